@@ -143,16 +143,18 @@ pub(super) fn rank<const D: usize, F: Field<D>>(
     }
 }
 
-/// Lets models and cuts take turns until nothing changes, at most `iterations` times.
+/// Lets models and cuts take turns until nothing changes, at most `iterations` times. `smoothness` is what separating
+/// two equal neighbours costs, usually [`SMOOTHNESS`].
 pub(super) fn iterate<const D: usize, F: Field<D>>(
     field: &F,
     labels: &mut [Label],
     first: Option<Models<D>>,
     iterations: u32,
+    smoothness: f32,
 ) -> Result<Models<D>, MaskError> {
     let active = open_pixels(labels);
     let scale = contrast_scale(field);
-    let mut open = OpenCut::new(field, scale, labels, &active);
+    let mut open = OpenCut::new(field, scale, smoothness, labels, &active);
     let mut models = match first {
         Some(models) => {
             open.decide(field, &models, labels);
@@ -225,6 +227,7 @@ impl<'a> OpenCut<'a> {
     pub(super) fn new<const D: usize, F: Field<D>>(
         field: &F,
         scale: f32,
+        smoothness: f32,
         labels: &[Label],
         active: &'a [u32],
     ) -> Self {
@@ -243,7 +246,7 @@ impl<'a> OpenCut<'a> {
                 let Some(next) = neighbour(at, direction, size) else {
                     continue;
                 };
-                let cost = separation(field, scale, at, next, direction);
+                let cost = separation(field, scale, smoothness, at, next, direction);
                 match node_of[next] {
                     NONE if labels[next].is_object() => *border += cost,
                     NONE => *border -= cost,
@@ -292,6 +295,7 @@ impl<'a> OpenCut<'a> {
 fn separation<const D: usize, F: Field<D>>(
     field: &F,
     scale: f32,
+    smoothness: f32,
     at: usize,
     next: usize,
     direction: usize,
@@ -303,7 +307,7 @@ fn separation<const D: usize, F: Field<D>>(
         1.0
     };
     let alike = (-scale * field.contrast(at.min(next), at.max(next))).exp();
-    (SMOOTHNESS / length * alike * UNIT) as i32
+    (smoothness / length * alike * UNIT) as i32
 }
 
 /// The neighbour of a pixel in one of [`DIRECTIONS`].

@@ -6,7 +6,7 @@
 use image::RgbImage;
 
 use super::bitmap::Bitmap;
-use super::grab_cut::{self, Field, Label, Models, OpenCut};
+use super::grab_cut::{self, Field, Label, Models, OpenCut, SMOOTHNESS};
 use super::lab::LabTable;
 use super::{Effort, Iterations, MaskError};
 
@@ -14,6 +14,8 @@ use super::{Effort, Iterations, MaskError};
 const COLOUR_VARIANCE: f64 = 0.1;
 /// Half the width of the band, pixels of the finer image: the coarse edge is uncertain by 2.
 const BAND: usize = 3;
+/// Where a cut finds one side alone at this smoothness too, there is none.
+const LEAST_SMOOTHNESS: f32 = SMOOTHNESS / 8.0;
 
 /// Where the first colour models come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +51,7 @@ pub(super) fn segment(
     let mut coarser: Option<(Vec<Label>, (usize, usize))> = None;
     for (image, mut known) in levels.into_iter().rev() {
         let begin =
-            |field: &LabField, labels: &mut [Label]| start(field, labels, first, iterations);
+            |field: &LabField, labels: &mut [Label]| begin_smooth(field, labels, first, iterations);
         solve(
             &image,
             &mut known,
@@ -61,7 +63,8 @@ pub(super) fn segment(
         )?;
         coarser = Some((known, size(&image)));
     }
-    let begin = |field: &LabField, labels: &mut [Label]| start(field, labels, first, iterations);
+    let begin =
+        |field: &LabField, labels: &mut [Label]| begin_smooth(field, labels, first, iterations);
     solve(
         image,
         labels,
@@ -95,12 +98,35 @@ fn solve(
     Ok(())
 }
 
+/// Cuts at the coarsest size. A cut that finds one side alone, because an outline costs more than what the colours gain,
+/// is made again with half the smoothness.
+fn begin_smooth(
+    field: &LabField,
+    labels: &mut [Label],
+    first: FirstModels,
+    iterations: Iterations,
+) -> Result<Models<3>, MaskError> {
+    let known = labels.to_vec();
+    let mut smoothness = SMOOTHNESS;
+    loop {
+        let cut = start(field, labels, first, iterations, smoothness);
+        match cut {
+            Err(MaskError::Empty | MaskError::Everything) if smoothness > LEAST_SMOOTHNESS => {
+                labels.copy_from_slice(&known);
+                smoothness /= 2.0;
+            }
+            cut => return cut,
+        }
+    }
+}
+
 /// Cuts at the coarsest size.
 pub(super) fn start<const D: usize>(
     field: &impl Field<D>,
     labels: &mut [Label],
     first: FirstModels,
     iterations: Iterations,
+    smoothness: f32,
 ) -> Result<Models<D>, MaskError> {
     let models = match first {
         FirstModels::Ranked(share) => {
@@ -110,7 +136,7 @@ pub(super) fn start<const D: usize>(
         FirstModels::Sure => Some(Models::learn(field, labels, Label::is_sure)),
         FirstModels::All => None,
     };
-    grab_cut::iterate(field, labels, models, iterations.get())
+    grab_cut::iterate(field, labels, models, iterations.get(), smoothness)
 }
 
 /// Decides a band along the coarse result's edge; elsewhere the coarse result stays.
@@ -126,7 +152,7 @@ pub(super) fn refine<const D: usize>(
     let band = band(labels, size, BAND);
     models.refine(field, labels);
     let scale = grab_cut::contrast_scale(field);
-    OpenCut::new(field, scale, labels, &band).decide(field, models, labels);
+    OpenCut::new(field, scale, SMOOTHNESS, labels, &band).decide(field, models, labels);
 }
 
 /// Each pixel that is not sure takes the coarse result.

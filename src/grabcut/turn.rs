@@ -11,7 +11,7 @@ use image::RgbImage;
 use super::MaskError;
 use super::backdrop::Backdrop;
 use super::bitmap::Bitmap;
-use super::grab_cut::{self, DIRECTIONS_AHEAD, Field, Label, Models, neighbour};
+use super::grab_cut::{self, DIRECTIONS_AHEAD, Field, Label, Models, SMOOTHNESS, neighbour};
 use super::initial::InitialLabels;
 use super::lab::LabTable;
 use super::pyramid::{FirstModels, RgbField, grow, half_image, half_labels, refine, start};
@@ -632,7 +632,7 @@ fn cut_turn(
             let size = (field.size.0 as u32, field.size.1 as u32);
             grab_cut::rank(field, labels, share, ring(size, RING));
         }
-        start(field, labels, FirstModels::All, iterations)
+        start(field, labels, FirstModels::All, iterations, SMOOTHNESS)
     };
     let mut labels = levels[0].labels.clone();
     let (Some(coarser), Some(coarse)) = (levels.get(1), &turn.coarse) else {

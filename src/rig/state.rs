@@ -88,6 +88,7 @@ impl RigState {
             phase: self.phase,
             has_table: self.has_table(),
             table: &self.table,
+            degrees_per_second: self.settings.degrees_per_second,
             camera: &self.camera,
             disk_fault: self.disk_fault.as_deref(),
             free_bytes: self.free_bytes,

@@ -51,6 +51,40 @@ fn a_rectangle_finds_the_object_in_it() {
     assert_eq!(figures.components_kept, 1);
 }
 
+/// A number that looks random, one for each pixel.
+fn grain(x: u32, y: u32) -> u32 {
+    let mixed = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77);
+    let mixed = (mixed ^ mixed >> 15).wrapping_mul(0x2C1B_3C6D);
+    mixed ^ mixed >> 12
+}
+
+#[test]
+fn an_object_that_hardly_differs_from_what_is_around_it_is_found() {
+    let inside = |x: u32, y: u32| (180..220).contains(&x) && (60..100).contains(&y);
+    let frame = RgbImage::from_fn(320, 240, |x, y| {
+        let grain = grain(x, y);
+        let busy = if x < 140 {
+            (grain >> 8 & 1) as u8 * 120
+        } else {
+            0
+        };
+        let level = 90 + (grain % 12) as u8 + busy;
+        Rgb([level + if inside(x, y) { 3 } else { 0 }, level, level])
+    });
+    let hints = Hints::Rect(Rect::new(176, 56, 48, 48));
+    let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
+    let (mut both, mut either) = (0, 0);
+    for (x, y, level) in mask.image().enumerate_pixels() {
+        let found = level.0[0] >= 128;
+        both += u32::from(found && inside(x, y));
+        either += u32::from(found || inside(x, y));
+    }
+    assert!(
+        f64::from(both) > 0.95 * f64::from(either),
+        "{both} {either}"
+    );
+}
+
 #[test]
 fn strokes_alone_find_the_object() {
     let hints = Hints::Seeds(seeds(strokes));

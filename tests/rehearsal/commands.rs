@@ -9,10 +9,15 @@ use crate::support::{SHORT, fixture};
 
 /// Records a turn of ten seconds without a table, as fast as it is read.
 fn record(root: &Path, camera: &str, arguments: &[&str]) -> Output {
+    let usual = ["--turntable", "none", "--degrees-per-second", "36"];
+    record_with(root, camera, &[&usual, arguments].concat())
+}
+
+/// Records with a table and a speed that `arguments` give.
+fn record_with(root: &Path, camera: &str, arguments: &[&str]) -> Output {
     let address = format!("replay:{}?loop=1&speed=0{camera}", fixture(SHORT).display());
     let mut command = Command::new(relit_tests::program("relit-capture"));
-    command.args(["record", "--object", "mug", "--turntable", "none", "--json"]);
-    command.args(["--degrees-per-second", "36", "--camera", &address]);
+    command.args(["record", "--object", "mug", "--json", "--camera", &address]);
     command.arg("--root").arg(root).args(arguments);
     command.output().unwrap()
 }
@@ -25,6 +30,20 @@ fn an_allowed_drop_leaves_one_session_and_exit_code_3_with_the_default_retries()
     assert_eq!(recordings(root.path()).unwrap().len(), 1);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("\"verdict\":\"tolerated\""), "{text}");
+}
+
+#[test]
+fn a_speed_that_the_table_does_not_reach_is_one_sentence_before_anything_moves() {
+    let root = tempfile::tempdir().unwrap();
+    let sessions = root.path().join("sessions");
+    let table = ["--turntable", "sim:?speed=0", "--yes"];
+    let speed = ["--degrees-per-second", "72"];
+    let output = record_with(&sessions, "", &[&table[..], &speed].concat());
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let text = String::from_utf8(output.stderr).unwrap();
+    let sentence = "the table turns at 36 degrees/s at most, and 72 degrees/s are set";
+    assert_eq!(text.matches(sentence).count(), 1, "{text}");
+    assert!(!sessions.exists(), "{text}");
 }
 
 #[test]

@@ -280,6 +280,45 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
 }
 
 #[test]
+fn a_speed_that_the_table_does_not_reach_is_refused_before_start_and_taken_back_by_settings() {
+    let root = tempfile::tempdir().unwrap();
+    let mut settings = settings(root.path(), "", "sim:?speed=20");
+    settings.degrees_per_second = 72.0;
+    let daemon = Daemon::start(settings).unwrap();
+    let state = once(&daemon, is_ready);
+    assert_eq!(state.table.max_degrees_per_second, Some(36.0));
+    let sentence = "the table turns at 36 degrees/s at most, and 72 degrees/s are set";
+    let start = || Command::Start {
+        object: "mug".to_owned(),
+        meter: false,
+    };
+    let refused = daemon.command(start()).unwrap_err();
+    assert!(
+        matches!(&refused, Refused::Unavailable(why) if why.contains(sentence)),
+        "{refused}"
+    );
+    let advice = daemon.monitor().state().advice;
+    assert!(advice.button.action.is_none(), "{advice:?}");
+    let speed = |degrees_per_second| Command::Configure {
+        size: None,
+        fps: None,
+        degrees_per_second: Some(degrees_per_second),
+        max_dropped: None,
+        retries: None,
+    };
+    let refused = daemon.command(speed(72.0)).unwrap_err();
+    assert!(
+        matches!(&refused, Refused::Invalid(why) if why.contains(sentence)),
+        "{refused}"
+    );
+    daemon.command(speed(36.0)).unwrap();
+    once(&daemon, |state| state.advice.headline == "Ready");
+    once(&daemon, |_| daemon.command(start()).is_ok());
+    let state = once(&daemon, |state| state.last_take.is_some());
+    assert_eq!(state.last_take.unwrap().verdict, Verdict::Clean);
+}
+
+#[test]
 fn settings_are_shown_and_changed_while_the_rig_rests() {
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();

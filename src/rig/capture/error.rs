@@ -10,6 +10,7 @@ use crate::camera::hold::ControlDrift;
 use crate::camera::{CameraError, FrameFault};
 use crate::lockfile::LockError;
 use crate::simulator;
+use crate::state::Obstacle;
 use crate::turntable::TurntableError;
 
 /// Why there is no capture.
@@ -154,6 +155,14 @@ pub enum Refusal {
         "{0:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most 80 bytes"
     )]
     Object(String),
+    /// The table does not turn as fast as asked for.
+    #[error("{}", Obstacle::TooFast(*.set, *.highest))]
+    TooFast {
+        /// The speed that was asked for, degrees/s.
+        set: f64,
+        /// The table's highest speed, degrees/s.
+        highest: f64,
+    },
     /// Metering without a table.
     #[error("metering turns the table, and there is none: give --turntable, or set the exposure")]
     MeterWithoutTable,

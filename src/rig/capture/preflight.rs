@@ -10,7 +10,7 @@ use jiff::Timestamp;
 
 use super::error::{CaptureError, Refusal};
 use super::settings::Settings;
-use crate::state::Check;
+use crate::state::{Check, Obstacle};
 use crate::turntable::{Alarm, Homed, Table, TurnPlan, TurnRequest, TurntableError};
 use relit_data::naming::is_session_name;
 
@@ -61,6 +61,15 @@ pub(crate) fn check_object(name: &str) -> Result<(), Refusal> {
     match is_session_name(name) && name.len() <= LONGEST_OBJECT {
         true => Ok(()),
         false => Err(Refusal::Object(name.to_owned())),
+    }
+}
+
+/// Checks that the table turns as fast as it is to.
+pub(super) fn check_speed(table: &Table, set: f64) -> Result<(), Refusal> {
+    let highest = table.identity().max_degrees_per_second;
+    match Obstacle::of_speed(set, highest) {
+        Some(_) => Err(Refusal::TooFast { set, highest }),
+        None => Ok(()),
     }
 }
 

@@ -181,7 +181,9 @@ fn prepare(
     context: CaptureContext<'_>,
 ) -> Result<(LockedCamera, Option<TurnPlan>), CaptureError> {
     let settings = equipment.settings().clone();
-    equipment.open_table()?;
+    if let Some(table) = equipment.open_table()? {
+        preflight::check_speed(table, settings.degrees_per_second)?;
+    }
     equipment.open_camera()?;
     let (Some(camera), table) = (equipment.camera.as_mut(), equipment.table.as_ref()) else {
         return Err(CaptureError::NoCamera);

@@ -172,6 +172,7 @@ pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), Turntab
             state: status.state.to_string(),
             angle_deg: Some(status.angle_deg),
             degrees_per_second: Some(status.degrees_per_second),
+            max_degrees_per_second: Some(table.identity().max_degrees_per_second),
             homed: status.homed,
             battery_v: status.battery_v,
             low_deg: Some(low_deg),

@@ -22,7 +22,7 @@ use crate::clock::{Clock, JoinHandle};
 use crate::lockfile::LockFile;
 use crate::preview::Preview;
 use crate::serve::rig::{Command, Refused, Rig};
-use crate::state::{CaptureSettings, Monitor, RigState};
+use crate::state::{CaptureSettings, Monitor, Obstacle, RigState, TableState};
 use dispatcher::Dispatcher;
 use schedule::Job;
 use worker::Worker;
@@ -130,7 +130,8 @@ impl Rig for Daemon {
                 max_dropped,
                 retries,
             } => {
-                let now = self.dispatcher.monitor().state().settings;
+                let state = self.dispatcher.monitor().state();
+                let now = state.settings;
                 let settings = CaptureSettings {
                     size: size.unwrap_or(now.size),
                     fps: fps.unwrap_or(now.fps),
@@ -140,6 +141,7 @@ impl Rig for Daemon {
                     ..now
                 };
                 check_settings(&settings)?;
+                check_speed(settings.degrees_per_second, &state.table)?;
                 dispatcher.change(|schedule| schedule.submit(Job::Configure(settings)))
             }
             Command::SetControl { name, value } => {
@@ -225,6 +227,15 @@ fn check_settings(settings: &CaptureSettings) -> Result<(), Refused> {
         Some((_, why)) => Err(Refused::Invalid((*why).to_owned())),
         None => Ok(()),
     }
+}
+
+/// The table is asked for no more than it can do, where that is known.
+fn check_speed(degrees_per_second: f64, table: &TableState) -> Result<(), Refused> {
+    let highest = table.max_degrees_per_second;
+    let too_fast = highest.and_then(|highest| Obstacle::of_speed(degrees_per_second, highest));
+    too_fast.map_or(Ok(()), |obstacle| {
+        Err(Refused::Invalid(obstacle.to_string()))
+    })
 }
 
 fn check_object(object: &str) -> Result<(), Refused> {

@@ -11,9 +11,11 @@ use super::parts::{CameraState, Phase, TableState, TakeSummary, Verdict};
 
 /// A take needs its expected size and a fifth more.
 const RESERVE: f64 = 1.2;
+/// By how much of itself a table's highest speed is rounded, which it counts in units a minute.
+const ROUNDING: f64 = 1e-9;
 
 /// Something that keeps a take from beginning, or the table from moving.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Obstacle {
     /// The emergency stop is pressed.
@@ -22,6 +24,8 @@ pub enum Obstacle {
     Locked(String),
     /// The table is not there; why, where that is known.
     NoTable(Option<String>),
+    /// The speed that is set, and the highest of the table, which is less, both in degrees a second.
+    TooFast(f64, f64),
     /// The camera is not there; why, where that is known.
     NoCamera(Option<String>),
     /// Nothing can be written into the folder of sessions; why.
@@ -31,11 +35,17 @@ pub enum Obstacle {
 }
 
 impl Obstacle {
+    /// The obstacle that a table's highest speed is to a turn at the speed that is set, where it is one.
+    pub(crate) fn of_speed(set: f64, highest: f64) -> Option<Self> {
+        (set > highest * (1.0 + ROUNDING)).then_some(Self::TooFast(set, highest))
+    }
+
     fn headline(&self) -> &'static str {
         match self {
             Self::EmergencyStop => "The emergency stop is pressed",
             Self::Locked(_) => "The table is locked",
             Self::NoTable(_) => "No turntable",
+            Self::TooFast(..) => "Too fast for the table",
             Self::NoCamera(_) => "No camera",
             Self::NoFolder(_) => "No folder for sessions",
             Self::NoSpace(..) => "Too little space",
@@ -68,6 +78,12 @@ impl fmt::Display for Obstacle {
             | Self::NoTable(Some(why))
             | Self::NoCamera(Some(why))
             | Self::NoFolder(why) => f.write_str(why),
+            Self::TooFast(set, highest) => write!(
+                f,
+                "the table turns at {} degrees/s at most, and {} degrees/s are set: set a lower speed",
+                rounded(*highest),
+                rounded(*set)
+            ),
             Self::NoSpace(free, needed) => write!(
                 f,
                 "{} MB are free and a take needs {} MB (a fifth in reserve): free some space",
@@ -208,6 +224,8 @@ pub(super) struct Situation<'a> {
     /// Whether there is to be a table.
     pub(super) has_table: bool,
     pub(super) table: &'a TableState,
+    /// Speed of the turn that is set, degrees a second.
+    pub(super) degrees_per_second: f64,
     pub(super) camera: &'a CameraState,
     pub(super) disk_fault: Option<&'a str>,
     pub(super) free_bytes: u64,
@@ -226,6 +244,7 @@ impl Situation<'_> {
     /// What keeps a take from beginning: of several obstacles the first that a person has to remove.
     pub(super) fn obstacle_to_take(&self) -> Option<Obstacle> {
         self.obstacle_of_table()
+            .or_else(|| self.obstacle_of_speed())
             .or_else(|| self.obstacle_of_camera())
             .or_else(|| self.obstacle_of_disk())
     }
@@ -245,6 +264,11 @@ impl Situation<'_> {
             return Some(Obstacle::Locked(table.fault.clone().unwrap_or_default()));
         }
         (self.has_table && !table.present).then(|| Obstacle::NoTable(table.fault.clone()))
+    }
+
+    fn obstacle_of_speed(&self) -> Option<Obstacle> {
+        let highest = self.table.max_degrees_per_second?;
+        Obstacle::of_speed(self.degrees_per_second, highest)
     }
 
     fn obstacle_of_camera(&self) -> Option<Obstacle> {
@@ -278,6 +302,11 @@ fn doing(phase: Phase) -> &'static str {
         Phase::Unwinding => "Turning back",
         Phase::Checking => "Checking the take",
     }
+}
+
+/// A speed as people read it.
+fn rounded(degrees_per_second: f64) -> f64 {
+    (degrees_per_second * 1000.0).round() / 1000.0
 }
 
 /// The sentence as it begins a line.

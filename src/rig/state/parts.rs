@@ -85,6 +85,8 @@ pub struct TableState {
     pub angle_deg: Option<f64>,
     /// Degrees a second.
     pub degrees_per_second: Option<f64>,
+    /// Its highest speed, degrees a second.
+    pub max_degrees_per_second: Option<f64>,
     /// Whether zero is known.
     pub homed: bool,
     /// Whether the emergency stop is pressed.

@@ -24,6 +24,9 @@ struct Row {
     table: Table,
     #[serde(default)]
     disk: Disk,
+    /// The speed that is set, degrees a second.
+    #[serde(default = "usual_speed")]
+    speed: f64,
     #[serde(default)]
     queue: Vec<String>,
     /// The last take's session, and whether it was aborted, and why.
@@ -52,6 +55,8 @@ struct Table {
     address: String,
     present: bool,
     state: String,
+    /// Its highest speed, degrees a second, where it is known.
+    fastest: Option<f64>,
     emergency_stop: bool,
     locked: bool,
     fault: Option<String>,
@@ -69,6 +74,10 @@ fn idle() -> String {
     "idle".to_owned()
 }
 
+fn usual_speed() -> f64 {
+    7.2
+}
+
 impl Default for Camera {
     fn default() -> Self {
         Self {
@@ -84,6 +93,7 @@ impl Default for Table {
             address: "serial:".to_owned(),
             present: true,
             state: "Idle".to_owned(),
+            fastest: Some(36.0),
             emergency_stop: false,
             locked: false,
             fault: None,
@@ -128,9 +138,11 @@ fn set(serving: &Serving, row: Row) {
     serving.rig.monitor.update(|state| {
         state.phase = phase;
         state.settings.turntable = row.table.address;
+        state.settings.degrees_per_second = row.speed;
         (state.camera.present, state.camera.fault) = (row.camera.present, row.camera.fault);
         state.table.present = row.table.present;
         state.table.state = row.table.state;
+        state.table.max_degrees_per_second = row.table.fastest;
         state.table.emergency_stop = row.table.emergency_stop;
         state.table.locked = row.table.locked;
         state.table.fault = row.table.fault;
