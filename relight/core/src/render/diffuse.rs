@@ -309,10 +309,11 @@ impl Kernel<3, 3> for DiffuseLayer {
 /// The coefficients Â_l of the cosine lobe for l = 0, 1, 2.
 pub(super) const COSINE_LOBE: [f64; 3] = [PI, 2.0 * PI / 3.0, PI / 4.0];
 
-/// The coefficients Â_l of the cosine lobe: [`COSINE_LOBE`], and for even l beyond
+/// The coefficients Â_l of the cosine lobe: π, 2π / 3, π / 4, and for even l beyond
 /// 2π (-1)^(l/2 - 1) / ((l + 2) (l - 1)) l! / (2^l (l/2)!²) (Ramamoorthi and Hanrahan, *On the relationship between
-/// radiance and irradiance*, 2001); 0 for other odd l.
-fn cosine_lobe(l: usize) -> f64 {
+/// radiance and irradiance*, 2001); 0 for other odd l. Irradiance is light whose band l is Â_l times as strong.
+#[must_use]
+pub fn cosine_lobe(l: usize) -> f64 {
     match l {
         0..=2 => COSINE_LOBE[l],
         _ if !l.is_multiple_of(2) => 0.0,

@@ -17,7 +17,7 @@ mod shots;
 mod surface;
 
 pub use diffuse::{DiffuseForm, DiffuseLayer};
-pub use diffuse::{RELEASED_AMBIENT, diffuse_constants};
+pub use diffuse::{RELEASED_AMBIENT, cosine_lobe, diffuse_constants};
 pub use fit::fit_light;
 pub use layers::{EXPOSURE, Gradients, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;

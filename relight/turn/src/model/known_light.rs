@@ -1,16 +1,14 @@
 //! A light that was given or measured, band by band.
 
+use std::f64::consts::PI;
+
 use relight_core::light::ShLight;
+use relight_core::render::cosine_lobe;
 
 use crate::model::frame::TableFrame;
 use crate::model::gloss::GlossLight;
-use crate::model::harmonics::GLOSS_ORDER;
-use crate::model::lighting::TableLight;
+use crate::model::lighting::{LAMBERTIAN_BANDS, TableLight};
 use crate::model::metal::MIRROR;
-
-/// The cosine lobe's coefficient of the even bands beyond the second, over π: that of band l is
-/// 2 (-1)^(l/2 - 1) / ((l + 2) (l - 1)) · l! / (2^l (l/2)!²) (Ramamoorthi and Hanrahan 2001, equation 8). Odd bands have 0.
-const COSINE_LOBE_BEYOND: [(usize, f64); 2] = [(4, -1.0 / 24.0), (6, 1.0 / 64.0)];
 
 /// A light that was measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,10 +24,16 @@ impl KnownLight {
     pub(crate) fn new(light: &ShLight, frame: &TableFrame) -> Self {
         let bands = GlossLight::bands(&light.rotated(&frame.rotation()));
         let mirror: Vec<GlossLight> = bands.iter().map(|band| band.times([MIRROR; 3])).collect();
-        let mut factors = [0.0; GLOSS_ORDER + 1];
-        for (band, factor) in COSINE_LOBE_BEYOND {
-            factors[band] = factor;
-        }
+        // A mirror shows π times the light.
+        let factors: Vec<f64> = (0..mirror.len())
+            .map(|l| {
+                if l < LAMBERTIAN_BANDS {
+                    0.0
+                } else {
+                    cosine_lobe(l) / PI
+                }
+            })
+            .collect();
         Self {
             diffuse: TableLight::from_viewer(light, frame),
             diffuse_beyond: GlossLight::sum(&mirror, &factors),
@@ -52,8 +56,6 @@ impl KnownLight {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::PI;
-
     use super::*;
     use crate::model::shading::ShadingModel;
     use crate::{Elevation, MaterialKind};
