@@ -42,6 +42,9 @@ struct Screen {
     is_phone: bool,
 }
 
+/// What the browser says of a page that gives way to another while it is asked.
+const PAGE_IS_GOING: [&str; 2] = ["context", "navigated or closed"];
+
 /// A browser with one page, and perhaps another that this one opened. Ends with its test, which fails by a panic
 /// where the browser does not do what it is told.
 #[derive(Debug)]
@@ -175,7 +178,7 @@ impl Chromium {
         let parameters = json!({ "expression": expression, "returnByValue": true });
         let answer = self.send("Runtime.evaluate", session, parameters);
         let error = answer["error"]["message"].as_str().unwrap_or_default();
-        if error.contains("context") {
+        if PAGE_IS_GOING.iter().any(|sign| error.contains(sign)) {
             return None;
         }
         let result = done("Runtime.evaluate", answer);
