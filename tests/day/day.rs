@@ -264,6 +264,9 @@ impl<'a> Day<'a> {
         phone.tap("#job-cancel");
         phone.wait_text("#job-failed", "Extraction: it was cancelled");
         phone.tap("#player-close");
+        // The next that opens is not shown with the steps of this one.
+        phone.wait_for("document.getElementById('make-extract').disabled");
+        assert_eq!(phone.text("#mask-text"), "…");
         phone.wait_text_so_long("#last-text", "Z-calf", longest);
         assert!(phone.text("#last-text").starts_with("clean"));
         let sessions = self.sessions();

@@ -39,8 +39,8 @@ pub enum InsertionMethod {
     WithoutEdgeColours,
     /// The same in the light of the photograph.
     WithoutRelighting,
-    /// The same where all that is dark beyond what the light explains counts as shadow, and none of it as paint.
-    WithoutPaint,
+    /// The same, with the decomposition taken for the truth.
+    WithoutHedge,
     /// The photograph's pixels under the mask.
     Naive,
 }
@@ -52,7 +52,7 @@ impl InsertionMethod {
         Self::WithoutShadow,
         Self::WithoutEdgeColours,
         Self::WithoutRelighting,
-        Self::WithoutPaint,
+        Self::WithoutHedge,
         Self::Naive,
     ];
 
@@ -64,7 +64,7 @@ impl InsertionMethod {
             Self::WithoutShadow => "without shadow",
             Self::WithoutEdgeColours => "without edge colours",
             Self::WithoutRelighting => "without relighting",
-            Self::WithoutPaint => "without black paint",
+            Self::WithoutHedge => "without hedge",
             Self::Naive => "naive insertion",
         }
     }
@@ -73,7 +73,7 @@ impl InsertionMethod {
     fn insert(self, stage: &Stage, subjects: &Subjects) -> Result<[Rgb<Linear>; 2], InsertError> {
         let subject = match self {
             Self::WithoutEdgeColours => &subjects.photographed,
-            Self::WithoutPaint => &subjects.without_paint,
+            Self::WithoutHedge => &subjects.without_hedge,
             _ => &subjects.freed,
         };
         let backgrounds = [&stage.background, &stage.bright[0]];
@@ -105,7 +105,7 @@ impl InsertionMethod {
 struct Subjects {
     freed: Subject,
     photographed: Subject,
-    without_paint: Subject,
+    without_hedge: Subject,
 }
 
 impl Subjects {
@@ -120,7 +120,7 @@ impl Subjects {
         let freed = subject(EdgeColours::Freed)?;
         Ok(Self {
             photographed: subject(EdgeColours::Photographed)?,
-            without_paint: freed.clone().without_paint(),
+            without_hedge: freed.clone().without_hedge(),
             freed,
         })
     }

@@ -49,7 +49,7 @@ impl<'a> InsertScene<'a> {
         for (number, object) in objects.iter().enumerate() {
             object.check(extent, number + 1)?;
         }
-        let balance = matching.balance.map(|b| f64::from(b * matching.level));
+        let balance = matching.balance.map(f64::from);
         Ok(Self {
             extent,
             light: light.tinted(balance),
@@ -118,9 +118,11 @@ impl<'a> InsertScene<'a> {
     ) -> Result<SceneLayer, InsertError> {
         let subject = object.subject;
         let angle = object.placement.rotation.to_radians();
-        let gain = object.exposure.exp2();
+        let mut gain = object.exposure.exp2();
         let colours = if object.relit {
-            let scale = exposure_between(subject.light(), &self.level_light());
+            // The background's brightness is no guess: it is not hedged as the light's shape is.
+            gain *= self.matching.level;
+            let scale = exposure_between(subject.light(), &self.light);
             // The object is turned back, and the light with it.
             let turned = light.rotated(&Rotation::about(Direction::VIEWER, -angle));
             subject.relit(&turned.tinted([f64::from(scale); 3]), &object.change)?
@@ -154,12 +156,6 @@ impl<'a> InsertScene<'a> {
             shadow,
             grain: lacking,
         })
-    }
-
-    /// The light as strong as if the background asked for nothing.
-    fn level_light(&self) -> ShLight {
-        let level = f64::from(self.matching.level.max(f32::MIN_POSITIVE));
-        self.light.clone().tinted([1.0 / level; 3])
     }
 
     /// The shadow of an object, from its layer's first pixel.

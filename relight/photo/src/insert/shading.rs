@@ -1,7 +1,6 @@
 //! The shading of a photograph beside that of its light: relief, shadows, and what neither says.
 
 use relight_core::image::Planes;
-use relight_core::statistics::ranked;
 
 use super::smooth::weighted_mean;
 
@@ -13,57 +12,9 @@ const RATIOS: (f32, f32) = (0.25, 4.0);
 /// Details of shading up to this part of the object's side are relief; larger ones are shadows, of which as much is kept as the
 /// lights are alike.
 const RELIEF: f64 = 0.04;
-/// How much the albedo's darkness counts beside that of the shading, where both may be paint.
-const DOUBT: f32 = 1.0;
-/// The part of an object that has a brighter albedo than that from which darkness counts.
-const BRIGHTER_PART: f64 = 0.25;
-/// The least albedo that counts, as a part of that one.
-const LEAST_ALBEDO: f32 = 0.02;
-
-/// What tells paint from shadow.
-pub(super) struct PaintCues<'a> {
-    /// The albedo that was found.
-    pub(super) albedo: &'a Planes<3>,
-    /// The irradiance on the side that the light reaches least: a shadow leaves that much.
-    pub(super) dark_side: f32,
-}
-
-impl PaintCues<'_> {
-    /// How much darker than the bright parts of the object each place was found to be painted: a logarithm, 0 on the bright parts.
-    fn darkness(&self, wanted: &[bool]) -> Planes<1> {
-        let [red, green, blue] = self.albedo.planes();
-        let mean = |at: usize| (red[at] + green[at] + blue[at]) / 3.0;
-        let mut known: Vec<f32> = (0..wanted.len())
-            .filter(|&at| wanted[at])
-            .map(mean)
-            .collect();
-        let place = (known.len() as f64 * (1.0 - BRIGHTER_PART)) as usize;
-        let bright = ranked(&mut known, place)
-            .unwrap_or(1.0)
-            .max(f32::MIN_POSITIVE);
-        let mut darkness = Planes::zeros(self.albedo.extent());
-        for (at, value) in darkness.planes_mut()[0].iter_mut().enumerate() {
-            if wanted[at] {
-                *value = -(mean(at) / bright).clamp(LEAST_ALBEDO, 1.0).ln();
-            }
-        }
-        darkness
-    }
-
-    /// How likely it is paint that makes a place dark, where the shading is `exp(coarse)` of what the light makes.
-    ///
-    /// A shadow takes away no more than the light from one side: what is darker than that is paint, or a hollow, which stays dark
-    /// in any light. Of the rest, as much may be paint as the network took for paint there: it shares what it is in doubt about.
-    fn paint(&self, coarse: f32, own: f32, darkness: f32) -> f32 {
-        if coarse >= 0.0 {
-            return 0.0;
-        }
-        let deepest = ((self.dark_side + DARK) / (own + DARK)).min(1.0).ln();
-        let beyond = (1.0 - deepest / coarse).max(0.0);
-        let doubt = DOUBT * darkness / (darkness - coarse);
-        1.0 - (1.0 - beyond) * (1.0 - doubt.clamp(0.0, 1.0))
-    }
-}
+/// How far the decomposition of a photograph is believed: see [`Shading::hedge`]. Chosen on synthetic objects
+/// (docs/results/insertion.md).
+pub(super) const TRUST_IN_PHOTOGRAPHS: f32 = 0.6;
 
 /// The shading S of a photograph beside the irradiance E of its light on the normals, with D = (S + d) / (E + d), d = 0.05.
 #[derive(Debug, Clone)]
@@ -74,21 +25,16 @@ pub(super) struct Shading {
     shadow: Vec<f32>,
     /// What the bounds of D leave of S.
     residual: Vec<f32>,
-    /// How likely the coarse part is paint, 0 to 1.
-    paint: Vec<f32>,
+    /// How far it is believed: 1 is wholly.
+    trust: f32,
     /// E.
     pub(super) own: Vec<f32>,
 }
 
 impl Shading {
-    /// Of the shading that was found and the irradiance of the light on the normals, where it is `wanted`. Of what lies in the
-    /// dark, `cues` say how likely it is painted so.
-    pub(super) fn new(
-        shading: &Planes<1>,
-        own: &Planes<3>,
-        wanted: &[bool],
-        cues: &PaintCues<'_>,
-    ) -> Self {
+    /// Of the shading that was found and the irradiance of the light on the normals, where it is `wanted`, and how far all of
+    /// that is believed.
+    pub(super) fn new(shading: &Planes<1>, own: &Planes<3>, wanted: &[bool], trust: f32) -> Self {
         let extent = shading.extent();
         // The light is grey: its channels are equal.
         let own = own.plane(0).to_vec();
@@ -111,12 +57,11 @@ impl Shading {
             Err(_) => plane.clone(),
         };
         let coarse = smooth(&logarithm);
-        let darkness = smooth(&cues.darkness(wanted));
         let mut result = Self {
             relief: vec![1.0; own.len()],
             shadow: vec![1.0; own.len()],
             residual: vec![0.0; own.len()],
-            paint: vec![0.0; own.len()],
+            trust,
             own,
         };
         for at in (0..wanted.len()).filter(|&at| wanted[at]) {
@@ -125,26 +70,40 @@ impl Shading {
             result.shadow[at] = coarse.exp();
             let held = all.exp() * (result.own[at] + DARK) - DARK;
             result.residual[at] = shading.plane(0)[at] - held;
-            result.paint[at] = cues.paint(coarse, result.own[at], darkness.plane(0)[at]);
         }
         result
     }
 
-    /// Takes all that is dark for shadow.
-    pub(super) fn forget_paint(&mut self) {
-        self.paint.fill(0.0);
+    /// Takes what was found for the truth.
+    pub(super) fn believe(&mut self) {
+        self.trust = 1.0;
     }
 
-    /// The shading of a pixel in new irradiance, where `kept` of the shadows are kept, and all that is paint.
-    pub(super) fn at(&self, at: usize, irradiance: f32, kept: f32) -> f32 {
-        let kept = kept + (1.0 - kept) * self.paint[at];
+    /// The shading of a pixel in new irradiance, red, green and blue, where `kept` of the shadows are kept.
+    pub(super) fn at(&self, at: usize, irradiance: [f32; 3], kept: f32) -> [f32; 3] {
         let shadow = if self.shadow[at] == 1.0 {
             1.0
         } else {
             self.shadow[at].powf(kept)
         };
-        let shade = self.relief[at] * shadow * (irradiance + DARK) - DARK;
-        (shade + kept * self.residual[at]).max(0.0)
+        irradiance.map(|irradiance| {
+            let shade = self.relief[at] * shadow * (irradiance + DARK) - DARK;
+            (shade + kept * self.residual[at]).max(0.0)
+        })
+    }
+
+    /// What the pixel is multiplied with, so that its brightness changes no more than can be believed.
+    ///
+    /// Dark may be paint that was taken for shadow, and normals are off by 25 degrees: the new shading S' is a guess whose errors
+    /// grow with its distance from the shading S of the photograph. So of the logarithm of their ratio only the part t that is
+    /// believed is kept: `((S + d) / (S' + d))^(1 - t)`, S' as the mean of its colours. It is 1 in the light of the photograph.
+    pub(super) fn hedge(&self, at: usize, new: [f32; 3]) -> f32 {
+        if self.trust == 1.0 {
+            return 1.0;
+        }
+        let [own, ..] = self.at(at, [self.own[at]; 3], 1.0);
+        let new = new.iter().sum::<f32>() / 3.0;
+        ((own + DARK) / (new + DARK)).powf(1.0 - self.trust)
     }
 }
 
@@ -154,51 +113,49 @@ mod tests {
     use relight_core::image::Extent;
 
     const SIDE: usize = 60;
+    const DARK_PLACE: usize = SIDE * SIDE / 2 + SIDE / 8;
 
-    /// Half of an even surface lies in the dark: its shading was found to be a fifth of what the light makes, and its albedo to be
-    /// `albedo` of the other half's.
-    fn half_dark(albedo: f32, dark_side: f32) -> Shading {
+    /// Half of an even surface lies in the dark: its shading was found to be a fifth of what the light makes.
+    fn half_dark(trust: f32) -> Shading {
         let extent = Extent::new(SIDE, SIDE);
-        let is_dark = |x: usize| x < SIDE / 2;
-        let shading = Planes::from_fn(extent, |x, _| [if is_dark(x) { 0.2 } else { 1.0 }]);
-        let found = Planes::from_fn(extent, |x, _| {
-            [if is_dark(x) { 0.6 * albedo } else { 0.6 }; 3]
-        });
-        let cues = PaintCues {
-            albedo: &found,
-            dark_side,
-        };
+        let shading = Planes::from_fn(extent, |x, _| [if x < SIDE / 2 { 0.2 } else { 1.0 }]);
         let own = Planes::filled(extent, [1.0; 3]);
-        Shading::new(&shading, &own, &vec![true; SIDE * SIDE], &cues)
+        Shading::new(&shading, &own, &vec![true; SIDE * SIDE], trust)
     }
 
-    /// The shading of its dark half in light of the same strength from elsewhere.
-    fn moved(shading: &Shading) -> f32 {
-        shading.at(SIDE * SIDE / 2 + SIDE / 8, 1.0, 0.0)
-    }
-
-    #[test]
-    fn a_shadow_goes_with_the_light_and_what_is_found_to_be_painted_too_stays_dark() {
-        let shadow = moved(&half_dark(1.0, 0.15));
-        assert!((shadow - 1.0).abs() < 0.05, "{shadow}");
-        let paint = moved(&half_dark(0.2, 0.15));
-        assert!(paint < 0.55, "{paint}");
-        let certain = moved(&half_dark(0.04, 0.15));
-        assert!(certain < paint, "{certain} {paint}");
+    /// The shading of a place in light of the same strength from elsewhere.
+    fn moved(shading: &Shading, at: usize) -> f32 {
+        let new = shading.at(at, [1.0; 3], 0.0);
+        new[0] * shading.hedge(at, new)
     }
 
     #[test]
-    fn what_no_shadow_can_make_in_even_light_is_paint() {
-        let paint = moved(&half_dark(1.0, 1.0));
-        assert!((paint - 0.2).abs() < 0.05, "{paint}");
+    fn a_shadow_goes_with_the_light_as_far_as_it_is_believed() {
+        let believed = moved(&half_dark(1.0), DARK_PLACE);
+        assert!((believed - 1.0).abs() < 0.05, "{believed}");
+        // As logarithms, 0.6 of the way from 0.2 to 1, with d.
+        let hedged = moved(&half_dark(0.6), DARK_PLACE);
+        assert!((hedged - 0.54).abs() < 0.03, "{hedged}");
+        let mut trusted = half_dark(0.6);
+        trusted.believe();
+        assert_eq!(moved(&trusted, DARK_PLACE), believed);
     }
 
     #[test]
-    fn nothing_changes_in_the_same_light_and_paint_can_be_forgotten() {
-        let mut shading = half_dark(0.2, 0.5);
-        let at = SIDE * SIDE / 2 + 3;
-        assert!((shading.at(at, 1.0, 1.0) - 0.2).abs() < 1e-4);
-        shading.forget_paint();
-        assert!((moved(&shading) - 1.0).abs() < 0.05);
+    fn what_the_light_does_not_change_is_not_hedged() {
+        let lit = moved(&half_dark(0.3), DARK_PLACE + SIDE / 2);
+        assert!((lit - 1.0).abs() < 0.05, "{lit}");
+        let shading = half_dark(0.3);
+        let same = shading.at(DARK_PLACE, [1.0; 3], 1.0);
+        assert!((same[0] - 0.2).abs() < 1e-4);
+        assert!((shading.hedge(DARK_PLACE, same) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn light_of_another_colour_keeps_its_colour() {
+        let shading = half_dark(0.5);
+        let new = shading.at(DARK_PLACE, [1.5, 1.0, 0.5], 0.0);
+        let hedged = new.map(|value| value * shading.hedge(DARK_PLACE, new));
+        assert!((hedged[0] / hedged[1] - new[0] / new[1]).abs() < 1e-5);
     }
 }

@@ -39,6 +39,7 @@ pub struct Shot<'a> {
     light: ShLight,
     change: MaterialChange,
     backdrop: Backdrop,
+    exposure: f32,
 }
 
 impl<'a> Shot<'a> {
@@ -63,7 +64,7 @@ impl<'a> Shot<'a> {
                 expected,
             });
         }
-        let scale = exposure * exposure_between(subject.light(), light);
+        let scale = exposure_between(subject.light(), light);
         Ok(Self {
             photo,
             subject,
@@ -72,12 +73,13 @@ impl<'a> Shot<'a> {
             backdrop: match backdrop {
                 Backdrop::Panorama(view, panorama) => {
                     let planes = panorama.image().planes().clone();
-                    let radiance = planes.map(|v| v.max(0.0) * scale * PI);
+                    let radiance = planes.map(|v| v.max(0.0) * exposure * scale * PI);
                     Backdrop::Panorama(view, Panorama::new(Rgb::new(radiance))?)
                 }
                 Backdrop::Even(colour) => Backdrop::Even(colour.map(|v| v * exposure)),
                 Backdrop::Photo => Backdrop::Photo,
             },
+            exposure,
         })
     }
 
@@ -87,7 +89,8 @@ impl<'a> Shot<'a> {
     /// As [`Subject::relit`].
     pub fn picture(&self, turn: f64) -> Result<Rgb<Linear>, InsertError> {
         let turned = self.turned(turn);
-        let colours = self.subject.relit(&turned, &self.change)?;
+        let relit = self.subject.relit(&turned, &self.change)?;
+        let colours = relit.map(|v| v * self.exposure);
         Ok(match self.background(turn) {
             None => self.subject.in_place(self.photo, &colours),
             Some(background) => self.subject.before(&background, &colours),

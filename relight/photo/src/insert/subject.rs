@@ -4,7 +4,7 @@ use super::InsertError;
 use super::cut::{Cut, EdgeColours};
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
-use super::shading::{DARK, PaintCues, Shading};
+use super::shading::{DARK, Shading, TRUST_IN_PHOTOGRAPHS};
 use super::smooth::weighted_mean;
 use super::source::likeness;
 use crate::decompose::{
@@ -12,7 +12,7 @@ use crate::decompose::{
 };
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
-use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
+use relight_core::light::{Normals, Order, ShLight, YUp};
 use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, LobeLayer, exposure_for};
 
 /// The most by which the residual of a pixel grows with the light.
@@ -132,12 +132,8 @@ impl Subject {
         let albedo = surface.albedo().planes().clone();
         let light = even_light();
         let ones = Planes::filled(extent, [1.0]);
-        let cues = PaintCues {
-            albedo: &albedo,
-            dark_side: 1.0,
-        };
         let even = Planes::filled(extent, [1.0; 3]);
-        let shading = Shading::new(&ones, &even, &wanted, &cues);
+        let shading = Shading::new(&ones, &even, &wanted, 1.0);
         Ok(Self {
             place: [0, 0],
             photo: extent,
@@ -200,15 +196,7 @@ impl Subject {
             place: cut.place,
             photo: cut.photo,
             mask: cut.mask,
-            shading: Shading::new(
-                &shading,
-                own.planes(),
-                &wanted,
-                &PaintCues {
-                    albedo: &albedo,
-                    dark_side: dark_side(&found.light),
-                },
-            ),
+            shading: Shading::new(&shading, own.planes(), &wanted, TRUST_IN_PHOTOGRAPHS),
             matte: cut.matte,
             normals,
             albedo,
@@ -219,11 +207,10 @@ impl Subject {
         })
     }
 
-    /// The same where all that is darker than the light explains counts as shadow, and none of it as paint: to see what the other
-    /// way is good for.
+    /// The same, whose decomposition is taken for the truth: to see what the hedge is good for.
     #[must_use]
-    pub fn without_paint(mut self) -> Self {
-        self.shading.forget_paint();
+    pub fn without_hedge(mut self) -> Self {
+        self.shading.believe();
         self
     }
 
@@ -289,14 +276,15 @@ impl Subject {
     ///
     /// ```text
     /// D = (S + d) / (E + d) = relief x shadow, d = 0.05
-    /// S' = relief x shadow^(w + (1 - w) p) x (E' + d) - d
-    /// I' = R S' + (E' + d) / (E + d) (I - R S - H) + H'
+    /// S' = relief x shadow^w x (E' + d) - d
+    /// h  = ((S + d) / (mean of S' + d))^(1 - t)
+    /// I' = h (R S' + (E' + d) / (E + d) (I - R S - H)) + H'
     /// H' = lobe(E') + w (H - lobe(E))
     /// ```
     ///
-    /// where p is how likely the dark place is paint. So relief and fine texture stay, paint that may have been taken for shadow stays,
-    /// shadows stay as far as the light comes from where it came from, and the photograph's own
-    /// light gives the photograph.
+    /// where t says how far the decomposition is believed: 0.6 of a photograph's, 1 of a captured object's. So relief and fine
+    /// texture stay, shadows stay as far as the light comes from where it came from, no brightness changes by more than can be
+    /// believed, and the photograph's own light gives the photograph.
     ///
     /// # Errors
     /// None for a subject, whose maps have one size; those of the render layers in general.
@@ -309,19 +297,21 @@ impl Subject {
         let irradiance = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(&self.normals);
         let mut image = irradiance.into_planes();
         let width = self.extent().width;
-        image.fill_rows(|y, row| {
-            for (channel, line) in row.into_iter().enumerate() {
-                let start = y * width;
-                let albedo = &self.albedo.plane(channel)[start..];
-                let rest = &self.rest.plane(channel)[start..];
-                for (x, value) in line.iter_mut().enumerate() {
-                    let at = start + x;
-                    let own = self.shading.own[at] + DARK;
-                    let grown = (*value + DARK) / own;
-                    let shade = self.shading.at(at, *value, kept);
-                    let colour = albedo[x] * shade + rest[x] * grown.min(REST_GROWTH);
-                    *value = colour * change.tint[channel];
-                }
+        image.fill_rows(|y, [red, green, blue]| {
+            let pixels = red.iter_mut().zip(green).zip(blue);
+            for (x, ((red, green), blue)) in pixels.enumerate() {
+                let at = y * width + x;
+                let irradiance = [*red, *green, *blue];
+                let shades = self.shading.at(at, irradiance, kept);
+                let own = self.shading.own[at] + DARK;
+                let hedge = self.shading.hedge(at, shades);
+                let colours: [f32; 3] = std::array::from_fn(|channel| {
+                    let grown = ((irradiance[channel] + DARK) / own).min(REST_GROWTH);
+                    let colour = self.albedo.plane(channel)[at] * shades[channel]
+                        + self.rest.plane(channel)[at] * grown;
+                    colour * hedge * change.tint[channel]
+                });
+                [*red, *green, *blue] = colours;
             }
         });
         self.add_highlight(&mut image, light, change, kept)?;
@@ -373,19 +363,6 @@ fn even_light() -> ShLight {
     let light = ShLight::even(Order::TWO, [1.0; 3]);
     let exposure = f64::from(exposure_for(&light));
     light.tinted([exposure; 3])
-}
-
-/// The irradiance on the normal that a light reaches least.
-fn dark_side(light: &ShLight) -> f32 {
-    let behind = light.rotated(&Rotation::about(Direction::UP, std::f64::consts::PI));
-    let least = [light, &behind].map(|light| {
-        let ball = Normals::sphere(24);
-        let shading = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(&ball);
-        let seen = ball.planes().plane(2).iter().zip(shading.planes().plane(0));
-        seen.filter(|(z, _)| **z > 0.0)
-            .fold(f32::INFINITY, |least, (_, &e)| least.min(e))
-    });
-    least[0].min(least[1]).max(0.0)
 }
 
 fn mean_gloss(gloss: &Gloss, covered: &[usize]) -> ObjectGloss {

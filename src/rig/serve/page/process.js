@@ -157,9 +157,12 @@ function showQueue() {
   $("verified").className = last ? (last.outcome === "good" ? "good" : "bad") : "quiet";
 }
 
-/** Forgets the session: the player is closed. */
+/** Forgets the session: the player is closed, and what it opens with next is not known yet. */
 export function hideSteps() {
   shown = null;
+  for (const part of ["job", "job-failed", "make-all", "check-page", "report-page", "by-hand"]) $(part).hidden = true;
+  for (const button of ["make-mask", "edit-mask", "make-check", "make-extract"]) $(button).disabled = true;
+  for (const name of ["mask", "check", "extract"]) step(name, "…", "");
 }
 
 async function edit() {
