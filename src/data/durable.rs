@@ -137,6 +137,12 @@ impl MadeFolder {
         fs::create_dir_all(path)?;
         Ok(made)
     }
+
+    /// Whether the folder was not there.
+    #[must_use]
+    pub fn is_new(&self) -> bool {
+        !self.made.is_empty()
+    }
 }
 
 impl Drop for MadeFolder {

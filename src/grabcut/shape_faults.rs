@@ -31,11 +31,11 @@ impl ShapeCheck {
     }
 
     /// Whether the mask is that of another object or recording, rather than one with a flaw: much of it is background,
-    /// or much of the object is not in it.
+    /// or much of the object is not in it: around it, or in its holes, as of one that is inverted.
     #[must_use]
     pub fn is_of_something_else(&self) -> bool {
         let px = |regions: &[DoubtfulRegion]| regions.iter().map(|region| region.px).sum::<u64>();
-        let wrong = px(&self.leaks).max(px(&self.missing));
+        let wrong = px(&self.leaks).max(px(&self.missing) + px(&self.holes));
         wrong as f64 > SOMETHING_ELSE * self.area_px as f64
     }
 }
@@ -84,5 +84,41 @@ fn places(regions: &[DoubtfulRegion]) -> String {
     match more {
         0 => named.join(" and "),
         _ => format!("{} and {more} more", named.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relit_data::geometry::Rect;
+
+    /// A mask of 1000 pixels, with parts of so many pixels that are leaks, missing, holes.
+    fn shape([leaks, missing, holes]: [u64; 3]) -> ShapeCheck {
+        let of = |px| {
+            vec![DoubtfulRegion {
+                px,
+                bounds: Rect::new(0, 0, 10, 10),
+            }]
+        };
+        ShapeCheck {
+            area_px: 1000,
+            outline: 0.9,
+            outline_of_turn: 0.9,
+            contradicted: false,
+            iou: 0.8,
+            edge_px: [1.0, 2.0],
+            leaks: of(leaks),
+            missing: of(missing),
+            holes: of(holes),
+        }
+    }
+
+    #[test]
+    fn a_mask_without_much_of_the_object_is_that_of_something_else() {
+        assert!(!shape([150, 150, 40]).is_of_something_else());
+        assert!(shape([210, 0, 0]).is_of_something_else());
+        assert!(shape([0, 210, 0]).is_of_something_else());
+        assert!(shape([0, 0, 247]).is_of_something_else());
+        assert!(shape([0, 120, 120]).is_of_something_else());
     }
 }

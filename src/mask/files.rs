@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use relit_data::durable;
+use relit_data::durable::{self, MadeFolder};
 
 use super::{MaskRecord, MaskingError};
 
@@ -62,7 +62,6 @@ pub(super) fn check_replaceable(
     force: bool,
     with_alpha: bool,
 ) -> Result<(), MaskingError> {
-    check_folder(&files.mask)?;
     let record = read_record(&files.record)?;
     // It may be written, too, and another program's file of that name is never overwritten.
     read_record(&files.previous)?;
@@ -83,14 +82,11 @@ pub(super) fn check_replaceable(
     }
 }
 
-/// Makes the mask's folder, before anybody works on a mask that cannot be kept.
-fn check_folder(mask: &Path) -> Result<(), MaskingError> {
-    match mask.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => {
-            fs::create_dir_all(folder).map_err(MaskingError::io(folder, "made"))
-        }
-        _ => Ok(()),
-    }
+/// Makes the mask's folder, before anybody works on a mask that cannot be kept. While nothing is in it, it goes with what is
+/// returned.
+pub(super) fn make_folder(files: &MaskFiles) -> Result<MadeFolder, MaskingError> {
+    let folder = files.mask.parent().unwrap_or(Path::new(""));
+    MadeFolder::make(folder).map_err(MaskingError::io(folder, "made"))
 }
 
 /// The record in a file, if there is such a file.
@@ -174,11 +170,14 @@ mod tests {
     fn the_folder_of_a_mask_is_made_and_a_file_in_its_place_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("masks").join("of").join("mug.png");
-        check_replaceable(&MaskFiles::of(&path).unwrap(), false, false).unwrap();
+        let made = make_folder(&MaskFiles::of(&path).unwrap()).unwrap();
         assert!(path.parent().unwrap().is_dir());
+        drop(made);
+        assert!(!folder.path().join("masks").exists());
+        let _made = make_folder(&MaskFiles::of(&path).unwrap()).unwrap();
         fs::write(&path, "painted").unwrap();
         let below = MaskFiles::of(&path.join("mug.png")).unwrap();
-        let error = check_replaceable(&below, false, false).unwrap_err();
+        let error = make_folder(&below).unwrap_err();
         assert!(error.to_string().contains("could not be made"), "{error}");
     }
 

@@ -9,7 +9,7 @@ use relit_video::Video;
 
 use super::earlier::{keep_recipe, with_strokes};
 use super::engine::cut_by_opencv;
-use super::files::{check_replaceable, has_alpha, remove, write};
+use super::files::{check_replaceable, has_alpha, make_folder, remove, write};
 use super::request::Recipe;
 use super::sampling::{SampledTurn, read_frame, read_turn, same_image};
 use super::{
@@ -64,6 +64,7 @@ fn mask_recording(
     request: &MaskRequest,
 ) -> Result<(MaskFiles, MaskRecord, Option<Notice>), MaskingError> {
     let files = files_of(recording, output)?;
+    let _made = make_folder(&files)?;
     check_replaceable(&files, request.force, request.settings.alpha)?;
     let video = Video::open(&recording.video)?;
     let (request, notice) = with_strokes(request, &files, &video)?;

@@ -156,6 +156,12 @@ impl LockFile {
         Self::take(&root.join(ROOT_LOCK), &root.display().to_string())
     }
 
+    /// Removes that file from a folder that nobody else has used yet.
+    pub fn forget_root(root: &Path) {
+        // Where it stays, the folder does too: there is nothing else to be done.
+        let _ = fs::remove_file(root.join(ROOT_LOCK));
+    }
+
     /// Takes a device, under whichever of its names, by a file in `folder`.
     ///
     /// # Errors

@@ -116,6 +116,12 @@ impl RigState {
         self.situation().obstacle_to_motion()
     }
 
+    /// What is wrong with the table, other than that there is to be none.
+    #[must_use]
+    pub fn obstacle_of_table(&self) -> Option<Obstacle> {
+        self.situation().obstacle_of_table()
+    }
+
     /// Whether the rig has a table, be it there at the moment or not.
     #[must_use]
     pub fn has_table(&self) -> bool {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use relit_rig::capture::CaptureError;
 use relit_rig::daemon::Daemon;
+use relit_rig::lockfile::LockFile;
 use relit_rig::processing::{Processing, ProcessingError, ProcessingOptions};
 use relit_rig::serve::rig::Rig;
 use relit_rig::serve::{
@@ -35,7 +36,7 @@ pub(crate) enum Error {
 }
 
 pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
-    let root = &asked.settings.root;
+    let root = &asked.settings.root.clone();
     let failed = |what: String, doing| {
         move |source| CaptureError::System {
             what,
@@ -57,7 +58,12 @@ pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
         ending.cancel();
     };
     at_end(end).map_err(failed("the signals".to_owned(), "listened to"))?;
-    let rig = Arc::new(Daemon::start(asked.settings)?);
+    let rig = Daemon::start(asked.settings).inspect_err(|_| {
+        if made.is_new() {
+            LockFile::forget_root(root);
+        }
+    })?;
+    let rig = Arc::new(rig);
     let processing = ProcessingOptions {
         datasets: asked.datasets,
         programs: Box::new(programs),

@@ -19,7 +19,7 @@ use relit_web::{AccessPolicy, Announcement, ConnectionLimits, Shutdown, Token};
 use tokio::sync::Semaphore;
 
 use super::earlier::with_strokes;
-use super::files::check_replaceable;
+use super::files::{check_replaceable, make_folder};
 use super::making::files_of;
 use super::{MaskFiles, MaskOutput, MaskRequest, MaskingError};
 use api::App;
@@ -49,6 +49,7 @@ pub fn edit(
         source: Box::new(source),
     };
     let files = files_of(&recording, output)?;
+    let _made = make_folder(&files).map_err(of_recording)?;
     check_replaceable(&files, request.force, request.settings.alpha).map_err(of_recording)?;
     let video = Video::open(&recording.video).map_err(|error| of_recording(error.into()))?;
     let (request, notice) = with_strokes(&request, &files, &video).map_err(of_recording)?;

@@ -10,7 +10,7 @@ use relit_grabcut::{Drawing, Effort, MIN_TURN_FRAMES, Mask, Seeds, Strokes};
 use relit_video::Video;
 use serde::{Deserialize, Serialize};
 
-use super::super::files::check_replaceable;
+use super::super::files::{check_replaceable, make_folder};
 use super::super::making::{cut, write_files};
 use super::super::request::TurnRequest;
 use super::super::sampling::{SampledTurn, read_frame, read_turn};
@@ -143,6 +143,7 @@ impl EditorSession {
         let turn = self.turn(&sketch)?;
         let request = self.request_of(sketch);
         let mask = cut(&frame.picture, turn.as_deref(), &request, Effort::Fine)?;
+        let _made = make_folder(&self.files)?;
         // Somebody may have painted one meanwhile.
         check_replaceable(&self.files, request.force, request.settings.alpha)?;
         let source = frame.source.clone();

@@ -11,7 +11,7 @@ use jiff::Timestamp;
 use super::error::{CaptureError, Refusal};
 use super::settings::Settings;
 use crate::state::{Check, Obstacle};
-use crate::turntable::{Alarm, Homed, Table, TurnPlan, TurnRequest, TurntableError};
+use crate::turntable::{Alarm, Homed, Table, TableStatus, TurnPlan, TurnRequest, TurntableError};
 use relit_data::naming::is_session_name;
 
 /// What is added to the expected size of a take, as a fraction of it.
@@ -108,18 +108,38 @@ pub(super) fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Chec
     Ok(checks)
 }
 
+/// The turn of a take.
+fn request(degrees_per_second: f64) -> TurnRequest {
+    TurnRequest {
+        degrees_per_second,
+        turn_deg: 360.0,
+        margin_deg: MARGIN_DEG,
+        direction: None,
+        unwind: true,
+    }
+}
+
+/// Why the turn of a take has no room from where the table stands, where its zero is known.
+pub(crate) fn no_room(
+    table: &Table,
+    status: &TableStatus,
+    degrees_per_second: f64,
+) -> Option<String> {
+    if !status.homed {
+        return None;
+    }
+    match TurnPlan::new(table.identity(), status, &request(degrees_per_second)) {
+        Err(error @ TurntableError::NoRoom { .. }) => Some(error.to_string()),
+        _ => None,
+    }
+}
+
 /// Plans the turn of a take from where the table stands.
 pub(super) fn plan_turn(
     table: &Table,
     settings: &Settings,
 ) -> Result<(TurnPlan, Check), CaptureError> {
-    let request = TurnRequest {
-        degrees_per_second: settings.degrees_per_second,
-        turn_deg: 360.0,
-        margin_deg: MARGIN_DEG,
-        direction: None,
-        unwind: true,
-    };
+    let request = request(settings.degrees_per_second);
     let plan = TurnPlan::new(table.identity(), &table.status()?, &request)?;
     let (from, to) = (plan.back_deg(), plan.end_deg());
     let words = format!("room for the turn from {from:.1} to {to:.1} degrees");

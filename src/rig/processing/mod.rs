@@ -102,17 +102,22 @@ impl Processing {
             source,
         })?;
         let beside = || root.parent().unwrap_or(&root).to_owned();
+        let datasets = options.datasets.clone().unwrap_or_else(beside);
+        let mut settings = kept.settings;
+        if datasets.join(&settings.dataset) == root {
+            settings.dataset.push_str("-shards");
+        }
         let mut queue = ProcessingQueue::default();
         for work in kept.pending {
             // A file that a person changed may name a session twice.
             let _ = queue.submit(work);
         }
         let shared = Arc::new(Shared {
-            datasets: options.datasets.clone().unwrap_or_else(beside),
+            datasets,
             monitor,
             plan: Mutex::new(Plan {
                 queue,
-                settings: kept.settings,
+                settings,
                 programs: (options.programs)(),
             }),
             editor: Mutex::default(),
@@ -179,6 +184,10 @@ impl Processing {
         let names = change.dataset.as_deref();
         if names.is_some_and(|name| !is_session_name(name)) {
             let error = "the data set's name has letters, digits, '-', '_' and '.', and no dot at its beginning: it is a folder beside that of the sessions";
+            return Err(Refused::Invalid(error.to_owned()));
+        }
+        if names.is_some_and(|name| self.shared.datasets.join(name) == self.shared.root) {
+            let error = "that is the folder of the sessions: give the data set another name";
             return Err(Refused::Invalid(error.to_owned()));
         }
         self.shared.look_for_programs();

@@ -142,6 +142,8 @@ impl Command {
         }
         let obstacle = match (captures, moves) {
             (true, _) => state.obstacle_to_take(),
+            // A locked table takes no motion; what lifts the lock is another matter.
+            (_, true) if matches!(self, Self::Jog { .. }) => state.obstacle_of_table(),
             (_, true) => state.obstacle_to_motion(),
             _ => None,
         };

@@ -26,6 +26,8 @@ pub enum Obstacle {
     NoTable(Option<String>),
     /// The speed that is set, and the highest of the table, which is less, both in degrees a second.
     TooFast(f64, f64),
+    /// A turn has no room in the cable from where the table stands; why, and what to do.
+    NoRoom(String),
     /// The camera is not there; why, where that is known.
     NoCamera(Option<String>),
     /// Nothing can be written into the folder of sessions; why.
@@ -46,6 +48,7 @@ impl Obstacle {
             Self::Locked(_) => "The table is locked",
             Self::NoTable(_) => "No turntable",
             Self::TooFast(..) => "Too fast for the table",
+            Self::NoRoom(_) => "No room for a turn",
             Self::NoCamera(_) => "No camera",
             Self::NoFolder(_) => "No folder for sessions",
             Self::NoSpace(..) => "Too little space",
@@ -76,6 +79,7 @@ impl fmt::Display for Obstacle {
             Self::NoCamera(None) => f.write_str("there is no camera yet: it is being looked for"),
             Self::Locked(why)
             | Self::NoTable(Some(why))
+            | Self::NoRoom(why)
             | Self::NoCamera(Some(why))
             | Self::NoFolder(why) => f.write_str(why),
             Self::TooFast(set, highest) => write!(
@@ -245,6 +249,7 @@ impl Situation<'_> {
     pub(super) fn obstacle_to_take(&self) -> Option<Obstacle> {
         self.obstacle_of_table()
             .or_else(|| self.obstacle_of_speed())
+            .or_else(|| self.table.no_room.clone().map(Obstacle::NoRoom))
             .or_else(|| self.obstacle_of_camera())
             .or_else(|| self.obstacle_of_disk())
     }
@@ -255,7 +260,8 @@ impl Situation<'_> {
             .filter(|obstacle| !matches!(obstacle, Obstacle::Locked(_)))
     }
 
-    fn obstacle_of_table(&self) -> Option<Obstacle> {
+    /// What is wrong with the table.
+    pub(super) fn obstacle_of_table(&self) -> Option<Obstacle> {
         let table = self.table;
         if table.emergency_stop {
             return Some(Obstacle::EmergencyStop);

@@ -97,6 +97,9 @@ pub struct TableState {
     pub low_deg: Option<f64>,
     /// How far it may turn on, degrees from the angle 0.
     pub high_deg: Option<f64>,
+    /// Why a take's turn has no room in the cable from where it stands, in a sentence; `None` where it has, or zero is not
+    /// known.
+    pub no_room: Option<String>,
     /// Volts of its battery, where it is measured.
     pub battery_v: Option<f64>,
     /// What is wrong with it, in a sentence.

@@ -8,6 +8,8 @@ const $ = (id) => document.getElementById(id);
 const SCRUB_WIDTH = 960;
 /** Milliseconds without a change after which the mask is made at full size. */
 const REST = 350;
+/** Milliseconds until what could not be answered for now is asked again. */
+const AGAIN = 2000;
 /** Distance at which a corner of the rectangle is taken hold of, pixels of the page. */
 const REACH = { mouse: 12, pen: 16, touch: 26 };
 /** Shorter drags draw no rectangle, pixels of the page. */
@@ -20,7 +22,7 @@ let shown = 0;
 /** Whether the page is served by another program under a path of its own: the rig, which takes over again at the end. */
 const within = location.pathname !== "/";
 
-/** Asks the program; throws an Error with its sentence. */
+/** Asks the program; throws an Error with its sentence, and `held` where it may answer later. */
 async function request(path, options = {}) {
   let response;
   try {
@@ -31,7 +33,8 @@ async function request(path, options = {}) {
   if (response.ok) return response;
   if (response.status === 401) throw new Error("This page has no access: open the address that the program printed.");
   const problem = await response.json().catch(() => ({}));
-  throw new Error(problem.error ?? `The program answered with status ${response.status}.`);
+  const error = new Error(problem.error ?? `The program answered with status ${response.status}.`);
+  throw Object.assign(error, { held: response.status === 503 });
 }
 
 function send(path, sketch) {
@@ -92,6 +95,8 @@ async function cut(draft) {
       view.setOutline(null);
       say("wrong", "no mask");
       warn([error.message]);
+      // The rig holds the editor while it captures.
+      if (error.held) resting = setTimeout(() => cut(draft), AGAIN);
     }
   }
   cutting = false;

@@ -57,6 +57,7 @@ struct Table {
     state: String,
     /// Its highest speed, degrees a second, where it is known.
     fastest: Option<f64>,
+    no_room: Option<String>,
     emergency_stop: bool,
     locked: bool,
     fault: Option<String>,
@@ -94,6 +95,7 @@ impl Default for Table {
             present: true,
             state: "Idle".to_owned(),
             fastest: Some(36.0),
+            no_room: None,
             emergency_stop: false,
             locked: false,
             fault: None,
@@ -143,6 +145,7 @@ fn set(serving: &Serving, row: Row) {
         state.table.present = row.table.present;
         state.table.state = row.table.state;
         state.table.max_degrees_per_second = row.table.fastest;
+        state.table.no_room = row.table.no_room;
         state.table.emergency_stop = row.table.emergency_stop;
         state.table.locked = row.table.locked;
         state.table.fault = row.table.fault;
