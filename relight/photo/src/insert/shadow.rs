@@ -14,7 +14,7 @@ const DRAWN: Extent = Extent::new(128, 64);
 /// Neighbouring pixels look in different directions, in squares of this side, over which the mean is taken.
 const PATTERN: usize = 4;
 /// Directions of one pixel, by the light and as many by the cosine.
-const RAYS: usize = 24;
+const RAYS: usize = 12;
 /// How many times its width the object's shadow is looked for to both sides, and its height above and below.
 const REACH: f64 = 1.5;
 /// The part of the object's lowest points that may lie below the ground: normals at the rim are rough.
