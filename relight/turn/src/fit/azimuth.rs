@@ -21,7 +21,7 @@ struct AzimuthParameters {
     /// Pixels on which the light of the network's normals is fitted. By hand.
     pixels: usize,
     /// Standard deviation of the network's azimuth, as a part of the error that it expects of normals. By hand, after
-    /// the 24 turns of docs/results/turns.md, on which it is off by 4 degrees in the mean.
+    /// the 24 turns of docs/results/turns.md, on which normals are turned by 4 degrees in the mean.
     of_network: f64,
     /// Least standard deviation of it, degrees. By hand.
     least_network_deg: f64,

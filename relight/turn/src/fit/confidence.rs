@@ -76,14 +76,11 @@ pub(crate) struct OwnError {
     deviation: f64,
     /// By how far it is from the normals around it.
     inconsistency: f64,
+    /// Whether nothing is seen of the curve.
+    is_dark: bool,
 }
 
 impl OwnError {
-    /// Whether nothing is seen of the curve.
-    fn is_blind(&self) -> bool {
-        self.deviation >= FRAC_PI_2
-    }
-
     /// With what all pixels have in common.
     pub(crate) fn with(&self, common: f64) -> f64 {
         self.deviation
@@ -129,7 +126,7 @@ pub(crate) fn errors_beside_prior(
                 .hypot(ERROR_PARAMETERS.of_shift * shift)
                 .hypot(common);
             // Of black pixels the curves say nothing, whatever was expected.
-            if own.is_blind() {
+            if own.is_dark {
                 FRAC_PI_2
             } else {
                 expected.min(FRAC_PI_2)
@@ -162,6 +159,7 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
                 return OwnError {
                     deviation: FRAC_PI_2,
                     inconsistency: 0.0,
+                    is_dark: true,
                 };
             }
             let prior = prior.map(|all| all[pixel]);
@@ -173,6 +171,7 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
             OwnError {
                 deviation: deviation.hypot(clipped),
                 inconsistency: inconsistency.clamp(-1.0, 1.0).acos(),
+                is_dark: false,
             }
         })
         .collect()
