@@ -345,7 +345,9 @@ mod tests {
         let ground = Ground::under(&relief, 0.4);
         let patterns = rays(&ground, relief.around(), &lamp(60.0, 0.3));
         let mut met = 0;
-        for (number, ray) in patterns.iter().flatten().enumerate() {
+        let rays: Vec<&Ray> = patterns.iter().flatten().collect();
+        for number in 0..4 * rays.len() {
+            let ray = rays[number % rays.len()];
             let x = (number * 37 % 200) as f32 - 70.0;
             let below = (number * 53 % 110) as f32;
             let z = ((ground.level + f64::from(below) * ground.up[1]) / ground.up[2]) as f32;
