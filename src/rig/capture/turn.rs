@@ -166,9 +166,8 @@ fn fault_of(status: &TableStatus) -> Option<String> {
 pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), TurntableError> {
     let status = table.status()?;
     let (low_deg, high_deg) = table.limits(&status);
-    let degrees_per_second = monitor.state().settings.degrees_per_second;
-    let no_room = preflight::no_room(table, &status, degrees_per_second);
     monitor.update(|state| {
+        let degrees_per_second = state.settings.degrees_per_second;
         state.table = TableState {
             present: true,
             state: status.state.to_string(),
@@ -179,7 +178,7 @@ pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), Turntab
             battery_v: status.battery_v,
             low_deg: Some(low_deg),
             high_deg: Some(high_deg),
-            no_room,
+            no_room: preflight::no_room(table, &status, degrees_per_second),
             emergency_stop: status.emergency_stop,
             locked: status.state == ControllerState::Alarm,
             fault: fault_of(&status),

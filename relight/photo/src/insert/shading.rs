@@ -101,7 +101,8 @@ impl Shading {
         if self.trust == 1.0 {
             return 1.0;
         }
-        let [own, ..] = self.at(at, [self.own[at]; 3], 1.0);
+        let held = self.relief[at] * self.shadow[at] * (self.own[at] + DARK) - DARK;
+        let own = (held + self.residual[at]).max(0.0);
         let new = new.iter().sum::<f32>() / 3.0;
         ((own + DARK) / (new + DARK)).powf(1.0 - self.trust)
     }
