@@ -1,7 +1,7 @@
 //! Folders of predictions.
 
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
@@ -127,13 +127,7 @@ impl Predictions {
 
     /// The predicted light of the sample `name`.
     pub(super) fn light(&self, name: &str) -> Result<ShLight, EvalError> {
-        let path = self.file(name, "light.txt");
-        let text = std::fs::read_to_string(&path).map_err(|source| EvalError::Read {
-            path: path.clone(),
-            source,
-        })?;
-        text.parse()
-            .map_err(|source| EvalError::Light { path, source })
+        read_light(&self.file(name, "light.txt"))
     }
 
     /// The predicted maps of the object `name`; none where there is no map of normals.
@@ -220,5 +214,17 @@ fn check_size(path: PathBuf, found: Extent, expected: Extent) -> Result<(), Eval
         path,
         found,
         expected,
+    })
+}
+
+/// A light in a file of coefficients.
+pub(crate) fn read_light(path: &Path) -> Result<ShLight, EvalError> {
+    let text = std::fs::read_to_string(path).map_err(|source| EvalError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    text.parse().map_err(|source| EvalError::Light {
+        path: path.to_owned(),
+        source,
     })
 }

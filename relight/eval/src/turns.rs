@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use relight_core::files::write_png;
 use relight_core::image::{ColourSpace, Depth, Linear, Planes, Rgb, Srgb, Transfer};
-use relight_core::light::{Normals, Order, Rotation, ShLight, YUp};
+use relight_core::light::{Normals, Rotation, ShLight, YUp};
 use relight_core::statistics::median;
 use relight_nets::Weights;
-use relight_synth::{FrameTruth, TurnDescription};
+use relight_synth::TurnDescription;
 use relight_turn::{
     AzimuthSource, Elevation, MaterialKind, NormalsSource, ReadTurn, RotationDirection, TableFrame,
     TableLight, TurnError, TurnNetwork, TurnOptions, TurnPrediction, TurnPrior, TurnSolution,
@@ -17,6 +17,7 @@ use relight_turn::{
 use relit_data::shard::Dataset;
 use serde::Serialize;
 
+use super::predictions::read_light;
 use super::reliability::{ReliabilityBin, reliability, summed, write_diagrams};
 use super::{EvalError, EvalProgress};
 
@@ -35,7 +36,7 @@ pub enum TurnMethod {
     Network,
     /// From what the network of turns says.
     NetworkThenSolver,
-    /// In its true light, of order 2.
+    /// In its true light, with all bands that the solver knows of.
     KnownLight,
 }
 
@@ -187,13 +188,6 @@ impl TurnSet {
         let description: TurnDescription = parse(&truth.join("turn.json"), |bytes| {
             serde_json::from_slice(bytes)
         })?;
-        let first: FrameTruth = parse(&truth.join("frames.jsonl"), |bytes| {
-            let end = bytes
-                .iter()
-                .position(|&byte| byte == b'\n')
-                .unwrap_or(bytes.len());
-            serde_json::from_slice(&bytes[..end])
-        })?;
         let [_, up, out] = description.axis;
         let turn = read_curves(shard, RotationDirection::CounterClockwise, &|_, _| {})?;
         Ok(TrueTurn {
@@ -201,7 +195,7 @@ impl TurnSet {
             normals: Normals::<YUp>::read(&truth.join("normal.png"))?,
             albedo: Rgb::<Linear>::read(&truth.join("albedo.png"), Transfer::Linear)?,
             elevation: Elevation::given(out.atan2(up).to_degrees()).map_err(TurnError::from)?,
-            light: ShLight::new(first.coefficients.to_vec()).map_err(TurnError::from)?,
+            light: read_light(&truth.join("light.txt"))?,
         })
     }
 
@@ -324,7 +318,7 @@ impl Answer {
         };
         let options = TurnOptions {
             elevation: truth.elevation,
-            light: (method == TurnMethod::KnownLight).then(|| truth.light.with_order(Order::TWO)),
+            light: (method == TurnMethod::KnownLight).then(|| truth.light.clone()),
             prior,
             ..TurnOptions::default()
         };
@@ -351,8 +345,7 @@ impl Answer {
 
 /// The sources of a solution's azimuth beside the bright side of the true light.
 fn azimuths(solution: &TurnSolution, truth: &TrueTurn) -> Vec<AzimuthScore> {
-    let light = truth.light.with_order(Order::TWO);
-    let right = TableLight::from_viewer(&light, &TableFrame::new(truth.elevation));
+    let right = TableLight::from_viewer(&truth.light, &TableFrame::new(truth.elevation));
     let right = right.bright_azimuth_deg();
     let Some(figures) = solution.azimuth() else {
         return Vec::new();

@@ -12,7 +12,7 @@ use super::lighting::{Lighting, Material, Panoramas, Shaded};
 use super::object::{ObjectSource, SyntheticView};
 use super::png::{Sixteen, encode_sixteen};
 use super::view::{Pose, Projection};
-use relight_core::light::ShLight;
+use relight_core::light::{Order, ShLight};
 
 /// All that a sample was made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -48,11 +48,15 @@ impl Lighting {
         panoramas.name(environment.panorama).map(str::to_owned)
     }
 
-    /// The coefficients as a camera of this gain sees them.
+    /// All light but what bounces, as a camera of this gain sees it.
+    pub(super) fn seen(&self, order: Order, panoramas: &Panoramas, gain: Vec3) -> ShLight {
+        self.coefficients(order, panoramas)
+            .tinted(gain.to_array().map(f64::from))
+    }
+
+    /// Its first nine coefficients.
     pub(super) fn seen_coefficients(&self, panoramas: &Panoramas, gain: Vec3) -> [[f64; 3]; 9] {
-        let light = self
-            .coefficients(panoramas)
-            .tinted(gain.to_array().map(f64::from));
+        let light = self.seen(Order::TWO, panoramas, gain);
         let mut coefficients = [[0.0; 3]; 9];
         for (to, from) in coefficients.iter_mut().zip(light.coefficients()) {
             *to = *from;

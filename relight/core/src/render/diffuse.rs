@@ -366,6 +366,22 @@ mod tests {
     }
 
     #[test]
+    fn the_bands_of_the_cosine_lobe_are_those_of_the_published_table() {
+        let expected = [
+            PI,
+            2.0 * PI / 3.0,
+            PI / 4.0,
+            0.0,
+            -PI / 24.0,
+            0.0,
+            PI / 64.0,
+        ];
+        for (l, expected) in expected.into_iter().enumerate() {
+            assert!((cosine_lobe(l) - expected).abs() < 1e-9, "{l}");
+        }
+    }
+
+    #[test]
     fn the_terms_are_the_harmonics_times_the_cosine_lobe() {
         let direction = Direction::new(0.3, -0.5, 0.7).unwrap();
         let values = basis(Order::TWO, direction);

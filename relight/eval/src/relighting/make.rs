@@ -18,7 +18,7 @@ use super::set::{FILE, Index, ObjectEntry, Part, SCHEMA, light_file, object_fold
 use crate::{EvalError, EvalProgress};
 use relight_core::files::write_png;
 use relight_core::image::{Depth, Rgb};
-use relight_core::light::{Direction, Rotation};
+use relight_core::light::{Direction, Order, Rotation};
 use relight_synth::{
     BlinnPhong, Environment, GBuffer, Library, Lighting, Material, Method, Recipe, Shaded, stream,
 };
@@ -180,7 +180,9 @@ pub fn make_relighting(
     make_folder(&out.join("lights"))?;
     for (number, (_, lighting)) in lightings.iter().enumerate() {
         let path = light_file(out, number);
-        let text = lighting.coefficients(&library.panoramas).to_string();
+        let text = lighting
+            .coefficients(Order::HIGHLIGHT, &library.panoramas)
+            .to_string();
         write_whole(&path, text.as_bytes()).map_err(EvalError::write(&path))?;
     }
     let objects = (0..recipe.objects)

@@ -4,7 +4,7 @@ use super::set::{Object, Part, RelightingSet, read_image};
 use crate::run::cut_out;
 use crate::{EvalError, Predictions};
 use relight_core::image::{Linear, Planes, Rgb, Srgb};
-use relight_core::light::ShLight;
+use relight_core::light::{Order, ShLight};
 use relight_core::render::{DiffuseForm, Layers, SpecularForm, Surface};
 
 /// Where relit images come from.
@@ -12,8 +12,9 @@ use relight_core::render::{DiffuseForm, Layers, SpecularForm, Surface};
 pub enum RelightMethod {
     /// The image as it is, whatever the light: naive insertion.
     Naive,
-    /// The true maps of the object through the render layers, with this specular layer, under the
-    /// true light's nine coefficients: what the paper's representation costs.
+    /// The true maps of the object through the render layers, with this specular layer, under the true light: with the
+    /// paper's layer under its nine coefficients, which tells what the paper's representation costs; with the lobe under
+    /// all bands.
     Oracle(SpecularForm),
     /// What was predicted from the image: maps of the object, which are rendered as those of the
     /// oracle (`normal`, `albedo`, and `reflectance` with `smoothness` for highlights, in a folder
@@ -114,6 +115,10 @@ impl Relight<'_> {
 }
 
 fn render(surface: &Surface, light: &ShLight, form: SpecularForm) -> Result<Planes<3>, EvalError> {
+    let light = match form {
+        SpecularForm::Power => &light.with_order(Order::TWO),
+        SpecularForm::Lobe => light,
+    };
     let layers = Layers::new(light, DiffuseForm::Irradiance, form);
     let image = layers.render(surface).image(surface.albedo())?;
     Ok(shown(image))

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::EvalError;
+use crate::predictions::read_light;
 use relight_core::files::read_planes;
 use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, ShLight, YUp};
@@ -20,7 +21,7 @@ pub(super) const FILE: &str = "relighting.json";
 ///
 /// ```text
 /// relighting.json             what there is, and what it was made of; written last
-/// lights/<ll>.txt             the light as nine coefficients, in the units of the images
+/// lights/<ll>.txt             the light as coefficients of order 24, in the units of the images
 /// <ooo>/{mask,normal,albedo}.png      the ground truth of an object: 16 bits, linear, y up
 /// <ooo>/<ll>-diffuse.png      the object without highlights under a light, sRGB
 /// <ooo>/<ll>-full.png         the same with its highlights
@@ -195,15 +196,4 @@ pub(super) fn object_folder(number: usize) -> String {
 
 pub(super) fn light_file(root: &Path, number: usize) -> PathBuf {
     root.join("lights").join(format!("{number:02}.txt"))
-}
-
-fn read_light(path: &Path) -> Result<ShLight, EvalError> {
-    let text = fs::read_to_string(path).map_err(|source| EvalError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    text.parse().map_err(|source| EvalError::Light {
-        path: path.to_owned(),
-        source,
-    })
 }

@@ -114,23 +114,19 @@ impl Panoramas {
 }
 
 impl Environment {
-    /// The light as coefficients of order 2, in the viewer's frame; dark where there is no such
-    /// panorama.
-    #[must_use]
-    pub fn coefficients(&self, panoramas: &Panoramas) -> ShLight {
-        self.of_order(panoramas, Order::TWO)
-    }
-
     /// The light as the coefficients whose irradiance the method takes; none where it casts rays.
     pub(super) fn smooth(&self, panoramas: &Panoramas) -> Option<ShLight> {
         match self.method {
-            Method::OrderTwo => Some(self.coefficients(panoramas)),
-            Method::Smooth => Some(self.of_order(panoramas, Order::HIGHLIGHT)),
+            Method::OrderTwo => Some(self.coefficients(Order::TWO, panoramas)),
+            Method::Smooth => Some(self.coefficients(Order::HIGHLIGHT, panoramas)),
             Method::MonteCarlo => None,
         }
     }
 
-    fn of_order(&self, panoramas: &Panoramas, order: Order) -> ShLight {
+    /// The light as coefficients of an order up to [`Order::HIGHLIGHT`], in the viewer's frame; dark where there is no
+    /// such panorama.
+    #[must_use]
+    pub fn coefficients(&self, order: Order, panoramas: &Panoramas) -> ShLight {
         match panoramas.entries.get(self.panorama) {
             Some(entry) => entry
                 .light

@@ -99,10 +99,10 @@ impl SyntheticLamp {
 
     /// The lamp, as all light from its middle.
     #[must_use]
-    pub fn coefficients(&self) -> ShLight {
-        let values = basis(Order::TWO, direction(self.emitter.towards()));
+    pub fn coefficients(&self, order: Order) -> ShLight {
+        let values = basis(order, direction(self.emitter.towards()));
         let colour = self.irradiance.to_array().map(f64::from);
-        let mut light = ShLight::dark(Order::TWO);
+        let mut light = ShLight::dark(order);
         for (coefficient, value) in light.coefficients_mut().iter_mut().zip(values) {
             *coefficient = colour.map(|c| c * value);
         }

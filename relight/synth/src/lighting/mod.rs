@@ -48,20 +48,20 @@ pub struct Lighting {
 }
 
 impl Lighting {
-    /// All light but what bounces, as coefficients of order 2: where nothing is in the way, their
+    /// All light but what bounces, as coefficients of an order: where nothing is in the way, their
     /// diffuse layer is the shading, smoothed where lamps are.
     #[must_use]
-    pub fn coefficients(&self, panoramas: &Panoramas) -> ShLight {
+    pub fn coefficients(&self, order: Order, panoramas: &Panoramas) -> ShLight {
         let even = self
             .ambient
             .to_array()
             .map(|e| f64::from(e) / std::f64::consts::PI);
-        let mut sum = ShLight::even(Order::TWO, even);
+        let mut sum = ShLight::even(order, even);
         for lamp in &self.lamps {
-            add(&mut sum, &lamp.coefficients());
+            add(&mut sum, &lamp.coefficients(order));
         }
         if let Some(environment) = &self.environment {
-            add(&mut sum, &environment.coefficients(panoramas));
+            add(&mut sum, &environment.coefficients(order, panoramas));
         }
         sum
     }

@@ -384,7 +384,7 @@ fn the_coefficients_of_a_lighting_shade_a_ball_as_its_lights_do_when_smoothed() 
         ambient: Vec3::new(0.2, 0.3, 0.4),
         ..Lighting::default()
     };
-    let light = lighting.coefficients(&Panoramas::default());
+    let light = lighting.coefficients(Order::TWO, &Panoramas::default());
     // The first harmonic's diffuse coefficient is pi Y_0.
     let mean = light.coefficients()[0]
         .map(|c| c * std::f64::consts::PI / (4.0 * std::f64::consts::PI).sqrt());
@@ -461,9 +461,9 @@ fn a_lamp_turns_with_its_light() {
         panic!("another lamp")
     };
     assert!((centre.length() - 3.0).abs() < 1e-5 && radius == 0.5);
-    let expected = lamp.coefficients().rotated(&turn);
+    let expected = lamp.coefficients(Order::TWO).rotated(&turn);
     for (a, b) in turned
-        .coefficients()
+        .coefficients(Order::TWO)
         .coefficients()
         .iter()
         .zip(expected.coefficients())

@@ -32,6 +32,7 @@ mod tests;
 mod views;
 
 use relight_core::light::Order;
+use relight_core::render::cosine_lobe;
 
 pub use cache::TransferCache;
 pub use cast::{RadianceTransfer, TransferFinish};
@@ -47,25 +48,9 @@ const COEFFICIENTS: usize = TRANSFER_ORDER.coefficients();
 /// Coefficients of what bounces: it is smooth.
 const BOUNCE_COEFFICIENTS: usize = Order::TWO.coefficients();
 
-/// What is left of a band of radiance in irradiance: the cosine's coefficients (Ramamoorthi and Hanrahan 2001,
-/// equation 8; π for band 0).
+/// What is left of a band of radiance in irradiance.
 fn cosine_band(l: usize) -> f32 {
-    use std::f64::consts::PI;
-    let value = match l {
-        0 => PI,
-        1 => 2.0 * PI / 3.0,
-        l if l % 2 == 1 => 0.0,
-        l => {
-            let half = l / 2;
-            // l! / (2^l ((l / 2)!)^2), factor by factor.
-            let ratio: f64 = (1..=half)
-                .map(|k| (half + k) as f64 / (4.0 * k as f64))
-                .product();
-            let sign = if half % 2 == 1 { 1.0 } else { -1.0 };
-            2.0 * PI * sign * ratio / ((l + 2) * (l - 1)) as f64
-        }
-    };
-    value as f32
+    cosine_lobe(l) as f32
 }
 
 /// The band of a coefficient.

@@ -96,22 +96,6 @@ fn value(curve: &CurveCoefficients, angle: f64, c: usize) -> f64 {
     sum
 }
 
-#[test]
-fn the_cosine_s_bands_are_those_of_the_published_table() {
-    let expected = [
-        PI,
-        2.0 * PI / 3.0,
-        PI / 4.0,
-        0.0,
-        -PI / 24.0,
-        0.0,
-        PI / 64.0,
-    ];
-    for (l, expected) in expected.into_iter().enumerate() {
-        assert!((cosine_band(l) - expected).abs() < 1e-5, "{l}");
-    }
-}
-
 /// An object of which parts shade others, on a plate.
 fn standing(size: u32, rays: u32) -> (RadianceTransfer, GBuffer, Occluder) {
     let mesh: Mesh = ShapeKind::Blend.build(2);

@@ -46,6 +46,7 @@ impl GroundTruthFolder {
     pub(super) fn write_object(&self, turn: &SimulatedTurn<'_>) -> Result<(), SynthError> {
         let (buffer, material) = (turn.scene.buffer(), &turn.material);
         self.write("turn.json", &turn.json())?;
+        self.write("light.txt", turn.first_light().to_string().as_bytes())?;
         let albedo = encode_sixteen(buffer, &Sixteen::up_to(&material.albedo, 1.0))?;
         self.write("albedo.png", &albedo)?;
         let normals = encode_sixteen(buffer, &Sixteen::normals(&material.normals))?;

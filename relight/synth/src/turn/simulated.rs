@@ -22,7 +22,7 @@ use crate::png::{Sixteen, encode_sixteen};
 use crate::random::{Random, stream};
 use crate::recipe::{AMBIENT_RAYS, Recipe};
 use crate::sample::{Whites, photograph};
-use relight_core::light::{Direction, Rotation};
+use relight_core::light::{Direction, Order, Rotation, ShLight};
 
 /// Frames from which the exposure is found.
 const METERED: u32 = 12;
@@ -169,6 +169,13 @@ impl<'a> SimulatedTurn<'a> {
         let mut bytes = serde_json::to_vec_pretty(&self.description).unwrap_or_default();
         bytes.push(b'\n');
         bytes
+    }
+
+    /// The light at angle 0, as a camera sees it, with all bands that a surface shows of it.
+    pub(super) fn first_light(&self) -> ShLight {
+        let gain = self.description.camera.gain;
+        let lighting = &self.description.lighting;
+        lighting.seen(Order::HIGHLIGHT, &self.library.panoramas, gain)
     }
 
     pub(super) fn frame(&self, index: u32, spans: &MaskSpans) -> Result<RenderedFrame, SynthError> {

@@ -111,6 +111,7 @@ fn the_number_of_threads_changes_no_byte() {
         let truth = folder.path().join("truth/synth-3-0000");
         let files = [
             "turn.json",
+            "light.txt",
             "frames.jsonl",
             "albedo.png",
             "shading/0007.png",

@@ -1,8 +1,10 @@
 //! From which side of the table the light comes, by all that says so.
 //!
 //! Turning all normals about the table's axis, and the light with them, changes no Lambertian curve: no residual says
-//! how far an answer is turned. Each source here says where the light's bright side is, with an uncertainty. They are put
-//! together as von Mises distributions, whose product is one again.
+//! how far an answer is turned. Two things are found here, each with its uncertainty: by how much the prior's normals are
+//! turned, and where the light's bright side is. What knows the shape says nothing of the light but through the light that
+//! fits the curves on it, which is the less sure of its bright side the weaker that is; what has seen the light says
+//! something of the shape by the same way. Sources are put together as von Mises distributions, whose product is one again.
 
 use serde::Serialize;
 
@@ -18,18 +20,26 @@ use relight_core::light::{Normals, YUp};
 
 /// Parameters of the sources.
 struct AzimuthParameters {
-    /// Pixels on which the light of the network's normals is fitted. By hand.
+    /// Pixels on which the light of the prior's normals is fitted. By hand.
     pixels: usize,
-    /// Standard deviation of the network's azimuth, as a part of the error that it expects of normals. By hand, after
-    /// the 24 turns of docs/results/turns.md, on which normals are turned by 4 degrees in the mean.
-    of_network: f64,
-    /// Least standard deviation of it, degrees. By hand.
-    least_network_deg: f64,
+    /// Expected error of normals that do not know it, degrees. By hand.
+    untold_error_deg: f64,
+    /// Standard deviation by which normals are turned about the axis, as a part of the error that is expected of them.
+    /// Measured: with the next but one, on the 16 synthetic turns of seed 3001 (docs/results/turns.md).
+    of_normals: f64,
+    /// The same of normals that do not know their errors. By hand: those of single photographs were turned by 8 to 29
+    /// degrees on three sessions.
+    of_untold_normals: f64,
+    /// Standard deviation of the bright side of the light that is fitted to normals, as a part of the error that is
+    /// expected of them, over the light's bright part. Measured.
+    of_light: f64,
+    /// Least standard deviation of each, degrees. By hand.
+    least_deg: f64,
     /// Standard deviation of the panorama strip's azimuth, degrees. Measured: the example `strip_azimuth`.
     of_panorama_deg: f64,
     /// Least bright part of a strip that says something. Measured: below, it points anywhere.
     least_bright_part: f64,
-    /// Standard deviation of the outline's azimuth, degrees. By hand.
+    /// Standard deviation of the turn that the outline shows, degrees. By hand.
     of_outline_deg: f64,
     /// Distance from the outline, pixels, in which normals are compared with it. By hand.
     rim: usize,
@@ -43,8 +53,11 @@ struct AzimuthParameters {
 
 const PARAMETERS: AzimuthParameters = AzimuthParameters {
     pixels: 2500,
-    of_network: 0.5,
-    least_network_deg: 2.0,
+    untold_error_deg: 20.0,
+    of_normals: 0.2,
+    of_untold_normals: 1.0,
+    of_light: 0.14,
+    least_deg: 1.0,
     of_panorama_deg: 70.0,
     least_bright_part: 0.6,
     of_outline_deg: 12.0,
@@ -58,7 +71,7 @@ const PARAMETERS: AzimuthParameters = AzimuthParameters {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AzimuthSource {
-    /// The network's normals, with the light that goes with them.
+    /// The network's normals, or others that were given, with the light that goes with them.
     Network,
     /// The bright side of what the video shows of the room.
     Panorama,
@@ -86,13 +99,13 @@ pub struct AzimuthFigures {
     pub azimuth_deg: f64,
     /// Its circular standard deviation, degrees.
     pub uncertainty_deg: f64,
-    /// By how much the network's normals were turned about the table's axis for it, degrees.
+    /// By how much the prior's normals were turned about the table's axis for it, degrees; 0 without a prior.
     pub turned_deg: f64,
     /// The sources.
     pub evidence: Vec<AzimuthEvidence>,
 }
 
-/// What is known beside the network's answer.
+/// What is known beside the prior.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AzimuthSources<'a> {
     pub(crate) frame: TableFrame,
@@ -100,54 +113,126 @@ pub(crate) struct AzimuthSources<'a> {
     pub(crate) given: Option<&'a TableLight>,
 }
 
+/// What is known of the shape: a prior, the light that fits it, and how far both may be turned, degrees.
+struct TurnedShape {
+    azimuth_deg: f64,
+    normals_deviation_deg: f64,
+    light_deviation_deg: f64,
+    /// By how much the outline would turn it.
+    by_outline_deg: Option<f64>,
+}
+
 impl AzimuthSources<'_> {
-    /// The prior of the network, turned about the table's axis to where all sources together see the light; as it is
-    /// where it does not know its errors, or no light goes with it.
+    /// The prior, turned about the table's axis to where all sources together see it, and where they see the light; none
+    /// where nothing says where that is.
     pub(crate) fn align(
         &self,
         curves: &TurnCurves,
-        prior: &TurnPrior,
-    ) -> Option<(TurnPrior, AzimuthFigures)> {
-        let expected = mean_expected_error(curves, prior)?;
-        let normals = normals_of(curves, &prior.normals);
-        let own = light_of(curves, &normals, &self.frame)?.bright_azimuth_deg();
-        let deviation = (PARAMETERS.of_network * expected).max(PARAMETERS.least_network_deg);
-        let mut evidence = vec![AzimuthEvidence {
-            source: AzimuthSource::Network,
-            azimuth_deg: own,
-            uncertainty_deg: deviation,
-        }];
-        let outline = turn_of_outline(curves, &normals, &self.frame);
-        evidence.extend(outline.map(|by| AzimuthEvidence {
-            source: AzimuthSource::Outline,
-            azimuth_deg: own + by,
-            uncertainty_deg: PARAMETERS.of_outline_deg,
-        }));
-        evidence.extend(self.panorama.and_then(of_panorama));
-        evidence.extend(self.given.map(|light| AzimuthEvidence {
+        prior: Option<&TurnPrior>,
+    ) -> (Option<TurnPrior>, Option<AzimuthFigures>) {
+        let shape = prior.and_then(|prior| self.shape(curves, prior));
+        let of_light = self.of_light();
+        let turned_deg = shape.as_ref().map_or(0.0, |shape| shape.turn(&of_light));
+        let own = shape
+            .as_ref()
+            .map(|shape| shape.light(product(shape.turns())));
+        let seen = own.into_iter().chain(of_light.iter().map(stated));
+        let mut evidence = shape.as_ref().map_or_else(Vec::new, TurnedShape::evidence);
+        let (azimuth_deg, uncertainty_deg) = product(seen);
+        evidence.extend(of_light);
+        let figures = (!evidence.is_empty()).then_some(AzimuthFigures {
+            azimuth_deg,
+            uncertainty_deg,
+            turned_deg,
+            evidence,
+        });
+        let aligned = prior.filter(|_| shape.is_some()).map(|prior| TurnPrior {
+            normals: turned(curves, &prior.normals, &self.frame, turned_deg),
+            ..prior.clone()
+        });
+        (aligned, figures)
+    }
+
+    /// What has seen the light itself.
+    fn of_light(&self) -> Vec<AzimuthEvidence> {
+        let given = self.given.map(|light| AzimuthEvidence {
             source: AzimuthSource::Given,
             azimuth_deg: light.bright_azimuth_deg(),
             uncertainty_deg: PARAMETERS.of_given_deg,
-        }));
-        let (azimuth_deg, uncertainty_deg) = product(&evidence);
-        let turned_deg = half_turn(azimuth_deg - own);
-        let aligned = turned(curves, &prior.normals, &self.frame, turned_deg);
-        Some((
-            TurnPrior {
-                normals: aligned,
-                ..prior.clone()
-            },
-            AzimuthFigures {
-                azimuth_deg,
-                uncertainty_deg,
-                turned_deg,
-                evidence,
-            },
-        ))
+        });
+        let panorama = self.panorama.and_then(of_panorama);
+        panorama.into_iter().chain(given).collect()
+    }
+
+    fn shape(&self, curves: &TurnCurves, prior: &TurnPrior) -> Option<TurnedShape> {
+        if prior.normals.extent() != curves.extent() {
+            return None;
+        }
+        let normals = normals_of(curves, &prior.normals);
+        let light = light_of(curves, &normals, &self.frame)?;
+        let (expected, of_normals) = match mean_expected_error(curves, prior) {
+            Some(expected) => (expected, PARAMETERS.of_normals),
+            None => (PARAMETERS.untold_error_deg, PARAMETERS.of_untold_normals),
+        };
+        let of_light = PARAMETERS.of_light / light.bright_part().max(f64::MIN_POSITIVE);
+        let deviation = |part: f64| (part * expected).max(PARAMETERS.least_deg);
+        Some(TurnedShape {
+            azimuth_deg: light.bright_azimuth_deg(),
+            normals_deviation_deg: deviation(of_normals),
+            light_deviation_deg: deviation(of_light),
+            by_outline_deg: turn_of_outline(curves, &normals, &self.frame),
+        })
     }
 }
 
-/// The mean error that the network expects, degrees.
+impl TurnedShape {
+    /// By how much prior and outline say that it is turned, degrees.
+    fn turns(&self) -> Vec<(f64, f64)> {
+        let outline = self
+            .by_outline_deg
+            .map(|by| (by, PARAMETERS.of_outline_deg));
+        let own = (0.0, self.normals_deviation_deg);
+        std::iter::once(own).chain(outline).collect()
+    }
+
+    /// By how much it is to be turned, degrees, by these and by what has seen the light.
+    fn turn(&self, of_light: &[AzimuthEvidence]) -> f64 {
+        let by_light = of_light.iter().map(|one| {
+            let by = one.azimuth_deg - self.azimuth_deg;
+            (by, one.uncertainty_deg.hypot(self.light_deviation_deg))
+        });
+        product(self.turns().into_iter().chain(by_light)).0
+    }
+
+    /// Where it sees the light, degrees, turned by so much with such a standard deviation.
+    fn light(&self, (turn_deg, deviation_deg): (f64, f64)) -> (f64, f64) {
+        let deviation = deviation_deg.hypot(self.light_deviation_deg);
+        (self.azimuth_deg + turn_deg, deviation)
+    }
+
+    /// What the prior and the outline say of the light, each by itself.
+    fn evidence(&self) -> Vec<AzimuthEvidence> {
+        let sources = [AzimuthSource::Network, AzimuthSource::Outline];
+        let turns = self.turns().into_iter().zip(sources);
+        turns
+            .map(|(turn, source)| {
+                let (azimuth_deg, uncertainty_deg) = self.light(turn);
+                AzimuthEvidence {
+                    source,
+                    azimuth_deg,
+                    uncertainty_deg,
+                }
+            })
+            .collect()
+    }
+}
+
+/// An azimuth with its standard deviation, degrees.
+fn stated(evidence: &AzimuthEvidence) -> (f64, f64) {
+    (evidence.azimuth_deg, evidence.uncertainty_deg)
+}
+
+/// The mean error that is expected of a prior, degrees.
 fn mean_expected_error(curves: &TurnCurves, prior: &TurnPrior) -> Option<f64> {
     let errors = prior.expected_errors.as_ref()?;
     if errors.extent() != curves.extent() {
@@ -247,12 +332,12 @@ fn outline(curves: &TurnCurves) -> impl Iterator<Item = Option<[f64; 2]>> {
     })
 }
 
-/// The product of von Mises distributions: its mean and circular standard deviation, degrees.
-fn product(evidence: &[AzimuthEvidence]) -> (f64, f64) {
+/// The product of von Mises distributions, each by its mean and circular standard deviation, degrees.
+fn product(all: impl IntoIterator<Item = (f64, f64)>) -> (f64, f64) {
     let (mut x, mut y) = (0.0, 0.0);
-    for one in evidence {
-        let (sin, cos) = one.azimuth_deg.to_radians().sin_cos();
-        let concentration = concentration(one.uncertainty_deg.to_radians());
+    for (mean_deg, deviation_deg) in all {
+        let (sin, cos) = mean_deg.to_radians().sin_cos();
+        let concentration = concentration(deviation_deg.to_radians());
         x += concentration * cos;
         y += concentration * sin;
     }
@@ -284,11 +369,6 @@ fn resultant(concentration: f64) -> f64 {
         fraction = 1.0 / (2.0 * f64::from(k) / concentration.max(1e-9) + fraction);
     }
     fraction
-}
-
-/// An angle between -180 and 180 degrees.
-fn half_turn(degrees: f64) -> f64 {
-    (degrees + 180.0).rem_euclid(360.0) - 180.0
 }
 
 /// Normals turned about the table's axis; those that would look away are at right angles to the line of sight.

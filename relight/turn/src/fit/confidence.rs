@@ -76,8 +76,6 @@ pub(crate) struct OwnError {
     deviation: f64,
     /// By how far it is from the normals around it.
     inconsistency: f64,
-    /// Whether nothing is seen of the curve.
-    is_dark: bool,
 }
 
 impl OwnError {
@@ -111,26 +109,20 @@ pub(crate) fn common_error(options: &TurnOptions, has_prior: bool, is_fit: bool)
 }
 
 /// What normals are expected to be off, radians, where that was known of the prior: as much as was expected of the prior,
-/// a little less because the curves agree, and more the further they lead away from it.
+/// and more the further the curves lead away from it. Of a black pixel they say nothing, and it keeps what was expected.
 pub(crate) fn errors_beside_prior(
     fits: &[PixelFit],
     prior: &[PriorNormal],
-    own: &[OwnError],
     common: f64,
 ) -> Vec<f64> {
-    let pixels = fits.iter().zip(prior).zip(own);
+    let pixels = fits.iter().zip(prior);
     pixels
-        .map(|((fit, prior), own)| {
+        .map(|(fit, prior)| {
             let shift = dot(fit.normal, prior.normal).clamp(-1.0, 1.0).acos();
             let expected = (ERROR_PARAMETERS.of_prior * prior.sureness.powf(-0.5))
                 .hypot(ERROR_PARAMETERS.of_shift * shift)
                 .hypot(common);
-            // Of black pixels the curves say nothing, whatever was expected.
-            if own.is_dark {
-                FRAC_PI_2
-            } else {
-                expected.min(FRAC_PI_2)
-            }
+            expected.min(FRAC_PI_2)
         })
         .collect()
 }
@@ -159,7 +151,6 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
                 return OwnError {
                     deviation: FRAC_PI_2,
                     inconsistency: 0.0,
-                    is_dark: true,
                 };
             }
             let prior = prior.map(|all| all[pixel]);
@@ -171,7 +162,6 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
             OwnError {
                 deviation: deviation.hypot(clipped),
                 inconsistency: inconsistency.clamp(-1.0, 1.0).acos(),
-                is_dark: false,
             }
         })
         .collect()

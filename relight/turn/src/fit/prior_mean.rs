@@ -36,7 +36,7 @@ pub(crate) struct Initialised {
     pub(crate) setting: Setting,
     pub(crate) found: FittedLight,
     pub(crate) is_prior_left_out: bool,
-    /// From which side the light comes, where a network said so too.
+    /// From which side the light comes, where anything says so.
     pub(crate) azimuth: Option<AzimuthFigures>,
 }
 
@@ -50,8 +50,7 @@ impl Initialised {
             panorama: options.panorama.as_ref(),
             given: known.as_ref().map(|known| &known.diffuse),
         };
-        let align = |prior| sources.align(curves, prior);
-        let (aligned, azimuth) = options.prior.as_ref().and_then(align).unzip();
+        let (aligned, azimuth) = sources.align(curves, options.prior.as_ref());
         let prior = aligned
             .as_ref()
             .or(options.prior.as_ref())

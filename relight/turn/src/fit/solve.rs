@@ -106,7 +106,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
     let albedo = shared_albedo(curves, &solver.fits, &own_errors);
     let expected_errors = match solver.prior.as_deref() {
         Some(prior) if solver.setting.knows_errors_of_unknown_light() => {
-            errors_beside_prior(&solver.fits, prior, &own_errors, common)
+            errors_beside_prior(&solver.fits, prior, common)
         }
         _ => own_errors.iter().map(|own| own.with(common)).collect(),
     };
