@@ -47,11 +47,14 @@ fn a_concentration_gives_back_its_deviation() {
 #[test]
 fn a_prior_that_is_turned_about_the_axis_is_turned_back_by_a_light_that_is_known() {
     let (curves, prior) = turned_prior(25.0);
+    let prior = TurnPrior {
+        expected_errors: None,
+        ..prior
+    };
     let given = TableLight::from_viewer(&environment(), &frame());
     let sources = AzimuthSources {
-        frame: frame(),
-        panorama: None,
         given: Some(&given),
+        ..alone()
     };
     let (aligned, figures) = sources.align(&curves, Some(&prior));
     let (aligned, figures) = (aligned.unwrap(), figures.unwrap());
