@@ -381,7 +381,7 @@ fn write_relighting(root: &Path) -> Vec<ShLight> {
     sphere()
         .write_png(&root.join("000/normal.png"), Depth::Sixteen)
         .unwrap();
-    let index = r#"{"schema": "relight.relighting/1", "about": "by hand", "lights": ["a", "b", "c"],
+    let index = r#"{"schema": "relight.relighting/2", "about": "by hand", "lights": ["a", "b", "c"],
         "objects": [{"name": "ball", "input": 1, "reflectance": [0.2, 0.2, 0.2], "smoothness": 20}]}"#;
     fs::write(root.join("relighting.json"), index).unwrap();
     lights

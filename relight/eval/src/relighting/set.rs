@@ -13,7 +13,7 @@ use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::render::{Gloss, Surface};
 
 /// What the description says it is.
-pub(super) const SCHEMA: &str = "relight.relighting/1";
+pub(super) const SCHEMA: &str = "relight.relighting/2";
 /// The description of a set.
 pub(super) const FILE: &str = "relighting.json";
 

@@ -122,8 +122,9 @@ fn is_whole(turn: &SimulatedTurn<'_>, dataset: &Dataset, out: &Path) -> Result<b
             path: out.to_owned(),
         });
     }
-    Ok(ground_truth::ground_truth_of(out, &turn.session).is_dir()
-        && dataset.check_integrity(out, &turn.session).is_ok())
+    let truth = ground_truth::ground_truth_of(out, &turn.session);
+    // The last file that came to be part of it.
+    Ok(truth.join("light.txt").is_file() && dataset.check_integrity(out, &turn.session).is_ok())
 }
 
 /// Writes shard, table, page and ground truth.

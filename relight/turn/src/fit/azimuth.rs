@@ -47,8 +47,10 @@ struct AzimuthParameters {
     least_up: f64,
     /// Least number of pixels at the outline. By hand.
     least_outline: usize,
-    /// Standard deviation of a light that was given or measured, degrees. By hand.
+    /// Standard deviation of the frame in which a light was given or measured, degrees. By hand.
     of_given_deg: f64,
+    /// Error of such a light from one side, in parts of its mean. By hand: in even light it hides the bright side.
+    of_given_part: f64,
 }
 
 const PARAMETERS: AzimuthParameters = AzimuthParameters {
@@ -65,6 +67,7 @@ const PARAMETERS: AzimuthParameters = AzimuthParameters {
     least_up: -0.3,
     least_outline: 30,
     of_given_deg: 3.0,
+    of_given_part: 0.02,
 };
 
 /// What says from which side the light comes.
@@ -158,7 +161,7 @@ impl AzimuthSources<'_> {
         let given = self.given.map(|light| AzimuthEvidence {
             source: AzimuthSource::Given,
             azimuth_deg: light.bright_azimuth_deg(),
-            uncertainty_deg: PARAMETERS.of_given_deg,
+            uncertainty_deg: of_given(light),
         });
         let panorama = self.panorama.and_then(of_panorama);
         panorama.into_iter().chain(given).collect()
@@ -197,9 +200,10 @@ impl TurnedShape {
 
     /// By how much it is to be turned, degrees, by these and by what has seen the light.
     fn turn(&self, of_light: &[AzimuthEvidence]) -> f64 {
-        let by_light = of_light.iter().map(|one| {
-            let by = one.azimuth_deg - self.azimuth_deg;
-            (by, one.uncertainty_deg.hypot(self.light_deviation_deg))
+        let by_light = (!of_light.is_empty()).then(|| {
+            let (seen_deg, deviation_deg) = product(of_light.iter().map(stated));
+            let deviation = deviation_deg.hypot(self.light_deviation_deg);
+            (seen_deg - self.azimuth_deg, deviation)
         });
         product(self.turns().into_iter().chain(by_light)).0
     }
@@ -225,6 +229,12 @@ impl TurnedShape {
             })
             .collect()
     }
+}
+
+/// The standard deviation of the bright side of a light that was given, degrees.
+fn of_given(light: &TableLight) -> f64 {
+    let hidden = PARAMETERS.of_given_part.atan2(light.bright_part());
+    PARAMETERS.of_given_deg.hypot(hidden.to_degrees())
 }
 
 /// An azimuth with its standard deviation, degrees.
@@ -332,18 +342,28 @@ fn outline(curves: &TurnCurves) -> impl Iterator<Item = Option<[f64; 2]>> {
     })
 }
 
-/// The product of von Mises distributions, each by its mean and circular standard deviation, degrees.
+/// The product of von Mises distributions, each by its mean and circular standard deviation, degrees. Where they are
+/// further apart than they say, it is the wider for it (Birge, "The Calculation of Errors by the Method of Least Squares",
+/// 1932).
 fn product(all: impl IntoIterator<Item = (f64, f64)>) -> (f64, f64) {
+    let all: Vec<(f64, f64)> = all.into_iter().collect();
     let (mut x, mut y) = (0.0, 0.0);
-    for (mean_deg, deviation_deg) in all {
+    for (mean_deg, deviation_deg) in &all {
         let (sin, cos) = mean_deg.to_radians().sin_cos();
         let concentration = concentration(deviation_deg.to_radians());
         x += concentration * cos;
         y += concentration * sin;
     }
+    let mean = y.atan2(x).to_degrees();
     let length = resultant(x.hypot(y)).clamp(1e-9, 1.0);
-    let deviation = (-2.0 * length.ln()).max(0.0).sqrt();
-    (y.atan2(x).to_degrees(), deviation.to_degrees())
+    let deviation = (-2.0 * length.ln()).max(0.0).sqrt().to_degrees();
+    let apart = |(one, deviation): &(f64, f64)| {
+        let off = (one - mean + 180.0).rem_euclid(360.0) - 180.0;
+        (off / deviation).powi(2)
+    };
+    let misfit: f64 = all.iter().map(apart).sum();
+    let freedom = all.len().saturating_sub(1).max(1) as f64;
+    (mean, deviation * (misfit / freedom).max(1.0).sqrt())
 }
 
 /// The concentration of a circular standard deviation, radians (Fisher, "Statistical Analysis of Circular Data", 1993,

@@ -133,7 +133,8 @@ impl Initialised {
                     ..found
                 },
                 is_prior_left_out: true,
-                azimuth: self.azimuth,
+                // It was that of the prior.
+                azimuth: None,
             };
         }
         self.found.initialisations = initialisations;

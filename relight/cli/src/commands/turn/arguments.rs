@@ -41,7 +41,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "W,H", value_parser = rim)]
     rim: Option<Elevation>,
     /// The light where it is known, in the viewer's frame at the table's angle 0: coefficients of spherical harmonics
-    /// (nine lines of red, green and blue, or up to 49), or a panorama (.hdr, .exr).
+    /// (nine lines of red, green and blue, or more, up to order 6), or a panorama (.hdr, .exr).
     #[arg(long, value_name = "FILE")]
     pub(super) light: Option<PathBuf>,
     /// The session from which the shard was made, or its video: to see the surroundings (room.png), the table's rim, and

@@ -1,6 +1,7 @@
 use super::*;
 use crate::test_turns::{TAKE, ball, elevation, environment, film};
 use crate::{RotationDirection, TableFrame};
+use relight_core::light::{Order, ShLight};
 
 fn frame() -> TableFrame {
     TableFrame::new(elevation())
@@ -34,6 +35,22 @@ fn two_sources_of_one_kind_are_surer_than_one_and_a_sure_one_outweighs_a_vague_o
     // Across 180 degrees there is no jump.
     let (mean, _) = product([(178.0, 10.0), (-178.0, 10.0)]);
     assert!((mean.abs() - 180.0).abs() < 1e-6, "{mean}");
+}
+
+#[test]
+fn sources_that_contradict_each_other_are_not_as_sure_as_those_that_agree() {
+    let (_, agreed) = product([(0.0, 3.0), (2.0, 3.0)]);
+    let (mean, contradicted) = product([(-100.0, 3.0), (0.0, 3.0)]);
+    assert!((mean + 50.0).abs() < 1e-6 && agreed < 2.2);
+    assert!(contradicted > 45.0, "{contradicted}");
+}
+
+#[test]
+fn a_light_that_is_even_or_black_says_nothing_of_a_bright_side() {
+    let uncertainty = |light: ShLight| of_given(&TableLight::from_viewer(&light, &frame()));
+    assert!(uncertainty(ShLight::dark(Order::TWO)) >= 90.0);
+    assert!(uncertainty(ShLight::even(Order::TWO, [1.0; 3])) > 80.0);
+    assert!(uncertainty(environment()) < 10.0);
 }
 
 #[test]
