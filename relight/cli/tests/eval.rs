@@ -476,7 +476,7 @@ fn a_set_of_another_version_is_refused() {
     write_relighting(dir.path());
     let path = dir.path().join("relighting.json");
     let text = fs::read_to_string(&path).unwrap();
-    fs::write(&path, text.replace("relighting/1", "relighting/9")).unwrap();
+    fs::write(&path, text.replace("relighting/2", "relighting/9")).unwrap();
     let text = with_causes(&RelightingSet::open(dir.path()).unwrap_err());
     assert!(text.contains("relight.relighting/9"), "{text}");
 }

@@ -56,6 +56,15 @@ fn a_plain_line_is_done_by_its_ok_and_gives_what_stood_before_it() {
 }
 
 #[test]
+fn a_setting_with_more_digits_than_grbl_writes_keeps_them() {
+    for line in ["$100=88.8895", "$100=88.889", "$27=1.000"] {
+        let message = parse(line).unwrap();
+        assert_eq!(message.to_string(), line);
+        assert_eq!(parse(&message.to_string()), Some(message));
+    }
+}
+
+#[test]
 fn a_plain_line_is_never_sent_twice_and_after_a_lost_answer_nothing_is_sent_until_a_reset() {
     let mut machine = Machine::new();
     machine.send(0, "G1X1F10", ReplyTimeout::AtOnce).unwrap();
