@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use relight_core::light::{LightError, Order, ShLight};
+use relight_core::render::cosine_lobe;
 
 use crate::model::frame::TableFrame;
 use crate::model::harmonics::{COEFFICIENTS, HarmonicTerm, LAMBERTIAN_COEFFICIENTS};
@@ -180,12 +181,11 @@ impl TableLight {
 
 /// The moments of a channel's light over all directions up to order 2, in the order 1, x, y, z.
 fn moments(light: &ShLight, channel: usize) -> [[f64; 4]; 4] {
-    // A coefficient is the light's moment with its polynomial, which is such a factor times 1, y, z, x, 2xy, yz, 3z² - 1, xz
-    // and x² - y².
+    // A coefficient is the light's moment with its polynomial, which is such a factor, without the lobe's, times 1, y, z, x,
+    // 2xy, yz, 3z² - 1, xz and x² - y².
     let mut of = [0.0; TERMS];
-    for (term, (at, factor)) in OF_COEFFICIENTS.into_iter().enumerate() {
-        let lobe = [PI, 2.0 * PI / 3.0, PI / 4.0][usize::from(term > 0) + usize::from(at > 3)];
-        of[at] = light.coefficients()[at][channel] * lobe / factor.abs();
+    for (at, factor) in OF_COEFFICIENTS {
+        of[at] = light.coefficients()[at][channel] * cosine_lobe(at.isqrt()) / factor.abs();
     }
     let [all, y, z, x, across, yz, above, xz, apart] = of;
     let xy = across / 2.0;
