@@ -134,12 +134,14 @@ impl FakeBoard {
         self.events.insert(Events::LOST_INPUT);
     }
 
-    /// What the interrupt of the emergency-stop pin does.
-    pub(crate) fn press_emergency(&mut self, level: bool) {
+    /// What the interrupt of the emergency-stop pin does; whether it stops the table.
+    pub(crate) fn press_emergency(&mut self, level: bool) -> bool {
         self.emergency = level;
-        if self.stepper.emergency(level) {
+        let active = self.stepper.emergency(level);
+        if active {
             self.events.insert(Events::EMERGENCY);
         }
+        active
     }
 
     /// Lets time go on, with all that interrupts do in it.

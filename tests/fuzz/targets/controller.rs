@@ -28,7 +28,9 @@ fuzz_target!(|bytes: &[u8]| {
         accepted |= table.status().starts_with("<Home");
         assert!(accepted || table.board.turned == before, "moved unasked");
     }
-    table.board.press_emergency(true);
+    // A setting says which of the two levels is the pressed one.
+    let pressed = table.board.press_emergency(true) || table.board.press_emergency(false);
+    assert!(pressed, "no level is the pressed one");
     let stood = table.board.turned;
     table.run_ms(20);
     assert_eq!(
