@@ -88,8 +88,9 @@ impl SrgbTable {
     }
 }
 
+/// The nearest of 256 steps: by half a step more and what is whole of it, as to round is a call where a processor cannot.
 fn byte(value: f32) -> u8 {
-    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+    (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
 /// Red, green and blue of pixels with alpha, and whether any alpha is not full.

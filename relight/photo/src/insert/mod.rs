@@ -41,6 +41,7 @@ mod shadow;
 mod shot;
 mod smooth;
 mod source;
+mod standing;
 mod subject;
 mod sun;
 mod surroundings;

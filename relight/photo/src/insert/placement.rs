@@ -49,6 +49,7 @@ impl Placement {
 }
 
 /// From an object's own pixels to those of a scene: another size, and turned about the middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Fit {
     reduced: Extent,
     pub(super) angle: f64,
@@ -134,13 +135,28 @@ pub(super) fn rows(alpha: &Planes<1>) -> Range<usize> {
     }
 }
 
-/// Where the first pixel of a layer lies, so that its lower edge is where it is wanted.
-pub(super) fn placed(alpha: &Planes<1>, placement: Placement, scene: Extent) -> [i64; 2] {
-    let base = rows(alpha).end;
-    [
-        (placement.at[0] * scene.width as f64 - middle(alpha)).round() as i64,
-        (placement.at[1] * scene.height as f64 - base as f64).round() as i64,
-    ]
+/// The middle of an object's lower edge in its layer, pixels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Foot {
+    across: f64,
+    down: f64,
+}
+
+impl Foot {
+    pub(super) fn of(alpha: &Planes<1>) -> Self {
+        Self {
+            across: middle(alpha),
+            down: rows(alpha).end as f64,
+        }
+    }
+
+    /// Where the first pixel of a layer lies, so that its lower edge is where it is wanted.
+    pub(super) fn first_pixel(&self, placement: Placement, scene: Extent) -> [i64; 2] {
+        [
+            (placement.at[0] * scene.width as f64 - self.across).round() as i64,
+            (placement.at[1] * scene.height as f64 - self.down).round() as i64,
+        ]
+    }
 }
 
 /// The columns in which an object covers at least half of a pixel.

@@ -13,6 +13,10 @@ const ROUNDS: usize = 300;
 const RELAXATION: f32 = 1.9;
 /// Half the thickness that the flattest object has, cells.
 const LEAST_THICKNESS: f32 = 0.75;
+/// The side of a block of cells, as a power of two.
+const BLOCK_BITS: u32 = 3;
+/// The side of a block, cells.
+pub(super) const BLOCK: usize = 1 << BLOCK_BITS;
 
 /// How far an object reaches towards the viewer, cell by cell. What is behind is not seen: it is taken to be the front,
 /// mirrored at the plane of the rim.
@@ -25,6 +29,10 @@ pub(super) struct Relief {
     pub(super) half: Vec<f32>,
     /// The most of it.
     pub(super) thickest: f32,
+    /// The most of it in each block of cells and in those that touch it.
+    near: Vec<f32>,
+    /// Blocks side by side.
+    blocks: usize,
 }
 
 impl Relief {
@@ -61,9 +69,36 @@ impl Relief {
             extent,
             scale,
             thickest: half.iter().fold(0.0, |a, &b| a.max(b)),
+            near: near(&half, extent),
+            blocks: extent.width.div_ceil(BLOCK),
             half,
         })
     }
+
+    /// The most of half the thickness of all cells that are less than a block's side away from this one.
+    pub(super) fn thickest_near(&self, column: usize, row: usize) -> f32 {
+        self.near[(row >> BLOCK_BITS) * self.blocks + (column >> BLOCK_BITS)]
+    }
+}
+
+/// The largest value of each block and those that touch it.
+fn near(half: &[f32], extent: Extent) -> Vec<f32> {
+    let [across, down] = [extent.width, extent.height].map(|side| side.div_ceil(BLOCK));
+    let mut most = vec![0.0_f32; across * down];
+    for (at, &half) in half.iter().enumerate() {
+        let block = at / extent.width / BLOCK * across + at % extent.width / BLOCK;
+        most[block] = most[block].max(half);
+    }
+    let around = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+    (0..most.len())
+        .map(|block| {
+            around(block / across, down)
+                .flat_map(|row| around(block % across, across).map(move |column| [column, row]))
+                .fold(0.0_f32, |all, [column, row]| {
+                    all.max(most[row * across + column])
+                })
+        })
+        .collect()
 }
 
 /// A cell with its neighbours inside.

@@ -2,12 +2,12 @@
 
 use super::layer::{GroundShadow, SceneLayer};
 use super::matching::grain;
-use super::placement::{Fit, placed};
-use super::relief::Relief;
+use super::placement::Fit;
 use super::shadow::Shadow;
+use super::standing::Standing;
 use super::{InsertError, LightSource, Matching, SceneObject, exposure_between};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
-use relight_core::light::{Direction, Normals, Panorama, Rotation, ShLight, YUp};
+use relight_core::light::{Direction, Panorama, Rotation, ShLight};
 
 /// A picture that objects are put into.
 #[derive(Debug)]
@@ -124,57 +124,66 @@ impl<'a> InsertScene<'a> {
             gain *= self.matching.level;
             let scale = exposure_between(subject.light(), &self.light);
             // The object is turned back, and the light with it.
-            let turned = light.rotated(&Rotation::about(Direction::VIEWER, -angle));
+            let turned = if angle == 0.0 {
+                light.clone()
+            } else {
+                light.rotated(&Rotation::about(Direction::VIEWER, -angle))
+            };
             subject.relit(&turned.tinted([f64::from(scale); 3]), &object.change)?
         } else {
             subject.matte().foreground.clone()
         };
-        let alpha = &subject.matte().alpha;
-        let fit = Fit::new(alpha, object.placement, self.extent);
+        let standing = subject.standing(Fit::new(
+            &subject.matte().alpha,
+            object.placement,
+            self.extent,
+        ));
         let mut premultiplied = colours.map(|v| v * gain);
         for plane in premultiplied.planes_mut() {
             plane
                 .iter_mut()
-                .zip(alpha.plane(0))
+                .zip(subject.matte().alpha.plane(0))
                 .for_each(|(v, a)| *v *= a);
         }
-        let (alpha, colours) = (fit.apply(alpha), fit.apply(&premultiplied));
-        let place = placed(&alpha, object.placement, self.extent);
+        let alpha = standing.alpha.clone();
+        let colours = standing.fit.apply(&premultiplied);
+        let place = standing.foot.first_pixel(object.placement, self.extent);
         let shadow = (object.shadow > 0.0)
-            .then(|| self.shadow(object, &fit, &alpha, panorama))
+            .then(|| self.shadow(object, &standing, panorama))
             .flatten()
             .map(|(from, arriving)| GroundShadow {
                 place: [place[0] + from[0], place[1] + from[1]],
                 arriving,
             });
-        let own = grain(&colours, Some(&alpha));
-        let lacking = (self.matching.grain.powi(2) - own.powi(2)).max(0.0).sqrt();
+        let grain = self.lacking_grain(&colours, &alpha);
         Ok(SceneLayer {
             place,
             alpha,
             colours,
             shadow,
-            grain: lacking,
+            grain,
         })
+    }
+
+    /// The grain that the picture has and an object has not.
+    fn lacking_grain(&self, colours: &Planes<3>, alpha: &Planes<1>) -> f32 {
+        let wanted = self.matching.grain;
+        if wanted <= 0.0 {
+            return 0.0;
+        }
+        let own = grain(colours, Some(alpha));
+        (wanted.powi(2) - own.powi(2)).max(0.0).sqrt()
     }
 
     /// The shadow of an object, from its layer's first pixel.
     fn shadow(
         &self,
         object: &SceneObject<'_>,
-        fit: &Fit,
-        alpha: &Planes<1>,
+        standing: &Standing,
         panorama: &Panorama,
     ) -> Option<([i64; 2], Planes<3>)> {
-        let normals = fit.apply(object.subject.normals().planes());
-        let (sin, cos) = (fit.angle.sin() as f32, fit.angle.cos() as f32);
-        let mut turned = normals.clone();
-        let [x, y, _] = turned.planes_mut();
-        for (x, y) in x.iter_mut().zip(y) {
-            [*x, *y] = [cos * *x - sin * *y, sin * *x + cos * *y];
-        }
-        let relief = Relief::new(&Normals::<YUp>::new(turned), alpha)?;
-        let shadow = Shadow::cast(&relief, self.tilt, panorama);
+        let relief = standing.relief(object.subject.normals())?;
+        let shadow = Shadow::cast(relief, self.tilt, panorama);
         let pixels = |cells: f64| cells / relief.scale;
         let extent = shadow.arriving.extent();
         let side = |cells: usize| (pixels(cells as f64).round() as usize).max(1);

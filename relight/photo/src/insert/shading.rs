@@ -17,14 +17,17 @@ const RELIEF: f64 = 0.04;
 pub(super) const TRUST_IN_PHOTOGRAPHS: f32 = 0.6;
 
 /// The shading S of a photograph beside the irradiance E of its light on the normals, with D = (S + d) / (E + d), d = 0.05.
+/// Logarithms are kept: a picture in new light raises to powers at each pixel.
 #[derive(Debug, Clone)]
 pub(super) struct Shading {
-    /// The fine part of D.
+    /// The logarithm of the fine part of D.
     relief: Vec<f32>,
-    /// The coarse part of D: shadows, bounced light, and what order 2 cannot say.
+    /// The logarithm of the coarse part of D: shadows, bounced light, and what order 2 cannot say.
     shadow: Vec<f32>,
     /// What the bounds of D leave of S.
     residual: Vec<f32>,
+    /// The logarithm of S + d.
+    seen: Vec<f32>,
     /// How far it is believed: 1 is wholly.
     trust: f32,
     /// E.
@@ -58,18 +61,20 @@ impl Shading {
         };
         let coarse = smooth(&logarithm);
         let mut result = Self {
-            relief: vec![1.0; own.len()],
-            shadow: vec![1.0; own.len()],
+            relief: vec![0.0; own.len()],
+            shadow: vec![0.0; own.len()],
             residual: vec![0.0; own.len()],
+            seen: own.iter().map(|&own| (own.max(0.0) + DARK).ln()).collect(),
             trust,
             own,
         };
         for at in (0..wanted.len()).filter(|&at| wanted[at]) {
             let (all, coarse) = (logarithm.plane(0)[at], coarse.plane(0)[at]);
-            result.relief[at] = (all - coarse).exp();
-            result.shadow[at] = coarse.exp();
-            let held = all.exp() * (result.own[at] + DARK) - DARK;
-            result.residual[at] = shading.plane(0)[at] - held;
+            result.relief[at] = all - coarse;
+            result.shadow[at] = coarse;
+            let seen = shading.plane(0)[at];
+            result.residual[at] = seen - (all.exp() * (result.own[at] + DARK) - DARK);
+            result.seen[at] = (seen.max(0.0) + DARK).ln();
         }
         result
     }
@@ -81,13 +86,9 @@ impl Shading {
 
     /// The shading of a pixel in new irradiance, red, green and blue, where `kept` of the shadows are kept.
     pub(super) fn at(&self, at: usize, irradiance: [f32; 3], kept: f32) -> [f32; 3] {
-        let shadow = if self.shadow[at] == 1.0 {
-            1.0
-        } else {
-            self.shadow[at].powf(kept)
-        };
+        let ratio = (self.relief[at] + kept * self.shadow[at]).exp();
         irradiance.map(|irradiance| {
-            let shade = self.relief[at] * shadow * (irradiance + DARK) - DARK;
+            let shade = ratio * (irradiance + DARK) - DARK;
             (shade + kept * self.residual[at]).max(0.0)
         })
     }
@@ -101,10 +102,8 @@ impl Shading {
         if self.trust == 1.0 {
             return 1.0;
         }
-        let held = self.relief[at] * self.shadow[at] * (self.own[at] + DARK) - DARK;
-        let own = (held + self.residual[at]).max(0.0);
         let new = new.iter().sum::<f32>() / 3.0;
-        ((own + DARK) / (new + DARK)).powf(1.0 - self.trust)
+        ((1.0 - self.trust) * (self.seen[at] - (new + DARK).ln())).exp()
     }
 }
 

@@ -2,10 +2,9 @@
 //! cast shadow and contact shadow are one.
 
 use std::f64::consts::{PI, TAU};
-use std::iter::StepBy;
 use std::ops::Range;
 
-use super::relief::Relief;
+use super::relief::{BLOCK, Relief};
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Direction, LightSampler, Panorama};
 
@@ -21,9 +20,15 @@ const REACH: f64 = 1.5;
 const BELOW_GROUND: f64 = 0.03;
 /// How far a ray goes at a time, cells: less than one.
 const STEP: f32 = 0.8;
+/// Steps that lead no further than to a block beside: at once where nothing can be met there.
+const LEAP: i32 = (BLOCK as f32 / STEP) as i32 - 1;
+/// Steps that are looked at one by one before it is asked again whether anything can be met.
+const LOOKS: i32 = 4;
 /// Bits behind the point of a place in fixed point; shapes and their grounds have a few hundred cells.
 const FIXED_BITS: u32 = 16;
 const FIXED: f32 = (1 << FIXED_BITS) as f32;
+/// The least part of the light that is missed where it is gone: less than a step of 8 bits.
+const LEAST_SEEN: f32 = 0.002;
 /// The least part of a direction along an axis.
 const LEAST_LEAN: f32 = 1e-6;
 /// Ground that is seen more edge-on than this is as if it were seen so, radians.
@@ -44,9 +49,40 @@ struct Ray {
     towards: [f32; 3],
     /// One over each part of the direction, so that the shape's box is found without a division.
     over: [f32; 3],
+    /// The sides by which it enters the shape's box, and those by which it leaves it.
+    sides: [[f32; 3]; 2],
     light: [f32; 3],
-    /// Columns and rows of the ground from which it may meet the shape, from the relief's first cell.
-    shaded: [Range<f32>; 2],
+}
+
+impl Ray {
+    /// How far along the ray the rows and depths of the shape's box are passed, from where it starts.
+    fn inside_from(&self, y: f32, z: f32) -> Range<f32> {
+        self.within(2, z, self.within(1, y, 0.0..f32::INFINITY))
+    }
+
+    /// The columns from which the box is met so far along.
+    fn columns(&self, inside: &Range<f32>) -> Range<f32> {
+        let [one, other] = self.sides.map(|side| side[0]);
+        let back = [inside.start, inside.end].map(|along| -along * self.towards[0]);
+        Range {
+            start: one.min(other) + back[0].min(back[1]),
+            end: one.max(other) + back[0].max(back[1]),
+        }
+    }
+
+    /// What lies between the box's two sides across an axis too.
+    fn within(&self, axis: usize, from: f32, along: Range<f32>) -> Range<f32> {
+        let [enter, leave] = self.sides.map(|side| (side[axis] - from) * self.over[axis]);
+        // Not by `max` and `min`, which look for what is no number.
+        Range {
+            start: if enter > along.start {
+                enter
+            } else {
+                along.start
+            },
+            end: if leave < along.end { leave } else { along.end },
+        }
+    }
 }
 
 /// The ground: points p with p · up = level.
@@ -70,22 +106,49 @@ impl Shadow {
         let from = [-(beside as i64), 0];
         let mut arriving = Planes::zeros(extent);
         arriving.fill_rows(|y, mut row| {
-            for column in 0..PATTERN {
-                let rays = &patterns[y % PATTERN * PATTERN + column];
-                let cells = (column..extent.width).step_by(PATTERN);
-                ground.shade(
-                    relief,
-                    rays,
-                    &mut row,
-                    (cells, y as f64 + 0.5, from[0] as f64),
-                );
+            for phase in 0..PATTERN {
+                let rays = &patterns[y % PATTERN * PATTERN + phase];
+                let below = y as f64 + 0.5;
+                ground.shade(relief, rays, &mut row, (phase, below, from[0] as f64));
             }
         });
         // Every square of the pattern holds all directions.
-        let smooth = super::smooth::blurred(&arriving, PATTERN / 2);
+        let arriving = super::smooth::blurred(&arriving, PATTERN / 2);
+        Self { arriving, from }.trimmed()
+    }
+
+    /// The part of it that can be seen.
+    fn trimmed(self) -> Self {
+        let Extent { width, height } = self.arriving.extent();
+        let is_seen = |x: usize, y: usize| {
+            let kept = self.arriving.pixel(x, y).map(|arriving| 1.0 - arriving);
+            kept.into_iter().any(|kept| kept > LEAST_SEEN)
+        };
+        let mut seen = [width..0, height..0];
+        for y in 0..height {
+            for x in (0..width).filter(|&x| is_seen(x, y)) {
+                seen = [(0, x), (1, y)].map(|(axis, at)| {
+                    let Range { start, end } = seen[axis];
+                    start.min(at)..end.max(at + 1)
+                });
+            }
+        }
+        let [columns, rows] = seen;
+        if columns.is_empty() {
+            return Self {
+                arriving: Planes::filled(Extent::new(1, 1), [1.0; 3]),
+                from: self.from,
+            };
+        }
+        let part = Extent::new(columns.len(), rows.len());
         Self {
-            arriving: smooth,
-            from,
+            arriving: Planes::from_fn(part, |x, y| {
+                self.arriving.pixel(columns.start + x, rows.start + y)
+            }),
+            from: [
+                self.from[0] + columns.start as i64,
+                self.from[1] + rows.start as i64,
+            ],
         }
     }
 }
@@ -112,69 +175,48 @@ impl Ground {
         }
     }
 
-    /// Fills in the part of the light that arrives at some cells of a row of the ground, which is so far below the relief's
-    /// first row; the row begins at column `first` of the relief.
+    /// Fills in the part of the light that arrives at every fourth cell of a row of the ground, from cell `phase` on. The row is so
+    /// far below the relief's first row, and begins at column `first` of the relief.
     fn shade(
         &self,
         relief: &Relief,
         rays: &[Ray],
         row: &mut [&mut [f32]; 3],
-        (cells, below, first): (StepBy<Range<usize>>, f64, f64),
+        (phase, below, first): (usize, f64, f64),
     ) {
         let z = (self.level + below * self.up[1]) / self.up[2];
-        let all = rays.iter().fold([0.0_f32; 3], |all, ray| {
-            [0, 1, 2].map(|c| all[c] + ray.light[c])
-        });
+        let [y, z] = [-below as f32, z as f32];
+        let middle = 0.5 + first as f32;
         // First all that is kept from each cell, then what is left of the light.
-        for ray in rays
-            .iter()
-            .filter(|ray| ray.shaded[1].contains(&(below as f32)))
-        {
-            for x in cells.clone() {
-                let at = (x as f64 + 0.5 + first) as f32;
-                let may_meet = ray.shaded[0].contains(&at);
-                if may_meet && relief.blocks([at, -below as f32, z as f32], ray) {
+        for ray in rays {
+            let inside = ray.inside_from(y, z);
+            if inside.is_empty() {
+                continue;
+            }
+            let columns = ray.columns(&inside);
+            let end = ((columns.end - middle).floor() + 1.0) as usize;
+            let from = (columns.start - middle).ceil() as usize;
+            let from = from.saturating_sub(phase).next_multiple_of(PATTERN) + phase;
+            for x in (from..end.min(row[0].len())).step_by(PATTERN) {
+                if relief.blocks([x as f32 + middle, y, z], ray, &inside) {
                     for (line, light) in row.iter_mut().zip(ray.light) {
                         line[x] += light;
                     }
                 }
             }
         }
+        let all = rays.iter().fold([0.0_f32; 3], |all, ray| {
+            [0, 1, 2].map(|c| all[c] + ray.light[c])
+        });
         for (line, all) in row.iter_mut().zip(all) {
-            for x in cells.clone() {
-                let kept = if all > 0.0 { line[x] / all } else { 0.0 };
-                line[x] = (1.0 - kept).max(0.0);
+            for kept in line.iter_mut().skip(phase).step_by(PATTERN) {
+                *kept = if all > 0.0 {
+                    (1.0 - *kept / all).max(0.0)
+                } else {
+                    1.0
+                };
             }
         }
-    }
-
-    /// Columns and rows of the ground, rows downwards, from which a direction leads into a box.
-    fn shaded(&self, [low, high]: [[f32; 3]; 2], towards: [f32; 3]) -> [Range<f32>; 2] {
-        let rises: f64 = (0..3)
-            .map(|axis| f64::from(towards[axis]) * self.up[axis])
-            .sum();
-        let mut ranges = [
-            f32::INFINITY..f32::NEG_INFINITY,
-            f32::INFINITY..f32::NEG_INFINITY,
-        ];
-        for corner in 0..8 {
-            let place = [0, 1, 2].map(|axis| match corner >> axis & 1 {
-                0 => f64::from(low[axis]),
-                _ => f64::from(high[axis]),
-            });
-            let above: f64 = (0..3).map(|axis| place[axis] * self.up[axis]).sum();
-            // A ray meets what is above the ground: the corner itself, or, of an edge that enters the ground, a place between
-            // its ends.
-            let back = ((above - self.level) / rises.max(1e-6)).max(0.0);
-            for back in [0.0, back] {
-                let seen = [0, 1].map(|axis| place[axis] - back * f64::from(towards[axis]));
-                for (range, at) in ranges.iter_mut().zip([seen[0], -seen[1]]) {
-                    range.start = range.start.min(at as f32 - 1.0);
-                    range.end = range.end.max(at as f32 + 1.0);
-                }
-            }
-        }
-        ranges
     }
 }
 
@@ -188,37 +230,86 @@ impl Relief {
         ]
     }
 
-    /// Whether the shape is in the way from a point in a direction. Its cells are 1 wide; rows lie below y = 0.
-    fn blocks(&self, from: [f32; 3], ray: &Ray) -> bool {
-        let Extent { width, height } = self.extent;
-        let [low, high] = self.around();
-        let (mut enter, mut leave) = (0.0_f32, f32::INFINITY);
-        for axis in 0..3 {
-            let ends = [low[axis], high[axis]].map(|end| (end - from[axis]) * ray.over[axis]);
-            enter = enter.max(ends[0].min(ends[1]));
-            leave = leave.min(ends[0].max(ends[1]));
-        }
-        // The first step is a little above the ground.
-        let along = enter + 0.4;
-        let steps = ((leave - along) / STEP).ceil().max(0.0) as usize;
-        let [x, y, mut z] = [0, 1, 2].map(|axis| from[axis] + along * ray.towards[axis]);
-        let [right, up, forward] = ray.towards.map(|part| STEP * part);
-        // Columns and rows in fixed point: floating point would be made whole at each step.
-        let fixed = |cells: f32| (cells * FIXED) as i32;
-        let [mut column, mut row] = [fixed(x), fixed(-y)];
-        let [right, down] = [fixed(right), fixed(-up)];
-        for _ in 0..steps {
-            let [at, line] = [column, row].map(|place| (place >> FIXED_BITS) as usize);
-            // What lies left or above is a very large number.
-            if at < width && line < height {
-                let half = self.half[line * width + at];
-                if half > 0.0 && z.abs() <= half {
+    /// Whether the shape is in the way from a point in a direction, `inside` of which rows and depths of the box are passed. Its cells
+    /// are 1 wide; rows lie below y = 0.
+    fn blocks(&self, from: [f32; 3], ray: &Ray, inside: &Range<f32>) -> bool {
+        let mut walk = Walk::through(ray, from, inside);
+        while walk.left > 0 {
+            let near = self.cell(&walk).map_or(self.thickest, |[column, row]| {
+                self.thickest_near(column, row)
+            });
+            if walk.passes(near) {
+                walk.go(LEAP);
+                continue;
+            }
+            for _ in 0..LOOKS.min(walk.left) {
+                if self.holds(&walk) {
                     return true;
                 }
+                walk.go(1);
             }
-            (column, row, z) = (column + right, row + down, z + forward);
         }
         false
+    }
+
+    /// The column and row at which a walk is, where that is among the cells.
+    fn cell(&self, walk: &Walk) -> Option<[usize; 2]> {
+        // What lies left or above is a very large number.
+        let [column, row] = walk.place.map(|place| (place >> FIXED_BITS) as usize);
+        (column < self.extent.width && row < self.extent.height).then_some([column, row])
+    }
+
+    /// Whether a walk is inside of the shape.
+    fn holds(&self, walk: &Walk) -> bool {
+        self.cell(walk).is_some_and(|[column, row]| {
+            let half = self.half[row * self.extent.width + column];
+            half > 0.0 && walk.z.abs() <= half
+        })
+    }
+}
+
+/// A way through the box around a shape, step by step.
+struct Walk {
+    /// Column and row in fixed point: floating point would be made whole at each step.
+    place: [i32; 2],
+    z: f32,
+    /// What a step adds to them.
+    across: [i32; 2],
+    forward: f32,
+    /// Steps that are left.
+    left: i32,
+}
+
+impl Walk {
+    /// From where a ray that starts at a point enters the box to where it leaves it.
+    fn through(ray: &Ray, from: [f32; 3], inside: &Range<f32>) -> Self {
+        let Range {
+            start: enter,
+            end: leave,
+        } = ray.within(0, from[0], inside.clone());
+        // The first step is a little above the ground.
+        let along = enter + 0.4;
+        let [x, y, z] = [0, 1, 2].map(|axis| from[axis] + along * ray.towards[axis]);
+        let [right, up, forward] = ray.towards.map(|part| STEP * part);
+        let fixed = |cells: f32| (cells * FIXED) as i32;
+        Self {
+            place: [fixed(x), fixed(-y)],
+            z,
+            across: [fixed(right), fixed(-up)],
+            forward,
+            left: ((leave - along) / STEP).ceil() as i32,
+        }
+    }
+
+    /// Whether the next steps, as many as can be leapt, meet nothing that is at most so thick to both sides.
+    fn passes(&self, half: f32) -> bool {
+        half <= 0.0 || self.z.abs() - LEAP as f32 * self.forward.abs() > half
+    }
+
+    fn go(&mut self, steps: i32) {
+        self.place = [0, 1].map(|axis| self.place[axis] + steps * self.across[axis]);
+        self.z += steps as f32 * self.forward;
+        self.left -= steps;
     }
 }
 
@@ -250,7 +341,7 @@ fn rays(ground: &Ground, around: [[f32; 3]; 2], light: &Panorama) -> Vec<Vec<Ray
         Some(Ray {
             towards: leaning,
             over: leaning.map(|part| 1.0 / part),
-            shaded: ground.shaded(around, leaning),
+            sides: sides(around, leaning),
             light: light.map(|l| l * (cosine / density) as f32),
         })
     };
@@ -271,6 +362,20 @@ fn rays(ground: &Ground, around: [[f32; 3]; 2], light: &Panorama) -> Vec<Vec<Ray
         drawn
     };
     (0..PATTERN * PATTERN).map(pattern).collect()
+}
+
+/// Of the sides of a box with these corners those by which a direction enters it, and those by which it leaves it.
+fn sides([low, high]: [[f32; 3]; 2], towards: [f32; 3]) -> [[f32; 3]; 2] {
+    let of = |enters: bool| {
+        [0, 1, 2].map(|axis| {
+            if (towards[axis] > 0.0) == enters {
+                low[axis]
+            } else {
+                high[axis]
+            }
+        })
+    };
+    [of(true), of(false)]
 }
 
 #[cfg(test)]
@@ -298,26 +403,34 @@ mod tests {
         lamp.panorama(Extent::new(128, 64))
     }
 
-    /// The mean of what arrives on the left and on the right of the object.
-    fn sides(shadow: &Shadow, relief: &Relief) -> [f32; 2] {
-        let extent = shadow.arriving.extent();
-        let first = (-shadow.from[0]) as usize;
-        let mut sums = [0.0_f32; 2];
-        for y in 0..extent.height {
-            for x in 0..first {
-                sums[0] += 1.0 - shadow.arriving.pixel(x, y)[0];
-                sums[1] += 1.0 - shadow.arriving.pixel(first + relief.extent.width + x, y)[0];
-            }
+    /// What arrives at a cell of the relief's columns and rows, or beside them.
+    fn arriving(shadow: &Shadow, x: i64, y: i64) -> f32 {
+        let Extent { width, height } = shadow.arriving.extent();
+        let [x, y] = [x - shadow.from[0], y - shadow.from[1]];
+        if (0..width as i64).contains(&x) && (0..height as i64).contains(&y) {
+            shadow.arriving.pixel(x as usize, y as usize)[0]
+        } else {
+            1.0
         }
-        sums
+    }
+
+    /// What is missing on the left and on the right of the object.
+    fn missing_beside(shadow: &Shadow, relief: &Relief) -> [f32; 2] {
+        let Extent { width, height } = relief.extent;
+        let missing = |columns: Range<i64>| {
+            let cells = columns.flat_map(|x| (0..4 * height as i64).map(move |y| [x, y]));
+            cells.map(|[x, y]| 1.0 - arriving(shadow, x, y)).sum()
+        };
+        let width = width as i64;
+        [missing(-3 * width..0), missing(width..4 * width)]
     }
 
     #[test]
     fn a_shadow_lies_on_the_side_away_from_the_lamp() {
         let relief = ball();
-        let [left, right] = sides(&Shadow::cast(&relief, 0.4, &lamp(90.0, 0.0)), &relief);
+        let [left, right] = missing_beside(&Shadow::cast(&relief, 0.4, &lamp(90.0, 0.0)), &relief);
         assert!(left > 50.0 && right < 0.1 * left, "{left} {right}");
-        let [left, right] = sides(&Shadow::cast(&relief, 0.4, &lamp(-90.0, 0.0)), &relief);
+        let [left, right] = missing_beside(&Shadow::cast(&relief, 0.4, &lamp(-90.0, 0.0)), &relief);
         assert!(right > 50.0 && left < 0.1 * right, "{left} {right}");
     }
 
@@ -329,14 +442,25 @@ mod tests {
             Extent::new(64, 32),
         );
         let shadow = Shadow::cast(&relief, 0.4, &even);
-        let first = (-shadow.from[0]) as usize;
-        let below = shadow
-            .arriving
-            .pixel(first + relief.extent.width / 2, relief.extent.height)[0];
-        let beside = shadow.arriving.pixel(4, relief.extent.height)[0];
+        let Extent { width, height } = relief.extent;
+        let [width, height] = [width, height].map(|side| side as i64);
+        let below = arriving(&shadow, width / 2, height);
+        let beside = arriving(&shadow, 4 - 3 * width / 2, height);
         assert!(below < 0.8 && beside > 0.95, "{below} {beside}");
-        let [left, right] = sides(&shadow, &relief);
+        let [left, right] = missing_beside(&shadow, &relief);
         assert!((left / right - 1.0).abs() < 0.15, "{left} {right}");
+    }
+
+    /// Whether a ray is inside of the shape in any of its steps, all looked at.
+    fn is_met(relief: &Relief, from: [f32; 3], ray: &Ray) -> bool {
+        let mut walk = Walk::through(ray, from, &ray.inside_from(from[1], from[2]));
+        while walk.left > 0 {
+            if relief.holds(&walk) {
+                return true;
+            }
+            walk.go(1);
+        }
+        false
     }
 
     #[test]
@@ -351,10 +475,13 @@ mod tests {
             let x = (number * 37 % 200) as f32 - 70.0;
             let below = (number * 53 % 110) as f32;
             let z = ((ground.level + f64::from(below) * ground.up[1]) / ground.up[2]) as f32;
-            if relief.blocks([x, -below, z], ray) {
+            let inside = ray.inside_from(-below, z);
+            let blocked = relief.blocks([x, -below, z], ray, &inside);
+            assert_eq!(blocked, is_met(&relief, [x, -below, z], ray), "{x} {below}");
+            if blocked {
                 met += 1;
-                let [columns, rows] = &ray.shaded;
-                assert!(columns.contains(&x) && rows.contains(&below), "{x} {below}");
+                let columns = ray.columns(&inside);
+                assert!(!inside.is_empty() && columns.contains(&x), "{x} {below}");
             }
         }
         assert!(met > 30, "{met}");

@@ -1,12 +1,16 @@
 //! An object out of a photograph, decomposed so that it can be shown in another light.
 
+use std::sync::Arc;
+
 use super::InsertError;
 use super::cut::{Cut, EdgeColours};
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
+use super::placement::Fit;
 use super::shading::{DARK, Shading, TRUST_IN_PHOTOGRAPHS};
 use super::smooth::weighted_mean;
 use super::source::likeness;
+use super::standing::{LastStanding, Standing};
 use crate::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, WORKING_SIDE,
 };
@@ -53,6 +57,7 @@ pub struct Subject {
     /// Foreground less diffuse part and highlight.
     rest: Planes<3>,
     light: ShLight,
+    last_standing: LastStanding,
 }
 
 impl Subject {
@@ -146,6 +151,7 @@ impl Subject {
             gloss: surface.gloss().map(|gloss| mean_gloss(gloss, &covered)),
             rest: Planes::zeros(extent),
             light,
+            last_standing: LastStanding::default(),
         })
     }
 
@@ -204,6 +210,7 @@ impl Subject {
             gloss,
             rest,
             light: found.light.clone(),
+            last_standing: LastStanding::default(),
         })
     }
 
@@ -254,6 +261,11 @@ impl Subject {
     #[must_use]
     pub const fn normals(&self) -> &Normals<YUp> {
         &self.normals
+    }
+
+    /// The object as it stands by this fit.
+    pub(super) fn standing(&self, fit: Fit) -> Arc<Standing> {
+        self.last_standing.by(fit, &self.matte.alpha)
     }
 
     /// The object's albedo, in units in which the mean shading is 1.

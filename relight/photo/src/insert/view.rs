@@ -56,34 +56,48 @@ impl PanoramaView {
         let shift = (turn / (2.0 * PI)).rem_euclid(1.0) as f32;
         let mut picture = Planes::zeros(self.extent);
         let columns = self.extent.width;
-        picture.fill_rows(|y, row| {
+        picture.fill_rows(|y, [red, green, blue]| {
             let places = &self.places[y * columns..][..columns];
-            let [red, green, blue] = row;
-            for (x, &[across, down]) in places.iter().enumerate() {
+            let pixels = red.iter_mut().zip(green).zip(blue).zip(places);
+            for (((red, green), blue), &[across, down]) in pixels {
                 let (left, right, part) = between_around(across + shift, width);
                 let (above, below, under) = between(down, height);
-                let of = |plane: &[f32]| {
-                    let mix = |row: usize| {
-                        let line = &plane[row * width..][..width];
-                        line[left] + (line[right] - line[left]) * part
-                    };
-                    let upper = mix(above);
-                    upper + (mix(below) - upper) * under
-                };
-                [red[x], green[x], blue[x]] = planes.map(of);
+                let (above, below) = (above * width, below * width);
+                let corners = [above + left, above + right, below + left, below + right];
+                *red = mixed(planes[0], corners, [part, under]);
+                *green = mixed(planes[1], corners, [part, under]);
+                *blue = mixed(planes[2], corners, [part, under]);
             }
         });
         Rgb::new(picture)
     }
 }
 
-/// The pixels between whose middles a place lies, and how far it is to the second; the ends meet.
+/// The value between four pixels, so far to the right and down.
+#[inline]
+fn mixed(plane: &[f32], [a, b, c, d]: [usize; 4], [right, down]: [f32; 2]) -> f32 {
+    let upper = plane[a] + (plane[b] - plane[a]) * right;
+    let lower = plane[c] + (plane[d] - plane[c]) * right;
+    upper + (lower - upper) * down
+}
+
+/// The pixels between whose middles a place lies, and how far it is to the second; the ends meet. A place lies less than a width
+/// outside.
 fn between_around(part: f32, pixels: usize) -> (usize, usize, f32) {
     let place = part * pixels as f32 - 0.5;
-    let first = place.floor();
-    // A place lies less than a width outside.
-    let left = (first as i64).rem_euclid(pixels as i64) as usize;
-    (left, (left + 1) % pixels, place - first)
+    let place = if place < 0.0 {
+        place + pixels as f32
+    } else {
+        place
+    };
+    let first = place as usize;
+    let left = if first >= pixels {
+        first - pixels
+    } else {
+        first
+    };
+    let right = if left + 1 == pixels { 0 } else { left + 1 };
+    (left, right, place - first as f32)
 }
 
 /// The same, where there is nothing beyond the ends.

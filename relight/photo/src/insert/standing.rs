@@ -1,0 +1,112 @@
+//! An object at the size and the angle at which it stands in a picture: all that neither light nor its place changes.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use super::placement::{Fit, Foot};
+use super::relief::Relief;
+use relight_core::image::Planes;
+use relight_core::light::{Normals, YUp};
+
+/// An object as it stands, without its colours.
+#[derive(Debug)]
+pub(super) struct Standing {
+    pub(super) fit: Fit,
+    /// How far it covers each pixel of the picture.
+    pub(super) alpha: Planes<1>,
+    pub(super) foot: Foot,
+    /// Its shape, once a shadow was asked for.
+    relief: OnceLock<Option<Relief>>,
+}
+
+impl Standing {
+    fn new(alpha: &Planes<1>, fit: Fit) -> Self {
+        let alpha = fit.apply(alpha);
+        Self {
+            foot: Foot::of(&alpha),
+            fit,
+            alpha,
+            relief: OnceLock::new(),
+        }
+    }
+
+    /// The shape of the object whose own normals these are; none where it covers no pixel by a half.
+    pub(super) fn relief(&self, normals: &Normals<YUp>) -> Option<&Relief> {
+        let shape = self.relief.get_or_init(|| {
+            let mut turned = self.fit.apply(normals.planes());
+            let (sin, cos) = (self.fit.angle.sin() as f32, self.fit.angle.cos() as f32);
+            let [x, y, _] = turned.planes_mut();
+            for (x, y) in x.iter_mut().zip(y) {
+                [*x, *y] = [cos * *x - sin * *y, sin * *x + cos * *y];
+            }
+            Relief::new(&Normals::<YUp>::new(turned), &self.alpha)
+        });
+        shape.as_ref()
+    }
+}
+
+/// How an object stood last: while its light turns, or it is moved, it stands so again.
+#[derive(Debug, Default)]
+pub(super) struct LastStanding(Mutex<Option<Arc<Standing>>>);
+
+impl LastStanding {
+    /// An object that covers its own pixels so far, as it stands by this fit.
+    pub(super) fn by(&self, fit: Fit, alpha: &Planes<1>) -> Arc<Standing> {
+        // What is kept is always whole, whoever had the lock.
+        let mut last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*last {
+            Some(standing) if standing.fit == fit => Arc::clone(standing),
+            _ => Arc::clone(last.insert(Arc::new(Standing::new(alpha, fit)))),
+        }
+    }
+}
+
+impl Clone for LastStanding {
+    fn clone(&self) -> Self {
+        let last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        Self(Mutex::new(last.clone()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Placement;
+    use super::*;
+    use relight_core::image::Extent;
+
+    fn disc() -> Planes<1> {
+        Planes::from_fn(Extent::new(40, 40), |x, y| {
+            let [x, y] = [x, y].map(|at| at as f32 - 19.5);
+            [f32::from(u8::from(x.hypot(y) < 16.0))]
+        })
+    }
+
+    fn fit(height: f64, rotation: f64) -> Fit {
+        let placement = Placement {
+            at: [0.5, 0.9],
+            height,
+            rotation,
+        };
+        Fit::new(&disc(), placement, Extent::new(160, 120))
+    }
+
+    #[test]
+    fn what_stands_as_before_is_not_made_again() {
+        let last = LastStanding::default();
+        let first = last.by(fit(0.5, 0.0), &disc());
+        assert!(Arc::ptr_eq(&first, &last.by(fit(0.5, 0.0), &disc())));
+        let shape = first.relief(&Normals::sphere(40)).unwrap();
+        let again = first.relief(&Normals::sphere(40)).unwrap();
+        assert!(std::ptr::eq(shape, again));
+    }
+
+    #[test]
+    fn what_stands_otherwise_is() {
+        let last = LastStanding::default();
+        let first = last.by(fit(0.5, 0.0), &disc());
+        for other in [fit(0.6, 0.0), fit(0.5, 20.0)] {
+            let changed = last.by(other, &disc());
+            assert_eq!(changed.fit, other);
+            assert_ne!(changed.alpha.extent(), first.alpha.extent());
+        }
+    }
+}
