@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-train train-turn test test-day test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-train train-turn test test-day test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -121,7 +121,10 @@ bench-python: wheel $(DEMO)/mask.png ## Measure the reader through Python agains
 image: packages ## Make a container image of relit-extract, relit-mask and relight, as an OCI layout
 	@.ci/image
 
-release: packages wheel image ## Make all that a release has: packages, wheel, image, checksums, list of crates
+static: ## Make relight as one file that needs no library
+	@.ci/static
+
+release: packages wheel image static ## Make all that a release has: packages, wheel, image, static file, checksums, list of crates
 	@.ci/release
 
 lint: setup ## Check formatting, lints and documentation
