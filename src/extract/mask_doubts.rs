@@ -1,14 +1,22 @@
 //! A look at the mask before it is used for a whole data set, by a few frames of the video.
+//!
+//! Frames and mask are looked at in a small size: an error of the mask that is worth a warning is a region that is wide.
 
-use image::GrayImage;
+use std::borrow::Cow;
+
+use image::{GrayImage, ImageBuffer, Pixel, RgbImage};
 use relit_data::shard::MaskMisfit;
-use relit_grabcut::{Effort, MaskCheck, MaskError, ShapeCheck, TurnFrames, TurnStatistics};
-use relit_video::Video;
+use relit_grabcut::{
+    Effort, MIN_SIDE, MaskCheck, MaskError, ShapeCheck, TurnFrames, TurnStatistics, half_image,
+};
+use relit_video::{Video, VideoError};
 
 use super::ExtractError;
 
 /// Frames that are looked at.
 const FRAMES: usize = 12;
+/// Frames are halved until they have at most so many pixels.
+const MOST_PIXELS: u64 = 240_000;
 
 /// What is worth a warning about a mask.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,27 +38,64 @@ pub fn mask_doubts(
     mask: &GrayImage,
     frame: Option<u64>,
 ) -> Result<MaskDoubts, ExtractError> {
-    let numbers = video.quick_spread(FRAMES);
-    let size = mask.dimensions();
-    let mut turn = TurnFrames::new(size.0, size.1);
-    for (_, picture) in video.pictures(&numbers, size)? {
-        turn.push(&picture);
-    }
+    let halvings = halvings(mask.dimensions());
+    let small = halved(mask, halvings);
+    let mut turn = TurnFrames::new(small.width(), small.height());
+    let frame = collect(video, mask.dimensions(), halvings, frame, &mut turn)?;
     let statistics = TurnStatistics::new(&turn);
-    let check = match MaskCheck::new(mask, &statistics) {
+    let check = match MaskCheck::new(&small, &statistics) {
         Ok(check) => check,
         Err(MaskError::FewFrames { .. } | MaskError::Empty) => return Ok(MaskDoubts::default()),
         Err(error) => return Err(error.into()),
     };
-    let of_mask = frame.and_then(|number| video.frame(number).ok());
-    let frame = match (of_mask, numbers.get(numbers.len() / 2)) {
-        (Some(frame), _) => frame,
-        (None, Some(&middle)) => video.frame(middle)?,
-        (None, None) => return Ok(MaskDoubts::default()),
+    let Some(frame) = frame else {
+        return Ok(MaskDoubts::default());
     };
-    // What is a region is wide: an edge that is blocky in a large frame changes none.
     let shape = check.shape(&frame, Effort::Draft)?;
+    let shape = shape.map(|shape| shape.enlarged(1 << halvings));
     Ok(shape.as_ref().map(doubts).unwrap_or_default())
+}
+
+/// Puts some frames, halved, into `turn`. Returns the one on which the mask was made, halved too: one in the middle if
+/// that is not known.
+fn collect(
+    video: &Video,
+    size: (u32, u32),
+    halvings: u32,
+    of_mask: Option<u64>,
+    turn: &mut TurnFrames,
+) -> Result<Option<RgbImage>, VideoError> {
+    let numbers = video.quick_spread(FRAMES);
+    let middle = numbers.get(numbers.len() / 2).copied();
+    let of_mask = of_mask.and_then(|number| video.frame(number).ok());
+    let mut shown = of_mask.map(|frame| halved(&frame, halvings).into_owned());
+    for (number, picture) in video.pictures(&numbers, size)? {
+        let picture = halved(&picture, halvings);
+        turn.push(&picture);
+        if shown.is_none() && Some(number) >= middle {
+            shown = Some(picture.into_owned());
+        }
+    }
+    Ok(shown)
+}
+
+/// How often a frame of this size is halved.
+fn halvings((width, height): (u32, u32)) -> u32 {
+    let too_large = |by: &u32| {
+        let (width, height) = (width >> by, height >> by);
+        let pixels = u64::from(width) * u64::from(height);
+        pixels > MOST_PIXELS && width.min(height) >= 2 * MIN_SIDE
+    };
+    (0..).take_while(too_large).count() as u32
+}
+
+fn halved<P: Pixel<Subpixel = u8>>(
+    image: &ImageBuffer<P, Vec<u8>>,
+    halvings: u32,
+) -> Cow<'_, ImageBuffer<P, Vec<u8>>> {
+    (0..halvings).fold(Cow::Borrowed(image), |image, _| {
+        Cow::Owned(half_image(&image))
+    })
 }
 
 fn doubts(shape: &ShapeCheck) -> MaskDoubts {

@@ -71,6 +71,34 @@ pub struct ShapeCheck {
     pub holes: Vec<DoubtfulRegion>,
 }
 
+impl ShapeCheck {
+    /// The same in pixels of frames that are `by` times as wide and high as those that were compared.
+    #[must_use]
+    pub fn enlarged(mut self, by: u32) -> Self {
+        let area = u64::from(by) * u64::from(by);
+        self.area_px *= area;
+        self.edge_px = self.edge_px.map(|distance| distance * by as f32);
+        let Self {
+            leaks,
+            missing,
+            holes,
+            ..
+        } = &mut self;
+        for region in [leaks, missing, holes].into_iter().flatten() {
+            let Rect { x, y, w, h } = region.bounds;
+            let signed = i32::try_from(by).unwrap_or(i32::MAX);
+            region.px *= area;
+            region.bounds = Rect::new(
+                x.saturating_mul(signed),
+                y.saturating_mul(signed),
+                w.saturating_mul(by),
+                h.saturating_mul(by),
+            );
+        }
+        self
+    }
+}
+
 /// A mask that is held against the frames of a turn.
 #[derive(Debug)]
 pub struct MaskCheck<'a> {

@@ -91,6 +91,7 @@ pub use hints::{Hints, Mark, Seeds};
 pub use mask::{Mask, MaskStatistics};
 pub use outline::outline;
 pub use preview::preview;
+pub use pyramid::half_image;
 pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
 pub use segment::{check_hints, clean_cut, segment, segment_turn, segment_with, start_cuts};
 pub use settings::{

@@ -3,7 +3,7 @@
 //!
 //! Time and memory therefore grow with the length of the object's edge, not with the image's area.
 
-use image::RgbImage;
+use image::{ImageBuffer, Pixel, RgbImage};
 
 use super::bitmap::Bitmap;
 use super::grab_cut::{self, Field, Label, Models, OpenCut, SMOOTHNESS};
@@ -193,23 +193,34 @@ fn pixels(image: &RgbImage) -> usize {
     size(image).0 * size(image).1
 }
 
-/// Each pixel is the average of 2 x 2; the last column and row of an odd side are doubled.
-pub(super) fn half_image(image: &RgbImage) -> RgbImage {
+/// Half the image: each pixel is the average of 2 x 2; the last column and row of an odd side are doubled.
+#[must_use]
+pub fn half_image<P: Pixel<Subpixel = u8>>(
+    image: &ImageBuffer<P, Vec<u8>>,
+) -> ImageBuffer<P, Vec<u8>> {
+    let channels = usize::from(P::CHANNEL_COUNT);
     let (width, height) = image.dimensions();
-    RgbImage::from_fn(width.div_ceil(2), height.div_ceil(2), |x, y| {
-        let columns = [2 * x, (2 * x + 1).min(width - 1)];
-        let rows = [2 * y, (2 * y + 1).min(height - 1)];
-        let mut sum = [2_u16; 3];
-        for row in rows {
-            for column in columns {
-                let pixel = image.get_pixel(column, row).0;
-                sum.iter_mut()
-                    .zip(pixel)
-                    .for_each(|(sum, level)| *sum += u16::from(level));
+    let mut half = ImageBuffer::new(width.div_ceil(2), height.div_ceil(2));
+    let row_bytes = channels * width as usize;
+    if row_bytes == 0 {
+        return half;
+    }
+    let to = half.chunks_exact_mut(channels * width.div_ceil(2) as usize);
+    for (to, pair) in to.zip(image.as_raw().chunks(2 * row_bytes)) {
+        let (above, below) = pair.split_at(row_bytes);
+        let below = if below.is_empty() { above } else { below };
+        let pairs = above.chunks(2 * channels).zip(below.chunks(2 * channels));
+        for (to, (above, below)) in to.chunks_exact_mut(channels).zip(pairs) {
+            // Of a last column alone, both pixels are one.
+            let right = above.len() - channels;
+            for (channel, to) in to.iter_mut().enumerate() {
+                let four = [above, below].map(|row| [row[channel], row[right + channel]]);
+                let sum: u16 = four.as_flattened().iter().copied().map(u16::from).sum();
+                *to = ((sum + 2) / 4) as u8;
             }
         }
-        image::Rgb(sum.map(|sum| (sum / 4) as u8))
-    })
+    }
+    half
 }
 
 /// A coarse pixel is what the marks in it say; background from outside a rectangle counts only if it
