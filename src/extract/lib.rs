@@ -72,7 +72,7 @@ pub use error::ExtractError;
 pub use mask_doubts::{MaskDoubts, mask_doubts};
 pub use observer::{Observer, RecordingOutcome};
 pub use options::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
-pub use scale::{APRON, ScaleBuffers, Scaler};
+pub use scale::{APRON, ScaleBuffers, Scaler, Scaling};
 pub use select::{Candidate, Selection, TimeGap, TurnSpan, runs_back_at, time_gaps};
 pub use tally::Tally;
 

@@ -3,6 +3,7 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
@@ -12,7 +13,7 @@ use rayon::ThreadPool;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, Measures};
+use relit_data::image_stats::{MaskSpans, Measures, Measuring};
 use relit_data::shard;
 use relit_video::{DecodeFault, Pending, Reader, Video};
 
@@ -22,6 +23,7 @@ use super::plan::Assignments;
 use super::scale::APRON;
 use super::{
     AlignBuffers, AlignSample, Aligner, Alignment, CropView, ExtractError, ScaleBuffers, Scaler,
+    Scaling,
 };
 
 /// The processing of the frames of one video.
@@ -82,6 +84,44 @@ struct Buffers {
     region: RgbaImage,
     scale: ScaleBuffers,
     align: AlignBuffers,
+    /// Whether the object of the last frame was moved.
+    moved: bool,
+}
+
+/// What is done with a crop's rows as they come, while they are in the processor's cache: their brightness is noted,
+/// and they are scaled where the mask lies, in the hope that the object turns out to be there.
+struct Early<'s, 'b> {
+    stage: &'s Stage<'s>,
+    scale: &'b mut ScaleBuffers,
+    align: &'b mut AlignBuffers,
+    scaled: Option<(Scaling, Measuring<'s>)>,
+    /// The object is likely to be elsewhere: scaling is left for later.
+    expect_moved: bool,
+}
+
+impl Early<'_, '_> {
+    /// Takes these rows of the part that is decoded.
+    fn take(&mut self, part: &RgbaImage, rows: Range<u32>) {
+        let stage = self.stage;
+        let border = stage.border();
+        let crop = CropView::within(part, border);
+        if rows.start == 0 {
+            let scaling = stage.scaler.begin(crop, self.scale).ok();
+            let scaling = scaling.filter(|_| !self.expect_moved);
+            self.scaled =
+                scaling.map(|scaling| (scaling, stage.spans.measuring(stage.saturation_level)));
+        }
+        let (_, height) = crop.dimensions();
+        let of_crop = |row: u32| row.saturating_sub(border).min(height);
+        let rows = of_crop(rows.start)..of_crop(rows.end);
+        if let Some((scaling, measuring)) = &mut self.scaled {
+            let scaler = &stage.scaler;
+            scaler.take_rows(scaling, crop, rows.end, self.scale, measuring);
+        }
+        if let Some(by) = &stage.align {
+            by.aligner.take_rows(crop, rows, self.align);
+        }
+    }
 }
 
 /// A frame that could not be decoded.
@@ -125,7 +165,24 @@ impl Stage<'_> {
 
     fn process(&self, pending: Pending, buffers: &mut Buffers) -> Finished {
         let number = pending.number();
-        match self.video.part(pending, self.region(), &mut buffers.region) {
+        let inside = self.region().clipped_to(self.frame().0, self.frame().1);
+        let inside = inside == Some(self.region());
+        let mut early = Early {
+            stage: self,
+            scale: &mut buffers.scale,
+            align: &mut buffers.align,
+            scaled: None,
+            expect_moved: buffers.moved,
+        };
+        let region = &mut buffers.region;
+        let decoded = self
+            .video
+            .part_by_bands(pending, self.region(), region, |part, rows| {
+                if inside {
+                    early.take(part, rows);
+                }
+            });
+        match decoded {
             Ok(()) => {}
             // The other frames have the same pixel format.
             Err(fault @ DecodeFault::PixelFormat(_)) => {
@@ -133,33 +190,39 @@ impl Stage<'_> {
             }
             Err(fault) => return Ok(Err(LostFrame { number, fault })),
         }
-        repeat_edge(&mut buffers.region, self.region(), self.frame());
-        let Buffers {
-            region,
-            scale,
-            align,
-        } = buffers;
+        if !inside {
+            repeat_edge(region, self.region(), self.frame());
+            early.take(region, 0..region.height());
+        }
+        let scaled = early.scaled;
         let crop = CropView::within(region, self.border());
         let alignment = self.align.as_ref();
-        let alignment = alignment.map(|by| by.aligner.measure_crop(crop, align));
+        let alignment = alignment.map(|by| by.aligner.measure_rows(&mut buffers.align));
         let (alignment, interpolated) = self.completed(number, alignment);
         let moved = alignment.and_then(|alignment| self.moved(crop, alignment));
-        let spans = match moved {
-            None => Cow::Borrowed(&self.spans),
-            Some(moved) => self.seen(moved.whole),
-        };
-        let mut measuring = spans.measuring(self.saturation_level);
-        let image = match moved {
-            None => self.scaler.scale(crop, scale, &mut measuring)?,
-            Some(Moved { crop, part, .. }) => {
-                self.scaler.scale_moved(crop, part, scale, &mut measuring)?
+        buffers.moved = moved.is_some();
+        let (image, measures) = match (moved, scaled) {
+            (None, Some((scaling, measuring))) => (scaling.into_image(), measuring.finish()),
+            (None, None) => {
+                let mut measuring = self.spans.measuring(self.saturation_level);
+                let image = self
+                    .scaler
+                    .scale(crop, &mut buffers.scale, &mut measuring)?;
+                (image, measuring.finish())
+            }
+            (Some(Moved { crop, whole, part }), _) => {
+                let spans = self.seen(whole);
+                let mut measuring = spans.measuring(self.saturation_level);
+                let scale = &mut buffers.scale;
+                let image = self.scaler.scale_moved(crop, part, scale, &mut measuring)?;
+                (image, measuring.finish())
             }
         };
         Ok(Ok(ProcessedFrame {
             number,
             png: shard::encode_rgb(&image)?,
             image,
-            measures: measuring.finish(),
+            measures,
             alignment,
             interpolated,
             shift_applied: moved.is_some(),

@@ -1,5 +1,7 @@
 //! A part of each frame, with as little work as its codec allows.
 
+use std::ops::Range;
+
 use ffmpeg_next::codec::Id;
 use image::{Rgba, RgbaImage};
 use yuv::YuvStandardMatrix;
@@ -11,6 +13,9 @@ use super::scan::Video;
 use super::track::Track;
 use super::{DecodeFault, Picture};
 use relit_data::geometry::Rect;
+
+/// Rows that are told together: few enough to be in the processor's cache still.
+const BAND: u32 = 16;
 
 impl Video {
     /// Decodes the part of the displayed picture under `region` into `part`, which takes its size: red, green,
@@ -30,19 +35,107 @@ impl Video {
         region: Rect,
         part: &mut RgbaImage,
     ) -> Result<(), DecodeFault> {
+        self.part_by_bands(pending, region, part, |_, _| {})
+    }
+
+    /// As [`Self::part`]. Meanwhile `seen` is told which rows of the part have come, from the top to the bottom, a few
+    /// at a time: soon enough that their pixels are still in the processor's cache. They come from the top once more
+    /// if the frame turns out to need another decoder.
+    ///
+    /// # Errors
+    /// As [`Self::part`].
+    pub fn part_by_bands(
+        &self,
+        pending: Pending,
+        region: Rect,
+        part: &mut RgbaImage,
+        mut seen: impl FnMut(&RgbaImage, Range<u32>),
+    ) -> Result<(), DecodeFault> {
         if part.dimensions() != (region.w, region.h) {
             *part = RgbaImage::new(region.w, region.h);
         }
-        if let Some(jpeg) = pending.coded().filter(|_| self.track.is_plain_jpeg())
-            && jpeg_part(jpeg, self.track.coded, region, part).is_some()
-        {
-            return Ok(());
+        if let Some(jpeg) = pending.coded().filter(|_| self.track.is_plain_jpeg()) {
+            let size = self.track.coded;
+            let rows = Rows::of(part, size, region, &mut seen);
+            let decoded = rows.and_then(|mut rows| {
+                let inside = rows.inside;
+                decode_part(jpeg, size, inside, &mut |row| rows.push(row)).ok()?;
+                rows.end();
+                Some(())
+            });
+            if decoded.is_some() {
+                return Ok(());
+            }
         }
         let picture = self.picture(pending)?;
-        match direct_part(&picture, region, part) {
-            Some(()) => Ok(()),
-            None => copy_part(&picture, region, part),
+        let rows = Rows::of(part, picture.size(), region, &mut seen);
+        let converted = rows.and_then(|mut rows| {
+            let inside = rows.inside;
+            picture.direct_rgba(inside, &mut |row| rows.push(row))?;
+            rows.end();
+            Some(())
+        });
+        if converted.is_none() {
+            copy_part(&picture, region, part)?;
+            seen(part, 0..region.h);
         }
+        Ok(())
+    }
+}
+
+/// A part that comes row by row.
+struct Rows<'a, F> {
+    part: &'a mut RgbaImage,
+    /// What of the region lies in the picture.
+    inside: Rect,
+    /// The first byte of the next row.
+    next: usize,
+    /// The rows of the part that have come, and those of them that were told.
+    come: u32,
+    told: u32,
+    seen: &'a mut F,
+}
+
+impl<'a, F: FnMut(&RgbaImage, Range<u32>)> Rows<'a, F> {
+    /// Everything is 0 where the region does not lie in the picture wholly; `None` if nothing of it does.
+    fn of(
+        part: &'a mut RgbaImage,
+        size: (u32, u32),
+        region: Rect,
+        seen: &'a mut F,
+    ) -> Option<Self> {
+        let inside = region.clipped_to(size.0, size.1)?;
+        if inside != region {
+            part.fill(0);
+        }
+        let left = usize::try_from(inside.x - region.x).ok()?;
+        let come = u32::try_from(inside.y - region.y).ok()?;
+        Some(Self {
+            next: 4 * (part.width() as usize * come as usize + left),
+            part,
+            inside,
+            come,
+            told: 0,
+            seen,
+        })
+    }
+
+    /// `None` if it is a row too many.
+    fn push(&mut self, row: &[u8]) -> Option<()> {
+        let to = self.part.get_mut(self.next..self.next + row.len())?;
+        to.copy_from_slice(row);
+        self.next += 4 * self.part.width() as usize;
+        self.come += 1;
+        if self.come - self.told >= BAND {
+            (self.seen)(self.part, self.told..self.come);
+            self.told = self.come;
+        }
+        Some(())
+    }
+
+    /// No more rows come.
+    fn end(self) {
+        (self.seen)(self.part, self.told..self.part.height());
     }
 }
 
@@ -52,31 +145,6 @@ impl Track {
         let jfif = self.colour.full_range && self.colour.matrix == YuvStandardMatrix::Bt601;
         self.codec == Id::MJPEG && jfif && self.orientation == Orientation::default()
     }
-}
-
-/// `None` if the JPEG is to be decoded by FFmpeg.
-fn jpeg_part(jpeg: &[u8], size: (u32, u32), region: Rect, part: &mut RgbaImage) -> Option<()> {
-    let (inside, start) = cleared(size, region, part)?;
-    let rows = part.get_mut(start..)?;
-    decode_part(jpeg, size, inside, rows, 4 * region.w as usize).ok()
-}
-
-/// `None` if the picture is to be converted in another way.
-fn direct_part(picture: &Picture, region: Rect, part: &mut RgbaImage) -> Option<()> {
-    let (inside, start) = cleared(picture.size(), region, part)?;
-    let rows = part.get_mut(start..)?;
-    picture.direct_rgba(inside, rows, 4 * region.w as usize)
-}
-
-/// The part of the region that lies in the picture, and its first byte; everything is 0 where it is not all.
-fn cleared(size: (u32, u32), region: Rect, part: &mut RgbaImage) -> Option<(Rect, usize)> {
-    let inside = region.clipped_to(size.0, size.1)?;
-    if inside != region {
-        part.fill(0);
-    }
-    let left = usize::try_from(inside.x - region.x).ok()?;
-    let top = usize::try_from(inside.y - region.y).ok()?;
-    Some((inside, 4 * (region.w as usize * top + left)))
 }
 
 fn copy_part(picture: &Picture, region: Rect, part: &mut RgbaImage) -> Result<(), DecodeFault> {

@@ -201,9 +201,13 @@ impl Picture {
 }
 
 impl Picture {
-    /// Writes `rect`, which lies inside the picture, to rows of red, green, blue and 255 that begin at multiples of
-    /// `stride`. `None` if that takes more than a conversion of its planes.
-    pub(super) fn direct_rgba(&self, rect: Rect, rows: &mut [u8], stride: usize) -> Option<()> {
+    /// Gives `take` the rows of `rect`, which lies inside the picture, one after the other: red, green, blue and 255.
+    /// `None` if that takes more than a conversion of its planes, or from `take`.
+    pub(super) fn direct_rgba(
+        &self,
+        rect: Rect,
+        take: &mut dyn FnMut(&[u8]) -> Option<()>,
+    ) -> Option<()> {
         let format = self.frame.format();
         let direct = is_planar(format) && strides_are_forward(&self.frame);
         if !direct || self.orientation != Orientation::default() {
@@ -217,7 +221,6 @@ impl Picture {
         let (_, shift_y) = chroma_shifts(format);
         let (skipped, bytes) = (4 * (left - x), 4 * rect.w as usize);
         let mut strip = vec![0; 4 * width * STRIP];
-        let mut rows = rows.chunks_mut(stride).take(rect.h as usize);
         let mut y = top - (top & shift_y);
         while y < top + rect.h as usize {
             let height = STRIP.min(top + rect.h as usize - y);
@@ -225,9 +228,7 @@ impl Picture {
             let size = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
             planes_to_rgba(&self.frame, format, self.colour, (x, y), size, strip)?;
             for row in strip.chunks_exact(4 * width).skip(top.saturating_sub(y)) {
-                rows.next()?
-                    .get_mut(..bytes)?
-                    .copy_from_slice(row.get(skipped..skipped + bytes)?);
+                take(row.get(skipped..skipped + bytes)?)?;
             }
             y += height;
         }

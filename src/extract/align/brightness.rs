@@ -1,27 +1,42 @@
 //! The brightness of pictures, and of half of them, where it is needed.
 
+use std::ops::Range;
+
 use image::GrayImage;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::region::Region;
 use crate::CropView;
 
-/// Brightness of a picture where it is needed, 0..=255; `grey` takes its size.
-pub(super) fn luma(picture: CropView<'_>, needed: &Region, grey: &mut GrayImage) {
+/// Brightness of these rows of a picture where it is needed, 0..=255; `grey` takes the picture's size.
+pub(super) fn luma(
+    picture: CropView<'_>,
+    rows: Range<usize>,
+    needed: &Region,
+    grey: &mut GrayImage,
+) {
     resize(grey, picture.dimensions());
     Arch::new().dispatch(Whole {
         picture,
+        rows,
         needed,
         grey,
     });
 }
 
-/// The brightness of half the picture, each pixel the mean of two by two.
-pub(super) fn half_luma(picture: CropView<'_>, needed: &Region, grey: &mut GrayImage) {
+/// The brightness of half the picture, each pixel the mean of two by two, as far as these rows of the picture tell it;
+/// those before them are known.
+pub(super) fn half_luma(
+    picture: CropView<'_>,
+    rows: Range<usize>,
+    needed: &Region,
+    grey: &mut GrayImage,
+) {
     let (width, height) = picture.dimensions();
     resize(grey, (width / 2, height / 2));
     Arch::new().dispatch(HalfOfPicture {
         picture,
+        rows: rows.start / 2..rows.end / 2,
         needed,
         grey,
     });
@@ -43,14 +58,16 @@ fn resize(image: &mut GrayImage, (width, height): (u32, u32)) {
     }
 }
 
-/// The rows of a picture with the columns of each that are needed.
+/// These rows of a picture with the columns of each that are needed.
 fn parts<'a>(
     image: &'a mut GrayImage,
+    rows: Range<usize>,
     needed: &'a Region,
-) -> impl Iterator<Item = (usize, std::ops::Range<usize>, &'a mut [u8])> {
+) -> impl Iterator<Item = (usize, Range<usize>, &'a mut [u8])> {
     let width = (image.width() as usize).max(1);
-    let rows = image.as_flat_samples_mut().samples.chunks_exact_mut(width);
-    rows.enumerate().filter_map(|(y, row)| {
+    let all = image.as_flat_samples_mut().samples.chunks_exact_mut(width);
+    let rows = all.enumerate().take(rows.end).skip(rows.start);
+    rows.filter_map(|(y, row)| {
         let columns = needed.row(y);
         let part = row.get_mut(columns.clone())?;
         Some((y, columns, part)).filter(|(_, columns, _)| !columns.is_empty())
@@ -60,6 +77,7 @@ fn parts<'a>(
 /// These loops are compiled for the kind of processor.
 struct Whole<'a> {
     picture: CropView<'a>,
+    rows: Range<usize>,
     needed: &'a Region,
     grey: &'a mut GrayImage,
 }
@@ -69,7 +87,7 @@ impl WithSimd for Whole<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        for (y, columns, to) in parts(self.grey, self.needed) {
+        for (y, columns, to) in parts(self.grey, self.rows, self.needed) {
             let row = self.picture.row(y as i64, 0);
             let pixels = row.get(4 * columns.start..4 * columns.end);
             for (to, pixel) in to
@@ -84,6 +102,8 @@ impl WithSimd for Whole<'_> {
 
 struct HalfOfPicture<'a> {
     picture: CropView<'a>,
+    /// Of the half.
+    rows: Range<usize>,
     needed: &'a Region,
     grey: &'a mut GrayImage,
 }
@@ -94,7 +114,7 @@ impl WithSimd for HalfOfPicture<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let mut line = vec![0_u32; 2 * self.grey.width() as usize];
-        for (y, columns, to) in parts(self.grey, self.needed) {
+        for (y, columns, to) in parts(self.grey, self.rows, self.needed) {
             let pair = 2 * columns.start..2 * columns.end;
             let row = |y: usize| {
                 let row = self.picture.row(y as i64, 0);
@@ -133,7 +153,8 @@ impl WithSimd for HalfOfGrey<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let source = self.image.width() as usize;
         let bytes = self.image.as_raw();
-        for (y, columns, to) in parts(self.small, self.needed) {
+        let rows = 0..self.small.height() as usize;
+        for (y, columns, to) in parts(self.small, rows, self.needed) {
             let row = |y: usize| {
                 let start = y * source;
                 let part = bytes.get(start + 2 * columns.start..start + 2 * columns.end);
@@ -184,15 +205,17 @@ mod tests {
                 assert_eq!(pixel.0, wanted, "{x} {y}");
             }
         };
-        luma(view, &Region::whole((31, 24)), &mut whole);
-        luma(view, &some((31, 24)), &mut part);
+        luma(view, 0..24, &Region::whole((31, 24)), &mut whole);
+        luma(view, 0..7, &some((31, 24)), &mut part);
+        luma(view, 7..24, &some((31, 24)), &mut part);
         check(&part, &whole, &some((31, 24)));
         let small = (15, 12);
         let quarter = halved(&whole, &Region::whole(small));
         check(&halved(&whole, &some(small)), &quarter, &some(small));
-        half_luma(view, &Region::whole(small), &mut whole);
+        half_luma(view, 0..24, &Region::whole(small), &mut whole);
         let mut part = GrayImage::default();
-        half_luma(view, &some(small), &mut part);
+        half_luma(view, 0..7, &some(small), &mut part);
+        half_luma(view, 7..24, &some(small), &mut part);
         check(&part, &whole, &some(small));
     }
 }

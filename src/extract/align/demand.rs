@@ -1,5 +1,7 @@
 //! What of a crop is looked at to measure a shift: not all of it, as the pixels of the templates are known.
 
+use std::ops::Range;
+
 use image::GrayImage;
 
 use super::brightness::{half, half_luma, luma};
@@ -59,19 +61,25 @@ impl Demand {
         }
     }
 
-    /// The brightness of a crop at each template's scale, from the finest on.
-    pub(super) fn lumas_of_crop<'b>(
+    /// Notes the brightness of these rows of a crop, which come from the top to the bottom.
+    pub(super) fn take_rows(
         &self,
         crop: CropView<'_>,
-        levels: &'b mut Vec<GrayImage>,
-    ) -> &'b [GrayImage] {
+        rows: Range<usize>,
+        levels: &mut Vec<GrayImage>,
+    ) {
         levels.resize_with(self.lumas.len(), GrayImage::default);
         if let (Some(first), Some(needed)) = (levels.first_mut(), self.lumas.first()) {
             match self.halvings {
-                0 => luma(crop, needed, first),
-                _ => half_luma(crop, needed, first),
+                0 => luma(crop, rows, needed, first),
+                _ => half_luma(crop, rows, needed, first),
             }
         }
+    }
+
+    /// The brightness at each template's scale, from the finest on, of a crop of which all rows were taken.
+    pub(super) fn lumas_of_rows<'b>(&self, levels: &'b mut Vec<GrayImage>) -> &'b [GrayImage] {
+        levels.resize_with(self.lumas.len(), GrayImage::default);
         self.halved(levels, 0)
     }
 

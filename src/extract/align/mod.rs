@@ -15,6 +15,8 @@ mod region;
 mod structure;
 mod template;
 
+use std::ops::Range;
+
 use image::GrayImage;
 use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
 
@@ -67,14 +69,15 @@ impl AlignSample {
     /// The brightness of `crop`.
     #[must_use]
     pub fn of(crop: CropView<'_>) -> Self {
-        let halvings = halvings(crop.dimensions());
+        let (width, height) = crop.dimensions();
+        let (halvings, rows) = (halvings((width, height)), 0..height as usize);
         let mut image = GrayImage::default();
         if halvings == 0 {
-            luma(crop, &Region::whole(crop.dimensions()), &mut image);
+            luma(crop, rows, &Region::whole(crop.dimensions()), &mut image);
             return Self(image);
         }
-        let (width, height) = crop.dimensions();
-        half_luma(crop, &Region::whole((width / 2, height / 2)), &mut image);
+        let half = Region::whole((width / 2, height / 2));
+        half_luma(crop, rows, &half, &mut image);
         Self((1..halvings).fold(image, |image, _| halved(&image)))
     }
 }
@@ -243,7 +246,21 @@ impl Aligner {
     /// The same from the frame's crop, of which no more is looked at than is needed. It has the size of the mask.
     #[must_use]
     pub fn measure_crop(&self, crop: CropView<'_>, buffers: &mut AlignBuffers) -> Alignment {
-        let lumas = self.demand.lumas_of_crop(crop, &mut buffers.lumas);
+        let (_, height) = crop.dimensions();
+        self.take_rows(crop, 0..height, buffers);
+        self.measure_rows(buffers)
+    }
+
+    /// Looks at these rows of a frame's crop, which come from the top to the bottom.
+    pub fn take_rows(&self, crop: CropView<'_>, rows: Range<u32>, buffers: &mut AlignBuffers) {
+        let rows = rows.start as usize..rows.end as usize;
+        self.demand.take_rows(crop, rows, &mut buffers.lumas);
+    }
+
+    /// [`Self::measure_crop`] of a crop whose rows were all taken.
+    #[must_use]
+    pub fn measure_rows(&self, buffers: &mut AlignBuffers) -> Alignment {
+        let lumas = self.demand.lumas_of_rows(&mut buffers.lumas);
         self.located(lumas, &mut buffers.gradients)
     }
 

@@ -88,8 +88,20 @@ pub(super) struct Gather<'a> {
     pub(super) part: Option<[f64; 2]>,
 }
 
+/// How far the gathering of a crop has come.
+#[derive(Debug)]
+pub(super) struct Progress {
+    pub(super) scaled: RgbImage,
+    /// The next row, with the apron's.
+    at: usize,
+    /// Output rows that are begun and not complete.
+    open: Range<usize>,
+}
+
 struct Run<'a, 'm> {
-    gather: Gather<'a>,
+    gather: &'a Gather<'a>,
+    until: usize,
+    progress: &'a mut Progress,
     buffers: &'a mut ScaleBuffers,
     measuring: &'a mut Measuring<'m>,
 }
@@ -97,11 +109,44 @@ struct Run<'a, 'm> {
 impl Gather<'_> {
     /// Gathers all rows, and measures those of the crop.
     pub(super) fn run(self, buffers: &mut ScaleBuffers, measuring: &mut Measuring<'_>) -> RgbImage {
+        let mut progress = self.begin(buffers);
+        let (_, height) = self.crop.dimensions();
+        let all = (height + 2 * self.apron()) as usize;
+        self.advance(all, &mut progress, buffers, measuring);
+        progress.scaled
+    }
+
+    /// Begins with a crop.
+    pub(super) fn begin(&self, buffers: &mut ScaleBuffers) -> Progress {
+        let (width, _) = self.crop.dimensions();
+        let source = (width + 2 * self.apron()) as usize;
+        buffers.reset(
+            source + self.across.taps(),
+            self.down.overlap().max(1),
+            3 * self.mask.width() as usize,
+        );
+        Progress {
+            scaled: RgbImage::new(self.mask.width(), self.mask.height()),
+            at: 0,
+            open: 0..0,
+        }
+    }
+
+    /// Gathers and measures the rows before row `until`, counted with the apron's.
+    pub(super) fn advance(
+        &self,
+        until: usize,
+        progress: &mut Progress,
+        buffers: &mut ScaleBuffers,
+        measuring: &mut Measuring<'_>,
+    ) {
         Arch::new().dispatch(Run {
             gather: self,
+            until,
+            progress,
             buffers,
             measuring,
-        })
+        });
     }
 
     fn apron(&self) -> u32 {
@@ -127,48 +172,46 @@ impl Gather<'_> {
 }
 
 impl WithSimd for Run<'_, '_> {
-    type Output = RgbImage;
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> RgbImage {
+    fn with_simd<S: Simd>(self, _: S) {
         let Self {
             gather,
+            until,
+            progress,
             buffers,
             measuring,
         } = self;
         let apron = gather.apron();
-        let (width, height) = gather.crop.dimensions();
-        let source = (width + 2 * apron) as usize;
+        let (_, height) = gather.crop.dimensions();
         let planes = match gather.gain {
             Some(_) => PLANES - 1,
             None => PLANES,
         };
-        let ring = gather.down.overlap().max(1);
-        buffers.reset(
-            source + gather.across.taps(),
-            ring,
-            3 * gather.mask.width() as usize,
-        );
-        let mask = gather.mask;
-        let mut scaled = RgbImage::new(mask.width(), mask.height());
-        let (mut first, mut next) = (0, 0);
-        for at in 0..(height + 2 * apron) as usize {
+        let ring = buffers.sums.len();
+        let Progress {
+            scaled,
+            at: from,
+            open,
+        } = progress;
+        for at in *from..until {
             let y = at as i64 - i64::from(apron);
             let row = gather.crop.row(y, apron);
             if (0..i64::from(height)).contains(&y) {
                 measuring.add_row::<4>(gather.crop.row(y, 0));
             }
-            while next < gather.down.outputs() && gather.down.window(next).0 <= at {
-                for plane in buffers.sums[next % ring].iter_mut().take(planes) {
+            while open.end < gather.down.outputs() && gather.down.window(open.end).0 <= at {
+                for plane in buffers.sums[open.end % ring].iter_mut().take(planes) {
                     plane.fill(0.0);
                 }
-                next += 1;
+                open.end += 1;
             }
             match gather.part {
                 None => {
                     for columns in gather.source.runs.get(at).into_iter().flatten() {
                         light_of(row, columns, &mut buffers.light);
-                        gather.add(first..next, at, columns, planes, buffers);
+                        gather.add(open.clone(), at, columns, planes, buffers);
                     }
                 }
                 Some(part) => {
@@ -176,16 +219,16 @@ impl WithSimd for Run<'_, '_> {
                     if !columns.is_empty() {
                         light_of(row, &columns, &mut buffers.light);
                         share(&gather.source.image, part, y, &columns, &mut buffers.light);
-                        gather.add(first..next, at, &columns, planes, buffers);
+                        gather.add(open.clone(), at, &columns, planes, buffers);
                     }
                 }
             }
-            while first < next && gather.down.end(first) <= at + 1 {
-                gather.finish(first, buffers, &mut scaled);
-                first += 1;
+            while open.start < open.end && gather.down.end(open.start) <= at + 1 {
+                gather.finish(open.start, buffers, scaled);
+                open.start += 1;
             }
         }
-        scaled
+        *from = until.max(*from);
     }
 }
 

@@ -16,7 +16,7 @@ use image::{GrayImage, RgbImage};
 
 use super::{CropView, ExtractError};
 use filter::{Axis, Filter};
-use gather::{Gather, SourceMask};
+use gather::{Gather, Progress, SourceMask};
 use light::Srgb;
 use relit_data::image_stats::Measuring;
 
@@ -26,6 +26,28 @@ pub use gather::{APRON, ScaleBuffers};
 pub(super) const METHOD: &str = "linear light, masked before, Hamming down, bilinear up";
 /// The name in `dataset.json` if nothing is scaled.
 pub(super) const NO_METHOD: &str = "none";
+
+/// The scaling of one crop, as far as its rows have come.
+#[derive(Debug)]
+pub struct Scaling(Work);
+
+#[derive(Debug)]
+enum Work {
+    Scaled(Progress),
+    /// The source pixels are kept: of so many rows so far.
+    Kept(RgbImage, u32),
+}
+
+impl Scaling {
+    /// The image, when all rows were taken.
+    #[must_use]
+    pub fn into_image(self) -> RgbImage {
+        match self.0 {
+            Work::Scaled(Progress { scaled, .. }) => scaled,
+            Work::Kept(image, _) => image,
+        }
+    }
+}
 
 /// Scales the crops of one video, which share a mask.
 #[derive(Debug)]
@@ -82,26 +104,71 @@ impl Scaler {
         buffers: &mut ScaleBuffers,
         measuring: &mut Measuring<'_>,
     ) -> Result<RgbImage, ExtractError> {
+        let mut scaling = self.begin(crop, buffers)?;
+        let (_, height) = crop.dimensions();
+        self.take_rows(&mut scaling, crop, height, buffers, measuring);
+        Ok(scaling.into_image())
+    }
+
+    /// Begins to mask and scale a crop, which has the size of the mask, and of which rows come by and by.
+    ///
+    /// # Errors
+    /// [`ExtractError::Scaling`] if the crop has another size.
+    pub fn begin(
+        &self,
+        crop: CropView<'_>,
+        buffers: &mut ScaleBuffers,
+    ) -> Result<Scaling, ExtractError> {
         if crop.dimensions() != self.source.image.dimensions() {
             return Err(ExtractError::Scaling(
                 "the crop and its mask differ in size",
             ));
         }
-        let Some(target) = &self.to else {
-            crop.rows().for_each(|row| measuring.add_row::<4>(row));
-            return Ok(masked(crop, &self.source.image));
-        };
-        let gather = Gather {
+        Ok(Scaling(match &self.to {
+            Some(target) => Work::Scaled(self.gather(crop, target).begin(buffers)),
+            None => Work::Kept(RgbImage::new(crop.dimensions().0, crop.dimensions().1), 0),
+        }))
+    }
+
+    /// Masks, scales and measures the rows of a crop before row `until` that were not taken yet.
+    pub fn take_rows(
+        &self,
+        scaling: &mut Scaling,
+        crop: CropView<'_>,
+        until: u32,
+        buffers: &mut ScaleBuffers,
+        measuring: &mut Measuring<'_>,
+    ) {
+        match (&mut scaling.0, &self.to) {
+            (Work::Scaled(progress), Some(target)) => {
+                let gather = self.gather(crop, target);
+                gather.advance(until as usize, progress, buffers, measuring);
+            }
+            (Work::Kept(image, taken), _) => {
+                for y in *taken..until {
+                    let row = crop.row(i64::from(y), 0);
+                    measuring.add_row::<4>(row);
+                    keep_row(row, &self.source.image, y, image);
+                }
+                *taken = until.max(*taken);
+            }
+            // A scaling that another scaler began.
+            (Work::Scaled(_), None) => {}
+        }
+    }
+
+    /// The gathering of a crop that is not moved.
+    fn gather<'a>(&'a self, crop: CropView<'a>, target: &'a Target) -> Gather<'a> {
+        Gather {
             source: &self.source,
-            mask: self.mask(),
+            mask: &target.mask,
             srgb: &self.srgb,
             crop,
             across: &target.across,
             down: &target.down,
             gain: Some(&target.gain),
             part: None,
-        };
-        Ok(gather.run(buffers, measuring))
+        }
     }
 
     /// Masks and scales a crop whose object lies `part` of a pixel (-0.5..=0.5, to the right and down)
@@ -144,15 +211,21 @@ impl Scaler {
     }
 }
 
-fn masked(crop: CropView<'_>, mask: &GrayImage) -> RgbImage {
-    let mut kept = RgbImage::new(mask.width(), mask.height());
-    let pixels = crop.rows().flat_map(|row| row.chunks_exact(4));
-    for ((kept, pixel), mask) in kept.pixels_mut().zip(pixels).zip(mask.as_raw()) {
+/// Copies row `y` of a crop to its place, where it is under the mask.
+fn keep_row(row: &[u8], mask: &GrayImage, y: u32, image: &mut RgbImage) {
+    let width = mask.width() as usize;
+    let start = y as usize * width;
+    let mask = mask.as_raw().get(start..start + width);
+    let kept = image.get_mut(3 * start..3 * (start + width));
+    let pixels = kept.unwrap_or_default().chunks_exact_mut(3);
+    let pixels = pixels
+        .zip(row.chunks_exact(4))
+        .zip(mask.unwrap_or_default());
+    for ((kept, pixel), mask) in pixels {
         if *mask != 0 {
-            kept.0 = [pixel[0], pixel[1], pixel[2]];
+            kept.copy_from_slice(&pixel[..3]);
         }
     }
-    kept
 }
 
 impl Target {

@@ -22,24 +22,31 @@ use relit_data::geometry::Rect;
 /// Bytes of a pixel: red, green, blue, 255.
 const PIXEL: usize = 4;
 
-/// Decodes the pixels of a JPEG of this size under `part`, which lies inside, to rows of red, green, blue and
-/// 255. `rows` holds the first byte of each row at multiples of `stride`.
+/// The library writes a row that begins at a multiple of this past the caches, from where it would have to be fetched.
+const CACHED: usize = 32;
+
+/// The first byte of a buffer at which the library writes into the caches; less than [`CACHED`].
+fn cached_start(buffer: *const u8) -> usize {
+    match buffer.addr().is_multiple_of(CACHED) {
+        true => CACHED / 2,
+        false => 0,
+    }
+}
+
+/// Decodes the pixels of a JPEG of this size under `part`, which lies inside, and gives `take` row after row: red,
+/// green, blue and 255. `None` from there ends the decoding.
 pub(in super::super) fn decode_part(
     jpeg: &[u8],
     size: (u32, u32),
     part: Rect,
-    rows: &mut [u8],
-    stride: usize,
+    take: &mut dyn FnMut(&[u8]) -> Option<()>,
 ) -> Result<(), Refused> {
     if size_of_plain(jpeg)? != size || part.clipped_to(size.0, size.1) != Some(part) {
         return Err(Refused);
     }
     let mut library = Library::new();
     // What was unwound through is only freed afterwards.
-    catch_unwind(AssertUnwindSafe(|| {
-        library.decode(jpeg, part, rows, stride)
-    }))
-    .unwrap_or(Err(Refused))
+    catch_unwind(AssertUnwindSafe(|| library.decode(jpeg, part, take))).unwrap_or(Err(Refused))
 }
 
 /// The library's state for one picture. It is freed when this is dropped.
@@ -75,8 +82,7 @@ impl Library {
         &mut self,
         jpeg: &[u8],
         part: Rect,
-        rows: &mut [u8],
-        stride: usize,
+        take: &mut dyn FnMut(&[u8]) -> Option<()>,
     ) -> Result<(), Refused> {
         let state = &mut *self.state;
         let (x, y) = (part.x.unsigned_abs(), part.y.unsigned_abs());
@@ -107,17 +113,18 @@ impl Library {
         // The library begins at a whole block, up to 15 columns before the part.
         let surplus = PIXEL * (x - left) as usize;
         let bytes = PIXEL * part.w as usize;
-        let mut line = vec![0; PIXEL * width as usize];
-        for row in rows.chunks_mut(stride).take(part.h as usize) {
+        let mut line = vec![0; PIXEL * width as usize + CACHED];
+        let start = cached_start(line.as_ptr());
+        let line = line.get_mut(start..).ok_or(Refused)?;
+        for _ in 0..part.h {
             let mut at = line.as_mut_ptr();
             // SAFETY: the line holds `width` pixels of the output's format.
             if unsafe { jpeg_read_scanlines(state, &mut at, 1) } != 1 {
                 return Err(Refused);
             }
-            let pixels = line.get(surplus..surplus + bytes).ok_or(Refused)?;
-            row.get_mut(..bytes).ok_or(Refused)?.copy_from_slice(pixels);
+            take(line.get(surplus..surplus + bytes).ok_or(Refused)?).ok_or(Refused)?;
         }
-        finish(state, &mut line)
+        finish(state, line)
     }
 }
 

@@ -53,7 +53,11 @@ const SIZE: (u32, u32) = (149, 101);
 
 fn part(jpeg: &[u8], rect: Rect) -> Result<RgbaImage, super::Refused> {
     let mut image = RgbaImage::new(rect.w, rect.h);
-    decode_part(jpeg, SIZE, rect, &mut image, 4 * rect.w as usize)?;
+    let mut rows = image.chunks_exact_mut(4 * rect.w as usize);
+    decode_part(jpeg, SIZE, rect, &mut |row| {
+        rows.next()?.copy_from_slice(row);
+        Some(())
+    })?;
     Ok(image)
 }
 
