@@ -16,7 +16,7 @@ use super::ExtractError;
 /// Frames that are looked at.
 const FRAMES: usize = 12;
 /// Frames are halved until they have at most so many pixels.
-const MOST_PIXELS: u64 = 240_000;
+const MOST_PIXELS: u64 = 310_000;
 
 /// What is worth a warning about a mask.
 #[derive(Debug, Clone, Default, PartialEq)]

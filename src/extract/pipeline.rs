@@ -175,13 +175,17 @@ impl Stage<'_> {
             expect_moved: buffers.moved,
         };
         let region = &mut buffers.region;
-        let decoded = self
-            .video
-            .part_by_bands(pending, self.region(), region, |part, rows| {
+        let decoded = self.video.part_by_bands(
+            pending,
+            self.region(),
+            self.needed(),
+            region,
+            |part, rows| {
                 if inside {
                     early.take(part, rows);
                 }
-            });
+            },
+        );
         match decoded {
             Ok(()) => {}
             // The other frames have the same pixel format.
@@ -310,6 +314,14 @@ impl Stage<'_> {
             self.crop.w + 2 * border,
             self.crop.h + 2 * border,
         )
+    }
+
+    /// What of that counts: all of it where the object is looked for, else what lies under the mask.
+    fn needed(&self) -> Rect {
+        match &self.align {
+            Some(_) => self.region(),
+            None => self.object,
+        }
     }
 
     /// The crops of some frames, in which shifts are learnt, in order; frames that cannot be decoded are

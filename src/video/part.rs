@@ -35,10 +35,10 @@ impl Video {
         region: Rect,
         part: &mut RgbaImage,
     ) -> Result<(), DecodeFault> {
-        self.part_by_bands(pending, region, part, |_, _| {})
+        self.part_by_bands(pending, region, region, part, |_, _| {})
     }
 
-    /// As [`Self::part`]. Meanwhile `seen` is told which rows of the part have come, from the top to the bottom, a few
+    /// As [`Self::part`], but no more than what `needed` covers has to be decoded: other pixels hold anything. Meanwhile `seen` is told which rows of the part have come, from the top to the bottom, a few
     /// at a time: soon enough that their pixels are still in the processor's cache. They come from the top once more
     /// if the frame turns out to need another decoder.
     ///
@@ -48,6 +48,7 @@ impl Video {
         &self,
         pending: Pending,
         region: Rect,
+        needed: Rect,
         part: &mut RgbaImage,
         mut seen: impl FnMut(&RgbaImage, Range<u32>),
     ) -> Result<(), DecodeFault> {
@@ -56,7 +57,7 @@ impl Video {
         }
         if let Some(jpeg) = pending.coded().filter(|_| self.track.is_plain_jpeg()) {
             let size = self.track.coded;
-            let rows = Rows::of(part, size, region, &mut seen);
+            let rows = Rows::of(part, size, (region, needed), &mut seen);
             let decoded = rows.and_then(|mut rows| {
                 let inside = rows.inside;
                 decode_part(jpeg, size, inside, &mut |row| rows.push(row)).ok()?;
@@ -68,7 +69,7 @@ impl Video {
             }
         }
         let picture = self.picture(pending)?;
-        let rows = Rows::of(part, picture.size(), region, &mut seen);
+        let rows = Rows::of(part, picture.size(), (region, needed), &mut seen);
         let converted = rows.and_then(|mut rows| {
             let inside = rows.inside;
             picture.direct_rgba(inside, &mut |row| rows.push(row))?;
@@ -86,7 +87,7 @@ impl Video {
 /// A part that comes row by row.
 struct Rows<'a, F> {
     part: &'a mut RgbaImage,
-    /// What of the region lies in the picture.
+    /// What of the region is needed and lies in the picture.
     inside: Rect,
     /// The first byte of the next row.
     next: usize,
@@ -101,13 +102,14 @@ impl<'a, F: FnMut(&RgbaImage, Range<u32>)> Rows<'a, F> {
     fn of(
         part: &'a mut RgbaImage,
         size: (u32, u32),
-        region: Rect,
+        (region, needed): (Rect, Rect),
         seen: &'a mut F,
     ) -> Option<Self> {
         let inside = region.clipped_to(size.0, size.1)?;
         if inside != region {
             part.fill(0);
         }
+        let inside = common(inside, needed)?;
         let left = usize::try_from(inside.x - region.x).ok()?;
         let come = u32::try_from(inside.y - region.y).ok()?;
         Some(Self {
@@ -145,6 +147,15 @@ impl Track {
         let jfif = self.colour.full_range && self.colour.matrix == YuvStandardMatrix::Bt601;
         self.codec == Id::MJPEG && jfif && self.orientation == Orientation::default()
     }
+}
+
+/// The part of both; `None` where they have none.
+fn common(a: Rect, b: Rect) -> Option<Rect> {
+    let (x, y) = (a.x.max(b.x), a.y.max(b.y));
+    let extent = |from: i32, end: i64| u32::try_from(end - i64::from(from)).ok();
+    let w = extent(x, a.right().min(b.right()))?;
+    let h = extent(y, a.bottom().min(b.bottom()))?;
+    (w > 0 && h > 0).then_some(Rect::new(x, y, w, h))
 }
 
 fn copy_part(picture: &Picture, region: Rect, part: &mut RgbaImage) -> Result<(), DecodeFault> {
