@@ -107,3 +107,30 @@ fn doubts(shape: &ShapeCheck) -> MaskDoubts {
     };
     MaskDoubts { reasons, misfit }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_frames_are_halved_and_small_ones_stay() {
+        let cases = [
+            ((640, 480), 0),
+            ((1280, 720), 1),
+            ((1920, 1080), 2),
+            ((3840, 2160), 3),
+            // Too low to be halved.
+            ((100_000, MIN_SIDE), 0),
+        ];
+        for (size, halvings_of_it) in cases {
+            assert_eq!(halvings(size), halvings_of_it, "{size:?}");
+        }
+    }
+
+    #[test]
+    fn a_halved_mask_has_the_mean_and_repeats_an_odd_edge() {
+        let mask = GrayImage::from_raw(3, 3, vec![0, 255, 8, 255, 255, 8, 4, 8, 255]);
+        let half = halved(&mask.unwrap_or_default(), 1).into_owned();
+        assert_eq!(half.as_raw(), &[191, 8, 6, 255]);
+    }
+}

@@ -356,6 +356,30 @@ mod tests {
     }
 
     #[test]
+    fn a_check_of_smaller_frames_tells_pixels_of_the_larger_ones() {
+        let region = DoubtfulRegion {
+            px: 3,
+            bounds: Rect::new(1, 2, 3, 1),
+        };
+        let small = ShapeCheck {
+            area_px: 50,
+            outline: 0.5,
+            outline_of_turn: 0.6,
+            contradicted: false,
+            iou: 0.8,
+            edge_px: [0.5, 2.0],
+            leaks: vec![region],
+            missing: Vec::new(),
+            holes: vec![region],
+        };
+        let large = small.clone().enlarged(4);
+        assert_eq!((large.area_px, large.edge_px), (800, [2.0, 8.0]));
+        assert_eq!(large.leaks[0].px, 48);
+        assert_eq!(large.holes[0].bounds, Rect::new(4, 8, 12, 4));
+        assert_eq!(small.clone().enlarged(1), small);
+    }
+
+    #[test]
     fn outlines_are_measured_apart() {
         let square = |left: u32| {
             let inside = move |at: u32| {

@@ -180,3 +180,25 @@ fn copy_part(picture: &Picture, region: Rect, part: &mut RgbaImage) -> Result<()
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_two_rectangles_have_in_common_lies_in_both() {
+        let a = Rect::new(-3, 2, 10, 5);
+        assert_eq!(
+            common(a, Rect::new(1, 0, 20, 4)),
+            Some(Rect::new(1, 2, 6, 2))
+        );
+        assert_eq!(common(a, a), Some(a));
+        for apart in [
+            Rect::new(7, 2, 3, 3),
+            Rect::new(0, 7, 3, 3),
+            Rect::new(30, 40, 2, 2),
+        ] {
+            assert_eq!(common(a, apart), None);
+        }
+    }
+}
