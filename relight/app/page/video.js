@@ -8,6 +8,8 @@ import { forEngine } from "./scene.js";
 const RATE = 24;
 const LONGEST = 640;
 const KINDS = ["video/mp4;codecs=avc1.42E01F", "video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
+/** A recorder that has not ended so long after it was stopped never does, milliseconds. */
+const LONGEST_END = 20_000;
 const NO_RECORDER = "This browser cannot make videos: save a picture instead.";
 
 export class Video {
@@ -58,6 +60,8 @@ export class Video {
   async #record(frames, type) {
     say("Recording the video …");
     const file = await recorded(frames, type);
+    // A browser may name a kind that it has no encoder for, and record nothing.
+    if (file.size === 0) throw new Error(NO_RECORDER);
     download(file);
     say("The video is saved.");
   }
@@ -94,7 +98,8 @@ async function recorded(frames, type) {
   recorder.start();
   await play(frames, context);
   recorder.stop();
-  await ended;
+  const late = setTimeout(() => recorder.onerror(), LONGEST_END);
+  await ended.finally(() => clearTimeout(late));
   stream.getTracks().forEach((track) => track.stop());
   const ending = type.startsWith("video/mp4") ? "mp4" : "webm";
   return new File(chunks, `relight.${ending}`, { type: type.split(";")[0] });
