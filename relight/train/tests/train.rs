@@ -690,7 +690,12 @@ fn the_settings_that_come_with_relight_can_be_read() {
     let paper = paper.unwrap().settings;
     paper.check().unwrap();
     assert_eq!((paper.run.learning_rate, paper.run.batch), (1e-6, 12));
-    for ours in ["decompose.toml", "refine.toml", "print.toml", "print-2.toml"] {
+    for ours in [
+        "decompose.toml",
+        "refine.toml",
+        "print.toml",
+        "print-2.toml",
+    ] {
         let ours = read_settings::<DecomposeSettings>(&folder.join(ours));
         let ours = ours.unwrap().settings;
         ours.check().unwrap();

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::number::{decimal, whole};
+use super::number::{decimal, shown, whole};
 use super::status::StatusReport;
 
 /// Why the controller started.
@@ -215,19 +215,9 @@ impl fmt::Display for Message {
             } => write!(f, "[OPT:{letters},{blocks},{buffer}]"),
             Message::Note(text) => write!(f, "[MSG:{text}]"),
             Message::Info { tag, text } => write!(f, "[{tag}:{text}]"),
-            Message::Setting { number, value } => write!(f, "${number}={}", shown(*value)),
+            Message::Setting { number, value } => write!(f, "${number}={}", shown(*value, 3)),
             Message::Startup(text) => write!(f, ">{text}"),
         }
-    }
-}
-
-/// A value as Grbl writes it, with three digits behind the point; with all that it has where others wrote more.
-fn shown(value: f64) -> String {
-    let usual = format!("{value:.3}");
-    if usual.parse() == Ok(value) {
-        usual
-    } else {
-        value.to_string()
     }
 }
 

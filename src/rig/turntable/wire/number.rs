@@ -20,6 +20,16 @@ pub(super) fn whole(text: &str) -> Option<u32> {
     usable.then(|| text.parse().ok()).flatten()
 }
 
+/// A value as Grbl writes it, with so many digits behind the point; with all that it has where others wrote more.
+pub(super) fn shown(value: f64, digits: usize) -> String {
+    let usual = format!("{value:.digits$}");
+    if usual.parse() == Ok(value) {
+        usual
+    } else {
+        value.to_string()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::number::{decimal, whole};
+use super::number::{decimal, shown, whole};
 
 /// The controller's state, as Grbl names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -191,8 +191,8 @@ impl fmt::Display for StatusReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "<{}", self.state)?;
         match self.position {
-            Position::Machine(at) => write!(f, "|MPos:{at:.3},0.000,0.000")?,
-            Position::Work(at) => write!(f, "|WPos:{at:.3},0.000,0.000")?,
+            Position::Machine(at) => write!(f, "|MPos:{},0.000,0.000", shown(at, 3))?,
+            Position::Work(at) => write!(f, "|WPos:{},0.000,0.000", shown(at, 3))?,
         }
         if let Some(feed) = self.feed {
             write!(f, "|FS:{feed},0")?;
@@ -201,7 +201,7 @@ impl fmt::Display for StatusReport {
             write!(f, "|T:{us}")?;
         }
         if let Some(volts) = self.battery_v {
-            write!(f, "|Bat:{volts:.2}")?;
+            write!(f, "|Bat:{}", shown(volts, 2))?;
         }
         match (self.pins.index, self.pins.emergency_stop) {
             (false, false) => {}
@@ -210,7 +210,7 @@ impl fmt::Display for StatusReport {
             (true, true) => f.write_str("|Pn:XR")?,
         }
         if let Some(zero) = self.work_zero {
-            write!(f, "|WCO:{zero:.3},0.000,0.000")?;
+            write!(f, "|WCO:{},0.000,0.000", shown(zero, 3))?;
         }
         f.write_str(">")
     }

@@ -56,8 +56,14 @@ fn a_plain_line_is_done_by_its_ok_and_gives_what_stood_before_it() {
 }
 
 #[test]
-fn a_setting_with_more_digits_than_grbl_writes_keeps_them() {
-    for line in ["$100=88.8895", "$100=88.889", "$27=1.000"] {
+fn a_value_with_more_digits_than_grbl_writes_keeps_them() {
+    for line in [
+        "$100=88.8895",
+        "$100=88.889",
+        "$27=1.000",
+        "<Idle|MPos:0.0005,0.000,0.000>",
+        "<Run|WPos:12.340,0.000,0.000|FS:432,0|Bat:11.845|WCO:0.1234,0.000,0.000>",
+    ] {
         let message = parse(line).unwrap();
         assert_eq!(message.to_string(), line);
         assert_eq!(parse(&message.to_string()), Some(message));
