@@ -9,8 +9,8 @@ use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
 use relight_photo::decompose::{DecomposeOptions, Decomposer};
 use relight_photo::insert::{
-    EdgeColours, InsertError, InsertScene, LightSource, Matching, MaterialChange, Placement,
-    SceneObject, Subject,
+    EdgeColours, InsertError, InsertScene, LightSource, Matching, MaterialChange, SceneObject,
+    Subject,
 };
 use relight_synth::Library;
 use stage::{Stage, StageRecipe};
@@ -82,7 +82,7 @@ impl InsertionMethod {
         }
         let object = SceneObject {
             subject,
-            placement: Placement::in_photo(subject),
+            placement: subject.own_placement(),
             change: MaterialChange::default(),
             exposure: 0.0,
             shadow: if self == Self::WithoutShadow {

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use super::Subject;
 use relight_core::image::{Extent, Planes};
 
 /// Where an object stands in a picture.
@@ -17,12 +16,10 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Where an object stood in its own photograph.
-    #[must_use]
-    pub fn in_photo(subject: &Subject) -> Self {
-        let alpha = &subject.matte().alpha;
-        let (rows, photo) = (rows(alpha), subject.photo_extent());
-        let [left, top] = subject.place().map(|at| at as f64);
+    /// Where an object that covers these pixels stood in its photograph, of which they begin at column and row `place`.
+    pub(super) fn in_photo(alpha: &Planes<1>, place: [usize; 2], photo: Extent) -> Self {
+        let rows = rows(alpha);
+        let [left, top] = place.map(|at| at as f64);
         Self {
             at: [
                 (left + middle(alpha)) / photo.width as f64,
@@ -32,9 +29,7 @@ impl Placement {
             rotation: 0.0,
         }
     }
-}
 
-impl Placement {
     /// Whether any of an object of this coverage would be seen in a picture of this size.
     pub(super) fn is_seen(&self, alpha: &Planes<1>, scene: Extent) -> bool {
         let (width, height) = (scene.width as f64, scene.height as f64);

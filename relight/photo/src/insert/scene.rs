@@ -299,7 +299,7 @@ mod tests {
     #[test]
     fn at_its_own_place_it_covers_itself() {
         let subject = subject();
-        let placement = Placement::in_photo(&subject);
+        let placement = subject.own_placement();
         let scene = InsertScene::new(
             PHOTO,
             &lamp(),
@@ -425,14 +425,14 @@ mod tests {
         let subject = subject();
         let refused = |placement| {
             let objects = vec![
-                object(&subject, Placement::in_photo(&subject)),
+                object(&subject, subject.own_placement()),
                 object(&subject, placement),
             ];
             InsertScene::new(PHOTO, &lamp(), 25.0, Matching::default(), objects)
                 .unwrap_err()
                 .to_string()
         };
-        let good = Placement::in_photo(&subject);
+        let good = subject.own_placement();
         assert_eq!(
             refused(Placement {
                 height: 0.0,

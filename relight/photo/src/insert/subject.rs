@@ -6,7 +6,7 @@ use super::InsertError;
 use super::cut::{Cut, EdgeColours};
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
-use super::placement::Fit;
+use super::placement::{Fit, Placement};
 use super::shading::{DARK, Shading, TRUST_IN_PHOTOGRAPHS};
 use super::smooth::weighted_mean;
 use super::source::likeness;
@@ -261,6 +261,12 @@ impl Subject {
     #[must_use]
     pub const fn normals(&self) -> &Normals<YUp> {
         &self.normals
+    }
+
+    /// Where it stood in its photograph.
+    #[must_use]
+    pub fn own_placement(&self) -> Placement {
+        Placement::in_photo(&self.matte.alpha, self.place, self.photo)
     }
 
     /// The object as it stands by this fit.
