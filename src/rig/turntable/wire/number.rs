@@ -20,10 +20,11 @@ pub(super) fn whole(text: &str) -> Option<u32> {
     usable.then(|| text.parse().ok()).flatten()
 }
 
-/// A value as Grbl writes it, with so many digits behind the point; with all that it has where others wrote more.
+/// A value as Grbl writes it, with so many digits behind the point; as it is where others wrote more, or where that would be too
+/// long.
 pub(super) fn shown(value: f64, digits: usize) -> String {
     let usual = format!("{value:.digits$}");
-    if usual.parse() == Ok(value) {
+    if usual.len() <= LONGEST && usual.parse() == Ok(value) {
         usual
     } else {
         value.to_string()
