@@ -12,10 +12,14 @@ use relight_core::light::{Direction, LightSampler, Panorama};
 const DRAWN: Extent = Extent::new(128, 64);
 /// Neighbouring pixels look in different directions, in squares of this side, over which the mean is taken.
 const PATTERN: usize = 4;
+/// Half of such a side.
+const HALF_PATTERN: i64 = PATTERN as i64 / 2;
 /// Directions of one pixel, by the light and as many by the cosine.
 const RAYS: usize = 12;
 /// How many times its width the object's shadow is looked for to both sides, and its height above and below.
 const REACH: f64 = 1.5;
+/// The part of the object's height over which a shadow that goes on ends where it is no longer looked for.
+const FADE: f32 = 0.125;
 /// The part of the object's lowest points that may lie below the ground: normals at the rim are rough.
 const BELOW_GROUND: f64 = 0.03;
 /// How far a ray goes at a time, cells: less than one.
@@ -112,12 +116,29 @@ impl Shadow {
                 ground.shade(relief, rays, &mut row, (phase, below, from[0] as f64));
             }
         });
-        // Every square of the pattern holds all directions.
-        let arriving = super::smooth::blurred(&arriving, PATTERN / 2);
-        Self { arriving, from }.trimmed()
+        let shadow = Self {
+            arriving: mean_of_patterns(&arriving),
+            from,
+        };
+        shadow.ending(FADE * height as f32).trimmed()
     }
 
-    /// The part of it that can be seen.
+    /// The same shadow, which fades to nothing over so many cells before each of its borders.
+    fn ending(mut self, over: f32) -> Self {
+        let Extent { width, height } = self.arriving.extent();
+        let part = |at: usize, count: usize| (at.min(count - 1 - at) as f32 / over).min(1.0);
+        self.arriving.fill_rows(|y, lines| {
+            let of_row = part(y, height);
+            for line in lines {
+                for (x, arriving) in line.iter_mut().enumerate() {
+                    *arriving = 1.0 - (1.0 - *arriving) * of_row.min(part(x, width));
+                }
+            }
+        });
+        self
+    }
+
+    /// The part of it that can be seen, with a cell around it where it ends: between cells it fades.
     fn trimmed(self) -> Self {
         let Extent { width, height } = self.arriving.extent();
         let is_seen = |x: usize, y: usize| {
@@ -133,13 +154,16 @@ impl Shadow {
                 });
             }
         }
-        let [columns, rows] = seen;
-        if columns.is_empty() {
+        if seen[0].is_empty() {
             return Self {
                 arriving: Planes::filled(Extent::new(1, 1), [1.0; 3]),
                 from: self.from,
             };
         }
+        let [columns, rows] = [(0, width), (1, height)].map(|(axis, end)| {
+            let Range { start, end: last } = seen[axis];
+            start.saturating_sub(1)..(last + 1).min(end)
+        });
         let part = Extent::new(columns.len(), rows.len());
         Self {
             arriving: Planes::from_fn(part, |x, y| {
@@ -364,6 +388,40 @@ fn rays(ground: &Ground, around: [[f32; 3]; 2], light: &Panorama) -> Vec<Vec<Ray
     (0..PATTERN * PATTERN).map(pattern).collect()
 }
 
+/// The mean over squares that hold each place of the pattern equally: a cell more to each side than half a pattern, where the
+/// outermost count half.
+fn mean_of_patterns(arriving: &Planes<3>) -> Planes<3> {
+    let Extent { width, height } = arriving.extent();
+    let along = |source: &Planes<3>, across: bool| {
+        let mut mean = Planes::zeros(source.extent());
+        let planes = source.planes();
+        mean.fill_rows(|y, lines| {
+            for (line, plane) in lines.into_iter().zip(planes) {
+                for (x, value) in line.iter_mut().enumerate() {
+                    let at = |step: i64| {
+                        let [x, y] = if across {
+                            [step_from(x, step, width), y]
+                        } else {
+                            [x, step_from(y, step, height)]
+                        };
+                        plane[y * width + x]
+                    };
+                    let ends = (at(-HALF_PATTERN) + at(HALF_PATTERN)) / 2.0;
+                    let inner: f32 = (1 - HALF_PATTERN..HALF_PATTERN).map(at).sum();
+                    *value = (ends + inner) / PATTERN as f32;
+                }
+            }
+        });
+        mean
+    };
+    along(&along(arriving, true), false)
+}
+
+/// A place so many steps on, as far as there are any.
+fn step_from(at: usize, steps: i64, count: usize) -> usize {
+    (at as i64 + steps).clamp(0, count as i64 - 1) as usize
+}
+
 /// Of the sides of a box with these corners those by which a direction enters it, and those by which it leaves it.
 fn sides([low, high]: [[f32; 3]; 2], towards: [f32; 3]) -> [[f32; 3]; 2] {
     let of = |enters: bool| {
@@ -485,6 +543,27 @@ mod tests {
             }
         }
         assert!(met > 30, "{met}");
+    }
+
+    #[test]
+    fn a_shadow_ends_where_all_light_arrives_and_shows_no_pattern() {
+        let relief = ball();
+        let shadow = Shadow::cast(&relief, 0.4, &lamp(60.0, 0.3));
+        let Extent { width, height } = shadow.arriving.extent();
+        let border = (0..height)
+            .flat_map(|y| [[0, y], [width - 1, y]])
+            .chain((0..width).flat_map(|x| [[x, 0], [x, height - 1]]));
+        for [x, y] in border {
+            let kept = 1.0 - shadow.arriving.pixel(x, y)[0];
+            assert!(kept <= LEAST_SEEN, "{x} {y} {kept}");
+        }
+        let pattern = Planes::from_fn(Extent::new(40, 40), |x, y| {
+            [(x % PATTERN + PATTERN * (y % PATTERN)) as f32; 3]
+        });
+        let even = mean_of_patterns(&pattern);
+        for place in [[20, 20], [21, 20], [22, 23], [19, 17]] {
+            assert!((even.pixel(place[0], place[1])[1] - 7.5).abs() < 1e-4);
+        }
     }
 
     #[test]
