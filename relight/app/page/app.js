@@ -39,14 +39,14 @@ async function begin() {
   const library = new Library(engine);
   const bundled = await library.bundled();
   const work = new Work(emptyScene((bundled.find(({ key }) => key === FIRST) ?? bundled[0]).key));
-  const rendering = new Rendering(engine, library, work, painterOn($("picture")), $("picture"));
+  const rendering = new Rendering(library, work, painterOn($("picture")), $("picture"));
   const cutter = new Cutter(library);
   const objects = new Objects(work, library, cutter, rendering);
   new Backgrounds(work, library, rendering);
   new Stage(work, rendering);
   new Lamp(work, rendering);
-  new Video(work, engine, library);
-  const saving = new Saving(work, engine, library);
+  new Video(work, library);
+  const saving = new Saving(work, library);
   bindControls(work);
   bindSteps(work, cutter);
   bindBefore(rendering);

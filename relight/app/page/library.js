@@ -19,7 +19,10 @@ export class Library {
 
   #engine;
   #number = 0;
+  /** The engine's background. */
   #background = null;
+  /** Ends with the last question that goes by the engine's background. */
+  #asked = Promise.resolve();
 
   constructor(engine) {
     this.#engine = engine;
@@ -78,25 +81,47 @@ export class Library {
   /** Opens a file as a background: "photo" or "panorama_file". */
   async openBackground(file, kind) {
     let [fields, parts] = [{ kind, name: file.name }, [file]];
-    const answer = await this.#ask(file, (_, bytes) => this.#engine.ask("background", { kind, name: file.name }, (parts = bytes)),
-      (read, bytes) => this.#engine.ask("background", (fields = { kind: pixelKind(kind), ...read }), (parts = bytes)));
-    const background = { key: `own ${++this.#number}`, name: file.name, kind, fields, parts, width: answer.width, height: answer.height };
-    this.#background = background.key;
+    const key = `own ${++this.#number}`;
+    const answer = await this.#inTurn(async () => {
+      const opened = await this.#ask(file, (_, bytes) => this.#engine.ask("background", { kind, name: file.name }, (parts = bytes)),
+        (read, bytes) => this.#engine.ask("background", (fields = { kind: pixelKind(kind), ...read }), (parts = bytes)));
+      this.#background = key;
+      return opened;
+    });
+    const background = { key, name: file.name, kind, fields, parts, width: answer.width, height: answer.height };
     background.small = await smallOfFile(file);
     this.#addBackground(background);
     return background;
   }
 
-  /** Sees to it that the engine has a background. */
-  async useBackground(key) {
-    if (this.#background === key) return;
-    const { fields, parts } = this.backgrounds.get(key);
-    await this.#engine.ask("background", fields, parts);
-    this.#background = key;
+  /** Asks the engine for something of a scene, before the background of that scene and nobody else's. */
+  askBefore(key, op, fields) {
+    return this.#inTurn(async () => {
+      if (this.#background !== key) {
+        const { fields: chosen, parts } = this.backgrounds.get(key);
+        await this.#engine.ask("background", chosen, parts);
+        this.#background = key;
+      }
+      return this.#engine.ask(op, fields);
+    });
   }
 
-  /** Takes what a kept scene brought, in place of everything. */
-  takeImport({ objects, background, parts }) {
+  /** Does something after all that was to be done so before it. */
+  #inTurn(work) {
+    const done = this.#asked.then(work);
+    this.#asked = done.catch(() => {});
+    return done;
+  }
+
+  /** Opens a kept scene's file in place of everything: its scene, and the key of its background. */
+  reopen(file) {
+    return this.#inTurn(async () => {
+      const answer = await this.#engine.ask("import", {}, [file]);
+      return { scene: answer.scene, background: this.#takeImport(answer) };
+    });
+  }
+
+  #takeImport({ objects, background, parts }) {
     const rest = [...parts];
     this.photos.clear();
     for (const { object, ...about } of objects) {

@@ -23,7 +23,6 @@ export class Rendering extends EventTarget {
   width = 4;
   height = 3;
 
-  #engine;
   #library;
   #work;
   #painter;
@@ -38,9 +37,9 @@ export class Rendering extends EventTarget {
   #before = null;
   #wantsBefore = false;
 
-  constructor(engine, library, work, painter, canvas) {
+  constructor(library, work, painter, canvas) {
     super();
-    [this.#engine, this.#library, this.#work, this.#painter, this.#canvas] = [engine, library, work, painter, canvas];
+    [this.#library, this.#work, this.#painter, this.#canvas] = [library, work, painter, canvas];
     work.addEventListener("scene", () => this.#sceneChanged());
     canvas.addEventListener("empty", () => this.refresh());
   }
@@ -90,7 +89,6 @@ export class Rendering extends EventTarget {
     this.#running = true;
     const { scene } = this.#work;
     try {
-      await this.#library.useBackground(scene.background);
       if (this.#wantsBefore) await this.#makeBefore(scene);
       else await this.#makeLayers(scene, sharp);
     } catch (error) {
@@ -103,7 +101,8 @@ export class Rendering extends EventTarget {
   }
 
   async #makeBefore(scene) {
-    const picture = await this.#engine.ask("render", { scene: forEngine(scene), longest: this.#sharpest(), before: true });
+    const fields = { scene: forEngine(scene), longest: this.#sharpest(), before: true };
+    const picture = await this.#library.askBefore(scene.background, "render", fields);
     this.#before = { scene, picture };
     if (this.#wantsBefore) this.#show();
   }
@@ -111,7 +110,8 @@ export class Rendering extends EventTarget {
   async #makeLayers(scene, sharp) {
     const began = performance.now();
     const longest = sharp ? this.#sharpest() : this.#draft;
-    const layers = await this.#engine.ask(this.#painter.layered ? "layers" : "render", { scene: forEngine(scene), longest, ...(this.#painter.layered ? {} : { before: false }) });
+    const [op, more] = this.#painter.layered ? ["layers", {}] : ["render", { before: false }];
+    const layers = await this.#library.askBefore(scene.background, op, { scene: forEngine(scene), longest, ...more });
     if (!sharp) this.#learn(performance.now() - began);
     this.#shown = { scene, look: lookOf(scene), sharp, layers };
     if (!this.#wantsBefore) this.#show();

@@ -11,11 +11,10 @@ const ENDS = { png: "png", jpeg: "jpg" };
 
 export class Saving {
   #work;
-  #engine;
   #library;
 
-  constructor(work, engine, library) {
-    [this.#work, this.#engine, this.#library] = [work, engine, library];
+  constructor(work, library) {
+    [this.#work, this.#library] = [work, library];
     for (const format of ["png", "jpeg"]) $(`save-${format}`).addEventListener("click", () => attempt(() => this.#save(format)));
     $("share").addEventListener("click", () => attempt(() => this.#share()));
     $("keep").addEventListener("click", () => attempt(() => this.#keep()));
@@ -48,16 +47,16 @@ export class Saving {
   }
 
   async #picture(format) {
-    const scene = await this.#ready();
+    const scene = this.#ready();
     say("Making the picture in full size …");
-    const { parts } = await this.#engine.ask("save", { scene: forEngine(scene), format });
+    const { parts } = await this.#library.askBefore(scene.background, "save", { scene: forEngine(scene), format });
     return new File(parts, `relight.${ENDS[format]}`, { type: TYPES[format] });
   }
 
   async #keep() {
-    const scene = await this.#ready();
+    const scene = this.#ready();
     say("Packing the scene …");
-    const { parts } = await this.#engine.ask("export", { scene: forEngine(scene), name: "scene" });
+    const { parts } = await this.#library.askBefore(scene.background, "export", { scene: forEngine(scene), name: "scene" });
     download(new File(parts, "relight-scene.zip", { type: "application/zip" }));
     this.#work.kept(scene);
     say("The scene is kept, with its photographs.");
@@ -69,18 +68,16 @@ export class Saving {
     if (!(await isZip(file))) throw new Error(`${file.name} is no kept scene: choose a zip file of this page.`);
     if (this.#work.unsaved && !confirm("Open another scene? This one is not kept.")) return;
     say(`Opening ${file.name} …`);
-    const answer = await this.#engine.ask("import", {}, [await copyOf(file)]);
-    const background = this.#library.takeImport(answer);
-    this.#work.begin(fromEngine(answer.scene, background));
+    const { scene, background } = await this.#library.reopen(await copyOf(file));
+    this.#work.begin(fromEngine(scene, background));
     say("The scene is open.");
   }
 
-  /** The scene, whose background the engine has. */
-  async #ready() {
+  /** The scene, which has an object. */
+  #ready() {
     calm();
     const { scene } = this.#work;
     if (scene.objects.length === 0) throw new Error("There is no object in the scene yet: add one first.");
-    await this.#library.useBackground(scene.background);
     return scene;
   }
 }

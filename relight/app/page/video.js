@@ -14,12 +14,11 @@ const NO_RECORDER = "This browser cannot make videos: save a picture instead.";
 
 export class Video {
   #work;
-  #engine;
   #library;
   #making = false;
 
-  constructor(work, engine, library) {
-    [this.#work, this.#engine, this.#library] = [work, engine, library];
+  constructor(work, library) {
+    [this.#work, this.#library] = [work, library];
     $("video").addEventListener("click", () => (this.#making ? (this.#making = false) : attempt(() => this.#make())));
   }
 
@@ -31,7 +30,6 @@ export class Video {
     this.#making = true;
     $("video-label").textContent = "Cancel";
     try {
-      await this.#library.useBackground(scene.background);
       const frames = await this.#render(scene, RATE * Number($("video-seconds").value));
       if (this.#making) await this.#record(frames, type);
       else say("No video was made.");
@@ -50,7 +48,8 @@ export class Video {
     for (let index = 0; index < count && this.#making; index++) {
       const turn = scene.light.turn + (360 * index) / count;
       const turned = { ...scene, light: { ...scene.light, turn: ((turn + 180) % 360) - 180 } };
-      const { width, height, parts } = await this.#engine.ask("render", { scene: forEngine(turned), longest: LONGEST, before: false });
+      const fields = { scene: forEngine(turned), longest: LONGEST, before: false };
+      const { width, height, parts } = await this.#library.askBefore(scene.background, "render", fields);
       frames.push(await compressed(parts[0], width, height));
       $("video-progress").value = index + 1;
     }
