@@ -53,7 +53,8 @@ impl Device {
                 answer => answer.ok(),
             }
         };
-        let name: Vec<u8> = raw.name.iter().map(|&byte| byte.cast_unsigned()).collect();
+        // A C char has a sign on x86 and none on ARM.
+        let name: Vec<u8> = raw.name.iter().flat_map(|byte| byte.to_ne_bytes()).collect();
         Ok(Some(Control {
             id: ControlId(raw.id),
             name: snake_case(&super::ioctl::text(&name)),
