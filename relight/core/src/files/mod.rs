@@ -10,5 +10,5 @@ mod result_folder;
 pub use maps::{Map, MapFiles};
 pub use movie::{MovieError, MovieFormat, MovieReader, MovieWriter};
 pub use output::{OutputKind, write_picture};
-pub use pictures::{read_planes, write_exr, write_jpeg, write_png};
+pub use pictures::{read_planes, write_exr, write_jpeg, write_png, write_png_of};
 pub use result_folder::{FolderFault, ResultFolder};

@@ -9,8 +9,8 @@ use relit_data::durable::{Partial, write_whole};
 use super::parent::make_parent;
 use crate::captured_object::{CapturedObject, CapturedObjectError};
 use crate::image::{
-    Depth, Gamma22, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
-    encode_exr, encode_jpeg, encode_png,
+    Depth, Extent, Gamma22, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
+    encode_exr, encode_jpeg, encode_png, encode_png_of,
 };
 use crate::light::{LightFileError, Normals, Panorama, PanoramaError, ShLight, YAxis};
 
@@ -20,6 +20,20 @@ use crate::light::{LightFileError, Normals, Panorama, PanoramaError, ShLight, YA
 /// Where the file cannot be written.
 pub fn write_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<(), ImageError> {
     write(path, &encode_png(path, planes, depth)?)
+}
+
+/// The same of a picture whose pixels are computed while it is written: `pixel` is given a row's number times the width,
+/// plus the column's.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_png_of(
+    path: &Path,
+    extent: Extent,
+    depth: Depth,
+    pixel: impl Fn(usize) -> [f32; 3] + Sync,
+) -> Result<(), ImageError> {
+    write(path, &encode_png_of(path, extent, depth, pixel)?)
 }
 
 /// Writes values of 0 to 1 with 8 bits and a little loss; others are clipped.
@@ -136,7 +150,8 @@ impl<Y: YAxis> Normals<Y> {
     /// # Errors
     /// Where the file cannot be written.
     pub fn write_png(&self, path: &Path, depth: Depth) -> Result<(), ImageError> {
-        write_png(path, &self.to_colours(), depth)
+        let extent = self.planes().extent();
+        write_png_of(path, extent, depth, |at| self.colour_at(at))
     }
 }
 
@@ -225,7 +240,6 @@ impl CapturedObject {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::Extent;
 
     fn ramp() -> Planes<3> {
         Planes::from_fn(Extent::new(7, 3), |x, y| {

@@ -1,10 +1,9 @@
-//! Encoded pictures: PNG, JPEG, WebP, EXR and HDR in, PNG, JPEG and EXR out. Knows bytes only: a path is how errors name a picture.
+//! Encoded pictures: PNG, JPEG, WebP, EXR and HDR in, JPEG and EXR out. Knows bytes only: a path is how errors name a picture.
 
 use std::io::Cursor;
 use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::metadata::Orientation;
 use image::{
     DynamicImage, ImageBuffer, ImageDecoder, ImageEncoder, ImageFormat, ImageReader, Limits, Pixel,
@@ -33,33 +32,6 @@ pub enum Samples {
     Integer,
     /// Floating point values, as they stood.
     Float,
-}
-
-/// Values of 0 to 1 as integers in a PNG; others are clipped.
-///
-/// # Errors
-/// Where the picture, called `path`, cannot be encoded.
-pub fn encode_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<Vec<u8>, ImageError> {
-    let encode = |source| ImageError::Encode {
-        path: path.to_owned(),
-        source,
-    };
-    let mut bytes = Vec::new();
-    // The default level takes twenty times as long, and files are no smaller.
-    let encoder =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
-    let (pixels, colour) = match depth {
-        Depth::Eight => (planes.to_bytes(), image::ExtendedColorType::Rgb8),
-        Depth::Sixteen => (
-            interleaved(planes, |v| (to_integer(v, 65535.0) as u16).to_ne_bytes()),
-            image::ExtendedColorType::Rgb16,
-        ),
-    };
-    let [width, height] = sides(planes.extent());
-    encoder
-        .write_image(&pixels, width, height, colour)
-        .map_err(encode)?;
-    Ok(bytes)
 }
 
 /// Values of 0 to 1 in a JPEG of good quality; others are clipped.
@@ -232,11 +204,11 @@ fn interleaved<T: Copy, const N: usize>(
 }
 
 /// The nearest integer of 0 to `most`; what is not a number becomes 0.
-fn to_integer(value: f32, most: f32) -> f32 {
+pub(super) fn to_integer(value: f32, most: f32) -> f32 {
     (value.clamp(0.0, 1.0) * most).round()
 }
 
-fn sides(extent: Extent) -> [u32; 2] {
+pub(super) fn sides(extent: Extent) -> [u32; 2] {
     let side = |pixels| u32::try_from(pixels).unwrap_or(u32::MAX);
     [side(extent.width), side(extent.height)]
 }

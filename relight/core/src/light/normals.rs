@@ -96,10 +96,15 @@ impl<Y: YAxis> Normals<Y> {
         let mut colours = self.planes.clone();
         let [x, y, z] = colours.planes_mut();
         for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
-            let is_surface = *x != 0.0 || *y != 0.0 || *z != 0.0;
-            [*x, *y, *z] = [*x, *y, *z].map(|v| if is_surface { v.midpoint(1.0) } else { 0.0 });
+            [*x, *y, *z] = colour([*x, *y, *z]);
         }
         colours
+    }
+
+    /// The colour of one pixel, by its row's number times the width, plus its column's.
+    #[must_use]
+    pub fn colour_at(&self, at: usize) -> [f32; 3] {
+        colour(self.planes.planes().map(|plane| plane[at]))
     }
 
     /// The same surface with y the other way.
@@ -224,6 +229,12 @@ impl Normals<YUp> {
             }
         }))
     }
+}
+
+/// The colour `(n + 1) / 2` of a normal; black where there is no surface.
+fn colour(normal: [f32; 3]) -> [f32; 3] {
+    let is_surface = normal.iter().any(|&v| v != 0.0);
+    normal.map(|v| if is_surface { v.midpoint(1.0) } else { 0.0 })
 }
 
 #[cfg(test)]

@@ -71,6 +71,8 @@ pub struct DecomposeOptions {
     /// The part of the object's pixels that are saturated, where it is known from a larger picture;
     /// else it is counted.
     pub saturated_fraction: Option<f64>,
+    /// Whether [`Decomposition::paint`] is wanted.
+    pub paint: bool,
 }
 
 impl Default for DecomposeOptions {
@@ -81,6 +83,7 @@ impl Default for DecomposeOptions {
             specular: SpecularGate::default(),
             saturated_from: Srgb::to_linear(SATURATED_VALUE),
             saturated_fraction: None,
+            paint: false,
         }
     }
 }
@@ -100,7 +103,7 @@ pub struct Decomposition {
     /// The highlight H, grey; 0 where none was separated.
     pub highlight: Planes<1>,
     /// Per pixel, which part of its darkness is expected to be paint, 0..=1: near 1 print, near 0 shadow, in between where
-    /// the network cannot tell. None of weights without that head.
+    /// the network cannot tell. None where it was not asked for, and of weights without that head.
     pub paint: Option<Planes<1>>,
     /// The light of order 2 whose irradiance on the normals is nearest to the shading: grey, as the
     /// shading is. The colour of the light is part of the albedo.
@@ -284,13 +287,21 @@ impl Decomposer {
         let maps = Enlargement::new(&whole.fields, &whole.mask, part)
             .with_normals(others, &whole.mask)
             .with_details(self.details(&object, &part, options)?);
+        let CutObject {
+            picture,
+            inside,
+            mask,
+            ..
+        } = object;
+        // Of large photographs every plane counts.
+        drop(mask);
         let plan = LayerPlan {
-            picture: &object.picture,
-            inside: &object.inside,
+            picture: &picture,
+            inside: &inside,
             window,
             photograph: extent,
             with_highlight: is_glossy,
-            with_paint: self.tells_paint,
+            with_paint: options.paint && self.tells_paint,
         };
         let layers = plan.compose(&maps)?;
         Ok(Decomposition {

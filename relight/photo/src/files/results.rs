@@ -10,9 +10,10 @@ use crate::decompose::{
     WorkingSize, in_colour,
 };
 use relight_core::files::ResultFolder;
-use relight_core::files::write_png;
+use relight_core::files::{write_png, write_png_of};
 use relight_core::image::{ColourSpace, Depth, Extent, ImageError, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, Panorama};
+use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
 use relight_core::statistics::ranked;
 
@@ -133,14 +134,22 @@ impl DecompositionFiles<'_> {
     fn write_files(&self, folder: &Path) -> Result<DecompositionFigures, DecomposeError> {
         let found = self.found;
         let path = |name: &str| folder.join(name);
-        found
-            .normals
-            .write_png(&path("normal.png"), Depth::Sixteen)?;
+        // Two at a time: each is in memory as it will stand in its file.
+        let normals = || found.normals.write_png(&path("normal.png"), Depth::Sixteen);
+        let albedo = || write_light(&path("albedo.png"), &found.albedo);
+        let shading = || write_grey(&path("shading.png"), &found.shading);
+        let diffuse = || write_light(&path("diffuse.png"), &found.diffuse);
+        let specular = || write_grey(&path("specular.png"), &found.highlight);
+        let (normals, albedo) = parallel::join(normals, albedo);
+        normals?;
+        let (shading, diffuse) = parallel::join(shading, diffuse);
+        let (specular, mask) = parallel::join(specular, || self.write_mask(&path("mask.png")));
+        mask?;
         let white = FigureWhites {
-            albedo: write_light(&path("albedo.png"), &found.albedo)?,
-            shading: write_grey(&path("shading.png"), &found.shading)?,
-            diffuse: write_light(&path("diffuse.png"), &found.diffuse)?,
-            specular: write_grey(&path("specular.png"), &found.highlight)?,
+            albedo: albedo?,
+            shading: shading?,
+            diffuse: diffuse?,
+            specular: specular?,
         };
         found.light.write(&path("light.txt"))?;
         ball(found)
@@ -153,9 +162,6 @@ impl DecompositionFiles<'_> {
             .clone()
             .map(|value| value.max(0.0));
         Rgb::<Linear>::new(radiance).write_exr(&path("light-panorama.exr"))?;
-        let mask = in_colour(self.photo.mask.clone());
-        write_png(&path("mask.png"), &mask, Depth::Eight)?;
-        drop(mask);
         write_png(&path("contact.png"), &self.sheet()?, Depth::Eight)?;
         let figures = self.figures(white);
         let mut json = serde_json::to_vec_pretty(&figures).unwrap_or_default();
@@ -163,6 +169,13 @@ impl DecompositionFiles<'_> {
         let file = path(FIGURES);
         write_whole(&file, &json).map_err(DecomposeError::write(&file))?;
         Ok(figures)
+    }
+
+    fn write_mask(&self, path: &Path) -> Result<(), ImageError> {
+        let mask = self.photo.mask.plane(0);
+        write_png_of(path, self.photo.mask.extent(), Depth::Eight, |at| {
+            [mask[at]; 3]
+        })
     }
 
     fn figures(&self, white: FigureWhites) -> DecompositionFigures {
@@ -261,25 +274,28 @@ fn ball(found: &Decomposition) -> Rgb<Linear> {
 
 /// Writes light as a PNG of 16 bits, sRGB; the light that its largest value stands for.
 pub fn write_light(path: &Path, light: &Rgb<Linear>) -> Result<f32, ImageError> {
-    let (encoded, white) = encoded(light.planes());
-    write_png(path, &encoded, Depth::Sixteen)?;
+    let white = white_of(light.planes());
+    let planes = light.planes().planes();
+    write_png_of(path, light.planes().extent(), Depth::Sixteen, |at| {
+        planes.map(|plane| Srgb::from_linear(plane[at] / white))
+    })?;
     Ok(white)
 }
 
 /// The same of grey light.
 fn write_grey(path: &Path, light: &Planes<1>) -> Result<f32, ImageError> {
-    let (encoded, white) = encoded(light);
-    write_png(path, &in_colour(encoded), Depth::Sixteen)?;
+    let white = white_of(light);
+    let plane = light.plane(0);
+    write_png_of(path, light.extent(), Depth::Sixteen, |at| {
+        [Srgb::from_linear(plane[at] / white); 3]
+    })?;
     Ok(white)
 }
 
-/// Light as sRGB over its largest value, and that value. What fits in stays as it is, so that files can be
-/// compared.
-fn encoded<const C: usize>(light: &Planes<C>) -> (Planes<C>, f32) {
+/// The light that the largest value of a file stands for: 1 where all fits in, so that files can be compared.
+fn white_of<const C: usize>(light: &Planes<C>) -> f32 {
     let values = light.planes().into_iter().flatten();
-    let white = values.fold(1.0_f32, |a, &b| a.max(b));
-    let encoded = light.clone();
-    (encoded.map(|value| Srgb::from_linear(value / white)), white)
+    values.fold(1.0_f32, |a, &b| a.max(b))
 }
 
 /// The value that one in two hundred under the mask exceeds; 1 where all is dark.
