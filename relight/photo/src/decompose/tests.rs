@@ -4,7 +4,7 @@ use super::answer::{Fields, MapsNet, details, fields, to_maps};
 use super::*;
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, YUp};
-use relight_nets::{INPUTS, NetError, OUTPUTS, Weights, decomposer};
+use relight_nets::{INPUTS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_paint};
 
 /// Answers pixel by pixel, from the encoded values of the pixel and the mean of all log luminances.
 struct PixelNet<F> {
@@ -382,4 +382,23 @@ fn a_mask_that_is_empty_or_of_another_size_is_refused() {
         decompose(Planes::filled(Extent::new(64, 63), [1.0])),
         "the mask has 64 x 63 pixels, and the photograph 64 x 64"
     );
+}
+
+#[test]
+fn the_part_of_darkness_that_is_paint_is_made_where_it_is_asked_for() {
+    let weights = Weights::initial(&decomposer_with_paint(), 1);
+    let net = Decomposer::with_side(&weights, 32).unwrap();
+    let extent = Extent::new(40, 30);
+    let picture = Rgb::new(Planes::filled(extent, [0.5, 0.4, 0.3]));
+    let mask = Planes::filled(extent, [1.0]);
+    let paint = |paint| {
+        let options = DecomposeOptions {
+            paint,
+            ..DecomposeOptions::default()
+        };
+        net.decompose(&picture, &mask, &options).unwrap().paint
+    };
+    assert!(paint(false).is_none());
+    let found = paint(true).unwrap();
+    assert!(found.plane(0).iter().all(|part| (0.0..=1.0).contains(part)));
 }

@@ -54,7 +54,11 @@ impl Device {
             }
         };
         // A C char has a sign on x86 and none on ARM.
-        let name: Vec<u8> = raw.name.iter().flat_map(|byte| byte.to_ne_bytes()).collect();
+        let name: Vec<u8> = raw
+            .name
+            .iter()
+            .flat_map(|byte| byte.to_ne_bytes())
+            .collect();
         Ok(Some(Control {
             id: ControlId(raw.id),
             name: snake_case(&super::ioctl::text(&name)),
