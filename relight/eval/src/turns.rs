@@ -305,16 +305,12 @@ impl Answer {
                 let source = NormalsSource::Own;
                 let axes = relight_core::light::NormalsFrame::YUp;
                 let normals = prior_normals(&source, own, axes, &turn.first, &turn.mask)?;
-                Some(TurnPrior::from(normals))
+                Some(TurnPrior {
+                    albedo: Some(prior_albedo(&networks.photo, &turn.first, &turn.mask)?),
+                    ..normals.into()
+                })
             }
             TurnMethod::Outline | TurnMethod::KnownLight => None,
-        };
-        let prior = match prior {
-            Some(prior) => Some(TurnPrior {
-                albedo: Some(prior_albedo(&networks.photo, &turn.first, &turn.mask)?),
-                ..prior
-            }),
-            None => None,
         };
         let options = TurnOptions {
             elevation: truth.elevation,
@@ -336,7 +332,7 @@ impl Answer {
         Self {
             normals: found.normals,
             expected_errors: found.expected_errors,
-            albedo: None,
+            albedo: Some(found.albedo),
             material: None,
             azimuths: Vec::new(),
         }

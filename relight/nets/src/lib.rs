@@ -51,7 +51,9 @@ pub use onnxruntime::OnnxRuntime;
 pub use parameter::{Parameter, Role};
 pub use plan::GivenNumber;
 pub use signature::{OnnxElement, OnnxSignature, OnnxValue};
-pub use turn_network::{TURN_INPUTS, TURN_OUTPUTS, turn_network};
+pub use turn_network::{
+    ALBEDO_OUTPUTS, ALBEDO_PARAMETERS, LOG_MEANS, TURN_INPUTS, TURN_OUTPUTS, turn_network,
+};
 pub use weights::{Tensor, Weights};
 
 /// The example of the README compiles.

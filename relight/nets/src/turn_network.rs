@@ -1,8 +1,9 @@
-//! The network of whole turns: normals from the harmonics of every pixel's curve over the table's angle.
+//! The network of whole turns: normals and shading from the harmonics of every pixel's curve over the table's angle.
 //!
 //! Input, [`TURN_INPUTS`] channels: what `relight_turn` makes of the curves (`relight_turn::NetworkInput`). Output
 //! `normals`, [`TURN_OUTPUTS`] channels: the normal in the viewer's frame before its length is made 1 (3), and the
-//! logarithm of the expected length of the chord to the true one (1).
+//! logarithm of the expected length of the chord to the true one (1). Output `albedo`, [`ALBEDO_OUTPUTS`] channels: the
+//! logarithm of albedo over the mean of the curve, each channel in any unit.
 
 use super::graph::{Graph, Value};
 
@@ -10,6 +11,12 @@ use super::graph::{Graph, Value};
 pub const TURN_INPUTS: usize = 65;
 /// Channels of the output.
 pub const TURN_OUTPUTS: usize = 4;
+/// Channels of the output for the albedo.
+pub const ALBEDO_OUTPUTS: usize = 3;
+/// The first of the three channels of the input that have the logarithms of the curves' means.
+pub const LOG_MEANS: usize = 32;
+/// How the names of the parameters of the head for albedo begin.
+pub const ALBEDO_PARAMETERS: &str = "albedo.";
 
 /// Channels that every pixel has of its own.
 const STEM: usize = 24;
@@ -50,14 +57,29 @@ pub fn turn_network() -> Graph {
             1,
         );
     }
-    value = net.convolution("fine".to_owned(), value, FINE * BLOCK * BLOCK, 1);
-    value = net.pixel_shuffle(value, BLOCK);
-    value = net.concatenate(value, stem);
-    value = net.convolution("head.0".to_owned(), value, STEM, 1);
-    value = net.relu(value);
-    value = net.convolution("head.1".to_owned(), value, TURN_OUTPUTS, 1);
-    net.output("normals", value);
+    let normals = head(
+        &mut net,
+        ["fine", "head.0", "head.1"],
+        value,
+        stem,
+        TURN_OUTPUTS,
+    );
+    net.output("normals", normals);
+    let names = ["albedo.fine", "albedo.0", "albedo.1"];
+    let albedo = head(&mut net, names, value, stem, ALBEDO_OUTPUTS);
+    net.output("albedo", albedo);
     net
+}
+
+/// What the blocks say and what each pixel has of its own, through three convolutions.
+fn head(net: &mut Graph, names: [&str; 3], blocks: Value, stem: Value, outputs: usize) -> Value {
+    let [fine, first, last] = names.map(str::to_owned);
+    let value = net.convolution(fine, blocks, FINE * BLOCK * BLOCK, 1);
+    let value = net.pixel_shuffle(value, BLOCK);
+    let value = net.concatenate(value, stem);
+    let value = net.convolution(first, value, STEM, 1);
+    let value = net.relu(value);
+    net.convolution(last, value, outputs, 1)
 }
 
 /// Convolution, normalisation of groups, ReLU.
@@ -86,6 +108,8 @@ mod tests {
         let net = turn_network();
         let normals = net.node(net.outputs()[0].value);
         assert_eq!((normals.channels, normals.scale), (TURN_OUTPUTS, Some(1)));
+        let albedo = net.node(net.outputs()[1].value);
+        assert_eq!((albedo.channels, albedo.scale), (ALBEDO_OUTPUTS, Some(1)));
         assert_eq!(net.multiple(), 16);
         let count: usize = net.parameters().iter().map(|p| p.count()).sum();
         assert!(2 * count < 6_000_000, "{count}");

@@ -34,6 +34,8 @@ pub(super) struct TurnBatch {
     pub(super) input: Tensor,
     /// Unit normals, 3 channels.
     pub(super) normals: Tensor,
+    /// The logarithm of the albedo, 3 channels.
+    pub(super) log_albedo: Tensor,
     /// 1 where the object is, 1 channel.
     pub(super) mask: Tensor,
 }
@@ -108,6 +110,9 @@ impl TurnViews {
     }
 }
 
+/// The least albedo whose logarithm is learned.
+const LEAST_ALBEDO: f32 = 0.002;
+
 /// Mostly the phase by which turns are looked at first.
 fn phase_of(seed: u64) -> PhaseHypothesis {
     match seed % (2 * BY_SECOND) {
@@ -122,6 +127,7 @@ struct Planes {
     side: usize,
     input: Vec<f32>,
     normals: Vec<f32>,
+    log_albedo: Vec<f32>,
     mask: Vec<f32>,
 }
 
@@ -136,16 +142,22 @@ impl Planes {
         };
         let area = side * side;
         let (mut normals, mut mask) = (vec![0.0; 3 * area], vec![0.0; area]);
-        for (&pixel, normal) in drawn.pixels.iter().zip(&drawn.normals) {
-            mask[pixel as usize] = 1.0;
-            for (axis, value) in normal.to_array().into_iter().enumerate() {
-                normals[axis * area + pixel as usize] = value;
+        let mut log_albedo = vec![0.0; 3 * area];
+        for (k, &pixel) in drawn.pixels.iter().enumerate() {
+            let at = pixel as usize;
+            mask[at] = 1.0;
+            for (axis, value) in drawn.normals[k].to_array().into_iter().enumerate() {
+                normals[axis * area + at] = value;
+            }
+            for (channel, value) in drawn.albedo[k].to_array().into_iter().enumerate() {
+                log_albedo[channel * area + at] = value.max(LEAST_ALBEDO).ln();
             }
         }
         Self {
             side,
             input: network_input(&turn, phase),
             normals,
+            log_albedo,
             mask,
         }
     }
@@ -164,6 +176,7 @@ impl TurnBatch {
         Ok(Self {
             input: stacked(TURN_INPUTS, |turn| &turn.input)?,
             normals: stacked(3, |turn| &turn.normals)?,
+            log_albedo: stacked(3, |turn| &turn.log_albedo)?,
             mask: stacked(1, |turn| &turn.mask)?,
         })
     }
@@ -173,6 +186,7 @@ impl TurnBatch {
         [
             ("input", &self.input),
             ("normals", &self.normals),
+            ("log_albedo", &self.log_albedo),
             ("mask", &self.mask),
         ]
         .map(|(name, tensor)| (name.to_owned(), tensor.shallow_clone()))

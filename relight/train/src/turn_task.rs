@@ -14,12 +14,14 @@ use super::settings::{TurnNetworkSettings, first_difference};
 use super::task::{StepLosses, TrainingTask, Validation};
 use super::terms::LossTerms;
 use super::turn_samples::{TurnBatch, TurnViews};
-use relight_nets::{Weights, turn_network};
+use relight_nets::{ALBEDO_PARAMETERS, LOG_MEANS, Weights, turn_network};
 use relight_reader::Rank;
 use relight_synth::stream;
 
 /// What the expected error counts beside the normals.
 const EXPECTED_ERROR: f64 = 0.05;
+/// What the albedo counts beside them.
+const ALBEDO: f64 = 0.5;
 /// Range of the logarithm of the expected chord while training.
 const LOG_CHORD: (f64, f64) = (-4.0, 1.0);
 /// Turns of a batch of validation.
@@ -53,6 +55,8 @@ impl TurnNetworkTask {
         let graph = turn_network();
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = weights.cloned().unwrap_or_else(initial);
+        // Those of before there was a head for albedo.
+        let weights = weights.completed(&graph, ALBEDO_PARAMETERS, settings.run.seed);
         let learner = Learner::new(
             graph,
             &weights,
@@ -108,6 +112,29 @@ fn answered(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
         .f_narrow(1, 3, 1)?
         .f_clamp(LOG_CHORD.0, LOG_CHORD.1)?;
     Ok((normals.f_div(&length)?, log_chord))
+}
+
+/// How far the logarithm of the albedo is off at each pixel and channel, 0 outside the masks. Each channel of a turn is in a
+/// unit of its own: that in which it is off by 0 in the mean.
+fn albedo_errors(answer: &Tensor, batch: &TurnBatch) -> Result<Tensor, TrainError> {
+    let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
+    let errors = answer
+        .f_add(&means)?
+        .f_sub(&batch.log_albedo)?
+        .f_mul(&batch.mask)?;
+    let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
+    let covered = over(&batch.mask)?.f_clamp_min(1.0)?;
+    let units = over(&errors)?.f_div(&covered)?;
+    Ok(errors.f_sub(&units)?.f_mul(&batch.mask)?)
+}
+
+/// The mean amount of these errors.
+fn albedo_error(errors: &Tensor, batch: &TurnBatch) -> Result<Mean, TrainError> {
+    let channels = errors.size()[1] as f64;
+    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
+    let sum = errors.f_abs()?.f_sum(None)?;
+    let value = sum.f_div(&over)?.f_div_scalar(channels)?;
+    Ok(Mean { value, over })
 }
 
 /// Minus the logarithm of the chord's likelihood, where it is distributed exponentially with the expected mean.
@@ -177,6 +204,8 @@ impl TrainingTask for TurnNetworkTask {
         );
         let expected = expected_error(&normals, &log_chord, &batch)?;
         terms.add_mean("expected_error", EXPECTED_ERROR, expected);
+        let albedo = albedo_error(&albedo_errors(&answer[1], &batch)?, &batch)?;
+        terms.add_mean("albedo", ALBEDO, albedo);
         Ok(StepLosses {
             terms,
             batch: batch.named(),
@@ -195,7 +224,8 @@ impl TrainingTask for TurnNetworkTask {
             no_grad(|| {
                 let answer = model.forward(&batch.input)?;
                 let (normals, log_chord) = answered(&answer[0])?;
-                tally.add(&batch, &normals, &log_chord)
+                tally.add(&batch, &normals, &log_chord)?;
+                tally.add_albedo(&batch, &answer[1])
             })?;
         }
         Ok(Validation {
@@ -212,6 +242,8 @@ struct ValidationTally {
     means: Vec<f64>,
     /// The error of each pixel, and by how much it is expected to be off, degrees.
     pixels: Vec<(f32, f32)>,
+    /// The relative squared error of each turn's albedo, in the best unit of each channel.
+    albedo: Vec<f64>,
 }
 
 impl ValidationTally {
@@ -250,6 +282,21 @@ impl ValidationTally {
         Ok(())
     }
 
+    fn add_albedo(&mut self, batch: &TurnBatch, answer: &Tensor) -> Result<(), TrainError> {
+        let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
+        let within = |of: &Tensor| of.f_exp()?.f_mul(&batch.mask);
+        let (found, right) = (within(&answer.f_add(&means)?)?, within(&batch.log_albedo)?);
+        let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
+        let square = over(&found.f_square()?)?.f_clamp_min(1e-12)?;
+        let unit = over(&found.f_mul(&right)?)?.f_div(&square)?;
+        let apart = found.f_mul(&unit)?.f_sub(&right)?.f_square()?;
+        let all = |of: &Tensor| of.f_sum_dim_intlist([1_i64, 2, 3].as_slice(), false, None);
+        let error = all(&apart)?.f_div(&all(&right.f_square()?)?.f_clamp_min(1e-12)?)?;
+        self.albedo
+            .extend(Vec::<f64>::try_from(error.f_to_kind(Kind::Double)?)?);
+        Ok(())
+    }
+
     fn figures(mut self) -> std::collections::BTreeMap<String, f64> {
         let count = self.means.len().max(1) as f64;
         let mean = self.means.iter().sum::<f64>() / count;
@@ -257,6 +304,7 @@ impl ValidationTally {
         let mut figures = std::collections::BTreeMap::from([
             ("normals_deg".to_owned(), mean),
             ("standard_error".to_owned(), square.sqrt() / count),
+            ("albedo".to_owned(), self.albedo.iter().sum::<f64>() / count),
         ]);
         for (limit, name) in WITHIN_DEG {
             let expected = self

@@ -43,6 +43,8 @@ pub struct DrawnTurn {
     pub elevation: f32,
     /// Unit normals in the viewer's frame.
     pub normals: Vec<Vec3>,
+    /// Albedo; of metal its reflectance.
+    pub albedo: Vec<Vec3>,
 }
 
 impl DrawnTurn {
@@ -60,6 +62,7 @@ impl DrawnTurn {
             curves,
             elevation: view.elevation,
             normals: finish.normals,
+            albedo: finish.albedo,
         };
         if random.chance(CLIPPED) {
             drawn.clip(&mut random);
@@ -125,6 +128,7 @@ impl DrawnTurn {
             .iter()
             .map(|&k| self.normals[k] * Vec3::new(-1.0, 1.0, 1.0))
             .collect();
+        self.albedo = order.iter().map(|&k| self.albedo[k]).collect();
         self.curves = order
             .iter()
             .map(|&k| {
@@ -159,6 +163,7 @@ impl DrawnTurn {
             curves: Vec::new(),
             elevation: self.elevation,
             normals: Vec::new(),
+            albedo: Vec::new(),
         };
         for (block, members) in (0_u32..)
             .zip(&members)
@@ -176,6 +181,8 @@ impl DrawnTurn {
             half.pixels.push(block);
             half.curves.push(curve);
             half.normals.push(normal.normalize_or(Vec3::Z));
+            let albedo: Vec3 = members.iter().map(|&k| self.albedo[k]).sum();
+            half.albedo.push(albedo / members.len() as f32);
         }
         half
     }

@@ -39,7 +39,7 @@ impl From<TurnPrediction> for TurnPrior {
         Self {
             normals: found.normals,
             expected_errors: Some(found.expected_errors),
-            albedo: None,
+            albedo: Some(found.albedo),
             hypotheses: Some(found.hypotheses),
         }
     }

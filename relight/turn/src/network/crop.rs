@@ -122,6 +122,24 @@ impl Crop {
     }
 }
 
+/// The mean light of every pixel, as the network is given it on the grid.
+pub(crate) fn mean_light(curves: &TurnCurves) -> Vec<[f32; 3]> {
+    let frame = CoveredPixels::new(curves);
+    let parts = frame.is_seen.iter().filter(|&&seen| seen).count().max(1) as f32;
+    (0..curves.pixels())
+        .map(|pixel| {
+            let mut sum = [0.0; 3];
+            for part in (0..curves.parts()).filter(|&part| frame.is_seen[part]) {
+                let light = frame.light(pixel, part);
+                sum.iter_mut()
+                    .zip(light)
+                    .for_each(|(sum, light)| *sum += light);
+            }
+            sum.map(|sum| sum / parts)
+        })
+        .collect()
+}
+
 /// The cells on both sides of a place and how much each counts.
 fn around(place: f32) -> [(usize, f32); 2] {
     let last = (GRID - 1) as f32;
@@ -225,23 +243,27 @@ impl<'a> CoveredPixels<'a> {
         (2 * members.len() >= all && !members.is_empty()).then_some(members)
     }
 
-    /// The Fourier coefficients of the mean curve of pixels. What is clipped counts as white: a camera that cuts light
-    /// off is what the network has seen.
-    fn coefficients(&self, members: &[(usize, f32)]) -> Option<[[f32; 3]; COEFFICIENTS]> {
+    /// The light of a pixel in a part of the turn. What is clipped counts as white: a camera that cuts light off is what the
+    /// network has seen.
+    fn light(&self, pixel: usize, part: usize) -> [f32; 3] {
         let white = self.curves.clipped_value() as f32;
+        let (values, seen) = (
+            self.curves.values(pixel)[part],
+            self.curves.weights(pixel)[part],
+        );
+        [0, 1, 2].map(|c| if seen[c] > 0.0 { values[c] } else { white })
+    }
+
+    /// The Fourier coefficients of the mean curve of pixels.
+    fn coefficients(&self, members: &[(usize, f32)]) -> Option<[[f32; 3]; COEFFICIENTS]> {
         let total: f32 = members.iter().map(|(_, weight)| weight).sum();
         let mut equations = NormalEquations::new(COEFFICIENTS);
         let parts = self.curves.harmonics().iter().enumerate();
         for (part, harmonics) in parts.filter(|(part, _)| self.is_seen[*part]) {
             let mut mean = [0.0; 3];
             for &(pixel, weight) in members {
-                let (values, seen) = (
-                    self.curves.values(pixel)[part],
-                    self.curves.weights(pixel)[part],
-                );
-                for c in 0..3 {
-                    let value = if seen[c] > 0.0 { values[c] } else { white };
-                    mean[c] += f64::from(value * weight / total);
+                for (mean, light) in mean.iter_mut().zip(self.light(pixel, part)) {
+                    *mean += f64::from(light * weight / total);
                 }
             }
             equations.add(harmonics, mean);

@@ -6,7 +6,7 @@
 
 use std::f32::consts::TAU;
 
-use relight_nets::TURN_INPUTS;
+use relight_nets::{LOG_MEANS, TURN_INPUTS};
 use serde::Serialize;
 
 /// Harmonics of which the network sees all channels.
@@ -161,11 +161,10 @@ pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32>
             whole.extend([mean.re, mean.im]);
         }
     }
+    debug_assert_eq!(planes.count(), LOG_MEANS);
+    let logarithms = logarithms(&ratios.means);
     for c in 0..3 {
-        let middle = ratios.means.iter().map(|mean| mean[c].ln()).sum::<f32>()
-            / ratios.means.len().max(1) as f32;
-        let most = PARAMETERS.largest_log;
-        planes.push(|k| (ratios.means[k][c].ln() - middle).clamp(-most, most));
+        planes.push(|k| logarithms[k][c]);
     }
     let side = turn.side as f32;
     planes.push(|_| 1.0);
@@ -176,6 +175,32 @@ pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32>
         planes.push(|_| value);
     }
     planes.finish()
+}
+
+/// The logarithms of the means of curves, each channel's over its own mean: what the network's albedo is added to.
+pub(crate) fn log_means(means: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    logarithms(&over_mean(means).1)
+}
+
+fn logarithms(means: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let middle = [0, 1, 2].map(|c| {
+        let sum: f32 = means.iter().map(|mean| mean[c].ln()).sum();
+        sum / means.len().max(1) as f32
+    });
+    let most = PARAMETERS.largest_log;
+    let one = |mean: &[f32; 3]| [0, 1, 2].map(|c| (mean[c].ln() - middle[c]).clamp(-most, most));
+    means.iter().map(one).collect()
+}
+
+/// The mean of each channel over the object, and the means of the curves in these.
+fn over_mean(means: &[[f32; 3]]) -> ([f32; 3], Vec<[f32; 3]>) {
+    let count = means.len().max(1) as f32;
+    let of_all = [0, 1, 2].map(|c| {
+        let sum: f32 = means.iter().map(|mean| mean[c].max(0.0)).sum();
+        (sum / count).max(1e-9)
+    });
+    let one = |mean: &[f32; 3]| [0, 1, 2].map(|c| (mean[c] / of_all[c]).max(PARAMETERS.least_mean));
+    (of_all, means.iter().map(one).collect())
 }
 
 /// A channel, or with the number 3 the mean of all.
@@ -204,16 +229,8 @@ struct Ratios {
 
 impl Ratios {
     fn new(turn: &NetworkTurn<'_>) -> Self {
-        let count = turn.curves.len().max(1) as f32;
-        let of_all = [0, 1, 2].map(|c| {
-            let sum: f32 = turn.curves.iter().map(|curve| curve[0][c].max(0.0)).sum();
-            (sum / count).max(1e-9)
-        });
-        let means: Vec<[f32; 3]> = turn
-            .curves
-            .iter()
-            .map(|curve| [0, 1, 2].map(|c| (curve[0][c] / of_all[c]).max(PARAMETERS.least_mean)))
-            .collect();
+        let means: Vec<[f32; 3]> = turn.curves.iter().map(|curve| curve[0]).collect();
+        let (of_all, means) = over_mean(&means);
         let ratio = |m: usize, k: usize| {
             [0, 1, 2].map(|c| {
                 let curve = &turn.curves[k];
@@ -289,6 +306,10 @@ impl<'a> PlaneWriter<'a> {
         for (k, &pixel) in self.turn.pixels.iter().enumerate() {
             self.values[begin + pixel as usize] = value(k);
         }
+    }
+
+    fn count(&self) -> usize {
+        self.values.len() / (self.turn.side * self.turn.side).max(1)
     }
 
     fn finish(self) -> Vec<f32> {

@@ -1,15 +1,15 @@
-//! Normals of a turn by the network, in an unknown room.
+//! Normals and albedo of a turn by the network, in an unknown room.
 
 use rayon::prelude::*;
-use relight_core::image::Planes;
+use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, YUp};
 use relight_nets::{Inference, NetError, Weights, turn_network};
 use serde::Serialize;
 
 use crate::model::frame::Elevation;
 use crate::network::answer::NetworkNormal;
-use crate::network::crop::{Crop, GRID};
-use crate::network::input::{PhaseHypothesis, network_input};
+use crate::network::crop::{Crop, GRID, mean_light};
+use crate::network::input::{PhaseHypothesis, log_means, network_input};
 use crate::observe::curves::TurnCurves;
 
 /// The network of turns with its weights.
@@ -25,6 +25,8 @@ pub struct TurnPrediction {
     pub normals: Normals<YUp>,
     /// By how much each is expected to be off, degrees; 0 outside the mask.
     pub expected_errors: Planes<1>,
+    /// Albedo, each channel in a unit of its own.
+    pub albedo: Rgb<Linear>,
     /// What it was taken for, and what else was looked at.
     pub hypotheses: HypothesisFigures,
 }
@@ -68,8 +70,16 @@ impl HypothesisFigures {
     }
 }
 
-/// A cell's normal and the logarithm of its expected chord.
-type Cells = Vec<Option<[f32; 4]>>;
+/// What the network says of a cell.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    /// The normal and the logarithm of its expected chord.
+    normal: [f32; 4],
+    /// The logarithm of albedo over the curve's mean.
+    albedo: [f32; 3],
+}
+
+type Cells = Vec<Option<Cell>>;
 
 impl TurnNetwork {
     /// The network with these weights.
@@ -145,14 +155,21 @@ impl TurnNetwork {
     ) -> Result<Cells, NetError> {
         let input = network_input(&crop.turn(elevation), phase);
         let answers = self.plan.run(&input)?;
-        let values = answers.first().map_or(&[][..], |answer| answer.values());
         let area = GRID * GRID;
+        let value = |output: usize, channel: usize, at: usize| {
+            let values = answers.get(output).map(|answer| answer.values());
+            let value = values.and_then(|values| values.get(channel * area + at));
+            value.copied().filter(|value| value.is_finite())
+        };
         let mut cells = vec![None; area];
         for &pixel in crop.pixels() {
             let at = pixel as usize;
-            let answer = [0, 1, 2, 3].map(|c| values.get(c * area + at).copied().unwrap_or(0.0));
+            let answer = [0, 1, 2, 3].map(|c| value(0, c, at).unwrap_or(0.0));
             let [x, y, z] = NetworkNormal::of_answer(answer).normal;
-            cells[at] = Some([x, y, z, answer[3]]);
+            cells[at] = Some(Cell {
+                normal: [x, y, z, answer[3]],
+                albedo: [0, 1, 2].map(|c| value(1, c, at).unwrap_or(0.0)),
+            });
         }
         Ok(cells)
     }
@@ -163,11 +180,15 @@ fn mean_of_looks(seen: &Cells, in_mirror: &Cells) -> Cells {
     (0..GRID * GRID)
         .map(|at| {
             let mirrored = at / GRID * GRID + (GRID - 1 - at % GRID);
-            let [x, y, z, error] = seen[at]?;
-            let Some([x2, y2, z2, error2]) = in_mirror[mirrored] else {
-                return Some([x, y, z, error]);
+            let one = seen[at]?;
+            let Some(other) = in_mirror[mirrored] else {
+                return Some(one);
             };
-            Some([x - x2, y + y2, z + z2, (error + error2) / 2.0])
+            let ([x, y, z, error], [x2, y2, z2, error2]) = (one.normal, other.normal);
+            Some(Cell {
+                normal: [x - x2, y + y2, z + z2, (error + error2) / 2.0],
+                albedo: [0, 1, 2].map(|c| (one.albedo[c] + other.albedo[c]) / 2.0),
+            })
         })
         .collect()
 }
@@ -176,7 +197,7 @@ fn mean_error(cells: &Cells) -> f32 {
     let errors = cells
         .iter()
         .flatten()
-        .map(|&cell| NetworkNormal::of_answer(cell).expected_error_deg);
+        .map(|cell| NetworkNormal::of_answer(cell.normal).expected_error_deg);
     let (sum, count) = errors.fold((0.0, 0.0), |(sum, count), error| (sum + error, count + 1.0));
     sum / f32::max(count, 1.0)
 }
@@ -188,18 +209,39 @@ fn spread(
     cells: &Cells,
     hypotheses: HypothesisFigures,
 ) -> TurnPrediction {
-    let width = curves.extent().width;
-    let answers: Vec<NetworkNormal> = curves
-        .places()
+    let normals: Vec<Option<[f32; 4]>> = cells
         .iter()
-        .map(|&place| {
-            let answer = crop.at(cells, place % width, place / width);
+        .map(|cell| Some(cell.as_ref()?.normal))
+        .collect();
+    let albedo: Vec<Option<[f32; 3]>> = cells
+        .iter()
+        .map(|cell| Some(cell.as_ref()?.albedo))
+        .collect();
+    let width = curves.extent().width;
+    let places = || {
+        curves
+            .places()
+            .iter()
+            .map(|&place| (place % width, place / width))
+    };
+    let answers: Vec<NetworkNormal> = places()
+        .map(|(x, y)| {
+            let answer = crop.at(&normals, x, y);
             NetworkNormal::of_answer(answer.unwrap_or([0.0, 0.0, 1.0, 0.0]))
+        })
+        .collect();
+    // What the network adds is smooth, so that the albedo is as fine as the frame.
+    let albedo: Vec<[f32; 3]> = places()
+        .zip(log_means(&mean_light(curves)))
+        .map(|((x, y), mean)| {
+            let more = crop.at(&albedo, x, y).unwrap_or_default();
+            [0, 1, 2].map(|c| (mean[c] + more[c]).exp())
         })
         .collect();
     TurnPrediction {
         normals: Normals::new(curves.map(|pixel| answers[pixel].normal)),
         expected_errors: curves.map(|pixel| [answers[pixel].expected_error_deg]),
+        albedo: Rgb::new(curves.map(|pixel| albedo[pixel])),
         hypotheses,
     }
 }

@@ -188,23 +188,27 @@ impl Arguments {
         elevation: Elevation,
     ) -> Result<TurnPrior, Box<dyn Error>> {
         let (y, shown) = (self.normals_y.into(), &turn.first);
+        // In a light that is known, curves tell the albedo, and in its units.
+        let is_lit = self.light.is_some() || self.probe.is_some();
         let prior: TurnPrior = match source {
             InitialNormals::Turn => {
                 let network = TurnNetwork::new(&self.turn_weights()?)?;
                 network.predict(&turn.curves, elevation)?.into()
             }
             InitialNormals::Photo(source) => {
-                prior_normals(source, shipped::weights, y, shown, &turn.mask)?.into()
+                let normals = prior_normals(source, shipped::weights, y, shown, &turn.mask)?;
+                let albedo = if is_lit {
+                    None
+                } else {
+                    Some(prior_albedo(&shipped::weights()?, shown, &turn.mask)?)
+                };
+                TurnPrior {
+                    albedo,
+                    ..normals.into()
+                }
             }
         };
-        // In a light that is known, curves tell the albedo, and in its units.
-        let is_lit = self.light.is_some() || self.probe.is_some();
-        let albedo = if is_lit {
-            None
-        } else {
-            let weights = shipped::weights()?;
-            Some(prior_albedo(&weights, shown, &turn.mask)?)
-        };
+        let albedo = prior.albedo.filter(|_| !is_lit);
         Ok(TurnPrior { albedo, ..prior })
     }
 
