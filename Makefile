@@ -51,7 +51,7 @@ setup-train: ## Install libtorch, which relight's training is built with (544 MB
 
 # The runs of the network of relight turn, each from the weights of the one before. DATA holds the folders meshes,
 # panoramas and held of what relight/cli/weights/README.md names; a run that was stopped goes on.
-TURN_STAGES := turn turn-2 turn-3 turn-4 turn-5
+TURN_STAGES := turn turn-2 turn-3 turn-4 turn-5 turn-6
 RUNS ?= $(CURDIR)/$(TARGET)/train-turn
 
 train-turn: setup-train ## Train the network of relight turn, all of its runs, from the folder DATA into RUNS

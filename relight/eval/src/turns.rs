@@ -297,20 +297,23 @@ impl Answer {
     ) -> Result<Self, EvalError> {
         let turn = &truth.turn;
         let predict = || networks.turn.predict(&turn.curves, truth.elevation);
-        let prior = match method {
+        let prior: Option<TurnPrior> = match method {
             TurnMethod::Network => return Ok(Self::of_network(predict()?)),
             TurnMethod::NetworkThenSolver => Some(predict()?.into()),
             TurnMethod::Photo => {
                 let own = || Ok(networks.photo.clone());
                 let source = NormalsSource::Own;
                 let axes = relight_core::light::NormalsFrame::YUp;
-                let normals = prior_normals(&source, own, axes, &turn.first, &turn.mask)?;
-                Some(TurnPrior {
-                    albedo: Some(prior_albedo(&networks.photo, &turn.first, &turn.mask)?),
-                    ..normals.into()
-                })
+                Some(prior_normals(&source, own, axes, &turn.first, &turn.mask)?.into())
             }
             TurnMethod::Outline | TurnMethod::KnownLight => None,
+        };
+        let prior = match prior {
+            Some(prior) => {
+                let seen = prior_albedo(&networks.photo, &turn.first, &turn.mask)?;
+                Some(prior.with_albedo_of_photographs(seen, &turn.mask))
+            }
+            None => None,
         };
         let options = TurnOptions {
             elevation: truth.elevation,

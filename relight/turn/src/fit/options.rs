@@ -3,6 +3,7 @@
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, ShLight, YUp};
 
+use crate::fit::prior::mean_albedo;
 use crate::model::frame::Elevation;
 use crate::model::material::MaterialKind;
 use crate::network::predict::{HypothesisFigures, TurnPrediction};
@@ -21,6 +22,21 @@ pub struct TurnPrior {
     pub albedo: Option<Rgb<Linear>>,
     /// What the network of turns took the turn for, where the normals are its own.
     pub hypotheses: Option<HypothesisFigures>,
+}
+
+impl TurnPrior {
+    /// The same with the albedo that a network of photographs sees, or the mean of it and that which there is.
+    #[must_use]
+    pub fn with_albedo_of_photographs(self, seen: Rgb<Linear>, mask: &Planes<1>) -> Self {
+        let albedo = match &self.albedo {
+            Some(own) => mean_albedo(own, &seen, mask),
+            None => seen,
+        };
+        Self {
+            albedo: Some(albedo),
+            ..self
+        }
+    }
 }
 
 impl From<Normals<YUp>> for TurnPrior {

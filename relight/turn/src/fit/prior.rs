@@ -1,9 +1,10 @@
-//! Normals of a network, or of a file, to start from, and the albedo that a network of photographs sees.
+//! Normals of a network, or of a file, to start from, and the albedo that networks see.
 
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
+use relight_core::statistics::median;
 use relight_nets::{NetError, Weights};
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, SpecularGate};
 
@@ -93,6 +94,23 @@ pub fn prior_albedo(
     Ok(Rgb::new(logarithms.map(f32::exp)))
 }
 
+/// The geometric mean of two albedos of one object, each in units of its own: each channel has the median of the first under
+/// the mask. Two networks that look at other things, a picture and its changes over the turn, err in other places.
+pub(crate) fn mean_albedo(one: &Rgb<Linear>, other: &Rgb<Linear>, mask: &Planes<1>) -> Rgb<Linear> {
+    let logarithm = |value: f32| value.max(PARAMETERS.darkest).ln();
+    let mut mean = one.planes().clone();
+    for (plane, other) in mean.planes_mut().into_iter().zip(other.planes().planes()) {
+        let pixels = plane.iter().zip(other).zip(mask.plane(0));
+        let inside = pixels.filter(|(_, covered)| **covered >= 0.5);
+        let apart = inside.map(|((one, other), _)| f64::from(logarithm(*one) - logarithm(*other)));
+        let unit = median(apart).unwrap_or(0.0) as f32;
+        for (value, other) in plane.iter_mut().zip(other) {
+            *value = logarithm(*value).midpoint(logarithm(*other) + unit).exp();
+        }
+    }
+    Rgb::new(mean)
+}
+
 /// How frames of a turn are decomposed.
 fn without_gate() -> DecomposeOptions {
     DecomposeOptions {
@@ -146,4 +164,46 @@ pub fn prior_normals(
         }
     }
     Ok(Normals::new(sums))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relight_core::image::Extent;
+
+    #[test]
+    fn the_mean_of_two_albedos_does_not_depend_on_the_unit_of_the_second() {
+        let extent = Extent::new(20, 10);
+        let mask = Planes::filled(extent, [1.0]);
+        let one = Rgb::new(Planes::from_fn(extent, |x, _| {
+            [0.1 + 0.02 * x as f32, 0.4, 0.3]
+        }));
+        let other = |unit: f32| {
+            Rgb::new(Planes::from_fn(extent, |x, y| {
+                [0.2 + 0.01 * x as f32, 0.2 + 0.03 * y as f32, 0.3].map(|value| unit * value)
+            }))
+        };
+        let (found, again) = (
+            mean_albedo(&one, &other(1.0), &mask),
+            mean_albedo(&one, &other(5.0), &mask),
+        );
+        for (a, b) in found
+            .planes()
+            .planes()
+            .into_iter()
+            .zip(again.planes().planes())
+        {
+            assert!(a.iter().zip(b).all(|(a, b)| (a / b - 1.0).abs() < 1e-5));
+        }
+        // What both say alike stays.
+        let same = mean_albedo(&one, &one, &mask);
+        for (a, b) in same
+            .planes()
+            .planes()
+            .into_iter()
+            .zip(one.planes().planes())
+        {
+            assert!(a.iter().zip(b).all(|(a, b)| (a / b - 1.0).abs() < 1e-5));
+        }
+    }
 }

@@ -188,28 +188,24 @@ impl Arguments {
         elevation: Elevation,
     ) -> Result<TurnPrior, Box<dyn Error>> {
         let (y, shown) = (self.normals_y.into(), &turn.first);
-        // In a light that is known, curves tell the albedo, and in its units.
-        let is_lit = self.light.is_some() || self.probe.is_some();
         let prior: TurnPrior = match source {
             InitialNormals::Turn => {
                 let network = TurnNetwork::new(&self.turn_weights()?)?;
                 network.predict(&turn.curves, elevation)?.into()
             }
             InitialNormals::Photo(source) => {
-                let normals = prior_normals(source, shipped::weights, y, shown, &turn.mask)?;
-                let albedo = if is_lit {
-                    None
-                } else {
-                    Some(prior_albedo(&shipped::weights()?, shown, &turn.mask)?)
-                };
-                TurnPrior {
-                    albedo,
-                    ..normals.into()
-                }
+                prior_normals(source, shipped::weights, y, shown, &turn.mask)?.into()
             }
         };
-        let albedo = prior.albedo.filter(|_| !is_lit);
-        Ok(TurnPrior { albedo, ..prior })
+        // In a light that is known, curves tell the albedo, and in its units.
+        if self.light.is_some() || self.probe.is_some() {
+            return Ok(TurnPrior {
+                albedo: None,
+                ..prior
+            });
+        }
+        let seen = prior_albedo(&shipped::weights()?, shown, &turn.mask)?;
+        Ok(prior.with_albedo_of_photographs(seen, &turn.mask))
     }
 
     fn turn_weights(&self) -> Result<Weights, NetError> {
