@@ -773,8 +773,35 @@ fn a_card_lists_every_file_with_its_checksum_and_leaves_a_data_set_that_verifies
     );
     assert_eq!(metadata["distribution"].as_array().unwrap().len(), 4);
     assert!(read("README.md").contains("| holds | 1 turn of 1 object, 12 samples"));
-    bench.errors(2, &CARD.replace("2026-11-23", "today"));
+    for (right, wrong) in [
+        ("2026-11-23", "today"),
+        ("2026-11-23", "2026-13-45"),
+        ("https://example.org/turns", "example"),
+        ("CC-BY-4.0", "CC/BY"),
+    ] {
+        bench.errors(2, &CARD.replace(right, wrong));
+    }
+    bench.errors(2, &format!("{CARD} --release 1.x"));
     bench.errors(1, &CARD.replace("card out", "card nothing"));
+    bench.errors(0, CARD);
+}
+
+#[test]
+fn a_card_is_refused_to_damaged_data_and_takes_no_page_of_ones_own() {
+    let bench = Bench::new();
+    bench.errors(0, "clip.mkv --mask mask.png -o out --frames 12 --size 32");
+    let page = bench.path("out/README.md");
+    fs::write(&page, "my own words").unwrap();
+    let said = bench.errors(1, CARD);
+    assert!(said.contains("README.md was not written by"), "{said}");
+    assert_eq!(fs::read_to_string(&page).unwrap(), "my own words");
+    fs::remove_file(&page).unwrap();
+    let shard = bench.path("out/clip.tar");
+    let whole = fs::read(&shard).unwrap();
+    fs::write(&shard, &whole[..whole.len() / 2]).unwrap();
+    let said = bench.errors(1, CARD);
+    assert!(said.contains("clip.tar"), "{said}");
+    assert!(!bench.path("out/SHA256SUMS").exists());
 }
 
 #[test]

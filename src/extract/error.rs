@@ -33,6 +33,11 @@ pub enum ExtractError {
     /// A page would take the place of a file of the data set.
     #[error("{0} is a file of the data set: give the page another name")]
     PageInTheWay(PathBuf),
+    /// A page that somebody wrote would be lost.
+    #[error(
+        "{0} was not written by relit-extract card: move it away, and put its words into the new one"
+    )]
+    OwnReadme(PathBuf),
     /// Two recordings have the same name.
     #[error(
         "another recording of this call is also named {0}: extract them into different folders, or rename one"

@@ -20,6 +20,8 @@ use crate::ExtractError;
 
 pub use self::facts::CardFacts;
 
+/// How a README.md begins that a card wrote.
+const MARKER: &str = "<!-- Written by relit-extract card. -->\n";
 /// The files that are written.
 const FILES: [&str; 3] = ["README.md", "croissant.json", "SHA256SUMS"];
 /// Bytes that are read at a time.
@@ -29,7 +31,8 @@ const PIECE: usize = 1 << 20;
 /// many.
 ///
 /// # Errors
-/// Where the folder holds no data set, a file that it lists cannot be read, or one cannot be written.
+/// Where the folder holds no data set, a file that it lists cannot be read or is not what it says, a README.md is there that
+/// no card wrote, or a file cannot be written.
 pub fn write_card(
     out: &Path,
     facts: &CardFacts,
@@ -37,6 +40,14 @@ pub fn write_card(
 ) -> Result<[&'static str; 3], ExtractError> {
     let dataset = Dataset::read(out)?;
     let overview = Overview::read(out)?;
+    let page = out.join(FILES[0]);
+    if std::fs::read(&page).is_ok_and(|own| !own.starts_with(MARKER.as_bytes())) {
+        return Err(ExtractError::OwnReadme(page));
+    }
+    // Checksums of what is damaged would make it look whole.
+    for session in &dataset.sessions {
+        dataset.check_integrity(out, &session.id)?;
+    }
     let names = listed(out, &dataset)?;
     let mut files = Vec::with_capacity(names.len());
     for name in names {
@@ -64,10 +75,8 @@ pub fn write_card(
         .iter()
         .map(|file| format!("{}  {}\n", file.sha256, file.name))
         .collect();
-    write(
-        FILES[0],
-        &readme::readme(facts, &overview, &dataset, &files),
-    )?;
+    let page = readme::readme(facts, &overview, &dataset, &files);
+    write(FILES[0], &format!("{MARKER}{page}"))?;
     write(FILES[1], &croissant::metadata(facts, &dataset, &files))?;
     write(FILES[2], &sums)?;
     Ok(FILES)

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::builder::RangedU64ValueParser;
+use clap::builder::{NonEmptyStringValueParser, RangedU64ValueParser};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
@@ -103,7 +103,7 @@ enum Verb {
     },
     /// Describe a data set for those who publish it: README.md, Croissant metadata, checksums.
     #[command(
-        after_help = "Example:\n  relit-extract card dataset --name mugs --license CC-BY-4.0 --creator 'A. Researcher' --url https://example.org/mugs\n\nIt writes README.md, croissant.json and SHA256SUMS into the folder."
+        after_help = "Example:\n  relit-extract card dataset --name mugs --license CC-BY-4.0 --creator 'A. Researcher' --url https://example.org/mugs --published 2026-11-23\n\nIt checks every file, and writes README.md, croissant.json and SHA256SUMS into the folder."
     )]
     Card {
         /// The data set's folder.
@@ -138,13 +138,13 @@ struct CardArguments {
     #[arg(long)]
     name: Option<String>,
     /// Its licence: an SPDX identifier, or a URL.
-    #[arg(long, value_name = "SPDX")]
+    #[arg(long, value_name = "SPDX", value_parser = license)]
     license: String,
     /// Who made it; may be given several times.
-    #[arg(long, value_name = "NAME", required = true)]
+    #[arg(long, value_name = "NAME", required = true, value_parser = NonEmptyStringValueParser::new())]
     creator: Vec<String>,
     /// Where it is published.
-    #[arg(long)]
+    #[arg(long, value_parser = address)]
     url: String,
     /// What it is, in a sentence or two.
     #[arg(
@@ -156,7 +156,7 @@ struct CardArguments {
     #[arg(long, value_name = "DATE", value_parser = date)]
     published: String,
     /// Its version.
-    #[arg(long, value_name = "X.Y.Z", default_value = "1.0.0")]
+    #[arg(long, value_name = "X.Y.Z", default_value = "1.0.0", value_parser = release)]
     release: String,
     /// How to cite it.
     #[arg(long, value_name = "TEXT")]
@@ -387,10 +387,43 @@ fn date(text: &str) -> Result<String, String> {
         part.len() == digits && part.bytes().all(|b| b.is_ascii_digit())
     };
     match parts[..] {
-        [year, month, day] if is_number(year, 4) && is_number(month, 2) && is_number(day, 2) => {
+        [year, month, day]
+            if is_number(year, 4)
+                && is_number(month, 2)
+                && is_number(day, 2)
+                && ("01"..="12").contains(&month)
+                && ("01"..="31").contains(&day) =>
+        {
             Ok(text.to_owned())
         }
         _ => Err("give YYYY-MM-DD".to_owned()),
+    }
+}
+
+fn address(text: &str) -> Result<String, String> {
+    match text.split_once("://") {
+        Some(("http" | "https", place)) if !place.is_empty() && !text.contains(' ') => {
+            Ok(text.to_owned())
+        }
+        _ => Err("give an address that begins with https:// or http://".to_owned()),
+    }
+}
+
+fn license(text: &str) -> Result<String, String> {
+    let is_identifier = |b: u8| b.is_ascii_alphanumeric() || b"-.+".contains(&b);
+    if !text.is_empty() && text.bytes().all(is_identifier) {
+        return Ok(text.to_owned());
+    }
+    address(text).map_err(|_| "give an identifier of SPDX, as CC-BY-4.0, or an address".to_owned())
+}
+
+fn release(text: &str) -> Result<String, String> {
+    let parts: Vec<&str> = text.split('.').collect();
+    let is_number = |part: &&str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+    if parts.len() == 3 && parts.iter().all(|part| is_number(part)) {
+        Ok(text.to_owned())
+    } else {
+        Err("give three numbers, as 1.0.0".to_owned())
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::{Extent, Linear, Rgb};
+use relight_core::image::{Extent, encode_exr};
 use relight_core::light::{Panorama, ShLight};
 use relight_export::frames::write_frames;
 use relight_export::glb::to_glb;
@@ -143,6 +143,10 @@ fn run_frames(arguments: &Arguments, frames: u32, console: Console) -> CommandRe
         None => None,
         Some(folder) => Some(lamp(folder, arguments.direction)?),
     };
+    let doubt = match &arguments.lamps {
+        None => None,
+        Some(folder) => lamp_doubt(folder, &arguments.input)?,
+    };
     let output = &arguments.output;
     let written = write_frames(&arguments.input, output, frames, lamp.as_ref())?;
     let shown = match lamp {
@@ -160,12 +164,14 @@ fn run_frames(arguments: &Arguments, frames: u32, console: Console) -> CommandRe
             "dominance": lamp.map(|lamp| lamp.dominance),
         }),
     );
-    if written < frames as usize {
-        console.warn(&format!(
-            "the turn has {written} frames, fewer than {frames}"
-        ));
+    let few = (written < frames as usize)
+        .then(|| format!("the turn has {written} frames, fewer than {frames}"));
+    let mut outcome = Outcome::Whole;
+    for warning in few.into_iter().chain(doubt) {
+        console.warn(&warning);
+        outcome = Outcome::Incomplete;
     }
-    Ok(Outcome::Whole)
+    Ok(outcome)
 }
 
 /// What is read of `light.json`.
@@ -179,7 +185,45 @@ struct LightElevation {
     degrees: f64,
 }
 
-/// The lamp of a turn that was decomposed into a folder.
+/// What is read of `turn.json`.
+#[derive(Deserialize)]
+struct SolvedTurn {
+    turn: String,
+    conditioning: SolvedConditioning,
+}
+
+#[derive(Deserialize)]
+struct SolvedConditioning {
+    verdict: String,
+}
+
+/// Checks that the folder is of this turn, and says what is wrong with its light, if anything is.
+fn lamp_doubt(folder: &Path, shard: &Path) -> Result<Option<String>, Box<dyn Error>> {
+    let path = folder.join("turn.json");
+    let wrong = |reason: String| ExportError::Figures {
+        path: path.clone(),
+        reason,
+    };
+    let json = fs::read(&path)
+        .map_err(|error| wrong(format!("{error}; --lamps takes a folder of relight turn")))?;
+    let solved: SolvedTurn =
+        serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
+    let name = shard.file_stem().unwrap_or_default().to_string_lossy();
+    if solved.turn != name {
+        return Err(wrong(format!("it is of the turn {}, not of {name}", solved.turn)).into());
+    }
+    let verdict = solved.conditioning.verdict;
+    let is_fit = ["good", "not_matt"].contains(&verdict.as_str());
+    let doubt = || {
+        format!(
+            "the light of {} is not to be believed ({verdict})",
+            folder.display()
+        )
+    };
+    Ok((!is_fit).then(doubt))
+}
+
+/// The lamp of a turn that was solved into a folder.
 fn lamp(folder: &Path, direction: DirectionName) -> Result<TurnLamp, Box<dyn Error>> {
     let light = ShLight::read(&folder.join("light.txt"))?;
     let path = folder.join("light.json");
@@ -223,35 +267,40 @@ fn write_script(
             .to_string_lossy()
             .into_owned()
     };
-    let mut files = vec![beside("glb")];
-    write(&files[0], &glb(arguments, object)?)?;
+    // All is made before anything is written: a light that cannot be read takes no file away.
+    let object_file = beside("glb");
+    let mut files = vec![(object_file.clone(), glb(arguments, object)?)];
+    let mut panorama = None;
     if let Some(light) = &arguments.light {
-        let panorama = if light
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("txt"))
-        {
+        let path = beside("light.exr");
+        let found = if is_coefficients(light) {
             Panorama::of_light(&ShLight::read(light)?, PANORAMA)
         } else {
             Panorama::read(light)?
         };
         // A light of few bands can be negative somewhere; a renderer's cannot.
-        let radiance = panorama.image().planes().clone().map(|v| v.max(0.0));
-        files.push(beside("light.exr"));
-        Rgb::<Linear>::new(radiance).write_exr(&files[1])?;
+        let radiance = found.image().planes().clone().map(|v| v.max(0.0));
+        // Coefficients are in the units of our albedo, which leaves out Lambert's 1 / π; a panorama holds radiance.
+        let strength = if is_coefficients(light) { PI } else { 1.0 };
+        panorama = Some((name(&path), strength));
+        files.push((path.clone(), encode_exr(&path, &radiance)?));
     }
     let extent = object.extent();
-    let panorama = files.get(1).map(|path| name(path));
-    // Coefficients are in the units of our albedo, which leaves out Lambert's 1 / π; a panorama holds radiance.
-    let is_ours = arguments.light.as_deref().is_some_and(is_coefficients);
-    let strength = if is_ours { PI } else { 1.0 };
     let text = blender::script(
-        &name(&files[0]),
-        panorama.as_deref().map(|name| (name, strength)),
+        &name(&object_file),
+        panorama
+            .as_ref()
+            .map(|(name, strength)| (name.as_str(), *strength)),
         arguments.size,
         extent.width as f64 / extent.height as f64,
     );
-    write(script, text.as_bytes())?;
-    Ok(files)
+    files.push((script.clone(), text.into_bytes()));
+    for (path, bytes) in &files {
+        write(path, bytes)?;
+    }
+    // The script has been told of already.
+    files.pop();
+    Ok(files.into_iter().map(|(path, _)| path).collect())
 }
 
 fn is_coefficients(light: &Path) -> bool {

@@ -50,7 +50,7 @@ impl LightVerdict {
             ),
             Self::ImpossibleLight => Some(
                 "no light explains the turn: the one that fits it best would be negative from some side; \
-                 do not trust the normals and the albedo, or give the light (--light, --probe)",
+                 do not trust light and albedo, and the normals as far as their confidence says, or give the light (--light, --probe)",
             ),
         }
     }
