@@ -19,15 +19,19 @@ use relight_nets::{NetError, Weights};
 use relight_reader::{Encoding, SampleId, Source, Turns};
 use relight_turn::{
     Conditioning, Elevation, MaterialKind, NormalsSource, ReadTurn, RotationDirection, TableFrame,
-    TurnMaps, TurnOptions, fit_turn_light, prior_normals, read_curves, solve_turn,
+    TurnMaps, TurnNetwork, TurnOptions, TurnPrior, fit_turn_light, prior_albedo, prior_normals,
+    read_curves, solve_turn,
 };
 use serde_json::Value;
 
-/// The weights that the program comes with.
+/// The weights for photographs that the program comes with.
 fn shipped() -> Result<Weights, NetError> {
-    Weights::read(
-        &Path::new(env!("CARGO_MANIFEST_DIR")).join("../cli/weights/decompose.safetensors"),
-    )
+    weights("decompose.safetensors")
+}
+
+fn weights(name: &str) -> Result<Weights, NetError> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cli/weights");
+    Weights::read(&folder.join(name))
 }
 
 /// Light from which a pixel counts as a highlight, in parts of white.
@@ -78,6 +82,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         "light unknown, prior",
         &turn,
         &options(None, Some(prior.into())),
+    )?;
+    let network = TurnNetwork::new(&weights("turn.safetensors")?)?;
+    let found = TurnPrior::from(network.predict(&turn.curves, truth.elevation)?);
+    let seen = prior_albedo(&shipped()?, &turn.first, &turn.mask)?;
+    let prior = found.with_albedo_of_photographs(seen, &turn.mask);
+    truth.tell(
+        "light unknown, network of turns",
+        &turn,
+        &options(None, Some(prior)),
     )
 }
 

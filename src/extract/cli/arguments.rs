@@ -420,7 +420,7 @@ fn license(text: &str) -> Result<String, String> {
 fn release(text: &str) -> Result<String, String> {
     let parts: Vec<&str> = text.split('.').collect();
     let is_number = |part: &&str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
-    if parts.len() == 3 && parts.iter().all(|part| is_number(part)) {
+    if parts.len() == 3 && parts.iter().all(is_number) {
         Ok(text.to_owned())
     } else {
         Err("give three numbers, as 1.0.0".to_owned())

@@ -17,8 +17,8 @@ use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
 use relight_nets::{Inference, InferenceEngine, NetError, Weights, decomposer_of};
 use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 
-/// Most pixels of a photograph, and with [`WorkingSize::Native`] of the square around the object: 24 million take 2.5 GB of
-/// memory, so these more than 6 GB.
+/// Most pixels of a photograph, and with [`WorkingSize::Native`] of the square around the object: 16 million take 1.3 GB of
+/// memory, so these more than 5 GB.
 pub const MOST_PIXELS: usize = 64_000_000;
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;

@@ -21,8 +21,8 @@ struct AlbedoParameters {
     taps: isize,
     /// Standard deviation of chromaticities of one surface. By hand.
     same_colour: f64,
-    /// Expected error of a normal at which the expected albedo counts one half, radians. Measured: on ten synthetic
-    /// turns 3 to 7 degrees come to the same.
+    /// Expected error of a normal at which the expected albedo counts one half, radians. Measured: on 16 synthetic turns
+    /// (docs/results/turns.md).
     half_expected: f64,
     /// The least albedo whose logarithm counts. Numerical.
     darkest: f64,
@@ -33,7 +33,7 @@ const PARAMETERS: AlbedoParameters = AlbedoParameters {
     reach: 1.0 / 32.0,
     taps: 8,
     same_colour: 0.05,
-    half_expected: 0.09,
+    half_expected: 0.04,
     darkest: 1e-4,
 };
 

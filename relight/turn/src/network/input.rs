@@ -163,7 +163,7 @@ pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32>
     }
     debug_assert_eq!(planes.count(), LOG_MEANS);
     let logarithms = logarithms(&ratios.means);
-    for c in 0..3 {
+    for c in [0, 1, 2] {
         planes.push(|k| logarithms[k][c]);
     }
     let side = turn.side as f32;
