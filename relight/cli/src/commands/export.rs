@@ -139,13 +139,13 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 }
 
 fn run_frames(arguments: &Arguments, frames: u32, console: Console) -> CommandResult {
-    let lamp = match &arguments.lamps {
-        None => None,
-        Some(folder) => Some(lamp(folder, arguments.direction)?),
-    };
     let doubt = match &arguments.lamps {
         None => None,
         Some(folder) => lamp_doubt(folder, &arguments.input)?,
+    };
+    let lamp = match &arguments.lamps {
+        None => None,
+        Some(folder) => Some(lamp(folder, arguments.direction)?),
     };
     let output = &arguments.output;
     let written = write_frames(&arguments.input, output, frames, lamp.as_ref())?;
