@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use relight_nets::paper::{self, Head};
-use relight_nets::{Graph, WeightPrecision, Weights, decomposer, to_onnx};
+use relight_nets::{Graph, WeightPrecision, Weights, decomposer_of, to_onnx, turn_network};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde_json::json;
@@ -51,8 +51,10 @@ struct Export {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum NetName {
-    /// Ours.
+    /// Ours of photographs, with the heads that the weights have.
     Decomposer,
+    /// Ours of turns.
+    TurnNet,
     /// The paper's Spec-Net.
     SpecNet,
     /// The paper's Normal-Net.
@@ -68,9 +70,11 @@ enum NetName {
 }
 
 impl NetName {
-    fn graph(self) -> Graph {
+    /// The network that these weights should be of.
+    fn graph(self, weights: &Weights) -> Graph {
         match self {
-            Self::Decomposer => decomposer(),
+            Self::Decomposer => decomposer_of(weights),
+            Self::TurnNet => turn_network(),
             Self::SpecNet => paper::spec_net(),
             Self::NormalNet => paper::normal_net(),
             Self::LightNet => paper::light_net(Head::Pooled),
@@ -105,8 +109,9 @@ impl Export {
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let Verb::Export(export) = &arguments.verb;
-    let graph = export.net.graph();
-    let weights = Weights::read(&export.input)?.fitted_to(&graph)?;
+    let weights = Weights::read(&export.input)?;
+    let graph = export.net.graph(&weights);
+    let weights = weights.fitted_to(&graph)?;
     if export.ending() == Some("onnx") {
         let side = usize::from(export.size);
         let bytes = to_onnx(&graph, &weights, 1, (side, side))?;

@@ -126,6 +126,24 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
 }
 
 #[test]
+fn the_weights_that_come_with_the_program_are_exported() {
+    let folder = Folder::new();
+    for (weights, net) in [("decompose", "decomposer"), ("turn", "turn-net")] {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/weights");
+        let command =
+            format!("weights export {path}/{weights}.safetensors --net {net} -o {net}.onnx");
+        let output = relight(&folder, &command);
+        assert_eq!(code_and_errors(&output), (0, String::new()));
+        assert!(
+            fs::metadata(folder.path(&format!("{net}.onnx")))
+                .unwrap()
+                .len()
+                > 5_000_000
+        );
+    }
+}
+
+#[test]
 fn photographs_side_by_side_come_out_as_one_by_one() {
     let folder = Folder::new();
     let weights = Weights::initial(&decomposer(), 3);
