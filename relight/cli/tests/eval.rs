@@ -22,6 +22,8 @@ use relight_eval::{
     ScoreTable, evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals,
     evaluate_relighting, make_relighting,
 };
+use relight_nets::Weights;
+use relight_photo::decompose::Decomposer;
 use relight_reader::{TruthLayout, TruthSet};
 use relight_synth::{Folders, Library};
 use relit_data::causes::with_causes;
@@ -355,11 +357,14 @@ fn what_cannot_be_compared_is_an_error_that_names_it() {
     );
 }
 
-/// Writes a set of one object under three lights, rendered by the layers themselves.
-fn write_relighting(root: &Path) -> Vec<ShLight> {
-    let lights: Vec<ShLight> = [[1.0, 1.0, 1.0], [0.3, 0.5, 0.9], [1.1, 0.4, 0.3]]
-        .map(|colour| light().tinted(colour))
-        .into();
+/// Writes a set of one object under three lights of different colours, rendered by the layers themselves.
+fn write_relighting(root: &Path) {
+    let colours = [[1.0, 1.0, 1.0], [0.3, 0.5, 0.9], [1.1, 0.4, 0.3]];
+    write_relighting_under(&colours.map(|colour| light().tinted(colour)), root);
+}
+
+/// The same under three lights; the image under the second is relit.
+fn write_relighting_under(lights: &[ShLight; 3], root: &Path) {
     fs::create_dir_all(root.join("lights")).unwrap();
     fs::create_dir_all(root.join("000")).unwrap();
     for (number, light) in lights.iter().enumerate() {
@@ -384,7 +389,6 @@ fn write_relighting(root: &Path) -> Vec<ShLight> {
     let index = r#"{"schema": "relight.relighting/2", "about": "by hand", "lights": ["a", "b", "c"],
         "objects": [{"name": "ball", "input": 1, "reflectance": [0.2, 0.2, 0.2], "smoothness": 20}]}"#;
     fs::write(root.join("relighting.json"), index).unwrap();
-    lights
 }
 
 fn surface() -> Surface {
@@ -425,6 +429,28 @@ fn relighting_compares_with_all_lights_but_the_input_s() {
         .iter()
         .find(|line| line.terms.mask == MaskRule::WholeImage);
     assert!(value(whole.unwrap(), "MSE") < value(&naive[0], "MSE"));
+}
+
+#[test]
+fn what_the_network_makes_of_the_image_is_nearer_than_the_image() {
+    let dir = tempfile::tempdir().unwrap();
+    let turned =
+        |degrees: f64| light().rotated(&Rotation::about(Direction::UP, degrees.to_radians()));
+    write_relighting_under(&[0.0, 120.0, 240.0].map(turned), dir.path());
+    let set = RelightingSet::open(dir.path()).unwrap();
+    let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights/decompose.safetensors");
+    let decomposer = Decomposer::new(&Weights::read(&weights).unwrap()).unwrap();
+    let methods = [
+        RelightMethod::Naive,
+        RelightMethod::Photograph(&decomposer),
+        RelightMethod::Maps(&decomposer),
+    ];
+    let table = evaluate_relighting(&set, "one", &methods, &|| {}).unwrap();
+    let (naive, found) = table.lines.split_at(4);
+    for (at, line) in found.iter().enumerate() {
+        let (found, naive) = (value(line, "MSE"), value(&naive[at % 4], "MSE"));
+        assert!(found < 0.5 * naive, "{found} {naive}: {line:?}");
+    }
 }
 
 #[test]

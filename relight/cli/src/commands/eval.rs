@@ -179,6 +179,9 @@ struct RelightingArguments {
     /// Make objects that cast no shadows on themselves.
     #[arg(long, requires = "make")]
     no_shadows: bool,
+    /// The network's weights [default: those that come with the program].
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
     /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
     #[arg(long, value_name = "DIR", requires = "make")]
     meshes: Option<PathBuf>,
@@ -395,8 +398,11 @@ fn relighting(arguments: &RelightingArguments, console: Console) -> Evaluated {
     }
     let common = &arguments.common;
     let set = RelightingSet::open(&common.data)?;
+    let network = network(arguments.weights.as_deref())?;
     let baselines = [
         RelightMethod::Naive,
+        RelightMethod::Photograph(&network),
+        RelightMethod::Maps(&network),
         RelightMethod::Oracle(SpecularForm::Power),
         RelightMethod::Oracle(SpecularForm::Lobe),
     ];

@@ -1,15 +1,19 @@
 //! Ways to show an object under another light.
 
+use std::f64::consts::PI;
+
 use super::set::{Object, Part, RelightingSet, read_image};
 use crate::run::cut_out;
 use crate::{EvalError, Predictions};
 use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Order, ShLight};
-use relight_core::render::{DiffuseForm, Layers, SpecularForm, Surface};
+use relight_core::render::{DiffuseForm, Gloss, Layers, SpecularForm, Surface};
+use relight_photo::decompose::{DecomposeOptions, Decomposer, Decomposition, SpecularGate};
+use relight_photo::insert::{MaterialChange, Subject};
 
 /// Where relit images come from.
 #[derive(Debug, Clone)]
-pub enum RelightMethod {
+pub enum RelightMethod<'d> {
     /// The image as it is, whatever the light: naive insertion.
     Naive,
     /// The true maps of the object through the render layers, with this specular layer, under the true light: with the
@@ -20,15 +24,23 @@ pub enum RelightMethod {
     /// oracle (`normal`, `albedo`, and `reflectance` with `smoothness` for highlights, in a folder
     /// for each object), or else the relit images under the names that the set has.
     Predictions(Predictions, SpecularForm),
+    /// What `relight relight` makes of the image: layers, light and hedge. Of the image's light the mean irradiance is given,
+    /// as all lights of a set have the same: how bright the new light is beside it cannot be seen.
+    Photograph(&'d Decomposer),
+    /// What `relight decompose` makes of it, with the same given: its normals, albedo and gloss, rendered as those of the
+    /// oracle.
+    Maps(&'d Decomposer),
 }
 
-impl RelightMethod {
+impl RelightMethod<'_> {
     pub(super) fn name(&self) -> String {
         match self {
             Self::Naive => "naive insertion".to_owned(),
             Self::Oracle(SpecularForm::Power) => "oracle, the paper's specular layer".to_owned(),
             Self::Oracle(SpecularForm::Lobe) => "oracle, lobe layer".to_owned(),
             Self::Predictions(predictions, _) => predictions.name(),
+            Self::Photograph(_) => "relight relight".to_owned(),
+            Self::Maps(_) => "relight decompose, its maps rendered".to_owned(),
         }
     }
 
@@ -64,8 +76,86 @@ impl RelightMethod {
                     }),
                 }
             }
+            Self::Photograph(decomposer) => {
+                let photo = Photographed::of(set, object, part)?;
+                let mask = &photo.mask;
+                let subject =
+                    Subject::new(&photo.picture, mask, Some(mask), decomposer, &photo.options);
+                let subject = Box::new(subject.map_err(|source| EvalError::Insertion {
+                    sample: object.name.clone(),
+                    source: Box::new(source),
+                })?);
+                Ok(Relight::Subject {
+                    set,
+                    object,
+                    photo,
+                    subject,
+                })
+            }
+            Self::Maps(decomposer) => {
+                let Photographed {
+                    picture,
+                    mask,
+                    options,
+                } = Photographed::of(set, object, part)?;
+                let found = decomposer.decompose(&picture, &mask, &options);
+                let found = found.map_err(|source| EvalError::Insertion {
+                    sample: object.name.clone(),
+                    source: Box::new(source.into()),
+                })?;
+                let white = mean_irradiance(&set.lights()[object.input]);
+                rendered(surface_of(found, white)?, SpecularForm::Lobe)
+            }
         }
     }
+}
+
+/// The image that is relit, as a photograph.
+pub(super) struct Photographed {
+    picture: Rgb<Linear>,
+    mask: Planes<1>,
+    options: DecomposeOptions,
+}
+
+impl Photographed {
+    fn of(set: &RelightingSet, object: &Object, part: Part) -> Result<Self, EvalError> {
+        let image = set.image(object, object.input, part)?;
+        let mask = object
+            .mask
+            .iter()
+            .map(|&inside| f32::from(u8::from(inside)));
+        let mask = Planes::from_planes(image.extent(), [mask.collect()])?;
+        let specular = match part {
+            Part::Diffuse => SpecularGate::Off,
+            Part::Full => SpecularGate::On,
+        };
+        Ok(Self {
+            picture: Rgb::<Srgb>::new(image).to_linear(),
+            mask,
+            options: DecomposeOptions {
+                specular,
+                ..DecomposeOptions::default()
+            },
+        })
+    }
+}
+
+/// The maps of a photograph in the units of the set, where the mean irradiance of its light is known.
+fn surface_of(found: Decomposition, irradiance: f32) -> Result<Surface, EvalError> {
+    let extent = found.normals.extent();
+    let scale = mean_irradiance(&found.light) / irradiance;
+    let gloss = found.gloss.map(|gloss| {
+        let reflectance = gloss.reflectance * scale;
+        Gloss::even(extent, [reflectance; 3], gloss.smoothness)
+    });
+    let albedo = found.albedo.into_planes().map(|value| value * scale);
+    Ok(Surface::new(found.normals, Rgb::new(albedo), gloss)?)
+}
+
+/// Irradiance, the mean over all normals and channels: √π / 2 of the mean first coefficient.
+fn mean_irradiance(light: &ShLight) -> f32 {
+    let first = light.coefficients()[0].iter().sum::<f64>() / 3.0;
+    (first * PI.sqrt() / 2.0) as f32
 }
 
 /// A method for one object.
@@ -84,6 +174,13 @@ pub(super) enum Relight<'a> {
         predictions: &'a Predictions,
         object: &'a Object,
         part: Part,
+    },
+    /// A photograph's object.
+    Subject {
+        set: &'a RelightingSet,
+        object: &'a Object,
+        photo: Photographed,
+        subject: Box<Subject>,
     },
 }
 
@@ -108,6 +205,23 @@ impl Relight<'_> {
             } => {
                 let path = predictions.file(&object.name, &part.file(light));
                 let image = read_image(path, object.surface.extent())?;
+                Ok(cut_out(&image, &object.mask))
+            }
+            Self::Subject {
+                set,
+                object,
+                photo,
+                subject,
+            } => {
+                let new = &set.lights()[light];
+                let exposure = mean_irradiance(subject.light()) / mean_irradiance(new);
+                let new = new.clone().tinted([f64::from(exposure); 3]);
+                let colours = subject.relit(&new, &MaterialChange::default());
+                let colours = colours.map_err(|source| EvalError::Insertion {
+                    sample: object.name.clone(),
+                    source: Box::new(source),
+                })?;
+                let image = shown(subject.in_place(&photo.picture, &colours));
                 Ok(cut_out(&image, &object.mask))
             }
         }

@@ -25,7 +25,7 @@ use set::{Object, Part};
 pub fn evaluate_relighting(
     set: &RelightingSet,
     split: &str,
-    methods: &[RelightMethod],
+    methods: &[RelightMethod<'_>],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
     let mut table = ScoreTable {
@@ -59,7 +59,7 @@ pub fn evaluate_relighting(
 fn score(
     set: &RelightingSet,
     object: &Object,
-    method: &RelightMethod,
+    method: &RelightMethod<'_>,
 ) -> Result<Vec<Scored>, EvalError> {
     let whole = vec![true; object.mask.len()];
     let rules = [
