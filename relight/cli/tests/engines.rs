@@ -16,7 +16,7 @@ use image::{Rgba, RgbaImage};
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_nets::paper::{Head, light_net, normal_net, spec_net};
 use relight_nets::{
-    Inference, InferenceEngine, NetError, OnnxRuntime, Weights, decomposer, to_onnx,
+    Inference, InferenceEngine, NetError, OnnxRuntime, Weights, decomposer_with_heads, to_onnx,
 };
 use relight_photo::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 
@@ -51,7 +51,7 @@ fn shipped() -> Weights {
 fn every_network_answers_the_same_by_both_engines() {
     let Some(other) = onnx_runtime() else { return };
     for graph in [
-        decomposer(),
+        decomposer_with_heads(),
         spec_net(),
         normal_net(),
         light_net(Head::Pooled),
@@ -135,7 +135,7 @@ fn what_is_no_network_is_told_by_the_library_too() {
     let fault = Inference::read_onnx(&path, 3, (SIDE, SIDE), &engine).unwrap_err();
     assert!(matches!(fault, NetError::Onnx { .. }), "{fault}");
     // A network that takes another number of channels.
-    let graph = decomposer();
+    let graph = decomposer_with_heads();
     let bytes = to_onnx(&graph, &Weights::initial(&graph, 1), 1, (SIDE, SIDE)).unwrap();
     fs::write(&path, bytes).unwrap();
     let net = Inference::read_onnx(&path, 3, (SIDE, SIDE), &engine);

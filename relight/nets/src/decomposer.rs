@@ -9,8 +9,9 @@
 //! power 1 / 2.2; the mask; log luminance; two chroma differences. All are 0 outside the mask.
 //! Output `maps`, [`OUTPUTS`] channels: normal (3, before its length is made 1), albedo (3, logit),
 //! highlight (1, before softplus), and log shading as two: an offset, and the share of the picture's
-//! own log luminance (logit). With [`decomposer_with_paint`] there is a second output, `paint`: how much of a pixel's
-//! darkness is paint rather than shadow (1, logit).
+//! own log luminance (logit). With [`decomposer_with_heads`] there are two more. `paint`: how much of a pixel's
+//! darkness is paint rather than shadow (1, logit). `light`, a vector of [`LIGHT_OUTPUTS`] numbers: the coefficients of order 2
+//! of the grey irradiance that arrives from all around where nothing is in its way, in units of the mean shading.
 
 use super::graph::{Graph, Value};
 use super::weights::Weights;
@@ -34,29 +35,54 @@ const PAINT: &str = "paint";
 /// How the names of its parameters begin.
 pub const PAINT_PARAMETERS: &str = "paint.";
 
+/// The output of the head for light.
+const LIGHT: &str = "light";
+/// How the names of its parameters begin.
+pub const LIGHT_PARAMETERS: &str = "light.";
+/// Numbers of its answer.
+pub const LIGHT_OUTPUTS: usize = 9;
+/// Numbers between its layers.
+const LIGHT_HIDDEN: usize = 128;
+
+/// The heads that weights may have or not.
+#[derive(Debug, Clone, Copy)]
+struct Heads {
+    paint: bool,
+    light: bool,
+}
+
 /// The network; width and height of its input are multiples of 32.
 #[must_use]
 pub fn decomposer() -> Graph {
-    build(false)
+    build(Heads {
+        paint: false,
+        light: false,
+    })
 }
 
-/// The same network with a head that tells paint from shadow.
+/// The same network with a head that tells paint from shadow, and one that tells the light.
 #[must_use]
-pub fn decomposer_with_paint() -> Graph {
-    build(true)
+pub fn decomposer_with_heads() -> Graph {
+    build(Heads {
+        paint: true,
+        light: true,
+    })
 }
 
-/// The network that has these weights: with the head for paint, where they have one.
+/// The network that has these weights: with the heads for paint and for light, where they have them.
 #[must_use]
 pub fn decomposer_of(weights: &Weights) -> Graph {
-    let of_head = |name: &str| {
-        name.trim_start_matches("module.")
-            .starts_with(PAINT_PARAMETERS)
+    let have = |prefix: &str| {
+        let mut names = weights.iter().map(|(name, _)| name);
+        names.any(|name| name.trim_start_matches("module.").starts_with(prefix))
     };
-    build(weights.iter().any(|(name, _)| of_head(name)))
+    build(Heads {
+        paint: have(PAINT_PARAMETERS),
+        light: have(LIGHT_PARAMETERS),
+    })
 }
 
-fn build(with_paint: bool) -> Graph {
+fn build(heads: Heads) -> Graph {
     let (mut net, input) = Graph::new("decomposer", INPUTS);
     let blocks = net.pixel_unshuffle(input, BLOCK);
     let features = encode(&mut net, blocks);
@@ -64,6 +90,7 @@ fn build(with_paint: bool) -> Graph {
     for step in 0..MIDDLE {
         value = residual(&mut net, &format!("middle.{step}"), value);
     }
+    let middle = value;
     let skips = features.iter().rev();
     let outputs = ENCODER.iter().rev().skip(1);
     for (step, (&outputs, &skip)) in outputs.zip(skips).enumerate() {
@@ -76,12 +103,28 @@ fn build(with_paint: bool) -> Graph {
     let maps = net.convolution("head.1".to_owned(), value, OUTPUTS * BLOCK * BLOCK, 1);
     let maps = net.pixel_shuffle(maps, BLOCK);
     net.output("maps", maps);
-    if with_paint {
+    if heads.paint {
         let paint = net.convolution(PAINT.to_owned(), value, BLOCK * BLOCK, 1);
         let paint = net.pixel_shuffle(paint, BLOCK);
         net.output(PAINT, paint);
     }
+    if heads.light {
+        let light = light(&mut net, middle);
+        net.output(LIGHT, light);
+    }
     net
+}
+
+/// From the coarsest features to what they say of the light, wherever in the picture they are.
+fn light(net: &mut Graph, middle: Value) -> Value {
+    let named = |layer: usize| format!("{LIGHT_PARAMETERS}{layer}");
+    let value = net.pointwise(named(0), middle, LIGHT_HIDDEN);
+    let value = net.relu(value);
+    let (mean, most) = (net.mean_pool(value), net.max_pool(value));
+    let value = net.concatenate(mean, most);
+    let value = net.linear(named(1), value, LIGHT_HIDDEN);
+    let value = net.relu(value);
+    net.linear(named(2), value, LIGHT_OUTPUTS)
 }
 
 /// The features of each step, the finest first.
@@ -121,12 +164,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_tell_whether_their_network_has_the_head_for_paint() {
-        let (plain, more) = (decomposer(), decomposer_with_paint());
+    fn weights_tell_which_heads_their_network_has() {
+        let (plain, more) = (decomposer(), decomposer_with_heads());
         assert_eq!(plain.outputs().len(), 1);
         let paint = more.node(more.outputs()[1].value);
         assert_eq!((paint.channels, paint.scale), (1, Some(1)));
-        for graph in [plain, more] {
+        let light = more.node(more.outputs()[2].value);
+        assert_eq!((light.channels, light.scale), (LIGHT_OUTPUTS, None));
+        let paint_alone = build(Heads {
+            paint: true,
+            light: false,
+        });
+        for graph in [plain, more, paint_alone] {
             assert_eq!(decomposer_of(&Weights::initial(&graph, 1)), graph);
         }
     }

@@ -39,7 +39,8 @@ mod weights;
 
 pub use codec::WeightPrecision;
 pub use decomposer::{
-    INPUTS, OUTPUTS, PAINT_PARAMETERS, decomposer, decomposer_of, decomposer_with_paint,
+    INPUTS, LIGHT_OUTPUTS, LIGHT_PARAMETERS, OUTPUTS, PAINT_PARAMETERS, decomposer, decomposer_of,
+    decomposer_with_heads,
 };
 pub use engine::InferenceEngine;
 pub use error::NetError;

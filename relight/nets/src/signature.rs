@@ -142,17 +142,17 @@ struct Side {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Weights, decomposer_with_paint, to_onnx};
+    use super::super::{Weights, decomposer_with_heads, to_onnx};
     use super::*;
 
     #[test]
     fn our_own_files_say_what_they_take_and_answer() {
-        let graph = decomposer_with_paint();
+        let graph = decomposer_with_heads();
         let bytes = to_onnx(&graph, &Weights::initial(&graph, 1), 1, (64, 32)).unwrap();
         let found = OnnxSignature::read(&bytes).unwrap();
         let names = |of: &[OnnxValue]| of.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
         assert_eq!(names(&found.inputs), ["input"]);
-        assert_eq!(names(&found.outputs), ["maps", "paint"]);
+        assert_eq!(names(&found.outputs), ["maps", "paint", "light"]);
         assert_eq!(found.inputs[0].sides, [1, 7, 32, 64].map(Some));
         assert_eq!(found.inputs[0].element, OnnxElement::Float);
         assert_eq!(found.output("paint"), Some(1));

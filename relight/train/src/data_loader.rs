@@ -153,7 +153,8 @@ impl Composition {
                 } else {
                     Linearisation::Exact
                 };
-                TruthArrays::new(&recipe.sample(&self.library, &seen, number), linearisation)
+                let sample = recipe.sample(&self.library, &seen, number);
+                TruthArrays::new(&sample, linearisation)
             })
             .collect()
     }

@@ -6,7 +6,7 @@ use tch::Tensor;
 
 use super::darkness::Darkness;
 use super::error::TrainError;
-use super::losses::{Mean, chord, gradient, scale_invariant, windowed};
+use super::losses::{Mean, chord, gradient, relative_distance, scale_invariant, windowed};
 use super::sample::TruthBatch;
 use super::terms::LossTerms;
 use relight_photo::decompose::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING};
@@ -38,6 +38,8 @@ pub struct AnsweredTensors {
     pub highlight: Tensor,
     /// How much of the darkness is paint, as a logit, 1 channel; none of a network without that head.
     pub paint: Option<Tensor>,
+    /// The light, `batch x 9` as [`relight_photo::decompose::PredictedLight`] has it; none of a network without that head.
+    pub light: Option<Tensor>,
 }
 
 impl AnsweredTensors {
@@ -46,9 +48,12 @@ impl AnsweredTensors {
     /// # Errors
     /// [`TrainError::Torch`].
     pub fn of_outputs(input: &Tensor, outputs: &[Tensor]) -> Result<Self, TrainError> {
-        let paint = outputs.get(1).map(Tensor::shallow_clone);
-        let maps = Self::new(input, &outputs[0])?;
-        Ok(Self { paint, ..maps })
+        let head = |at: usize| outputs.get(at).map(Tensor::shallow_clone);
+        Ok(Self {
+            paint: head(1),
+            light: head(2),
+            ..Self::new(input, &outputs[0])?
+        })
     }
 
     /// The maps for the network's input and its answer, the output `maps`.
@@ -80,6 +85,7 @@ impl AnsweredTensors {
                 .f_add_scalar(-f64::from(HIGHLIGHT_OFFSET))?
                 .f_softplus()?,
             paint: None,
+            light: None,
         })
     }
 }
@@ -104,6 +110,8 @@ pub struct DecomposeLossCoefficients {
     pub highlight_energy: f64,
     /// Cross entropy of what is paint of a pixel's darkness.
     pub paint: f64,
+    /// Distance of the light.
+    pub light: f64,
 }
 
 impl Default for DecomposeLossCoefficients {
@@ -117,6 +125,7 @@ impl Default for DecomposeLossCoefficients {
             highlight: 1.0,
             highlight_energy: 0.2,
             paint: 0.1,
+            light: 0.1,
         }
     }
 }
@@ -188,6 +197,10 @@ pub fn decompose_losses(
     if let Some(logit) = &answer.paint {
         let truth = Darkness::new(&batch.albedo, &batch.shading, mask)?;
         terms.add_mean("paint", coefficients.paint, truth.cross_entropy(logit)?);
+    }
+    if let Some(light) = &answer.light {
+        let distance = relative_distance(light, &batch.light)?;
+        terms.add_mean("light", coefficients.light, distance);
     }
     Ok(terms)
 }

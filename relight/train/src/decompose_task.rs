@@ -11,7 +11,7 @@ use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, highlight_figures};
 use super::learner::{Learner, LearnerSettings};
-use super::losses::{angular_degrees, scale_invariant, windowed};
+use super::losses::{angular_degrees, light_degrees, relative_distance, scale_invariant, windowed};
 use super::model::{ComputePrecision, Model};
 use super::process_group::ProcessGroup;
 use super::resources::Resources;
@@ -19,7 +19,7 @@ use super::sample::TruthBatch;
 use super::settings::{DecomposeSettings, PrecisionChoice, first_difference};
 use super::sheet::validation_sheet;
 use super::task::{StepLosses, TrainingTask, Validation};
-use relight_nets::{PAINT_PARAMETERS, Weights, decomposer_with_paint};
+use relight_nets::{LIGHT_PARAMETERS, PAINT_PARAMETERS, Weights, decomposer_with_heads};
 use relight_synth::AlbedoKind;
 
 /// Samples that are shown.
@@ -53,17 +53,20 @@ impl DecomposeTask {
         let validation = HeldOutSamples::new(&composition, settings.data.validation, None);
         let print = Some(AlbedoKind::Print);
         let print = HeldOutSamples::new(&composition, settings.data.validation.div_ceil(2), print);
-        let graph = decomposer_with_paint();
+        let graph = decomposer_with_heads();
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = weights.cloned().unwrap_or_else(initial);
-        // Weights from before there was a head for paint begin without one.
-        let weights = weights.completed(&graph, PAINT_PARAMETERS, settings.run.seed);
+        // Weights from before there was a head for paint or for light begin without one.
+        let heads = [PAINT_PARAMETERS, LIGHT_PARAMETERS];
+        let weights = heads.into_iter().fold(weights, |weights, head| {
+            weights.completed(&graph, head, settings.run.seed)
+        });
         let device = resources.device;
         let precision = match settings.run.precision.named() {
             Some(precision) => precision,
             None => fastest(&weights, &validation.first(Kind::Float, device)?, device)?,
         };
-        let learner = Learner::new(
+        let mut learner = Learner::new(
             graph,
             &weights,
             LearnerSettings {
@@ -73,6 +76,9 @@ impl DecomposeTask {
                 device: resources.device,
             },
         )?;
+        if let Some(head) = settings.only {
+            learner.model.train_only(head.parameters())?;
+        }
         Ok(Self {
             composed: ComposedBatches::new(
                 composition,
@@ -222,6 +228,12 @@ fn figures(
             figures.push((name, f64::try_from(error)?));
         }
     }
+    if let Some(light) = &answer.light {
+        let distance = relative_distance(light, &batch.light)?.value;
+        figures.push(("light", f64::try_from(distance)?));
+        let degrees = light_degrees(light, &batch.light)?;
+        figures.push(("light_deg", f64::try_from(degrees)?));
+    }
     Ok(figures)
 }
 
@@ -232,7 +244,7 @@ fn fastest(
     device: Device,
 ) -> Result<ComputePrecision, TrainError> {
     let seconds = |precision| -> Result<f64, TrainError> {
-        let model = Model::new(decomposer_with_paint(), weights, device, precision)?;
+        let model = Model::new(decomposer_with_heads(), weights, device, precision)?;
         let mut best = f64::INFINITY;
         for _ in 0..3 {
             let start = Instant::now();

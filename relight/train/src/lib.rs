@@ -74,9 +74,9 @@ pub use resources::Resources;
 pub use run::{Run, RunOutcome, TrainObserver};
 pub use sample::{DrawnSample, Linearisation, TruthArrays, TruthBatch};
 pub use settings::{
-    DataSettings, DecomposeSettings, PaperLossCoefficients, PaperSettings, PrecisionChoice,
-    RenamedSetting, RunSettings, SettingsFile, TransferSettings, TurnNetworkSettings, TurnSettings,
-    read_settings,
+    DataSettings, DecomposeHead, DecomposeSettings, PaperLossCoefficients, PaperSettings,
+    PrecisionChoice, RenamedSetting, RunSettings, SettingsFile, TransferSettings,
+    TurnNetworkSettings, TurnSettings, read_settings,
 };
 pub use shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
 pub use symmetry::Symmetry;

@@ -139,6 +139,54 @@ pub fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, Tr
     Ok(Mean { value, over })
 }
 
+/// Distance of vectors (`batch x numbers`) from the true ones in parts of their length, mean over the batch without those of
+/// which the truth is 0: it is not known.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub fn relative_distance(found: &Tensor, truth: &Tensor) -> Result<Mean, TrainError> {
+    let length = |of: &Tensor| {
+        of.f_square()?
+            .f_sum_dim_intlist([1_i64].as_slice(), false, None)?
+            .f_add_scalar(TINY)?
+            .f_sqrt()
+    };
+    let of_truth = length(truth)?;
+    let known = of_truth.f_gt(2.0 * TINY.sqrt())?.f_to_kind(truth.kind())?;
+    let part = length(&found.f_sub(truth)?)?
+        .f_div(&of_truth)?
+        .f_mul(&known)?;
+    let over = known.f_sum(None)?.f_add_scalar(TINY)?;
+    let value = part.f_sum(None)?.f_div(&over)?;
+    Ok(Mean { value, over })
+}
+
+/// Mean angle between the bands 1 of lights (`batch x 9`), degrees, over those whose truth is known.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub fn light_degrees(found: &Tensor, truth: &Tensor) -> Result<Tensor, TrainError> {
+    let direction = |of: &Tensor| -> Result<(Tensor, Tensor), tch::TchError> {
+        let band = of.f_narrow(1, 1, 3)?;
+        let length = band
+            .f_square()?
+            .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+            .f_add_scalar(TINY * TINY)?
+            .f_sqrt()?;
+        Ok((band.f_div(&length)?, length))
+    };
+    let ((found, _), (truth, length)) = (direction(found)?, direction(truth)?);
+    let angle = found
+        .f_mul(&truth)?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+        .f_clamp(-1.0, 1.0)?
+        .f_acos()?
+        .f_rad2deg()?;
+    let known = length.f_gt(2.0 * TINY)?.f_to_kind(truth.kind())?;
+    let over = known.f_sum(None)?.f_add_scalar(TINY)?;
+    Ok(angle.f_mul(&known)?.f_sum(None)?.f_div(&over)?)
+}
+
 /// Mean angle between unit normals under the weight, degrees.
 ///
 /// # Errors
@@ -189,6 +237,21 @@ mod tests {
         };
         assert!(cost(chord, 40.0) < cost(chord, 15.0));
         assert!(cost(angular, 40.0) > cost(angular, 15.0));
+    }
+
+    #[test]
+    fn lights_that_are_not_known_do_not_count() {
+        let lights = |first: [f64; 9]| Tensor::from_slice2(&[first, [0.0; 9]]);
+        let truth = lights([2.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let found = Tensor::from_slice2(&[
+            [2.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [7.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0],
+        ]);
+        let distance = relative_distance(&found, &truth).unwrap();
+        assert!((distance.value.double_value(&[]) - 1.0 / 5.0_f64.sqrt()).abs() < 1e-3);
+        assert!((distance.over.double_value(&[]) - 1.0).abs() < 1e-5);
+        let degrees = light_degrees(&found, &truth).unwrap().double_value(&[]);
+        assert!((degrees - 45.0).abs() < 0.01, "{degrees}");
     }
 
     #[test]

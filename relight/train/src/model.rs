@@ -129,12 +129,24 @@ impl Model {
         Ok(())
     }
 
-    /// Adds 0 to the gradient of every parameter, so that all have one.
+    /// Wants gradients only of the parameters whose names begin so: all others stay as they are.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub(super) fn train_only(&mut self, prefix: &str) -> Result<(), TrainError> {
+        for (name, parameter) in &mut self.parameters {
+            *parameter = parameter.f_set_requires_grad(name.starts_with(prefix))?;
+        }
+        Ok(())
+    }
+
+    /// Adds 0 to the gradient of every parameter that is trained, so that all of those have one.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
     pub(super) fn add_zero_gradients(&self) -> Result<(), TrainError> {
-        for parameter in self.parameters.values() {
+        let trained = |parameter: &&Tensor| parameter.requires_grad();
+        for parameter in self.parameters.values().filter(trained) {
             parameter.f_sum(None)?.f_mul_scalar(0.0)?.f_backward()?;
         }
         Ok(())

@@ -472,6 +472,7 @@ mod tests {
             albedo: Tensor::ones([2, 3, SIDE, SIDE], place),
             normals: Tensor::cat(&[ones() * 0.0, ones() * 0.0, ones()], 1),
             highlight,
+            light: Tensor::zeros([2, 9], place),
         };
         let loss = |batch: &TruthBatch| {
             let loss = normal_on_truth(&normal, batch).unwrap();

@@ -10,8 +10,8 @@ use tch::{Device, Kind, Tensor};
 use super::error::TrainError;
 use super::symmetry::Symmetry;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
-use relight_nets::INPUTS;
-use relight_photo::decompose::EncodedPicture;
+use relight_nets::{INPUTS, LIGHT_OUTPUTS};
+use relight_photo::decompose::{EncodedPicture, PredictedLight};
 use relight_reader::TruthSample;
 use relight_synth::SynthSample;
 
@@ -33,6 +33,8 @@ pub enum Linearisation {
 pub struct TruthArrays {
     extent: Extent,
     values: Vec<f16>,
+    /// What the head for light should answer; 0 where the light is not known.
+    light: [f32; LIGHT_OUTPUTS],
 }
 
 /// A sample in a batch.
@@ -61,6 +63,8 @@ pub struct TruthBatch {
     pub normals: Tensor,
     /// Highlight, 1 channel, in whites: what of it the picture shows.
     pub highlight: Tensor,
+    /// What the head for light should answer, `batch x 9`; 0 where the light is not known.
+    pub light: Tensor,
 }
 
 impl TruthArrays {
@@ -81,8 +85,16 @@ impl TruthArrays {
             values.extend(plane.iter().map(|v| f16::from_f32(v / white)));
         }
         values.resize(PLANES * pixels, f16::ZERO);
-        fill_truth(sample, white, &mut values[(INPUTS + 3) * pixels..], pixels);
-        Self { extent, values }
+        let mean = mean_shading(sample);
+        let truth = &mut values[(INPUTS + 3) * pixels..];
+        fill_truth(sample, white, mean, truth, pixels);
+        let light = &sample.description().coefficients;
+        let light = PredictedLight::of_light(light, f64::from(mean));
+        Self {
+            extent,
+            values,
+            light: light.numbers().map(|number| number as f32),
+        }
     }
 
     /// The arrays of a picture whose ground truth was found otherwise. Its colours are taken for light as they stand.
@@ -122,6 +134,7 @@ impl TruthArrays {
         Ok(Self {
             extent: encoded.extent(),
             values,
+            light: [0.0; LIGHT_OUTPUTS],
         })
     }
 
@@ -138,14 +151,18 @@ fn grey(light: &Planes<3>) -> Vec<f32> {
     channels.map(|((r, g), b)| (r + g + b) / 3.0).collect()
 }
 
+/// The mean of the shading; above 0, also of an object on which no light falls.
+fn mean_shading(sample: &SynthSample<'_>) -> f32 {
+    let shading = &sample.shaded().shading;
+    let total: f32 = shading.iter().map(|light| light.element_sum() / 3.0).sum();
+    (total / shading.len().max(1) as f32).max(1e-6)
+}
+
 /// The ground truth at the covered pixels.
-fn fill_truth(sample: &SynthSample<'_>, white: f32, values: &mut [f16], pixels: usize) {
+fn fill_truth(sample: &SynthSample<'_>, white: f32, mean: f32, values: &mut [f16], pixels: usize) {
     let grey = |light: &Vec3| light.element_sum() / 3.0;
     let (shaded, material) = (sample.shaded(), sample.material());
     let buffer = sample.view().scene.buffer();
-    let total: f32 = shaded.shading.iter().map(grey).sum();
-    // Of an object on which no light falls, shading is 0.
-    let mean = (total / buffer.len().max(1) as f32).max(1e-6);
     for (at, &pixel) in buffer.pixels().iter().enumerate() {
         let (albedo, normal) = (material.albedo[at], material.normals[at]);
         let truth = [
@@ -211,6 +228,8 @@ impl TruthBatch {
             .par_chunks_exact_mut(2 * each.max(1))
             .zip(samples)
             .for_each(|(to, sample)| sample.write(to));
+        let lights: Vec<f32> = samples.iter().flat_map(DrawnSample::light).collect();
+        let light = Tensor::f_from_slice(&lights)?.f_reshape([-1, LIGHT_OUTPUTS as i64])?;
         let shape = [samples.len(), PLANES, extent.height, extent.width].map(|n| n as i64);
         let all = Tensor::f_from_data_size(&bytes, &shape, Kind::Half)?
             .f_to_device(device)?
@@ -224,6 +243,7 @@ impl TruthBatch {
             albedo: part(INPUTS + 4, 3)?,
             normals: part(INPUTS + 7, 3)?,
             highlight: part(INPUTS + 10, 1)?,
+            light: light.f_to_device(device)?.f_to_kind(kind)?,
         })
     }
 }
@@ -239,6 +259,7 @@ impl TruthBatch {
             ("albedo", &self.albedo),
             ("normals", &self.normals),
             ("highlight", &self.highlight),
+            ("light", &self.light),
         ]
         .map(|(name, tensor)| (name.to_owned(), tensor.shallow_clone()))
         .into()
@@ -249,6 +270,10 @@ impl TruthBatch {
 const NORMAL_X: usize = INPUTS + 7;
 
 impl DrawnSample<'_> {
+    fn light(&self) -> [f32; LIGHT_OUTPUTS] {
+        self.symmetry.light(self.arrays.light)
+    }
+
     /// Writes the planes one after the other, two bytes a value.
     fn write(&self, to: &mut [u8]) {
         let extent = self.arrays.extent;
@@ -283,6 +308,7 @@ mod tests {
         let arrays = TruthArrays {
             extent,
             values: values.collect(),
+            light: std::array::from_fn(|at| at as f32),
         };
         let batch = |mirrored: bool| {
             let arrays = &arrays;
@@ -297,5 +323,7 @@ mod tests {
         let (normals, found) = (flipped(&plain.normals), mirrored.normals);
         assert_eq!(found.narrow(1, 0, 1), -normals.narrow(1, 0, 1));
         assert_eq!(found.narrow(1, 1, 2), normals.narrow(1, 1, 2));
+        let light = [0.0_f32, 1.0, 2.0, -3.0, -4.0, 5.0, 6.0, -7.0, 8.0];
+        assert_eq!(mirrored.light, Tensor::from_slice(&light).reshape([1, 9]));
     }
 }

@@ -1,5 +1,7 @@
 //! The eight symmetries of a square picture, by which a sample is seen in eight ways.
 
+use std::ops::Neg;
+
 use relight_core::image::Extent;
 
 /// One of them: the picture's axes are swapped, then each is turned over.
@@ -65,11 +67,33 @@ impl Symmetry {
             _ => (axis, 1.0),
         }
     }
+
+    /// The nine coefficients of order 2 of a light on what is seen.
+    pub(super) fn light<N: Copy + Neg<Output = N>>(self, of: [N; 9]) -> [N; 9] {
+        // Where the coefficients of x and y are, and of x z and y z.
+        const BAND_1: [usize; 2] = [3, 1];
+        const BAND_2: [usize; 2] = [7, 5];
+        let signed = |value: N, sign: f32| if sign < 0.0 { -value } else { value };
+        let [x, y] = [self.component(0), self.component(1)];
+        let mut seen = of;
+        for places in [BAND_1, BAND_2] {
+            seen[places[0]] = signed(of[places[x.0]], x.1);
+            seen[places[1]] = signed(of[places[y.0]], y.1);
+        }
+        seen[4] = signed(of[4], x.1 * y.1);
+        if self.transposed {
+            seen[8] = -of[8];
+        }
+        seen
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use relight_core::image::Planes;
+    use relight_core::light::{Normals, ShLight};
+    use relight_core::render::{DiffuseForm, DiffuseLayer};
 
     const SIDE: usize = 9;
 
@@ -107,6 +131,31 @@ mod tests {
             places.sort_unstable();
             places.dedup();
             assert_eq!(places.len(), SIDE * SIDE);
+        }
+    }
+
+    #[test]
+    fn light_is_as_bright_on_a_normal_as_it_was_before_both_were_turned() {
+        let coefficients = [1.0, 0.4, 0.3, 0.5, 0.1, -0.1, 0.05, 0.2, 0.15];
+        let irradiance = |coefficients: [f64; 9], normal: [f32; 3]| {
+            let light = ShLight::new(coefficients.map(|c| [c; 3]).to_vec()).unwrap();
+            let normals = Normals::new(Planes::filled(Extent::new(1, 1), normal));
+            let layer = DiffuseLayer::new(&light, DiffuseForm::Irradiance);
+            layer.shading(&normals).planes().plane(0)[0]
+        };
+        for bits in 0..8 {
+            let symmetry = Symmetry::of_bits(bits);
+            for normal in [[0.6, 0.8, 0.0], [-0.48, 0.64, 0.6], [0.0, -0.6, 0.8]] {
+                let seen = [0, 1, 2].map(|axis| {
+                    let (from, sign) = symmetry.component(axis);
+                    sign * normal[from]
+                });
+                let (own, turned) = (
+                    irradiance(coefficients, normal),
+                    irradiance(symmetry.light(coefficients), seen),
+                );
+                assert!((own - turned).abs() < 1e-5, "{symmetry:?}: {own} {turned}");
+            }
         }
     }
 

@@ -12,19 +12,22 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use half::f16;
 use relight_core::image::{Extent, Planes};
 use relight_nets::paper::{Head, light_net, normal_net, spec_net};
-use relight_nets::{Graph, Inference, Weights, decomposer};
+use relight_nets::{
+    Graph, Inference, LIGHT_PARAMETERS, Weights, decomposer, decomposer_with_heads,
+};
 use relight_photo::decompose::EncodedPicture;
 use relight_reader::Rank;
 use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight_train::{
     Adam, AdamSettings, AnsweredTensors, Checkpoint, Composition, ComputePrecision, DataLoader,
-    DataSettings, DecomposeSettings, DecomposeTask, Journal, Learner, LearnerSettings, Model,
-    PaperInputs, PaperLossCoefficients, PaperPhase, PaperSettings, PaperTask, PrecisionChoice,
-    ProcessGroup, Resources, Run, RunOutcome, RunSettings, StepLosses, TABLE, TrainError,
-    TrainObserver, TrainingTask, TransferSettings, TruthArrays, TurnNetworkSettings,
-    TurnNetworkTask, Validation, read_settings,
+    DataSettings, DecomposeHead, DecomposeSettings, DecomposeTask, Journal, Learner,
+    LearnerSettings, Model, PaperInputs, PaperLossCoefficients, PaperPhase, PaperSettings,
+    PaperTask, PrecisionChoice, ProcessGroup, Resources, Run, RunOutcome, RunSettings, StepLosses,
+    TABLE, TrainError, TrainObserver, TrainingTask, TransferSettings, TruthArrays,
+    TurnNetworkSettings, TurnNetworkTask, Validation, read_settings,
 };
 use tch::{Device, Kind, Tensor};
 
@@ -42,7 +45,11 @@ fn model(graph: Graph, precision: ComputePrecision) -> Model {
 
 #[test]
 fn what_is_trained_answers_as_what_is_shipped() {
-    for graph in [decomposer(), normal_net(), light_net(Head::Pooled)] {
+    for graph in [
+        decomposer_with_heads(),
+        normal_net(),
+        light_net(Head::Pooled),
+    ] {
         let weights = Weights::initial(&graph, 3);
         let picture = input(graph.input_channels());
         let flat = Vec::<f32>::try_from(picture.flatten(0, -1)).unwrap();
@@ -50,17 +57,20 @@ fn what_is_trained_answers_as_what_is_shipped() {
         let shipped = Inference::new(&graph, &weights, (side, side)).unwrap();
         let shipped = shipped.run(&flat).unwrap();
         let model = Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap();
-        let trained = &model.forward(&picture).unwrap()[0];
-        let trained = Vec::<f32>::try_from(trained.flatten(0, -1)).unwrap();
-        let largest = trained
-            .iter()
-            .fold(1.0_f32, |most, value| most.max(value.abs()));
-        for (a, b) in trained.iter().zip(shipped[0].values()) {
-            assert!(
-                (a - b).abs() < 1e-4 * largest,
-                "{}: {a} {b}",
-                model.graph().name()
-            );
+        let trained = model.forward(&picture).unwrap();
+        assert_eq!(trained.len(), shipped.len());
+        for (trained, shipped) in trained.iter().zip(&shipped) {
+            let trained = Vec::<f32>::try_from(trained.flatten(0, -1)).unwrap();
+            assert_eq!(trained.len(), shipped.values().len());
+            let sizes = trained.iter().map(|value| value.abs());
+            let largest = sizes.fold(1.0_f32, f32::max);
+            for (a, b) in trained.iter().zip(shipped.values()) {
+                assert!(
+                    (a - b).abs() < 1e-4 * largest,
+                    "{}: {a} {b}",
+                    model.graph().name()
+                );
+            }
         }
         assert_eq!(model.weights().unwrap(), weights);
     }
@@ -220,6 +230,32 @@ fn a_run_that_was_stopped_goes_on_to_the_same_losses_and_weights() {
     let weights = |folder: &Path| Weights::read(&folder.join("decomposer.safetensors")).unwrap();
     assert_eq!(weights(parted.path()), weights(whole.path()));
     assert!(whole.path().join("validation.png").is_file());
+}
+
+#[test]
+fn a_head_is_trained_alone_and_all_else_stays_as_it_was() {
+    tch::set_num_threads(1);
+    let folder = tempfile::tempdir().unwrap();
+    let settings = DecomposeSettings {
+        only: Some(DecomposeHead::Light),
+        run: small_run(3),
+        data: small_data(),
+        ..DecomposeSettings::default()
+    };
+    let (run, first) = (settings.run.clone(), Weights::initial(&decomposer(), 7));
+    let mut task = DecomposeTask::new(settings, resources(), Some(&first)).unwrap();
+    make_run(&mut task, &run, folder.path(), (false, u64::MAX)).unwrap();
+    let found = Weights::read(&folder.path().join("decomposer.safetensors")).unwrap();
+    let rounded = |value: &f32| f16::from_f32(*value).to_f32();
+    for (name, tensor) in first.iter() {
+        let expected: Vec<f32> = tensor.values().iter().map(rounded).collect();
+        assert_eq!(found.get(name).unwrap().values(), expected, "{name}");
+    }
+    let begun = Weights::initial(&decomposer_with_heads(), run.seed);
+    for (name, tensor) in begun.iter() {
+        let moved = found.get(name).unwrap().values() != tensor.values();
+        assert!(!name.starts_with(LIGHT_PARAMETERS) || moved, "{name}");
+    }
 }
 
 fn turn_task(steps: u64, views: &Path) -> (TurnNetworkTask, RunSettings) {

@@ -205,6 +205,11 @@ fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
     let settings = file.settings;
     let run = settings.run.clone();
     let weights = read_weights(arguments.weights.as_deref())?;
+    if settings.only.is_some() && weights.is_none() && !arguments.resume {
+        let message =
+            "`only` trains one head of a network that is there: give its weights by --weights FILE";
+        return Err(message.into());
+    }
     let resources = processes.resources.clone();
     let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
     train(&mut task, &run, (arguments, processes), console)

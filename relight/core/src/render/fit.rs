@@ -35,19 +35,52 @@ pub fn fit_light(
     mask: &[bool],
     stiffness: f64,
 ) -> Result<ShLight, LightError> {
+    fit_light_near(
+        &ShLight::dark(Order::TWO),
+        normals,
+        shading,
+        mask,
+        stiffness,
+    )
+}
+
+/// The same, with the bands 1 and 2 drawn towards those of the light `near`, of which the first three bands count.
+///
+/// # Errors
+/// As [`fit_light`].
+pub fn fit_light_near(
+    near: &ShLight,
+    normals: &Normals<YUp>,
+    shading: &Rgb<Linear>,
+    mask: &[bool],
+    stiffness: f64,
+) -> Result<ShLight, LightError> {
+    let near = near.with_order(Order::TWO);
     let mut equations = NormalEquations::new(Order::TWO.coefficients());
     let planes = normals.planes().planes();
     let colours = shading.planes().planes();
     for (at, _) in mask.iter().enumerate().filter(|(_, inside)| **inside) {
         let [x, y, z] = planes.map(|plane| f64::from(plane[at]));
         if let Some(normal) = Direction::new(x, y, z) {
-            let colour = colours.map(|colour| f64::from(colour[at]));
-            equations.add(&terms(normal.components()), colour);
+            let terms = terms(normal.components());
+            let mut rest = colours.map(|colour| f64::from(colour[at]));
+            for (term, coefficient) in terms.iter().zip(near.coefficients()) {
+                for (rest, coefficient) in rest.iter_mut().zip(coefficient) {
+                    *rest -= term * coefficient;
+                }
+            }
+            equations.add(&terms, rest);
         }
     }
     equations.add_ridge(0, RIDGE);
     equations.add_ridge(1, stiffness);
-    ShLight::new(equations.solve().ok_or(LightError::TooFewPixels)?)
+    let mut light = ShLight::new(equations.solve().ok_or(LightError::TooFewPixels)?)?;
+    for (found, near) in light.coefficients_mut().iter_mut().zip(near.coefficients()) {
+        for (found, near) in found.iter_mut().zip(near) {
+            *found += near;
+        }
+    }
+    Ok(light)
 }
 
 #[cfg(test)]
@@ -68,6 +101,26 @@ mod tests {
                 assert!((a - b).abs() < 1e-3, "{a} {b}");
             }
         }
+    }
+
+    #[test]
+    fn a_stiff_fit_keeps_the_shape_of_the_light_that_it_is_drawn_to() {
+        let coefficients = [9.0, 0.6, -0.5, 0.4, 0.3, -0.2, 0.5, 0.1, -0.4];
+        let near = ShLight::new(coefficients.map(|c| [c; 3]).to_vec()).unwrap();
+        let normals = Normals::sphere(41);
+        let shading = Rgb::new(Planes::filled(Extent::new(41, 41), [4.0; 3]));
+        let mask = vec![true; 41 * 41];
+        let found =
+            |stiffness| fit_light_near(&near, &normals, &shading, &mask, stiffness).unwrap();
+        let (stiff, free) = (found(1e9), found(0.0));
+        for (at, coefficient) in coefficients.into_iter().enumerate().skip(1) {
+            assert!((stiff.coefficients()[at][1] - coefficient).abs() < 1e-3);
+            assert!(free.coefficients()[at][1].abs() < 1e-3);
+        }
+        let of_stiff = DiffuseLayer::new(&stiff, DiffuseForm::Irradiance).shading(&normals);
+        let visible = 41.0 * 41.0 * std::f32::consts::PI / 4.0;
+        let mean = of_stiff.planes().plane(0).iter().sum::<f32>() / visible;
+        assert!((mean - 4.0).abs() < 0.1, "{mean}");
     }
 
     #[test]

@@ -18,7 +18,7 @@ mod surface;
 
 pub use diffuse::{DiffuseForm, DiffuseLayer};
 pub use diffuse::{RELEASED_AMBIENT, cosine_lobe, diffuse_constants};
-pub use fit::fit_light;
+pub use fit::{fit_light, fit_light_near};
 pub use layers::{EXPOSURE, Gradients, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;
 pub use power::PowerLayer;

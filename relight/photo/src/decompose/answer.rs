@@ -4,16 +4,24 @@ use std::ops::Range;
 
 use super::crop::{CropSquare, cut_out, enlarged, inside, reduced};
 use super::encoding::{AnsweredMaps, EncodedPicture, LEAST_FACING};
+use super::light::PredictedLight;
 use relight_core::image::{Extent, ImageError, Part, Planes};
 use relight_core::light::{Normals, YUp};
 use relight_core::parallel;
 use relight_nets::{Inference, NetError};
 
-/// What answers an encoded picture of `side` x `side` pixels with the planes that
-/// [`EncodedPicture::decode`] takes.
+/// What answers an encoded picture of `side` x `side` pixels.
 pub(super) trait MapsNet: Send + Sync {
     fn side(&self) -> usize;
-    fn answer(&self, encoded: &[f32]) -> Result<Vec<f32>, NetError>;
+    fn answer(&self, encoded: &[f32]) -> Result<NetAnswer, NetError>;
+}
+
+/// What a network answers.
+pub(super) struct NetAnswer {
+    /// The planes that [`EncodedPicture::decode`] takes.
+    pub(super) maps: Vec<f32>,
+    /// Of a network with that head.
+    pub(super) light: Option<PredictedLight>,
 }
 
 /// The network in an engine.
@@ -27,18 +35,33 @@ impl MapsNet for Engine {
         self.side
     }
 
-    fn answer(&self, encoded: &[f32]) -> Result<Vec<f32>, NetError> {
+    fn answer(&self, encoded: &[f32]) -> Result<NetAnswer, NetError> {
         let outputs = self.inference.run(encoded)?;
-        Ok(outputs
-            .into_iter()
-            .flat_map(relight_nets::Tensor::into_values)
-            .collect())
+        let mut answer = NetAnswer {
+            maps: Vec::new(),
+            light: None,
+        };
+        for output in outputs {
+            // The heads for pixels have four sides, that for light two.
+            if output.shape().len() > 2 {
+                answer.maps.append(&mut output.into_values());
+            } else {
+                answer.light = PredictedLight::of(output.values());
+            }
+        }
+        Ok(answer)
     }
 }
 
 /// All maps of a picture as one image, in values that can be averaged and blended: normals, log albedo,
 /// log shading, highlight, paint.
 pub(super) type Fields = Planes<9>;
+
+/// What the network says of a picture.
+pub(super) struct Look {
+    pub(super) fields: Fields,
+    pub(super) light: Option<PredictedLight>,
+}
 
 /// The network for pictures of two sizes. An object that fills a smaller picture is nearer to those that it was trained on,
 /// and is seen as a whole; the larger picture shows what is finer.
@@ -63,27 +86,34 @@ const DARKEST: f32 = 1e-4;
 /// Pixels by which tiles overlap, a part of their side.
 const OVERLAP: f64 = 0.25;
 
-/// The fields of a picture of the network's size; with `mirror`, the mean of those of the picture and of
-/// its mirror image.
-pub(super) fn fields(
+/// What is said of a picture of the network's size; with `mirror`, the mean of that and of what is said of its mirror image.
+pub(super) fn look(
     net: &dyn MapsNet,
     picture: &Planes<3>,
     mask: &Planes<1>,
     mirror: bool,
-) -> Result<Fields, NetError> {
+) -> Result<Look, NetError> {
     let plain = || answered(net, picture, mask);
     if !mirror {
         return plain();
     }
     let mirrored = || answered(net, &picture.clone().mirrored(), &mask.clone().mirrored());
     let (plain, mirrored) = parallel::join(plain, mirrored);
-    Ok(mean(plain?, turned_back(mirrored?)))
+    let (plain, mirrored) = (plain?, mirrored?);
+    let lights = plain.light.zip(mirrored.light);
+    Ok(Look {
+        fields: mean(plain.fields, turned_back(mirrored.fields)),
+        light: lights.map(|(plain, mirrored)| plain.mean(mirrored.mirrored())),
+    })
 }
 
-fn answered(net: &dyn MapsNet, picture: &Planes<3>, mask: &Planes<1>) -> Result<Fields, NetError> {
+fn answered(net: &dyn MapsNet, picture: &Planes<3>, mask: &Planes<1>) -> Result<Look, NetError> {
     let encoded = EncodedPicture::new(picture, mask);
     let answer = net.answer(encoded.values())?;
-    Ok(of_maps(encoded.decode(&answer)))
+    Ok(Look {
+        fields: of_maps(encoded.decode(&answer.maps)),
+        light: answer.light,
+    })
 }
 
 fn of_maps(maps: AnsweredMaps) -> Fields {
@@ -234,8 +264,8 @@ fn tile_detail(
     if !known.contains(&true) {
         return Ok(None);
     }
-    let fields = fields(net, &cut_out(picture, &mask), &mask, mirror)?;
-    let mut fine = enlarged(&fields, &known, &Part::all(tile.extent()));
+    let seen = look(net, &cut_out(picture, &mask), &mask, mirror)?;
+    let mut fine = enlarged(&seen.fields, &known, &Part::all(tile.extent()));
     let low = fine
         .resized(Extent::new(coarse, coarse))
         .resized(tile.extent());
@@ -289,6 +319,8 @@ pub(super) struct Whole {
     pub(super) picture: Planes<3>,
     pub(super) mask: Planes<1>,
     pub(super) fields: Fields,
+    /// As it was said at the coarse scale, which is that of the training.
+    pub(super) light: Option<PredictedLight>,
 }
 
 impl Whole {
@@ -303,11 +335,12 @@ impl Whole {
         let at_scale = |net: &dyn MapsNet, mirror| {
             let extent = Extent::new(net.side(), net.side());
             let (picture, mask) = reduced(picture, mask, part, extent);
-            let fields = fields(net, &picture, &mask, mirror)?;
+            let Look { fields, light } = look(net, &picture, &mask, mirror)?;
             Ok::<_, NetError>(Self {
                 picture,
                 mask,
                 fields,
+                light,
             })
         };
         let Some(coarse) = &scales.coarse else {
@@ -323,6 +356,7 @@ impl Whole {
     /// Its own details on the shape of a coarser scale.
     fn with_shape_of(mut self, other: &Self) -> Self {
         let (extent, small) = (self.mask.extent(), other.mask.extent());
+        self.light = other.light;
         let known = inside(&self.mask);
         let low = enlarged(&self.fields, &known, &Part::all(small)).resized(extent);
         let shape = enlarged(&other.fields, &inside(&other.mask), &Part::all(extent));

@@ -11,6 +11,7 @@ mod decomposer;
 mod encoding;
 mod error;
 mod gloss;
+mod light;
 mod mask;
 mod other;
 mod photo;
@@ -30,6 +31,7 @@ pub use encoding::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING, M
 pub use error::DecomposeError;
 pub use gloss::FittedGloss;
 pub use gloss::fit_gloss;
+pub use light::PredictedLight;
 pub use mask::{MaskSource, Rectangle};
 #[cfg(feature = "files")]
 pub(crate) use photo::stem;

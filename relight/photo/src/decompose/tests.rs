@@ -1,10 +1,10 @@
 //! The decomposer as a whole, on networks that are not trained and on stubs.
 
-use super::answer::{Fields, MapsNet, details, fields, to_maps};
+use super::answer::{Fields, MapsNet, NetAnswer, details, look, to_maps};
 use super::*;
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, YUp};
-use relight_nets::{INPUTS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_paint};
+use relight_nets::{INPUTS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_heads};
 
 /// Answers pixel by pixel, from the encoded values of the pixel and the mean of all log luminances.
 struct PixelNet<F> {
@@ -17,7 +17,7 @@ impl<F: Fn([f32; INPUTS], f32) -> [f32; OUTPUTS] + Send + Sync> MapsNet for Pixe
         self.side
     }
 
-    fn answer(&self, encoded: &[f32]) -> Result<Vec<f32>, NetError> {
+    fn answer(&self, encoded: &[f32]) -> Result<NetAnswer, NetError> {
         let pixels = self.side * self.side;
         assert_eq!(encoded.len(), INPUTS * pixels);
         let mean = encoded[4 * pixels..5 * pixels].iter().sum::<f32>() / pixels as f32;
@@ -28,7 +28,10 @@ impl<F: Fn([f32; INPUTS], f32) -> [f32; OUTPUTS] + Send + Sync> MapsNet for Pixe
                 answer[channel * pixels + at] = value;
             }
         }
-        Ok(answer)
+        Ok(NetAnswer {
+            maps: answer,
+            light: None,
+        })
     }
 }
 
@@ -318,11 +321,11 @@ fn fields_and_maps_are_the_same_but_for_the_mask() {
         pixel: by_colour,
     };
     let mask = disc(extent, 12.0);
-    let found = fields(&net, &smooth(extent), &mask, false).unwrap();
+    let found = look(&net, &smooth(extent), &mask, false).unwrap().fields;
     let inside: Vec<bool> = mask.plane(0).iter().map(|&m| m > 0.5).collect();
     let maps = to_maps(found, &inside).unwrap();
     let encoded = EncodedPicture::new(&smooth(extent), &mask);
-    let decoded = encoded.decode(&net.answer(encoded.values()).unwrap());
+    let decoded = encoded.decode(&net.answer(encoded.values()).unwrap().maps);
     assert!(most_apart(maps.shading.plane(0), decoded.shading.plane(0)) < 1e-5);
     assert!(most_apart(maps.albedo.plane(2), decoded.albedo.plane(2)) < 1e-5);
     let [a, b] = [maps.normals, decoded.normals].map(|n| n.planes().plane(0).to_vec());
@@ -386,7 +389,7 @@ fn a_mask_that_is_empty_or_of_another_size_is_refused() {
 
 #[test]
 fn the_part_of_darkness_that_is_paint_is_made_where_it_is_asked_for() {
-    let weights = Weights::initial(&decomposer_with_paint(), 1);
+    let weights = Weights::initial(&decomposer_with_heads(), 1);
     let net = Decomposer::with_side(&weights, 32).unwrap();
     let extent = Extent::new(40, 30);
     let picture = Rgb::new(Planes::filled(extent, [0.5, 0.4, 0.3]));

@@ -29,6 +29,7 @@ use super::error::TrainError;
 use super::paper_phases::PaperPhase;
 use file::read_with;
 use loss::{check_coefficient, check_coefficients};
+use relight_nets::{LIGHT_PARAMETERS, PAINT_PARAMETERS};
 
 pub use data::{DataSettings, TurnSettings};
 pub(super) use file::first_difference;
@@ -38,10 +39,34 @@ pub use renamed::RenamedSetting;
 pub use run::{PrecisionChoice, RunSettings};
 pub use transfer::TransferSettings;
 
+/// A head of the decomposing network that can be trained by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DecomposeHead {
+    /// That which tells paint from shadow.
+    Paint,
+    /// That which tells the light.
+    Light,
+}
+
+impl DecomposeHead {
+    /// How the names of its parameters begin.
+    #[must_use]
+    pub fn parameters(self) -> &'static str {
+        match self {
+            Self::Paint => PAINT_PARAMETERS,
+            Self::Light => LIGHT_PARAMETERS,
+        }
+    }
+}
+
 /// The settings of `relight train decompose`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DecomposeSettings {
+    /// The one head that is trained, where all else stays as the weights have it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub only: Option<DecomposeHead>,
     /// How long and how fast.
     pub run: RunSettings,
     /// On what.
@@ -143,6 +168,7 @@ impl DecomposeSettings {
             ("loss.highlight", loss.highlight),
             ("loss.highlight_energy", loss.highlight_energy),
             ("loss.paint", loss.paint),
+            ("loss.light", loss.light),
         ])?;
         // A part of others: alone it counts nothing.
         check_coefficient("loss.quotient", loss.quotient)

@@ -86,6 +86,16 @@ fn what_a_file_does_not_name_has_its_default() {
 }
 
 #[test]
+fn one_head_can_be_named_and_is_written_before_the_tables() {
+    let settings = read("only = \"light\"\n[run]\nsteps = 7\n").unwrap();
+    assert_eq!(settings.only, Some(DecomposeHead::Light));
+    let written = toml::to_string(&settings).unwrap();
+    assert_eq!(read(&written).unwrap(), settings);
+    let error = read("only = \"normals\"\n").unwrap_err().to_string();
+    assert!(error.contains("`paint` or `light`"), "{error}");
+}
+
+#[test]
 fn a_name_that_is_none_is_told_with_its_line() {
     let error = read("[run]\nstep = 7").unwrap_err().to_string();
     assert!(
@@ -200,6 +210,7 @@ fn loss_coefficients_that_teach_nothing_are_named() {
         highlight: 0.0,
         highlight_energy: 0.0,
         paint: 0.0,
+        light: 0.0,
     };
     let told = error(nothing).unwrap_err();
     assert!(told.contains("all others"), "{told}");

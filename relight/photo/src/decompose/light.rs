@@ -1,0 +1,177 @@
+//! The light of a photograph: what the network says of it, and the fit to the shading that begins there.
+
+use std::f64::consts::PI;
+
+use relight_core::image::{Linear, Rgb};
+use relight_core::light::{LightError, Normals, ShLight, YUp};
+use relight_core::render::{fit_light, fit_light_near};
+use relight_nets::LIGHT_OUTPUTS;
+
+/// Keeps the light from behind, which normals hardly show, small: see [`fit_light`].
+const STIFFNESS: f64 = 1e-3;
+/// The same towards what the network says. Chosen on synthetic objects: a stiffer fit finds the light's side a little better
+/// and explains the shading less, and objects relit by it are further off (docs/results/decomposition.md).
+const STIFFNESS_TO_PREDICTION: f64 = 1e-2;
+/// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
+/// a light that is negative in most directions.
+const MOST_ONE_SIDED: f64 = 2.5;
+/// How often the light is fitted with four times the stiffness, at most.
+const STIFFER_FITS: usize = 8;
+/// What the cosine makes of a coefficient of radiance, band by band (Ramamoorthi and Hanrahan 2001).
+const COSINE: [f64; 3] = [PI, 2.0 * PI / 3.0, PI / 4.0];
+/// The coefficients that change sign in the mirror image, left and right: those that are odd in x.
+const ODD_IN_X: [usize; 3] = [3, 4, 7];
+
+/// The coefficients of order 2 of grey irradiance, where nothing is in the light's way, in units of the mean shading of an
+/// object: what the network's head for light answers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PredictedLight([f64; LIGHT_OUTPUTS]);
+
+impl PredictedLight {
+    /// What the network answers; none where these are not so many numbers.
+    pub(super) fn of(answer: &[f32]) -> Option<Self> {
+        let numbers: [f32; LIGHT_OUTPUTS] = answer.try_into().ok()?;
+        let is_light = numbers.iter().all(|value| value.is_finite());
+        is_light.then(|| Self(numbers.map(f64::from)))
+    }
+
+    /// What the network should answer of the coefficients of a light, in which the mean shading of an object is `mean`,
+    /// above 0.
+    #[must_use]
+    pub fn of_light(coefficients: &[[f64; 3]; LIGHT_OUTPUTS], mean: f64) -> Self {
+        let irradiance = |at: usize| {
+            let grey = coefficients[at].iter().sum::<f64>() / 3.0;
+            COSINE[band(at)] * grey / mean
+        };
+        Self(std::array::from_fn(irradiance))
+    }
+
+    /// The numbers.
+    #[must_use]
+    pub const fn numbers(&self) -> &[f64; LIGHT_OUTPUTS] {
+        &self.0
+    }
+
+    /// That of the mirror image, left and right.
+    pub(super) fn mirrored(mut self) -> Self {
+        for at in ODD_IN_X {
+            self.0[at] = -self.0[at];
+        }
+        self
+    }
+
+    pub(super) fn mean(self, other: Self) -> Self {
+        Self(std::array::from_fn(|at| self.0[at].midpoint(other.0[at])))
+    }
+
+    fn light(&self) -> Result<ShLight, LightError> {
+        let numbers = self.0.iter().enumerate();
+        ShLight::new(numbers.map(|(at, n)| [n / COSINE[band(at)]; 3]).collect())
+    }
+}
+
+fn band(at: usize) -> usize {
+    at.isqrt()
+}
+
+/// The light of a shading, grey and of mean 1: the nearest one by least squares, drawn to what the network says where it says
+/// something, as stiff as it has to be to be one that there can be.
+pub(super) fn light_of_shading(
+    normals: &Normals<YUp>,
+    shading: &Rgb<Linear>,
+    known: &[bool],
+    predicted: Option<&PredictedLight>,
+) -> Result<ShLight, LightError> {
+    let near = predicted.map(PredictedLight::light).transpose()?;
+    let fitted = |stiffness| match &near {
+        Some(near) => fit_light_near(near, normals, shading, known, stiffness),
+        None => fit_light(normals, shading, known, stiffness),
+    };
+    let mut stiffness = match near {
+        Some(_) => STIFFNESS_TO_PREDICTION,
+        None => STIFFNESS,
+    };
+    let mut light = fitted(stiffness)?;
+    for _ in 0..STIFFER_FITS {
+        if !is_too_one_sided(&light) {
+            break;
+        }
+        stiffness *= 4.0;
+        light = fitted(stiffness)?;
+    }
+    Ok(light)
+}
+
+/// Whether band 1 is longer than that of any light; it is grey, so that one channel says it.
+fn is_too_one_sided(light: &ShLight) -> bool {
+    let [mean, a, b, c] = [0, 1, 2, 3].map(|at: usize| light.coefficients()[at][1]);
+    (a * a + b * b + c * c).sqrt() > MOST_ONE_SIDED * mean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relight_core::image::{Extent, Planes};
+    use relight_core::render::{DiffuseForm, DiffuseLayer};
+
+    /// Lit from the right, above and the viewer's side.
+    const LOPSIDED: [f64; 9] = [1.0, 0.4, 0.3, 0.5, 0.1, -0.1, 0.05, 0.2, 0.15];
+
+    fn lopsided(mean: f64) -> PredictedLight {
+        PredictedLight::of_light(&LOPSIDED.map(|c| [c; 3]), mean)
+    }
+
+    fn grey(shading: &[f32], extent: Extent) -> Rgb<Linear> {
+        let plane = shading.to_vec();
+        Rgb::new(Planes::from_planes(extent, [plane.clone(), plane.clone(), plane]).unwrap())
+    }
+
+    #[test]
+    fn a_shading_with_hard_shadows_has_a_light_that_there_can_be() {
+        let normals = Normals::sphere(33);
+        // Bright where the surface turns far to the right, and black elsewhere.
+        let shadowed = normals.planes().plane(0).iter();
+        let plane: Vec<f32> = shadowed.map(|x| if *x > 0.6 { 3.0 } else { 0.0 }).collect();
+        let (shading, known) = (grey(&plane, Extent::new(33, 33)), vec![true; 33 * 33]);
+        let nearest = fit_light(&normals, &shading, &known, STIFFNESS).unwrap();
+        assert!(is_too_one_sided(&nearest), "{nearest:?}");
+        let possible = light_of_shading(&normals, &shading, &known, None).unwrap();
+        assert!(!is_too_one_sided(&possible), "{possible:?}");
+    }
+
+    #[test]
+    fn what_is_said_of_a_light_is_that_light_again() {
+        let said = lopsided(1.0).light().unwrap();
+        for (said, expected) in said.coefficients().iter().zip(LOPSIDED) {
+            assert!((said[1] - expected).abs() < 1e-12);
+        }
+        // Half as bright in units of twice the mean.
+        assert!((lopsided(2.0).numbers()[0] - 0.5 * PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn in_the_mirror_image_light_comes_from_the_other_side() {
+        let irradiance = |light: PredictedLight, normal: [f32; 3]| {
+            let normals = Normals::new(Planes::filled(Extent::new(1, 1), normal));
+            let layer = DiffuseLayer::new(&light.light().unwrap(), DiffuseForm::Irradiance);
+            layer.shading(&normals).planes().plane(0)[0]
+        };
+        for normal in [[0.6, 0.8, 0.0], [-0.48, 0.64, 0.6], [0.0, 0.0, 1.0]] {
+            let [x, y, z] = normal;
+            let own = irradiance(lopsided(1.0), normal);
+            let mirrored = irradiance(lopsided(1.0).mirrored(), [-x, y, z]);
+            assert!((own - mirrored).abs() < 1e-5, "{own} {mirrored}");
+        }
+    }
+
+    #[test]
+    fn where_the_object_shows_nothing_of_the_light_the_prediction_counts() {
+        // All of the surface faces the viewer: it says nothing of right and left.
+        let extent = Extent::new(8, 8);
+        let normals = Normals::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
+        let shading = grey(&[1.0; 64], extent);
+        let light =
+            light_of_shading(&normals, &shading, &[true; 64], Some(&lopsided(1.0))).unwrap();
+        assert!((light.coefficients()[3][1] - 0.5).abs() < 1e-6);
+    }
+}
