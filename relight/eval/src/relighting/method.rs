@@ -143,7 +143,7 @@ impl Photographed {
 /// The maps of a photograph in the units of the set, where the mean irradiance of its light is known.
 fn surface_of(found: Decomposition, irradiance: f32) -> Result<Surface, EvalError> {
     let extent = found.normals.extent();
-    let scale = mean_irradiance(&found.light) / irradiance;
+    let scale = mean_irradiance(&found.shading_light) / irradiance;
     let gloss = found.gloss.map(|gloss| {
         let reflectance = gloss.reflectance * scale;
         Gloss::even(extent, [reflectance; 3], gloss.smoothness)

@@ -99,10 +99,13 @@ pub struct Decomposition {
     /// Per pixel, which part of its darkness is expected to be paint, 0..=1: near 1 print, near 0 shadow, in between where
     /// the network cannot tell. None where it was not asked for, and of weights without that head.
     pub paint: Option<Planes<1>>,
-    /// The light of order 2 whose irradiance on the normals is nearest to the shading: grey, as the
+    /// The light of order 2 around the object, by its shading and by what the network says of it: grey, as the
     /// shading is. The colour of the light is part of the albedo.
     pub light: ShLight,
-    /// The gloss of the whole object, where a highlight was separated and the light explains it.
+    /// The light of order 2 whose irradiance on the normals is nearest to the shading, whatever the network says. Its side is
+    /// less sure, but it holds what of the light reaches the object: relighting begins with it.
+    pub shading_light: ShLight,
+    /// The gloss of the whole object, where a highlight was separated and [`Self::shading_light`] explains it.
     pub gloss: Option<FittedGloss>,
     /// The square of the picture that the network saw.
     pub region: CropSquare,
@@ -306,6 +309,7 @@ impl Decomposer {
             highlight: layers.highlight,
             paint: layers.paint,
             light: fitted.light,
+            shading_light: fitted.shading_light,
             gloss: fitted.gloss,
             region,
             is_glossy,
@@ -342,11 +346,16 @@ impl Decomposer {
         let shading = normalised(maps.shading, &known);
         let target = Rgb::new(in_colour(shading.clone()));
         let steep = normals.clone().steeper(TILT);
-        let light = light_of_shading(&steep, &target, &known, whole.light.as_ref())?;
+        let light_near = |predicted| light_of_shading(&steep, &target, &known, predicted);
+        let shading_light = light_near(None)?;
+        let light = match &whole.light {
+            Some(predicted) => light_near(Some(predicted))?,
+            None => shading_light.clone(),
+        };
         let lit = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&steep);
         let gloss = if is_glossy {
             let highlight = possible_highlight(&whole.picture, &known, maps.highlight);
-            fit_gloss(&light, &normals, &highlight)?
+            fit_gloss(&shading_light, &normals, &highlight)?
         } else {
             None
         };
@@ -354,6 +363,7 @@ impl Decomposer {
             light_residual: relative_difference(lit.planes().plane(0), shading.plane(0)),
             normals,
             light,
+            shading_light,
             gloss,
         })
     }
@@ -429,6 +439,7 @@ pub(super) fn check_size(what: &'static str, extent: Extent) -> Result<(), Decom
 struct FittedLight {
     normals: Normals<YUp>,
     light: ShLight,
+    shading_light: ShLight,
     light_residual: f64,
     gloss: Option<FittedGloss>,
 }

@@ -10,7 +10,7 @@ use relight_nets::LIGHT_OUTPUTS;
 /// Keeps the light from behind, which normals hardly show, small: see [`fit_light`].
 const STIFFNESS: f64 = 1e-3;
 /// The same towards what the network says. Chosen on synthetic objects: a stiffer fit finds the light's side a little better
-/// and explains the shading less, and objects relit by it are further off (docs/results/decomposition.md).
+/// and explains the shading less (docs/results/decomposition.md).
 const STIFFNESS_TO_PREDICTION: f64 = 1e-2;
 /// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
 /// a light that is negative in most directions.

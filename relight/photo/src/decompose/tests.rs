@@ -4,7 +4,9 @@ use super::answer::{Fields, MapsNet, NetAnswer, details, look, to_maps};
 use super::*;
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, YUp};
-use relight_nets::{INPUTS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_heads};
+use relight_nets::{
+    INPUTS, LIGHT_PARAMETERS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_heads,
+};
 
 /// Answers pixel by pixel, from the encoded values of the pixel and the mean of all log luminances.
 struct PixelNet<F> {
@@ -404,4 +406,25 @@ fn the_part_of_darkness_that_is_paint_is_made_where_it_is_asked_for() {
     assert!(paint(false).is_none());
     let found = paint(true).unwrap();
     assert!(found.plane(0).iter().all(|part| (0.0..=1.0).contains(part)));
+}
+
+#[test]
+fn what_the_head_says_of_the_light_does_not_move_what_relighting_begins_with() {
+    let with = Weights::initial(&decomposer_with_heads(), 1);
+    let plain = with
+        .iter()
+        .filter(|(name, _)| !name.starts_with(LIGHT_PARAMETERS));
+    let without: Weights = plain
+        .map(|(name, tensor)| (name.to_owned(), tensor.clone()))
+        .collect();
+    let extent = Extent::new(64, 64);
+    let (picture, mask) = (Rgb::new(smooth(extent)), disc(extent, 25.0));
+    let [with, without] = [with, without].map(|weights| {
+        let net = Decomposer::with_side(&weights, 32).unwrap();
+        net.decompose(&picture, &mask, &DecomposeOptions::default())
+            .unwrap()
+    });
+    assert_eq!(with.shading_light, without.shading_light);
+    assert_eq!(without.light, without.shading_light);
+    assert_ne!(with.light, without.light);
 }

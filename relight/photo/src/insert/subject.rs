@@ -169,7 +169,8 @@ impl Subject {
             &wanted,
             found.region.side,
         );
-        let own = DiffuseLayer::new(&found.light, DiffuseForm::Irradiance).shading(&normals);
+        let own =
+            DiffuseLayer::new(&found.shading_light, DiffuseForm::Irradiance).shading(&normals);
         let shading = found.shading.clone().extended(&known, &wanted);
         let highlight = found.highlight.clone().extended(&known, &wanted);
         let mut albedo = found.albedo.planes().clone().extended(&known, &wanted);
@@ -194,7 +195,7 @@ impl Subject {
         });
         let mut highlight = highlight;
         if let Some(gloss) = gloss {
-            let lobe = lobes(&found.light, &normals, gloss)?;
+            let lobe = lobes(&found.shading_light, &normals, gloss)?;
             let pairs = highlight.planes_mut()[0].iter_mut().zip(lobe.plane(0));
             pairs.for_each(|(highlight, lobe)| *highlight -= lobe);
         }
@@ -209,7 +210,7 @@ impl Subject {
             highlight,
             gloss,
             rest,
-            light: found.light.clone(),
+            light: found.shading_light.clone(),
             last_standing: LastStanding::default(),
         })
     }
