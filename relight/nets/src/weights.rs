@@ -161,6 +161,16 @@ impl Weights {
 }
 
 impl Weights {
+    /// The same without those whose names begin so: a network that gets a head less.
+    #[must_use]
+    pub fn without(&self, prefix: &str) -> Self {
+        let named = |name: &str| name.trim_start_matches("module.").starts_with(prefix);
+        let others = self.iter().filter(|(name, _)| !named(name));
+        others
+            .map(|(name, tensor)| (name.to_owned(), tensor.clone()))
+            .collect()
+    }
+
     /// The same with those of a graph's parameters under `prefix` that are missing here as [`Self::initial`] has them: a
     /// network that gets a head more.
     #[must_use]

@@ -15,7 +15,9 @@ use relight_core::light::NormalsFrame;
 use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer};
-use relight_nets::{Inference, InferenceEngine, NetError, Weights, decomposer_of};
+use relight_nets::{
+    Inference, InferenceEngine, LIGHT_PARAMETERS, NetError, Weights, decomposer_of,
+};
 use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 
 /// Most pixels of a photograph, and with [`WorkingSize::Native`] of the square around the object: 16 million take 1.3 GB of
@@ -180,13 +182,22 @@ impl Decomposer {
         engine: InferenceEngine,
     ) -> Result<Self, DecomposeError> {
         let graph = decomposer_of(weights);
-        let net = |side: usize| -> Result<Box<dyn MapsNet>, NetError> {
+        let net = |weights: &Weights, side: usize| -> Result<Box<dyn MapsNet>, NetError> {
+            let graph = decomposer_of(weights);
             let inference = Inference::with_engine(&graph, weights, (side, side), &engine)?;
             Ok(Box::new(Engine { inference, side }))
         };
         let has_coarse = side.is_multiple_of(2 * graph.multiple());
-        let coarse = || has_coarse.then(|| net(side / 2)).transpose();
-        let (fine, coarse) = parallel::join(|| net(side), coarse);
+        let coarse = || has_coarse.then(|| net(weights, side / 2)).transpose();
+        // The light is told at the coarse scale, and each head takes its time to be prepared.
+        let fine = || {
+            if has_coarse {
+                net(&weights.without(LIGHT_PARAMETERS), side)
+            } else {
+                net(weights, side)
+            }
+        };
+        let (fine, coarse) = parallel::join(fine, coarse);
         let found = Self::of(fine?, coarse?);
         Ok(Self {
             engine,

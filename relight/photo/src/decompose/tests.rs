@@ -411,12 +411,7 @@ fn the_part_of_darkness_that_is_paint_is_made_where_it_is_asked_for() {
 #[test]
 fn what_the_head_says_of_the_light_does_not_move_what_relighting_begins_with() {
     let with = Weights::initial(&decomposer_with_heads(), 1);
-    let plain = with
-        .iter()
-        .filter(|(name, _)| !name.starts_with(LIGHT_PARAMETERS));
-    let without: Weights = plain
-        .map(|(name, tensor)| (name.to_owned(), tensor.clone()))
-        .collect();
+    let without = with.without(LIGHT_PARAMETERS);
     let extent = Extent::new(64, 64);
     let (picture, mask) = (Rgb::new(smooth(extent)), disc(extent, 25.0));
     let [with, without] = [with, without].map(|weights| {
