@@ -139,8 +139,8 @@ pub enum EvalError {
         /// Why.
         source: LightError,
     },
-    /// An object cannot be decomposed or inserted.
-    #[error("{sample} cannot be inserted")]
+    /// An object cannot be decomposed, relit or inserted.
+    #[error("{sample} cannot be decomposed or shown in other light")]
     Insertion {
         /// The sample.
         sample: String,

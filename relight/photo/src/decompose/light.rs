@@ -1,13 +1,11 @@
 //! The light of a photograph: what the network says of it, and the fit to the shading that begins there.
 
-use std::f64::consts::PI;
-
 use relight_core::image::{Linear, Rgb};
-use relight_core::light::{LightError, Normals, ShLight, YUp};
-use relight_core::render::{fit_light, fit_light_near};
+use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
+use relight_core::render::{cosine_lobe, fit_light_near};
 use relight_nets::LIGHT_OUTPUTS;
 
-/// Keeps the light from behind, which normals hardly show, small: see [`fit_light`].
+/// Keeps the light from behind, which normals hardly show, small: see [`fit_light_near`].
 const STIFFNESS: f64 = 1e-3;
 /// The same towards what the network says. Chosen on synthetic objects: a stiffer fit finds the light's side a little better
 /// and explains the shading less (docs/results/decomposition.md).
@@ -17,8 +15,6 @@ const STIFFNESS_TO_PREDICTION: f64 = 1e-2;
 const MOST_ONE_SIDED: f64 = 2.5;
 /// How often the light is fitted with four times the stiffness, at most.
 const STIFFER_FITS: usize = 8;
-/// What the cosine makes of a coefficient of radiance, band by band (Ramamoorthi and Hanrahan 2001).
-const COSINE: [f64; 3] = [PI, 2.0 * PI / 3.0, PI / 4.0];
 /// The coefficients that change sign in the mirror image, left and right: those that are odd in x.
 const ODD_IN_X: [usize; 3] = [3, 4, 7];
 
@@ -41,7 +37,7 @@ impl PredictedLight {
     pub fn of_light(coefficients: &[[f64; 3]; LIGHT_OUTPUTS], mean: f64) -> Self {
         let irradiance = |at: usize| {
             let grey = coefficients[at].iter().sum::<f64>() / 3.0;
-            COSINE[band(at)] * grey / mean
+            cosine_lobe(at.isqrt()) * grey / mean
         };
         Self(std::array::from_fn(irradiance))
     }
@@ -66,12 +62,12 @@ impl PredictedLight {
 
     fn light(&self) -> Result<ShLight, LightError> {
         let numbers = self.0.iter().enumerate();
-        ShLight::new(numbers.map(|(at, n)| [n / COSINE[band(at)]; 3]).collect())
+        ShLight::new(
+            numbers
+                .map(|(at, n)| [n / cosine_lobe(at.isqrt()); 3])
+                .collect(),
+        )
     }
-}
-
-fn band(at: usize) -> usize {
-    at.isqrt()
 }
 
 /// The light of a shading, grey and of mean 1: the nearest one by least squares, drawn to what the network says where it says
@@ -82,15 +78,11 @@ pub(super) fn light_of_shading(
     known: &[bool],
     predicted: Option<&PredictedLight>,
 ) -> Result<ShLight, LightError> {
-    let near = predicted.map(PredictedLight::light).transpose()?;
-    let fitted = |stiffness| match &near {
-        Some(near) => fit_light_near(near, normals, shading, known, stiffness),
-        None => fit_light(normals, shading, known, stiffness),
+    let (near, mut stiffness) = match predicted {
+        Some(predicted) => (predicted.light()?, STIFFNESS_TO_PREDICTION),
+        None => (ShLight::dark(Order::TWO), STIFFNESS),
     };
-    let mut stiffness = match near {
-        Some(_) => STIFFNESS_TO_PREDICTION,
-        None => STIFFNESS,
-    };
+    let fitted = |stiffness| fit_light_near(&near, normals, shading, known, stiffness);
     let mut light = fitted(stiffness)?;
     for _ in 0..STIFFER_FITS {
         if !is_too_one_sided(&light) {
@@ -110,9 +102,11 @@ fn is_too_one_sided(light: &ShLight) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
     use relight_core::image::{Extent, Planes};
-    use relight_core::render::{DiffuseForm, DiffuseLayer};
+    use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
 
     /// Lit from the right, above and the viewer's side.
     const LOPSIDED: [f64; 9] = [1.0, 0.4, 0.3, 0.5, 0.1, -0.1, 0.05, 0.2, 0.15];
