@@ -12,9 +12,52 @@ const RATIOS: (f32, f32) = (0.25, 4.0);
 /// Details of shading up to this part of the object's side are relief; larger ones are shadows, of which as much is kept as the
 /// lights are alike.
 const RELIEF: f64 = 0.04;
-/// How far the decomposition of a photograph is believed: see [`Shading::hedge`]. Chosen on synthetic objects
-/// (docs/results/insertion.md).
-pub(super) const TRUST_IN_PHOTOGRAPHS: f32 = 0.6;
+/// Where nothing tells paint from shadow: half certain.
+const UNKNOWN_PAINT: f32 = 0.25;
+/// The most pixels over which the mean change of an object is taken, evenly from all of them: enough for a mean.
+const MEAN_PIXELS: usize = 4096;
+
+/// How far a decomposition is believed: which parts of a change of brightness, as a logarithm, are kept (see
+/// [`Shading::hedge`]). The parts of photographs were chosen on synthetic objects (docs/results/insertion.md).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Trust {
+    /// Of the mean change of the object.
+    mean: f32,
+    /// Of what is beside the mean, where the photograph is dark: that may be paint.
+    dark: f32,
+    /// The same where it is bright.
+    bright: f32,
+    /// By how much more of it is kept where it is certain what is paint than where nobody can tell.
+    certain: f32,
+}
+
+impl Trust {
+    pub(super) const WHOLE: Self = Self {
+        mean: 1.0,
+        dark: 1.0,
+        bright: 1.0,
+        certain: 0.0,
+    };
+    pub(super) const PHOTOGRAPH: Self = Self {
+        mean: 0.6,
+        dark: 0.2,
+        bright: 0.8,
+        certain: 0.5,
+    };
+    /// Shading that counts as dark, and as bright.
+    const DARK_AND_BRIGHT: (f32, f32) = (0.15, 0.5);
+
+    /// The part of a change beside the mean that is kept at a place of this `ln(S + d)`, of whose darkness the part `paint` is
+    /// expected to be paint.
+    fn beside_mean(&self, seen: f32, paint: f32) -> f32 {
+        let (dark, bright) = Self::DARK_AND_BRIGHT;
+        let (dark, bright) = ((dark + DARK).ln(), (bright + DARK).ln());
+        let towards_bright = ((seen - dark) / (bright - dark)).clamp(0.0, 1.0);
+        let certainty = (2.0 * paint - 1.0).abs();
+        let kept = self.dark + towards_bright * (self.bright - self.dark);
+        (kept + self.certain * (certainty - 0.5)).clamp(0.0, 1.0)
+    }
+}
 
 /// The shading S of a photograph beside the irradiance E of its light on the normals, with D = (S + d) / (E + d), d = 0.05.
 /// Logarithms are kept: a picture in new light raises to powers at each pixel.
@@ -28,8 +71,11 @@ pub(super) struct Shading {
     residual: Vec<f32>,
     /// The logarithm of S + d.
     seen: Vec<f32>,
-    /// How far it is believed: 1 is wholly.
-    trust: f32,
+    /// The part of the darkness that is expected to be paint; none where nothing tells it.
+    paint: Option<Vec<f32>>,
+    /// Pixels over which the mean change is taken.
+    sample: Vec<usize>,
+    trust: Trust,
     /// E.
     pub(super) own: Vec<f32>,
 }
@@ -37,7 +83,7 @@ pub(super) struct Shading {
 impl Shading {
     /// Of the shading that was found and the irradiance of the light on the normals, where it is `wanted`, and how far all of
     /// that is believed.
-    pub(super) fn new(shading: &Planes<1>, own: &Planes<3>, wanted: &[bool], trust: f32) -> Self {
+    pub(super) fn new(shading: &Planes<1>, own: &Planes<3>, wanted: &[bool], trust: Trust) -> Self {
         let extent = shading.extent();
         // The light is grey: its channels are equal.
         let own = own.plane(0).to_vec();
@@ -65,6 +111,8 @@ impl Shading {
             shadow: vec![0.0; own.len()],
             residual: vec![0.0; own.len()],
             seen: own.iter().map(|&own| (own.max(0.0) + DARK).ln()).collect(),
+            paint: None,
+            sample: evenly(wanted),
             trust,
             own,
         };
@@ -79,9 +127,15 @@ impl Shading {
         result
     }
 
-    /// Takes what was found for the truth.
-    pub(super) fn believe(&mut self) {
-        self.trust = 1.0;
+    /// The same, of which it is known what of its darkness is expected to be paint, 0..=1.
+    pub(super) fn with_paint(mut self, paint: Option<Planes<1>>) -> Self {
+        self.paint = paint.map(|paint| paint.plane(0).to_vec());
+        self
+    }
+
+    /// Believes it as far as is said.
+    pub(super) fn believe(&mut self, trust: Trust) {
+        self.trust = trust;
     }
 
     /// The shading of a pixel in new irradiance, red, green and blue, where `kept` of the shadows are kept.
@@ -93,18 +147,40 @@ impl Shading {
         })
     }
 
+    /// The mean over the object of the change `ln((S' + d) / (S + d))` in new irradiance.
+    pub(super) fn mean_change(&self, irradiance: &Planes<3>, kept: f32) -> f32 {
+        let changes = self.sample.iter().map(|&at| {
+            let irradiance = std::array::from_fn(|channel| irradiance.plane(channel)[at]);
+            self.change(at, self.at(at, irradiance, kept))
+        });
+        changes.sum::<f32>() / self.sample.len().max(1) as f32
+    }
+
+    /// The change of a pixel of the new shading S', as the mean of its colours.
+    fn change(&self, at: usize, new: [f32; 3]) -> f32 {
+        let new = new.iter().sum::<f32>() / 3.0;
+        (new + DARK).ln() - self.seen[at]
+    }
+
     /// What the pixel is multiplied with, so that its brightness changes no more than can be believed.
     ///
     /// Dark may be paint that was taken for shadow, and normals are off by 25 degrees: the new shading S' is a guess whose errors
-    /// grow with its distance from the shading S of the photograph. So of the logarithm of their ratio only the part t that is
-    /// believed is kept: `((S + d) / (S' + d))^(1 - t)`, S' as the mean of its colours. It is 1 in the light of the photograph.
-    pub(super) fn hedge(&self, at: usize, new: [f32; 3]) -> f32 {
-        if self.trust == 1.0 {
-            return 1.0;
-        }
-        let new = new.iter().sum::<f32>() / 3.0;
-        ((1.0 - self.trust) * (self.seen[at] - (new + DARK).ln())).exp()
+    /// grow with its distance from the shading S of the photograph. So of its change c only parts are kept: t of the mean m over
+    /// the object, which says how bright the light is on the side that is seen, and u of what is beside it:
+    /// `exp(-(1 - t) m - (1 - u) (c - m))`. It is 1 in the light of the photograph.
+    pub(super) fn hedge(&self, at: usize, new: [f32; 3], mean_change: f32) -> f32 {
+        let beside = self.change(at, new) - mean_change;
+        let paint = self.paint.as_ref().map_or(UNKNOWN_PAINT, |paint| paint[at]);
+        let kept = self.trust.beside_mean(self.seen[at], paint);
+        ((self.trust.mean - 1.0) * mean_change + (kept - 1.0) * beside).exp()
     }
+}
+
+/// The pixels that are `wanted`, or [`MEAN_PIXELS`] of them.
+fn evenly(wanted: &[bool]) -> Vec<usize> {
+    let all = (0..wanted.len()).filter(|&at| wanted[at]);
+    let count = all.clone().count();
+    all.step_by(count.div_ceil(MEAN_PIXELS).max(1)).collect()
 }
 
 #[cfg(test)]
@@ -115,47 +191,76 @@ mod tests {
     const SIDE: usize = 60;
     const DARK_PLACE: usize = SIDE * SIDE / 2 + SIDE / 8;
 
-    /// Half of an even surface lies in the dark: its shading was found to be a fifth of what the light makes.
-    fn half_dark(trust: f32) -> Shading {
+    /// Half of an even surface lies in the dark: its shading was found to be a tenth of what the light makes.
+    fn half_dark(trust: Trust) -> Shading {
         let extent = Extent::new(SIDE, SIDE);
-        let shading = Planes::from_fn(extent, |x, _| [if x < SIDE / 2 { 0.2 } else { 1.0 }]);
+        let shading = Planes::from_fn(extent, |x, _| [if x < SIDE / 2 { 0.1 } else { 1.0 }]);
         let own = Planes::filled(extent, [1.0; 3]);
         Shading::new(&shading, &own, &vec![true; SIDE * SIDE], trust)
     }
 
     /// The shading of a place in light of the same strength from elsewhere.
     fn moved(shading: &Shading, at: usize) -> f32 {
+        let new = Planes::filled(Extent::new(SIDE, SIDE), [1.0; 3]);
+        let mean_change = shading.mean_change(&new, 0.0);
         let new = shading.at(at, [1.0; 3], 0.0);
-        new[0] * shading.hedge(at, new)
+        new[0] * shading.hedge(at, new, mean_change)
     }
 
     #[test]
     fn a_shadow_goes_with_the_light_as_far_as_it_is_believed() {
-        let believed = moved(&half_dark(1.0), DARK_PLACE);
+        let mut shading = half_dark(Trust::WHOLE);
+        let believed = moved(&shading, DARK_PLACE);
         assert!((believed - 1.0).abs() < 0.05, "{believed}");
-        // As logarithms, 0.6 of the way from 0.2 to 1, with d.
-        let hedged = moved(&half_dark(0.6), DARK_PLACE);
-        assert!((hedged - 0.54).abs() < 0.03, "{hedged}");
-        let mut trusted = half_dark(0.6);
-        trusted.believe();
-        assert_eq!(moved(&trusted, DARK_PLACE), believed);
+        // Of the change from 0.1 to 1, with d, half is that of the mean: 0.6 of that is kept, and 0.2 of the rest.
+        let change = (1.05_f32 / 0.15).ln();
+        let expected = 0.15 * (change * 0.5 * 0.6 + change * 0.5 * 0.2).exp() - DARK;
+        shading.believe(Trust::PHOTOGRAPH);
+        let hedged = moved(&shading, DARK_PLACE);
+        assert!((hedged - expected).abs() < 0.03, "{hedged} {expected}");
+    }
+
+    #[test]
+    fn a_change_is_believed_less_where_the_photograph_is_dark() {
+        let trust = |seen: f32| Trust::PHOTOGRAPH.beside_mean(seen.ln(), UNKNOWN_PAINT);
+        assert!((trust(0.0) - 0.2).abs() < 1e-6);
+        assert!((trust(1.05) - 0.8).abs() < 1e-6);
+        assert!((0.4..0.7).contains(&trust(0.35)));
+    }
+
+    #[test]
+    fn a_change_is_believed_less_where_nobody_can_tell_paint_from_shadow() {
+        let trust = |paint| Trust::PHOTOGRAPH.beside_mean(0.35_f32.ln(), paint);
+        assert!((trust(0.0) - trust(1.0)).abs() < 1e-6);
+        assert!((trust(1.0) - trust(0.5) - 0.5).abs() < 1e-6);
+        assert_eq!(Trust::WHOLE.beside_mean(0.0, 0.5), 1.0);
     }
 
     #[test]
     fn what_the_light_does_not_change_is_not_hedged() {
-        let lit = moved(&half_dark(0.3), DARK_PLACE + SIDE / 2);
-        assert!((lit - 1.0).abs() < 0.05, "{lit}");
-        let shading = half_dark(0.3);
+        let shading = half_dark(Trust::PHOTOGRAPH);
         let same = shading.at(DARK_PLACE, [1.0; 3], 1.0);
-        assert!((same[0] - 0.2).abs() < 1e-4);
-        assert!((shading.hedge(DARK_PLACE, same) - 1.0).abs() < 1e-5);
+        assert!((same[0] - 0.1).abs() < 1e-4);
+        let new = Planes::filled(Extent::new(SIDE, SIDE), [1.0; 3]);
+        let mean_change = shading.mean_change(&new, 1.0);
+        assert!((shading.hedge(DARK_PLACE, same, mean_change) - 1.0).abs() < 1e-4);
     }
 
     #[test]
     fn light_of_another_colour_keeps_its_colour() {
-        let shading = half_dark(0.5);
+        let shading = half_dark(Trust::PHOTOGRAPH);
         let new = shading.at(DARK_PLACE, [1.5, 1.0, 0.5], 0.0);
-        let hedged = new.map(|value| value * shading.hedge(DARK_PLACE, new));
+        let hedged = new.map(|value| value * shading.hedge(DARK_PLACE, new, 0.3));
         assert!((hedged[0] / hedged[1] - new[0] / new[1]).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_mean_of_a_large_object_is_taken_over_pixels_from_all_of_it() {
+        let wanted: Vec<bool> = (0..100_000).map(|at| at % 3 == 0).collect();
+        let sample = evenly(&wanted);
+        assert!(sample.len() <= MEAN_PIXELS && sample.len() > MEAN_PIXELS / 2);
+        assert!(sample.iter().all(|&at| wanted[at]));
+        assert!(sample[sample.len() - 1] > 99_900);
+        assert!(evenly(&[false; 4]).is_empty());
     }
 }

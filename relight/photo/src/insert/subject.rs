@@ -7,7 +7,7 @@ use super::cut::{Cut, EdgeColours};
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
 use super::placement::{Fit, Placement};
-use super::shading::{DARK, Shading, TRUST_IN_PHOTOGRAPHS};
+use super::shading::{DARK, Shading, Trust};
 use super::smooth::weighted_mean;
 use super::source::likeness;
 use super::standing::{LastStanding, Standing};
@@ -115,7 +115,11 @@ impl Subject {
     ) -> Result<Self, InsertError> {
         let cut = Cut::new(photo, (mask, alpha), edges)?;
         let foreground = Rgb::new(cut.matte.foreground.clone());
-        let found = decomposer.decompose(&foreground, &cut.mask, options)?;
+        let options = DecomposeOptions {
+            paint: true,
+            ..*options
+        };
+        let found = decomposer.decompose(&foreground, &cut.mask, &options)?;
         Self::of_parts(cut, &found)
     }
 
@@ -138,7 +142,7 @@ impl Subject {
         let light = even_light();
         let ones = Planes::filled(extent, [1.0]);
         let even = Planes::filled(extent, [1.0; 3]);
-        let shading = Shading::new(&ones, &even, &wanted, 1.0);
+        let shading = Shading::new(&ones, &even, &wanted, Trust::WHOLE);
         Ok(Self {
             place: [0, 0],
             photo: extent,
@@ -169,6 +173,8 @@ impl Subject {
             &wanted,
             found.region.side,
         );
+        let paint = found.paint.clone();
+        let paint = paint.map(|paint| paint.extended(&known, &wanted));
         let own =
             DiffuseLayer::new(&found.shading_light, DiffuseForm::Irradiance).shading(&normals);
         let shading = found.shading.clone().extended(&known, &wanted);
@@ -203,7 +209,8 @@ impl Subject {
             place: cut.place,
             photo: cut.photo,
             mask: cut.mask,
-            shading: Shading::new(&shading, own.planes(), &wanted, TRUST_IN_PHOTOGRAPHS),
+            shading: Shading::new(&shading, own.planes(), &wanted, Trust::PHOTOGRAPH)
+                .with_paint(paint),
             matte: cut.matte,
             normals,
             albedo,
@@ -218,7 +225,7 @@ impl Subject {
     /// The same, whose decomposition is taken for the truth: to see what the hedge is good for.
     #[must_use]
     pub fn without_hedge(mut self) -> Self {
-        self.shading.believe();
+        self.shading.believe(Trust::WHOLE);
         self
     }
 
@@ -296,14 +303,17 @@ impl Subject {
     /// ```text
     /// D = (S + d) / (E + d) = relief x shadow, d = 0.05
     /// S' = relief x shadow^w x (E' + d) - d
-    /// h  = ((S + d) / (mean of S' + d))^(1 - t)
+    /// c  = ln((mean of S' + d) / (S + d)), m the mean of c over the object
+    /// h  = exp(-(1 - t) m - (1 - u) (c - m))
     /// I' = h (R S' + (E' + d) / (E + d) (I - R S - H)) + H'
     /// H' = lobe(E') + w (H - lobe(E))
     /// ```
     ///
-    /// where t says how far the decomposition is believed: 0.6 of a photograph's, 1 of a captured object's. So relief and fine
-    /// texture stay, shadows stay as far as the light comes from where it came from, no brightness changes by more than can be
-    /// believed, and the photograph's own light gives the photograph.
+    /// where t and u say how far the decomposition is believed. Of a photograph's t is 0.6. u is 0.2 where it is dark (S up to
+    /// 0.15) to 0.8 where it is bright (from 0.5 on), 0.25 more where the network is certain what of the darkness is paint, and
+    /// as much less where it cannot tell. Of a captured object's both are 1. So relief and fine texture stay, shadows stay as
+    /// far as the light comes from where it came from, no brightness changes by more than can be believed, and the photograph's
+    /// own light gives the photograph.
     ///
     /// # Errors
     /// None for a subject, whose maps have one size; those of the render layers in general.
@@ -315,6 +325,7 @@ impl Subject {
         let kept = likeness(&self.light, light) as f32;
         let irradiance = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(&self.normals);
         let mut image = irradiance.into_planes();
+        let mean_change = self.shading.mean_change(&image, kept);
         let width = self.extent().width;
         image.fill_rows(|y, [red, green, blue]| {
             let pixels = red.iter_mut().zip(green).zip(blue);
@@ -323,7 +334,7 @@ impl Subject {
                 let irradiance = [*red, *green, *blue];
                 let shades = self.shading.at(at, irradiance, kept);
                 let own = self.shading.own[at] + DARK;
-                let hedge = self.shading.hedge(at, shades);
+                let hedge = self.shading.hedge(at, shades, mean_change);
                 let colours: [f32; 3] = std::array::from_fn(|channel| {
                     let grown = ((irradiance[channel] + DARK) / own).min(REST_GROWTH);
                     let colour = self.albedo.plane(channel)[at] * shades[channel]
