@@ -212,9 +212,9 @@ mod tests {
         let mut shading = half_dark(Trust::WHOLE);
         let believed = moved(&shading, DARK_PLACE);
         assert!((believed - 1.0).abs() < 0.05, "{believed}");
-        // Of the change from 0.1 to 1, with d, half is that of the mean: 0.6 of that is kept, and 0.2 of the rest.
+        // Of the change from 0.1 to 1, with d, half is that of the mean: 0.4 of that goes, and 0.8 of the rest.
         let change = (1.05_f32 / 0.15).ln();
-        let expected = 0.15 * (change * 0.5 * 0.6 + change * 0.5 * 0.2).exp() - DARK;
+        let expected = believed * (-0.4 * change / 2.0 - 0.8 * change / 2.0).exp();
         shading.believe(Trust::PHOTOGRAPH);
         let hedged = moved(&shading, DARK_PLACE);
         assert!((hedged - expected).abs() < 0.03, "{hedged} {expected}");
