@@ -52,6 +52,8 @@ setup-train: ## Install libtorch, which relight's training is built with (544 MB
 # The runs of the network of relight turn, each from the weights of the one before. DATA holds the folders meshes,
 # panoramas and held of what relight/cli/weights/README.md names; a run that was stopped goes on.
 TURN_STAGES := turn turn-2 turn-3 turn-4 turn-5 turn-6
+# Of the last run, whose mean ships.
+TURN_SEEDS := 31 32 33
 RUNS ?= $(CURDIR)/$(TARGET)/train-turn
 
 train-turn: setup-train ## Train the network of relight turn, all of its runs, from the folder DATA into RUNS
@@ -64,7 +66,14 @@ train-turn: setup-train ## Train the network of relight turn, all of its runs, f
 	        --views "$$runs/views" --resume -o "$$runs/$$stage" || exit; \
 	    weights=(--weights "$$runs/$$stage/turn-net.safetensors"); \
 	done; \
-	echo "$$runs/$$stage/turn-net.safetensors"
+	last=(); \
+	for seed in $(TURN_SEEDS); do \
+	    sed "s/^seed = .*/seed = $$seed/" "$(CURDIR)/relight/cli/weights/turn-7.toml" > "$$runs/turn-7-$$seed.toml"; \
+	    "$$program" train turn --settings "$$runs/turn-7-$$seed.toml" "$${weights[@]}" \
+	        --views "$$runs/views" --resume -o "$$runs/turn-7-$$seed" || exit; \
+	    last+=("$$runs/turn-7-$$seed/turn-net.safetensors"); \
+	done; \
+	"$$program" weights export "$${last[@]}" --net turn-net --half -o "$$runs/turn-net.safetensors"
 
 # Cargo builds the programs before it runs the first test: those of the package relit-tests run several.
 test: setup ## Run all tests

@@ -1,5 +1,6 @@
 //! `relight weights`: weights of networks from one format into another.
 
+use std::error::Error;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
@@ -16,7 +17,9 @@ Examples:
   relight weights export net.pth -o net.safetensors --half
       what PyTorch saved, as a safetensors file of half precision
   relight weights export net.pth --net normal-net -o normal-net.onnx
-      the paper's Normal-Net for any ONNX engine, for pictures of 256 x 256 pixels";
+      the paper's Normal-Net for any ONNX engine, for pictures of 256 x 256 pixels
+  relight weights export a/decomposer.safetensors b/decomposer.safetensors -o mean.safetensors --half
+      the mean of two runs that began with the same weights";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -26,15 +29,17 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Check weights against a network, and write them with it as ONNX or alone as safetensors.
+    /// Check weights against a network, and write them with it as ONNX or alone as safetensors. Of several, the mean is
+    /// written.
     Export(Export),
 }
 
 #[derive(Args)]
 struct Export {
-    /// The weights (.safetensors, or a state dict that PyTorch saved: .pth, .pt).
-    #[arg(value_name = "IN")]
-    input: PathBuf,
+    /// The weights (.safetensors, or a state dict that PyTorch saved: .pth, .pt). Several are those of runs that began with the
+    /// same weights.
+    #[arg(value_name = "IN", required = true)]
+    inputs: Vec<PathBuf>,
     /// The file to write: .onnx or .safetensors.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
@@ -105,13 +110,25 @@ impl Export {
             .into_iter()
             .find(|known| ending.eq_ignore_ascii_case(known))
     }
+
+    /// The network, as the first weights have it, and the mean of all weights, each checked against it.
+    fn mean(&self) -> Result<(Graph, Weights), Box<dyn Error>> {
+        let read = self.inputs.iter().map(|input| Weights::read(input));
+        let all = read.collect::<Result<Vec<_>, _>>()?;
+        let graph = self.net.graph(&all[0]);
+        let mut fitted = Vec::with_capacity(all.len());
+        for (input, weights) in self.inputs.iter().zip(all) {
+            let weights = weights.fitted_to(&graph);
+            fitted.push(weights.map_err(|fault| format!("{}: {fault}", input.display()))?);
+        }
+        let mean = Weights::mean(&fitted).ok_or("the weights are of different networks")?;
+        Ok((graph, mean))
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let Verb::Export(export) = &arguments.verb;
-    let weights = Weights::read(&export.input)?;
-    let graph = export.net.graph(&weights);
-    let weights = weights.fitted_to(&graph)?;
+    let (graph, weights) = export.mean()?;
     if export.ending() == Some("onnx") {
         let side = usize::from(export.size);
         let bytes = to_onnx(&graph, &weights, 1, (side, side))?;

@@ -53,6 +53,9 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
 
     fs::create_dir(folder.path("shards")).unwrap();
     write_shard(&folder.path("shards"));
+    Weights::initial(&relight_nets::paper::normal_net(), 3)
+        .write(&folder.path("other.safetensors"), WeightPrecision::Single)
+        .unwrap();
     for (command, code, expected) in [
         (
             "decompose shards --rect 1,2,3,4 -o o",
@@ -110,6 +113,12 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
             1,
             "another network's",
         ),
+        (
+            "weights export w.safetensors other.safetensors -o w.onnx",
+            1,
+            "other.safetensors: the weights have no",
+        ),
+        ("weights export -o w.onnx", 2, "<IN>"),
     ] {
         let (found, errors) = code_and_errors(&relight(&folder, command));
         assert_eq!(found, code, "{command}: {errors}");
@@ -123,6 +132,23 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
         (0, String::new())
     );
     assert!(fs::metadata(folder.path("w.onnx")).unwrap().len() > 1_000_000);
+}
+
+#[test]
+fn of_the_weights_of_several_runs_the_mean_is_exported() {
+    let folder = Folder::new();
+    let of = |seed| Weights::initial(&decomposer(), seed);
+    for seed in [3, 4] {
+        let path = folder.path(&format!("{seed}.safetensors"));
+        of(seed).write(&path, WeightPrecision::Single).unwrap();
+    }
+    let command = "weights export 3.safetensors 4.safetensors -o mean.safetensors";
+    assert_eq!(
+        code_and_errors(&relight(&folder, command)),
+        (0, String::new())
+    );
+    let mean = Weights::read(&folder.path("mean.safetensors")).unwrap();
+    assert_eq!(Some(mean), Weights::mean(&[of(3), of(4)]));
 }
 
 #[test]
