@@ -11,6 +11,8 @@ use relit_data::durable::write_whole;
 use serde_json::json;
 
 use crate::commands::CommandResult;
+use crate::folder::make_folder;
+use crate::photos::not_an_input;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -128,7 +130,11 @@ impl Export {
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let Verb::Export(export) = &arguments.verb;
+    not_an_input(&export.output, &export.inputs)?;
     let (graph, weights) = export.mean()?;
+    if let Some(folder) = export.output.parent() {
+        make_folder(folder)?;
+    }
     if export.ending() == Some("onnx") {
         let side = usize::from(export.size);
         let bytes = to_onnx(&graph, &weights, 1, (side, side))?;

@@ -119,6 +119,11 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
             "other.safetensors: the weights have no",
         ),
         ("weights export -o w.onnx", 2, "<IN>"),
+        (
+            "weights export w.safetensors -o ./w.safetensors --half",
+            1,
+            "./w.safetensors is read as well",
+        ),
     ] {
         let (found, errors) = code_and_errors(&relight(&folder, command));
         assert_eq!(found, code, "{command}: {errors}");
@@ -142,12 +147,12 @@ fn of_the_weights_of_several_runs_the_mean_is_exported() {
         let path = folder.path(&format!("{seed}.safetensors"));
         of(seed).write(&path, WeightPrecision::Single).unwrap();
     }
-    let command = "weights export 3.safetensors 4.safetensors -o mean.safetensors";
+    let command = "weights export 3.safetensors 4.safetensors -o of/both/mean.safetensors";
     assert_eq!(
         code_and_errors(&relight(&folder, command)),
         (0, String::new())
     );
-    let mean = Weights::read(&folder.path("mean.safetensors")).unwrap();
+    let mean = Weights::read(&folder.path("of/both/mean.safetensors")).unwrap();
     assert_eq!(Some(mean), Weights::mean(&[of(3), of(4)]));
 }
 
