@@ -12,51 +12,37 @@ const RATIOS: (f32, f32) = (0.25, 4.0);
 /// Details of shading up to this part of the object's side are relief; larger ones are shadows, of which as much is kept as the
 /// lights are alike.
 const RELIEF: f64 = 0.04;
-/// Where nothing tells paint from shadow: half certain.
-const UNKNOWN_PAINT: f32 = 0.25;
 /// The most pixels over which the mean change of an object is taken, evenly from all of them: enough for a mean.
 const MEAN_PIXELS: usize = 4096;
 
-/// How far a decomposition is believed: which parts of a change of brightness, as a logarithm, are kept (see
-/// [`Shading::hedge`]). The parts of photographs were chosen on synthetic objects (docs/results/insertion.md).
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Trust {
-    /// Of the mean change of the object.
-    mean: f32,
-    /// Of what is beside the mean, where the photograph is dark: that may be paint.
-    dark: f32,
-    /// The same where it is bright.
-    bright: f32,
-    /// By how much more of it is kept where it is certain what is paint than where nobody can tell.
-    certain: f32,
+/// The part of the mean change of a photographed object's brightness, as a logarithm, that is kept. This and the next ones were
+/// chosen on synthetic objects (docs/results/insertion.md).
+const KEPT_OF_MEAN: f32 = 0.6;
+/// The part of what is beside the mean where the shading is dark, which may be paint, and where it is bright.
+const KEPT_BESIDE: (f32, f32) = (0.2, 0.8);
+/// By how much more of it is kept where it is certain what is paint than where nobody can tell.
+const KEPT_IF_CERTAIN: f32 = 0.5;
+/// Shading that counts as dark, and as bright.
+const DARK_AND_BRIGHT: (f32, f32) = (0.15, 0.5);
+
+/// How little the decomposition of a photograph is believed: see [`Shading::hedge`].
+#[derive(Debug, Clone)]
+struct Doubt {
+    /// Pixels over which the mean change is taken.
+    sample: Vec<usize>,
+    /// The part of a change beside the mean that is kept, per pixel.
+    kept_beside: Vec<f32>,
 }
 
-impl Trust {
-    pub(super) const WHOLE: Self = Self {
-        mean: 1.0,
-        dark: 1.0,
-        bright: 1.0,
-        certain: 0.0,
-    };
-    pub(super) const PHOTOGRAPH: Self = Self {
-        mean: 0.6,
-        dark: 0.2,
-        bright: 0.8,
-        certain: 0.5,
-    };
-    /// Shading that counts as dark, and as bright.
-    const DARK_AND_BRIGHT: (f32, f32) = (0.15, 0.5);
-
-    /// The part of a change beside the mean that is kept at a place of this `ln(S + d)`, of whose darkness the part `paint` is
-    /// expected to be paint.
-    fn beside_mean(&self, seen: f32, paint: f32) -> f32 {
-        let (dark, bright) = Self::DARK_AND_BRIGHT;
-        let (dark, bright) = ((dark + DARK).ln(), (bright + DARK).ln());
-        let towards_bright = ((seen - dark) / (bright - dark)).clamp(0.0, 1.0);
-        let certainty = (2.0 * paint - 1.0).abs();
-        let kept = self.dark + towards_bright * (self.bright - self.dark);
-        (kept + self.certain * (certainty - 0.5)).clamp(0.0, 1.0)
-    }
+/// The part of a change beside the mean that is kept at a place of this `ln(S + d)`, of whose darkness the part `paint` is
+/// expected to be paint, if something tells it.
+fn kept_beside(seen: f32, paint: Option<f32>) -> f32 {
+    let (dark, bright) = DARK_AND_BRIGHT;
+    let (dark, bright) = ((dark + DARK).ln(), (bright + DARK).ln());
+    let towards_bright = ((seen - dark) / (bright - dark)).clamp(0.0, 1.0);
+    let kept = KEPT_BESIDE.0 + towards_bright * (KEPT_BESIDE.1 - KEPT_BESIDE.0);
+    let certainty = paint.map_or(0.5, |paint| (2.0 * paint - 1.0).abs());
+    (kept + KEPT_IF_CERTAIN * (certainty - 0.5)).clamp(0.0, 1.0)
 }
 
 /// The shading S of a photograph beside the irradiance E of its light on the normals, with D = (S + d) / (E + d), d = 0.05.
@@ -71,19 +57,15 @@ pub(super) struct Shading {
     residual: Vec<f32>,
     /// The logarithm of S + d.
     seen: Vec<f32>,
-    /// The part of the darkness that is expected to be paint; none where nothing tells it.
-    paint: Option<Vec<f32>>,
-    /// Pixels over which the mean change is taken.
-    sample: Vec<usize>,
-    trust: Trust,
+    /// None where it is taken for the truth.
+    doubt: Option<Doubt>,
     /// E.
     pub(super) own: Vec<f32>,
 }
 
 impl Shading {
-    /// Of the shading that was found and the irradiance of the light on the normals, where it is `wanted`, and how far all of
-    /// that is believed.
-    pub(super) fn new(shading: &Planes<1>, own: &Planes<3>, wanted: &[bool], trust: Trust) -> Self {
+    /// Of the shading that was found and the irradiance of the light on the normals, where it is `wanted`, taken for the truth.
+    pub(super) fn new(shading: &Planes<1>, own: &Planes<3>, wanted: &[bool]) -> Self {
         let extent = shading.extent();
         // The light is grey: its channels are equal.
         let own = own.plane(0).to_vec();
@@ -111,9 +93,7 @@ impl Shading {
             shadow: vec![0.0; own.len()],
             residual: vec![0.0; own.len()],
             seen: own.iter().map(|&own| (own.max(0.0) + DARK).ln()).collect(),
-            paint: None,
-            sample: evenly(wanted),
-            trust,
+            doubt: None,
             own,
         };
         for at in (0..wanted.len()).filter(|&at| wanted[at]) {
@@ -127,15 +107,20 @@ impl Shading {
         result
     }
 
-    /// The same, of which it is known what of its darkness is expected to be paint, 0..=1.
-    pub(super) fn with_paint(mut self, paint: Option<Planes<1>>) -> Self {
-        self.paint = paint.map(|paint| paint.plane(0).to_vec());
+    /// The same of a photograph, which is believed in part, where it is `wanted`; `paint` is what of its darkness is expected to
+    /// be paint, 0..=1.
+    pub(super) fn doubted(mut self, paint: Option<&Planes<1>>, wanted: &[bool]) -> Self {
+        let kept = |(at, &seen)| kept_beside(seen, paint.map(|paint| paint.plane(0)[at]));
+        self.doubt = Some(Doubt {
+            sample: evenly(wanted),
+            kept_beside: self.seen.iter().enumerate().map(kept).collect(),
+        });
         self
     }
 
-    /// Believes it as far as is said.
-    pub(super) fn believe(&mut self, trust: Trust) {
-        self.trust = trust;
+    /// Takes what was found for the truth.
+    pub(super) fn believe(&mut self) {
+        self.doubt = None;
     }
 
     /// The shading of a pixel in new irradiance, red, green and blue, where `kept` of the shadows are kept.
@@ -147,13 +132,16 @@ impl Shading {
         })
     }
 
-    /// The mean over the object of the change `ln((S' + d) / (S + d))` in new irradiance.
+    /// The mean over the object of the change `ln((S' + d) / (S + d))` in new irradiance; 0 where no hedge needs it.
     pub(super) fn mean_change(&self, irradiance: &Planes<3>, kept: f32) -> f32 {
-        let changes = self.sample.iter().map(|&at| {
+        let Some(Doubt { sample, .. }) = &self.doubt else {
+            return 0.0;
+        };
+        let changes = sample.iter().map(|&at| {
             let irradiance = std::array::from_fn(|channel| irradiance.plane(channel)[at]);
             self.change(at, self.at(at, irradiance, kept))
         });
-        changes.sum::<f32>() / self.sample.len().max(1) as f32
+        changes.sum::<f32>() / sample.len().max(1) as f32
     }
 
     /// The change of a pixel of the new shading S', as the mean of its colours.
@@ -169,10 +157,11 @@ impl Shading {
     /// the object, which says how bright the light is on the side that is seen, and u of what is beside it:
     /// `exp(-(1 - t) m - (1 - u) (c - m))`. It is 1 in the light of the photograph.
     pub(super) fn hedge(&self, at: usize, new: [f32; 3], mean_change: f32) -> f32 {
+        let Some(Doubt { kept_beside, .. }) = &self.doubt else {
+            return 1.0;
+        };
         let beside = self.change(at, new) - mean_change;
-        let paint = self.paint.as_ref().map_or(UNKNOWN_PAINT, |paint| paint[at]);
-        let kept = self.trust.beside_mean(self.seen[at], paint);
-        ((self.trust.mean - 1.0) * mean_change + (kept - 1.0) * beside).exp()
+        ((KEPT_OF_MEAN - 1.0) * mean_change + (kept_beside[at] - 1.0) * beside).exp()
     }
 }
 
@@ -192,11 +181,12 @@ mod tests {
     const DARK_PLACE: usize = SIDE * SIDE / 2 + SIDE / 8;
 
     /// Half of an even surface lies in the dark: its shading was found to be a tenth of what the light makes.
-    fn half_dark(trust: Trust) -> Shading {
+    fn half_dark() -> Shading {
         let extent = Extent::new(SIDE, SIDE);
         let shading = Planes::from_fn(extent, |x, _| [if x < SIDE / 2 { 0.1 } else { 1.0 }]);
         let own = Planes::filled(extent, [1.0; 3]);
-        Shading::new(&shading, &own, &vec![true; SIDE * SIDE], trust)
+        let wanted = vec![true; SIDE * SIDE];
+        Shading::new(&shading, &own, &wanted).doubted(None, &wanted)
     }
 
     /// The shading of a place in light of the same strength from elsewhere.
@@ -209,20 +199,21 @@ mod tests {
 
     #[test]
     fn a_shadow_goes_with_the_light_as_far_as_it_is_believed() {
-        let mut shading = half_dark(Trust::WHOLE);
-        let believed = moved(&shading, DARK_PLACE);
+        let shading = half_dark();
+        let hedged = moved(&shading, DARK_PLACE);
+        let mut trusted = shading;
+        trusted.believe();
+        let believed = moved(&trusted, DARK_PLACE);
         assert!((believed - 1.0).abs() < 0.05, "{believed}");
         // Of the change from 0.1 to 1, with d, half is that of the mean: 0.4 of that goes, and 0.8 of the rest.
         let change = (1.05_f32 / 0.15).ln();
         let expected = believed * (-0.4 * change / 2.0 - 0.8 * change / 2.0).exp();
-        shading.believe(Trust::PHOTOGRAPH);
-        let hedged = moved(&shading, DARK_PLACE);
         assert!((hedged - expected).abs() < 0.03, "{hedged} {expected}");
     }
 
     #[test]
     fn a_change_is_believed_less_where_the_photograph_is_dark() {
-        let trust = |seen: f32| Trust::PHOTOGRAPH.beside_mean(seen.ln(), UNKNOWN_PAINT);
+        let trust = |seen: f32| kept_beside(seen.ln(), None);
         assert!((trust(0.0) - 0.2).abs() < 1e-6);
         assert!((trust(1.05) - 0.8).abs() < 1e-6);
         assert!((0.4..0.7).contains(&trust(0.35)));
@@ -230,15 +221,14 @@ mod tests {
 
     #[test]
     fn a_change_is_believed_less_where_nobody_can_tell_paint_from_shadow() {
-        let trust = |paint| Trust::PHOTOGRAPH.beside_mean(0.35_f32.ln(), paint);
+        let trust = |paint| kept_beside(0.35_f32.ln(), Some(paint));
         assert!((trust(0.0) - trust(1.0)).abs() < 1e-6);
         assert!((trust(1.0) - trust(0.5) - 0.5).abs() < 1e-6);
-        assert_eq!(Trust::WHOLE.beside_mean(0.0, 0.5), 1.0);
     }
 
     #[test]
     fn what_the_light_does_not_change_is_not_hedged() {
-        let shading = half_dark(Trust::PHOTOGRAPH);
+        let shading = half_dark();
         let same = shading.at(DARK_PLACE, [1.0; 3], 1.0);
         assert!((same[0] - 0.1).abs() < 1e-4);
         let new = Planes::filled(Extent::new(SIDE, SIDE), [1.0; 3]);
@@ -248,7 +238,7 @@ mod tests {
 
     #[test]
     fn light_of_another_colour_keeps_its_colour() {
-        let shading = half_dark(Trust::PHOTOGRAPH);
+        let shading = half_dark();
         let new = shading.at(DARK_PLACE, [1.5, 1.0, 0.5], 0.0);
         let hedged = new.map(|value| value * shading.hedge(DARK_PLACE, new, 0.3));
         assert!((hedged[0] / hedged[1] - new[0] / new[1]).abs() < 1e-5);

@@ -7,7 +7,7 @@ use super::cut::{Cut, EdgeColours};
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
 use super::placement::{Fit, Placement};
-use super::shading::{DARK, Shading, Trust};
+use super::shading::{DARK, Shading};
 use super::smooth::weighted_mean;
 use super::source::likeness;
 use super::standing::{LastStanding, Standing};
@@ -142,7 +142,7 @@ impl Subject {
         let light = even_light();
         let ones = Planes::filled(extent, [1.0]);
         let even = Planes::filled(extent, [1.0; 3]);
-        let shading = Shading::new(&ones, &even, &wanted, Trust::WHOLE);
+        let shading = Shading::new(&ones, &even, &wanted);
         Ok(Self {
             place: [0, 0],
             photo: extent,
@@ -209,8 +209,7 @@ impl Subject {
             place: cut.place,
             photo: cut.photo,
             mask: cut.mask,
-            shading: Shading::new(&shading, own.planes(), &wanted, Trust::PHOTOGRAPH)
-                .with_paint(paint),
+            shading: Shading::new(&shading, own.planes(), &wanted).doubted(paint.as_ref(), &wanted),
             matte: cut.matte,
             normals,
             albedo,
@@ -225,7 +224,7 @@ impl Subject {
     /// The same, whose decomposition is taken for the truth: to see what the hedge is good for.
     #[must_use]
     pub fn without_hedge(mut self) -> Self {
-        self.shading.believe(Trust::WHOLE);
+        self.shading.believe();
         self
     }
 
