@@ -7,11 +7,12 @@ use glam::{Vec2, Vec3};
 use super::cast::{RadianceTransfer, TransferFinish};
 use super::curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferLobe, TransferMaterial};
 use super::rooms::Rooms;
+use super::timing::TableTiming;
 use crate::lighting::BlinnPhong;
 use crate::random::Random;
 
 /// Part of the objects of metal.
-const METAL: f32 = 0.12;
+const METAL: f32 = 0.22;
 /// Part of the others without gloss.
 const MATT: f32 = 0.3;
 /// Part of the glossy ones whose highlights are as strong as a half vector's power is drawn in `synth`: up to half of the
@@ -21,6 +22,8 @@ const HALF_VECTOR: f32 = 0.5;
 const TINTED: f32 = 0.2;
 /// Part of the objects of one colour.
 const PLAIN: f32 = 0.35;
+/// Part of the turns whose angles are off and whose frames are not all there.
+const MISTIMED: f32 = 0.4;
 /// Part of the turns whose highlights clip.
 const CLIPPED: f32 = 0.3;
 /// Part of the turns whose elevation is not known well, and how far it is off, degrees.
@@ -37,7 +40,7 @@ pub struct DrawnTurn {
     pub size: u32,
     /// The covered pixels, ascending: row times size plus column.
     pub pixels: Vec<u32>,
-    /// Curves over the table's angle, with noise and clipping.
+    /// Curves over the table's angle, with noise, clipping and errors of the angle.
     pub curves: Vec<CurveCoefficients>,
     /// The elevation that is said, radians; the true one is near.
     pub elevation: f32,
@@ -66,6 +69,9 @@ impl DrawnTurn {
         };
         if random.chance(CLIPPED) {
             drawn.clip(&mut random);
+        }
+        if random.chance(MISTIMED) {
+            drawn.mistime(&mut random);
         }
         drawn.add_noise(&mut random);
         if random.chance(UNSURE) {
@@ -115,6 +121,16 @@ impl DrawnTurn {
             for c in 0..3 {
                 clip_channel(curve, c, white);
             }
+        }
+    }
+
+    /// What is left of the curves where the table's angle is not known well.
+    fn mistime(&mut self, random: &mut Random) {
+        let Some(timing) = TableTiming::draw(random) else {
+            return;
+        };
+        for curve in &mut self.curves {
+            *curve = timing.seen(curve);
         }
     }
 

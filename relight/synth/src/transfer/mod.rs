@@ -20,6 +20,7 @@
 //! | `rooms` | light to draw from |
 //! | `views` | which objects and poses are drawn |
 //! | `cache` | views on disk |
+//! | `timing` | the table's angle as a rig knows it |
 //! | `drawn` | a view in a random material, room and camera |
 
 mod cache;
@@ -29,6 +30,7 @@ mod drawn;
 mod rooms;
 #[cfg(test)]
 mod tests;
+mod timing;
 mod views;
 
 use relight_core::light::Order;
