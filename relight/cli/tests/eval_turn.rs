@@ -98,18 +98,13 @@ fn a_turn_is_scored_by_each_method_and_written_for_others() {
     assert_eq!(names[12], "mask.png");
 }
 
-/// What `relight turn` writes and warns of with a rotation direction.
-fn solved(data: &Path, direction: &str, out: &Path) -> (serde_json::Value, String) {
+/// What `relight turn` writes and warns of with these options.
+fn solved(data: &Path, options: &[&str], out: &Path) -> (serde_json::Value, String) {
     let shard = data.join("synth-12-0000.tar");
-    let output = relight(&[
-        "turn",
-        shard.to_str().unwrap(),
-        "--direction",
-        direction,
-        "--no-video",
-        "-o",
-        out.to_str().unwrap(),
-    ]);
+    let mut arguments = vec!["turn", shard.to_str().unwrap(), "--no-video"];
+    arguments.extend(["-o", out.to_str().unwrap()]);
+    arguments.extend(options);
+    let output = relight(&arguments);
     assert!(matches!(output.status.code(), Some(0 | 3)), "{output:?}");
     let json = fs::read(out.join("turn.json")).unwrap();
     let told = String::from_utf8(output.stderr).unwrap();
@@ -121,8 +116,11 @@ fn a_turn_read_the_wrong_way_is_doubted_by_the_network() {
     let dir = tempfile::tempdir().unwrap();
     let data = dir.path().join("turns");
     write_turn(&data);
-    let (right, told) = solved(&data, "counter-clockwise", &dir.path().join("right"));
-    let (wrong, warned) = solved(&data, "clockwise", &dir.path().join("wrong"));
+    let given = |direction: &str| {
+        let options = ["--elevation", "20", "--direction", direction];
+        solved(&data, &options, &dir.path().join(direction))
+    };
+    let ((right, told), (wrong, warned)) = (given("counter-clockwise"), given("clockwise"));
     let other = |json: &serde_json::Value| json["network"]["other_direction_deg"].as_f64().unwrap();
     let phases = right["network"]["phases"].as_array().unwrap();
     let least = phases
@@ -135,6 +133,46 @@ fn a_turn_read_the_wrong_way_is_doubted_by_the_network() {
     assert!(!told.contains(doubt), "{told}");
     assert!(warned.contains(doubt), "{warned}");
     assert!(warned.contains("--direction counter-clockwise"), "{warned}");
+}
+
+/// Gives each frame of a shard the angle that it has on a table that turns the other way.
+fn turn_around(shard: &Path) {
+    let mut bytes = fs::read(shard).unwrap();
+    let key = b"\"angle_deg\":";
+    let mut at = 0;
+    while let Some(found) = bytes[at..].windows(key.len()).position(|part| part == key) {
+        let begin = at + found + key.len();
+        let length = bytes[begin..]
+            .iter()
+            .position(|&byte| byte == b',')
+            .unwrap();
+        let text = std::str::from_utf8(&bytes[begin..begin + length]).unwrap();
+        let angle: f64 = text.parse().unwrap();
+        // Frames are 15 degrees apart, so that the other angle is no longer than the first.
+        let other = format!("{:<length$}", (360.0 - angle) % 360.0);
+        bytes[begin..begin + length].copy_from_slice(other.as_bytes());
+        at = begin + length;
+    }
+    fs::write(shard, bytes).unwrap();
+}
+
+#[test]
+fn the_rotation_direction_that_nobody_says_is_found() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("turns");
+    write_turn(&data);
+    let (usual, told) = solved(&data, &[], &dir.path().join("usual"));
+    turn_around(&data.join("synth-12-0000.tar"));
+    let (found, warned) = solved(&data, &[], &dir.path().join("found"));
+    let rotation =
+        |direction: &str| serde_json::json!({"direction": direction, "source": "network"});
+    assert_eq!(usual["rotation"], rotation("counter_clockwise"));
+    assert_eq!(found["rotation"], rotation("clockwise"));
+    let taken = "taken to turn clockwise";
+    assert!(!told.contains(taken) && warned.contains(taken), "{warned}");
+    let residual = |json: &serde_json::Value| json["residual"].as_f64().unwrap();
+    let (as_usual, as_found) = (residual(&usual), residual(&found));
+    assert!((as_usual / as_found - 1.0).abs() < 1e-3, "{usual} {found}");
 }
 
 #[test]

@@ -22,7 +22,7 @@ use relight_synth::{
     Folders, FrameTruth, Library, LightKind, Recipe, TurnDescription, TurnRecipe, write_turns,
 };
 use relight_turn::{
-    Elevation, MaterialKind, NormalsSource, RotationDirection, TableFrame, TurnError, TurnOptions,
+    Elevation, MaterialKind, NormalsSource, TableFrame, TableRotation, TurnError, TurnOptions,
     fit_turn_light, prior_normals, read_curves, solve_turn,
 };
 
@@ -84,7 +84,7 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     let (shard, truth_folder) = turn(folder.path(), 60);
     let (degrees, light) = truth(&truth_folder);
     let surface = surface(&truth_folder);
-    let read = read_curves(&shard, RotationDirection::default(), &|_, _| {}).unwrap();
+    let read = read_curves(&shard, TableRotation::default(), &|_, _| {}).unwrap();
     assert_eq!((read.curves.frames(), read.damage.len()), (60, 0));
     assert!(read.has_angles);
     let options = TurnOptions {
@@ -154,6 +154,7 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
             serde_json::from_str(text(&run.stdout).lines().next().unwrap()).unwrap();
         assert_eq!(event["event"], "turned");
         assert_eq!(event["figures"]["elevation"]["source"], "assumed");
+        assert_eq!(event["figures"]["rotation"]["source"], "assumed");
         assert!(event["figures"]["ambiguity"].is_null());
     }
     let taken_for = |name: &str| {
@@ -392,7 +393,7 @@ fn wrong_usage_and_several_turns_are_refused() {
     let (shard, _) = turn(folder.path(), 12);
     fs::copy(&shard, folder.path().join("again.tar")).unwrap();
     fs::remove_file(folder.path().join("dataset.json")).unwrap();
-    let error = read_curves(folder.path(), RotationDirection::default(), &|_, _| {}).unwrap_err();
+    let error = read_curves(folder.path(), TableRotation::default(), &|_, _| {}).unwrap_err();
     assert!(
         matches!(error, TurnError::ManyTurns { found: 2, .. }),
         "{error}"

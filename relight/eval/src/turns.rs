@@ -11,8 +11,8 @@ use relight_nets::Weights;
 use relight_synth::TurnDescription;
 use relight_turn::{
     AzimuthSource, Elevation, MaterialKind, NormalsSource, ReadTurn, RotationDirection, TableFrame,
-    TableLight, TurnError, TurnNetwork, TurnOptions, TurnPrediction, TurnPrior, TurnSolution,
-    prior_albedo, prior_normals, read_curves, solve_turn,
+    TableLight, TableRotation, TurnError, TurnNetwork, TurnOptions, TurnPrediction, TurnPrior,
+    TurnSolution, prior_albedo, prior_normals, read_curves, solve_turn,
 };
 use relit_data::shard::Dataset;
 use serde::Serialize;
@@ -189,7 +189,11 @@ impl TurnSet {
             serde_json::from_slice(bytes)
         })?;
         let [_, up, out] = description.axis;
-        let turn = read_curves(shard, RotationDirection::CounterClockwise, &|_, _| {})?;
+        let turn = read_curves(
+            shard,
+            TableRotation::given(RotationDirection::CounterClockwise),
+            &|_, _| {},
+        )?;
         Ok(TrueTurn {
             turn,
             normals: Normals::<YUp>::read(&truth.join("normal.png"))?,

@@ -18,7 +18,7 @@ use relight_core::render::Surface;
 use relight_nets::{NetError, Weights};
 use relight_reader::{Encoding, SampleId, Source, Turns};
 use relight_turn::{
-    Conditioning, Elevation, MaterialKind, NormalsSource, ReadTurn, RotationDirection, TableFrame,
+    Conditioning, Elevation, MaterialKind, NormalsSource, ReadTurn, TableFrame, TableRotation,
     TurnMaps, TurnNetwork, TurnOptions, TurnPrior, fit_turn_light, prior_albedo, prior_normals,
     read_curves, solve_turn,
 };
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let (shard, truth) = (Path::new(shard), Path::new(truth));
     let start = Instant::now();
-    let turn = read_curves(shard, RotationDirection::default(), &|_, _| {})?;
+    let turn = read_curves(shard, TableRotation::default(), &|_, _| {})?;
     println!(
         "read in {:.1} s; {:?}",
         start.elapsed().as_secs_f64(),

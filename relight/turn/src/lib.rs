@@ -10,7 +10,7 @@
 //! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `metal`, `shading` (one of them) |
 //! | `observe` | what the frames show: `reading`, `curves`, `exposure`, `conditioning`; `film`, `strip`, `rim` and `probe` for what the video has beside the object |
 //! | `network` | `input`, `answer`: normals by the network of turns |
-//! | `fit` | `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the light), `initialisation`, `azimuth`, `prior`, `robust`, `albedo`, `confidence`, `solve` |
+//! | `fit` | `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the light), `initialisation`, `azimuth`, `prior`, `robust`, `albedo`, `confidence`, `solve`; `rotation` (which way the table turns) |
 //! | `report` | `files`, `figures`, `maps`, `labels`, `object`: what is written; `warnings` and `destinations`: what a user should know after and before |
 //!
 //! A folder knows those above it in this table. Each module has its parameters in one struct, with unit and source:
@@ -50,7 +50,9 @@ pub use observe::exposure::ExposureStep;
 pub use observe::film::{Filmed, film};
 pub use observe::probe::{Probe, ProbeBall, ProbeBuilder};
 pub use observe::probe_place::ProbePlace;
-pub use observe::reading::{ReadTurn, RotationDirection, TurnOrigin, read_curves};
+pub use observe::reading::{
+    ReadTurn, RotationDirection, RotationSource, TableRotation, TurnOrigin, read_curves,
+};
 pub use observe::session::session_of;
 pub use observe::strip::{PanoramaStrip, StripBuilder, StripFigures};
 pub use observe::verdict::LightVerdict;

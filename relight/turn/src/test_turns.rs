@@ -12,6 +12,7 @@ use crate::model::gloss::GlossLight;
 use crate::model::harmonics::basis_at;
 use crate::model::metal::MIRROR;
 use crate::model::shading::ShadingModel;
+use crate::observe::reading::TableRotation;
 use crate::{
     CurveBuilder, Elevation, MaterialKind, ReadTurn, TableFrame, TableLight, TurnCurves,
     TurnOptions, TurnSolution, solve_turn,
@@ -147,6 +148,7 @@ pub(crate) fn read(surface: &Surface, light: &ShLight) -> ReadTurn {
     ReadTurn {
         name: "ball".to_owned(),
         curves: film(surface, light, TAKE),
+        rotation: TableRotation::default(),
         first: first_angles
             .iter()
             .map(|&angle| frame(surface, light, angle))

@@ -63,9 +63,10 @@ pub(crate) struct Arguments {
     /// With --frames: the folder of relight turn that has the turn's light, for lights.lp.
     #[arg(long, value_name = "DIR", requires = "frames")]
     lamps: Option<PathBuf>,
-    /// With --lamps: the rotation direction of the table, seen from above, as its angle grows.
-    #[arg(long, value_enum, default_value_t = DirectionName::CounterClockwise, requires = "lamps")]
-    direction: DirectionName,
+    /// With --lamps: the rotation direction of the table, seen from above, as its angle grows [default: that with which the
+    /// turn was solved].
+    #[arg(long, value_enum, requires = "lamps")]
+    direction: Option<DirectionName>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -76,9 +77,11 @@ enum ShapeName {
     Plane,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, Default, ValueEnum, Deserialize)]
+#[serde(rename_all = "snake_case")]
 enum DirectionName {
     /// The background moves to the right.
+    #[default]
     CounterClockwise,
     /// The background moves to the left.
     Clockwise,
@@ -178,6 +181,14 @@ fn run_frames(arguments: &Arguments, frames: u32, console: Console) -> CommandRe
 #[derive(Deserialize)]
 struct LightFigures {
     elevation: LightElevation,
+    /// Files from before it was told have none.
+    #[serde(default)]
+    rotation: LightRotation,
+}
+
+#[derive(Default, Deserialize)]
+struct LightRotation {
+    direction: DirectionName,
 }
 
 #[derive(Deserialize)]
@@ -224,7 +235,7 @@ fn lamp_doubt(folder: &Path, shard: &Path) -> Result<Option<String>, Box<dyn Err
 }
 
 /// The lamp of a turn that was solved into a folder.
-fn lamp(folder: &Path, direction: DirectionName) -> Result<TurnLamp, Box<dyn Error>> {
+fn lamp(folder: &Path, direction: Option<DirectionName>) -> Result<TurnLamp, Box<dyn Error>> {
     let light = ShLight::read(&folder.join("light.txt"))?;
     let path = folder.join("light.json");
     let wrong = |reason: String| ExportError::Figures {
@@ -234,7 +245,7 @@ fn lamp(folder: &Path, direction: DirectionName) -> Result<TurnLamp, Box<dyn Err
     let json = fs::read(&path).map_err(|error| wrong(error.to_string()))?;
     let figures: LightFigures =
         serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
-    let turn = match direction {
+    let turn = match direction.unwrap_or(figures.rotation.direction) {
         DirectionName::CounterClockwise => TableTurn::CounterClockwise,
         DirectionName::Clockwise => TableTurn::Clockwise,
     };

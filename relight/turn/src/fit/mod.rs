@@ -23,6 +23,7 @@ pub(crate) mod probe_check;
 pub(crate) mod probe_light;
 pub(crate) mod residuals;
 pub(crate) mod robust;
+pub(crate) mod rotation;
 pub(crate) mod schur;
 pub(crate) mod search;
 pub(crate) mod setting;

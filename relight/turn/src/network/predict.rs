@@ -63,6 +63,12 @@ impl HypothesisFigures {
         taken.map_or(0.0, |figure| figure.expected_error_deg)
     }
 
+    /// Whether the table clearly looks as if it turned this way.
+    #[must_use]
+    pub fn is_direction_sure(&self) -> bool {
+        self.expected_error_deg() < CLEARLY * self.other_direction_deg
+    }
+
     /// Whether the table looks as if it turned the other way.
     #[must_use]
     pub fn is_direction_doubted(&self) -> bool {

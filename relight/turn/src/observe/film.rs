@@ -254,6 +254,7 @@ mod tests {
 
     use super::*;
     use crate::CurveBuilder;
+    use crate::observe::reading::TableRotation;
     use crate::observe::session::session_of;
     use relight_core::image::Linear;
 
@@ -297,6 +298,7 @@ mod tests {
         ReadTurn {
             name: "mug".to_owned(),
             curves: builder.finish().unwrap(),
+            rotation: TableRotation::default(),
             first,
             first_angles: (0..12).map(|number| 30.0 * f64::from(number)).collect(),
             sources: (0..12)

@@ -1,5 +1,6 @@
 //! A turn's frames, once through, into curves.
 
+use std::fmt;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::Arc;
@@ -35,6 +36,61 @@ pub enum RotationDirection {
     Clockwise,
 }
 
+impl fmt::Display for RotationDirection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::CounterClockwise => "counter-clockwise",
+            Self::Clockwise => "clockwise",
+        })
+    }
+}
+
+impl RotationDirection {
+    /// The other one.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::CounterClockwise => Self::Clockwise,
+            Self::Clockwise => Self::CounterClockwise,
+        }
+    }
+}
+
+/// What says which way the table turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RotationSource {
+    /// Nobody: it is what is usual on this rig.
+    #[default]
+    Assumed,
+    /// The caller.
+    Given,
+    /// The background of the session's video.
+    Background,
+    /// The network of turns, which is clearly surer of its normals this way.
+    Network,
+}
+
+/// Which way the table turns, and what says so.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct TableRotation {
+    /// Seen from above, as the table's angle grows.
+    pub direction: RotationDirection,
+    /// What says so.
+    pub source: RotationSource,
+}
+
+impl TableRotation {
+    /// One that is known.
+    #[must_use]
+    pub const fn given(direction: RotationDirection) -> Self {
+        Self {
+            direction,
+            source: RotationSource::Given,
+        }
+    }
+}
+
 /// What the records of a shard say of the video that it was made from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TurnOrigin {
@@ -51,6 +107,8 @@ pub struct ReadTurn {
     pub name: String,
     /// Its curves.
     pub curves: TurnCurves,
+    /// Which way its table was taken to turn.
+    pub rotation: TableRotation,
     /// Its first twelve frames, which cover the whole turn.
     pub first: Vec<Rgb<Linear>>,
     /// Their angles of the table, degrees.
@@ -74,7 +132,7 @@ pub struct ReadTurn {
 /// Where it cannot be opened, holds several turns, or shows too little.
 pub fn read_curves(
     path: &Path,
-    direction: RotationDirection,
+    rotation: TableRotation,
     progress: &dyn Fn(u64, u64),
 ) -> Result<ReadTurn, TurnError> {
     let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
@@ -100,7 +158,7 @@ pub fn read_curves(
     };
     let mut reader = Reader {
         frames,
-        direction,
+        rotation,
         builder: None,
         first: Vec::new(),
         first_angles: Vec::new(),
@@ -140,7 +198,7 @@ pub fn read_curves(
 
 struct Reader {
     frames: u32,
-    direction: RotationDirection,
+    rotation: TableRotation,
     builder: Option<CurveBuilder>,
     first: Vec<Rgb<Linear>>,
     first_angles: Vec<f64>,
@@ -207,7 +265,7 @@ impl Reader {
         self.last_index = self.last_index.max(index(frame));
         let degrees =
             recorded.unwrap_or_else(|| 360.0 * index(frame) / f64::from(self.frames.max(1)));
-        Some(match self.direction {
+        Some(match self.rotation.direction {
             RotationDirection::CounterClockwise => degrees,
             RotationDirection::Clockwise => -degrees,
         })
@@ -226,6 +284,7 @@ impl Reader {
         Ok(ReadTurn {
             name,
             curves: builder.finish()?,
+            rotation: self.rotation,
             first: self.first,
             first_angles: self.first_angles,
             sources: self.sources,

@@ -13,6 +13,7 @@ use crate::model::material::MaterialKind;
 use crate::network::predict::HypothesisFigures;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::exposure::ExposureStep;
+use crate::observe::reading::{ReadTurn, TableRotation};
 use crate::observe::strip::{PanoramaStrip, StripFigures};
 use crate::report::maps::AngleFigure;
 
@@ -29,6 +30,8 @@ pub struct TurnFigures {
     pub(crate) has_angles: bool,
     pub(crate) clipped: f64,
     pub(crate) elevation: Elevation,
+    /// Which way the table was taken to turn, and what says so.
+    pub(crate) rotation: TableRotation,
     pub(crate) conditioning: Conditioning,
     pub(crate) advice: Option<&'static str>,
     pub(crate) normals: Option<String>,
@@ -122,6 +125,8 @@ pub(crate) struct LightFile {
     /// e, f, g, Re a, Im a, Re b, Im b, Re d, Im d of each channel.
     pub(crate) terms: [[f64; TERMS]; 3],
     pub(crate) elevation: Elevation,
+    /// Which way the table was taken to turn as its angle grows: the light turns the other way.
+    pub(crate) rotation: TableRotation,
 }
 
 impl TurnFigures {
@@ -134,7 +139,7 @@ impl TurnFigures {
 
 impl LightFile {
     /// That of a solved turn.
-    pub(crate) fn new(solution: &TurnSolution) -> Result<Self, TurnError> {
+    pub(crate) fn new(turn: &ReadTurn, solution: &TurnSolution) -> Result<Self, TurnError> {
         let light = solution.light();
         Ok(Self {
             schema: "relight.table_light/1",
@@ -143,6 +148,7 @@ impl LightFile {
             coefficients: light.coefficients()?.coefficients().to_vec(),
             terms: *light.terms(),
             elevation: solution.elevation,
+            rotation: turn.rotation,
         })
     }
 }

@@ -119,7 +119,7 @@ impl TurnFiles<'_> {
         )?;
         let light = solution.light().to_viewer(solution.frame())?;
         light.write(&path("light.txt"))?;
-        write_json(&path("light.json"), &LightFile::new(solution)?)?;
+        write_json(&path("light.json"), &LightFile::new(self.turn, solution)?)?;
         let sheet = contact_sheet(self.turn, solution, maps, (&surface, &light))?;
         write_png(&path("contact.png"), &sheet, Depth::Eight)?;
         if let Some(strip) = self.strip {
@@ -157,6 +157,7 @@ impl TurnFiles<'_> {
             has_angles: turn.has_angles,
             clipped: turn.curves.clipped(),
             elevation: solution.elevation,
+            rotation: turn.rotation,
             conditioning: solution.conditioning(),
             advice: solution.conditioning().verdict.advice(),
             normals: self.normals_source.map(str::to_owned),

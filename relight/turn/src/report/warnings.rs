@@ -6,7 +6,7 @@ use crate::fit::solution::TurnSolution;
 use crate::model::frame::ElevationSource;
 use crate::model::material::MaterialKind;
 use crate::observe::probe::ProbeBall;
-use crate::observe::reading::{ReadTurn, RotationDirection};
+use crate::observe::reading::{ReadTurn, RotationDirection, RotationSource, TableRotation};
 use crate::observe::strip::PanoramaStrip;
 use crate::observe::verdict::LightVerdict;
 
@@ -36,6 +36,18 @@ pub enum TurnWarning {
     BallResidual {
         /// The residual over the variation.
         residual: f64,
+    },
+    /// Nobody said which way the table turns, and it is not the usual way.
+    #[error("the table is taken to turn {direction}, seen from above: {}", match by {
+        RotationSource::Background => "so the background of the video moves",
+        RotationSource::Network => "so the network of turns is clearly surer of its normals",
+        RotationSource::Assumed | RotationSource::Given => "so it was said",
+    })]
+    TakenRotation {
+        /// Which way.
+        direction: RotationDirection,
+        /// What says so.
+        by: RotationSource,
     },
     /// The background moves against the given rotation direction.
     #[error("the background moves the other way: the normals are mirrored")]
@@ -127,6 +139,18 @@ impl TurnWarning {
             residual: measured.residual,
         });
         kind.into_iter().chain(residual).collect()
+    }
+
+    /// That of a rotation that was found and is not the usual one.
+    #[must_use]
+    pub fn of_rotation(turn: &ReadTurn) -> Option<Self> {
+        let TableRotation { direction, source } = turn.rotation;
+        let is_found = matches!(source, RotationSource::Background | RotationSource::Network);
+        let is_usual = direction == RotationDirection::default();
+        (is_found && !is_usual).then_some(Self::TakenRotation {
+            direction,
+            by: source,
+        })
     }
 
     /// That of the background of a video that was read.

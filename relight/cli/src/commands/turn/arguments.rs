@@ -7,11 +7,12 @@ use clap::{Args, ValueEnum};
 use relight_core::light::ShLight;
 use relight_nets::{NetError, Weights};
 use relight_turn::{
-    Elevation, Filmed, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace, ReadTurn,
-    RotationDirection, TurnNetwork, TurnOptions, TurnPrior, prior_albedo, prior_normals,
-    read_given_light,
+    Elevation, Filmed, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace,
+    RotationDirection, TableRotation, TurnNetwork, TurnOptions, TurnPrior, prior_albedo,
+    prior_normals, read_given_light,
 };
 
+use super::observed::Observed;
 use crate::shipped;
 use crate::values::YName;
 
@@ -76,9 +77,10 @@ pub(crate) struct Arguments {
     /// The object's material: without it, the one that fits the turn.
     #[arg(long, alias = "body", value_enum, value_name = "KIND")]
     pub(super) material: Option<MaterialName>,
-    /// The table's rotation direction as its angle grows, seen from above.
-    #[arg(long, alias = "sense", value_enum, default_value_t = DirectionName::CounterClockwise)]
-    direction: DirectionName,
+    /// The table's rotation direction as its angle grows, seen from above [default: by the background in the session's
+    /// video; else the one in which the network of turns is clearly surer; else counter-clockwise].
+    #[arg(long, alias = "sense", value_enum)]
+    direction: Option<DirectionName>,
     /// Write the object as one file that can be lit, object.relit.
     #[arg(long, value_name = "FILE")]
     pub(super) asset: Option<PathBuf>,
@@ -109,12 +111,11 @@ pub(super) enum DirectionName {
     Clockwise,
 }
 
-impl DirectionName {
-    /// The name of the other one.
-    pub(super) const fn other(self) -> &'static str {
-        match self {
-            Self::CounterClockwise => "clockwise",
-            Self::Clockwise => "counter-clockwise",
+impl From<DirectionName> for RotationDirection {
+    fn from(name: DirectionName) -> Self {
+        match name {
+            DirectionName::CounterClockwise => Self::CounterClockwise,
+            DirectionName::Clockwise => Self::Clockwise,
         }
     }
 }
@@ -154,15 +155,10 @@ impl From<MaterialName> for MaterialKind {
 }
 
 impl Arguments {
-    pub(super) const fn direction_name(&self) -> DirectionName {
-        self.direction
-    }
-
-    pub(super) fn direction(&self) -> RotationDirection {
-        match self.direction {
-            DirectionName::CounterClockwise => RotationDirection::CounterClockwise,
-            DirectionName::Clockwise => RotationDirection::Clockwise,
-        }
+    /// The rotation that was given, or what is usual.
+    pub(super) fn rotation(&self) -> TableRotation {
+        let given = self.direction.map(RotationDirection::from);
+        given.map_or_else(TableRotation::default, TableRotation::given)
     }
 
     /// The normals that initialise, and how they are named.
@@ -180,84 +176,86 @@ impl Arguments {
         }
     }
 
+    /// The network of turns, where normals are to be its own.
+    pub(super) fn turn_network(&self) -> Result<Option<TurnNetwork>, NetError> {
+        if !matches!(self.normals(), Some((InitialNormals::Turn, _))) {
+            return Ok(None);
+        }
+        let weights = match &self.turn_network {
+            Some(path) => Weights::read(path)?,
+            None => shipped::turn_weights()?,
+        };
+        TurnNetwork::new(&weights).map(Some)
+    }
+
     /// Normals to start from.
     fn prior(
         &self,
         source: &InitialNormals,
-        turn: &ReadTurn,
-        elevation: Elevation,
-    ) -> Result<TurnPrior, Box<dyn Error>> {
+        observed: &Observed,
+    ) -> Result<Option<TurnPrior>, Box<dyn Error>> {
+        let turn = &observed.turn;
         let (y, shown) = (self.normals_y.into(), &turn.first);
-        let prior: TurnPrior = match source {
-            InitialNormals::Turn => {
-                let network = TurnNetwork::new(&self.turn_weights()?)?;
-                network.predict(&turn.curves, elevation)?.into()
-            }
+        let prior: Option<TurnPrior> = match source {
+            InitialNormals::Turn => observed.prediction.clone().map(TurnPrior::from),
             InitialNormals::Photo(source) => {
-                prior_normals(source, shipped::weights, y, shown, &turn.mask)?.into()
+                Some(prior_normals(source, shipped::weights, y, shown, &turn.mask)?.into())
             }
         };
         // In a light that is known, curves tell the albedo, and in its units.
         if self.light.is_some() || self.probe.is_some() {
-            return Ok(TurnPrior {
+            return Ok(prior.map(|prior| TurnPrior {
                 albedo: None,
                 ..prior
-            });
+            }));
         }
         let seen = prior_albedo(&shipped::weights()?, shown, &turn.mask)?;
-        Ok(prior.with_albedo_of_photographs(seen, &turn.mask))
-    }
-
-    fn turn_weights(&self) -> Result<Weights, NetError> {
-        match &self.turn_network {
-            Some(path) => Weights::read(path),
-            None => shipped::turn_weights(),
-        }
+        Ok(prior.map(|prior| prior.with_albedo_of_photographs(seen, &turn.mask)))
     }
 
     pub(super) fn probe(&self) -> Option<Probe> {
         self.probe.map(|place| Probe {
             place,
             ball: self.probe_ball.map(ProbeBall::from),
-            elevation: self.elevation(),
+            elevation: self.given_elevation().unwrap_or_else(Elevation::assumed),
         })
     }
 
-    fn elevation(&self) -> Elevation {
-        let given = self.elevation.or(self.rim);
-        given.unwrap_or_else(Elevation::assumed)
+    fn given_elevation(&self) -> Option<Elevation> {
+        self.elevation.or(self.rim)
     }
 
     /// The elevation that was given, or else that of the table's rim in the video.
-    fn elevation_by(&self, filmed: Option<&Filmed>) -> Elevation {
+    pub(super) fn elevation(&self, filmed: Option<&Filmed>) -> Elevation {
         let seen = filmed
             .and_then(Filmed::elevation)
             // A light by a ball was measured with the elevation that was known then.
-            .filter(|_| self.elevation.is_none() && self.rim.is_none() && self.probe.is_none());
-        seen.unwrap_or_else(|| self.elevation())
+            .filter(|_| self.probe.is_none());
+        let known = self.given_elevation().or(seen);
+        known.unwrap_or_else(Elevation::assumed)
     }
 
     /// `measured` is the light by the ball.
     pub(super) fn options(
         &self,
-        turn: &ReadTurn,
-        filmed: Option<&Filmed>,
+        observed: &Observed,
         measured: Option<ShLight>,
     ) -> Result<TurnOptions, Box<dyn Error>> {
-        let elevation = self.elevation_by(filmed);
         let prior = self
             .normals()
-            .map(|(source, _)| self.prior(&source, turn, elevation));
-        let strip = filmed.and_then(Filmed::strip).map(|strip| *strip.figures());
+            .map(|(source, _)| self.prior(&source, observed));
         Ok(TurnOptions {
-            elevation,
+            elevation: observed.elevation,
             // Of a table that turns the other way it would be the mirrored azimuth.
-            panorama: strip.filter(|strip| strip.direction == RotationDirection::CounterClockwise),
+            panorama: observed
+                .background()
+                .filter(|strip| strip.direction == RotationDirection::CounterClockwise)
+                .copied(),
             light: match &self.light {
                 Some(path) => Some(read_given_light(path)?),
                 None => measured,
             },
-            prior: prior.transpose()?,
+            prior: prior.transpose()?.flatten(),
             prior_weight: self.normals_weight,
             material: self.material.map(MaterialKind::from),
         })

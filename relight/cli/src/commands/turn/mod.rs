@@ -1,41 +1,38 @@
 //! `relight turn`: a whole turn into normals, albedo, light and their residuals.
 
 mod arguments;
+mod observed;
 mod warnings;
 
 use std::error::Error;
-use std::path::Path;
 use std::time::Instant;
 
 use relight_turn::{
     AssetDestination, DestinationError, Destinations, Filmed, ProbeLight, ReadTurn, TurnError,
-    TurnFigures, TurnFiles, TurnLabels, TurnMaps, TurnSolution, TurnWarning, film, read_curves,
-    session_of, solve_turn,
+    TurnFigures, TurnFiles, TurnLabels, TurnMaps, TurnSolution, TurnWarning, solve_turn,
 };
 use relit_console::{Console, Outcome};
-use relit_data::causes::with_causes;
 use serde_json::json;
 
 pub(crate) use self::arguments::{Arguments, EXAMPLES};
+use self::observed::Observed;
 use self::warnings::{warn, warn_of};
 use crate::commands::CommandResult;
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let start = Instant::now();
     let asset = check_destinations(arguments)?;
-    let turn = read(arguments, console)?;
+    let mut observed = Observed::new(arguments, console)?;
     let read_seconds = start.elapsed().as_secs_f64();
-    let mut filmed = film_surroundings(arguments, &turn, console)?;
-    let measured = filmed.as_mut().map(Filmed::light).transpose()?.flatten();
+    let direction = observed.turn.rotation.direction;
+    let filmed = observed.filmed.as_mut();
+    let measured = filmed.map(Filmed::light).transpose()?.flatten();
     if let Some(measured) = &measured {
-        warn_of(TurnWarning::of_ball(measured), arguments, console);
+        warn_of(TurnWarning::of_ball(measured), direction, console);
     }
     let light_source = light_source(arguments, measured.as_ref());
-    let options = arguments.options(
-        &turn,
-        filmed.as_ref(),
-        measured.map(|measured| measured.light),
-    )?;
+    let options = arguments.options(&observed, measured.map(|measured| measured.light))?;
+    let Observed { turn, filmed, .. } = observed;
     let solution = solve_turn(&turn.curves, &options)?;
     let strip = filmed.as_ref().and_then(Filmed::strip);
     let object = match asset {
@@ -68,14 +65,15 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     );
     // Of a session that nobody named nothing is missed.
     if arguments.session.is_some() || strip.is_some() {
-        warn_of(TurnWarning::of_background(strip), arguments, console);
+        warn_of(TurnWarning::of_background(strip), direction, console);
     }
+    warn_of(TurnWarning::of_rotation(&turn), direction, console);
     // The background, where it was seen, says more.
     if strip.is_none() {
-        warn_of(TurnWarning::of_direction(&solution), arguments, console);
+        warn_of(TurnWarning::of_direction(&solution), direction, console);
     }
     let warnings = TurnWarning::of_solution(&turn, &options, &solution);
-    warn_of(warnings, arguments, console);
+    warn_of(warnings, direction, console);
     let outcome = if solution.is_whole(&turn) {
         Outcome::Whole
     } else {
@@ -100,52 +98,6 @@ fn check_destinations(arguments: &Arguments) -> Result<AssetDestination<'_>, Box
         DestinationError::Labels(_) => format!("--labels {error}").into(),
         DestinationError::AssetPlace { .. } => format!("--asset {error}").into(),
         error => error.into(),
-    })
-}
-
-fn read(arguments: &Arguments, console: Console) -> Result<ReadTurn, TurnError> {
-    let bar = console.progress(0, "frames");
-    let turn = read_curves(&arguments.shard, arguments.direction(), &|done, all| {
-        bar.set_length(all);
-        bar.set_position(done);
-    })?;
-    bar.finish_and_clear();
-    Ok(turn)
-}
-
-/// What the session's video shows, where there is one.
-fn film_surroundings(
-    arguments: &Arguments,
-    turn: &ReadTurn,
-    console: Console,
-) -> Result<Option<Filmed>, TurnError> {
-    let bar = console.progress(0, "frames of the video");
-    let filmed = |path: &Path| {
-        film(path, turn, arguments.probe(), &|done, all| {
-            bar.set_length(all);
-            bar.set_position(done);
-        })
-    };
-    if let Some(path) = &arguments.session {
-        return filmed(path).map(Some);
-    }
-    if arguments.no_session {
-        return Ok(None);
-    }
-    let Some(path) = session_of(&arguments.shard, turn) else {
-        return Ok(None);
-    };
-    // Nobody asked for it: the turn is solved without.
-    Ok(match filmed(&path) {
-        Ok(found) => Some(found),
-        Err(error) => {
-            let text = with_causes(&error);
-            console.warn(&format!(
-                "the session {} beside the shard was left out: {text}",
-                path.display()
-            ));
-            None
-        }
     })
 }
 
