@@ -1,18 +1,14 @@
 //! The arguments of `relight turn`.
 
-use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use relight_core::light::ShLight;
 use relight_nets::{NetError, Weights};
 use relight_turn::{
     Elevation, Filmed, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace,
-    RotationDirection, TableRotation, TurnNetwork, TurnOptions, TurnPrior, prior_albedo,
-    prior_normals, read_given_light,
+    RotationDirection, TableRotation, TurnNetwork, TurnOptions,
 };
 
-use super::observed::Observed;
 use crate::shipped;
 use crate::values::YName;
 
@@ -67,7 +63,7 @@ pub(crate) struct Arguments {
     normals: Option<String>,
     /// Which way y points in these normals.
     #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
-    normals_y: YName,
+    pub(super) normals_y: YName,
     /// How much these normals count beside what the turn says.
     #[arg(long, value_name = "WEIGHT", default_value_t = TurnOptions::default().prior_weight, value_parser = weight)]
     pub(super) normals_weight: f64,
@@ -188,31 +184,6 @@ impl Arguments {
         TurnNetwork::new(&weights).map(Some)
     }
 
-    /// Normals to start from.
-    fn prior(
-        &self,
-        source: &InitialNormals,
-        observed: &Observed,
-    ) -> Result<Option<TurnPrior>, Box<dyn Error>> {
-        let turn = &observed.turn;
-        let (y, shown) = (self.normals_y.into(), &turn.first);
-        let prior: Option<TurnPrior> = match source {
-            InitialNormals::Turn => observed.prediction.clone().map(TurnPrior::from),
-            InitialNormals::Photo(source) => {
-                Some(prior_normals(source, shipped::weights, y, shown, &turn.mask)?.into())
-            }
-        };
-        // In a light that is known, curves tell the albedo, and in its units.
-        if self.light.is_some() || self.probe.is_some() {
-            return Ok(prior.map(|prior| TurnPrior {
-                albedo: None,
-                ..prior
-            }));
-        }
-        let seen = prior_albedo(&shipped::weights()?, shown, &turn.mask)?;
-        Ok(prior.map(|prior| prior.with_albedo_of_photographs(seen, &turn.mask)))
-    }
-
     pub(super) fn probe(&self) -> Option<Probe> {
         self.probe.map(|place| Probe {
             place,
@@ -233,32 +204,6 @@ impl Arguments {
             .filter(|_| self.probe.is_none());
         let known = self.given_elevation().or(seen);
         known.unwrap_or_else(Elevation::assumed)
-    }
-
-    /// `measured` is the light by the ball.
-    pub(super) fn options(
-        &self,
-        observed: &Observed,
-        measured: Option<ShLight>,
-    ) -> Result<TurnOptions, Box<dyn Error>> {
-        let prior = self
-            .normals()
-            .map(|(source, _)| self.prior(&source, observed));
-        Ok(TurnOptions {
-            elevation: observed.elevation,
-            // Of a table that turns the other way it would be the mirrored azimuth.
-            panorama: observed
-                .background()
-                .filter(|strip| strip.direction == RotationDirection::CounterClockwise)
-                .copied(),
-            light: match &self.light {
-                Some(path) => Some(read_given_light(path)?),
-                None => measured,
-            },
-            prior: prior.transpose()?.flatten(),
-            prior_weight: self.normals_weight,
-            material: self.material.map(MaterialKind::from),
-        })
     }
 }
 

@@ -23,7 +23,6 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let start = Instant::now();
     let asset = check_destinations(arguments)?;
     let mut observed = Observed::new(arguments, console)?;
-    let read_seconds = start.elapsed().as_secs_f64();
     let direction = observed.turn.rotation.direction;
     let filmed = observed.filmed.as_mut();
     let measured = filmed.map(Filmed::light).transpose()?.flatten();
@@ -31,8 +30,13 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         warn_of(TurnWarning::of_ball(measured), direction, console);
     }
     let light_source = light_source(arguments, measured.as_ref());
-    let options = arguments.options(&observed, measured.map(|measured| measured.light))?;
-    let Observed { turn, filmed, .. } = observed;
+    let options = observed.options(arguments, measured.map(|measured| measured.light))?;
+    let Observed {
+        turn,
+        filmed,
+        reading_seconds,
+        ..
+    } = observed;
     let solution = solve_turn(&turn.curves, &options)?;
     let strip = filmed.as_ref().and_then(Filmed::strip);
     let object = match asset {
@@ -60,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         arguments,
         &figures,
         &solution,
-        [start.elapsed().as_secs_f64(), read_seconds],
+        [start.elapsed().as_secs_f64(), reading_seconds],
         console,
     );
     // Of a session that nobody named nothing is missed.
@@ -134,11 +138,11 @@ fn say(
     arguments: &Arguments,
     figures: &TurnFigures,
     solution: &TurnSolution,
-    [seconds, read_seconds]: [f64; 2],
+    [seconds, reading_seconds]: [f64; 2],
     console: Console,
 ) {
     let text = format!(
-        "{}: {} frames in {read_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}, material {}",
+        "{}: {} frames in {reading_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees (median), light {}, material {}",
         arguments.output.display(),
         figures.frames(),
         solution.expected_error_deg(),
@@ -153,7 +157,7 @@ fn say(
         "event": "turned",
         "output": arguments.output,
         "seconds": seconds,
-        "reading_seconds": read_seconds,
+        "reading_seconds": reading_seconds,
         "figures": figures,
     });
     console.say(&text, &event);

@@ -1,24 +1,30 @@
 //! A turn as `relight turn` sees it before it is solved: read with the right rotation direction, with what its video shows,
-//! the elevation, and what the network of turns says.
+//! the elevation, and what networks say.
 
 use std::error::Error;
 use std::path::Path;
+use std::time::Instant;
 
+use relight_core::light::ShLight;
 use relight_turn::{
-    Elevation, Filmed, ReadTurn, StripFigures, TableRotation, TurnError, TurnNetwork,
-    TurnPrediction, film, read_curves, session_of,
+    Elevation, Filmed, MaterialKind, ReadTurn, RotationDirection, StripFigures, TableRotation,
+    TurnError, TurnNetwork, TurnOptions, TurnPrediction, TurnPrior, film, prior_albedo,
+    prior_normals, read_curves, read_given_light, session_of,
 };
 use relit_console::Console;
 use relit_data::causes::with_causes;
 
-use super::arguments::Arguments;
+use super::arguments::{Arguments, InitialNormals};
+use crate::shipped;
 
 pub(super) struct Observed {
     pub(super) turn: ReadTurn,
     pub(super) filmed: Option<Filmed>,
-    pub(super) elevation: Elevation,
+    elevation: Elevation,
     /// None where normals come from elsewhere.
-    pub(super) prediction: Option<TurnPrediction>,
+    prediction: Option<TurnPrediction>,
+    /// How long the frames took to read.
+    pub(super) reading_seconds: f64,
 }
 
 impl Observed {
@@ -41,7 +47,9 @@ impl Observed {
         rotation: TableRotation,
         console: Console,
     ) -> Result<Self, Box<dyn Error>> {
+        let start = Instant::now();
         let turn = read_turn(arguments, rotation, console)?;
+        let reading_seconds = start.elapsed().as_secs_f64();
         let filmed = film_surroundings(arguments, &turn, console)?;
         let elevation = arguments.elevation(filmed.as_ref());
         let prediction = network.map(|network| network.predict(&turn.curves, elevation));
@@ -50,13 +58,64 @@ impl Observed {
             filmed,
             elevation,
             prediction: prediction.transpose()?,
+            reading_seconds,
         })
     }
 
     /// What is known of the surroundings by the background of the video.
-    pub(super) fn background(&self) -> Option<&StripFigures> {
+    fn background(&self) -> Option<&StripFigures> {
         let strip = self.filmed.as_ref().and_then(Filmed::strip);
         strip.map(|strip| strip.figures())
+    }
+
+    /// What is known of the turn beforehand; `measured` is the light by the ball.
+    pub(super) fn options(
+        &self,
+        arguments: &Arguments,
+        measured: Option<ShLight>,
+    ) -> Result<TurnOptions, Box<dyn Error>> {
+        let normals = arguments.normals();
+        let prior = normals.map(|(source, _)| self.prior(&source, arguments));
+        Ok(TurnOptions {
+            elevation: self.elevation,
+            // Of a table that turns the other way it would be the mirrored azimuth.
+            panorama: self
+                .background()
+                .filter(|strip| strip.direction == RotationDirection::CounterClockwise)
+                .copied(),
+            light: match &arguments.light {
+                Some(path) => Some(read_given_light(path)?),
+                None => measured,
+            },
+            prior: prior.transpose()?.flatten(),
+            prior_weight: arguments.normals_weight,
+            material: arguments.material.map(MaterialKind::from),
+        })
+    }
+
+    /// Normals to start from.
+    fn prior(
+        &self,
+        source: &InitialNormals,
+        arguments: &Arguments,
+    ) -> Result<Option<TurnPrior>, Box<dyn Error>> {
+        let (shown, mask) = (&self.turn.first, &self.turn.mask);
+        let prior: Option<TurnPrior> = match source {
+            InitialNormals::Turn => self.prediction.clone().map(TurnPrior::from),
+            InitialNormals::Photo(source) => {
+                let y = arguments.normals_y.into();
+                Some(prior_normals(source, shipped::weights, y, shown, mask)?.into())
+            }
+        };
+        // In a light that is known, curves tell the albedo, and in its units.
+        if arguments.light.is_some() || arguments.probe.is_some() {
+            return Ok(prior.map(|prior| TurnPrior {
+                albedo: None,
+                ..prior
+            }));
+        }
+        let seen = prior_albedo(&shipped::weights()?, shown, mask)?;
+        Ok(prior.map(|prior| prior.with_albedo_of_photographs(seen, mask)))
     }
 
     fn rotation(&self) -> TableRotation {
