@@ -151,24 +151,33 @@ impl DecompositionFiles<'_> {
             diffuse: diffuse?,
             specular: specular?,
         };
-        found.light.write(&path("light.txt"))?;
-        ball(found)
-            .encode::<Srgb>()
-            .write_png(&path("light-sphere.png"))?;
-        let panorama = Panorama::of_light(&found.light, PANORAMA);
-        let radiance = panorama
-            .image()
-            .planes()
-            .clone()
-            .map(|value| value.max(0.0));
-        Rgb::<Linear>::new(radiance).write_exr(&path("light-panorama.exr"))?;
-        write_png(&path("contact.png"), &self.sheet()?, Depth::Eight)?;
+        let light = || self.write_light(folder);
+        let sheet = || {
+            write_png(&path("contact.png"), &self.sheet()?, Depth::Eight)?;
+            Ok::<_, DecomposeError>(())
+        };
+        let (light, sheet) = parallel::join(light, sheet);
+        light?;
+        sheet?;
         let figures = self.figures(white);
         let mut json = serde_json::to_vec_pretty(&figures).unwrap_or_default();
         json.push(b'\n');
         let file = path(FIGURES);
         write_whole(&file, &json).map_err(DecomposeError::write(&file))?;
         Ok(figures)
+    }
+
+    /// The light, as coefficients, on a ball and all around.
+    fn write_light(&self, folder: &Path) -> Result<(), DecomposeError> {
+        let light = &self.found.light;
+        light.write(&folder.join("light.txt"))?;
+        ball(self.found)
+            .encode::<Srgb>()
+            .write_png(&folder.join("light-sphere.png"))?;
+        let panorama = Panorama::of_light(light, PANORAMA).image().planes().clone();
+        Rgb::<Linear>::new(panorama.map(|value| value.max(0.0)))
+            .write_exr(&folder.join("light-panorama.exr"))?;
+        Ok(())
     }
 
     fn write_mask(&self, path: &Path) -> Result<(), ImageError> {
