@@ -95,6 +95,19 @@ fn our_network_answers_as_in_pytorch() {
 }
 
 #[test]
+fn the_answer_is_the_same_on_any_number_of_threads() {
+    let graph = decomposer();
+    let weights = Weights::initial(&graph, 3);
+    let inference = Inference::new(&graph, &weights, (SIDE, SIDE)).unwrap();
+    let input = picture(graph.input_channels());
+    let [one, other] = [1, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| inference.run(&input)).unwrap()
+    });
+    assert!(one == other);
+}
+
+#[test]
 fn state_dicts_are_read_as_pytorch_saved_them() {
     let plain = Weights::read(&fixture("plain.pth")).unwrap();
     assert_eq!(
