@@ -117,9 +117,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         .as_ref()
         .and_then(|prior| prior.albedo.as_ref())
     {
-        Some(expected) if solver.model.material == MaterialKind::Diffuse => {
-            toward_expected(curves, &albedo, expected, &expected_errors)
-        }
+        Some(expected) => toward_expected(curves, &albedo, expected, &expected_errors),
         _ => albedo,
     };
     Ok(TurnSolution {
