@@ -52,28 +52,32 @@ setup-train: ## Install libtorch, which relight's training is built with (544 MB
 # The runs of the network of relight turn, each from the weights of the one before. DATA holds the folders meshes,
 # panoramas and held of what relight/cli/weights/README.md names; a run that was stopped goes on.
 TURN_STAGES := turn turn-2 turn-3 turn-4 turn-5 turn-6
-# Of the last run, whose mean ships.
-TURN_SEEDS := 31 32 33
+# Then each of these runs is the mean of several seeds.
+TURN_SEEDS := turn-7:31,32,33 turn-8:51,52,53
 RUNS ?= $(CURDIR)/$(TARGET)/train-turn
 
 train-turn: setup-train ## Train the network of relight turn, all of its runs, from the folder DATA into RUNS
 	@[[ -d "$(DATA)/panoramas" ]] || { echo "say where the data is: make train-turn DATA=FOLDER"; exit 1; }
 	cargo build --locked --release -p relight --features train
-	@program="$$(realpath $(TARGET)/release/relight)"; weights=(); mkdir -p "$(RUNS)"; runs="$$(realpath "$(RUNS)")"; \
+	@program="$$(realpath $(TARGET)/release/relight)"; begin=(); mkdir -p "$(RUNS)"; runs="$$(realpath "$(RUNS)")"; \
 	cd "$(DATA)"; \
+	run() { \
+	    "$$program" train turn --settings "$$1" "$${begin[@]}" --views "$$runs/views" --resume -o "$$2"; \
+	}; \
 	for stage in $(TURN_STAGES); do \
-	    "$$program" train turn --settings "$(CURDIR)/relight/cli/weights/$$stage.toml" "$${weights[@]}" \
-	        --views "$$runs/views" --resume -o "$$runs/$$stage" || exit; \
-	    weights=(--weights "$$runs/$$stage/turn-net.safetensors"); \
+	    run "$(CURDIR)/relight/cli/weights/$$stage.toml" "$$runs/$$stage" || exit; \
+	    begin=(--weights "$$runs/$$stage/turn-net.safetensors"); \
 	done; \
-	last=(); \
-	for seed in $(TURN_SEEDS); do \
-	    sed "s/^seed = .*/seed = $$seed/" "$(CURDIR)/relight/cli/weights/turn-7.toml" > "$$runs/turn-7-$$seed.toml"; \
-	    "$$program" train turn --settings "$$runs/turn-7-$$seed.toml" "$${weights[@]}" \
-	        --views "$$runs/views" --resume -o "$$runs/turn-7-$$seed" || exit; \
-	    last+=("$$runs/turn-7-$$seed/turn-net.safetensors"); \
-	done; \
-	"$$program" weights export "$${last[@]}" --net turn-net --half -o "$$runs/turn-net.safetensors"
+	for stage in $(TURN_SEEDS); do \
+	    name="$${stage%%:*}"; seeds=(); \
+	    for seed in $$(tr , ' ' <<< "$${stage#*:}"); do \
+	        sed "s/^seed = .*/seed = $$seed/" "$(CURDIR)/relight/cli/weights/$$name.toml" > "$$runs/$$name-$$seed.toml"; \
+	        run "$$runs/$$name-$$seed.toml" "$$runs/$$name-$$seed" || exit; \
+	        seeds+=("$$runs/$$name-$$seed/turn-net.safetensors"); \
+	    done; \
+	    "$$program" weights export "$${seeds[@]}" --net turn-net --half -o "$$runs/$$name.safetensors" || exit; \
+	    begin=(--weights "$$runs/$$name.safetensors"); \
+	done
 
 # Cargo builds the programs before it runs the first test: those of the package relit-tests run several.
 test: setup ## Run all tests

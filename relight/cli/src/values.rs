@@ -5,6 +5,7 @@ use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_photo::decompose::SpecularGate;
 use relight_photo::insert::WhiteBalance;
+use relight_turn::RotationDirection;
 
 /// How integers in files of colour are encoded.
 #[derive(Clone, Copy, ValueEnum)]
@@ -80,6 +81,24 @@ impl From<GateName> for SpecularGate {
             GateName::Auto => Self::Auto,
             GateName::On => Self::On,
             GateName::Off => Self::Off,
+        }
+    }
+}
+
+/// Which way a table turns as its angle grows, seen from above.
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum DirectionName {
+    /// The background moves to the right.
+    CounterClockwise,
+    /// The background moves to the left.
+    Clockwise,
+}
+
+impl From<DirectionName> for RotationDirection {
+    fn from(name: DirectionName) -> Self {
+        match name {
+            DirectionName::CounterClockwise => Self::CounterClockwise,
+            DirectionName::Clockwise => Self::Clockwise,
         }
     }
 }

@@ -104,11 +104,12 @@ fn clear_upper_halves() {
     }
 }
 
-/// Other processors have no such halves.
+/// No other processor has AVX in use.
 #[cfg(not(target_arch = "x86_64"))]
 fn clear_upper_halves() {}
 
-/// The same on the other threads, each as soon as it has nothing else to do.
+/// The same on the other threads, each as soon as it has nothing else to do: until then what they took over between two of a
+/// network's multiplications is slower.
 #[cfg(feature = "threads")]
 fn clear_upper_halves_elsewhere() {
     rayon::spawn_broadcast(|_| clear_upper_halves());

@@ -16,12 +16,14 @@ use relight_export::layers::to_layers;
 use relight_export::mesh::{MeshShape, ObjectMesh};
 use relight_export::source::read_object;
 use relight_export::{ExportError, blender};
+use relight_turn::RotationDirection;
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde::Deserialize;
 use serde_json::json;
 
 use crate::commands::CommandResult;
+use crate::values::DirectionName;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -63,8 +65,8 @@ pub(crate) struct Arguments {
     /// With --frames: the folder of relight turn that has the turn's light, for lights.lp.
     #[arg(long, value_name = "DIR", requires = "frames")]
     lamps: Option<PathBuf>,
-    /// With --lamps: the rotation direction of the table, seen from above, as its angle grows [default: that with which the
-    /// turn was solved].
+    /// With --lamps, for folders of before light.json said it: the rotation direction of the table, seen from above, as its
+    /// angle grows.
     #[arg(long, value_enum, requires = "lamps")]
     direction: Option<DirectionName>,
 }
@@ -75,16 +77,6 @@ enum ShapeName {
     Relief,
     /// The picture's rectangle.
     Plane,
-}
-
-#[derive(Clone, Copy, Default, ValueEnum, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum DirectionName {
-    /// The background moves to the right.
-    #[default]
-    CounterClockwise,
-    /// The background moves to the left.
-    Clockwise,
 }
 
 /// The kind of file that an object is written into.
@@ -181,14 +173,13 @@ fn run_frames(arguments: &Arguments, frames: u32, console: Console) -> CommandRe
 #[derive(Deserialize)]
 struct LightFigures {
     elevation: LightElevation,
-    /// Files from before it was told have none.
-    #[serde(default)]
-    rotation: LightRotation,
+    /// None in files from before it was told.
+    rotation: Option<LightRotation>,
 }
 
-#[derive(Default, Deserialize)]
+#[derive(Deserialize)]
 struct LightRotation {
-    direction: DirectionName,
+    direction: RotationDirection,
 }
 
 #[derive(Deserialize)]
@@ -245,9 +236,25 @@ fn lamp(folder: &Path, direction: Option<DirectionName>) -> Result<TurnLamp, Box
     let json = fs::read(&path).map_err(|error| wrong(error.to_string()))?;
     let figures: LightFigures =
         serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
-    let turn = match direction.unwrap_or(figures.rotation.direction) {
-        DirectionName::CounterClockwise => TableTurn::CounterClockwise,
-        DirectionName::Clockwise => TableTurn::Clockwise,
+    let solved = figures.rotation.map(|rotation| rotation.direction);
+    let given = direction.map(RotationDirection::from);
+    let direction = match (solved, given) {
+        (Some(solved), Some(given)) if solved != given => {
+            return Err(wrong(format!(
+                "the turn was solved as {solved}, and its light is mirrored in the other direction: solve it again with \
+                 relight turn --direction {given}"
+            ))
+            .into());
+        }
+        (Some(direction), _) | (None, Some(direction)) => direction,
+        (None, None) => {
+            let reason = "it does not say which way the table turns: give --direction";
+            return Err(wrong(reason.to_owned()).into());
+        }
+    };
+    let turn = match direction {
+        RotationDirection::CounterClockwise => TableTurn::CounterClockwise,
+        RotationDirection::Clockwise => TableTurn::Clockwise,
     };
     Ok(TurnLamp::new(
         &light,

@@ -37,7 +37,7 @@ struct FrameAngle {
 }
 
 impl TableTiming {
-    /// A turn's timing; none where too few frames are left.
+    /// A turn's timing; none where its equations have no solution.
     pub(super) fn draw(random: &mut Random) -> Option<Self> {
         let angles = frame_angles(random);
         Self::of(&angles)

@@ -62,6 +62,35 @@ mod tests {
         }
     }
 
+    fn background(direction: RotationDirection) -> StripFigures {
+        StripFigures {
+            direction,
+            field_deg: 40.0,
+            correlation: 0.9,
+            bright_azimuth_deg: 0.0,
+            bright_part: 0.1,
+        }
+    }
+
+    #[test]
+    fn the_background_says_more_than_the_network() {
+        let mut turn = read(&ball(), &environment());
+        let network = expecting(10.0, 20.0);
+        let (right, wrong) = (
+            RotationDirection::CounterClockwise,
+            RotationDirection::Clockwise,
+        );
+        for (seen, expected) in [(right, right), (wrong, wrong)] {
+            let found = TableRotation::of_turn(&turn, Some(&background(seen)), Some(&network));
+            assert_eq!(found.direction, expected);
+            assert_eq!(found.source, RotationSource::Background);
+        }
+        // With its angles negated it moves as those of a table that turns counter-clockwise.
+        turn.rotation = TableRotation::given(wrong);
+        let found = TableRotation::of_turn(&turn, Some(&background(right)), None);
+        assert_eq!(found, TableRotation::given(wrong));
+    }
+
     #[test]
     fn what_was_given_stands_and_else_the_network_chooses_where_it_is_sure() {
         let mut turn = read(&ball(), &environment());

@@ -118,7 +118,7 @@ pub fn solve_turn(curves: &TurnCurves, options: &TurnOptions) -> Result<TurnSolu
         .and_then(|prior| prior.albedo.as_ref())
     {
         Some(expected) => toward_expected(curves, &albedo, expected, &expected_errors),
-        _ => albedo,
+        None => albedo,
     };
     Ok(TurnSolution {
         has_prior,

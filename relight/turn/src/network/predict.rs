@@ -51,8 +51,8 @@ pub struct PhaseFigure {
     pub expected_error_deg: f32,
 }
 
-/// Largest part of the expected error in the given direction with which the other one is taken to be right. Measured: on
-/// eight synthetic turns the wrong direction has 1.13 to 1.9 times the expected error of the right one.
+/// Largest part of one direction's expected error with which the other direction is taken to be right. Measured: on 40
+/// synthetic turns the wrong direction has 0.99 to 2.8 times the expected error of the right one (docs/results/turns.md).
 const CLEARLY: f32 = 0.9;
 
 impl HypothesisFigures {
@@ -60,7 +60,7 @@ impl HypothesisFigures {
     #[must_use]
     pub fn expected_error_deg(&self) -> f32 {
         let taken = self.phases.iter().find(|figure| figure.phase == self.phase);
-        taken.map_or(0.0, |figure| figure.expected_error_deg)
+        taken.map_or(f32::INFINITY, |figure| figure.expected_error_deg)
     }
 
     /// Whether the table clearly looks as if it turned this way.

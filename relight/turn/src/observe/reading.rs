@@ -12,7 +12,7 @@ use relight_reader::{
 };
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::TurnError;
 use crate::observe::curves::{CurveBuilder, TurnCurves};
@@ -26,7 +26,7 @@ struct ReadingParameters {
 const PARAMETERS: ReadingParameters = ReadingParameters { batch: 12 };
 
 /// Which way the table turns as its angle grows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RotationDirection {
     /// Counter-clockwise, seen from above: the background moves to the right.

@@ -33,6 +33,9 @@ struct StripParameters {
     least_field_deg: usize,
     /// Correlation from which the columns see the same surroundings, 0 to 1. By hand.
     least_correlation: f64,
+    /// By how much that correlation is above the best one of a table that turns the other way. By hand: light that changes
+    /// on both sides at once, as under clouds, is as like itself either way.
+    least_margin: f64,
 }
 
 const PARAMETERS: StripParameters = StripParameters {
@@ -45,6 +48,7 @@ const PARAMETERS: StripParameters = StripParameters {
     most_field_deg: 100,
     least_field_deg: 4,
     least_correlation: 0.5,
+    least_margin: 0.1,
 };
 
 /// Gathers the background of a turn's frames, in any order.
@@ -78,7 +82,7 @@ pub struct PanoramaStrip {
 /// The figures of the strip.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StripFigures {
-    /// Which way the table turns as its angle grows.
+    /// Which way the table turns as the angle grows with which the strip was made.
     #[serde(rename = "sense")]
     pub direction: RotationDirection,
     /// The angle between the two columns, degrees.
@@ -138,16 +142,20 @@ impl StripBuilder {
         Ok(())
     }
 
-    /// The strip; none where the two columns do not show the same surroundings, or frames are missing.
+    /// The strip; none where the two columns do not show the same surroundings one clearly before the other, or frames are
+    /// missing.
     #[must_use]
     pub fn finish(self) -> Option<PanoramaStrip> {
         let rows = self.rows;
         let [left, right] = &self.sides;
         let (left, right) = (left.filled(rows)?, right.filled(rows)?);
-        let (lag, correlation) = best_lag(&grey(&left, rows), &grey(&right, rows))?;
-        if correlation < PARAMETERS.least_correlation {
+        let found = Lag::find(&grey(&left, rows), &grey(&right, rows))?;
+        if !found.is_clear() {
             return None;
         }
+        let Lag {
+            lag, correlation, ..
+        } = found;
         let direction = if lag > 0 {
             RotationDirection::CounterClockwise
         } else {
@@ -284,32 +292,67 @@ fn grey(light: &[[f32; 3]], rows: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// By how many coarse columns the second view has to be turned to be most like the first, and how like it is then.
-fn best_lag(first: &[Vec<f64>], second: &[Vec<f64>]) -> Option<(isize, f64)> {
-    let count = PARAMETERS.columns / PARAMETERS.coarse_columns;
-    let a_degree = count as f64 / 360.0;
-    let energy = |rows: &[Vec<f64>]| rows.iter().flatten().map(|v| v * v).sum::<f64>();
-    let unit = (energy(first) * energy(second)).sqrt();
-    if unit <= 0.0 {
-        return None;
+/// By how many coarse columns the second view has to be turned to be most like the first.
+#[derive(Debug, Clone, Copy)]
+struct Lag {
+    lag: isize,
+    /// How like it is then.
+    correlation: f64,
+    /// How like it is at best where it is turned the other way.
+    other: f64,
+}
+
+impl Lag {
+    fn find(first: &[Vec<f64>], second: &[Vec<f64>]) -> Option<Self> {
+        let count = PARAMETERS.columns / PARAMETERS.coarse_columns;
+        let energy = |rows: &[Vec<f64>]| rows.iter().flatten().map(|v| v * v).sum::<f64>();
+        let unit = (energy(first) * energy(second)).sqrt();
+        if unit <= 0.0 {
+            return None;
+        }
+        let like = |lag: isize| {
+            let turn = lag.rem_euclid(count as isize) as usize;
+            let rows = first.iter().zip(second);
+            let sum: f64 = rows
+                .map(|(a, b)| {
+                    let turned = b[turn..].iter().chain(&b[..turn]);
+                    a.iter().zip(turned).map(|(a, b)| a * b).sum::<f64>()
+                })
+                .sum();
+            (lag, sum / unit)
+        };
+        let [least, most] = Self::range();
+        let best = |sign: isize| {
+            let lags = (least..=most).map(|lag| like(sign * lag));
+            lags.max_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        let (one, other) = (best(1)?, best(-1)?);
+        let (best, other) = if one.1 >= other.1 {
+            (one, other)
+        } else {
+            (other, one)
+        };
+        Some(Self {
+            lag: best.0,
+            correlation: best.1,
+            other: other.1,
+        })
     }
-    let least = (PARAMETERS.least_field_deg as f64 * a_degree) as isize;
-    let most = (PARAMETERS.most_field_deg as f64 * a_degree) as isize;
-    let like = |lag: isize| {
-        let turn = lag.rem_euclid(count as isize) as usize;
-        let rows = first.iter().zip(second);
-        let sum: f64 = rows
-            .map(|(a, b)| {
-                let turned = b[turn..].iter().chain(&b[..turn]);
-                a.iter().zip(turned).map(|(a, b)| a * b).sum::<f64>()
-            })
-            .sum();
-        (lag, sum / unit)
-    };
-    (least..=most)
-        .flat_map(|lag| [lag, -lag])
-        .map(like)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
+
+    /// The least and the largest lag that is looked at.
+    fn range() -> [isize; 2] {
+        let a_degree = (PARAMETERS.columns / PARAMETERS.coarse_columns) as f64 / 360.0;
+        [PARAMETERS.least_field_deg, PARAMETERS.most_field_deg]
+            .map(|degrees| (degrees as f64 * a_degree) as isize)
+    }
+
+    /// Whether the views are of the same surroundings, and one of them is clearly the earlier one. At the ends of the range
+    /// the best lag may lie beyond.
+    fn is_clear(self) -> bool {
+        self.correlation >= PARAMETERS.least_correlation
+            && self.correlation >= self.other + PARAMETERS.least_margin
+            && !Self::range().contains(&self.lag.abs())
+    }
 }
 
 /// Azimuth and relative size of the first harmonic of what the camera sees over the table's angle.
@@ -396,6 +439,18 @@ mod tests {
             let right = (brightest.unwrap() as f64 - 720.0) / 4.0;
             assert!((right - 50.0).abs() < 2.0, "{right}");
         }
+    }
+
+    #[test]
+    fn light_that_changes_everywhere_at_once_tells_no_direction() {
+        let extent = Extent::new(100, 20);
+        let mut builder = StripBuilder::new(extent).unwrap();
+        for k in 0..360 {
+            let cloud = (f64::from(k).to_radians().sin() * 0.1 + 0.4) as f32;
+            let frame = Rgb::<Srgb>::new(Planes::filled(extent, [cloud; 3]));
+            builder.push(f64::from(k), &frame).unwrap();
+        }
+        assert!(builder.finish().is_none());
     }
 
     #[test]

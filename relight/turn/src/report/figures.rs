@@ -13,7 +13,7 @@ use crate::model::material::MaterialKind;
 use crate::network::predict::HypothesisFigures;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::exposure::ExposureStep;
-use crate::observe::reading::{ReadTurn, TableRotation};
+use crate::observe::reading::{ReadTurn, RotationDirection, TableRotation};
 use crate::observe::strip::{PanoramaStrip, StripFigures};
 use crate::report::maps::AngleFigure;
 
@@ -79,10 +79,14 @@ pub(crate) struct FigurePanorama {
 }
 
 impl FigurePanorama {
-    pub(crate) fn new(strip: &PanoramaStrip, light: &TableLight) -> Self {
-        let strip = *strip.figures();
+    /// Of a strip that was made with a rotation; it tells the direction of the shard's own angle.
+    pub(crate) fn new(strip: &PanoramaStrip, light: &TableLight, rotation: TableRotation) -> Self {
+        let mut strip = *strip.figures();
         let light_azimuth_deg = light.bright_azimuth_deg();
         let apart = (strip.bright_azimuth_deg - light_azimuth_deg).rem_euclid(360.0);
+        if rotation.direction == RotationDirection::Clockwise {
+            strip.direction = strip.direction.other();
+        }
         Self {
             strip,
             light_azimuth_deg,

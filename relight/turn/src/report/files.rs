@@ -181,7 +181,7 @@ impl TurnFiles<'_> {
             exposure_steps: turn.curves.exposure_steps().to_vec(),
             panorama: self
                 .strip
-                .map(|strip| FigurePanorama::new(strip, solution.light())),
+                .map(|strip| FigurePanorama::new(strip, solution.light(), turn.rotation)),
             white,
             over_angle: self.maps.over_angle.clone(),
         })

@@ -38,23 +38,31 @@ pub enum TurnWarning {
         residual: f64,
     },
     /// Nobody said which way the table turns, and it is not the usual way.
-    #[error("the table is taken to turn {direction}, seen from above: {}", match by {
-        RotationSource::Background => "so the background of the video moves",
-        RotationSource::Network => "so the network of turns is clearly surer of its normals",
-        RotationSource::Assumed | RotationSource::Given => "so it was said",
+    #[error("the table is taken to turn {direction}, seen from above: {}", if *by_background {
+        "the background of the video moves that way"
+    } else {
+        "that way the network of turns expects clearly smaller errors"
     })]
     TakenRotation {
         /// Which way.
         direction: RotationDirection,
-        /// What says so.
-        by: RotationSource,
+        /// Whether the background says so, and not the network.
+        by_background: bool,
     },
-    /// The background moves against the given rotation direction.
+    /// Nothing says which way the table turns.
+    #[error(
+        "which way the table turns is not known: it is taken to turn {direction}, seen from above"
+    )]
+    AssumedRotation {
+        /// What is usual.
+        direction: RotationDirection,
+    },
+    /// The background moves against the rotation direction that was given.
     #[error("the background moves the other way: the normals are mirrored")]
     BackgroundMovesOtherWay,
     /// The sides of the picture do not show the same surroundings one after the other.
     #[error(
-        "the two sides of the picture do not show the same surroundings: there is no room.png, and the rotation direction is not checked"
+        "the two sides of the picture do not show the same surroundings: there is no room.png, and the video does not tell the rotation direction"
     )]
     NoPanoramaStrip,
     /// The network of turns is surer of the turn in the other rotation direction.
@@ -121,9 +129,7 @@ pub enum TurnWarning {
     )]
     PriorLeftOut,
     /// The object is taken for metal in unknown light.
-    #[error(
-        "the object is taken for metal, which in unknown light can be wrong: do not use its albedo"
-    )]
+    #[error("the object is taken for metal, which in unknown light can be wrong")]
     MetalInUnknownLight,
 }
 
@@ -141,16 +147,23 @@ impl TurnWarning {
         kind.into_iter().chain(residual).collect()
     }
 
-    /// That of a rotation that was found and is not the usual one.
+    /// That of a rotation that nobody said: where it was found and is not the usual one, or where nothing tells it.
     #[must_use]
     pub fn of_rotation(turn: &ReadTurn) -> Option<Self> {
         let TableRotation { direction, source } = turn.rotation;
-        let is_found = matches!(source, RotationSource::Background | RotationSource::Network);
-        let is_usual = direction == RotationDirection::default();
-        (is_found && !is_usual).then_some(Self::TakenRotation {
-            direction,
-            by: source,
-        })
+        let found = |by_background| {
+            let is_usual = direction == RotationDirection::default();
+            (!is_usual).then_some(Self::TakenRotation {
+                direction,
+                by_background,
+            })
+        };
+        match source {
+            RotationSource::Background => found(true),
+            RotationSource::Network => found(false),
+            RotationSource::Assumed => Some(Self::AssumedRotation { direction }),
+            RotationSource::Given => None,
+        }
     }
 
     /// That of the background of a video that was read.
@@ -164,15 +177,20 @@ impl TurnWarning {
         }
     }
 
-    /// That of the rotation direction, where no background says more.
+    /// Where the network of turns speaks against the direction that was taken, or, where neither it nor a background says
+    /// anything, the residuals do.
     #[must_use]
-    pub fn of_direction(solution: &TurnSolution) -> Option<Self> {
+    pub fn of_direction(turn: &ReadTurn, solution: &TurnSolution) -> Option<Self> {
         let network = solution.hypotheses();
         if let Some(figures) = network.filter(|figures| figures.is_direction_doubted()) {
             return Some(Self::SurerInOtherDirection {
                 expected_deg: figures.expected_error_deg(),
                 other_deg: figures.other_direction_deg,
             });
+        }
+        let source = turn.rotation.source;
+        if matches!(source, RotationSource::Background | RotationSource::Network) {
+            return None;
         }
         let figure = solution.direction().filter(|figure| figure.is_doubted())?;
         Some(Self::OtherDirection {

@@ -10,7 +10,7 @@ use relight_turn::{
 };
 
 use crate::shipped;
-use crate::values::YName;
+use crate::values::{DirectionName, YName};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -41,8 +41,8 @@ pub(crate) struct Arguments {
     /// (nine lines of red, green and blue, or more, up to order 6), or a panorama (.hdr, .exr).
     #[arg(long, value_name = "FILE")]
     pub(super) light: Option<PathBuf>,
-    /// The session from which the shard was made, or its video: to see the surroundings (room.png), the table's rim, and
-    /// the ball of --probe. Needs the program ffmpeg [default: the session that the shard names, where it lies beside the
+    /// The session from which the shard was made, or its video: to see the surroundings (room.png), which way the table turns,
+    /// the table's rim, and the ball of --probe. Needs the program ffmpeg [default: the session that the shard names, where it lies beside the
     /// shard or its folder, or in sessions there].
     #[arg(long, value_name = "PATH")]
     pub(super) session: Option<PathBuf>,
@@ -97,23 +97,6 @@ pub(super) enum InitialNormals {
     Turn,
     /// What sees single frames, or a file.
     Photo(NormalsSource),
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum DirectionName {
-    /// The background moves to the right.
-    CounterClockwise,
-    /// The background moves to the left.
-    Clockwise,
-}
-
-impl From<DirectionName> for RotationDirection {
-    fn from(name: DirectionName) -> Self {
-        match name {
-            DirectionName::CounterClockwise => Self::CounterClockwise,
-            DirectionName::Clockwise => Self::Clockwise,
-        }
-    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -72,10 +72,8 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         warn_of(TurnWarning::of_background(strip), direction, console);
     }
     warn_of(TurnWarning::of_rotation(&turn), direction, console);
-    // The background, where it was seen, says more.
-    if strip.is_none() {
-        warn_of(TurnWarning::of_direction(&solution), direction, console);
-    }
+    let doubt = TurnWarning::of_direction(&turn, &solution);
+    warn_of(doubt, direction, console);
     let warnings = TurnWarning::of_solution(&turn, &options, &solution);
     warn_of(warnings, direction, console);
     let outcome = if solution.is_whole(&turn) {

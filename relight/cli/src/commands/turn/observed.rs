@@ -31,26 +31,33 @@ impl Observed {
     /// Reads the turn, and again where it turns the other way than is usual and nobody said which.
     pub(super) fn new(arguments: &Arguments, console: Console) -> Result<Self, Box<dyn Error>> {
         let network = arguments.turn_network()?;
-        let read = |rotation| Self::read(arguments, network.as_ref(), rotation, console);
-        let mut seen = read(arguments.rotation())?;
+        let read = |rotation, with_video| {
+            Self::read(arguments, network.as_ref(), (rotation, with_video), console)
+        };
+        let mut seen = read(arguments.rotation(), true)?;
         let rotation = seen.rotation();
         if rotation.direction == seen.turn.rotation.direction {
             seen.turn.rotation = rotation;
             return Ok(seen);
         }
-        read(rotation)
+        // A video that could not be read was told of.
+        read(rotation, seen.filmed.is_some())
     }
 
     fn read(
         arguments: &Arguments,
         network: Option<&TurnNetwork>,
-        rotation: TableRotation,
+        (rotation, with_video): (TableRotation, bool),
         console: Console,
     ) -> Result<Self, Box<dyn Error>> {
         let start = Instant::now();
         let turn = read_turn(arguments, rotation, console)?;
         let reading_seconds = start.elapsed().as_secs_f64();
-        let filmed = film_surroundings(arguments, &turn, console)?;
+        let filmed = if with_video {
+            film_surroundings(arguments, &turn, console)?
+        } else {
+            None
+        };
         let elevation = arguments.elevation(filmed.as_ref());
         let prediction = network.map(|network| network.predict(&turn.curves, elevation));
         Ok(Self {

@@ -29,6 +29,9 @@ fn advice(warning: &TurnWarning, direction: RotationDirection) -> Option<String>
             format!(": try --direction {other}")
         }
         TurnWarning::AssumedElevation { .. } => ": give --elevation or --rim".to_owned(),
+        TurnWarning::AssumedRotation { .. } => {
+            ": look at it from above as it turns, and give --direction".to_owned()
+        }
         TurnWarning::TakenRotation { direction, .. } => {
             format!(
                 "; give --direction {direction} if that is right, else {}",
@@ -37,7 +40,7 @@ fn advice(warning: &TurnWarning, direction: RotationDirection) -> Option<String>
         }
         TurnWarning::OtherMaterial { material, .. } => format!(": try --material {material}"),
         TurnWarning::MetalInUnknownLight => {
-            ", and give --material diffuse if it is not of metal".to_owned()
+            ": give --material metal if that is right, else diffuse".to_owned()
         }
         _ => return None,
     })
