@@ -16,7 +16,7 @@ use super::terms::LossTerms;
 use super::turn_samples::{TurnBatch, TurnViews};
 use relight_nets::{ALBEDO_PARAMETERS, LOG_MEANS, Weights, turn_network};
 use relight_reader::Rank;
-use relight_synth::stream;
+use relight_synth::{DrawnTurn, stream};
 
 /// What the expected error counts beside the normals.
 const EXPECTED_ERROR: f64 = 0.05;
@@ -169,6 +169,10 @@ impl TrainingTask for TurnNetworkTask {
 
     fn differing_setting(&self, other: &str) -> Option<String> {
         first_difference(&self.settings, other)
+    }
+
+    fn inputs(&self) -> Result<String, TrainError> {
+        Ok(format!("turns of recipe {}\n", DrawnTurn::RECIPE))
     }
 
     fn learners(&mut self) -> Vec<&mut Learner> {

@@ -51,6 +51,9 @@ pub struct DrawnTurn {
 }
 
 impl DrawnTurn {
+    /// How turns are drawn: another number draws another turn of a seed.
+    pub const RECIPE: u32 = 2;
+
     /// The turn of a seed: the view in a random material and room.
     #[must_use]
     pub fn draw(view: &RadianceTransfer, rooms: &Rooms, seed: u64) -> Self {
