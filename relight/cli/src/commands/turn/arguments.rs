@@ -41,9 +41,9 @@ pub(crate) struct Arguments {
     /// (nine lines of red, green and blue, or more, up to order 6), or a panorama (.hdr, .exr).
     #[arg(long, value_name = "FILE")]
     pub(super) light: Option<PathBuf>,
-    /// The session from which the shard was made, or its video: to see the surroundings (room.png), which way the table turns,
-    /// the table's rim, and the ball of --probe. Needs the program ffmpeg [default: the session that the shard names, where it lies beside the
-    /// shard or its folder, or in sessions there].
+    /// The session from which the shard was made, or its video: to see the surroundings (room.png), which way the table
+    /// turns, the table's rim, and the ball of --probe. Needs the program ffmpeg [default: the session that the shard
+    /// names, where it lies beside the shard or its folder, or in sessions there].
     #[arg(long, value_name = "PATH")]
     pub(super) session: Option<PathBuf>,
     /// Do not look for the session.
