@@ -6,11 +6,18 @@ use serde::{Deserialize, Serialize};
 use super::geometry::GBuffer;
 use super::library::Library;
 use super::lighting::{BlinnPhong, Material};
-use super::paint::{AlbedoKind, Paint, Relief};
+use super::mesh::OwnSurface;
+use super::paint::{AlbedoKind, Paint, Relief, possible};
 use super::random::Random;
 
 /// Part of the objects that have relief.
 const RELIEF: f32 = 0.35;
+/// Part of the objects whose file says how they look that look so.
+const OWN: f32 = 0.5;
+/// What a surface that is no metal reflects at its highlight.
+const DIELECTRIC: f32 = 0.04;
+/// Rougher than this, a surface has no highlight that could be told from its diffuse light.
+const ROUGHEST: f32 = 0.9;
 
 /// Paint, relief and gloss.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,6 +40,11 @@ impl Finish {
         glossy: f32,
         albedo: Option<AlbedoKind>,
     ) -> Self {
+        if let Some(own) = buffer.own_surface()
+            && (albedo == Some(AlbedoKind::Own) || (albedo.is_none() && random.chance(OWN)))
+        {
+            return Self::own(own);
+        }
         let pictures = library.pictures.len();
         let paint = Paint::draw(random, buffer.object_points(), pictures, albedo);
         let relief = random.chance(RELIEF).then(|| Relief::draw(random));
@@ -46,6 +58,16 @@ impl Finish {
         }
     }
 
+    /// What the mesh's own file says, one gloss for all of the surface.
+    fn own(surface: &[OwnSurface]) -> Self {
+        let albedo: Vec3 = surface.iter().map(own_albedo).sum();
+        Self {
+            paint: Paint::own(possible(albedo / surface.len() as f32)),
+            relief: None,
+            gloss: BlinnPhong::of_surface(surface),
+        }
+    }
+
     /// The finish on what a buffer shows.
     #[must_use]
     pub fn apply(&self, buffer: &GBuffer, library: &Library) -> Material {
@@ -53,15 +75,25 @@ impl Finish {
             Some(relief) => relief.apply(buffer),
             None => buffer.normals().to_vec(),
         };
-        let pictures = &library.pictures;
-        Material {
-            albedo: self
+        let own = buffer.own_surface();
+        let own = own.filter(|_| self.paint.kind == AlbedoKind::Own);
+        let albedo = match own {
+            Some(own) => own.iter().map(|at| possible(own_albedo(at))).collect(),
+            None => self
                 .paint
-                .apply(buffer.object_points(), buffer.texture(), pictures),
+                .apply(buffer.object_points(), buffer.texture(), &library.pictures),
+        };
+        Material {
+            albedo,
             normals,
             gloss: self.gloss,
         }
     }
+}
+
+/// Metal has no diffuse light.
+fn own_albedo(surface: &OwnSurface) -> Vec3 {
+    surface.colour * (1.0 - surface.metallic)
 }
 
 impl BlinnPhong {
@@ -77,6 +109,25 @@ impl BlinnPhong {
             reflectance: colour * strength,
             exponent,
         }
+    }
+
+    /// The highlights of a surface whose file says how rough it is; none of a dull one. The exponent is 2 / roughness^4 - 2
+    /// (Karis 2013, "Specular BRDF Reference"), and as much brighter as it gathers light, (exponent + 8) / 8 (Hoffman 2013,
+    /// "Background: Physics and Math of Shading").
+    fn of_surface(surface: &[OwnSurface]) -> Option<Self> {
+        let mean = |of: fn(&OwnSurface) -> Vec3| {
+            surface.iter().map(of).sum::<Vec3>() / surface.len().max(1) as f32
+        };
+        let roughness = mean(|at| Vec3::splat(at.roughness)).x;
+        if roughness > ROUGHEST {
+            return None;
+        }
+        let reflected = mean(|at| Vec3::splat(DIELECTRIC).lerp(at.colour, at.metallic));
+        let exponent = (2.0 / roughness.powi(4).max(1e-4) - 2.0).clamp(4.0, 150.0);
+        Some(Self {
+            reflectance: reflected * ((exponent + 8.0) / 8.0),
+            exponent,
+        })
     }
 
     /// A random strength and exponent.

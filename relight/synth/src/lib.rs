@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | `mesh`, `shape` | triangles from files, and out of nothing but a seed |
 //! | `view`, `geometry`, `object` | what a camera sees of them, which light is blocked |
-//! | `paint`, `finish` | albedo, relief and gloss |
+//! | `paint`, `texture`, `finish` | albedo, relief and gloss; pictures that are laid onto objects |
 //! | `lighting` | lamps and panoramas on what is seen |
 //! | `studio` | panoramas out of nothing but a seed |
 //! | `camera` | from light to 8-bit values |
@@ -47,6 +47,7 @@ mod recipe;
 mod sample;
 mod shape;
 mod studio;
+mod texture;
 mod transfer;
 mod turn;
 mod vectors;
@@ -62,15 +63,16 @@ pub use lighting::{
     BlinnPhong, Emitter, Environment, LampShadows, LightKind, Lighting, Material, Method,
     Panoramas, Shaded, SyntheticLamp, SyntheticScene,
 };
-pub use mesh::{Mesh, MeshFault};
+pub use mesh::{Mesh, MeshFault, OwnSurface};
 pub use object::{ObjectSource, SyntheticView};
-pub use paint::{AlbedoKind, Paint, Relief, TextureImage};
+pub use paint::{AlbedoKind, Paint, Relief};
 pub use preview::write_preview;
 pub use random::stream;
 pub use recipe::Recipe;
 pub use sample::{Description, SynthSample, Whites};
 pub use shape::ShapeKind;
 pub use studio::Surroundings;
+pub use texture::TextureImage;
 pub use transfer::{
     CURVE_COEFFICIENTS, CurveCoefficients, DrawnTurn, RadianceTransfer, Rooms, TransferCache,
     TransferFinish, TransferLobe, TransferMaterial, TransferRecipe,

@@ -130,6 +130,8 @@ enum AlbedoName {
     Print,
     /// Patterns of two to five colours.
     Patterned,
+    /// What the mesh's own file says; other objects as without --albedo.
+    Own,
 }
 
 impl From<AlbedoName> for AlbedoKind {
@@ -141,6 +143,7 @@ impl From<AlbedoName> for AlbedoKind {
             AlbedoName::TwoTone => Self::TwoTone,
             AlbedoName::Print => Self::Print,
             AlbedoName::Patterned => Self::Patterned,
+            AlbedoName::Own => Self::Own,
         }
     }
 }

@@ -3,7 +3,7 @@
 use glam::{Affine3A, DVec4, Mat3, Vec2, Vec3, Vec4};
 
 use super::raster::{NOTHING, Projected, Triangle, Weights, foremost};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, OwnSurface};
 use crate::view::Projection;
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, YUp};
@@ -30,6 +30,8 @@ struct Surface {
     ray_starts: Vec<Vec3>,
     object_points: Vec<Vec3>,
     texture: Option<Vec<Vec2>>,
+    /// None of a mesh whose file says nothing of it.
+    own: Vec<OwnSurface>,
 }
 
 impl GBuffer {
@@ -109,6 +111,13 @@ impl GBuffer {
     #[must_use]
     pub fn texture(&self) -> Option<&[Vec2]> {
         self.surface.texture.as_deref()
+    }
+
+    /// How the mesh's own file says that the surface looks, where it says anything.
+    #[must_use]
+    pub fn own_surface(&self) -> Option<&[OwnSurface]> {
+        let own = &self.surface.own;
+        (own.len() == self.len() && !own.is_empty()).then_some(own)
     }
 
     /// Where rays of light start: a little above the surface, and lifted where facets are flatter
@@ -217,6 +226,7 @@ impl Surface {
             ray_starts: Vec::with_capacity(count),
             object_points: Vec::with_capacity(count),
             texture: is_textured.then(|| Vec::with_capacity(count)),
+            own: Vec::new(),
         }
     }
 }
@@ -285,10 +295,15 @@ impl<'a> Posed<'a> {
         surface.ray_starts.push(lifted + facet * side * LIFT);
         let own = corners.map(|vertex| self.mesh.positions()[vertex as usize]);
         surface.object_points.push(blend(weights, own));
-        if let (Some(list), Some(coordinates)) = (&mut surface.texture, self.mesh.texture()) {
+        let place = self.mesh.texture().map(|coordinates| {
             let [a, b, c] = coordinates[number as usize];
-            list.push(a * weights[0] + b * weights[1] + c * weights[2]);
+            a * weights[0] + b * weights[1] + c * weights[2]
+        });
+        if let (Some(list), Some(place)) = (&mut surface.texture, place) {
+            list.push(place);
         }
+        let own = self.mesh.own_surface(number as usize, place);
+        surface.own.extend(own);
         true
     }
 

@@ -36,7 +36,7 @@ fn floor_scene() -> SyntheticScene {
     let raw = RawMesh {
         positions: corners.map(|(x, y)| Vec3::new(x, y, 0.0)).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        texture: Vec::new(),
+        ..RawMesh::default()
     };
     let plane = Mesh::new(raw, 1.0).unwrap();
     let buffer = GBuffer::render(&plane, Affine3A::IDENTITY, Projection::Orthographic, SIZE);

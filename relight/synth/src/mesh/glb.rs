@@ -1,5 +1,5 @@
-//! glTF 2.0 files: JSON with its buffers beside it or inside, or one binary file. Only positions
-//! and texture coordinates of triangles are read, placed as the scene's nodes say.
+//! glTF 2.0 files: JSON with its buffers beside it or inside, or one binary file. Positions and texture
+//! coordinates of triangles are read, placed as the scene's nodes say, and their materials with pictures.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -11,8 +11,11 @@ use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Node, Primitive, Semantic};
 
+use super::beside::file_beside;
+use super::material::MeshMaterial;
 use super::raw::RawMesh;
 use crate::SynthError;
+use crate::texture::TextureImage;
 
 /// Deepest nesting of nodes that is followed.
 const DEEPEST: usize = 64;
@@ -28,12 +31,19 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     };
     let file = Gltf::from_slice(&bytes).map_err(|fault| damaged(fault.to_string()))?;
     let buffers = buffers(path, &file)?;
+    let pictures = Pictures {
+        path,
+        buffers: &buffers,
+    };
+    let materials = file.materials().map(|one| pictures.material(&one));
+    let materials = materials.collect::<Result<_, _>>()?;
     let mut reader = Reader {
         buffers: &buffers,
         raw: RawMesh::default(),
         all_textured: true,
         visited: 0,
     };
+    reader.raw.materials.all = materials;
     let scene = file.default_scene().or_else(|| file.scenes().next());
     for node in scene.iter().flat_map(gltf::Scene::nodes) {
         reader.node(&node, Mat4::IDENTITY, 0).map_err(damaged)?;
@@ -84,13 +94,69 @@ fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, SynthError> {
             .decode(text)
             .map_err(|fault| damaged(format!("a buffer's data is damaged: {fault}")));
     }
-    let plain = !uri.contains(['/', '\\', ':']) && uri != "..";
-    if !plain {
-        let reason = format!("its buffer {uri:?} does not lie in the folder of the mesh");
-        return Err(damaged(reason));
-    }
-    let beside = path.with_file_name(uri.replace("%20", " "));
+    let beside = file_beside(path, uri).ok_or_else(|| {
+        damaged(format!(
+            "its file {uri:?} does not lie in the folder of the mesh"
+        ))
+    })?;
     std::fs::read(&beside).map_err(SynthError::read(&beside))
+}
+
+/// The pictures of a file's materials.
+struct Pictures<'a> {
+    path: &'a Path,
+    buffers: &'a [Cow<'a, [u8]>],
+}
+
+impl Pictures<'_> {
+    fn material(&self, of: &gltf::Material<'_>) -> Result<MeshMaterial, SynthError> {
+        let surface = of.pbr_metallic_roughness();
+        let [red, green, blue, _] = surface.base_color_factor();
+        Ok(MeshMaterial {
+            colour: Vec3::new(red, green, blue),
+            picture: self.read(surface.base_color_texture(), TextureImage::of_colours)?,
+            roughness: surface.roughness_factor(),
+            metallic: surface.metallic_factor(),
+            factors: self.read(
+                surface.metallic_roughness_texture(),
+                TextureImage::of_numbers,
+            )?,
+        })
+    }
+
+    fn read(
+        &self,
+        texture: Option<gltf::texture::Info<'_>>,
+        decode: fn(&[u8]) -> Result<TextureImage, image::ImageError>,
+    ) -> Result<Option<TextureImage>, SynthError> {
+        let Some(texture) = texture else {
+            return Ok(None);
+        };
+        let image = texture.texture().source();
+        let damaged = |why: String| SynthError::Mesh {
+            path: self.path.to_owned(),
+            reason: format!("its picture {} {why}", image.index()),
+        };
+        if texture.tex_coord() != 0 {
+            return Err(damaged(
+                "lies on other texture coordinates than the first, which are all that is read"
+                    .to_owned(),
+            ));
+        }
+        let bytes = match image.source() {
+            gltf::image::Source::Uri { uri, .. } => Cow::Owned(linked(self.path, uri)?),
+            gltf::image::Source::View { view, .. } => {
+                let buffer = self.buffers.get(view.buffer().index());
+                let end = view.offset().checked_add(view.length());
+                let bytes = buffer
+                    .zip(end)
+                    .and_then(|(buffer, end)| buffer.get(view.offset()..end));
+                Cow::Borrowed(bytes.ok_or_else(|| damaged("reaches beyond its buffer".to_owned()))?)
+            }
+        };
+        let picture = decode(&bytes).map_err(|fault| damaged(format!("is damaged: {fault}")))?;
+        Ok(Some(picture))
+    }
 }
 
 struct Reader<'a> {
@@ -142,6 +208,10 @@ impl Reader<'_> {
             .map(|&p| placed.transform_point3(Vec3::from(p)));
         self.raw.positions.extend(moved);
         self.texture(primitive, &triangles)?;
+        let material = primitive.material().index();
+        let material = material.map_or(u32::MAX, |number| number as u32);
+        let materials = &mut self.raw.materials.of_triangle;
+        materials.extend(std::iter::repeat_n(material, triangles.len()));
         let shifted = |corners: [u32; 3]| corners.map(|vertex| vertex.saturating_add(first));
         self.raw
             .triangles
@@ -369,6 +439,63 @@ mod tests {
             *document.pointer_mut(place).unwrap() = value;
             let error = read(&document, &bytes).unwrap_err().to_string();
             assert!(error.contains("a.gltf"), "{place}: {error}");
+        }
+    }
+
+    #[test]
+    fn materials_are_read_with_their_pictures_and_roughness() {
+        let picture = image::RgbImage::from_fn(1, 2, |_, y| image::Rgb([255, 255 * y as u8, 0]));
+        let mut png = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+        let png = png.into_inner();
+        let (mut document, mut bytes) = square();
+        // Texture coordinates at the lower edge and at the upper one, v running downwards.
+        let coordinates = [[0.5_f32, 0.75], [0.5, 0.75], [0.5, 0.25], [0.5, 0.25]];
+        bytes.extend(coordinates.iter().flatten().flat_map(|v| v.to_le_bytes()));
+        bytes.extend(&png);
+        document["buffers"][0] = json!({"byteLength": bytes.len(), "uri": "a.bin"});
+        let views = document["bufferViews"].as_array_mut().unwrap();
+        views.push(json!({"buffer": 0, "byteOffset": 60, "byteLength": 32}));
+        views.push(json!({"buffer": 0, "byteOffset": 92, "byteLength": png.len()}));
+        let accessors = document["accessors"].as_array_mut().unwrap();
+        accessors.push(json!({"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"}));
+        document["images"] = json!([{"bufferView": 3, "mimeType": "image/png"}]);
+        document["textures"] = json!([{"source": 0}]);
+        document["materials"] = json!([{"pbrMetallicRoughness": {
+            "baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 1.0, 1.0, 1.0],
+            "metallicFactor": 0.0, "roughnessFactor": 0.4}}]);
+        document["meshes"][0]["primitives"][0]["material"] = json!(0);
+        document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(2);
+        let mesh = read(&document, &bytes).unwrap();
+        let look = |corner: usize| {
+            let place = mesh.texture().unwrap()[0][corner];
+            mesh.own_surface(0, Some(place)).unwrap()
+        };
+        assert_eq!(look(0).colour, Vec3::new(0.5, 1.0, 0.0));
+        assert_eq!(look(2).colour, Vec3::new(0.5, 0.0, 0.0));
+        assert_eq!((look(0).roughness, look(0).metallic), (0.4, 0.0));
+        for (place, value, told) in [
+            ("/bufferViews/3/byteLength", json!(20), "damaged"),
+            (
+                "/bufferViews/3/byteLength",
+                json!(9000),
+                "beyond its buffer",
+            ),
+            ("/images/0", json!({"uri": "../a.png"}), "in the folder"),
+            (
+                "/materials/0/pbrMetallicRoughness/baseColorTexture/texCoord",
+                json!(1),
+                "the first",
+            ),
+        ] {
+            let mut document = document.clone();
+            let (parent, key) = place.rsplit_once('/').unwrap();
+            match document.pointer_mut(parent).unwrap() {
+                Value::Array(list) => list[key.parse::<usize>().unwrap()] = value,
+                object => object[key] = value,
+            }
+            let error = read(&document, &bytes).unwrap_err().to_string();
+            assert!(error.contains(told), "{place}: {error}");
         }
     }
 

@@ -1,7 +1,9 @@
 //! Triangle meshes with a normal for each corner. Knows nothing of cameras or light; `obj` and
-//! `glb` read files.
+//! `glb` read files, `material` is what they say of the surface.
 
+mod beside;
 mod glb;
+mod material;
 mod obj;
 mod raw;
 
@@ -11,6 +13,8 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::SynthError;
+use material::MeshMaterials;
+pub use material::OwnSurface;
 pub(super) use raw::RawMesh;
 
 /// Most triangles that a mesh may have.
@@ -27,6 +31,7 @@ pub struct Mesh {
     /// One for each corner of each triangle, unit length.
     normals: Vec<[Vec3; 3]>,
     texture: Option<Vec<[Vec2; 3]>>,
+    materials: Option<MeshMaterials>,
 }
 
 /// Why numbers are no mesh.
@@ -56,7 +61,8 @@ pub enum MeshFault {
 
 impl Mesh {
     /// Reads a mesh: Wavefront (`.obj`) or glTF 2.0 (`.gltf`, `.glb`). All its parts become one
-    /// surface; its own normals are not used, those of faces within 50 degrees are blended.
+    /// surface; its own normals are not used, those of faces within 50 degrees are blended. Materials with pictures or of several
+    /// colours are read, from the files beside it that it names; one colour for all is not taken for the object's.
     ///
     /// # Errors
     /// [`SynthError::Mesh`] where the file is damaged or holds no surface, [`SynthError::Read`] where it
@@ -95,6 +101,7 @@ impl Mesh {
             triangles: raw.triangles,
             normals,
             texture: (!raw.texture.is_empty()).then_some(raw.texture),
+            materials: raw.materials.tell_anything().then_some(raw.materials),
         })
     }
 
@@ -111,6 +118,12 @@ impl Mesh {
     /// A normal for each corner of each triangle.
     pub(super) fn normals(&self) -> &[[Vec3; 3]] {
         &self.normals
+    }
+
+    /// The look of a triangle at texture coordinates, where the mesh's file says one.
+    pub(super) fn own_surface(&self, triangle: usize, place: Option<Vec2>) -> Option<OwnSurface> {
+        let materials = self.materials.as_ref()?;
+        Some(materials.at(triangle, place))
     }
 
     /// Texture coordinates for each corner of each triangle, where the mesh has them.
@@ -165,6 +178,7 @@ fn weld(raw: RawMesh) -> RawMesh {
         positions,
         triangles,
         texture: raw.texture,
+        materials: raw.materials,
     }
 }
 
@@ -205,6 +219,9 @@ fn drop_flat(raw: &mut RawMesh) {
         .retain(|_| keep.next().copied().unwrap_or(true));
     let mut keep = has_area.iter();
     raw.texture.retain(|_| keep.next().copied().unwrap_or(true));
+    let mut keep = has_area.iter();
+    let materials = &mut raw.materials.of_triangle;
+    materials.retain(|_| keep.next().copied().unwrap_or(true));
 }
 
 /// For each corner, the mean normal of the faces around its vertex, each weighted by its angle there,

@@ -2,11 +2,14 @@
 
 use glam::{Vec2, Vec3};
 
+use super::material::MeshMaterials;
+
 /// What a file or a generator gives: positions, triangles by index, and texture coordinates for
-/// each corner where there are any.
+/// each corner and materials where there are any.
 #[derive(Debug, Default)]
 pub(crate) struct RawMesh {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) triangles: Vec<[u32; 3]>,
     pub(crate) texture: Vec<[Vec2; 3]>,
+    pub(crate) materials: MeshMaterials,
 }

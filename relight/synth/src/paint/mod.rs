@@ -9,14 +9,12 @@
 //! | `mark` | printed forms |
 //! | `print` | labels, glyphs, logos and bar codes in ink |
 //! | `writing` | lines of strokes that look like a script |
-//! | `picture` | image files and parts of panoramas as patterns |
 //! | `relief` | slopes that are finer than the mesh |
 
 mod frame;
 mod mark;
 mod palette;
 mod pattern;
-mod picture;
 mod print;
 mod relief;
 mod writing;
@@ -26,11 +24,11 @@ use serde::{Deserialize, Serialize};
 
 use super::noise::Noise;
 use super::random::{Random, stream};
+use super::texture::TextureImage;
 use palette::{Inks, Palette};
 use pattern::{Canvas, Pattern};
 
 pub use palette::AlbedoKind;
-pub use picture::TextureImage;
 pub use relief::Relief;
 
 /// Least albedo of anything: soot reflects more.
@@ -84,6 +82,15 @@ impl Paint {
         }
     }
 
+    /// The mesh's own albedo, of which `mean` is the mean.
+    pub(super) fn own(mean: Vec3) -> Self {
+        Self {
+            kind: AlbedoKind::Own,
+            ground: mean,
+            ..Self::constant([0.0; 3])
+        }
+    }
+
     /// A random paint for an object on which `points` lie; `pictures` tells how many there are to
     /// choose from, `kind` what it is drawn as, else that is drawn, too.
     pub(super) fn draw(
@@ -93,6 +100,7 @@ impl Paint {
         kind: Option<AlbedoKind>,
     ) -> Self {
         let drawn = AlbedoKind::draw(random);
+        let kind = kind.filter(|&kind| kind != AlbedoKind::Own);
         let kind = kind.unwrap_or(drawn);
         if kind == AlbedoKind::Print {
             return Self::printed(random, points);
@@ -181,10 +189,15 @@ impl Paint {
             }
         }
         for value in &mut albedo {
-            *value = value.clamp(Vec3::splat(DARKEST), Vec3::ONE);
+            *value = possible(*value);
         }
         albedo
     }
+}
+
+/// The nearest albedo that a surface can have.
+pub(super) fn possible(albedo: Vec3) -> Vec3 {
+    albedo.clamp(Vec3::splat(DARKEST), Vec3::ONE)
 }
 
 impl Warp {

@@ -21,6 +21,8 @@ pub enum AlbedoKind {
     Print,
     /// Patterns of two to five colours.
     Patterned,
+    /// What the file of the mesh says. Of objects whose file says nothing, and where nothing is asked for, any of the others.
+    Own,
 }
 
 impl AlbedoKind {

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::super::noise::Noise;
 use super::super::random::Random;
+use super::super::texture::TextureImage;
 use super::frame::{Frame, step};
 use super::mark::Mark;
 use super::palette::Palette;
-use super::picture::TextureImage;
 use super::writing::Writing;
 
 /// Where a coat of paint lies. Lengths are in the object's own frame, in which it is about 2 large.

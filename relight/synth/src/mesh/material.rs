@@ -1,0 +1,142 @@
+//! What a mesh's own file says of its surface: colours, pictures of them, roughness and metal, as in glTF 2.0. Knows nothing of
+//! light.
+
+use glam::{Vec2, Vec3};
+
+use crate::texture::TextureImage;
+
+/// Roughness where a file has none: a plain, dull surface.
+pub(crate) const DULL: f32 = 1.0;
+
+/// One material of a mesh.
+#[derive(Debug, Clone)]
+pub(crate) struct MeshMaterial {
+    /// Linear red, green and blue, by which the picture is multiplied.
+    pub(crate) colour: Vec3,
+    /// The colours from place to place.
+    pub(crate) picture: Option<TextureImage>,
+    /// 0 a mirror, 1 dull.
+    pub(crate) roughness: f32,
+    /// 0 paint, 1 metal.
+    pub(crate) metallic: f32,
+    /// Factors of roughness (green) and metal (blue) from place to place.
+    pub(crate) factors: Option<TextureImage>,
+}
+
+/// The materials of a mesh, and which triangle has which.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct MeshMaterials {
+    pub(crate) all: Vec<MeshMaterial>,
+    /// For each triangle.
+    pub(crate) of_triangle: Vec<u32>,
+}
+
+/// A surface's own look at one place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnSurface {
+    /// Linear red, green and blue, 0..=1: the albedo of paint, the highlights' colour of metal.
+    pub colour: Vec3,
+    /// 0 a mirror, 1 dull.
+    pub roughness: f32,
+    /// 0 paint, 1 metal.
+    pub metallic: f32,
+}
+
+impl Default for MeshMaterial {
+    fn default() -> Self {
+        Self {
+            colour: Vec3::ONE,
+            picture: None,
+            roughness: DULL,
+            metallic: 0.0,
+            factors: None,
+        }
+    }
+}
+
+impl MeshMaterial {
+    /// The look at a place of the pictures; where there are no texture coordinates, that of the pictures' means.
+    fn at(&self, place: Option<Vec2>) -> OwnSurface {
+        let looked_up = |picture: &TextureImage| match place {
+            Some(place) => picture.at(place),
+            None => picture.mean(),
+        };
+        let of = |picture: &Option<TextureImage>| picture.as_ref().map_or(Vec3::ONE, looked_up);
+        let factors = of(&self.factors);
+        OwnSurface {
+            colour: (self.colour * of(&self.picture)).clamp(Vec3::ZERO, Vec3::ONE),
+            roughness: (self.roughness * factors.y).clamp(0.0, 1.0),
+            metallic: (self.metallic * factors.z).clamp(0.0, 1.0),
+        }
+    }
+}
+
+impl MeshMaterials {
+    /// Whether they say more than one colour for all: a file without materials has a grey one.
+    pub(crate) fn tell_anything(&self) -> bool {
+        let mut used = self
+            .of_triangle
+            .iter()
+            .filter_map(|&one| self.all.get(one as usize));
+        let Some(first) = used.next() else {
+            return false;
+        };
+        let mut used = used.chain([first]);
+        used.any(|one| one.picture.is_some() || one.colour != first.colour)
+    }
+
+    /// The look of a triangle at texture coordinates.
+    pub(crate) fn at(&self, triangle: usize, place: Option<Vec2>) -> OwnSurface {
+        let number = self.of_triangle.get(triangle).copied().unwrap_or(u32::MAX);
+        match self.all.get(number as usize) {
+            Some(material) => material.at(place),
+            None => MeshMaterial::default().at(None),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture() -> TextureImage {
+        TextureImage::from_fn(2, 1, |x, _| Vec3::splat(x as f32))
+    }
+
+    #[test]
+    fn pictures_are_multiplied_by_the_colour_and_looked_up_where_there_are_coordinates() {
+        let material = MeshMaterial {
+            colour: Vec3::new(0.5, 1.0, 2.0),
+            picture: Some(picture()),
+            roughness: 0.8,
+            metallic: 1.0,
+            factors: Some(TextureImage::from_fn(1, 1, |_, _| {
+                Vec3::new(9.0, 0.5, 0.25)
+            })),
+        };
+        let right = material.at(Some(Vec2::new(0.75, 0.5)));
+        assert_eq!(right.colour, Vec3::new(0.5, 1.0, 1.0));
+        assert_eq!((right.roughness, right.metallic), (0.4, 0.25));
+        assert_eq!(material.at(None).colour, Vec3::new(0.25, 0.5, 1.0));
+    }
+
+    #[test]
+    fn one_colour_for_all_tells_nothing_and_two_or_a_picture_do() {
+        let with = |all: Vec<MeshMaterial>| MeshMaterials {
+            of_triangle: (0..all.len() as u32).collect(),
+            all,
+        };
+        let colour = |colour| MeshMaterial {
+            colour,
+            ..MeshMaterial::default()
+        };
+        assert!(!MeshMaterials::default().tell_anything());
+        assert!(!with(vec![colour(Vec3::X), colour(Vec3::X)]).tell_anything());
+        assert!(with(vec![colour(Vec3::X), colour(Vec3::Y)]).tell_anything());
+        let painted = MeshMaterial {
+            picture: Some(picture()),
+            ..MeshMaterial::default()
+        };
+        assert!(with(vec![painted]).tell_anything());
+    }
+}
