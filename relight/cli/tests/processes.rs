@@ -304,6 +304,27 @@ fn signals_that_a_launcher_repeats_cost_no_checkpoint() {
 }
 
 #[test]
+fn two_signals_at_once_cost_no_checkpoint() {
+    let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let file = scratch.path().join("settings.toml");
+    fs::write(&file, settings(1_000_000, "single")).unwrap();
+    let mut processes = Processes(vec![
+        train("decompose", &file, folder.path()).spawn().unwrap(),
+    ]);
+    wait_for_a_step(folder.path(), &mut processes);
+    let process = Pid::from_raw(processes.0[0].id() as i32).unwrap();
+    // As `timeout` does: to the program, and to its process group.
+    for _ in 0..2 {
+        kill_process(process, Signal::INT).unwrap();
+        sleep(Duration::from_millis(50));
+    }
+    let code = processes.0[0].wait().unwrap().code();
+    assert_eq!(code, Some(3));
+    assert!(checkpoint(folder.path()).step > 0);
+    assert!(folder.path().join("decomposer.safetensors").is_file());
+}
+
+#[test]
 fn processes_that_were_started_with_other_settings_say_so() {
     let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let files = ["one.toml", "other.toml"].map(|name| scratch.path().join(name));

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use tch::{Tensor, no_grad};
+use tch::{Kind, Tensor, no_grad};
 
 use super::error::TrainError;
 use super::model::{copy_into, to_weights};
@@ -137,14 +137,7 @@ impl Adam {
         learning_rate: f64,
         max_grad_norm: f64,
     ) -> Result<f64, TrainError> {
-        let mut square = 0.0;
-        for parameter in parameters.values() {
-            let gradient = parameter.f_grad()?;
-            if gradient.defined() {
-                square += f64::try_from(gradient.f_norm()?)?.powi(2);
-            }
-        }
-        let norm = square.sqrt();
+        let norm = gradient_norm(parameters)?;
         let shrink = if norm > max_grad_norm {
             max_grad_norm / norm
         } else {
@@ -183,4 +176,25 @@ impl Adam {
         }
         Ok(norm)
     }
+}
+
+/// The norm of all gradients together.
+fn gradient_norm(parameters: &BTreeMap<String, Tensor>) -> Result<f64, TrainError> {
+    let mut norms = Vec::with_capacity(parameters.len());
+    for parameter in parameters.values() {
+        let gradient = parameter.f_grad()?;
+        if gradient.defined() {
+            norms.push(gradient.f_norm()?);
+        }
+    }
+    if norms.is_empty() {
+        return Ok(0.0);
+    }
+    // One number at a time would keep a GPU waiting for each.
+    let norms = Tensor::f_stack(&norms, 0)?.f_to_kind(Kind::Double)?;
+    let square: f64 = Vec::<f64>::try_from(norms)?
+        .iter()
+        .map(|norm| norm.powi(2))
+        .sum();
+    Ok(square.sqrt())
 }

@@ -33,6 +33,20 @@ pub enum TrainError {
         /// The option that gives it.
         option: &'static str,
     },
+    /// libtorch's library for CUDA is missing, or lacks another.
+    #[error(
+        "libtorch's library for CUDA cannot be loaded: PyTorch for CUDA is needed, with all its packages, and LIBTORCH as its \
+         folder torch when relight is built"
+    )]
+    NoCuda(#[source] libloading::Error),
+    /// A GPU that is not there.
+    #[error("libtorch finds no GPU {number} here: it finds {count}")]
+    NoGpu {
+        /// The number that was asked for, from 0.
+        number: usize,
+        /// How many there are.
+        count: i64,
+    },
     /// Data-loader workers could not be started.
     #[error("the data-loader workers could not be started")]
     Threads(#[source] io::Error),

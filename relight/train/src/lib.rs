@@ -9,7 +9,7 @@
 //! | `decompose`, `decompose_task` | the decomposing network: maps, losses, run |
 //! | `held_out` | turns and samples that networks are judged by while they train |
 //! | `task`, `run`, `checkpoint`, `journal`, `guard` | a run: what is trained, its steps, what is saved, what is logged, what ends it |
-//! | `resources` | device, workers, how a run is stopped |
+//! | `resources`, `cuda` | device, workers, how a run is stopped; GPUs |
 //! | `launch`, `process_group`, `agreement`, `all_reduced` | several processes: their ranks, sums over them, whether they agree, all-reduced losses |
 //! | `paper_layers`, `paper_phases`, `paper_networks`, `paper_task` | the paper's phases: layers on tensors, losses, networks, runs |
 //! | `turn_samples`, `turn_task` | the network of whole turns: views in rooms, its run |
@@ -22,6 +22,7 @@ mod all_reduced;
 mod average;
 mod checkpoint;
 mod composed;
+mod cuda;
 mod darkness;
 mod data_loader;
 mod decompose;
@@ -57,6 +58,7 @@ mod turn_task;
 pub use adam::{Adam, AdamSettings};
 pub use average::WeightAverage;
 pub use checkpoint::{CHECKPOINT, Checkpoint};
+pub use cuda::cuda_device;
 pub use data_loader::{Composition, DataLoader};
 pub use decompose::{AnsweredTensors, DecomposeLossCoefficients, decompose_losses, head_spreads};
 pub use decompose_task::DecomposeTask;

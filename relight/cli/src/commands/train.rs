@@ -6,21 +6,24 @@ use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand};
 use relight_nets::{NetError, Weights};
 use relight_train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
-    ProcessGroup, Resources, Run, RunOutcome, RunSettings, SettingsFile, TrainObserver,
-    TrainingTask, TurnNetworkSettings, TurnNetworkTask, read_settings,
+    ProcessGroup, Resources, Run, RunOutcome, RunSettings, SettingsFile, TrainError, TrainObserver,
+    TrainingTask, TurnNetworkSettings, TurnNetworkTask, cuda_device, read_settings,
 };
 use relit_console::{Console, Outcome, ProgressBar};
 use serde::Serialize;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag;
+use signal_hook::iterator::Signals;
+use signal_hook::low_level;
 use tch::Device;
 
 use crate::commands::CommandResult;
@@ -48,6 +51,8 @@ Examples:
 In the folder of a run: checkpoint.safetensors, losses.csv, event files for TensorBoard, validation.png, and at
 the end the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
 
+/// Signals within this time count as one: `timeout` sends two.
+const TOGETHER: Duration = Duration::from_secs(1);
 /// The exit code of a run that a second signal ends without a checkpoint, as the shell has it for SIGINT.
 const ENDED_BY_SIGNAL: i32 = 130;
 
@@ -164,18 +169,11 @@ fn device(text: &str) -> Result<DeviceName, String> {
 }
 
 impl DeviceName {
-    fn device(self, launch: Option<&Launch>) -> Result<Device, String> {
-        let number = match self {
-            Self::Cpu => return Ok(Device::Cpu),
-            Self::Cuda => launch.and_then(|launch| launch.local).unwrap_or(0),
-            Self::CudaNumber(number) => number,
-        };
-        if (number as i64) < tch::Cuda::device_count() {
-            Ok(Device::Cuda(number))
-        } else {
-            Err(format!(
-                "--device cuda:{number}: libtorch finds no such device here"
-            ))
+    fn device(self, launch: Option<&Launch>) -> Result<Device, TrainError> {
+        match self {
+            Self::Cpu => Ok(Device::Cpu),
+            Self::Cuda => cuda_device(launch.and_then(|launch| launch.local).unwrap_or(0)),
+            Self::CudaNumber(number) => cuda_device(number),
         }
     }
 }
@@ -378,17 +376,24 @@ fn train(
     Ok(outcome_of(&outcome))
 }
 
-/// The flag that Ctrl-C and SIGTERM set. Where no launcher has started the program, the second signal ends it at once; launchers
-/// repeat signals themselves.
+/// The flag that Ctrl-C and SIGTERM set. Where no launcher has started the program, another signal a second or more later ends it
+/// at once; launchers repeat signals themselves.
 fn stop_at_signals(is_launched: bool) -> io::Result<Arc<AtomicBool>> {
+    let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        if !is_launched {
-            // In this order: the first signal finds the flag not set yet.
-            flag::register_conditional_shutdown(signal, ENDED_BY_SIGNAL, Arc::clone(&stop))?;
-        }
-        flag::register(signal, Arc::clone(&stop))?;
-    }
+    let flag = Arc::clone(&stop);
+    thread::Builder::new()
+        .name("relight-signals".to_owned())
+        .spawn(move || {
+            let mut stopped: Option<Instant> = None;
+            for _ in signals.forever() {
+                flag.store(true, Ordering::Relaxed);
+                let first = *stopped.get_or_insert_with(Instant::now);
+                if !is_launched && first.elapsed() >= TOGETHER {
+                    low_level::exit(ENDED_BY_SIGNAL);
+                }
+            }
+        })?;
     Ok(stop)
 }
 
