@@ -76,9 +76,9 @@ const NORMAL_PLANES: Range<usize> = 0..3;
 /// The share of the coarse scale in the low frequencies of the normals. Measured on photographs with ground truth: a share of 1
 /// is three degrees better than 0.
 const SHAPE_OF_NORMALS: f32 = 1.0;
-/// The share of the coarse scale in the low frequencies of albedo, shading and highlight. Measured: chosen on 96 synthetic
+/// The share of the coarse scale in the low frequencies of albedo, shading and highlight. Measured: chosen on synthetic
 /// objects (docs/results/decomposition.md).
-const SHAPE_OF_LAYERS: f32 = 0.6;
+const SHAPE_OF_LAYERS: f32 = 0.8;
 
 /// Keeps logarithms of dark values finite.
 const DARKEST: f32 = 1e-4;
