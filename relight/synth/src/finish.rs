@@ -12,8 +12,11 @@ use super::random::Random;
 
 /// Part of the objects that have relief.
 const RELIEF: f32 = 0.35;
-/// Part of the objects whose file says how they look that look so.
+/// How many of the objects that come with a look of their own keep it.
 const OWN: f32 = 0.5;
+/// Exponents of highlights.
+const BROADEST: f32 = 4.0;
+const SHARPEST: f32 = 150.0;
 /// What a surface that is no metal reflects at its highlight.
 const DIELECTRIC: f32 = 0.04;
 /// Rougher than this, a surface has no highlight that could be told from its diffuse light.
@@ -32,7 +35,8 @@ pub struct Finish {
 
 impl Finish {
     /// A random finish for what a buffer shows; it is glossy with the probability `glossy`, and
-    /// painted as `albedo` says, where that says anything.
+    /// painted as `albedo` says, where that says anything. Half of the objects that come with a look of their own keep it,
+    /// with the gloss of that.
     pub(super) fn draw(
         random: &mut Random,
         buffer: &GBuffer,
@@ -45,6 +49,17 @@ impl Finish {
         {
             return Self::own(own);
         }
+        Self::painted(random, buffer, library, glossy, albedo)
+    }
+
+    /// The same for an object whose own look, if it has one, is painted over.
+    pub(super) fn painted(
+        random: &mut Random,
+        buffer: &GBuffer,
+        library: &Library,
+        glossy: f32,
+        albedo: Option<AlbedoKind>,
+    ) -> Self {
         let pictures = library.pictures.len();
         let paint = Paint::draw(random, buffer.object_points(), pictures, albedo);
         let relief = random.chance(RELIEF).then(|| Relief::draw(random));
@@ -123,7 +138,7 @@ impl BlinnPhong {
             return None;
         }
         let reflected = mean(|at| Vec3::splat(DIELECTRIC).lerp(at.colour, at.metallic));
-        let exponent = (2.0 / roughness.powi(4).max(1e-4) - 2.0).clamp(4.0, 150.0);
+        let exponent = (2.0 / roughness.powi(4) - 2.0).clamp(BROADEST, SHARPEST);
         Some(Self {
             reflectance: reflected * ((exponent + 8.0) / 8.0),
             exponent,
@@ -132,7 +147,7 @@ impl BlinnPhong {
 
     /// A random strength and exponent.
     pub(super) fn draw_strength(random: &mut Random) -> (f32, f32) {
-        let exponent = random.log_uniform(4.0..150.0);
+        let exponent = random.log_uniform(BROADEST..SHARPEST);
         // A sharper highlight is brighter, as it gathers the same light.
         let strength = random.uniform(0.03..0.6) * ((exponent + 8.0) / 16.0).min(4.0);
         (strength, exponent)

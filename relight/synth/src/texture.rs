@@ -9,7 +9,7 @@ use image::{ImageError as FileError, ImageReader, RgbImage};
 use super::SynthError;
 use relight_core::image::{ColourSpace, Extent, Linear, Rgb, Srgb, Transfer};
 
-/// Longest side of a mesh's own pictures: larger ones are made smaller, as many are kept.
+/// Longest side of a mesh's own pictures in memory: larger ones are made smaller.
 const LONGEST_SIDE: usize = 1024;
 
 /// A picture in linear light, which repeats itself in all directions.
@@ -18,18 +18,21 @@ pub struct TextureImage {
     width: usize,
     height: usize,
     texels: Vec<Vec3>,
+    mean: Vec3,
 }
 
 impl TextureImage {
     /// A picture of the colours that `at` gives for column and row.
     pub(crate) fn from_fn(width: usize, height: usize, at: impl Fn(usize, usize) -> Vec3) -> Self {
-        let texels = (0..width * height)
+        let texels: Vec<Vec3> = (0..width * height)
             .map(|k| at(k % width, k / width))
             .collect();
+        let mean = texels.iter().sum::<Vec3>() / texels.len().max(1) as f32;
         Self {
             width,
             height,
             texels,
+            mean,
         }
     }
 
@@ -46,7 +49,7 @@ impl TextureImage {
         }))
     }
 
-    /// A picture of a mesh's own, PNG or JPEG, whose values are sRGB.
+    /// A picture of a mesh's own, PNG, JPEG or WebP, whose values are sRGB.
     pub(super) fn of_colours(bytes: &[u8]) -> Result<Self, FileError> {
         let image = decoded(bytes)?;
         Ok(Self::reduced(&image, Srgb::to_linear))
@@ -78,7 +81,7 @@ impl TextureImage {
 
     /// The mean of all its colours; black without pixels.
     pub(super) fn mean(&self) -> Vec3 {
-        self.texels.iter().sum::<Vec3>() / self.texels.len().max(1) as f32
+        self.mean
     }
 
     /// The colour at a place; the picture is 1 wide and high, v runs upwards. Bilinear. A picture

@@ -16,7 +16,7 @@ use super::error::TrainError;
 pub fn cuda_device(number: usize) -> Result<Device, TrainError> {
     load()?;
     let count = Cuda::device_count();
-    if (number as i64) < count {
+    if i64::try_from(number).is_ok_and(|number| number < count) {
         Ok(Device::Cuda(number))
     } else {
         Err(TrainError::NoGpu { number, count })
@@ -54,7 +54,7 @@ mod tests {
         let text = error.to_string();
         let told = match error {
             TrainError::NoCuda(_) => "libtorch's library for CUDA cannot be loaded",
-            _ => "libtorch finds no GPU 4711",
+            _ => "there is no GPU 4711",
         };
         assert!(text.starts_with(told), "{text}");
     }

@@ -35,12 +35,12 @@ pub enum TrainError {
     },
     /// libtorch's library for CUDA is missing, or lacks another.
     #[error(
-        "libtorch's library for CUDA cannot be loaded: PyTorch for CUDA is needed, with all its packages, and LIBTORCH as its \
-         folder torch when relight is built"
+        "libtorch's library for CUDA cannot be loaded: PyTorch for CUDA is needed with all its packages, its folder torch as \
+         LIBTORCH where relight is built, or torch/lib in LD_LIBRARY_PATH where it runs"
     )]
     NoCuda(#[source] libloading::Error),
     /// A GPU that is not there.
-    #[error("libtorch finds no GPU {number} here: it finds {count}")]
+    #[error("there is no GPU {number}, counted from 0: libtorch finds {count} here")]
     NoGpu {
         /// The number that was asked for, from 0.
         number: usize,

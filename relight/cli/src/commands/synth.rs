@@ -170,6 +170,9 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         textures: arguments.textures.clone(),
         panoramas: arguments.panoramas.clone(),
     })?;
+    if matches!(arguments.albedo, Some(AlbedoName::Own)) {
+        tell_of_plain_meshes(&library, console)?;
+    }
     let result = pool.install(|| {
         if arguments.preview {
             preview(arguments, &library, console)
@@ -183,6 +186,31 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         Ok(()) => Ok(Outcome::Whole),
         Err(error) => Err(error),
     }
+}
+
+/// Warns of meshes whose files do not say how they look.
+fn tell_of_plain_meshes(library: &Library, console: Console) -> Result<(), &'static str> {
+    let plain = library
+        .meshes
+        .iter()
+        .filter(|(_, mesh)| !mesh.has_own_surface());
+    let plain: Vec<&str> = plain.map(|(name, _)| name.as_str()).collect();
+    if plain.len() == library.meshes.len() {
+        return Err(
+            "--albedo own: no mesh says how it looks: give a folder with some whose files have materials, by --meshes",
+        );
+    }
+    if !plain.is_empty() {
+        let text = format!(
+            "{} of {} meshes do not say how they look, and are painted: {}",
+            plain.len(),
+            library.meshes.len(),
+            plain.join(", ")
+        );
+        let event = json!({ "event": "plain_meshes", "meshes": plain });
+        console.warn_with(&text, &event);
+    }
+    Ok(())
 }
 
 fn recipe(arguments: &Arguments, size: u32) -> Recipe {

@@ -25,8 +25,8 @@ use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 pub const MOST_PIXELS: usize = 64_000_000;
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;
-/// By how much normals are tilted further before light is fitted to them: the network's are flatter than the true ones, and
-/// light fitted to flat normals swings aside. Measured on synthetic objects (docs/results/decomposition.md).
+/// By how much normals are tilted further before light is fitted to them: the network's are a little flatter than the true ones.
+/// Measured on synthetic objects (docs/results/decomposition.md).
 const TILT: f32 = 1.1;
 
 /// At which size a picture is decomposed.

@@ -133,7 +133,7 @@ mod tests {
         let raw = RawMesh {
             positions: corners.map(|(x, y)| Vec3::new(x, y, 0.0)).to_vec(),
             triangles: vec![[0, 1, 2], [0, 2, 3]],
-            texture: Vec::new(),
+            ..RawMesh::default()
         };
         Mesh::new(raw, 1.0).unwrap()
     }

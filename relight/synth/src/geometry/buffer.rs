@@ -295,14 +295,11 @@ impl<'a> Posed<'a> {
         surface.ray_starts.push(lifted + facet * side * LIFT);
         let own = corners.map(|vertex| self.mesh.positions()[vertex as usize]);
         surface.object_points.push(blend(weights, own));
-        let place = self.mesh.texture().map(|coordinates| {
+        if let (Some(list), Some(coordinates)) = (&mut surface.texture, self.mesh.texture()) {
             let [a, b, c] = coordinates[number as usize];
-            a * weights[0] + b * weights[1] + c * weights[2]
-        });
-        if let (Some(list), Some(place)) = (&mut surface.texture, place) {
-            list.push(place);
+            list.push(a * weights[0] + b * weights[1] + c * weights[2]);
         }
-        let own = self.mesh.own_surface(number as usize, place);
+        let own = self.mesh.own_surface(number as usize, weights);
         surface.own.extend(own);
         true
     }

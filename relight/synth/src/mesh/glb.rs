@@ -2,7 +2,9 @@
 //! coordinates of triangles are read, placed as the scene's nodes say, and their materials with pictures.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -31,27 +33,35 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     };
     let file = Gltf::from_slice(&bytes).map_err(|fault| damaged(fault.to_string()))?;
     let buffers = buffers(path, &file)?;
-    let pictures = Pictures {
-        path,
-        buffers: &buffers,
-    };
-    let materials = file.materials().map(|one| pictures.material(&one));
-    let materials = materials.collect::<Result<_, _>>()?;
     let mut reader = Reader {
         buffers: &buffers,
         raw: RawMesh::default(),
         all_textured: true,
         visited: 0,
     };
-    reader.raw.materials.all = materials;
     let scene = file.default_scene().or_else(|| file.scenes().next());
     for node in scene.iter().flat_map(gltf::Scene::nodes) {
         reader.node(&node, Mat4::IDENTITY, 0).map_err(damaged)?;
     }
+    let mut raw = reader.raw;
     if !reader.all_textured {
-        reader.raw.texture.clear();
+        raw.texture.clear();
     }
-    Ok(reader.raw)
+    let used = raw.materials.used();
+    let mut pictures = Pictures {
+        path,
+        file: &file,
+        buffers: &buffers,
+        read: HashMap::new(),
+    };
+    let materials = file.materials().enumerate();
+    raw.materials.all = materials
+        .map(|(number, one)| match used.contains(&number) {
+            true => pictures.material(&one),
+            false => Ok(MeshMaterial::default()),
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(raw)
 }
 
 /// The bytes of each buffer.
@@ -80,7 +90,7 @@ fn buffers<'a>(path: &Path, file: &'a Gltf) -> Result<Vec<Cow<'a, [u8]>>, SynthE
     file.buffers().map(one).collect()
 }
 
-/// What a buffer's address stands for: data within it, or a file in the folder of the mesh.
+/// What an address stands for: data within it, or a file in the folder of the mesh.
 fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, SynthError> {
     let damaged = |reason: String| SynthError::Mesh {
         path: path.to_owned(),
@@ -89,10 +99,10 @@ fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, SynthError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (_, text) = data
             .split_once(";base64,")
-            .ok_or_else(|| damaged("a buffer's data is not in base64".to_owned()))?;
+            .ok_or_else(|| damaged("data within it is not in base64".to_owned()))?;
         return STANDARD
             .decode(text)
-            .map_err(|fault| damaged(format!("a buffer's data is damaged: {fault}")));
+            .map_err(|fault| damaged(format!("data within it is damaged: {fault}")));
     }
     let beside = file_beside(path, uri).ok_or_else(|| {
         damaged(format!(
@@ -102,60 +112,104 @@ fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, SynthError> {
     std::fs::read(&beside).map_err(SynthError::read(&beside))
 }
 
-/// The pictures of a file's materials.
+/// The pictures of a file's materials, each read once.
 struct Pictures<'a> {
     path: &'a Path,
+    file: &'a Gltf,
     buffers: &'a [Cow<'a, [u8]>],
+    /// By the picture's number and what its values are.
+    read: HashMap<(usize, PictureKind), Arc<TextureImage>>,
+}
+
+/// What the values of a picture are.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum PictureKind {
+    Colours,
+    Numbers,
 }
 
 impl Pictures<'_> {
-    fn material(&self, of: &gltf::Material<'_>) -> Result<MeshMaterial, SynthError> {
+    fn material(&mut self, of: &gltf::Material<'_>) -> Result<MeshMaterial, SynthError> {
+        if let Some(surface) = of.pbr_specular_glossiness() {
+            let colour = surface.diffuse_factor();
+            return Ok(MeshMaterial {
+                colour: Vec3::from_slice(&colour),
+                picture: self.picture(surface.diffuse_texture(), PictureKind::Colours)?,
+                roughness: 1.0 - surface.glossiness_factor(),
+                ..MeshMaterial::default()
+            });
+        }
         let surface = of.pbr_metallic_roughness();
-        let [red, green, blue, _] = surface.base_color_factor();
+        let plain = MeshMaterial {
+            colour: Vec3::from_slice(&surface.base_color_factor()),
+            picture: self.picture(surface.base_color_texture(), PictureKind::Colours)?,
+            ..MeshMaterial::default()
+        };
+        // Its colours are those of a photograph, as scans have them.
+        if of.unlit() {
+            return Ok(plain);
+        }
+        let factors = surface.metallic_roughness_texture();
         Ok(MeshMaterial {
-            colour: Vec3::new(red, green, blue),
-            picture: self.read(surface.base_color_texture(), TextureImage::of_colours)?,
             roughness: surface.roughness_factor(),
             metallic: surface.metallic_factor(),
-            factors: self.read(
-                surface.metallic_roughness_texture(),
-                TextureImage::of_numbers,
-            )?,
+            factors: self.picture(factors, PictureKind::Numbers)?,
+            ..plain
         })
     }
 
-    fn read(
-        &self,
+    fn picture(
+        &mut self,
         texture: Option<gltf::texture::Info<'_>>,
-        decode: fn(&[u8]) -> Result<TextureImage, image::ImageError>,
-    ) -> Result<Option<TextureImage>, SynthError> {
+        kind: PictureKind,
+    ) -> Result<Option<Arc<TextureImage>>, SynthError> {
         let Some(texture) = texture else {
             return Ok(None);
         };
-        let image = texture.texture().source();
-        let damaged = |why: String| SynthError::Mesh {
+        let number = texture.texture().source().index();
+        let unusable = |why: String| SynthError::Mesh {
             path: self.path.to_owned(),
-            reason: format!("its picture {} {why}", image.index()),
+            reason: format!("its picture {number}, counted from 0, {why}"),
         };
         if texture.tex_coord() != 0 {
-            return Err(damaged(
-                "lies on other texture coordinates than the first, which are all that is read"
-                    .to_owned(),
-            ));
+            let why = "lies on other texture coordinates than the first, and only those are read";
+            return Err(unusable(why.to_owned()));
         }
-        let bytes = match image.source() {
-            gltf::image::Source::Uri { uri, .. } => Cow::Owned(linked(self.path, uri)?),
-            gltf::image::Source::View { view, .. } => {
-                let buffer = self.buffers.get(view.buffer().index());
-                let end = view.offset().checked_add(view.length());
-                let bytes = buffer
-                    .zip(end)
-                    .and_then(|(buffer, end)| buffer.get(view.offset()..end));
-                Cow::Borrowed(bytes.ok_or_else(|| damaged("reaches beyond its buffer".to_owned()))?)
-            }
+        if let Some(picture) = self.read.get(&(number, kind)) {
+            return Ok(Some(Arc::clone(picture)));
+        }
+        let bytes = self.bytes(number, &unusable)?;
+        let picture = match kind {
+            PictureKind::Colours => TextureImage::of_colours(&bytes),
+            PictureKind::Numbers => TextureImage::of_numbers(&bytes),
         };
-        let picture = decode(&bytes).map_err(|fault| damaged(format!("is damaged: {fault}")))?;
+        let picture = picture.map_err(|fault| unusable(format!("cannot be used: {fault}")))?;
+        let picture = Arc::new(picture);
+        self.read.insert((number, kind), Arc::clone(&picture));
         Ok(Some(picture))
+    }
+
+    /// The bytes of a picture's file. Looked up in the JSON: `gltf` ends the program at a picture without a type or a place.
+    fn bytes(
+        &self,
+        number: usize,
+        unusable: &dyn Fn(String) -> SynthError,
+    ) -> Result<Cow<'_, [u8]>, SynthError> {
+        let image = self.file.as_json().images.get(number);
+        let image = image.ok_or_else(|| unusable("is not there".to_owned()))?;
+        if let Some(view) = &image.buffer_view {
+            let view = self.file.views().nth(view.value());
+            let bytes = view.and_then(|view| {
+                let buffer = self.buffers.get(view.buffer().index())?;
+                buffer.get(view.offset()..view.offset().checked_add(view.length())?)
+            });
+            let bytes = bytes.ok_or_else(|| unusable("reaches beyond its buffer".to_owned()))?;
+            return Ok(Cow::Borrowed(bytes));
+        }
+        match &image.uri {
+            Some(uri) => Ok(Cow::Owned(linked(self.path, uri)?)),
+            None => Err(unusable("has neither bytes nor a file".to_owned())),
+        }
     }
 }
 
@@ -208,10 +262,6 @@ impl Reader<'_> {
             .map(|&p| placed.transform_point3(Vec3::from(p)));
         self.raw.positions.extend(moved);
         self.texture(primitive, &triangles)?;
-        let material = primitive.material().index();
-        let material = material.map_or(u32::MAX, |number| number as u32);
-        let materials = &mut self.raw.materials.of_triangle;
-        materials.extend(std::iter::repeat_n(material, triangles.len()));
         let shifted = |corners: [u32; 3]| corners.map(|vertex| vertex.saturating_add(first));
         self.raw
             .triangles
@@ -219,31 +269,50 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Adds the texture coordinates of these triangles, where the part has them as numbers.
+    /// Adds the material of these triangles and their texture coordinates, where the part has them.
     fn texture(&mut self, part: &Primitive<'_>, triangles: &[[u32; 3]]) -> Result<(), String> {
-        let accessor = part
-            .get(&Semantic::TexCoords(0))
-            .filter(|accessor| accessor.data_type() == DataType::F32);
-        let Some(accessor) = accessor else {
-            self.all_textured = false;
-            return Ok(());
+        let pairs = match part.get(&Semantic::TexCoords(0)) {
+            Some(accessor) => self.pairs(&accessor)?,
+            None => Vec::new(),
         };
-        let pairs = self.floats::<2>(&accessor, Dimensions::Vec2)?;
         // In glTF, v runs downwards.
         let at = |vertex: u32| {
-            pairs
-                .get(vertex as usize)
-                .map(|&[u, v]| Vec2::new(u, 1.0 - v))
+            let &[u, v] = pairs.get(vertex as usize)?;
+            Some(Vec2::new(u, 1.0 - v)).filter(|place| place.is_finite())
         };
+        let material = part.material().index();
         for corners in triangles {
-            match corners.map(at) {
-                [Some(a), Some(b), Some(c)] if (a + b + c).is_finite() => {
-                    self.raw.texture.push([a, b, c]);
-                }
-                _ => self.all_textured = false,
-            }
+            let found = match corners.map(at) {
+                [Some(a), Some(b), Some(c)] => Some([a, b, c]),
+                _ => None,
+            };
+            self.raw.materials.push(material, found);
+            self.raw.texture.extend(found);
+            self.all_textured &= found.is_some();
         }
         Ok(())
+    }
+
+    /// Texture coordinates: numbers, or parts of 255 or 65535.
+    fn pairs(&self, accessor: &Accessor<'_>) -> Result<Vec<[f32; 2]>, String> {
+        let bytes = match accessor.data_type() {
+            DataType::U8 => 1,
+            DataType::U16 => 2,
+            _ => return self.floats::<2>(accessor, Dimensions::Vec2),
+        };
+        if accessor.dimensions() != Dimensions::Vec2 {
+            let number = accessor.index();
+            return Err(format!("accessor {number} holds numbers of another kind"));
+        }
+        let value = |item: &[u8]| match *item {
+            [byte] => f32::from(byte) / 255.0,
+            [low, high] => f32::from(u16::from_le_bytes([low, high])) / 65535.0,
+            _ => f32::NAN,
+        };
+        let items = self.items(accessor, 2 * bytes)?;
+        Ok(items
+            .map(|item| [value(&item[..bytes]), value(&item[bytes..])])
+            .collect())
     }
 
     fn floats<const N: usize>(
@@ -468,20 +537,21 @@ mod tests {
         document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(2);
         let mesh = read(&document, &bytes).unwrap();
         let look = |corner: usize| {
-            let place = mesh.texture().unwrap()[0][corner];
-            mesh.own_surface(0, Some(place)).unwrap()
+            let weights = std::array::from_fn(|at| f32::from(u8::from(at == corner)));
+            mesh.own_surface(0, weights).unwrap()
         };
         assert_eq!(look(0).colour, Vec3::new(0.5, 1.0, 0.0));
         assert_eq!(look(2).colour, Vec3::new(0.5, 0.0, 0.0));
         assert_eq!((look(0).roughness, look(0).metallic), (0.4, 0.0));
         for (place, value, told) in [
-            ("/bufferViews/3/byteLength", json!(20), "damaged"),
+            ("/bufferViews/3/byteLength", json!(20), "cannot be used"),
             (
                 "/bufferViews/3/byteLength",
                 json!(9000),
                 "beyond its buffer",
             ),
             ("/images/0", json!({"uri": "../a.png"}), "in the folder"),
+            ("/images/0", json!({}), "neither"),
             (
                 "/materials/0/pbrMetallicRoughness/baseColorTexture/texCoord",
                 json!(1),

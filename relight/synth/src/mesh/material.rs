@@ -1,6 +1,9 @@
 //! What a mesh's own file says of its surface: colours, pictures of them, roughness and metal, as in glTF 2.0. Knows nothing of
 //! light.
 
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3};
 
 use crate::texture::TextureImage;
@@ -14,13 +17,13 @@ pub(crate) struct MeshMaterial {
     /// Linear red, green and blue, by which the picture is multiplied.
     pub(crate) colour: Vec3,
     /// The colours from place to place.
-    pub(crate) picture: Option<TextureImage>,
+    pub(crate) picture: Option<Arc<TextureImage>>,
     /// 0 a mirror, 1 dull.
     pub(crate) roughness: f32,
     /// 0 paint, 1 metal.
     pub(crate) metallic: f32,
     /// Factors of roughness (green) and metal (blue) from place to place.
-    pub(crate) factors: Option<TextureImage>,
+    pub(crate) factors: Option<Arc<TextureImage>>,
 }
 
 /// The materials of a mesh, and which triangle has which.
@@ -28,7 +31,9 @@ pub(crate) struct MeshMaterial {
 pub(crate) struct MeshMaterials {
     pub(crate) all: Vec<MeshMaterial>,
     /// For each triangle.
-    pub(crate) of_triangle: Vec<u32>,
+    of_triangle: Vec<u32>,
+    /// Where the corners of each triangle lie in the pictures; not numbers where there are no coordinates.
+    places: Vec<[Vec2; 3]>,
 }
 
 /// A surface's own look at one place.
@@ -61,7 +66,8 @@ impl MeshMaterial {
             Some(place) => picture.at(place),
             None => picture.mean(),
         };
-        let of = |picture: &Option<TextureImage>| picture.as_ref().map_or(Vec3::ONE, looked_up);
+        let of =
+            |picture: &Option<Arc<TextureImage>>| picture.as_deref().map_or(Vec3::ONE, looked_up);
         let factors = of(&self.factors);
         OwnSurface {
             colour: (self.colour * of(&self.picture)).clamp(Vec3::ZERO, Vec3::ONE),
@@ -72,12 +78,30 @@ impl MeshMaterial {
 }
 
 impl MeshMaterials {
-    /// Whether they say more than one colour for all: a file without materials has a grey one.
+    /// Adds a triangle of a material, and where its corners lie in the pictures, if that is known.
+    pub(crate) fn push(&mut self, material: Option<usize>, places: Option<[Vec2; 3]>) {
+        self.of_triangle
+            .push(material.map_or(u32::MAX, |number| number as u32));
+        self.places.push(places.unwrap_or([Vec2::NAN; 3]));
+    }
+
+    /// The materials that triangles have.
+    pub(crate) fn used(&self) -> BTreeSet<usize> {
+        self.of_triangle.iter().map(|&one| one as usize).collect()
+    }
+
+    /// Keeps the triangles for which `keep` says so.
+    pub(crate) fn retain(&mut self, keep: &[bool]) {
+        let mut kept = keep.iter().copied();
+        self.of_triangle.retain(|_| kept.next().unwrap_or(true));
+        let mut kept = keep.iter().copied();
+        self.places.retain(|_| kept.next().unwrap_or(true));
+    }
+
+    /// Whether they say more than one colour for all, as programs write for an object that has none.
     pub(crate) fn tell_anything(&self) -> bool {
-        let mut used = self
-            .of_triangle
-            .iter()
-            .filter_map(|&one| self.all.get(one as usize));
+        let used = self.used();
+        let mut used = used.iter().filter_map(|&one| self.all.get(one));
         let Some(first) = used.next() else {
             return false;
         };
@@ -85,8 +109,13 @@ impl MeshMaterials {
         used.any(|one| one.picture.is_some() || one.colour != first.colour)
     }
 
-    /// The look of a triangle at texture coordinates.
-    pub(crate) fn at(&self, triangle: usize, place: Option<Vec2>) -> OwnSurface {
+    /// The look of a triangle at weights of its corners.
+    pub(crate) fn at(&self, triangle: usize, weights: [f32; 3]) -> OwnSurface {
+        let place = self
+            .places
+            .get(triangle)
+            .map(|&[a, b, c]| a * weights[0] + b * weights[1] + c * weights[2]);
+        let place = place.filter(|place| place.is_finite());
         let number = self.of_triangle.get(triangle).copied().unwrap_or(u32::MAX);
         match self.all.get(number as usize) {
             Some(material) => material.at(place),
@@ -99,8 +128,8 @@ impl MeshMaterials {
 mod tests {
     use super::*;
 
-    fn picture() -> TextureImage {
-        TextureImage::from_fn(2, 1, |x, _| Vec3::splat(x as f32))
+    fn picture() -> Arc<TextureImage> {
+        TextureImage::from_fn(2, 1, |x, _| Vec3::splat(x as f32)).into()
     }
 
     #[test]
@@ -110,9 +139,7 @@ mod tests {
             picture: Some(picture()),
             roughness: 0.8,
             metallic: 1.0,
-            factors: Some(TextureImage::from_fn(1, 1, |_, _| {
-                Vec3::new(9.0, 0.5, 0.25)
-            })),
+            factors: Some(TextureImage::from_fn(1, 1, |_, _| Vec3::new(9.0, 0.5, 0.25)).into()),
         };
         let right = material.at(Some(Vec2::new(0.75, 0.5)));
         assert_eq!(right.colour, Vec3::new(0.5, 1.0, 1.0));
@@ -122,9 +149,10 @@ mod tests {
 
     #[test]
     fn one_colour_for_all_tells_nothing_and_two_or_a_picture_do() {
-        let with = |all: Vec<MeshMaterial>| MeshMaterials {
-            of_triangle: (0..all.len() as u32).collect(),
-            all,
+        let with = |all: Vec<MeshMaterial>| {
+            let mut materials = MeshMaterials::default();
+            (0..all.len()).for_each(|number| materials.push(Some(number), None));
+            MeshMaterials { all, ..materials }
         };
         let colour = |colour| MeshMaterial {
             colour,

@@ -1,9 +1,10 @@
 //! Triangle meshes with a normal for each corner. Knows nothing of cameras or light; `obj` and
-//! `glb` read files, `material` is what they say of the surface.
+//! `glb` read files, `material` is what they say of the surface, and `mtl` reads it for `obj`.
 
 mod beside;
 mod glb;
 mod material;
+mod mtl;
 mod obj;
 mod raw;
 
@@ -120,10 +121,16 @@ impl Mesh {
         &self.normals
     }
 
-    /// The look of a triangle at texture coordinates, where the mesh's file says one.
-    pub(super) fn own_surface(&self, triangle: usize, place: Option<Vec2>) -> Option<OwnSurface> {
+    /// Whether the mesh's file says how it looks.
+    #[must_use]
+    pub fn has_own_surface(&self) -> bool {
+        self.materials.is_some()
+    }
+
+    /// The look of a triangle at weights of its corners, where the mesh's file says one.
+    pub(super) fn own_surface(&self, triangle: usize, weights: [f32; 3]) -> Option<OwnSurface> {
         let materials = self.materials.as_ref()?;
-        Some(materials.at(triangle, place))
+        Some(materials.at(triangle, weights))
     }
 
     /// Texture coordinates for each corner of each triangle, where the mesh has them.
@@ -219,9 +226,7 @@ fn drop_flat(raw: &mut RawMesh) {
         .retain(|_| keep.next().copied().unwrap_or(true));
     let mut keep = has_area.iter();
     raw.texture.retain(|_| keep.next().copied().unwrap_or(true));
-    let mut keep = has_area.iter();
-    let materials = &mut raw.materials.of_triangle;
-    materials.retain(|_| keep.next().copied().unwrap_or(true));
+    raw.materials.retain(&has_area);
 }
 
 /// For each corner, the mean normal of the faces around its vertex, each weighted by its angle there,

@@ -1,13 +1,17 @@
-//! Wavefront files and the materials beside them, by `tobj`.
+//! Wavefront files, by `tobj`, and the materials beside them.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, ErrorKind};
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::beside::file_beside;
-use super::material::{DULL, MeshMaterial};
+use super::beside::near;
+use super::material::MeshMaterial;
+use super::mtl::{self, MtlMaterial};
 use super::raw::RawMesh;
 use crate::SynthError;
 use crate::texture::TextureImage;
@@ -25,24 +29,27 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
         path: path.to_owned(),
         reason,
     };
+    // `tobj` reads materials where they are named, by a function that may be called several times.
+    let (materials, fault) = (RefCell::new(Vec::new()), RefCell::new(None));
     let beside = |named: &Path| {
-        let file =
-            file_beside(path, &named.to_string_lossy()).and_then(|path| File::open(path).ok());
-        let file = file.ok_or(tobj::LoadError::OpenFileFailed)?;
-        tobj::load_mtl_buf(&mut BufReader::new(file))
-    };
-    let (models, materials) = tobj::load_obj_buf(&mut BufReader::new(file), &options, beside)
-        .map_err(|fault| damaged(fault.to_string()))?;
-    let mut raw = RawMesh::default();
-    match materials {
-        Ok(materials) => {
-            let all = materials.iter().map(|one| material(path, one));
-            raw.materials.all = all.collect::<Result<_, _>>().map_err(damaged)?;
+        let mut known: Vec<MtlMaterial> = Vec::new();
+        match text_of_materials(path, named) {
+            Ok(text) => known = mtl::materials(&text),
+            Err(why) => *fault.borrow_mut() = Some(why),
         }
-        // Many files name materials that nobody has kept: the surface is there all the same.
-        Err(tobj::LoadError::OpenFileFailed) => {}
-        Err(fault) => return Err(damaged(format!("its materials are damaged: {fault}"))),
+        let names = (0..).zip(&known);
+        let numbers = names.map(|(at, one)| (one.name.clone(), at)).collect();
+        let count = known.len();
+        materials.borrow_mut().extend(known);
+        // `tobj` counts them, and tells which one each model has.
+        Ok((vec![tobj::Material::default(); count], numbers))
+    };
+    let (models, _) = tobj::load_obj_buf(&mut BufReader::new(file), &options, beside)
+        .map_err(|fault| damaged(fault.to_string()))?;
+    if let Some(fault) = fault.take() {
+        return Err(damaged(fault));
     }
+    let mut raw = RawMesh::default();
     let mut all_textured = true;
     for model in &models {
         all_textured &= append(&mut raw, &model.mesh);
@@ -50,39 +57,65 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     if !all_textured {
         raw.texture.clear();
     }
+    raw.materials.all = with_pictures(path, &raw, &materials.take()).map_err(damaged)?;
     Ok(raw)
 }
 
-/// What a material says, with its picture read.
-fn material(path: &Path, of: &tobj::Material) -> Result<MeshMaterial, String> {
-    let picture = match of.diffuse_texture.as_deref() {
-        None => None,
-        Some(name) => Some(picture(path, name)?),
+/// The text of the materials that a mesh names; none where the file is not there: the surface is there all the same.
+fn text_of_materials(path: &Path, named: &Path) -> Result<String, String> {
+    let Some(file) = near(path, &named.to_string_lossy()) else {
+        return Ok(String::new());
     };
-    let is_dull = of.specular.is_none_or(|specular| specular == [0.0; 3]);
-    // From the exponent of Blinn and Phong's highlight to roughness, as a highlight is made of roughness.
-    let roughness = of.shininess.filter(|_| !is_dull);
-    let roughness = roughness.map_or(DULL, |exponent| {
-        (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25)
-    });
-    // Beside a picture, programs write a colour that they do not multiply by.
-    let colour = of.diffuse.filter(|_| picture.is_none());
-    let colour = colour.filter(|colour| colour.iter().all(|c| c.is_finite()));
-    Ok(MeshMaterial {
-        colour: colour.map_or(Vec3::ONE, Vec3::from_array),
-        picture,
-        roughness,
-        ..MeshMaterial::default()
-    })
+    match std::fs::read(&file) {
+        Ok(bytes) => Ok(String::from_utf8_lossy(&bytes).into_owned()),
+        Err(fault) if fault.kind() == ErrorKind::NotFound => Ok(String::new()),
+        Err(fault) => Err(format!(
+            "its materials {} cannot be read: {fault}",
+            file.display()
+        )),
+    }
+}
+
+/// The materials with the pictures of those that are used, each file read once.
+fn with_pictures(
+    path: &Path,
+    raw: &RawMesh,
+    materials: &[MtlMaterial],
+) -> Result<Vec<MeshMaterial>, String> {
+    let used = raw.materials.used();
+    let mut pictures: HashMap<&str, Arc<TextureImage>> = HashMap::new();
+    let mut all = Vec::with_capacity(materials.len());
+    for (number, of) in materials.iter().enumerate() {
+        let name = of.picture.as_deref().filter(|_| used.contains(&number));
+        let picture = match name {
+            None => None,
+            Some(name) => Some(match pictures.get(name) {
+                Some(picture) => Arc::clone(picture),
+                None => {
+                    let picture = Arc::new(picture(path, name)?);
+                    pictures.insert(name, Arc::clone(&picture));
+                    picture
+                }
+            }),
+        };
+        // Beside a picture, programs write a colour that they do not multiply by.
+        let colour = of.colour.filter(|_| picture.is_none());
+        all.push(MeshMaterial {
+            colour: colour.unwrap_or(Vec3::ONE),
+            picture,
+            roughness: of.roughness(),
+            ..MeshMaterial::default()
+        });
+    }
+    Ok(all)
 }
 
 fn picture(path: &Path, name: &str) -> Result<TextureImage, String> {
     let unusable = |why: String| format!("its picture {name:?} {why}");
-    let file = file_beside(path, name)
-        .ok_or_else(|| unusable("does not lie in the folder of the mesh".to_owned()))?;
+    let file = near(path, name).ok_or_else(|| unusable("is no file".to_owned()))?;
     let bytes =
         std::fs::read(file).map_err(|fault| unusable(format!("cannot be read: {fault}")))?;
-    TextureImage::of_colours(&bytes).map_err(|fault| unusable(format!("is damaged: {fault}")))
+    TextureImage::of_colours(&bytes).map_err(|fault| unusable(format!("cannot be used: {fault}")))
 }
 
 /// Adds a model; whether it has texture coordinates for all corners.
@@ -92,27 +125,24 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh) -> bool {
     raw.positions
         .extend(places.map(|p| Vec3::new(p[0], p[1], p[2])));
     let shifted = |corner: u32| corner.saturating_add(first);
-    let corners = mesh.indices.chunks_exact(3);
-    raw.triangles
-        .extend(corners.map(|c| [c[0], c[1], c[2]].map(shifted)));
     let coordinate = |index: u32| {
         let at = 2 * index as usize;
         let pair = mesh.texcoords.get(at..at + 2)?;
         Some(Vec2::new(pair[0], pair[1])).filter(|c| c.is_finite())
     };
-    let material = mesh.material_id.map_or(u32::MAX, |number| number as u32);
-    let count = mesh.indices.len() / 3;
-    raw.materials
-        .of_triangle
-        .extend(std::iter::repeat_n(material, count));
-    let before = raw.texture.len();
-    for c in mesh.texcoord_indices.chunks_exact(3) {
-        let [Some(a), Some(b), Some(c)] = [c[0], c[1], c[2]].map(coordinate) else {
-            return false;
-        };
-        raw.texture.push([a, b, c]);
+    let mut all_textured = true;
+    let mut coordinates = mesh.texcoord_indices.chunks_exact(3);
+    for corners in mesh.indices.chunks_exact(3) {
+        raw.triangles
+            .push([corners[0], corners[1], corners[2]].map(shifted));
+        let found = coordinates
+            .next()
+            .and_then(|c| Some([coordinate(c[0])?, coordinate(c[1])?, coordinate(c[2])?]));
+        raw.materials.push(mesh.material_id, found);
+        raw.texture.extend(found);
+        all_textured &= found.is_some();
     }
-    raw.texture.len() - before == count
+    all_textured
 }
 
 #[cfg(test)]
@@ -163,33 +193,35 @@ mod tests {
         );
         std::fs::write(at("a.obj"), &text).unwrap();
         let mesh = Mesh::read(&at("a.obj")).unwrap();
-        let look = |triangle, u| {
-            mesh.own_surface(triangle, Some(glam::Vec2::new(u, 0.5)))
-                .unwrap()
+        let look = |triangle, corner: usize| {
+            let weights = std::array::from_fn(|at| f32::from(u8::from(at == corner)));
+            mesh.own_surface(triangle, weights).unwrap()
         };
-        assert_eq!(look(0, 0.25).colour, glam::Vec3::Z);
-        assert_eq!(look(0, 0.75).colour, glam::Vec3::new(1.0, 0.0, 1.0));
-        assert!((look(0, 0.25).roughness - 0.5).abs() < 1e-6);
-        assert_eq!(look(1, 0.3).colour, glam::Vec3::new(0.25, 0.5, 1.0));
-        assert_eq!(look(1, 0.3).roughness, 1.0);
+        assert_eq!(look(0, 0).colour, glam::Vec3::Z);
+        assert_eq!(look(0, 1).colour, glam::Vec3::new(1.0, 0.0, 1.0));
+        assert!((look(0, 0).roughness - 0.5).abs() < 1e-6);
+        assert_eq!(look(1, 2).colour, glam::Vec3::new(0.25, 0.5, 1.0));
+        assert_eq!(look(1, 2).roughness, 1.0);
         std::fs::write(at("maps/a.png"), "no picture").unwrap();
         let error = Mesh::read(&at("a.obj")).unwrap_err().to_string();
         assert!(
-            error.contains("a.png") && error.contains("damaged"),
+            error.contains("a.png") && error.contains("cannot be used"),
             "{error}"
         );
-        for (name, told) in [("../a.png", "in the folder"), ("b.png", "cannot be read")] {
+        for name in ["../../c.png", "b.png", "/etc/passwd"] {
             std::fs::write(at("a.mtl"), format!("newmtl a\nmap_Kd {name}\n")).unwrap();
             let error = Mesh::read(&at("a.obj")).unwrap_err().to_string();
-            assert!(error.contains(name) && error.contains(told), "{error}");
+            assert!(
+                error.contains(name) && error.contains("cannot be read"),
+                "{error}"
+            );
         }
+        // Of a material that no triangle has, it is not missed.
+        let spare = "newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\nnewmtl c\nmap_Kd b.png\n";
+        std::fs::write(at("a.mtl"), spare).unwrap();
+        assert!(Mesh::read(&at("a.obj")).unwrap().has_own_surface());
         std::fs::remove_file(at("a.mtl")).unwrap();
-        assert!(
-            Mesh::read(&at("a.obj"))
-                .unwrap()
-                .own_surface(0, None)
-                .is_none()
-        );
+        assert!(!Mesh::read(&at("a.obj")).unwrap().has_own_surface());
     }
 
     #[test]

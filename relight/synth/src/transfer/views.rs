@@ -48,7 +48,7 @@ impl TransferRecipe {
             RadianceTransfer::cast(&buffer, &occluder, elevation, self.rays, random.seed());
         transfer.finishes = (0..FINISHES)
             .map(|_| {
-                let finish = Finish::draw(&mut random, &buffer, library, 0.0, None);
+                let finish = Finish::painted(&mut random, &buffer, library, 0.0, None);
                 let material = finish.apply(&buffer, library);
                 TransferFinish {
                     normals: material.normals,
