@@ -2,7 +2,7 @@
 //! coordinates of triangles are read, placed as the scene's nodes say, and their materials with pictures.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -47,21 +47,33 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     if !reader.all_textured {
         raw.texture.clear();
     }
-    let used = raw.materials.used();
+    raw.materials.all = materials(path, &file, &buffers, &raw.materials.used())?;
+    Ok(raw)
+}
+
+/// The materials that are used, and plain ones in place of the others, so that numbers stay as they are.
+fn materials(
+    path: &Path,
+    file: &Gltf,
+    buffers: &[Cow<'_, [u8]>],
+    used: &BTreeSet<usize>,
+) -> Result<Vec<MeshMaterial>, SynthError> {
     let mut pictures = Pictures {
         path,
-        file: &file,
-        buffers: &buffers,
+        file,
+        buffers,
         read: HashMap::new(),
     };
-    let materials = file.materials().enumerate();
-    raw.materials.all = materials
-        .map(|(number, one)| match used.contains(&number) {
-            true => pictures.material(&one),
-            false => Ok(MeshMaterial::default()),
+    let numbered = file.materials().enumerate();
+    numbered
+        .map(|(number, one)| {
+            if used.contains(&number) {
+                pictures.material(&one)
+            } else {
+                Ok(MeshMaterial::default())
+            }
         })
-        .collect::<Result<_, _>>()?;
-    Ok(raw)
+        .collect()
 }
 
 /// The bytes of each buffer.

@@ -67,9 +67,9 @@ fn colour(text: &str) -> Option<Vec3> {
         .split_whitespace()
         .map(|number| number.parse().ok())
         .collect();
-    let colour = match numbers?.as_slice() {
-        &[grey] => Vec3::splat(grey),
-        &[red, green, blue, ..] => Vec3::new(red, green, blue),
+    let colour = match *numbers?.as_slice() {
+        [grey] => Vec3::splat(grey),
+        [red, green, blue, ..] => Vec3::new(red, green, blue),
         _ => return None,
     };
     (colour.is_finite() && colour.min_element() >= 0.0).then_some(colour)
