@@ -3,7 +3,7 @@
 use glam::{Affine3A, DVec4, Mat3, Vec2, Vec3, Vec4};
 
 use super::raster::{NOTHING, Projected, Triangle, Weights, foremost};
-use crate::mesh::{Mesh, OwnSurface};
+use crate::mesh::{Mesh, OwnSurface, blended};
 use crate::view::Projection;
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, YUp};
@@ -296,8 +296,7 @@ impl<'a> Posed<'a> {
         let own = corners.map(|vertex| self.mesh.positions()[vertex as usize]);
         surface.object_points.push(blend(weights, own));
         if let (Some(list), Some(coordinates)) = (&mut surface.texture, self.mesh.texture()) {
-            let [a, b, c] = coordinates[number as usize];
-            list.push(a * weights[0] + b * weights[1] + c * weights[2]);
+            list.push(blended(coordinates[number as usize], weights));
         }
         let own = self.mesh.own_surface(number as usize, weights);
         surface.own.extend(own);

@@ -15,7 +15,7 @@ use gltf::{Accessor, Gltf, Node, Primitive, Semantic};
 
 use super::beside::file_beside;
 use super::material::MeshMaterial;
-use super::raw::RawMesh;
+use super::raw::{NO_TEXTURE, RawMesh};
 use crate::SynthError;
 use crate::texture::TextureImage;
 
@@ -36,7 +36,6 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     let mut reader = Reader {
         buffers: &buffers,
         raw: RawMesh::default(),
-        all_textured: true,
         visited: 0,
     };
     let scene = file.default_scene().or_else(|| file.scenes().next());
@@ -44,9 +43,6 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
         reader.node(&node, Mat4::IDENTITY, 0).map_err(damaged)?;
     }
     let mut raw = reader.raw;
-    if !reader.all_textured {
-        raw.texture.clear();
-    }
     raw.materials.all = materials(path, &file, &buffers, &raw.materials.used())?;
     Ok(raw)
 }
@@ -228,7 +224,6 @@ impl Pictures<'_> {
 struct Reader<'a> {
     buffers: &'a [Cow<'a, [u8]>],
     raw: RawMesh,
-    all_textured: bool,
     visited: usize,
 }
 
@@ -290,17 +285,16 @@ impl Reader<'_> {
         // In glTF, v runs downwards.
         let at = |vertex: u32| {
             let &[u, v] = pairs.get(vertex as usize)?;
-            Some(Vec2::new(u, 1.0 - v)).filter(|place| place.is_finite())
+            Some(Vec2::new(u, 1.0 - v))
         };
         let material = part.material().index();
         for corners in triangles {
             let found = match corners.map(at) {
-                [Some(a), Some(b), Some(c)] => Some([a, b, c]),
-                _ => None,
+                [Some(a), Some(b), Some(c)] => [a, b, c],
+                _ => NO_TEXTURE,
             };
-            self.raw.materials.push(material, found);
-            self.raw.texture.extend(found);
-            self.all_textured &= found.is_some();
+            self.raw.texture.push(found);
+            self.raw.materials.push(material);
         }
         Ok(())
     }

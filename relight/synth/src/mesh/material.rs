@@ -31,9 +31,7 @@ pub(crate) struct MeshMaterial {
 pub(crate) struct MeshMaterials {
     pub(crate) all: Vec<MeshMaterial>,
     /// For each triangle.
-    of_triangle: Vec<u32>,
-    /// Where the corners of each triangle lie in the pictures; not numbers where there are no coordinates.
-    places: Vec<[Vec2; 3]>,
+    pub(crate) of_triangle: Vec<u32>,
 }
 
 /// A surface's own look at one place.
@@ -78,24 +76,15 @@ impl MeshMaterial {
 }
 
 impl MeshMaterials {
-    /// Adds a triangle of a material, and where its corners lie in the pictures, if that is known.
-    pub(crate) fn push(&mut self, material: Option<usize>, places: Option<[Vec2; 3]>) {
+    /// Adds a triangle of a material.
+    pub(crate) fn push(&mut self, material: Option<usize>) {
         self.of_triangle
             .push(material.map_or(u32::MAX, |number| number as u32));
-        self.places.push(places.unwrap_or([Vec2::NAN; 3]));
     }
 
     /// The materials that triangles have.
     pub(crate) fn used(&self) -> BTreeSet<usize> {
         self.of_triangle.iter().map(|&one| one as usize).collect()
-    }
-
-    /// Keeps the triangles for which `keep` says so.
-    pub(crate) fn retain(&mut self, keep: &[bool]) {
-        let mut kept = keep.iter().copied();
-        self.of_triangle.retain(|_| kept.next().unwrap_or(true));
-        let mut kept = keep.iter().copied();
-        self.places.retain(|_| kept.next().unwrap_or(true));
     }
 
     /// Whether they say more than one colour for all, as programs write for an object that has none.
@@ -109,13 +98,8 @@ impl MeshMaterials {
         used.any(|one| one.picture.is_some() || one.colour != first.colour)
     }
 
-    /// The look of a triangle at weights of its corners.
-    pub(crate) fn at(&self, triangle: usize, weights: [f32; 3]) -> OwnSurface {
-        let place = self
-            .places
-            .get(triangle)
-            .map(|&[a, b, c]| a * weights[0] + b * weights[1] + c * weights[2]);
-        let place = place.filter(|place| place.is_finite());
+    /// The look of a triangle at a place of its pictures.
+    pub(crate) fn at(&self, triangle: usize, place: Option<Vec2>) -> OwnSurface {
         let number = self.of_triangle.get(triangle).copied().unwrap_or(u32::MAX);
         match self.all.get(number as usize) {
             Some(material) => material.at(place),
@@ -151,7 +135,7 @@ mod tests {
     fn one_colour_for_all_tells_nothing_and_two_or_a_picture_do() {
         let with = |all: Vec<MeshMaterial>| {
             let mut materials = MeshMaterials::default();
-            (0..all.len()).for_each(|number| materials.push(Some(number), None));
+            (0..all.len()).for_each(|number| materials.push(Some(number)));
             MeshMaterials { all, ..materials }
         };
         let colour = |colour| MeshMaterial {

@@ -31,7 +31,10 @@ pub struct Mesh {
     triangles: Vec<[u32; 3]>,
     /// One for each corner of each triangle, unit length.
     normals: Vec<[Vec3; 3]>,
-    texture: Option<Vec<[Vec2; 3]>>,
+    /// As in [`RawMesh::texture`].
+    texture: Vec<[Vec2; 3]>,
+    /// Whether all of them have some.
+    is_textured: bool,
     materials: Option<MeshMaterials>,
 }
 
@@ -101,7 +104,9 @@ impl Mesh {
             positions: raw.positions,
             triangles: raw.triangles,
             normals,
-            texture: (!raw.texture.is_empty()).then_some(raw.texture),
+            is_textured: !raw.texture.is_empty()
+                && raw.texture.iter().flatten().all(|place| place.is_finite()),
+            texture: raw.texture,
             materials: raw.materials.tell_anything().then_some(raw.materials),
         })
     }
@@ -130,13 +135,21 @@ impl Mesh {
     /// The look of a triangle at weights of its corners, where the mesh's file says one.
     pub(super) fn own_surface(&self, triangle: usize, weights: [f32; 3]) -> Option<OwnSurface> {
         let materials = self.materials.as_ref()?;
-        Some(materials.at(triangle, weights))
+        let corners = self.texture.get(triangle);
+        let place = corners.map(|&corners| blended(corners, weights));
+        let place = place.filter(|place| place.is_finite());
+        Some(materials.at(triangle, place))
     }
 
-    /// Texture coordinates for each corner of each triangle, where the mesh has them.
+    /// Texture coordinates for each corner of each triangle, where all of them have some.
     pub(super) fn texture(&self) -> Option<&[[Vec2; 3]]> {
-        self.texture.as_deref()
+        self.is_textured.then_some(&self.texture)
     }
+}
+
+/// Texture coordinates at weights of a triangle's corners.
+pub(super) fn blended([a, b, c]: [Vec2; 3], weights: [f32; 3]) -> Vec2 {
+    a * weights[0] + b * weights[1] + c * weights[2]
 }
 
 fn check(raw: &RawMesh) -> Result<(), MeshFault> {
@@ -226,7 +239,9 @@ fn drop_flat(raw: &mut RawMesh) {
         .retain(|_| keep.next().copied().unwrap_or(true));
     let mut keep = has_area.iter();
     raw.texture.retain(|_| keep.next().copied().unwrap_or(true));
-    raw.materials.retain(&has_area);
+    let mut keep = has_area.iter();
+    let materials = &mut raw.materials.of_triangle;
+    materials.retain(|_| keep.next().copied().unwrap_or(true));
 }
 
 /// For each corner, the mean normal of the faces around its vertex, each weighted by its angle there,

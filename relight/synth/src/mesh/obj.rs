@@ -12,7 +12,7 @@ use glam::{Vec2, Vec3};
 use super::beside::near;
 use super::material::MeshMaterial;
 use super::mtl::{self, MtlMaterial};
-use super::raw::RawMesh;
+use super::raw::{NO_TEXTURE, RawMesh};
 use crate::SynthError;
 use crate::texture::TextureImage;
 
@@ -50,12 +50,8 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
         return Err(damaged(fault));
     }
     let mut raw = RawMesh::default();
-    let mut all_textured = true;
     for model in &models {
-        all_textured &= append(&mut raw, &model.mesh);
-    }
-    if !all_textured {
-        raw.texture.clear();
+        append(&mut raw, &model.mesh);
     }
     raw.materials.all = with_pictures(path, &raw, &materials.take()).map_err(damaged)?;
     Ok(raw)
@@ -118,8 +114,8 @@ fn picture(path: &Path, name: &str) -> Result<TextureImage, String> {
     TextureImage::of_colours(&bytes).map_err(|fault| unusable(format!("cannot be used: {fault}")))
 }
 
-/// Adds a model; whether it has texture coordinates for all corners.
-fn append(raw: &mut RawMesh, mesh: &tobj::Mesh) -> bool {
+/// Adds a model.
+fn append(raw: &mut RawMesh, mesh: &tobj::Mesh) {
     let first = raw.positions.len() as u32;
     let places = mesh.positions.chunks_exact(3);
     raw.positions
@@ -128,9 +124,8 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh) -> bool {
     let coordinate = |index: u32| {
         let at = 2 * index as usize;
         let pair = mesh.texcoords.get(at..at + 2)?;
-        Some(Vec2::new(pair[0], pair[1])).filter(|c| c.is_finite())
+        Some(Vec2::new(pair[0], pair[1]))
     };
-    let mut all_textured = true;
     let mut coordinates = mesh.texcoord_indices.chunks_exact(3);
     for corners in mesh.indices.chunks_exact(3) {
         raw.triangles
@@ -138,11 +133,9 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh) -> bool {
         let found = coordinates
             .next()
             .and_then(|c| Some([coordinate(c[0])?, coordinate(c[1])?, coordinate(c[2])?]));
-        raw.materials.push(mesh.material_id, found);
-        raw.texture.extend(found);
-        all_textured &= found.is_some();
+        raw.texture.push(found.unwrap_or(NO_TEXTURE));
+        raw.materials.push(mesh.material_id);
     }
-    all_textured
 }
 
 #[cfg(test)]
