@@ -10,8 +10,10 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::{Mat4, Vec2, Vec3};
 use gltf::accessor::{DataType, Dimensions};
+use gltf::json::Index;
+use gltf::json::validation::Checked::Valid;
 use gltf::mesh::Mode;
-use gltf::{Accessor, Gltf, Node, Primitive, Semantic};
+use gltf::{Accessor, Document, Gltf, Node, Primitive, Semantic};
 
 use super::beside::file_beside;
 use super::material::MeshMaterial;
@@ -21,6 +23,8 @@ use crate::texture::TextureImage;
 
 /// Deepest nesting of nodes that is followed.
 const DEEPEST: usize = 64;
+/// Bytes of the header of a binary file.
+const GLB_HEADER: u32 = 12;
 /// Most nodes that are visited; more are a circle.
 const MOST_NODES: usize = 100_000;
 
@@ -31,7 +35,7 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
         path: path.to_owned(),
         reason,
     };
-    let file = Gltf::from_slice(&bytes).map_err(|fault| damaged(fault.to_string()))?;
+    let file = parsed(&bytes).map_err(damaged)?;
     let buffers = buffers(path, &file)?;
     let mut reader = Reader {
         buffers: &buffers,
@@ -45,6 +49,31 @@ pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     let mut raw = reader.raw;
     raw.materials.all = materials(path, &file, &buffers, &raw.materials.used())?;
     Ok(raw)
+}
+
+/// The file, validated.
+fn parsed(bytes: &[u8]) -> Result<Gltf, String> {
+    let told = |fault: gltf::Error| fault.to_string();
+    // `gltf` takes the header off the length that a binary file says it has, whatever that is.
+    if let [b'g', b'l', b'T', b'F', _, _, _, _, length @ ..] = bytes
+        && let Some(length) = length
+            .first_chunk()
+            .map(|&length| u32::from_le_bytes(length))
+        && length < GLB_HEADER
+    {
+        return Err(format!("it says that it is {length} bytes long"));
+    }
+    let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).map_err(told)?;
+    let root = document.into_json();
+    // `gltf` ends the program where it validates positions that are not there.
+    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let positions = primitives.filter_map(|one| one.attributes.get(&Valid(Semantic::Positions)));
+    let count = root.accessors.len();
+    if let Some(missing) = positions.map(Index::value).find(|&number| number >= count) {
+        return Err(format!("its positions are accessor {missing} of {count}"));
+    }
+    let document = Document::from_json(root).map_err(told)?;
+    Ok(Gltf { document, blob })
 }
 
 /// The materials that are used, and plain ones in place of the others, so that numbers stay as they are.
@@ -497,7 +526,7 @@ mod tests {
 
     #[test]
     fn what_points_outside_its_buffer_or_folder_is_an_error() {
-        let changes: [(&str, Value); 8] = [
+        let changes: [(&str, Value); 9] = [
             ("/accessors/0/count", json!(5)),
             ("/accessors/1/byteOffset", json!(2)),
             ("/accessors/0/componentType", json!(5123)),
@@ -506,6 +535,7 @@ mod tests {
             ("/buffers/0/byteLength", json!(61)),
             ("/buffers/0/uri", json!("../a.bin")),
             ("/buffers/0/uri", json!("data:text/plain,abc")),
+            ("/meshes/0/primitives/0/attributes/POSITION", json!(7)),
         ];
         for (place, value) in changes {
             let (mut document, bytes) = square();
