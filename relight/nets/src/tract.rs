@@ -59,27 +59,35 @@ impl TractPlan {
 
     fn outputs(&self, inputs: TVec<TValue>) -> TractResult<TVec<TValue>> {
         let mut state = self.plan.spawn()?;
-        let found = on_all_threads(|| {
+        with_threads(|| {
             state.run_plan_with_eval(inputs, |context, state, node, inputs| {
                 let outputs = eval(context, state, node, inputs);
                 clear_upper_halves();
                 outputs
             })
-        });
-        clear_upper_halves_elsewhere();
-        found
+        })
     }
 }
 
-/// Lets what is multiplied in `work` be multiplied on all of rayon's threads.
+/// Runs an inference, whose products are computed on all of rayon's threads where that is safe.
+///
+/// tract keeps its scratch memory borrowed in a thread-local while it waits for those threads. One of rayon's threads does
+/// not only wait, it takes over other work meanwhile: the next inference, which would borrow the same memory again. So an
+/// inference on one of rayon's threads computes alone, and only another thread, which sleeps while it waits, gets help.
 #[cfg(feature = "threads")]
-fn on_all_threads<R>(work: impl FnOnce() -> R) -> R {
+fn with_threads<R>(work: impl FnOnce() -> R) -> R {
     use tract_linalg::multithread::{Executor, multithread_tract_scope};
-    multithread_tract_scope(Executor::RayonGlobal, work)
+    if rayon::current_thread_index().is_some() {
+        return multithread_tract_scope(Executor::SingleThread, work);
+    }
+    let found = multithread_tract_scope(Executor::RayonGlobal, work);
+    // Each thread as soon as it has nothing else to do: until then what it takes over is slower.
+    rayon::spawn_broadcast(|_| clear_upper_halves());
+    found
 }
 
 #[cfg(not(feature = "threads"))]
-fn on_all_threads<R>(work: impl FnOnce() -> R) -> R {
+fn with_threads<R>(work: impl FnOnce() -> R) -> R {
     work()
 }
 
@@ -107,16 +115,6 @@ fn clear_upper_halves() {
 /// No other processor has AVX in use.
 #[cfg(not(target_arch = "x86_64"))]
 fn clear_upper_halves() {}
-
-/// The same on the other threads, each as soon as it has nothing else to do: until then what they took over between two of a
-/// network's multiplications is slower.
-#[cfg(feature = "threads")]
-fn clear_upper_halves_elsewhere() {
-    rayon::spawn_broadcast(|_| clear_upper_halves());
-}
-
-#[cfg(not(feature = "threads"))]
-fn clear_upper_halves_elsewhere() {}
 
 impl Plan for TractPlan {
     fn run(&self, input: &[f32]) -> Result<Vec<Tensor>, String> {

@@ -9,6 +9,7 @@
 
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
 use relight_nets::paper::{self, Head};
 use relight_nets::{Graph, Inference, Tensor, Weights, decomposer};
 
@@ -105,6 +106,27 @@ fn the_answer_is_the_same_on_any_number_of_threads() {
         pool.unwrap().install(|| inference.run(&input)).unwrap()
     });
     assert!(one == other);
+}
+
+/// One of rayon's threads that waited within an inference would take over the next one.
+#[test]
+fn many_inferences_at_once_on_eight_threads_do_not_disturb_each_other() {
+    let graph = decomposer();
+    let weights = Weights::initial(&graph, 3);
+    let inference = Inference::new(&graph, &weights, (SIDE, SIDE)).unwrap();
+    let input = picture(graph.input_channels());
+    let alone = inference.run(&input).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build();
+    let is_same = |_| inference.run(&input).unwrap() == alone;
+    let on_rayon = pool
+        .unwrap()
+        .install(|| (0..150).into_par_iter().all(is_same));
+    let on_others = std::thread::scope(|scope| {
+        let work = || scope.spawn(|| (0..10).all(is_same));
+        let threads: Vec<_> = (0..5).map(|_| work()).collect();
+        threads.into_iter().all(|thread| thread.join().unwrap())
+    });
+    assert!(on_rayon && on_others);
 }
 
 #[test]

@@ -7,8 +7,7 @@ use std::time::Instant;
 
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
-use rayon::ThreadPoolBuilder;
-use rayon::prelude::*;
+use relight_core::parallel;
 use relight_nets::{InferenceEngine, NetError, OnnxRuntime, Weights};
 use relight_photo::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, WORKING_SIDE, WorkingSize,
@@ -220,26 +219,26 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         return Ok(Outcome::Whole);
     }
     let bar = console.progress(inputs.len() as u64, "photographs");
+    let failed = |input: &PhotoInput, message: &str| {
+        let text = format!("{}: {message}", input.place());
+        let event = json!({ "event": "failed", "photo": input.place(), "message": message });
+        bar.suspend(|| console.warn_with(&text, &event));
+    };
     let decompose = |input: &PhotoInput| {
-        let result = run.decompose(input);
-        bar.suspend(|| match &result {
-            Ok(done) => console.say(&done.text, &done.event),
-            Err(error) => {
-                let message = with_causes(error);
-                let text = format!("{}: {message}", input.place());
-                let event =
-                    json!({ "event": "failed", "photo": input.place(), "message": message });
-                console.warn_with(&text, &event);
-            }
-        });
+        let result = parallel::caught(|| run.decompose(input));
+        match &result {
+            Ok(Ok(done)) => bar.suspend(|| console.say(&done.text, &done.event)),
+            Ok(Err(error)) => failed(input, &with_causes(error)),
+            Err(panic) => failed(input, &panic.to_string()),
+        }
         bar.inc(1);
-        result.is_err()
+        matches!(result, Ok(Ok(_)))
     };
     let side_by_side = arguments
         .threads
         .unwrap_or_else(|| rayon::current_num_threads().min(MOST_SIDE_BY_SIDE));
-    let threads = ThreadPoolBuilder::new().num_threads(side_by_side).build()?;
-    let lost = threads.install(|| inputs.par_iter().filter(|&input| decompose(input)).count());
+    let whole = parallel::jobs(&inputs, side_by_side, decompose);
+    let lost = whole.iter().filter(|is_whole| !**is_whole).count();
     bar.finish_and_clear();
     match lost {
         0 => Ok(Outcome::Whole),

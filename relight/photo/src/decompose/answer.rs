@@ -223,23 +223,24 @@ pub(super) fn details(
     let window = window(side);
     let mut sums = Fields::zeros(extent);
     let mut weights = Planes::<1>::zeros(extent);
-    for y in starts(extent.height, side) {
-        let columns = starts(extent.width, side);
-        let row = parallel::map(columns.len(), |column| {
-            let x = columns[column];
-            let tile = CropSquare {
-                x: x as i64,
-                y: y as i64,
-                side,
-            };
-            let detail = tile_detail(net, &tile, (picture, mask), coarse, mirror)?;
-            Ok(detail.map(|detail| (x, detail)))
+    let columns = starts(extent.width, side);
+    let tiles: Vec<[usize; 2]> = starts(extent.height, side)
+        .into_iter()
+        .flat_map(|y| columns.iter().map(move |&x| [x, y]))
+        .collect();
+    // As many at once as there are threads: each waits in memory until it is added.
+    for some in tiles.chunks(parallel::threads().max(1)) {
+        let details = parallel::map(some.len(), |at| {
+            let [x, y] = some[at].map(|at| at as i64);
+            let tile = CropSquare { x, y, side };
+            tile_detail(net, &tile, (picture, mask), coarse, mirror)
         });
-        let row: Vec<Option<(usize, Fields)>> = row.into_iter().collect::<Result<_, NetError>>()?;
-        for (x, detail) in row.into_iter().flatten() {
-            add_weighted(&mut sums, &detail, &window, [x, y]);
-            let ones = Planes::filled(detail.extent(), [1.0]);
-            add_weighted(&mut weights, &ones, &window, [x, y]);
+        for (&at, detail) in some.iter().zip(details) {
+            if let Some(detail) = detail? {
+                add_weighted(&mut sums, &detail, &window, at);
+                let ones = Planes::filled(detail.extent(), [1.0]);
+                add_weighted(&mut weights, &ones, &window, at);
+            }
         }
     }
     for plane in sums.planes_mut() {

@@ -1,6 +1,6 @@
 //! An object at the size and the angle at which it stands in a picture: all that neither light nor its place changes.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::placement::{Fit, Foot};
 use super::relief::Relief;
@@ -31,16 +31,21 @@ impl Standing {
 
     /// The shape of the object whose own normals these are; none where it covers no pixel by a half.
     pub(super) fn relief(&self, normals: &Normals<YUp>) -> Option<&Relief> {
-        let shape = self.relief.get_or_init(|| {
-            let mut turned = self.fit.apply(normals.planes());
-            let (sin, cos) = (self.fit.angle.sin() as f32, self.fit.angle.cos() as f32);
-            let [x, y, _] = turned.planes_mut();
-            for (x, y) in x.iter_mut().zip(y) {
-                [*x, *y] = [cos * *x - sin * *y, sin * *x + cos * *y];
-            }
-            Relief::new(&Normals::<YUp>::new(turned), &self.alpha)
-        });
-        shape.as_ref()
+        if self.relief.get().is_none() {
+            // Not within `get_or_init`: while this thread waits for others, it may take over another frame that comes here.
+            let _ = self.relief.set(self.new_relief(normals));
+        }
+        self.relief.get()?.as_ref()
+    }
+
+    fn new_relief(&self, normals: &Normals<YUp>) -> Option<Relief> {
+        let mut turned = self.fit.apply(normals.planes());
+        let (sin, cos) = (self.fit.angle.sin() as f32, self.fit.angle.cos() as f32);
+        let [x, y, _] = turned.planes_mut();
+        for (x, y) in x.iter_mut().zip(y) {
+            [*x, *y] = [cos * *x - sin * *y, sin * *x + cos * *y];
+        }
+        Relief::new(&Normals::<YUp>::new(turned), &self.alpha)
     }
 }
 
@@ -51,19 +56,28 @@ pub(super) struct LastStanding(Mutex<Option<Arc<Standing>>>);
 impl LastStanding {
     /// An object that covers its own pixels so far, as it stands by this fit.
     pub(super) fn by(&self, fit: Fit, alpha: &Planes<1>) -> Arc<Standing> {
-        // What is kept is always whole, whoever had the lock.
-        let mut last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        match &*last {
-            Some(standing) if standing.fit == fit => Arc::clone(standing),
-            _ => Arc::clone(last.insert(Arc::new(Standing::new(alpha, fit)))),
+        if let Some(standing) = self.get().filter(|standing| standing.fit == fit) {
+            return standing;
         }
+        // Without the lock: while this thread waits for others, it may take over another frame that comes here.
+        let standing = Arc::new(Standing::new(alpha, fit));
+        *self.lock() = Some(Arc::clone(&standing));
+        standing
+    }
+
+    fn get(&self) -> Option<Arc<Standing>> {
+        self.lock().clone()
+    }
+
+    /// What is kept is always whole, whoever had the lock.
+    fn lock(&self) -> MutexGuard<'_, Option<Arc<Standing>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Clone for LastStanding {
     fn clone(&self) -> Self {
-        let last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        Self(Mutex::new(last.clone()))
+        Self(Mutex::new(self.get()))
     }
 }
 
