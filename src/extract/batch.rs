@@ -1,6 +1,7 @@
 //! Several recordings into one data set: one after the other, each noted when it is done with.
 
 use std::collections::HashSet;
+use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -85,7 +86,9 @@ impl Run<'_> {
         recording: &Path,
         tally: &mut Tally,
     ) -> Result<(), ExtractError> {
-        let outcome = RecordingOutcome::of(self.extract_one(recording));
+        // What a panic leaves behind of this recording lies under temporary names.
+        let extracted = panic::catch_unwind(AssertUnwindSafe(|| self.extract_one(recording)));
+        let outcome = RecordingOutcome::of(extracted.unwrap_or(Err(ExtractError::Panic)));
         tally.count(&outcome);
         self.observer.ended(recording, &outcome);
         self.catalog.note(&self.folder, position, &outcome)?;

@@ -59,6 +59,9 @@ pub enum ExtractError {
         /// Frames of the video.
         frames: u64,
     },
+    /// Extracting a recording panicked.
+    #[error("a fault of the program, described above: please report it")]
+    Panic,
     /// The mask cannot be read.
     #[error("the mask {path} cannot be read as an image ({source}): give a PNG")]
     Mask {

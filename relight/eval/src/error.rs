@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use relight_core::image::{Extent, ImageError};
 use relight_core::light::LightError;
 use relight_core::metrics::MetricError;
+use relight_core::parallel::JobPanic;
 use relight_photo::insert::InsertError;
 use relight_reader::{DamagedSample, OpenError};
 
@@ -18,6 +19,15 @@ pub enum EvalError {
     /// A sample of the ground truth cannot be read.
     #[error("the ground truth is damaged")]
     Damage(#[from] DamagedSample),
+    /// Measuring a sample panicked.
+    #[error("{sample}")]
+    Panic {
+        /// The sample.
+        sample: String,
+        /// The panic.
+        #[source]
+        panic: JobPanic,
+    },
     /// The ground truth does not have a part that the protocol needs.
     #[error("the ground truth has no {part} of {sample}: this protocol cannot be run on it")]
     Lacks {

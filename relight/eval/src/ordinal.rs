@@ -1,8 +1,6 @@
 //! Albedo of photographs, judged by people: WHDR on Intrinsic Images in the Wild.
 
-use rayon::prelude::*;
-
-use super::run::{Scored, add_lines};
+use super::run::{Scored, add_lines, each};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Planes, Rgb, Transfer};
 use relight_core::metrics::{ScaleFit, whdr};
@@ -63,14 +61,10 @@ pub fn evaluate_ordinal(
         images: Vec::new(),
     };
     for method in methods {
-        let scored = (0..images.len())
-            .into_par_iter()
-            .map(|index| {
-                let scored = score(images, index, method)?;
-                progress();
-                Ok((images.name(index), vec![scored]))
-            })
-            .collect::<Result<Vec<_>, EvalError>>()?;
+        let name = |index| images.name(index);
+        let scored = each(images.len(), progress, name, |index| {
+            Ok(vec![score(images, index, method)?])
+        })?;
         add_lines(&mut table, &method.name(), split, 1, scored);
     }
     Ok(table)

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::{EvalError, ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::metrics::MetricError;
+use relight_core::parallel;
 use relight_reader::{TruthSample, TruthSet};
 
 /// Told after each image, from many threads.
@@ -30,17 +31,35 @@ pub(super) fn add_method(
     progress: EvalProgress<'_>,
     score: impl Fn(&TruthSample) -> Result<Vec<Scored>, EvalError> + Sync,
 ) -> Result<(), EvalError> {
-    let scored: Vec<(String, Vec<Scored>)> = (0..set.names().len())
-        .into_par_iter()
-        .map(|index| {
-            let sample = set.load(index)?;
-            let scored = score(&sample)?;
-            progress();
-            Ok((sample.name, scored))
-        })
-        .collect::<Result<_, EvalError>>()?;
+    let names: Vec<&str> = set.names().collect();
+    let name = |index: usize| names[index].to_owned();
+    let scored = each(names.len(), progress, name, |index| {
+        score(&set.load(index)?)
+    })?;
     add_lines(table, method, split, 1, scored);
     Ok(())
+}
+
+/// What `work` finds of `count` samples, side by side, with their names. A panic is an error that names the sample.
+pub(super) fn each<R: Send>(
+    count: usize,
+    progress: EvalProgress<'_>,
+    name: impl Fn(usize) -> String + Sync,
+    work: impl Fn(usize) -> Result<R, EvalError> + Sync,
+) -> Result<Vec<(String, R)>, EvalError> {
+    (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let sample = name(index);
+            match parallel::caught(|| work(index)) {
+                Ok(found) => {
+                    progress();
+                    Ok((sample, found?))
+                }
+                Err(panic) => Err(EvalError::Panic { sample, panic }),
+            }
+        })
+        .collect()
 }
 
 /// Adds the lines of means, and the scores of each sample, which are of `images` images each.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use relit_data::causes::with_causes;
 
 use relight_core::image::{Extent, ImageError};
+use relight_core::parallel::JobPanic;
 
 /// Why a data set cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -78,6 +79,9 @@ pub enum SampleFault {
     /// The shard is damaged there, or the image does not decode.
     #[error(transparent)]
     Shard(#[from] relit_data::shard::ShardError),
+    /// Reading it panicked.
+    #[error(transparent)]
+    Panic(#[from] JobPanic),
     /// The sample lacks a part.
     #[error("its {part} is missing")]
     Missing {

@@ -6,17 +6,15 @@ mod make;
 mod method;
 mod set;
 
-use rayon::prelude::*;
-
 pub use make::{RelightingRecipe, make_relighting};
 pub use method::RelightMethod;
 pub use set::RelightingSet;
 
-use super::run::{Scored, add_lines};
+use super::run::{Scored, add_lines, each};
 use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
 use relight_core::image::Planes;
 use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
-use set::{Object, Part};
+use set::{Object, Part, object_folder};
 
 /// MSE and DSSIM of relit images, for each method: the mean over all objects and target lights.
 ///
@@ -41,15 +39,9 @@ pub fn evaluate_relighting(
     };
     let targets = set.lights().len().saturating_sub(1);
     for method in methods {
-        let scored = (0..set.objects())
-            .into_par_iter()
-            .map(|number| {
-                let object = set.object(number)?;
-                let scored = score(set, &object, method)?;
-                progress();
-                Ok((object.name, scored))
-            })
-            .collect::<Result<Vec<_>, EvalError>>()?;
+        let scored = each(set.objects(), progress, object_folder, |number| {
+            score(set, &set.object(number)?, method)
+        })?;
         add_lines(&mut table, &method.name(), split, targets, scored);
     }
     Ok(table)

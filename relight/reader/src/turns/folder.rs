@@ -12,6 +12,7 @@ use crate::error::check_extent;
 use crate::listing::listed;
 use crate::{DamagedSample, OpenError, SampleFault};
 use relight_core::image::{Extent, ImageError};
+use relight_core::parallel::caught;
 
 /// The images of a video, and its mask.
 pub(super) struct FolderTurn {
@@ -68,7 +69,8 @@ impl FolderTurn {
             .get(position as usize)
             .copied()
             .unwrap_or(position);
-        self.decode(index).map_err(|fault| DamagedSample {
+        let frame = caught(|| self.decode(index)).map_err(SampleFault::from);
+        frame.flatten().map_err(|fault| DamagedSample {
             sample: format!("{}, frame {index}", self.folder.display()),
             fault,
         })

@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use relit_data::causes::with_causes;
 use relit_data::shard::{SampleSpan, SampleSpans, ShardReader, ShardSample, decode_rgb};
 
+use relight_core::parallel::caught;
+
 use super::batch::{Frame, MaskBytes, TurnFrame, extent_of};
 use crate::{DamagedSample, OpenError, SampleFault};
 
@@ -101,7 +103,8 @@ impl ShardTurn {
                 return Err(damage(SampleFault::Lost { why }));
             }
         };
-        decode(&bytes).map_err(damage)
+        let frame = caught(|| decode(&bytes)).map_err(SampleFault::from);
+        frame.flatten().map_err(damage)
     }
 
     fn read(&self, place: &Range<u64>) -> Result<Vec<u8>, SampleFault> {
