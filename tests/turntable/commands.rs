@@ -190,7 +190,7 @@ fn a_jog_that_is_interrupted_stops_the_table() {
 /// Sends a line to the controller behind a port, as any serial terminal would, and waits for its `ok`.
 fn type_in(port: &std::path::Path, line: &str) {
     let settings = serialport::new(port.display().to_string(), 115_200);
-    let mut port = settings.timeout(Duration::from_secs(30)).open().unwrap();
+    let mut port = settings.timeout(Duration::from_secs(300)).open().unwrap();
     let mut heard = String::new();
     let mut until = |words: &str, port: &mut dyn Read| {
         let mut byte = [0];

@@ -133,7 +133,9 @@ fn report(console: Console, event: &str, status: &TableStatus) {
 
 fn in_words(status: &TableStatus) -> String {
     let mut text = format!("{}, {:.3} degrees", status.state, status.angle_deg);
-    if !status.homed {
+    if status.restarted {
+        text += " (not homed: the controller restarted)";
+    } else if !status.homed {
         text += " (not homed: from where it was switched on)";
     }
     if status.degrees_per_second != 0.0 {

@@ -81,7 +81,7 @@ pub(super) fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Chec
         return Err(TurntableError::EmergencyStop.into());
     }
     // After an emergency stop a person decides when the table may move again.
-    if status.alarm == Some(Alarm::EMERGENCY_STOP) {
+    if status.alarm.is_some_and(Alarm::is_emergency_stop) {
         let (state, alarm) = (status.state, status.alarm);
         return Err(TurntableError::NotReady { state, alarm }.into());
     }
@@ -95,6 +95,10 @@ pub(super) fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Chec
     }
     let firmware = &table.identity().firmware;
     checks.push(Check::passed("table", format!("Grbl {firmware} answers")));
+    // Without an index, the place where it stands would become the zero of a cable that may be wound.
+    if status.restarted && !table.identity().homing {
+        return Err(TurntableError::NotHomed.into());
+    }
     checks.push(match status.homed {
         true => Check::passed("table's zero", "known"),
         false => match table.home()? {

@@ -11,8 +11,8 @@ use super::recording::{Recorder, Window};
 use crate::clock::Clock;
 use crate::state::{Monitor, Obstacle, Phase, TableState};
 use crate::turntable::{
-    ControllerState, FinishedTurn, Table, TableStatus, Track, TrackError, Turn, TurnPlan,
-    TurntableError,
+    ControllerState, FinishedTurn, MotionFault, Table, TableStatus, Track, TrackError, Turn,
+    TurnPlan, TurntableError,
 };
 use relit_data::causes::with_causes;
 
@@ -156,10 +156,18 @@ fn enter_without_reports(context: CaptureContext<'_>, phase: Phase) {
 
 /// What is wrong with the table, in a sentence.
 fn fault_of(status: &TableStatus) -> Option<String> {
-    match status.emergency_stop {
-        true => Some(Obstacle::EmergencyStop.to_string()),
-        false => status.alarm.map(|alarm| alarm.to_string()),
+    if status.emergency_stop {
+        return Some(Obstacle::EmergencyStop.to_string());
     }
+    let restarted = || {
+        status
+            .restarted
+            .then(|| MotionFault::Restarted(None).to_string())
+    };
+    status
+        .alarm
+        .map(|alarm| alarm.to_string())
+        .or_else(restarted)
 }
 
 /// Asks the table and shows its answer.

@@ -1,43 +1,131 @@
-//! The meanings of Grbl's alarm and error numbers. Alarms from 20 and errors from 70 on are those of
-//! the rig's own firmware.
+//! The meanings of alarm and error numbers. Grbl's own are the same everywhere; above them each
+//! firmware of the family counts in its own way.
 
 use std::fmt;
 
-/// What locked the table: Grbl's alarm number, or none if no alarm was reported: a controller can
-/// start locked, and a message can be lost.
+use super::family::Family;
+
+/// What locked the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-pub struct Alarm(pub Option<u8>);
+pub struct Alarm {
+    /// The alarm's number, or none if none was reported: a controller can start locked, and a message
+    /// can be lost.
+    pub code: Option<u8>,
+    /// Whose number it is.
+    pub family: Family,
+    /// Whether the emergency stop was seen pressed since the table was locked.
+    pub emergency_stop: bool,
+}
 
 impl Alarm {
-    /// The emergency stop was pressed. It stays locked until it is released and the controller reset.
-    pub const EMERGENCY_STOP: Self = Self(Some(10));
+    /// A locked table whose controller does not say why.
+    pub(super) fn unknown(family: Family) -> Alarm {
+        Alarm {
+            code: None,
+            family,
+            emergency_stop: false,
+        }
+    }
+
+    /// Whether the emergency stop locked it. It stays locked until that is released and the controller
+    /// reset.
+    #[must_use]
+    pub fn is_emergency_stop(self) -> bool {
+        let numbered = self.family.emergency_stop_alarm();
+        self.emergency_stop || (self.code.is_some() && self.code == numbered)
+    }
 
     /// Whether the counted position may be wrong after this alarm.
     #[must_use]
     pub fn loses_position(self) -> bool {
-        !matches!(self.0, None | Some(2 | 4 | 5 | 20))
+        match self.code {
+            _ if self.emergency_stop => true,
+            None | Some(2 | 4 | 5) => false,
+            Some(20) => self.family != Family::Rig,
+            Some(_) => true,
+        }
+    }
+
+    fn meaning(self, code: u8) -> &'static str {
+        match (code, self.family) {
+            (1, _) => {
+                "a limit switch stopped it, its position is lost: free it, unlock and home it"
+            }
+            (2, _) => {
+                "a target was beyond the soft limit, the position is kept: unlock it and go the other way"
+            }
+            (3, _) => "it was reset in motion, its position is lost: unlock and home it",
+            (4 | 5, _) => "a probe failed, which tables have none of: unlock it",
+            (6, _) => "it was reset while it looked for the index: home it again",
+            (7, _) => "a door opened while it looked for the index: close it and home again",
+            (8, _) => "the index sensor stayed active after it was left: check sensor and $27",
+            (9, _) => "no index was found within a turn: check the sensor, its wiring and $5",
+            (_, Family::FluidNc | Family::GrblEsp32) => fluid_nc(code),
+            (20, Family::Rig) => {
+                "the host was silent longer than its lease, the position is kept: unlock it"
+            }
+            _ => grbl_hal(code),
+        }
+    }
+}
+
+const UNKNOWN: &str = "an alarm this program does not know: see the firmware's manual";
+
+/// grblHAL's alarms. The rig's firmware has the emergency stop from it; stock Grbl has none of them.
+fn grbl_hal(code: u8) -> &'static str {
+    match code {
+        10 => {
+            "the emergency stop was pressed, its position is lost: once it is released, reset and home the table"
+        }
+        11 => "it has to be homed before it moves: home it",
+        12 => "a limit switch is active: free it and unlock",
+        13 => "a probe is active, which tables have none of: unlock it",
+        14 => "a spindle failed, which tables have none of: unlock it",
+        15 => "no second limit switch was found: home X alone, without automatic squaring",
+        16 => "its self-test failed: restart it",
+        17 => {
+            "the motor's driver reports a fault, its position is lost: check motor and supply, then home it"
+        }
+        18 => "homing is set up wrong: check $22 and $44",
+        19 => "a Modbus device does not answer, which tables have none of: switch it off",
+        20 => "an I/O expander failed: restart the controller",
+        _ => UNKNOWN,
+    }
+}
+
+/// The alarms of FluidNC and, as far as it has them, of Grbl_ESP32.
+fn fluid_nc(code: u8) -> &'static str {
+    match code {
+        10 => "a spindle failed, which tables have none of: unlock it",
+        11 => {
+            "a control pin was active at the start: release it (emergency stop, reset, hold), then reset and home"
+        }
+        12 => "a limit switch is active and it cannot tell which side: free it and home again",
+        13 => {
+            "a limit switch or a fault stopped it at once, its position is lost: free it, unlock and home it"
+        }
+        14 => "it is not homed: home it",
+        15 => "it has just started: unlock or home it",
+        16 => "an I/O expander restarted: restart the controller",
+        17 => "a line of a file failed: unlock it",
+        18 => "a probe stopped it, which tables have none of: unlock it",
+        _ => UNKNOWN,
     }
 }
 
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some(code) = self.0 else {
-            return f.write_str("the controller is locked: unlock or home it");
-        };
-        write!(f, "ALARM:{code}, ")?;
-        f.write_str(match code {
-            1 => "a limit switch stopped it, its position is lost: free it, unlock and home it",
-            2 => "a target was beyond the soft limit, the position is kept: unlock it and go the other way",
-            3 => "it was reset in motion, its position is lost: unlock and home it",
-            4 | 5 => "a probe failed, which tables have none of: unlock it",
-            6 => "it was reset while it looked for the index: home it again",
-            7 => "a door opened while it looked for the index: close it and home again",
-            8 => "the index sensor stayed active after it was left: check sensor and $27",
-            9 => "no index was found within a turn: check the sensor, its wiring and $5",
-            10 => "the emergency stop was pressed, its position is lost: once it is released, reset and home the table",
-            20 => "the host was silent longer than its lease, the position is kept: unlock it",
-            _ => "an alarm this program does not know: see the firmware's manual",
-        })
+        match self.code {
+            Some(code) => write!(f, "ALARM:{code}, {}", self.meaning(code))?,
+            None if self.emergency_stop => return f.write_str(grbl_hal(10)),
+            None => f.write_str("the controller is locked: unlock or home it")?,
+        }
+        match self.emergency_stop && self.code != self.family.emergency_stop_alarm() {
+            true => {
+                f.write_str("; the emergency stop was pressed: release it, then reset the table")
+            }
+            false => Ok(()),
+        }
     }
 }
 
@@ -57,6 +145,7 @@ pub(super) fn meaning_of_error(code: u8) -> &'static str {
         11 | 14 => "the line is too long",
         12 => "that speed needs more steps a second than it can make",
         13 => "a door is open",
+        18 => "its reset pin is active, or homing is not set up",
         15 => "the jog goes beyond the soft limit",
         16 => "the jog is malformed",
         20 => "a command it does not know",
@@ -73,6 +162,13 @@ pub(super) fn meaning_of_error(code: u8) -> &'static str {
         33 => "the target is invalid",
         37 => "a tool offset, which tables have none of",
         38 => "a tool number too large",
+        40 => "a control pin is active",
+        45 => "a limit switch is active",
+        46 => "it has to be homed first",
+        50 => "its emergency stop is pressed",
+        51 => "the motor's driver reports a fault",
+        79 => "it has to be reset first, once its emergency stop is released",
+        152 => "its configuration is invalid: see what it prints at its start",
         70 => "the line came damaged",
         71 => "the line's number is out of order",
         72 => "no checked session is open",
@@ -84,21 +180,63 @@ pub(super) fn meaning_of_error(code: u8) -> &'static str {
 mod tests {
     use super::*;
 
+    const FAMILIES: [Family; 5] = [
+        Family::Rig,
+        Family::Grbl,
+        Family::GrblHal,
+        Family::FluidNc,
+        Family::GrblEsp32,
+    ];
+
+    fn alarm(code: u8, family: Family) -> Alarm {
+        Alarm {
+            code: Some(code),
+            ..Alarm::unknown(family)
+        }
+    }
+
     #[test]
     fn only_alarms_at_rest_or_with_a_ramp_keep_the_position() {
-        for code in 1..=u8::MAX {
-            let kept = matches!(code, 2 | 4 | 5 | 20);
-            assert_eq!(Alarm(Some(code)).loses_position(), !kept, "{code}");
+        for family in FAMILIES {
+            for code in 1..=u8::MAX {
+                let lease = code == 20 && family == Family::Rig;
+                let kept = matches!(code, 2 | 4 | 5) || lease;
+                assert_eq!(
+                    alarm(code, family).loses_position(),
+                    !kept,
+                    "{code} {family}"
+                );
+            }
+            assert!(!Alarm::unknown(family).loses_position());
         }
-        assert!(!Alarm(None).loses_position());
     }
 
     #[test]
     fn an_alarm_says_its_number_and_the_way_out() {
-        let text = Alarm(Some(10)).to_string();
+        let text = alarm(10, Family::Rig).to_string();
         assert!(
             text.contains("ALARM:10") && text.contains("release"),
             "{text}"
         );
+        let text = alarm(11, Family::GrblHal).to_string();
+        assert!(text.contains("ALARM:11") && text.contains("home"), "{text}");
+    }
+
+    #[test]
+    fn a_number_above_grbls_own_means_what_its_firmware_means_by_it() {
+        for family in [Family::Rig, Family::Grbl, Family::GrblHal] {
+            assert!(alarm(10, family).is_emergency_stop(), "{family}");
+        }
+        for family in [Family::FluidNc, Family::GrblEsp32] {
+            let spindle = alarm(10, family);
+            assert!(!spindle.is_emergency_stop(), "{family}");
+            let pressed = Alarm {
+                emergency_stop: true,
+                ..spindle
+            };
+            assert!(pressed.is_emergency_stop() && pressed.to_string().contains("emergency stop"));
+        }
+        let lease = alarm(20, Family::Rig).to_string();
+        assert_ne!(lease, alarm(20, Family::GrblHal).to_string());
     }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::codes::{Alarm, meaning_of_error};
+use super::family::Family;
 use super::wire::{ControllerState, LineFault, RestartCause, SendError};
 use crate::lockfile::LockError;
 
@@ -78,7 +79,7 @@ pub enum TurntableError {
     },
     /// There is no Grbl controller at the port.
     #[error(
-        "{port} does not answer as a Grbl 1.1 controller ({heard}): check port, cable and power, and that its firmware is Grbl 1.1 or the rig's"
+        "{port} does not answer as a Grbl 1.1 controller ({heard}): check port, cable and power, and that its firmware is the rig's, Grbl 1.1, grblHAL or FluidNC"
     )]
     NoController {
         /// The port.
@@ -91,6 +92,17 @@ pub enum TurntableError {
         "the controller does not report {0}: send `$$` and `$I` to it by hand and look at the answers"
     )]
     NotReported(&'static str),
+    /// The controller's settings lack some that are needed.
+    #[error(
+        "the controller ({family}) does not report {}, which the table needs: set up its X axis, send `$$` to it by hand and look at the answer",
+        listed(.settings)
+    )]
+    MissingSettings {
+        /// Its firmware.
+        family: Family,
+        /// The settings' numbers.
+        settings: Vec<u16>,
+    },
     /// No report or answer came.
     #[error("the table did not answer `?` within {milliseconds} ms: check cable and power")]
     Silent {
@@ -235,7 +247,7 @@ pub enum MotionFault {
     },
     /// The table stands in another place than its target, or does something else.
     #[error(
-        "the table was sent to {target_deg:.3} degrees and is in state {state} at {machine_deg:.3} (from machine zero); the line to it was damaged or something else drives it"
+        "the table was sent to {target_deg:.3} degrees and is in state {state} at {machine_deg:.3} (from machine zero); the line to it was damaged, it restarted, or something else drives it; look at the cable, then home it"
     )]
     Astray {
         /// Its state.
@@ -259,14 +271,21 @@ pub enum MotionFault {
     Stopped,
 }
 
+fn listed(settings: &[u16]) -> String {
+    let settings: Vec<_> = settings.iter().map(|n| format!("${n}")).collect();
+    settings.join(", ")
+}
+
 fn advice(state: ControllerState, alarm: Option<&Alarm>) -> String {
     match state {
         ControllerState::Alarm => {
             alarm.map_or_else(|| "unlock or home it".to_owned(), Alarm::to_string)
         }
-        ControllerState::Held | ControllerState::Holding | ControllerState::Door => {
-            "stop it first".to_owned()
-        }
+        ControllerState::Held
+        | ControllerState::Holding
+        | ControllerState::Door
+        | ControllerState::DoorMoving => "stop it first".to_owned(),
+        ControllerState::Tool => "end its tool change with a reset".to_owned(),
         ControllerState::Check => "switch Grbl's check mode off with `$C`".to_owned(),
         ControllerState::Sleep => "wake it with a reset".to_owned(),
         _ => "stop it, or wait until it is idle".to_owned(),

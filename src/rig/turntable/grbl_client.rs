@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::TableOptions;
 use super::codes::Alarm;
-use super::error::TurntableError;
+use super::error::{MotionFault, TurntableError};
 use super::greeting;
 use super::identity::Identity;
 use super::link::{IoThread, Link};
@@ -154,11 +154,29 @@ impl Table {
         self.identity.max_degrees_per_second.min(BRISK)
     }
 
-    /// Moves to `machine_deg`, degrees from machine zero, and waits until the table has arrived.
-    pub(super) fn go(&self, machine_deg: f64, speed: f64) -> Result<(), TurntableError> {
+    /// Moves to `machine_deg`, degrees from machine zero, and waits until the table has arrived. That
+    /// place was computed while the angle 0 was at `zero_deg`.
+    pub(super) fn go(
+        &self,
+        machine_deg: f64,
+        speed: f64,
+        zero_deg: f64,
+    ) -> Result<(), TurntableError> {
         let status = self.ready()?;
+        self.require_zero(zero_deg)?;
         let block = straight(machine_deg, speed);
         self.travel(&block, &status, machine_deg, speed)
+    }
+
+    /// Checks that the angle 0 is still known to be at `zero_deg`: a controller that has restarted
+    /// counts from another place.
+    pub(super) fn require_zero(&self, zero_deg: f64) -> Result<(), TurntableError> {
+        let supervisor = self.link.supervisor();
+        match supervisor.zero_deg() {
+            Some(known) if known == zero_deg => Ok(()),
+            None if supervisor.has_restarted() => Err(MotionFault::Restarted(None).into()),
+            _ => Err(TurntableError::NotHomed),
+        }
     }
 
     fn travel(
@@ -217,7 +235,7 @@ impl Table {
             Some(fault) => Err(fault),
             None if ended.is_none() => {
                 self.stop()?;
-                Err(super::error::MotionFault::Late.into())
+                Err(MotionFault::Late.into())
             }
             None => Ok(()),
         }
@@ -275,14 +293,31 @@ impl Table {
         self.link.stop()
     }
 
-    /// Unlocks the table after an alarm. After an emergency stop, this resets the controller first.
+    /// Unlocks the table after an alarm. A controller that refuses that, as after an emergency stop, is
+    /// reset first.
     ///
     /// # Errors
     /// [`TurntableError::EmergencyStop`] while it is pressed.
     pub fn unlock(&self) -> Result<TableStatus, TurntableError> {
         self.clear_emergency_stop()?;
-        self.command("$X")?;
-        self.status()
+        if let Err(refused) = self.command("$X") {
+            self.unlock_after_reset(refused)?;
+        }
+        let status = self.status()?;
+        let still_locked = status.alarm.is_some_and(Alarm::is_emergency_stop);
+        match still_locked {
+            true => Err(TurntableError::EmergencyStop),
+            false => Ok(status),
+        }
+    }
+
+    fn unlock_after_reset(&self, refused: TurntableError) -> Result<(), TurntableError> {
+        let locked = self.status()?.state == ControllerState::Alarm;
+        if !locked || !matches!(refused, TurntableError::Refused { .. }) {
+            return Err(refused);
+        }
+        self.link.reset()?;
+        self.command("$X").map(|_| ())
     }
 
     /// Resets a controller that is locked since an emergency stop: it takes neither `$X` nor `$H`
@@ -290,7 +325,7 @@ impl Table {
     pub(super) fn clear_emergency_stop(&self) -> Result<(), TurntableError> {
         let status = self.status()?;
         require_released(&status)?;
-        if status.alarm == Some(Alarm::EMERGENCY_STOP) {
+        if status.alarm.is_some_and(Alarm::is_emergency_stop) {
             self.link.reset()?;
         }
         Ok(())
@@ -325,9 +360,7 @@ impl Table {
     pub(super) fn lost(&self, block: &str, fault: super::wire::LineFault) -> TurntableError {
         match self.end_by_fault() {
             Err(error) => error,
-            Ok(Some(TurntableError::Motion(fault @ super::error::MotionFault::PortLost(_)))) => {
-                fault.into()
-            }
+            Ok(Some(TurntableError::Motion(fault @ MotionFault::PortLost(_)))) => fault.into(),
             Ok(_) => TurntableError::Lost {
                 block: block.to_owned(),
                 fault,

@@ -4,10 +4,11 @@ use std::time::Duration;
 
 use super::TableOptions;
 use super::error::TurntableError;
+use super::family::Family;
 use super::identity::{Extras, GrblSettings, Identity};
 use super::link::Link;
 use super::supervisor::ControllerTraits;
-use super::wire::{ControllerState, LineOutcome, Message, ReplyTimeout};
+use super::wire::{ControllerState, Counts, LineFault, LineOutcome, Message, ReplyTimeout};
 
 /// Longest start of an Arduino after its port was opened.
 const START_WAIT: Duration = Duration::from_secs(4);
@@ -15,6 +16,8 @@ const START_WAIT: Duration = Duration::from_secs(4);
 const SHORT_WAIT: Duration = Duration::from_millis(300);
 /// Longest wait for the answer to the first `?`.
 const PROBE_WAIT: Duration = Duration::from_secs(5);
+/// How many times that is waited for while the controller prints something else.
+const PROBES: usize = 4;
 /// How long answers to an echo may be in transit.
 const ECHO_WAIT: Duration = Duration::from_millis(250);
 /// Attempts to read the settings completely and, without checksums, twice the same.
@@ -27,6 +30,7 @@ const POLL_STOCK: Duration = Duration::from_millis(200);
 
 /// What is assumed of a controller until its identity is known.
 pub(super) const UNKNOWN_CONTROLLER: ControllerTraits = ControllerTraits {
+    family: Family::Grbl,
     degrees_per_unit: 1.0,
     poll: POLL_STOCK,
     stamps: false,
@@ -50,11 +54,12 @@ pub(super) fn greet(
     let offered = about.iter().find_map(build).filter(|_| options.extras);
     let extras = offered.unwrap_or_default();
     secure(link, &extras)?;
-    let settings = settings(link, extras)?;
+    let settings = settings(link, Family::from_messages(&about), extras)?;
     let mut identity = Identity::read(&about, &settings, options.travel_deg)?;
     identity.extras = extras;
     identity.lease_s = identity.lease_s.filter(|_| extras.lease);
     link.supervisor().set_traits(ControllerTraits {
+        family: identity.family,
         degrees_per_unit: identity.degrees_per_unit,
         poll: if extras.stamps {
             POLL_STAMPED
@@ -83,26 +88,44 @@ fn wake(link: &Link, resets: bool) -> Result<bool, TurntableError> {
     link.wait(limit, |supervisor| {
         (supervisor.restarts() > 0).then_some(())
     });
-    let until_us = link.clock().after(PROBE_WAIT);
-    link.supervisor().want_reports(until_us);
-    let state = link.wait(PROBE_WAIT, |supervisor| {
-        if supervisor.closed().is_some() {
-            return Some(None);
-        }
-        supervisor.last_report().map(|report| Some(report.state))
-    });
-    let moves = match state {
-        Some(Some(ControllerState::Idle | ControllerState::Alarm | ControllerState::Check)) => {
-            false
-        }
-        Some(Some(_)) => true,
-        Some(None) | None => return Err(no_controller(link)),
+    let moves = match first_state(link) {
+        Some(ControllerState::Idle | ControllerState::Alarm | ControllerState::Check) => false,
+        Some(_) => true,
+        None => return Err(no_controller(link)),
     };
     if moves {
         link.stop()?;
     }
     forget_echo(link)?;
     Ok(moves)
+}
+
+/// The state of the first report. A controller with a radio can take long to start, and prints what it
+/// does meanwhile: as long as it does, it is waited for.
+fn first_state(link: &Link) -> Option<ControllerState> {
+    for _ in 0..PROBES {
+        let before = heard(&link.supervisor().counts());
+        let until_us = link.clock().after(PROBE_WAIT);
+        link.supervisor().want_reports(until_us);
+        let state = link.wait(PROBE_WAIT, |supervisor| {
+            if supervisor.closed().is_some() {
+                return Some(None);
+            }
+            supervisor.last_report().map(|report| Some(report.state))
+        });
+        if state.is_some() {
+            return state.flatten();
+        }
+        if heard(&link.supervisor().counts()) == before {
+            return None;
+        }
+    }
+    None
+}
+
+/// Lines received that are neither reports nor answers.
+fn heard(counts: &Counts) -> u64 {
+    counts.noise + counts.messages
 }
 
 /// Discards the effects of an echo. Until a port is set up, the system echoes what the controller
@@ -112,8 +135,17 @@ fn wake(link: &Link, resets: bool) -> Result<bool, TurntableError> {
 fn forget_echo(link: &Link) -> Result<(), TurntableError> {
     link.clock().sleep(ECHO_WAIT);
     match link.line("", ReplyTimeout::AtOnce)? {
-        LineOutcome::Failed(_) => link.wait_stopped(),
+        LineOutcome::Failed(fault) => recover(link, fault),
         LineOutcome::Done(_) | LineOutcome::Refused(_) => Ok(()),
+    }
+}
+
+/// Waits until another line can be sent after one that got no answer: the table is being stopped, unless
+/// the controller has restarted.
+fn recover(link: &Link, fault: LineFault) -> Result<(), TurntableError> {
+    match fault {
+        LineFault::Restarted => Ok(()),
+        _ => link.wait_stopped(),
     }
 }
 
@@ -141,36 +173,54 @@ fn about(link: &Link) -> Result<Vec<Message>, TurntableError> {
             done(link, "N0", link.open_session()?)?;
             continue;
         }
-        let messages = match outcome {
-            LineOutcome::Failed(_) if link.wait_stopped().is_ok() => continue,
+        let mut messages = match outcome {
+            LineOutcome::Failed(fault) if recover(link, fault).is_ok() => continue,
             outcome => done(link, "$I", outcome)?,
         };
-        let whole = |kind: fn(&Message) -> bool| messages.iter().any(kind);
-        let options = whole(|message| matches!(message, Message::Build { .. }));
-        let version = whole(|message| matches!(message, Message::Version { .. }));
-        if options && version && last == messages {
+        // Relatives of Grbl report more, such as their radio's state, which changes.
+        messages.retain(describes_firmware);
+        if lacks(&messages).is_none() && last == messages {
             return Ok(messages);
         }
         last = messages;
     }
     Err(TurntableError::NotReported(
-        "its version and options (`$I`) twice the same",
+        lacks(&last).unwrap_or("its version and options (`$I`) twice the same"),
     ))
 }
 
+fn describes_firmware(message: &Message) -> bool {
+    match message {
+        Message::Version { .. } | Message::Build { .. } => true,
+        Message::Info { tag, .. } => tag == "FIRMWARE",
+        _ => false,
+    }
+}
+
+/// What an answer to `$I` has not.
+fn lacks(about: &[Message]) -> Option<&'static str> {
+    let has = |kind: fn(&Message) -> bool| about.iter().any(kind);
+    if !has(|message| matches!(message, Message::Version { .. })) {
+        return Some("its version ([VER:..])");
+    }
+    (!has(|message| matches!(message, Message::Build { .. }))).then_some("its options ([OPT:..])")
+}
+
 /// The answer to `$$`, complete and twice the same: without checksums a digit could be wrong.
-fn settings(link: &Link, extras: Extras) -> Result<GrblSettings, TurntableError> {
+fn settings(link: &Link, family: Family, extras: Extras) -> Result<GrblSettings, TurntableError> {
     let mut last = None;
+    let mut missing = Vec::new();
     for _ in 0..READINGS {
         let messages = match link.line("$$", ReplyTimeout::AtOnce)? {
-            LineOutcome::Failed(_) if link.wait_stopped().is_ok() => {
+            LineOutcome::Failed(fault) if recover(link, fault).is_ok() => {
                 secure(link, &extras)?;
                 continue;
             }
             outcome => done(link, "$$", outcome)?,
         };
         let settings = GrblSettings::of(&messages);
-        if !settings.is_whole(extras) {
+        missing = settings.missing(family, extras);
+        if !missing.is_empty() {
             continue;
         }
         if last.as_ref() == Some(&settings) {
@@ -178,9 +228,13 @@ fn settings(link: &Link, extras: Extras) -> Result<GrblSettings, TurntableError>
         }
         last = Some(settings);
     }
-    Err(TurntableError::NotReported(
-        "its settings (`$$`) twice the same",
-    ))
+    Err(match missing.is_empty() {
+        true => TurntableError::NotReported("its settings (`$$`) twice the same"),
+        false => TurntableError::MissingSettings {
+            family,
+            settings: missing,
+        },
+    })
 }
 
 fn done(link: &Link, block: &str, outcome: LineOutcome) -> Result<Vec<Message>, TurntableError> {
@@ -189,7 +243,7 @@ fn done(link: &Link, block: &str, outcome: LineOutcome) -> Result<Vec<Message>, 
         LineOutcome::Done(messages) => Ok(messages),
         LineOutcome::Refused(code) => Err(TurntableError::Refused { block, code }),
         LineOutcome::Failed(fault) => {
-            link.wait_stopped()?;
+            recover(link, fault)?;
             Err(TurntableError::Lost { block, fault })
         }
     }

@@ -52,7 +52,11 @@ impl Table {
         // A controller that has not found its index accepts `$H` all the same.
         let status = self.status()?;
         if status.state != ControllerState::Idle {
-            return Err(TurntableError::Homing(status.alarm.unwrap_or(Alarm(None))));
+            return Err(TurntableError::Homing(
+                status
+                    .alarm
+                    .unwrap_or(Alarm::unknown(self.identity().family)),
+            ));
         }
         self.link().supervisor().set_zero_deg(0.0);
         Ok(Homed::Index)

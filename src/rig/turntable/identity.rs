@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::error::TurntableError;
+use super::family::Family;
 use super::wire::Message;
 
 /// Degrees in a reported inch: a stock board can be set to report in inches.
@@ -45,6 +46,8 @@ pub struct TravelLimits {
 pub struct Identity {
     /// The firmware's version and note, such as `1.1h.20190830` or `1.1h.20261121 (relit)`.
     pub firmware: String,
+    /// Which firmware of the Grbl family it is.
+    pub family: Family,
     /// Its extensions to Grbl: none on a stock board.
     pub extras: Extras,
     /// Steps per degree.
@@ -83,6 +86,7 @@ impl Identity {
         settings: &GrblSettings,
         travel_deg: f64,
     ) -> Result<Identity, TurntableError> {
+        let family = Family::from_messages(about);
         let mut firmware = None;
         let mut extras = None;
         for message in about {
@@ -107,13 +111,18 @@ impl Identity {
                 .ok_or(TurntableError::NotReported(what))
         };
         Ok(Identity {
-            firmware,
+            firmware: match family {
+                Family::GrblHal | Family::GrblEsp32 => format!("{firmware} ({family})"),
+                Family::Rig | Family::Grbl | Family::FluidNc => firmware,
+            },
+            family,
             extras,
             steps_per_degree: positive(100, "its steps per degree ($100)")?,
             max_degrees_per_second: positive(110, "its fastest speed ($110)")? / 60.0,
             acceleration: positive(120, "its acceleration ($120)")?,
             limits: settings.limits(extras, travel_deg)?,
-            homing: settings.is_on(22),
+            // grblHAL's setting is a set of bits, of which the first switches homing on.
+            homing: settings.get(22).is_some_and(|value| value % 2.0 == 1.0),
             lease_s: extras.lease.then(|| settings.get(60)).flatten(),
             degrees_per_unit: if settings.is_on(13) { INCH } else { 1.0 },
         })
@@ -134,11 +143,18 @@ impl GrblSettings {
         GrblSettings(messages.iter().filter_map(setting).collect())
     }
 
-    /// Whether all settings are there that this program needs.
-    pub(super) fn is_whole(&self, extras: Extras) -> bool {
-        let mut needed = [13, 20, 22, 100, 110, 120, 130].iter();
-        needed.all(|number| self.0.contains_key(number))
-            && (!extras.lease || self.0.contains_key(&60))
+    /// The settings that this program needs and that are not there.
+    pub(super) fn missing(&self, family: Family, extras: Extras) -> Vec<u16> {
+        let mut needed = vec![20, 22, 100, 110, 120, 130];
+        // FluidNC has it in its configuration file only.
+        if family != Family::FluidNc {
+            needed.push(13);
+        }
+        if extras.lease {
+            needed.push(60);
+        }
+        needed.retain(|number| !self.0.contains_key(number));
+        needed
     }
 
     fn get(&self, number: u16) -> Option<f64> {
@@ -212,6 +228,32 @@ mod tests {
         assert_eq!((limits(&[]).low_deg, limits(&[]).high_deg), (-400.0, 0.0));
         let free = limits(&[(20, 0.0), (130, 200.0)]);
         assert_eq!((free.low_deg, free.high_deg), (-400.0, 400.0));
+    }
+
+    #[test]
+    fn grbls_relatives_are_known_by_their_version_and_lines_of_their_own() {
+        let hal = [
+            "[VER:1.1f.20240812:]",
+            "[OPT:VNMZL,35,1024,3,0]",
+            "[FIRMWARE:grblHAL]",
+        ];
+        let hal = identity(&hal, &[(22, 9.0)]).unwrap();
+        assert_eq!((hal.family, hal.homing), (Family::GrblHal, true));
+        assert!(hal.is_stock() && hal.firmware.contains("grblHAL"));
+        let fluid = ["[VER:3.7 FluidNC v3.7.8 (wifi):]", "[OPT:PHS]"];
+        assert_eq!(identity(&fluid, &[]).unwrap().family, Family::FluidNc);
+        let esp = ["[VER:1.3a.20211103:]", "[OPT:PHBSW]"];
+        assert_eq!(identity(&esp, &[]).unwrap().family, Family::GrblEsp32);
+        assert_eq!(identity(&STOCK, &[]).unwrap().family, Family::Grbl);
+        assert_eq!(identity(&RIG, &[]).unwrap().family, Family::Rig);
+    }
+
+    #[test]
+    fn only_fluid_nc_may_leave_out_the_unit_of_its_reports() {
+        let settings = GrblSettings([20, 22, 100, 110, 120].map(|n| (n, 1.0)).into());
+        let missing = |family| settings.missing(family, Extras::default());
+        assert_eq!(missing(Family::FluidNc), [130]);
+        assert_eq!(missing(Family::Grbl), [130, 13]);
     }
 
     #[test]

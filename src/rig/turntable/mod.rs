@@ -5,8 +5,8 @@
 //!                                                  table, turn, plan, sync -> angles over time
 //! ```
 //!
-//! It works with a stock Grbl 1.1 board on which one millimetre of X is one degree, and with the
-//! rig's own firmware. Of the latter it uses the extras that `$I` offers: reports with the chip's
+//! It works with a stock Grbl 1.1 board on which one millimetre of X is one degree, with Grbl's
+//! relatives grblHAL, FluidNC and Grbl_ESP32, and with the rig's own firmware. Of the latter it uses the extras that `$I` offers: reports with the chip's
 //! time, lines with number and checksum, and a lease that stops the table when the host falls
 //! silent.
 //!
@@ -50,6 +50,7 @@ mod codes;
 mod error;
 #[cfg(test)]
 mod fake_grbl;
+mod family;
 mod grbl_client;
 mod greeting;
 mod homing;
@@ -74,6 +75,7 @@ use crate::lockfile;
 pub use address::{SimulatedAddress, TurntableAddress, find_serial};
 pub use codes::Alarm;
 pub use error::{MotionFault, TurntableError};
+pub use family::Family;
 pub use grbl_client::Table;
 pub use homing::Homed;
 pub use identity::{Extras, Identity, TravelLimits};

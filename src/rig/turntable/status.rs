@@ -24,6 +24,8 @@ pub struct TableStatus {
     pub emergency_stop: bool,
     /// Whether the angle 0 is known.
     pub homed: bool,
+    /// Whether the angle 0 was known until the controller restarted.
+    pub restarted: bool,
     /// The alarm that locked the table.
     pub alarm: Option<Alarm>,
 }
@@ -40,6 +42,7 @@ impl TableStatus {
             index: report.pins.index,
             emergency_stop: report.pins.emergency_stop,
             homed: zero.is_some(),
+            restarted: supervisor.has_restarted(),
             alarm: supervisor.alarm(),
         }
     }

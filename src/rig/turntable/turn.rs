@@ -64,7 +64,8 @@ impl Table {
         if self.identity().lease_s == Some(0.0) {
             self.set_lease()?;
         }
-        Turn::start(self, plan, status.machine_deg - status.angle_deg)
+        let zero_deg = self.link().supervisor().zero_deg();
+        Turn::start(self, plan, zero_deg.ok_or(TurntableError::NotHomed)?)
     }
 
     fn set_lease(&self) -> Result<(), TurntableError> {
@@ -90,8 +91,9 @@ pub struct Turn<'table> {
 impl<'table> Turn<'table> {
     fn start(table: &'table Table, plan: TurnPlan, zero_deg: f64) -> Result<Self, TurntableError> {
         let speed = plan.degrees_per_second();
-        table.go(zero_deg + plan.back_deg(), speed)?;
+        table.go(zero_deg + plan.back_deg(), speed, zero_deg)?;
         table.clock().sleep(SETTLE);
+        table.require_zero(zero_deg)?;
         let end_deg = zero_deg + plan.end_deg();
         let distance = (plan.end_deg() - plan.back_deg()).abs();
         table.link().supervisor().record();
@@ -209,6 +211,7 @@ impl<'table> Turn<'table> {
             table: self.table,
             arrived,
             back_to,
+            zero_deg: self.zero_deg,
         };
         (track, finished)
     }
@@ -287,6 +290,7 @@ pub struct FinishedTurn<'table> {
     arrived: Result<(), TurntableError>,
     /// Where the turn began, degrees from machine zero; `None` if it is not to be unwound.
     back_to: Option<f64>,
+    zero_deg: f64,
 }
 
 impl FinishedTurn<'_> {
@@ -297,7 +301,10 @@ impl FinishedTurn<'_> {
     pub fn unwind(self) -> Result<(), TurntableError> {
         self.arrived?;
         match self.back_to {
-            Some(machine_deg) => self.table.go(machine_deg, self.table.brisk()),
+            Some(machine_deg) => {
+                let speed = self.table.brisk();
+                self.table.go(machine_deg, speed, self.zero_deg)
+            }
             None => Ok(()),
         }
     }

@@ -54,12 +54,20 @@ impl FakeGrbl {
     fn carry_out(&mut self, block: &str) -> String {
         match block {
             "$I" => {
-                let options = if self.rig { "NHtcl,8,128" } else { "V,15,128" };
-                self.say("[VER:1.1h.20190830:]");
-                self.say(&format!("[OPT:{options}]"));
+                let about = match self.rig {
+                    true => &["[VER:1.1h.20190830:]", "[OPT:NHtcl,8,128]"],
+                    false => self.dialect.about(),
+                };
+                about.iter().for_each(|line| self.say(line));
+                // A radio's state, which changes.
+                let strength = self.now_us % 90;
+                self.say(&format!("[MSG:INFO: Signal: -{strength} dBm]"));
             }
             "$$" => self.settings(),
-            "$X" => self.mode = Mode::Idle,
+            "$X" => {
+                self.mode = Mode::Idle;
+                self.alarm = None;
+            }
             "$H" if !self.homing => return "error:5".to_owned(),
             "$H" if self.found => {
                 self.at = 0.0;
@@ -95,7 +103,14 @@ impl FakeGrbl {
             "$120=36.000".to_owned(),
             "$130=400.000".to_owned(),
         ] {
-            self.say(&line);
+            let lost = self.trouble.lose_setting;
+            if self.dialect.has_setting(&line) && !lost.is_some_and(|start| line.starts_with(start))
+            {
+                self.say(&line);
+            }
+        }
+        for line in self.dialect.more_settings() {
+            self.say(line);
         }
     }
 
@@ -104,7 +119,7 @@ impl FakeGrbl {
             return "error:20".to_owned();
         };
         if self.mode != Mode::Idle {
-            return "error:9".to_owned();
+            return self.dialect.locked().to_owned();
         }
         let (target, feed) = rest.split_once('F').unwrap();
         let mut target = target.to_owned();

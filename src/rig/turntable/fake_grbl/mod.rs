@@ -5,6 +5,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
+mod dialect;
 mod lines;
 mod port;
 
@@ -12,6 +13,7 @@ use std::collections::VecDeque;
 
 use crc::{CRC_16_IBM_3740, Crc};
 
+pub(super) use dialect::Dialect;
 pub(super) use port::FakePort;
 
 const STEPS: f64 = 88.889;
@@ -36,6 +38,10 @@ pub(super) struct Trouble {
     pub(super) lose_answers: u32,
     /// Number of lines with a motion that lose the digit after X.
     pub(super) wrong_digits: u32,
+    /// Its next report has this position.
+    pub(super) wrong_report: Option<f64>,
+    /// It leaves out the setting that begins so.
+    pub(super) lose_setting: Option<&'static str>,
     /// Its banner was echoed: soon after its first report it answers a part of the echo and keeps the
     /// rest as the beginning of a line.
     pub(super) echo: bool,
@@ -55,8 +61,11 @@ enum Mode {
 pub(super) struct FakeGrbl {
     pub(super) trouble: Trouble,
     rig: bool,
+    dialect: Dialect,
     homing: bool,
     found: bool,
+    /// The number of its last alarm.
+    alarm: Option<u8>,
     now_us: i64,
     pub(super) rate: f64,
     pub(super) delay_us: i64,
@@ -78,11 +87,22 @@ pub(super) struct FakeGrbl {
 
 impl FakeGrbl {
     pub(super) fn new(rig: bool) -> FakeGrbl {
+        FakeGrbl::speaking(Dialect::Grbl, rig)
+    }
+
+    /// A relative of Grbl.
+    pub(super) fn relative(dialect: Dialect) -> FakeGrbl {
+        FakeGrbl::speaking(dialect, false)
+    }
+
+    fn speaking(dialect: Dialect, rig: bool) -> FakeGrbl {
         let mut fake_grbl = FakeGrbl {
             trouble: Trouble::default(),
             rig,
+            dialect,
             homing: false,
             found: true,
+            alarm: None,
             now_us: 0,
             rate: 1.0,
             delay_us: 2000,
@@ -158,7 +178,9 @@ impl FakeGrbl {
         } else {
             String::new()
         };
-        self.say_as_is(&format!("\r\nGrbl 1.1h ['$' for help]{cause}"));
+        if let Some(banner) = self.dialect.banner() {
+            self.say_as_is(&format!("\r\n{banner}{cause}"));
+        }
     }
 
     fn restart(&mut self, cause: &str) {
@@ -179,6 +201,9 @@ impl FakeGrbl {
             self.at = 0.0;
             self.out.clear();
             self.mode = Mode::Idle;
+            for line in self.dialect.boot_log() {
+                self.say_as_is(line);
+            }
         }
         self.banner(cause);
     }
@@ -210,6 +235,7 @@ impl FakeGrbl {
         {
             self.speed = 0.0;
             self.mode = Mode::Alarm;
+            self.alarm = Some(code);
             self.say(&format!("ALARM:{code}"));
         }
     }
@@ -295,8 +321,9 @@ impl FakeGrbl {
             Mode::Held => "Hold:0",
             Mode::Alarm => "Alarm",
         };
-        let steps = self.at * STEPS;
-        let ahead = self.target >= self.at;
+        let at = self.trouble.wrong_report.take().unwrap_or(self.at);
+        let steps = at * STEPS;
+        let ahead = self.target >= at;
         let steps = if ahead {
             (steps + 1e-6).floor()
         } else {
@@ -310,7 +337,8 @@ impl FakeGrbl {
         } else {
             String::new()
         };
-        self.say(&format!("<{state}|MPos:{place}|FS:{feed},0{stamp}>"));
+        let report = format!("<{state}|MPos:{place}|FS:{feed},0{stamp}>");
+        self.say(&self.dialect.report(report, self.alarm));
     }
 }
 

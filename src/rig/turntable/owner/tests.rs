@@ -95,11 +95,8 @@ fn a_port_has_one_owner_that_answers_until_it_is_closed() {
 }
 
 fn stop_once_it_moves(owner: &Owner) -> TableStatus {
-    for _ in 0..200 {
-        if owner.status().unwrap().state.may_move() {
-            break;
-        }
-    }
+    // A jog that ends by itself fails the test.
+    while !owner.status().unwrap().state.may_move() {}
     owner.stop().unwrap()
 }
 
@@ -109,13 +106,13 @@ fn a_stop_requested_from_the_owner_stops_the_table_and_ends_its_motion() {
     let table = terminal.open().unwrap();
     let owner = terminal.owner().unwrap();
     let stopper = thread::spawn(move || stop_once_it_moves(&owner));
-    let error = table.jog(300.0, Some(5.0)).unwrap_err();
+    let error = table.jog(300.0, Some(1.0)).unwrap_err();
     assert!(
         matches!(error, TurntableError::Motion(MotionFault::Stopped)),
         "{error}"
     );
     let stopped = stopper.join().unwrap();
-    assert!(!stopped.state.may_move() && stopped.angle_deg < 100.0);
+    assert!(!stopped.state.may_move() && stopped.angle_deg < 299.0);
 }
 
 #[test]
@@ -178,7 +175,7 @@ fn an_operator_asks_and_stops_the_table_of_a_service_and_an_outsider_opens_nothi
         );
     });
     let error = thread::scope(|scope| {
-        let moving = scope.spawn(|| table.jog(300.0, Some(5.0)).unwrap_err());
+        let moving = scope.spawn(|| table.jog(300.0, Some(1.0)).unwrap_err());
         as_user(OPERATOR, || stop_once_it_moves(&terminal.owner().unwrap()));
         moving.join().unwrap()
     });

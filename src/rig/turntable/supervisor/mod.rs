@@ -38,7 +38,16 @@ pub(crate) struct Supervisor {
     work_zero: Option<f64>,
     /// Machine position of the angle 0, degrees; `None` if it is unknown.
     zero_deg: Option<f64>,
+    /// The angle 0 was known until the controller restarted.
+    restarted: bool,
+    /// Where the table rests, degrees from machine zero, if it was seen there and has not been sent
+    /// elsewhere since.
+    rest_deg: Option<f64>,
+    /// Whether the controller counts itself as homed, by the last report that says so.
+    homed: Option<bool>,
     alarm: Option<u8>,
+    /// The emergency stop was seen pressed since the table was locked.
+    emergency_stop: bool,
     restarts: u64,
     motion: Option<Motion>,
     fault: Option<MotionFault>,
@@ -62,7 +71,11 @@ impl Supervisor {
             confirmed: false,
             work_zero: None,
             zero_deg: None,
+            restarted: false,
+            rest_deg: None,
+            homed: None,
             alarm: None,
+            emergency_stop: false,
             restarts: 0,
             motion: None,
             fault: None,
@@ -108,13 +121,27 @@ impl Supervisor {
 
     pub(crate) fn set_zero_deg(&mut self, machine_deg: f64) {
         self.zero_deg = Some(machine_deg);
+        self.restarted = false;
+    }
+
+    /// Whether the angle 0 was known until the controller restarted.
+    pub(crate) fn has_restarted(&self) -> bool {
+        self.restarted
     }
 
     pub(crate) fn alarm(&self) -> Option<Alarm> {
         let locked = self
             .last_report
             .is_some_and(|report| report.state == ControllerState::Alarm);
-        locked.then_some(Alarm(self.alarm))
+        locked.then(|| self.alarm_of(self.alarm))
+    }
+
+    fn alarm_of(&self, code: Option<u8>) -> Alarm {
+        Alarm {
+            code,
+            family: self.traits.family,
+            emergency_stop: self.emergency_stop,
+        }
     }
 
     pub(crate) fn fault(&self) -> Option<&MotionFault> {
@@ -177,6 +204,7 @@ impl Supervisor {
     /// Starts to monitor a motion; clears the last fault.
     pub(crate) fn begin_motion(&mut self, now_us: i64, goal: MotionGoal) {
         self.fault = None;
+        self.rest_deg = None;
         self.motion = Some(Motion::new(now_us, goal));
     }
 
@@ -189,7 +217,9 @@ impl Supervisor {
 
     /// Ends the monitoring.
     pub(crate) fn end_motion(&mut self) {
-        self.motion = None;
+        let arrived = self.motion.take().is_some_and(|m| m.is_at_target());
+        let last = self.last_report.filter(|_| arrived);
+        self.rest_deg = last.map(|report| report.machine_deg);
     }
 
     /// Records reports from now on.
@@ -261,8 +291,13 @@ impl Supervisor {
         }
     }
 
-    /// Stops the table because of a fault.
+    /// Stops the table because of a fault. One that stands elsewhere than it was sent may count wrong.
     fn fail(&mut self, now_us: i64, fault: MotionFault) {
+        match fault {
+            MotionFault::Restarted(_) => self.lose_by_restart(),
+            MotionFault::Astray { .. } => self.zero_deg = None,
+            _ => {}
+        }
         self.raise(fault);
         self.begin_stop(now_us);
     }
@@ -342,29 +377,82 @@ impl Supervisor {
             .last_report
             .is_some_and(|before| before.confirms(&report));
         self.last_report = Some(report);
-        if report.state != ControllerState::Alarm {
-            self.alarm = None;
-        } else if report.pins.emergency_stop {
-            // The controller says so once; a reset in the meantime does not make it say so again.
-            self.alarm = Alarm::EMERGENCY_STOP.0;
-            self.zero_deg = None;
-        }
+        self.note_alarm(&report);
         if let Some(recorded) = &mut self.recorded
             && recorded.len() < MOST_RECORDED
         {
             recorded.push(report);
+        }
+        let displaced = self.is_displaced(&report);
+        if displaced {
+            self.restarts += 1;
+            self.lose_by_restart();
         }
         if self.is_stopping() {
             if let Some(stop) = &mut self.stop {
                 stop.on_report(now_us, &report, &mut self.wire);
             }
             self.settle();
-        } else if self.fault.is_none()
-            && let Some(motion) = &mut self.motion
-            && let Some(fault) = motion.on_report(&report, self.alarm, &self.traits)
-        {
+            return;
+        }
+        let alarm = self.alarm();
+        let Some(motion) = self.motion.as_mut().filter(|_| self.fault.is_none()) else {
+            return;
+        };
+        let fault = match displaced {
+            true => Some(MotionFault::Restarted(None)),
+            false => motion.on_report(&report, alarm, &self.traits),
+        };
+        if let Some(fault) = fault {
             self.fail(now_us, fault);
         }
+    }
+
+    /// Notes what a report says of an alarm.
+    fn note_alarm(&mut self, report: &PositionReport) {
+        if report.state != ControllerState::Alarm {
+            self.alarm = None;
+            self.emergency_stop = false;
+            return;
+        }
+        self.alarm = report.alarm.or(self.alarm);
+        if report.pins.emergency_stop {
+            // The controller says so once; a reset in the meantime does not make it say so again.
+            self.emergency_stop = true;
+            self.alarm = self.alarm.or(self.traits.family.emergency_stop_alarm());
+        }
+        if self.alarm_of(self.alarm).loses_position() {
+            self.zero_deg = None;
+        }
+    }
+
+    /// Whether a report shows that the controller counts from another place than before although the
+    /// table was not sent there: it has restarted, and its banner was lost or is none that is known.
+    fn is_displaced(&mut self, report: &PositionReport) -> bool {
+        let tolerance_deg = self.traits.tolerance_deg();
+        let was_homed = self.homed;
+        self.homed = report.homed.or(was_homed);
+        if let Some(motion) = &mut self.motion {
+            return motion.went_back(report, tolerance_deg);
+        }
+        if report.state.may_move() {
+            self.rest_deg = None;
+            return false;
+        }
+        if !self.is_confirmed() {
+            return false;
+        }
+        let before = self.rest_deg.replace(report.machine_deg);
+        let elsewhere =
+            before.is_some_and(|before| (before - report.machine_deg).abs() > tolerance_deg);
+        elsewhere || (was_homed == Some(true) && report.homed == Some(false))
+    }
+
+    /// Forgets the position: the controller has restarted.
+    fn lose_by_restart(&mut self) {
+        self.restarted |= self.zero_deg.take().is_some();
+        self.rest_deg = None;
+        self.homed = None;
     }
 
     /// Forgets the position if a stop has lost it.
@@ -382,12 +470,13 @@ impl Supervisor {
     fn on_reset(&mut self, now_us: i64, cause: Option<RestartCause>) {
         self.restarts += 1;
         self.alarm = None;
+        self.emergency_stop = false;
         self.work_zero = None;
         let asked_for = matches!(cause, None | Some(RestartCause::Host));
         let stop = self.stop.as_mut().filter(|stop| stop.outcome().is_none());
         let kept = stop.is_some_and(|stop| stop.on_reset(now_us)) && asked_for;
         if !kept {
-            self.zero_deg = None;
+            self.lose_by_restart();
         }
         if !self.is_stopping() && self.motion.is_some() {
             self.fail(now_us, MotionFault::Restarted(cause));
@@ -395,8 +484,8 @@ impl Supervisor {
     }
 
     fn on_alarm(&mut self, now_us: i64, code: u8) {
-        let alarm = Alarm(Some(code));
         self.alarm = Some(code);
+        let alarm = self.alarm_of(Some(code));
         if alarm.loses_position() {
             self.zero_deg = None;
         }

@@ -12,8 +12,9 @@ const STALL_US: i64 = 800_000;
 /// How long a table may stand away from its target, microseconds: between accepting a line and
 /// starting, a controller is idle for a moment.
 const ASTRAY_US: i64 = 600_000;
-/// Rounding error of a printed position, degrees.
-const PRINTED_DEG: f64 = 0.002;
+/// Number of reports in a row from farther away than the table has been, that show that the controller
+/// counts from another place: a single one can be damaged.
+const FARTHER: u32 = 2;
 
 /// The goal of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +38,13 @@ pub(crate) struct Motion {
     last_report_us: i64,
     /// The last reported position, and the time of its first report.
     place: Option<(f64, i64)>,
+    /// Where it was in motion, by the last report.
+    moved_at: Option<f64>,
+    /// The smallest distance from the target that two reports in a row agree on, degrees, the last
+    /// report's distance, and the number of reports in a row that are farther away.
+    nearest: Option<f64>,
+    distance: Option<f64>,
+    farther: u32,
     at_target: bool,
 }
 
@@ -47,6 +55,10 @@ impl Motion {
             accepted_us: None,
             last_report_us: now_us,
             place: None,
+            moved_at: None,
+            nearest: None,
+            distance: None,
+            farther: 0,
             at_target: false,
         }
     }
@@ -65,7 +77,7 @@ impl Motion {
     pub(super) fn on_report(
         &mut self,
         report: &PositionReport,
-        alarm: Option<u8>,
+        alarm: Option<Alarm>,
         traits: &ControllerTraits,
     ) -> Option<MotionFault> {
         self.last_report_us = report.came_us;
@@ -75,6 +87,7 @@ impl Motion {
         let stands_us = self.stands_for(report);
         match report.state {
             ControllerState::Run | ControllerState::Jog => {
+                self.moved_at = Some(report.machine_deg);
                 (stands_us > STALL_US).then_some(MotionFault::Stalled {
                     machine_deg: report.machine_deg,
                 })
@@ -83,14 +96,39 @@ impl Motion {
             ControllerState::Held
             | ControllerState::Holding
             | ControllerState::Door
-            | ControllerState::Sleep => Some(MotionFault::Held),
-            ControllerState::Alarm => Some(MotionFault::Alarm(Alarm(alarm))),
+            | ControllerState::DoorMoving
+            | ControllerState::Sleep
+            | ControllerState::Tool => Some(MotionFault::Held),
+            ControllerState::Alarm => Some(MotionFault::Alarm(
+                alarm.unwrap_or(Alarm::unknown(traits.family)),
+            )),
             state @ (ControllerState::Home | ControllerState::Check) => Some(MotionFault::Astray {
                 state,
                 machine_deg: report.machine_deg,
                 target_deg,
             }),
+            // The name may be damaged. A motion that does not go on is late in the end.
+            ControllerState::Unknown => None,
         }
+    }
+
+    /// Whether the table is reported farther from its target than it has been. It only comes nearer,
+    /// unless the controller has restarted and counts from another place.
+    pub(super) fn went_back(&mut self, report: &PositionReport, tolerance_deg: f64) -> bool {
+        let MotionGoal::To { target_deg, .. } = self.goal else {
+            return false;
+        };
+        let distance = (report.machine_deg - target_deg).abs();
+        let nearest = self.nearest.unwrap_or(f64::INFINITY);
+        if distance > nearest + tolerance_deg {
+            self.farther += 1;
+        } else {
+            let before = self.distance.unwrap_or(f64::INFINITY);
+            self.farther = 0;
+            self.nearest = Some(distance.max(before).min(nearest));
+        }
+        self.distance = Some(distance);
+        self.farther >= FARTHER
     }
 
     fn on_idle(
@@ -105,14 +143,25 @@ impl Motion {
             .asked_us
             .is_some_and(|asked_us| asked_us >= accepted_us);
         let off = (report.machine_deg - target_deg).abs();
-        if after && off <= traits.step_deg + PRINTED_DEG {
+        if after && off <= traits.tolerance_deg() {
             self.at_target = true;
             return None;
         }
-        (after && !self.at_target && stands_us > ASTRAY_US).then_some(MotionFault::Astray {
-            state: ControllerState::Idle,
-            machine_deg: report.machine_deg,
-            target_deg,
+        if !after || self.at_target || stands_us <= ASTRAY_US {
+            return None;
+        }
+        // After a start, a controller stands where it begins to count.
+        let at_zero = report.machine_deg.abs() <= traits.tolerance_deg();
+        let moved = self
+            .moved_at
+            .is_some_and(|at| at.abs() > traits.tolerance_deg());
+        Some(match at_zero && moved {
+            true => MotionFault::Restarted(None),
+            false => MotionFault::Astray {
+                state: ControllerState::Idle,
+                machine_deg: report.machine_deg,
+                target_deg,
+            },
         })
     }
 

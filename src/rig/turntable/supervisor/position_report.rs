@@ -2,12 +2,20 @@
 
 use std::time::Duration;
 
+use crate::turntable::family::Family;
 use crate::turntable::wire::{ControllerState, Pins, Poll, Position};
+
+/// Rounding error of a printed position, degrees.
+const PRINTED_DEG: f64 = 0.002;
 
 /// A status report in degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionReport {
     pub(crate) state: ControllerState,
+    /// The alarm's number, if the state came with it.
+    pub(crate) alarm: Option<u8>,
+    /// Whether the controller counts itself as homed, if it says so.
+    pub(crate) homed: Option<bool>,
     /// Degrees from machine zero.
     pub(crate) machine_deg: f64,
     /// Degrees/s.
@@ -35,6 +43,8 @@ impl PositionReport {
         };
         Some(PositionReport {
             state: report.state,
+            alarm: report.alarm,
+            homed: report.homed,
             machine_deg: units * traits.degrees_per_unit,
             speed: report.feed.unwrap_or(0.0) * traits.degrees_per_unit / 60.0,
             chip_us: report.chip_us.filter(|_| traits.stamps),
@@ -49,13 +59,15 @@ impl PositionReport {
     /// Whether the next report agrees with this one. In motion, positions differ.
     pub(super) fn confirms(&self, next: &PositionReport) -> bool {
         let same = self.machine_deg == next.machine_deg || next.state.may_move();
-        self.state == next.state && same
+        self.state == next.state && self.alarm == next.alarm && same
     }
 }
 
 /// What has to be known of a controller to read its reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ControllerTraits {
+    /// Whose alarms it reports.
+    pub(crate) family: Family,
     /// Degrees in one unit of its reports.
     pub(crate) degrees_per_unit: f64,
     /// Interval of reports in motion.
@@ -66,4 +78,11 @@ pub(crate) struct ControllerTraits {
     pub(crate) reports_homing: bool,
     /// One step, degrees: how far it may stand from its target.
     pub(crate) step_deg: f64,
+}
+
+impl ControllerTraits {
+    /// How far two reports of the same place can lie apart, degrees.
+    pub(super) fn tolerance_deg(&self) -> f64 {
+        self.step_deg + PRINTED_DEG
+    }
 }

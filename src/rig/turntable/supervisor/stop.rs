@@ -16,6 +16,9 @@ const RAMP_US: i64 = 5_000_000;
 const SILENT_US: i64 = 800_000;
 /// Longest restart of a controller, microseconds.
 const RESTART_US: i64 = 4_000_000;
+/// Time after a reset from which reports at rest show that it was carried out without a banner,
+/// microseconds: it has been sent several times by then.
+const NO_BANNER_US: i64 = 2_500_000;
 /// Longest wait for reports at rest after a restart, microseconds.
 const CHECK_US: i64 = 2_000_000;
 /// Number of reports of the same position, requested after the stop, that prove a standstill.
@@ -142,12 +145,25 @@ impl Stop {
             (Step::Braking, ControllerState::Home) => self.reset(now_us, false, wire),
             (Step::Braking | Step::Checking, state) if state.may_move() => self.standing = None,
             (Step::Braking, state) if self.stands(report) => {
-                if self.unsettled || matches!(state, ControllerState::Held) {
+                // Only a reset leads out of these, and it discards what is left of the motion.
+                let waits = matches!(
+                    state,
+                    ControllerState::Held
+                        | ControllerState::Door
+                        | ControllerState::Tool
+                        | ControllerState::Unknown
+                );
+                if self.unsettled || waits {
                     self.stood_at = Some(report.machine_deg);
                     self.reset(now_us, true, wire);
                 } else {
                     self.enter(now_us, Step::Done(StopOutcome::Standing));
                 }
+            }
+            (Step::Resetting { .. }, ControllerState::Idle | ControllerState::Alarm)
+                if now_us - self.since_us > NO_BANNER_US && self.stands(report) =>
+            {
+                wire.assume_reset();
             }
             (Step::Checking, _) if self.stands(report) => {
                 let same = self

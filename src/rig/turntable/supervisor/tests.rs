@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use super::*;
+use crate::turntable::family::Family;
 
 const TRAITS: ControllerTraits = ControllerTraits {
+    family: Family::GrblHal,
     degrees_per_unit: 1.0,
     poll: Duration::from_millis(67),
     stamps: true,
@@ -244,4 +246,101 @@ fn a_banner_at_rest_loses_the_position_without_stopping_anything() {
     assert_eq!(bench.supervisor.zero_deg(), None);
     assert!(!bench.supervisor.is_stopping());
     assert_eq!(bench.supervisor.restarts(), 1);
+}
+
+#[test]
+fn a_position_that_jumps_at_rest_without_a_banner_is_lost() {
+    let mut bench = Bench::new();
+    bench.report("Idle", -200.0, 3);
+    assert_eq!(bench.supervisor.zero_deg(), Some(0.0));
+    bench.report("Idle", 0.0, 1);
+    assert_eq!(bench.supervisor.zero_deg(), Some(0.0), "one may be damaged");
+    bench.report("Idle", 0.0, 1);
+    assert_eq!(bench.supervisor.zero_deg(), None);
+    assert!(bench.supervisor.has_restarted());
+}
+
+#[test]
+fn a_table_that_is_driven_from_elsewhere_keeps_its_position() {
+    let mut bench = Bench::new();
+    bench.report("Idle", -200.0, 3);
+    bench.report("Jog", -100.0, 2);
+    bench.report("Idle", -50.0, 3);
+    assert_eq!(bench.supervisor.zero_deg(), Some(0.0));
+}
+
+#[test]
+fn a_controller_that_counts_itself_as_homed_no_more_has_lost_the_position() {
+    let mut bench = Bench::new();
+    for homed in [1, 0, 0] {
+        bench.pass(80);
+        bench.hear(&format!("<Idle|MPos:0.000,0.000,0.000|FS:0,0|H:{homed}>"));
+    }
+    assert_eq!(bench.supervisor.zero_deg(), None);
+}
+
+#[test]
+fn while_it_is_homed_a_controller_is_not_homed_and_that_is_no_restart() {
+    let mut bench = Bench::new();
+    bench.hear("<Idle|MPos:5.000,0.000,0.000|FS:0,0|H:1>");
+    bench
+        .supervisor
+        .begin_motion(bench.now_us, MotionGoal::Homing);
+    for at in [5.0, 3.0, -2.0] {
+        bench.pass(80);
+        bench.hear(&format!("<Home|MPos:{at:.3},0.000,0.000|FS:432,0|H:0>"));
+    }
+    assert_eq!(bench.supervisor.fault(), None);
+    assert_eq!(bench.supervisor.restarts(), 0);
+}
+
+#[test]
+fn a_motion_that_goes_back_shows_a_restart_and_one_damaged_report_does_not() {
+    let mut bench = Bench::new();
+    bench.moving(100.0);
+    for at in [10.0, 20.0, 90.0, 30.0, 40.0, 0.0, 50.0] {
+        bench.report("Run", at, 1);
+    }
+    assert_eq!(bench.supervisor.fault(), None);
+    bench.report("Idle", 0.0, 2);
+    assert_eq!(
+        bench.supervisor.fault(),
+        Some(&MotionFault::Restarted(None))
+    );
+    assert_eq!(bench.supervisor.zero_deg(), None);
+}
+
+#[test]
+fn a_reset_that_no_banner_follows_is_done_when_the_table_is_reported_free() {
+    let mut bench = Bench::new();
+    bench.supervisor.request_stop(0);
+    bench.report("Hold:0", 11.2, 2);
+    assert!(bench.pass(20).contains(&0x18));
+    bench.report("Idle", 11.2, 40);
+    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Standing));
+    assert_eq!(bench.supervisor.zero_deg(), Some(0.0));
+    assert!(
+        bench
+            .supervisor
+            .send(bench.now_us, "$X", ReplyTimeout::AtOnce)
+            .is_ok()
+    );
+}
+
+#[test]
+fn an_alarm_comes_with_its_number_or_from_the_pins() {
+    let mut bench = Bench::new();
+    bench.hear("<Alarm:11|MPos:0.000,0.000,0.000|FS:0,0>");
+    let alarm = bench.supervisor.alarm().unwrap();
+    assert_eq!((alarm.code, alarm.is_emergency_stop()), (Some(11), false));
+    assert_eq!(bench.supervisor.zero_deg(), None);
+    for letter in ["R", "E"] {
+        let mut bench = Bench::new();
+        bench.hear(&format!(
+            "<Alarm|MPos:0.000,0.000,0.000|FS:0,0|Pn:{letter}>"
+        ));
+        bench.hear("<Alarm|MPos:0.000,0.000,0.000|FS:0,0>");
+        assert!(bench.supervisor.alarm().unwrap().is_emergency_stop());
+        assert_eq!(bench.supervisor.zero_deg(), None);
+    }
 }

@@ -75,6 +75,8 @@ pub struct Counts {
     pub lines: u64,
     /// Status reports received.
     pub reports: u64,
+    /// Messages received while no line waited for its answer, such as those of a start.
+    pub messages: u64,
     /// Lines sent again.
     pub repeats: u64,
     /// Lines received damaged, or that no controller sends.

@@ -1,7 +1,7 @@
 //! Assembles lines from bytes, each with the arrival time of its first byte.
 
-/// Longest accepted line, bytes; Grbl's longest answers are much shorter.
-const LONGEST: usize = 160;
+/// Longest accepted line, bytes: a report of grblHAL with six axes and all its fields is shorter.
+const LONGEST: usize = 512;
 
 /// The result of a line end.
 #[derive(Debug, Clone, PartialEq, Eq)]

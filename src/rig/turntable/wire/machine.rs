@@ -246,11 +246,10 @@ impl Machine {
                 self.events.push_back(WireEvent::Status(poll));
             }
             Message::Banner(banner) => self.reset(banner.cause),
-            other => {
-                if let Some(pending) = &mut self.pending {
-                    pending.keep(other);
-                }
-            }
+            other => match &mut self.pending {
+                Some(pending) => pending.keep(now_us, other),
+                None => self.counts.messages += 1,
+            },
         }
     }
 
@@ -314,6 +313,11 @@ impl Machine {
             let outcome = LineOutcome::Failed(fault);
             self.events.push_back(WireEvent::Answered { id, outcome });
         }
+    }
+
+    /// Notes that the controller was reset although no banner came.
+    pub fn assume_reset(&mut self) {
+        self.reset(None);
     }
 
     /// Notes that the controller has restarted: it answers no earlier line and takes plain lines.

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::error_texts;
 use super::number::{decimal, shown, whole};
 use super::status::StatusReport;
 
@@ -16,16 +17,19 @@ pub enum RestartCause {
     BrownOut,
     /// It hung, and its watchdog restarted it.
     Watchdog,
+    /// Its own program: after a crash, an update, or on request (ESP32).
+    Software,
     /// The host sent the reset command.
     Host,
 }
 
 impl RestartCause {
-    const NAMES: [(RestartCause, &'static str); 5] = [
+    const NAMES: [(RestartCause, &'static str); 6] = [
         (RestartCause::PowerOn, "power-on"),
         (RestartCause::External, "external"),
         (RestartCause::BrownOut, "brown-out"),
         (RestartCause::Watchdog, "watchdog"),
+        (RestartCause::Software, "software"),
         (RestartCause::Host, "host"),
     ];
 
@@ -34,6 +38,18 @@ impl RestartCause {
         names
             .find(|(_, name)| *name == text)
             .map(|(cause, _)| *cause)
+    }
+
+    /// Reads the name that an ESP32's boot loader gives, such as `POWERON_RESET`.
+    fn from_boot_loader(name: &str) -> RestartCause {
+        let is = |part: &str| name.contains(part);
+        match () {
+            () if is("POWERON") => RestartCause::PowerOn,
+            () if is("BROWN") => RestartCause::BrownOut,
+            () if is("WDT") => RestartCause::Watchdog,
+            () if is("EXT") => RestartCause::External,
+            () => RestartCause::Software,
+        }
     }
 }
 
@@ -45,11 +61,11 @@ impl fmt::Display for RestartCause {
     }
 }
 
-/// The line with which a controller starts.
+/// A line with which a controller starts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Banner {
-    /// Grbl's version, such as `1.1h`.
-    pub version: String,
+    /// The line.
+    pub text: String,
     /// Why it started, if it reports that.
     pub cause: Option<RestartCause>,
 }
@@ -77,7 +93,7 @@ pub enum Message {
     Banner(Banner),
     /// `[VER:..]`: the firmware's version and the note its owner gave it.
     Version {
-        /// Version and date, such as `1.1h.20190830`.
+        /// Version and date, such as `1.1h.20190830`, or `3.9 FluidNC v3.9.1`.
         version: String,
         /// The note.
         note: String,
@@ -86,14 +102,12 @@ pub enum Message {
     Build {
         /// One letter per option.
         letters: String,
-        /// Size of the planner buffer, blocks.
-        blocks: u32,
-        /// Size of the receive buffer, bytes.
-        buffer: u32,
+        /// Sizes of its buffers, and what grblHAL adds to them; empty with FluidNC and Grbl_ESP32.
+        sizes: String,
     },
     /// `[MSG:..]`: a text for the user.
     Note(String),
-    /// Any other line in brackets, such as `[GC:G0 G54 ..]`.
+    /// Any other line in brackets, such as `[GC:G0 G54 ..]` or `[FIRMWARE:grblHAL]`.
     Info {
         /// The text before the colon.
         tag: String,
@@ -107,11 +121,18 @@ pub enum Message {
         /// Its value.
         value: f64,
     },
+    /// `$300=grblHAL`: a setting whose value is not a number.
+    TextSetting {
+        /// Its number.
+        number: u16,
+        /// Its value.
+        text: String,
+    },
     /// `>G21:ok`: a start-up line the controller ran by itself, with its answer.
     Startup(String),
 }
 
-/// Parses one line without its line end; `None` if it is no line of a Grbl 1.1 controller.
+/// Parses one line without its line end; `None` if no controller of the Grbl family sends it.
 #[must_use]
 pub fn parse(line: &str) -> Option<Message> {
     match line.as_bytes().first()? {
@@ -119,12 +140,17 @@ pub fn parse(line: &str) -> Option<Message> {
         b'[' => bracket(line.strip_prefix('[')?.strip_suffix(']')?),
         b'$' => setting(line.strip_prefix('$')?),
         b'>' => Some(Message::Startup(line.strip_prefix('>')?.to_owned())),
-        b'G' => banner(line),
-        _ => answer(line),
+        _ => banner(line).map(Message::Banner).or_else(|| answer(line)),
     }
 }
 
 fn answer(line: &str) -> Option<Message> {
+    if let Some(text) = line.strip_prefix("error:")
+        && text.starts_with(|letter: char| letter.is_ascii_alphabetic())
+    {
+        let code = error_texts::code(text);
+        return Some(Message::Error { code, seq: None });
+    }
     let (word, seq) = match line.split_once(' ') {
         Some((word, number)) => (word, Some(whole(number.strip_prefix('N')?)?)),
         None => (line, None),
@@ -141,27 +167,38 @@ fn answer(line: &str) -> Option<Message> {
     }
 }
 
-fn banner(line: &str) -> Option<Message> {
-    let (version, rest) = line.strip_prefix("Grbl ")?.split_once(' ')?;
-    let rest = rest.strip_prefix("['$' for help]")?;
-    let usable = |b: u8| b.is_ascii_alphanumeric() || b == b'.';
-    if version.is_empty() || !version.bytes().all(usable) {
-        return None;
-    }
-    let cause = match rest {
-        "" => None,
-        _ => {
-            let words = rest.strip_prefix(" [reset: ")?.strip_suffix(']')?;
-            Some(RestartCause::parse(words)?)
-        }
+/// A controller's first line, in whichever words: `Grbl 1.1h ['$' for help]`, `GrblHAL 1.1f ['$' or
+/// '$HELP' for help]`, `Grbl 3.9 [FluidNC v3.9.1 (wifi) '$' for help]`. A restart that is missed costs
+/// the position, so that a part of such a line counts too, and so does what an ESP32's boot loader
+/// prints before it.
+fn banner(line: &str) -> Option<Banner> {
+    let boot = line
+        .strip_prefix("rst:")
+        .map(RestartCause::from_boot_loader);
+    let named = line
+        .rsplit_once(" [reset: ")
+        .and_then(|(_, cause)| RestartCause::parse(cause.strip_suffix(']')?));
+    let is_banner = boot.is_some() || line.contains("for help]") || names_grbl(line);
+    is_banner.then(|| Banner {
+        text: line.to_owned(),
+        cause: boot.or(named),
+    })
+}
+
+/// Whether a line begins with Grbl's name or a relative's, and a version.
+fn names_grbl(line: &str) -> bool {
+    let Some((name, rest)) = line.split_once(' ') else {
+        return false;
     };
-    let version = version.to_owned();
-    Some(Message::Banner(Banner { version, cause }))
+    let named = name
+        .get(..4)
+        .is_some_and(|start| start.eq_ignore_ascii_case("grbl"));
+    named && rest.starts_with(|first: char| first.is_ascii_digit() || first == 'v')
 }
 
 fn bracket(inside: &str) -> Option<Message> {
-    let (tag, text) = inside.split_once(':')?;
-    if tag.is_empty() || !tag.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'.') {
+    let (tag, text) = inside.split_once(':').unwrap_or((inside, ""));
+    if tag.is_empty() {
         return None;
     }
     Some(match tag {
@@ -173,12 +210,10 @@ fn bracket(inside: &str) -> Option<Message> {
             }
         }
         "OPT" => {
-            let mut parts = text.split(',');
-            let letters = parts.next()?.to_owned();
+            let (letters, sizes) = text.split_once(',').unwrap_or((text, ""));
             Message::Build {
-                letters,
-                blocks: whole(parts.next()?)?,
-                buffer: whole(parts.next()?)?,
+                letters: letters.to_owned(),
+                sizes: sizes.to_owned(),
             }
         }
         "MSG" => Message::Note(text.to_owned()),
@@ -190,10 +225,15 @@ fn bracket(inside: &str) -> Option<Message> {
 }
 
 fn setting(inside: &str) -> Option<Message> {
-    let (number, value) = inside.split_once('=')?;
+    let (number, text) = inside.split_once('=')?;
     let number = u16::try_from(whole(number)?).ok()?;
-    let value = decimal(value)?;
-    Some(Message::Setting { number, value })
+    Some(match decimal(text) {
+        Some(value) => Message::Setting { number, value },
+        None => Message::TextSetting {
+            number,
+            text: text.to_owned(),
+        },
+    })
 }
 
 impl fmt::Display for Message {
@@ -203,19 +243,14 @@ impl fmt::Display for Message {
             Message::Error { code, seq } => write!(f, "error:{code}{}", numbered(*seq)),
             Message::Alarm(code) => write!(f, "ALARM:{code}"),
             Message::Status(report) => report.fmt(f),
-            Message::Banner(Banner { version, cause }) => {
-                write!(f, "Grbl {version} ['$' for help]")?;
-                cause.map_or(Ok(()), |cause| write!(f, " [reset: {cause}]"))
-            }
+            Message::Banner(banner) => f.write_str(&banner.text),
             Message::Version { version, note } => write!(f, "[VER:{version}:{note}]"),
-            Message::Build {
-                letters,
-                blocks,
-                buffer,
-            } => write!(f, "[OPT:{letters},{blocks},{buffer}]"),
+            Message::Build { letters, sizes } if sizes.is_empty() => write!(f, "[OPT:{letters}]"),
+            Message::Build { letters, sizes } => write!(f, "[OPT:{letters},{sizes}]"),
             Message::Note(text) => write!(f, "[MSG:{text}]"),
             Message::Info { tag, text } => write!(f, "[{tag}:{text}]"),
             Message::Setting { number, value } => write!(f, "${number}={}", shown(*value, 3)),
+            Message::TextSetting { number, text } => write!(f, "${number}={text}"),
             Message::Startup(text) => write!(f, ">{text}"),
         }
     }

@@ -1,7 +1,7 @@
 //! The serial protocol: bytes in, events out. A state machine without I/O, without threads and
 //! without a clock of its own; calls for which time matters take the time as an argument.
 //!
-//! It assembles lines, parses the messages of a Grbl 1.1 controller, keeps one line in flight and
+//! It assembles lines, parses the messages of a Grbl 1.1 controller and of its relatives, keeps one line in flight and
 //! matches its answer to it, requests status reports and brackets each with the times of request and
 //! arrival, and distinguishes noise, merged lines and lost lines from success. If the controller
 //! offers checked lines, each line carries a number and a checksum, and a lost one is sent again
@@ -10,6 +10,7 @@
 //! This module knows nothing of what the lines mean for the table.
 
 mod checksum;
+mod error_texts;
 mod event;
 mod lines;
 mod machine;

@@ -9,8 +9,8 @@ const ANSWER_US: i64 = 500_000;
 /// Shortest time after which an error for a damaged line can refer to the line in flight,
 /// microseconds: an earlier one refers to something sent before it.
 const TURNAROUND_US: i64 = 5_000;
-/// Limit of messages kept that stand before an answer.
-const MOST_INFO: usize = 128;
+/// Limit of messages kept that stand before an answer: grblHAL has more than 200 settings.
+const MAX_MESSAGES: usize = 512;
 
 /// The time limit for a line's answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,9 +108,14 @@ impl Pending {
         self.last_us = now_us;
     }
 
-    pub(super) fn keep(&mut self, message: Message) {
-        if self.info.len() < MOST_INFO {
+    /// Keeps a message that stands before the answer. An answer of many lines takes a while: the wait
+    /// for the end of a plain line's answer begins again.
+    pub(super) fn keep(&mut self, now_us: i64, message: Message) {
+        if self.info.len() < MAX_MESSAGES {
             self.info.push(message);
+            if self.seq.is_none() {
+                self.last_us = now_us;
+            }
         }
     }
 }

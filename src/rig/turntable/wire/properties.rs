@@ -126,6 +126,33 @@ proptest! {
     }
 
     #[test]
+    fn what_is_not_known_in_a_report_changes_nothing_that_is(
+        report in report(),
+        axes in 0..5_usize,
+        sub in proptest::option::of("[0-9A-Za-z]{0,3}"),
+        fields in vec(other_field(), 0..6),
+        at in 0..7_usize,
+    ) {
+        let plain = StatusReport { pins: Pins::default(), chip_us: None, battery_v: None, homed: None, ..report };
+        let printed = plain.to_string();
+        let mut parts: Vec<String> = printed[1..printed.len() - 1].split('|').map(str::to_owned).collect();
+        if let Some(sub) = sub.filter(|_| matches!(plain.state, ControllerState::Idle | ControllerState::Run)) {
+            parts[0] += &format!(":{sub}");
+        }
+        for axis in 0..axes {
+            parts[1] += &format!(",{axis}.500");
+        }
+        let at = 2 + at % (parts.len() - 1);
+        let at = at.min(parts.len());
+        parts.splice(at..at, fields);
+        let Some(Message::Status(read)) = parse(&format!("<{}>", parts.join("|"))) else {
+            return Err(TestCaseError::fail(parts.join("|")));
+        };
+        let known = StatusReport { pins: Pins::default(), chip_us: None, battery_v: None, homed: None, ..read };
+        prop_assert_eq!(known, plain);
+    }
+
+    #[test]
     fn a_message_printed_is_the_same_read(message in message()) {
         prop_assert_eq!(parse(&message.to_string()), Some(message));
     }
@@ -142,7 +169,7 @@ fn seq() -> impl Strategy<Value = Option<u32>> {
 fn report() -> impl Strategy<Value = StatusReport> {
     use ControllerState::*;
     let state = [
-        Idle, Run, Held, Holding, Jog, Home, Alarm, Check, Door, Sleep,
+        Idle, Run, Held, Holding, Jog, Home, Alarm, Check, Door, DoorMoving, Sleep, Tool, Unknown,
     ];
     let position = prop_oneof![
         thousandths().prop_map(Position::Machine),
@@ -158,17 +185,47 @@ fn report() -> impl Strategy<Value = StatusReport> {
     let stamp = proptest::option::of(any::<u32>());
     let zero = proptest::option::of(thousandths());
     let state = proptest::sample::select(state.to_vec());
+    let state = (state, any::<Option<u8>>(), any::<Option<bool>>());
     (state, position, whole, stamp, volts, pins, zero).prop_map(
-        |(state, position, feed, chip_us, battery_v, pins, work_zero)| StatusReport {
-            state,
-            position,
-            feed,
-            chip_us,
-            battery_v,
-            pins,
-            work_zero,
+        |((state, alarm, homed), position, feed, chip_us, battery_v, pins, work_zero)| {
+            StatusReport {
+                state,
+                alarm: alarm.filter(|_| state == Alarm),
+                homed,
+                position,
+                feed,
+                chip_us,
+                battery_v,
+                pins,
+                work_zero,
+            }
         },
     )
+}
+
+/// The first lines of controllers.
+fn banner() -> impl Strategy<Value = String> {
+    prop_oneof![
+        "[0-9]\\.[0-9]{1,2}[a-z]?".prop_map(|version| format!("Grbl {version} ['$' for help]")),
+        "[0-9]\\.[0-9]{1,2}[a-z]?"
+            .prop_map(|version| format!("GrblHAL {version} ['$' or '$HELP' for help]")),
+        ("[0-9]\\.[0-9]", "[a-z+-]{0,12}").prop_map(|(version, radio)| {
+            format!("Grbl {version} [FluidNC v{version}.1 ({radio}) '$' for help]")
+        }),
+    ]
+}
+
+/// A field that this program does not know, or one it reads as far as it understands it.
+fn other_field() -> impl Strategy<Value = String> {
+    prop_oneof![
+        "[A-Z][A-Za-z0-9]{0,4}(:[ -;=?-{}~]{0,20})?",
+        "Pn:[A-Z0-9a-z]{0,8}",
+        "(Bf|Ov|A|Ln|SD|H|T|Bat|FW|SP1|Sc|MPG|WCS|TLR|In|AR|S):[ -;=?-{}~]{0,20}",
+    ]
+    .prop_filter("a known field", |field| {
+        let known = ["MPos:", "WPos:", "WCO:", "FS:", "F:"];
+        !known.iter().any(|name| field.starts_with(name))
+    })
 }
 
 fn message() -> impl Strategy<Value = Message> {
@@ -185,19 +242,20 @@ fn message() -> impl Strategy<Value = Message> {
         (any::<u8>(), seq()).prop_map(|(code, seq)| Message::Error { code, seq }),
         any::<u8>().prop_map(Message::Alarm),
         report().prop_map(Message::Status),
-        ("[0-9.a-z]{1,8}", cause)
-            .prop_map(|(version, cause)| Message::Banner(Banner { version, cause })),
+        (banner(), cause).prop_map(|(start, cause)| {
+            let reset = cause.map_or_else(String::new, |cause| format!(" [reset: {cause}]"));
+            let text = format!("{start}{reset}");
+            Message::Banner(Banner { text, cause })
+        }),
         ("[0-9.a-z]{0,12}", "[ a-z:]{0,12}")
             .prop_map(|(version, note)| Message::Version { version, note }),
-        ("[A-Za-z]{0,8}", any::<u32>(), any::<u32>()).prop_map(|(letters, blocks, buffer)| {
-            Message::Build {
-                letters,
-                blocks,
-                buffer,
-            }
-        }),
+        ("[A-Za-z]{0,8}", "([0-9]{1,4}(,[0-9]{1,4}){0,3})?")
+            .prop_map(|(letters, sizes)| Message::Build { letters, sizes }),
         "[ -~]{0,40}".prop_map(Message::Note),
-        ("G[0-9]{2}(\\.1)?|GC|HLP", "[ -~]{0,40}")
+        (
+            "G[0-9]{2}(\\.1)?|GC|HLP|FIRMWARE|NVS STORAGE",
+            "[ -~]{0,40}"
+        )
             .prop_map(|(tag, text)| Message::Info { tag, text }),
         (any::<u16>(), thousandths())
             .prop_map(|(number, value)| Message::Setting { number, value }),

@@ -1,4 +1,5 @@
-//! Status reports: `<Run|MPos:12.345,0.000,0.000|FS:432,0|T:123456789|Bat:11.84|Pn:X>`.
+//! Status reports: `<Run|MPos:12.345,0.000,0.000|FS:432,0|T:123456789|Bat:11.84|Pn:X>`, and those of
+//! Grbl's relatives: `<Alarm:11|MPos:0.000,0.000,0.000,0.000|Bf:35,1023|FS:0,0|Pn:X2|H:0|FW:grblHAL>`.
 
 use std::fmt;
 
@@ -24,10 +25,17 @@ pub enum ControllerState {
     Alarm,
     /// Check mode: parses G-code without moving.
     Check,
-    /// The safety door is open. A table has none, but a stock board can report it.
+    /// The safety door is open, or was, and the table rests (`Door:0`, `Door:1`). A table has none,
+    /// but a stock board can report it.
     Door,
+    /// The same, and the table ramps down or moves on again.
+    DoorMoving,
     /// Asleep until a reset.
     Sleep,
+    /// Waits for a tool change (grblHAL).
+    Tool,
+    /// A state that this program does not know.
+    Unknown,
 }
 
 impl ControllerState {
@@ -40,27 +48,30 @@ impl ControllerState {
                 | ControllerState::Holding
                 | ControllerState::Jog
                 | ControllerState::Home
-                | ControllerState::Door
+                | ControllerState::DoorMoving
         )
     }
 
-    fn parse(text: &str) -> Option<ControllerState> {
-        let (name, sub) = match text.split_once(':') {
-            Some((name, sub)) => (name, Some(whole(sub)?)),
-            None => (text, None),
-        };
-        Some(match (name, sub) {
-            ("Idle", None) => ControllerState::Idle,
-            ("Run", None) => ControllerState::Run,
-            ("Hold", Some(0)) => ControllerState::Held,
-            ("Hold", Some(1)) => ControllerState::Holding,
-            ("Jog", None) => ControllerState::Jog,
-            ("Home", None) => ControllerState::Home,
-            ("Alarm", None) => ControllerState::Alarm,
-            ("Check", None) => ControllerState::Check,
-            ("Door", Some(0..=3)) => ControllerState::Door,
-            ("Sleep", None) => ControllerState::Sleep,
-            _ => return None,
+    /// Reads a state's name; `sub` is the number after it. Grbl's relatives have sub-states and names
+    /// of their own.
+    fn from_name(name: &str, sub: Option<u32>) -> Option<ControllerState> {
+        if !name.bytes().all(|byte| byte.is_ascii_alphabetic()) {
+            return None;
+        }
+        Some(match (name, sub.unwrap_or(0)) {
+            ("Idle", _) => ControllerState::Idle,
+            ("Run", _) => ControllerState::Run,
+            ("Hold", 0) => ControllerState::Held,
+            ("Hold", _) => ControllerState::Holding,
+            ("Jog", _) => ControllerState::Jog,
+            ("Home", _) => ControllerState::Home,
+            ("Alarm", _) => ControllerState::Alarm,
+            ("Check", _) => ControllerState::Check,
+            ("Door", 0 | 1) => ControllerState::Door,
+            ("Door", _) => ControllerState::DoorMoving,
+            ("Sleep", _) => ControllerState::Sleep,
+            ("Tool", _) => ControllerState::Tool,
+            _ => ControllerState::Unknown,
         })
     }
 }
@@ -77,7 +88,10 @@ impl fmt::Display for ControllerState {
             ControllerState::Alarm => "Alarm",
             ControllerState::Check => "Check",
             ControllerState::Door => "Door:0",
+            ControllerState::DoorMoving => "Door:2",
             ControllerState::Sleep => "Sleep",
+            ControllerState::Tool => "Tool",
+            ControllerState::Unknown => "Unknown",
         })
     }
 }
@@ -96,20 +110,34 @@ pub enum Position {
 pub struct Pins {
     /// The index sensor (Grbl's limit switch of X).
     pub index: bool,
-    /// The emergency stop (Grbl's reset pin).
+    /// The emergency stop (Grbl's reset pin, or the emergency stop of grblHAL and FluidNC).
     pub emergency_stop: bool,
 }
 
-/// A status report. Unknown fields are skipped, as Grbl's documentation demands.
+impl Pins {
+    /// Reads the letters of the active pins. Other letters and digits are other inputs.
+    fn from_letters(letters: &str) -> Pins {
+        Pins {
+            index: letters.contains('X'),
+            emergency_stop: letters.contains(['R', 'E']),
+        }
+    }
+}
+
+/// A status report. What is not known in it is skipped, as Grbl's documentation demands; a damaged
+/// position or speed makes the whole report noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StatusReport {
     /// The controller's state.
     pub state: ControllerState,
+    /// The alarm's number, where the state comes with it (`Alarm:11`).
+    pub alarm: Option<u8>,
     /// The table's position.
     pub position: Position,
     /// Speed, the controller's unit per minute.
     pub feed: Option<f64>,
-    /// Microseconds of the chip's clock at the moment of the position; wraps.
+    /// Microseconds of the chip's clock at the moment of the position; wraps. Only the rig's firmware
+    /// means that by `T:`: to grblHAL it is a tool's number.
     pub chip_us: Option<u32>,
     /// Battery, volts.
     pub battery_v: Option<f64>,
@@ -117,6 +145,8 @@ pub struct StatusReport {
     pub pins: Pins,
     /// Machine position of the work coordinates' zero.
     pub work_zero: Option<f64>,
+    /// Whether the controller counts itself as homed (grblHAL's `H:`).
+    pub homed: Option<bool>,
 }
 
 impl StatusReport {
@@ -126,20 +156,27 @@ impl StatusReport {
             return None;
         }
         let mut fields = inside.split('|');
-        let state = ControllerState::parse(fields.next()?)?;
+        let state = fields.next()?;
+        let (name, sub) = state.split_once(':').unwrap_or((state, ""));
+        let sub = whole(sub);
+        let state = ControllerState::from_name(name, sub)?;
+        let alarm = sub.filter(|_| state == ControllerState::Alarm);
         let mut read = Fields::default();
         for field in fields {
-            let (name, value) = field.split_once(':')?;
-            read.take(name, value)?;
+            if let Some((name, value)) = field.split_once(':') {
+                read.take(name, value)?;
+            }
         }
         Some(StatusReport {
             state,
+            alarm: alarm.and_then(|code| u8::try_from(code).ok()),
             position: read.position?,
             feed: read.feed,
             chip_us: read.chip_us,
             battery_v: read.battery_v,
             pins: read.pins,
             work_zero: read.work_zero,
+            homed: read.homed,
         })
     }
 }
@@ -152,27 +189,33 @@ struct Fields {
     battery_v: Option<f64>,
     pins: Pins,
     work_zero: Option<f64>,
+    homed: Option<bool>,
 }
 
 impl Fields {
-    /// Reads a field; `None` if a known one is damaged or repeated.
+    /// Reads a field; `None` if one that decides where the table is is damaged or repeated.
     fn take(&mut self, name: &str, value: &str) -> Option<()> {
         match name {
-            "MPos" => once(&mut self.position, Position::Machine(first(value)?)),
-            "WPos" => once(&mut self.position, Position::Work(first(value)?)),
-            "FS" | "F" => once(&mut self.feed, first(value)?),
-            "T" => once(&mut self.chip_us, whole(value)?),
-            "Bat" => once(&mut self.battery_v, decimal(value)?),
-            "WCO" => once(&mut self.work_zero, first(value)?),
-            "Pn" => {
-                self.pins = Pins {
-                    index: value.contains('X'),
-                    emergency_stop: value.contains('R'),
-                };
-                value.bytes().all(|b| b.is_ascii_uppercase()).then_some(())
-            }
-            _ => Some(()),
+            "MPos" => once(&mut self.position, Position::Machine(first(value)?))?,
+            "WPos" => once(&mut self.position, Position::Work(first(value)?))?,
+            "FS" | "F" => once(&mut self.feed, first(value)?)?,
+            "WCO" => once(&mut self.work_zero, first(value)?)?,
+            "T" => self.chip_us = whole(value),
+            "Bat" => self.battery_v = decimal(value),
+            "Pn" => self.pins = Pins::from_letters(value),
+            "H" => self.homed = homed(value),
+            _ => {}
         }
+        Some(())
+    }
+}
+
+/// grblHAL's `1` or `0`, perhaps with the homed axes after it.
+fn homed(value: &str) -> Option<bool> {
+    match value.split(',').next()? {
+        "1" => Some(true),
+        "0" => Some(false),
+        _ => None,
     }
 }
 
@@ -180,7 +223,7 @@ fn once<T>(place: &mut Option<T>, value: T) -> Option<()> {
     place.replace(value).is_none().then_some(())
 }
 
-/// The first number of a list; `None` if one of them is not a number.
+/// The first number of a list, one for each axis; `None` if one of them is not a number.
 fn first(list: &str) -> Option<f64> {
     let mut numbers = list.split(',').map(decimal);
     let first = numbers.next()??;
@@ -190,6 +233,9 @@ fn first(list: &str) -> Option<f64> {
 impl fmt::Display for StatusReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "<{}", self.state)?;
+        if let Some(code) = self.alarm {
+            write!(f, ":{code}")?;
+        }
         match self.position {
             Position::Machine(at) => write!(f, "|MPos:{},0.000,0.000", shown(at, 3))?,
             Position::Work(at) => write!(f, "|WPos:{},0.000,0.000", shown(at, 3))?,
@@ -211,6 +257,9 @@ impl fmt::Display for StatusReport {
         }
         if let Some(zero) = self.work_zero {
             write!(f, "|WCO:{},0.000,0.000", shown(zero, 3))?;
+        }
+        if let Some(homed) = self.homed {
+            write!(f, "|H:{}", u8::from(homed))?;
         }
         f.write_str(">")
     }

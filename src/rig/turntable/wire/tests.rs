@@ -267,3 +267,158 @@ fn after_a_lost_report_the_next_ones_are_not_trusted_for_time() {
     machine.on_bytes(632_000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
     assert!(certain(&mut machine));
 }
+
+/// What controllers of the family say, one transcript each: all of it is understood.
+const TRANSCRIPTS: [(&str, &str); 4] = [
+    (
+        "grblhal",
+        include_str!("../../../../tests/fuzz/seeds/turntable_wire/grblhal.txt"),
+    ),
+    (
+        "fluidnc",
+        include_str!("../../../../tests/fuzz/seeds/turntable_wire/fluidnc.txt"),
+    ),
+    (
+        "grbl-esp32",
+        include_str!("../../../../tests/fuzz/seeds/turntable_wire/grbl-esp32.txt"),
+    ),
+    (
+        "stock",
+        include_str!("../../../../tests/fuzz/seeds/turntable_wire/stock.txt"),
+    ),
+];
+
+#[test]
+fn transcripts_of_grbls_relatives_hold_no_noise() {
+    for (name, transcript) in TRANSCRIPTS {
+        let mut machine = Machine::new();
+        machine.send(0, "$I", ReplyTimeout::AtOnce).unwrap();
+        for (now_us, line) in (0..).zip(transcript.lines()) {
+            let before = machine.counts();
+            machine.on_bytes(now_us, format!("{line}\r\n").as_bytes());
+            let boot = line.starts_with("ets ") || line.starts_with("configsip:");
+            assert!(
+                boot || machine.counts().noise == before.noise,
+                "{name}: {line}"
+            );
+        }
+    }
+}
+
+#[test]
+fn any_first_line_of_the_family_is_a_restart() {
+    for line in [
+        "Grbl 0.9j ['$' for help]",
+        "Grbl 1.1h ['$' for help]",
+        "Grbl 1.3a ['$' for help]",
+        "GrblHAL 1.1f ['$' or '$HELP' for help]",
+        "grblHAL 1.1f ['$' or '$HELP' for help]",
+        "Grbl 3.9 [FluidNC v3.9.1 (esp32-wifi) '$' for help]",
+        "Grbl 3.7 [FluidNC v3.7.8 (noradio)]",
+        "Grbl v1.1 [My Table '$' for help]",
+        "rbl 1.1h ['$' for help]",
+        "Grbl 1.1h ['$",
+    ] {
+        let mut machine = Machine::new();
+        machine.on_bytes(0, format!("\r\n{line}\r\n").as_bytes());
+        assert_eq!(events(&mut machine), [WireEvent::Reset(None)], "{line}");
+    }
+    let boot = "rst:0xf (RTCWDT_BROWN_OUT_RESET),boot:0x13 (SPI_FAST_FLASH_BOOT)";
+    let mut machine = Machine::new();
+    machine.on_bytes(0, format!("{boot}\r\n").as_bytes());
+    let cause = Some(RestartCause::BrownOut);
+    assert_eq!(events(&mut machine), [WireEvent::Reset(cause)]);
+}
+
+#[test]
+fn lines_that_only_mention_grbl_are_no_restart() {
+    for line in [
+        "[MSG:Grbl_ESP32 Ver 1.3a Date 20211103]",
+        "[FIRMWARE:grblHAL]",
+        "$300=grblHAL 1.1f",
+        "<Idle|MPos:0.000,0.000,0.000|FW:grblHAL>",
+        "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]",
+        "[MSG:'$' for help]",
+    ] {
+        let mut machine = Machine::new();
+        machine.on_bytes(0, format!("{line}\r\n").as_bytes());
+        let found = events(&mut machine);
+        assert!(
+            !found
+                .iter()
+                .any(|event| matches!(event, WireEvent::Reset(_))),
+            "{line}"
+        );
+    }
+}
+
+#[test]
+fn a_report_of_a_relative_gives_its_state_its_alarm_and_its_pins() {
+    let report = |line: &str| match parse(line) {
+        Some(Message::Status(report)) => report,
+        other => panic!("{line}: {other:?}"),
+    };
+    let alarm = report(
+        "<Alarm:11|MPos:1.000,0.000,0.000,0.000,0.000,0.000|Bf:35,1023|FS:0,0,0|Pn:XE2|A:|AR>",
+    );
+    assert_eq!(
+        (alarm.state, alarm.alarm),
+        (ControllerState::Alarm, Some(11))
+    );
+    assert!(alarm.pins.index && alarm.pins.emergency_stop);
+    let tool = report("<Tool|WPos:1.000,0.000,0.000|WCO:2.000,0.000,0.000|T:3|H:1,7>");
+    assert_eq!(
+        (tool.state, tool.homed),
+        (ControllerState::Tool, Some(true))
+    );
+    assert_eq!(
+        (tool.position, tool.work_zero),
+        (Position::Work(1.0), Some(2.0))
+    );
+    let states = [
+        ("Hold", ControllerState::Held),
+        ("Hold:0", ControllerState::Held),
+        ("Hold:2", ControllerState::Holding),
+        ("Door:1", ControllerState::Door),
+        ("Door:4", ControllerState::DoorMoving),
+        ("Run:2", ControllerState::Run),
+        ("Idle:x", ControllerState::Idle),
+        ("Critical", ControllerState::Unknown),
+        ("", ControllerState::Unknown),
+    ];
+    for (name, state) in states {
+        let line = format!("<{name}|MPos:0.000,0.000,0.000||FS:0,0|SD:12.3,/a b.nc|X>");
+        assert_eq!(report(&line).state, state, "{name}");
+    }
+}
+
+#[test]
+fn a_report_whose_position_is_damaged_or_twice_is_noise() {
+    for line in [
+        "<Idle|MPos:1.0x0,0.000,0.000>",
+        "<Idle|MPos:1.000,0.000,>",
+        "<Idle|MPos:1.000|MPos:2.000>",
+        "<Idle|MPos:1.000|WCO:-->",
+        "<Idle|FS:0,0>",
+        "<Idle|MPos:1.000<Idle|MPos:1.000>",
+        "<Idle|MPos:1.000",
+    ] {
+        assert_eq!(parse(line), None, "{line}");
+    }
+}
+
+#[test]
+fn an_answer_of_many_lines_may_take_longer_than_one() {
+    let mut machine = Machine::new();
+    machine.send(0, "$$", ReplyTimeout::AtOnce).unwrap();
+    for number in 0..300_i64 {
+        let now_us = number * 5_000;
+        machine.on_bytes(now_us, format!("${number}=1.000\r\n").as_bytes());
+        machine.on_time(now_us);
+    }
+    machine.on_bytes(1_500_000, b"ok\r\n");
+    let Some(LineOutcome::Done(settings)) = outcome(&mut machine) else {
+        panic!("an answer");
+    };
+    assert_eq!(settings.len(), 300);
+}
