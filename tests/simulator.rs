@@ -265,7 +265,7 @@ fn open(path: &Path) -> TTYPort {
 /// Listens until the table has said this.
 fn hear(port: &mut TTYPort, text: &str) -> String {
     let (mut heard, mut buffer) = (String::new(), [0; 256]);
-    let end = Instant::now() + Duration::from_secs(30);
+    let end = Instant::now() + Duration::from_secs(300);
     while !heard.contains(text) {
         assert!(Instant::now() < end, "never {text:?}, but {heard:?}");
         let count = port.read(&mut buffer).unwrap_or(0);

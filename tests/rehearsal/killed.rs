@@ -92,10 +92,14 @@ fn thirty_programs_that_end_while_the_table_turns_back_leave_whole_takes() {
     }
 }
 
+/// Between two lines about where the table is, on its own time.
+const TOLD_EVERY: Duration = Duration::from_millis(20);
+
 #[test]
 #[ignore = "run by the tests that kill it in a turn"]
 fn child_that_turns_until_it_is_killed() {
     let root = PathBuf::from(std::env::var("RELIT_TEST_ROOT").unwrap());
+    let frames: u64 = std::env::var("RELIT_TEST_FRAMES").unwrap().parse().unwrap();
     let mut rig = Rehearsal::whole(SHORT, "").in_folder(&root);
     let clock = rig.equipment.clock();
     let (table, monitor) = (
@@ -104,14 +108,20 @@ fn child_that_turns_until_it_is_killed() {
     );
     clock.clone().scope(|scope| {
         let truth = scope.spawn("truth", || {
+            let mut enough = false;
             loop {
                 let t_us = clock.now_us();
-                println!(
-                    "TRUTH {t_us} {} {}",
-                    table.angle_at(t_us),
-                    monitor.state().frames
-                );
-                clock.sleep(Duration::from_millis(20));
+                println!("TRUTH {t_us} {}", table.angle_at(t_us));
+                if enough {
+                    // No time passes on the rig's clock while this thread takes part in it and does not
+                    // wait on it: the turn stands still until the program is killed.
+                    println!("ENOUGH");
+                    loop {
+                        thread::park();
+                    }
+                }
+                enough = monitor.state().frames >= frames;
+                clock.sleep(TOLD_EVERY);
             }
         });
         truth.unwrap();
@@ -124,7 +134,7 @@ struct Truth(Vec<(i64, f64)>);
 
 impl Truth {
     fn angle_at(&self, t_us: i64) -> f64 {
-        let after = self.0.partition_point(|(at, _)| *at <= t_us);
+        let after = self.0.partition_point(|(at, _)| *at < t_us);
         let ((t0, a0), (t1, a1)) = (self.0[after - 1], self.0[after]);
         a0 + (a1 - a0) * (t_us - t0) as f64 / (t1 - t0) as f64
     }
@@ -138,30 +148,25 @@ fn kill_in_the_turn(frames: u64) -> f64 {
         .args(["--ignored", "--exact", "--nocapture"])
         .arg("killed::child_that_turns_until_it_is_killed")
         .env("RELIT_TEST_ROOT", root.path())
+        .env("RELIT_TEST_FRAMES", frames.to_string())
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
     let mut truth = Truth(Vec::new());
-    let mut killed = false;
-    for line in BufReader::new(child.stdout.take().unwrap()).lines() {
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let enough = lines.any(|line| {
         let line = line.unwrap();
-        let Some(words) = line.strip_prefix("TRUTH ") else {
-            continue;
-        };
-        let words: Vec<&str> = words.split(' ').collect();
-        let [t_us, angle, written] = words[..] else {
-            continue;
-        };
-        truth
-            .0
-            .push((t_us.parse().unwrap(), angle.parse().unwrap()));
-        if !killed && written.parse::<u64>().unwrap() >= frames {
-            end(&mut child, "-KILL");
-            killed = true;
+        let words = line
+            .strip_prefix("TRUTH ")
+            .and_then(|words| words.split_once(' '));
+        if let Some((t_us, angle)) = words {
+            let told = (t_us.parse().unwrap(), angle.parse().unwrap());
+            truth.0.push(told);
         }
-    }
-    child.wait().unwrap();
-    assert!(killed);
+        line == "ENOUGH"
+    });
+    assert!(enough, "the turn ended before so many frames were written");
+    end(&mut child, "-KILL");
     assert_eq!(salvage(root.path()).unwrap().len(), 1);
     let (recording, entries) = only_session(root.path());
     let known: Vec<_> = entries

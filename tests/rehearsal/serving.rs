@@ -15,7 +15,7 @@ use crate::support::{SHORT, fixture};
 
 const TOKEN: &str = "0123456789abcdef";
 /// Longest wait for anything; all that is waited for comes far sooner.
-const LONG: Duration = Duration::from_secs(60);
+const LONG: Duration = Duration::from_secs(300);
 
 /// The program, with a token in a file of these permissions.
 fn serve(root: &Path, mode: u32) -> Command {

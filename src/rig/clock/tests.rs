@@ -159,7 +159,7 @@ fn who_is_notified_looks_before_time_passes() {
 
 #[test]
 fn a_wait_ends_at_its_deadline_with_a_last_look() {
-    for clock in [Clock::virtual_time(), Clock::monotonic()] {
+    for (clock, looks_before) in [(Clock::virtual_time(), 1), (Clock::monotonic(), 0)] {
         let value = Waitable::new(&clock, 0);
         let deadline_us = clock.after(ms(5));
         let mut looks = 0;
@@ -168,7 +168,8 @@ fn a_wait_ends_at_its_deadline_with_a_last_look() {
             (clock.now_us() >= deadline_us).then_some("late")
         });
         assert_eq!(found, Some("late"));
-        assert!(looks >= 2);
+        // In real time the deadline can be over before the first look.
+        assert!(looks > looks_before);
         assert_eq!(value.wait_for(ms(5), |_| None::<()>), None);
         assert_eq!(value.wait_until(0, |_| None::<()>), None);
     }

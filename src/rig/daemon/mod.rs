@@ -22,6 +22,7 @@ use crate::clock::{Clock, JoinHandle};
 use crate::lockfile::LockFile;
 use crate::preview::Preview;
 use crate::serve::rig::{Command, Refused, Rig};
+use crate::simulator::SimulatedTable;
 use crate::state::{CaptureSettings, Monitor, Obstacle, RigState, TableState};
 use dispatcher::Dispatcher;
 use schedule::Job;
@@ -35,6 +36,7 @@ const FARTHEST_JOG: f64 = 800.0;
 pub struct Daemon {
     dispatcher: Arc<Dispatcher>,
     root: PathBuf,
+    simulator: Option<SimulatedTable>,
     worker: Mutex<Option<JoinHandle<()>>>,
     _locks: (LockFile, Option<LockFile>),
 }
@@ -60,14 +62,21 @@ impl Daemon {
         let thread = |source| CaptureError::system("a thread", "started")(source);
         let preview = Preview::start(dispatcher.monitor().clone()).map_err(thread)?;
         let clock = equipment.clock();
+        let simulator = equipment.simulator().cloned();
         let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), preview);
         let worker = spawn(&clock, &dispatcher, move || worker.run()).map_err(thread)?;
         Ok(Self {
             dispatcher,
             root,
+            simulator,
             worker: Mutex::new(Some(worker)),
             _locks: locks,
         })
+    }
+
+    /// The simulated table, if there is one: whoever rehearses with it presses its emergency stop.
+    pub fn simulator(&self) -> Option<&SimulatedTable> {
+        self.simulator.as_ref()
     }
 
     /// Aborts what is under way, stops the table, and comes back when all of it is done. Does nothing

@@ -1,5 +1,6 @@
 //! The simulated table, and its port in memory.
 
+use std::fmt;
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -27,6 +28,12 @@ pub struct SimulatedTable {
     clock: Clock,
     model: Arc<Mutex<Model>>,
     reset_on_open: bool,
+}
+
+impl fmt::Debug for SimulatedTable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SimulatedTable").finish_non_exhaustive()
+    }
 }
 
 impl SimulatedTable {

@@ -32,7 +32,7 @@ use crate::serve::rig::{Command, Refused, Rig};
 use crate::state::{Monitor, Phase};
 
 /// Longest wait for anything in these tests; all that is waited for comes far sooner.
-const LONG: Duration = Duration::from_secs(30);
+const LONG: Duration = Duration::from_secs(120);
 /// Between two questions whether something is so.
 const ASKED_EVERY: Duration = Duration::from_millis(5);
 /// What begins and ends as a JPEG does.

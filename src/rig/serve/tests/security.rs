@@ -199,8 +199,9 @@ fn every_answer_forbids_the_browser_what_the_page_does_not_need() {
 
 fn impatient() -> Serving {
     Serving::with(|options| {
-        options.limits.head = Duration::from_millis(400);
-        options.limits.body = Duration::from_millis(400);
+        // Long enough for a whole request on a busy machine.
+        options.limits.head = Duration::from_secs(3);
+        options.limits.body = Duration::from_secs(3);
     })
 }
 
