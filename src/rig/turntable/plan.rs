@@ -251,11 +251,13 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::turntable::family::Family;
     use crate::turntable::identity::{Extras, TravelLimits};
     use crate::turntable::wire::ControllerState;
 
     fn identity(low_deg: f64, high_deg: f64) -> Identity {
         Identity {
+            family: Family::Rig,
             firmware: String::new(),
             extras: Extras::default(),
             steps_per_degree: 88.889,
@@ -270,6 +272,7 @@ mod tests {
 
     fn status(angle_deg: f64, machine_deg: f64) -> TableStatus {
         TableStatus {
+            restarted: false,
             state: ControllerState::Idle,
             angle_deg,
             machine_deg,

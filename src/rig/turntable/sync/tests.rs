@@ -78,6 +78,8 @@ impl Turn {
         };
         let chip = ((latched - START_US as f64) * self.rate) as u64;
         PositionReport {
+            alarm: None,
+            homed: None,
             state: ControllerState::Run,
             machine_deg: ((steps * STEP + off) * 1000.0).round() / 1000.0,
             speed: 7.2,

@@ -23,17 +23,22 @@ pub(super) fn seal(text: &str) -> String {
 
 /// Checks and removes a line's checksum.
 pub(super) fn unseal(line: &str) -> Sealed<'_> {
-    let Some((text, digits)) = line.rsplit_once('*') else {
+    // Grbl's relatives write stars of their own, as in `[NVS STORAGE:*FLASH 4K]`.
+    let Some((text, digits)) = line
+        .rsplit_once('*')
+        .filter(|(_, digits)| is_checksum(digits))
+    else {
         return Sealed::Open;
     };
-    let received = (digits.len() == 4 && digits.bytes().all(is_digit))
-        .then(|| u16::from_str_radix(digits, 16).ok())
-        .flatten();
-    if received == Some(CRC.checksum(text.as_bytes())) {
+    if u16::from_str_radix(digits, 16) == Ok(CRC.checksum(text.as_bytes())) {
         Sealed::Good(text)
     } else {
         Sealed::Bad
     }
+}
+
+fn is_checksum(digits: &str) -> bool {
+    digits.len() == 4 && digits.bytes().all(is_digit)
 }
 
 fn is_digit(byte: u8) -> bool {

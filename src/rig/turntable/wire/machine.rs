@@ -219,6 +219,10 @@ impl Machine {
     /// has restarted and left the session.
     fn on_unchecked(&mut self, line: &str) {
         self.counts.noise += 1;
+        if line.contains('*') {
+            // A damaged checksum.
+            return;
+        }
         let awaited = self.pending.as_ref().and_then(|line| line.seq);
         match parse(line) {
             Some(Message::Banner(banner)) => self.reset(banner.cause),
