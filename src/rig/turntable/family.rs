@@ -26,8 +26,8 @@ pub enum Family {
 impl Family {
     /// Reads the answer to `$I`.
     pub(super) fn from_messages(about: &[Message]) -> Family {
-        let families = about.iter().filter_map(Self::from_message);
-        families.last().unwrap_or_default()
+        let families = about.iter().rev().find_map(Self::from_message);
+        families.unwrap_or_default()
     }
 
     /// The number of its alarm for the emergency stop.
