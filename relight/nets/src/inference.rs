@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::engine::InferenceEngine;
 use super::error::NetError;
+use super::external::first_location;
 use super::graph::Graph;
 use super::onnx::to_onnx;
 use super::plan::{GivenNumber, Plan};
@@ -78,12 +79,16 @@ impl Inference {
         engine: &InferenceEngine,
     ) -> Result<Self, NetError> {
         let shape = [1, channels, height, width];
-        let plan = engine
-            .prepare(bytes, shape, given)
-            .map_err(|fault| NetError::Onnx {
-                path: path.to_owned(),
-                fault,
-            });
+        let unusable = |fault| NetError::Onnx {
+            path: path.to_owned(),
+            fault,
+        };
+        if let Some(location) = first_location(bytes) {
+            return Err(unusable(format!(
+                "its weights stand in another file, {location:?}: save it as one file"
+            )));
+        }
+        let plan = engine.prepare(bytes, shape, given).map_err(unusable);
         Ok(Self {
             name: "the network of the ONNX file",
             engine: engine.name(),

@@ -21,6 +21,7 @@ mod codec;
 mod decomposer;
 mod engine;
 mod error;
+mod external;
 #[cfg(feature = "files")]
 mod files;
 mod graph;
@@ -44,6 +45,9 @@ pub use decomposer::{
 };
 pub use engine::InferenceEngine;
 pub use error::NetError;
+pub use external::{ExternalFault, ExternalPart, with_external_weights};
+#[cfg(feature = "files")]
+pub use files::read_onnx;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Value};
 pub use inference::Inference;
 pub use onnx::{INPUT, check_size, to_onnx};

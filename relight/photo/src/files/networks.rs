@@ -1,10 +1,9 @@
 //! Networks for a decomposer in files.
 
-use std::fs;
 use std::path::Path;
 
 use relight_core::light::NormalsFrame;
-use relight_nets::NetError;
+use relight_nets::read_onnx;
 
 use crate::decompose::{DecomposeError, Decomposer};
 
@@ -18,11 +17,6 @@ impl Decomposer {
         path: &Path,
         frame: Option<NormalsFrame>,
     ) -> Result<(), DecomposeError> {
-        let onnx = fs::read(path).map_err(|source| NetError::Io {
-            path: path.to_owned(),
-            doing: "read",
-            source,
-        })?;
-        self.set_normals(path, &onnx, frame)
+        self.set_normals(path, &read_onnx(path)?, frame)
     }
 }
