@@ -36,8 +36,8 @@ pub enum SynthError {
         /// What is wrong with it.
         reason: String,
     },
-    /// A file is no mesh.
-    #[error("{path} is no mesh that can be read: give .obj, .gltf or .glb")]
+    /// A file is no mesh, or one of another kind.
+    #[error("{path} is not a mesh of a kind that can be read: give .obj, .gltf or .glb")]
     MeshKind {
         /// The file.
         path: PathBuf,

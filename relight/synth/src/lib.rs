@@ -58,7 +58,7 @@ pub use error::SynthError;
 pub use finish::Finish;
 pub use folder::{SynthTally, write_samples};
 pub use geometry::{GBuffer, Occluder};
-pub use library::{Folders, Library, PANORAMA_EXTENT, made_panoramas};
+pub use library::{Folders, LeftOut, Library, PANORAMA_EXTENT, made_panoramas};
 pub use lighting::{
     BlinnPhong, Emitter, Environment, LampShadows, LightKind, Lighting, Material, Method,
     Panoramas, Shaded, SyntheticLamp, SyntheticScene,

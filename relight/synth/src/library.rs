@@ -1,6 +1,9 @@
 //! What a user brings: meshes, textures and panoramas, read once.
 
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::{fmt, fs};
 
 use glam::Vec3;
 
@@ -23,18 +26,35 @@ const VARIANTS: u64 = 4;
 /// Meshes, pictures and panoramas to draw from.
 #[derive(Debug, Clone, Default)]
 pub struct Library {
-    /// By file name; none: all objects are procedural.
+    /// By file name, with the folders in which it lies; none: all objects are procedural.
     pub meshes: Vec<(String, Mesh)>,
     /// Textures, and panoramas as textures.
     pub pictures: Vec<TextureImage>,
     /// The panoramas, never none.
     pub panoramas: Panoramas,
+    /// What of the folders of meshes is not used.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// Something of a user's own that is not used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LeftOut {
+    /// The file.
+    pub path: PathBuf,
+    /// What of it, and why.
+    pub what: String,
+}
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.path.display(), self.what)
+    }
 }
 
 /// Folders of a user's own files.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Folders {
-    /// `.obj`, `.gltf` and `.glb`.
+    /// `.obj`, `.gltf` and `.glb`, also in folders within it.
     pub meshes: Option<PathBuf>,
     /// `.png` and `.jpg`, sRGB.
     pub textures: Option<PathBuf>,
@@ -44,26 +64,21 @@ pub struct Folders {
 
 impl Library {
     /// Reads all files of the kinds in these folders, in the order of their names. Where no folder of
-    /// panoramas is given, 13 are made.
+    /// panoramas is given, 13 are made. Meshes of other kinds are left out.
     ///
     /// # Errors
     /// [`SynthError::Nothing`] where a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
-        let meshes = match &folders.meshes {
-            Some(folder) => read_all(folder, "meshes", &["obj", "gltf", "glb"], Mesh::read)?,
-            None => Vec::new(),
+        let (meshes, left_out) = match &folders.meshes {
+            Some(folder) => read_meshes(folder)?,
+            None => (Vec::new(), Vec::new()),
         };
         let textures = match &folders.textures {
-            Some(folder) => read_all(
-                folder,
-                "textures",
-                &["png", "jpg", "jpeg"],
-                TextureImage::read,
-            )?,
+            Some(folder) => read_all(folder, &TEXTURES, TextureImage::read)?,
             None => Vec::new(),
         };
         let panoramas = match &folders.panoramas {
-            Some(folder) => read_all(folder, "panoramas", &["hdr", "exr"], |path| {
+            Some(folder) => read_all(folder, &PANORAMAS, |path| {
                 Panorama::read(path).map_err(SynthError::Panorama)
             })?,
             None => made_panoramas()?,
@@ -79,6 +94,7 @@ impl Library {
             meshes,
             pictures,
             panoramas,
+            left_out,
         })
     }
 
@@ -89,6 +105,7 @@ impl Library {
             meshes: Vec::new(),
             pictures: self.pictures.clone(),
             panoramas: self.panoramas.clone(),
+            left_out: Vec::new(),
         }
     }
 }
@@ -129,29 +146,133 @@ fn picture_of(panorama: &Panorama) -> TextureImage {
     })
 }
 
-/// Every file of these extensions in a folder, by name.
-fn read_all<T>(
-    folder: &Path,
+/// Files that are looked for in a folder.
+struct Wanted {
     what: &'static str,
     extensions: &'static [&'static str],
-    read: impl Fn(&Path) -> Result<T, SynthError>,
-) -> Result<Vec<(String, T)>, SynthError> {
-    let entries = std::fs::read_dir(folder).map_err(SynthError::read(folder))?;
-    let mut paths = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(SynthError::read(folder))?.path();
-        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        if extensions.iter().any(|&wanted| extension == wanted) {
-            paths.push(path);
+}
+
+const MESHES: Wanted = Wanted {
+    what: "meshes",
+    extensions: &["obj", "gltf", "glb"],
+};
+const TEXTURES: Wanted = Wanted {
+    what: "textures",
+    extensions: &["png", "jpg", "jpeg"],
+};
+const PANORAMAS: Wanted = Wanted {
+    what: "panoramas",
+    extensions: &["hdr", "exr"],
+};
+
+/// How files of meshes end that are not read.
+const OTHER_MESHES: [&str; 35] = [
+    "3ds", "3mf", "abc", "amf", "blend", "bvh", "c4d", "cob", "dae", "dxf", "fbx", "iges", "igs",
+    "lwo", "lxo", "ma", "max", "mb", "md2", "md5mesh", "ms3d", "off", "ply", "skp", "step", "stl",
+    "stp", "usd", "usda", "usdc", "usdz", "vrm", "wrl", "x", "x3d",
+];
+
+/// All meshes of a folder and those within it, and what of them is not used.
+fn read_meshes(folder: &Path) -> Result<(Vec<(String, Mesh)>, Vec<LeftOut>), SynthError> {
+    let files = files_below(folder)?;
+    let (wanted, others): (Vec<PathBuf>, Vec<PathBuf>) =
+        files.into_iter().partition(|path| MESHES.includes(path));
+    let kind = |path: &Path| extension(path).filter(|kind| OTHER_MESHES.contains(&kind.as_str()));
+    let others = others
+        .into_iter()
+        .filter_map(|path| Some((kind(&path)?, path)));
+    let others = others.map(|(kind, path)| LeftOut {
+        path,
+        what: format!(
+            "files of meshes in the format {} are not read: save it as .glb, .gltf or .obj",
+            kind.to_uppercase()
+        ),
+    });
+    let mut left_out: Vec<LeftOut> = others.collect();
+    if wanted.is_empty() {
+        return Err(match left_out.first() {
+            Some(first) => SynthError::MeshKind {
+                path: first.path.clone(),
+            },
+            None => MESHES.missing(folder),
+        });
+    }
+    let mut meshes = Vec::with_capacity(wanted.len());
+    for path in wanted {
+        let mesh = Mesh::read(&path)?;
+        left_out.extend(mesh.left_out().iter().map(|what| LeftOut {
+            path: path.clone(),
+            what: what.clone(),
+        }));
+        let name = path.strip_prefix(folder).unwrap_or(&path);
+        let parts: Vec<_> = name.iter().map(OsStr::to_string_lossy).collect();
+        meshes.push((parts.join("/"), mesh));
+    }
+    Ok((meshes, left_out))
+}
+
+/// The files of a folder and of those within it, by their paths; each folder once, where links lead in a circle.
+fn files_below(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
+    let mut files = Vec::new();
+    let mut seen = BTreeSet::new();
+    let mut waiting = vec![folder.to_owned()];
+    while let Some(folder) = waiting.pop() {
+        if !seen.insert(fs::canonicalize(&folder).map_err(SynthError::read(&folder))?) {
+            continue;
+        }
+        for path in members(&folder)? {
+            if path.is_dir() {
+                waiting.push(path);
+            } else {
+                files.push(path);
+            }
         }
     }
+    files.sort();
+    Ok(files)
+}
+
+/// What lies in a folder, without what systems hide there.
+fn members(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder).map_err(SynthError::read(folder))? {
+        let entry = entry.map_err(SynthError::read(folder))?;
+        if !entry.file_name().as_encoded_bytes().starts_with(b".") {
+            paths.push(entry.path());
+        }
+    }
+    Ok(paths)
+}
+
+fn extension(path: &Path) -> Option<String> {
+    Some(path.extension()?.to_str()?.to_ascii_lowercase())
+}
+
+impl Wanted {
+    fn includes(&self, path: &Path) -> bool {
+        extension(path).is_some_and(|found| self.extensions.contains(&found.as_str()))
+    }
+
+    fn missing(&self, folder: &Path) -> SynthError {
+        SynthError::Nothing {
+            path: folder.to_owned(),
+            what: self.what,
+            extensions: self.extensions,
+        }
+    }
+}
+
+/// Every file of the wanted kind in a folder, by name.
+fn read_all<T>(
+    folder: &Path,
+    wanted: &Wanted,
+    read: impl Fn(&Path) -> Result<T, SynthError>,
+) -> Result<Vec<(String, T)>, SynthError> {
+    let mut paths = members(folder)?;
+    paths.retain(|path| wanted.includes(path));
     paths.sort();
     if paths.is_empty() {
-        return Err(SynthError::Nothing {
-            path: folder.to_owned(),
-            what,
-            extensions,
-        });
+        return Err(wanted.missing(folder));
     }
     let named = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default();
@@ -201,5 +322,83 @@ mod tests {
         assert!(error.contains("b.OBJ"), "{error}");
         std::fs::remove_file(folder.path().join("b.OBJ")).unwrap();
         assert_eq!(Library::read(&folders).unwrap().meshes[0].0, "a.obj");
+    }
+
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+    /// A folder of meshes with files of these contents.
+    fn folder_with(files: &[(&str, &str)]) -> (tempfile::TempDir, Folders) {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, content) in files {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, content).unwrap();
+        }
+        let folders = Folders {
+            meshes: Some(folder.path().to_owned()),
+            ..Folders::default()
+        };
+        (folder, folders)
+    }
+
+    #[test]
+    fn meshes_are_found_in_folders_within_and_not_among_hidden_files() {
+        let (_folder, folders) = folder_with(&[
+            ("chairs/oak/chair.obj", TRIANGLE),
+            ("a.OBJ", TRIANGLE),
+            ("._a.obj", "of macOS"),
+            (".trash/b.obj", "deleted"),
+            ("chairs/readme.txt", "text"),
+            ("chairs/oak/chair.mtl", ""),
+        ]);
+        let library = Library::read(&folders).unwrap();
+        let names: Vec<&str> = library
+            .meshes
+            .iter()
+            .map(|(name, _)| name.as_str())
+            .collect();
+        assert_eq!(names, ["a.OBJ", "chairs/oak/chair.obj"]);
+        assert!(library.left_out.is_empty());
+    }
+
+    #[test]
+    fn meshes_of_other_kinds_and_what_meshes_miss_are_left_out_and_named() {
+        let missing = format!("mtllib none.mtl\nusemtl a\n{TRIANGLE}");
+        let (folder, folders) = folder_with(&[
+            ("a.obj", &missing),
+            ("b.ply", "ply"),
+            ("c/d.STL", "solid"),
+            ("e.usdz", ""),
+            ("photo.png", ""),
+        ]);
+        let library = Library::read(&folders).unwrap();
+        let of = |one: &LeftOut| one.path.strip_prefix(folder.path()).unwrap().to_owned();
+        let mut paths: Vec<PathBuf> = library.left_out.iter().map(of).collect();
+        paths.sort();
+        assert_eq!(
+            paths,
+            ["a.obj", "b.ply", "c/d.STL", "e.usdz"].map(PathBuf::from)
+        );
+        assert!(library.left_out.iter().all(|one| !one.what.is_empty()));
+        assert!(library.without_meshes().left_out.is_empty());
+    }
+
+    #[test]
+    fn a_folder_of_other_kinds_alone_is_refused_by_the_first_of_them() {
+        let (folder, folders) = folder_with(&[("b.fbx", ""), ("a.blend", ""), ("c.txt", "")]);
+        let error = Library::read(&folders).unwrap_err();
+        let first = folder.path().join("a.blend");
+        assert!(
+            matches!(&error, SynthError::MeshKind { path } if *path == first),
+            "{error}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_that_lead_in_a_circle_are_followed_once() {
+        let (folder, folders) = folder_with(&[("a/b.obj", TRIANGLE)]);
+        std::os::unix::fs::symlink(folder.path(), folder.path().join("a/again")).unwrap();
+        assert_eq!(Library::read(&folders).unwrap().meshes.len(), 1);
     }
 }

@@ -1,74 +1,129 @@
-//! Files that a mesh's file names: they lie in its folder, or below.
+//! Files that a mesh's file names: they lie in its folder, or below. Names are those of the computer on which it was written,
+//! whose letters may differ in case and whose folders may be others.
 
+use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use percent_encoding::percent_decode_str;
 
-/// The path of a file by the address that glTF has for it; none where it would lie elsewhere.
-pub(super) fn file_beside(mesh: &Path, address: &str) -> Option<PathBuf> {
-    let name = percent_decode_str(address).decode_utf8().ok()?;
-    below(mesh, &name)
+/// The file that lies beside a mesh by the address that glTF has for it; none where there is no such file.
+pub(super) fn by_address(mesh: &Path, address: &str) -> Option<PathBuf> {
+    let decoded = percent_decode_str(address).decode_utf8().ok();
+    // Some programs do not encode what a file has of per cent signs.
+    let names = decoded.as_deref().into_iter().chain([address]);
+    names.filter_map(|name| within(mesh, name)).next()
 }
 
-/// The path of a file by the name that a Wavefront file has for it. Such names are often those of another computer: where the
-/// file would lie elsewhere, it is looked for beside the mesh. None where there is no name.
-pub(super) fn near(mesh: &Path, name: &str) -> Option<PathBuf> {
-    let name = name.trim().replace('\\', "/");
-    below(mesh, &name).or_else(|| below(mesh, name.rsplit('/').next()?))
+/// The file that lies beside a mesh by the name that a Wavefront file has for it; none where there is no such file. Such
+/// names are often those of another computer: where nothing lies there, the file is looked for beside the mesh.
+pub(super) fn by_name(mesh: &Path, name: &str) -> Option<PathBuf> {
+    let name = name.trim();
+    within(mesh, name).or_else(|| within(mesh, name.rsplit(['/', '\\']).next()?))
 }
 
-fn below(mesh: &Path, name: &str) -> Option<PathBuf> {
-    let path = Path::new(name);
-    let mut parts = path.components();
+/// The file of a name in the folder of the mesh or below.
+fn within(mesh: &Path, name: &str) -> Option<PathBuf> {
+    let name = name.replace('\\', "/");
     // A colon: of a drive, or of an address on the network.
-    let lies_below = parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
-        && !name.contains([':', '\\']);
-    (lies_below && path.file_name().is_some()).then(|| mesh.with_file_name(path))
+    if name.contains(':') {
+        return None;
+    }
+    let mut path = mesh.parent()?.to_owned();
+    for part in Path::new(&name).components() {
+        match part {
+            Component::CurDir => {}
+            Component::Normal(part) => path = member(path, part.to_str()?)?,
+            _ => return None,
+        }
+    }
+    path.is_file().then_some(path)
+}
+
+/// What has this name in a folder, or the only one whose name differs in case only.
+fn member(folder: PathBuf, name: &str) -> Option<PathBuf> {
+    let exact = folder.join(name);
+    if exact.exists() {
+        return Some(exact);
+    }
+    // The folder of a mesh that is named without one.
+    let listed = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        &folder
+    };
+    let lower = name.to_lowercase();
+    let mut alike = fs::read_dir(listed)
+        .ok()?
+        .flatten()
+        .map(|entry| entry.file_name())
+        .filter(|found| found.to_string_lossy().to_lowercase() == lower);
+    let found = alike.next()?;
+    alike.next().is_none().then(|| folder.join(found))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const MESH: &str = "meshes/a.obj";
+    fn folder_with(names: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for name in names {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+        folder
+    }
 
     #[test]
     fn files_lie_in_the_folder_of_the_mesh_or_below() {
-        let beside = |address| file_beside(Path::new(MESH), address);
+        let folder = folder_with(&["m/a.png", "m/maps/k\u{e4}se b.png", "m/a%20b.png", "c.png"]);
+        let mesh = folder.path().join("m/a.gltf");
         for (address, path) in [
-            ("a.png", "meshes/a.png"),
-            ("./maps/k%C3%A4se%20b.png", "meshes/./maps/k\u{e4}se b.png"),
+            ("a.png", "m/a.png"),
+            ("A.PNG", "m/a.png"),
+            ("./maps/k%C3%A4se%20b.png", "m/maps/k\u{e4}se b.png"),
+            ("maps\\k\u{e4}se b.png", "m/maps/k\u{e4}se b.png"),
+            ("a%20b.png", "m/a%20b.png"),
         ] {
-            assert_eq!(beside(address), Some(PathBuf::from(path)));
+            let right = folder.path().join(path);
+            assert_eq!(by_address(&mesh, address), Some(right), "{address}");
         }
         for address in [
             "",
             ".",
             "..",
-            "../a.png",
-            "maps/../../a.png",
-            "%2e%2e/a.png",
+            "maps",
+            "../c.png",
+            "maps/../../c.png",
+            "%2e%2e/c.png",
             "/etc/passwd",
             "http://a/b.png",
             "%ff",
+            "b.png",
         ] {
-            assert_eq!(beside(address), None, "{address}");
+            assert_eq!(by_address(&mesh, address), None, "{address}");
         }
     }
 
     #[test]
     fn files_of_another_computer_are_looked_for_beside_the_mesh() {
-        let near = |name| near(Path::new(MESH), name);
+        let folder = folder_with(&["a.png", "Maps/B c.PNG", "two.png", "Two.png"]);
+        let mesh = folder.path().join("a.obj");
         for (name, path) in [
-            (" maps\\a%20b.png", "meshes/maps/a%20b.png"),
-            ("C:\\Users\\me\\a.png", "meshes/a.png"),
-            ("/home/me/a.png", "meshes/a.png"),
-            ("../a.png", "meshes/a.png"),
+            (" maps\\b c.png\t", "Maps/B c.PNG"),
+            ("C:\\Users\\me\\a.png", "a.png"),
+            ("/home/me/a.png", "a.png"),
+            ("../a.png", "a.png"),
+            ("textures/a.png", "a.png"),
+            ("two.png", "two.png"),
         ] {
-            assert_eq!(near(name), Some(PathBuf::from(path)));
+            let right = folder.path().join(path);
+            assert_eq!(by_name(&mesh, name), Some(right), "{name}");
         }
-        for name in ["", "..", "a/.."] {
-            assert_eq!(near(name), None, "{name}");
+        // Either could be meant.
+        for name in ["", "..", "a/..", "TWO.png", "C:", "no.png"] {
+            assert_eq!(by_name(&mesh, name), None, "{name}");
         }
     }
 }

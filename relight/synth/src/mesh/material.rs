@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{Affine2, Vec2, Vec3};
 
 use crate::texture::TextureImage;
 
@@ -17,13 +17,32 @@ pub(crate) struct MeshMaterial {
     /// Linear red, green and blue, by which the picture is multiplied.
     pub(crate) colour: Vec3,
     /// The colours from place to place.
-    pub(crate) picture: Option<Arc<TextureImage>>,
+    pub(crate) picture: Option<PlacedPicture>,
     /// 0 a mirror, 1 dull.
     pub(crate) roughness: f32,
     /// 0 paint, 1 metal.
     pub(crate) metallic: f32,
     /// Factors of roughness (green) and metal (blue) from place to place.
-    pub(crate) factors: Option<Arc<TextureImage>>,
+    pub(crate) factors: Option<PlacedPicture>,
+}
+
+/// A picture, and where texture coordinates lie on it.
+#[derive(Debug, Clone)]
+pub(crate) struct PlacedPicture {
+    pub(crate) image: Arc<TextureImage>,
+    /// From texture coordinates to places of the picture, where they differ.
+    pub(crate) placed: Option<Affine2>,
+}
+
+impl PlacedPicture {
+    /// The value at texture coordinates, the mean of all where there are none.
+    fn at(&self, coordinates: Option<Vec2>) -> Vec3 {
+        let place = |at: Vec2| self.placed.map_or(at, |placed| placed.transform_point2(at));
+        match coordinates.map(place).filter(|place| place.is_finite()) {
+            Some(place) => self.image.at(place),
+            None => self.image.mean(),
+        }
+    }
 }
 
 /// The materials of a mesh, and which triangle has which.
@@ -58,17 +77,14 @@ impl Default for MeshMaterial {
 }
 
 impl MeshMaterial {
-    /// The look at a place of the pictures; where there are no texture coordinates, that of the pictures' means.
-    fn at(&self, place: Option<Vec2>) -> OwnSurface {
-        let looked_up = |picture: &TextureImage| match place {
-            Some(place) => picture.at(place),
-            None => picture.mean(),
-        };
-        let of =
-            |picture: &Option<Arc<TextureImage>>| picture.as_deref().map_or(Vec3::ONE, looked_up);
+    /// The look at a place of the pictures, under a colour that multiplies them; where there are no texture coordinates, that
+    /// of the pictures' means.
+    fn at(&self, place: Option<Vec2>, paint: Vec3) -> OwnSurface {
+        let looked_up = |picture: &PlacedPicture| picture.at(place);
+        let of = |picture: &Option<PlacedPicture>| picture.as_ref().map_or(Vec3::ONE, looked_up);
         let factors = of(&self.factors);
         OwnSurface {
-            colour: (self.colour * of(&self.picture)).clamp(Vec3::ZERO, Vec3::ONE),
+            colour: (self.colour * of(&self.picture) * paint).clamp(Vec3::ZERO, Vec3::ONE),
             roughness: (self.roughness * factors.y).clamp(0.0, 1.0),
             metallic: (self.metallic * factors.z).clamp(0.0, 1.0),
         }
@@ -98,12 +114,12 @@ impl MeshMaterials {
         used.any(|one| one.picture.is_some() || one.colour != first.colour)
     }
 
-    /// The look of a triangle at a place of its pictures.
-    pub(crate) fn at(&self, triangle: usize, place: Option<Vec2>) -> OwnSurface {
+    /// The look of a triangle at a place of its pictures, under a colour that multiplies them.
+    pub(crate) fn at(&self, triangle: usize, place: Option<Vec2>, paint: Vec3) -> OwnSurface {
         let number = self.of_triangle.get(triangle).copied().unwrap_or(u32::MAX);
         match self.all.get(number as usize) {
-            Some(material) => material.at(place),
-            None => MeshMaterial::default().at(None),
+            Some(material) => material.at(place, paint),
+            None => MeshMaterial::default().at(None, paint),
         }
     }
 }
@@ -112,8 +128,15 @@ impl MeshMaterials {
 mod tests {
     use super::*;
 
-    fn picture() -> Arc<TextureImage> {
-        TextureImage::from_fn(2, 1, |x, _| Vec3::splat(x as f32)).into()
+    fn placed(image: TextureImage) -> PlacedPicture {
+        PlacedPicture {
+            image: image.into(),
+            placed: None,
+        }
+    }
+
+    fn picture() -> PlacedPicture {
+        placed(TextureImage::from_fn(2, 1, |x, _| Vec3::splat(x as f32)))
     }
 
     #[test]
@@ -123,12 +146,30 @@ mod tests {
             picture: Some(picture()),
             roughness: 0.8,
             metallic: 1.0,
-            factors: Some(TextureImage::from_fn(1, 1, |_, _| Vec3::new(9.0, 0.5, 0.25)).into()),
+            factors: Some(placed(TextureImage::from_fn(1, 1, |_, _| {
+                Vec3::new(9.0, 0.5, 0.25)
+            }))),
         };
-        let right = material.at(Some(Vec2::new(0.75, 0.5)));
+        let right = material.at(Some(Vec2::new(0.75, 0.5)), Vec3::ONE);
         assert_eq!(right.colour, Vec3::new(0.5, 1.0, 1.0));
         assert_eq!((right.roughness, right.metallic), (0.4, 0.25));
-        assert_eq!(material.at(None).colour, Vec3::new(0.25, 0.5, 1.0));
+        let mean = |paint| material.at(None, paint).colour;
+        assert_eq!(mean(Vec3::ONE), Vec3::new(0.25, 0.5, 1.0));
+        assert_eq!(mean(Vec3::new(1.0, 0.5, 0.0)), Vec3::new(0.25, 0.25, 0.0));
+    }
+
+    #[test]
+    fn a_picture_that_is_moved_is_looked_up_elsewhere() {
+        let moved = Affine2::from_translation(Vec2::new(0.5, 0.0));
+        let material = MeshMaterial {
+            picture: Some(PlacedPicture {
+                placed: Some(moved),
+                ..picture()
+            }),
+            ..MeshMaterial::default()
+        };
+        let right = material.at(Some(Vec2::new(0.25, 0.5)), Vec3::ONE);
+        assert_eq!(right.colour, Vec3::ONE);
     }
 
     #[test]

@@ -1,12 +1,14 @@
 //! Triangle meshes with a normal for each corner. Knows nothing of cameras or light; `obj` and
-//! `glb` read files, `material` is what they say of the surface, and `mtl` reads it for `obj`.
+//! `gltf` read files, `material` is what they say of the surface, and `mtl` reads it for `obj`.
 
 mod beside;
-mod glb;
+mod gltf;
 mod material;
 mod mtl;
 mod obj;
+mod polygon;
 mod raw;
+mod text;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -35,7 +37,10 @@ pub struct Mesh {
     texture: Vec<[Vec2; 3]>,
     /// Whether all of them have some.
     is_textured: bool,
+    /// As in [`RawMesh::colours`].
+    colours: Vec<[Vec3; 3]>,
     materials: Option<MeshMaterials>,
+    left_out: Vec<String>,
 }
 
 /// Why numbers are no mesh.
@@ -66,7 +71,8 @@ pub enum MeshFault {
 impl Mesh {
     /// Reads a mesh: Wavefront (`.obj`) or glTF 2.0 (`.gltf`, `.glb`). All its parts become one
     /// surface; its own normals are not used, those of faces within 50 degrees are blended. Materials with pictures or of several
-    /// colours are read, from the files beside it that it names; one colour for all is not taken for the object's.
+    /// colours are read, from the files beside it that it names, and colours of vertices; one colour for all is not taken for
+    /// the object's. What of that cannot be used is left out: see [`Self::left_out`].
     ///
     /// # Errors
     /// [`SynthError::Mesh`] where the file is damaged or holds no surface, [`SynthError::Read`] where it
@@ -75,7 +81,7 @@ impl Mesh {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         let raw = match extension.to_str() {
             Some("obj") => obj::read(path)?,
-            Some("gltf" | "glb") => glb::read(path)?,
+            Some("gltf" | "glb") => gltf::read(path)?,
             _ => {
                 return Err(SynthError::MeshKind {
                     path: path.to_owned(),
@@ -100,6 +106,7 @@ impl Mesh {
             return Err(MeshFault::Empty);
         }
         let normals = corner_normals(&raw.positions, &raw.triangles, crease);
+        let has_own_surface = raw.has_own_surface();
         Ok(Self {
             positions: raw.positions,
             triangles: raw.triangles,
@@ -107,7 +114,9 @@ impl Mesh {
             is_textured: !raw.texture.is_empty()
                 && raw.texture.iter().flatten().all(|place| place.is_finite()),
             texture: raw.texture,
-            materials: raw.materials.tell_anything().then_some(raw.materials),
+            colours: raw.colours,
+            materials: has_own_surface.then_some(raw.materials),
+            left_out: raw.left_out,
         })
     }
 
@@ -126,6 +135,12 @@ impl Mesh {
         &self.normals
     }
 
+    /// What the mesh's file names and is not used, as its pictures where they are not there: each in words of its own.
+    #[must_use]
+    pub fn left_out(&self) -> &[String] {
+        &self.left_out
+    }
+
     /// Whether the mesh's file says how it looks.
     #[must_use]
     pub fn has_own_surface(&self) -> bool {
@@ -138,7 +153,11 @@ impl Mesh {
         let corners = self.texture.get(triangle);
         let place = corners.map(|&corners| blended(corners, weights));
         let place = place.filter(|place| place.is_finite());
-        Some(materials.at(triangle, place))
+        let paint = match self.colours.get(triangle) {
+            Some(&[a, b, c]) => a * weights[0] + b * weights[1] + c * weights[2],
+            None => Vec3::ONE,
+        };
+        Some(materials.at(triangle, place, paint))
     }
 
     /// Texture coordinates for each corner of each triangle, where all of them have some.
@@ -156,17 +175,20 @@ fn check(raw: &RawMesh) -> Result<(), MeshFault> {
     if raw.triangles.len() > MOST_TRIANGLES {
         return Err(MeshFault::TooLarge(raw.triangles.len()));
     }
-    if let Some(vertex) = raw.positions.iter().position(|p| !p.is_finite()) {
-        return Err(MeshFault::NotFinite(vertex));
-    }
     let count = raw.positions.len();
     for (triangle, corners) in raw.triangles.iter().enumerate() {
-        if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= count) {
-            return Err(MeshFault::NoSuchVertex {
-                triangle,
-                vertex,
-                count,
-            });
+        for &vertex in corners {
+            match raw.positions.get(vertex as usize) {
+                Some(position) if position.is_finite() => {}
+                Some(_) => return Err(MeshFault::NotFinite(vertex as usize)),
+                None => {
+                    return Err(MeshFault::NoSuchVertex {
+                        triangle,
+                        vertex,
+                        count,
+                    });
+                }
+            }
         }
     }
     if raw.triangles.is_empty() {
@@ -197,8 +219,7 @@ fn weld(raw: RawMesh) -> RawMesh {
     RawMesh {
         positions,
         triangles,
-        texture: raw.texture,
-        materials: raw.materials,
+        ..raw
     }
 }
 
@@ -234,14 +255,16 @@ fn drop_flat(raw: &mut RawMesh) {
             (b - a).cross(c - a).length_squared() > 1e-20
         })
         .collect();
-    let mut keep = has_area.iter();
-    raw.triangles
-        .retain(|_| keep.next().copied().unwrap_or(true));
-    let mut keep = has_area.iter();
-    raw.texture.retain(|_| keep.next().copied().unwrap_or(true));
-    let mut keep = has_area.iter();
-    let materials = &mut raw.materials.of_triangle;
-    materials.retain(|_| keep.next().copied().unwrap_or(true));
+    keep(&mut raw.triangles, &has_area);
+    keep(&mut raw.texture, &has_area);
+    keep(&mut raw.colours, &has_area);
+    keep(&mut raw.materials.of_triangle, &has_area);
+}
+
+/// Keeps the items that are marked, and those beyond the marks.
+fn keep<T>(items: &mut Vec<T>, marks: &[bool]) {
+    let mut marks = marks.iter();
+    items.retain(|_| marks.next().copied().unwrap_or(true));
 }
 
 /// For each corner, the mean normal of the faces around its vertex, each weighted by its angle there,

@@ -1,9 +1,10 @@
 //! Materials of Wavefront files: their colour, its picture, and how sharp the highlight is. All else in them is left out, also
-//! where it is damaged: programs write many things there. `tobj` ends the program at a colour of one number, which is a grey.
+//! where it is damaged: programs write many things there.
 
-use glam::Vec3;
+use glam::{Affine2, Vec2, Vec3};
 
 use super::material::DULL;
+use super::text::{Statements, keyword, without_comment};
 
 /// A material as the file has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,10 +12,18 @@ pub(super) struct MtlMaterial {
     pub(super) name: String,
     /// Linear red, green and blue.
     pub(super) colour: Option<Vec3>,
-    /// The name of the picture's file.
-    pub(super) picture: Option<String>,
+    pub(super) picture: Option<MtlPicture>,
     specular: Vec3,
     exponent: Option<f32>,
+}
+
+/// A picture as a material names it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MtlPicture {
+    /// The name of its file.
+    pub(super) name: String,
+    /// From texture coordinates to places of the picture, where they differ.
+    pub(super) placed: Option<Affine2>,
 }
 
 impl MtlMaterial {
@@ -32,10 +41,8 @@ impl MtlMaterial {
 /// The materials of a file, in their order.
 pub(super) fn materials(text: &str) -> Vec<MtlMaterial> {
     let mut all: Vec<MtlMaterial> = Vec::new();
-    for line in text.lines() {
-        let line = line.trim();
-        let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
-        let rest = rest.trim();
+    for (_, statement) in Statements::of(text) {
+        let (key, rest) = keyword(&statement);
         if key.eq_ignore_ascii_case("newmtl") {
             all.push(MtlMaterial {
                 name: rest.to_owned(),
@@ -51,44 +58,113 @@ pub(super) fn materials(text: &str) -> Vec<MtlMaterial> {
         match key.to_ascii_lowercase().as_str() {
             "kd" => material.colour = colour(rest),
             "ks" => material.specular = colour(rest).unwrap_or_default(),
-            "ns" => material.exponent = rest.parse().ok().filter(|number: &f32| number.is_finite()),
-            "map_kd" => {
-                material.picture = Some(without_options(rest)).filter(|name| !name.is_empty())
-            }
+            "ns" => material.exponent = numbers(rest).and_then(|all| all.first().copied()),
+            "map_kd" => material.picture = picture(rest),
             _ => {}
         }
     }
     all
 }
 
+/// Finite numbers; none where something else stands among them.
+fn numbers(text: &str) -> Option<Vec<f32>> {
+    let words = without_comment(text).split_whitespace();
+    let number = |word: &str| word.parse().ok().filter(|number: &f32| number.is_finite());
+    words.map(number).collect()
+}
+
 /// Three numbers, or one for all three.
 fn colour(text: &str) -> Option<Vec3> {
-    let numbers: Option<Vec<f32>> = text
-        .split_whitespace()
-        .map(|number| number.parse().ok())
-        .collect();
-    let colour = match *numbers?.as_slice() {
+    let colour = match *numbers(text)? {
         [grey] => Vec3::splat(grey),
         [red, green, blue, ..] => Vec3::new(red, green, blue),
         _ => return None,
     };
-    (colour.is_finite() && colour.min_element() >= 0.0).then_some(colour)
+    (colour.min_element() >= 0.0).then_some(colour)
 }
 
 /// The name behind `-o 0 0 0` and the like, without quotes.
-fn without_options(text: &str) -> String {
+fn picture(text: &str) -> Option<MtlPicture> {
+    let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
     let mut rest = text;
-    while rest.starts_with('-') {
-        let (_, behind) = rest.split_once(char::is_whitespace).unwrap_or(("", ""));
-        rest = behind.trim_start();
-        while let Some((value, behind)) = rest.split_once(char::is_whitespace)
-            && (value.parse::<f32>().is_ok() || matches!(value, "on" | "off"))
-        {
-            rest = behind.trim_start();
+    while let Some((option, behind)) = option(rest) {
+        let values: Vec<&str> = values(option, &mut rest, behind).collect();
+        let pair = |plain: Vec2| {
+            let number = |at: usize| values.get(at)?.parse().ok().filter(|n: &f32| n.is_finite());
+            Vec2::new(number(0).unwrap_or(plain.x), number(1).unwrap_or(plain.y))
+        };
+        match option {
+            "-s" => scale = pair(Vec2::ONE),
+            "-o" => offset = pair(Vec2::ZERO),
+            _ => {}
         }
     }
-    rest.trim_matches('"').to_owned()
+    let placed = Affine2::from_scale_angle_translation(scale, 0.0, offset);
+    let name = rest.trim_matches('"').trim();
+    (!name.is_empty()).then(|| MtlPicture {
+        name: name.to_owned(),
+        placed: (placed != Affine2::IDENTITY).then_some(placed),
+    })
 }
+
+/// The option with which a text begins, and what stands behind it.
+fn option(text: &str) -> Option<(&str, &str)> {
+    let (word, behind) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    OPTIONS
+        .iter()
+        .find(|(name, _)| name.eq_ignore_ascii_case(word))
+        .map(|&(name, _)| (name, behind.trim_start()))
+}
+
+/// The values of an option; `rest` becomes what stands behind them. Numbers that are left out are not taken from the name.
+fn values<'a>(
+    option: &str,
+    rest: &mut &'a str,
+    behind: &'a str,
+) -> impl Iterator<Item = &'a str> + use<'a> {
+    let most = OPTIONS.iter().find(|(name, _)| *name == option);
+    let most = most.map_or(Values::Words(0), |(_, most)| *most);
+    let mut found = Vec::new();
+    *rest = behind;
+    while let Some((word, behind)) = rest.split_once(char::is_whitespace) {
+        let is_value = match most {
+            Values::Numbers(most) => found.len() < most && word.parse::<f32>().is_ok(),
+            Values::Words(most) => found.len() < most,
+        };
+        if !is_value {
+            break;
+        }
+        found.push(word);
+        *rest = behind.trim_start();
+    }
+    found.into_iter()
+}
+
+/// What may follow an option.
+#[derive(Clone, Copy)]
+enum Values {
+    /// At most so many numbers.
+    Numbers(usize),
+    /// So many words.
+    Words(usize),
+}
+
+/// The options of pictures.
+const OPTIONS: [(&str, Values); 13] = [
+    ("-blendu", Values::Words(1)),
+    ("-blendv", Values::Words(1)),
+    ("-bm", Values::Numbers(1)),
+    ("-boost", Values::Numbers(1)),
+    ("-cc", Values::Words(1)),
+    ("-clamp", Values::Words(1)),
+    ("-imfchan", Values::Words(1)),
+    ("-mm", Values::Numbers(2)),
+    ("-o", Values::Numbers(3)),
+    ("-s", Values::Numbers(3)),
+    ("-t", Values::Numbers(3)),
+    ("-texres", Values::Numbers(1)),
+    ("-type", Values::Words(1)),
+];
 
 #[cfg(test)]
 mod tests {
@@ -96,8 +172,8 @@ mod tests {
 
     #[test]
     fn what_programs_write_is_read_and_what_they_should_not_is_left_out() {
-        let text = "# caf\u{fffd}\nKd 1 1 1\nnewmtl a b\nillum x\nKd 0.5\nKs 1 1 1\nNs 30\nmap_Kd -s 1 1 1 -clamp on \"a b.png\"\n\
-             newmtl c\nKd spectral a.rfl\nKd\nNs nan\nmap_Kd\nnewmtl d\nKd 0.1 0.2 0.3\nNs 9\nmap_kd d.png\nnewmtl\nKd 1 -1 0\n";
+        let text = "# caf\u{fffd}\nKd 1 1 1\nnewmtl a b\nillum x\nKd 0.5\nKs 1 1 1\nNs 30 # sharp\nmap_Kd -s 1 1 1 -clamp on \"a b.png\"\n\
+             newmtl c\nKd spectral a.rfl\nKd\nNs nan\nmap_Kd\nnewmtl d\nKd 0.1 0.2 0.3 # grey\nNs 9\nmap_kd d.png\nnewmtl\nKd 1 -1 0\n";
         let all = materials(text);
         let names: Vec<&str> = all.iter().map(|one| one.name.as_str()).collect();
         assert_eq!(names, ["a b", "c", "d", ""]);
@@ -111,8 +187,39 @@ mod tests {
         let roughness = [0.5, 1.0, 1.0, 1.0];
         for (at, one) in all.iter().enumerate() {
             assert_eq!(one.colour, colours[at]);
-            assert_eq!(one.picture.as_deref(), pictures[at]);
+            let name = one.picture.as_ref().map(|picture| picture.name.as_str());
+            assert_eq!(name, pictures[at]);
             assert!((one.roughness() - roughness[at]).abs() < 1e-6);
         }
+    }
+
+    #[test]
+    fn options_of_pictures_are_told_from_names_that_look_like_them() {
+        for (text, name) in [
+            ("-bm 0.5 -mm 0 1 a.png", "a.png"),
+            ("-o 1 a.png", "a.png"),
+            ("-imfchan r -type sphere 2 b.png", "2 b.png"),
+            ("-blendu off -cc on -texres 256\tc.png", "c.png"),
+            ("-leaf.png", "-leaf.png"),
+            ("1.png", "1.png"),
+            ("maps\\d #2.png", "maps\\d #2.png"),
+        ] {
+            assert_eq!(picture(text).unwrap().name, name, "{text}");
+        }
+        for text in ["", "-clamp", "-clamp on", "-o 1 2", "\"\""] {
+            // What is left is no name of a file, or none at all.
+            let name = picture(text).map(|picture| picture.name);
+            assert!(name.is_none_or(|name| !name.contains('.')), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_picture_is_scaled_and_then_moved() {
+        let placed = picture("-s 2 3 1 -o 0.5 0.25 a.png").unwrap().placed;
+        let at = placed.unwrap().transform_point2(Vec2::ONE);
+        assert_eq!(at, Vec2::new(2.5, 3.25));
+        assert!(picture("-s 1 1 1 -o 0 0 0 a.png").unwrap().placed.is_none());
+        let one = picture("-s 4 a.png").unwrap().placed.unwrap();
+        assert_eq!(one.transform_point2(Vec2::ONE), Vec2::new(4.0, 1.0));
     }
 }

@@ -1,235 +1,452 @@
-//! Wavefront files, by `tobj`, and the materials beside them.
+//! Wavefront files and the materials beside them, as programs write them.
+//!
+//! Read here and not by a library: none of those that are maintained reads concave polygons, text that is not UTF-8, lines that
+//! go on and colours of vertices alike, and says the line in which a file is damaged.
 
-use std::cell::RefCell;
-use std::collections::HashMap;
-use std::fs::File;
-use std::io::{BufReader, ErrorKind};
-use std::path::Path;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
+use relight_core::image::{ColourSpace, Srgb};
 
-use super::beside::near;
-use super::material::MeshMaterial;
-use super::mtl::{self, MtlMaterial};
-use super::raw::{NO_TEXTURE, RawMesh};
+use super::beside::by_name;
+use super::material::{MeshMaterial, PlacedPicture};
+use super::mtl::{self, MtlMaterial, MtlPicture};
+use super::polygon::Triangulator;
+use super::raw::{RawMesh, RawTriangle};
+use super::text::{Statements, decoded, keyword, readings, without_comment};
 use crate::SynthError;
 use crate::texture::TextureImage;
 
-/// All models of the file as one surface, with the materials of the `.mtl` file that it names, if that is there.
+/// Names of materials by which programs say that there is none.
+const NO_MATERIAL: [&str; 3] = ["", "none", "(null)"];
+
+/// Most files of materials that one statement may be read as.
+const MOST_LIBRARIES: usize = 32;
+
+/// All parts of the file as one surface, with the materials of the `.mtl` files that it names.
 pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
-    let file = File::open(path).map_err(SynthError::read(path))?;
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
-    };
+    let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
     let damaged = |reason: String| SynthError::Mesh {
         path: path.to_owned(),
         reason,
     };
-    // `tobj` reads materials where they are named, by a function that may be called several times.
-    let (materials, fault) = (RefCell::new(Vec::new()), RefCell::new(None));
-    let beside = |named: &Path| {
-        let mut known: Vec<MtlMaterial> = Vec::new();
-        match text_of_materials(path, named) {
-            Ok(text) => known = mtl::materials(&text),
-            Err(why) => *fault.borrow_mut() = Some(why),
-        }
-        let names = (0..).zip(&known);
-        let numbers = names.map(|(at, one)| (one.name.clone(), at)).collect();
-        let count = known.len();
-        materials.borrow_mut().extend(known);
-        // `tobj` counts them, and tells which one each model has.
-        Ok((vec![tobj::Material::default(); count], numbers))
-    };
-    let (models, _) = tobj::load_obj_buf(&mut BufReader::new(file), &options, beside)
-        .map_err(|fault| damaged(fault.to_string()))?;
-    if let Some(fault) = fault.take() {
-        return Err(damaged(fault));
+    let file = ObjFile::parsed(&decoded(&bytes)).map_err(damaged)?;
+    let mut left_out = Vec::new();
+    if file.has_free_form {
+        left_out.push("its free-form surfaces are not read, only its polygons".to_owned());
     }
-    let mut raw = RawMesh::default();
-    for model in &models {
-        append(&mut raw, &model.mesh);
-    }
-    raw.materials.all = with_pictures(path, &raw, &materials.take()).map_err(damaged)?;
+    let materials = Materials::read(path, &file, &mut left_out).map_err(damaged)?;
+    let mut raw = file.triangles(&materials).map_err(damaged)?;
+    raw.materials.all = materials.all;
+    raw.left_out = left_out;
     Ok(raw)
 }
 
-/// The text of the materials that a mesh names; none where the file is not there: the surface is there all the same.
-fn text_of_materials(path: &Path, named: &Path) -> Result<String, String> {
-    let Some(file) = near(path, &named.to_string_lossy()) else {
-        return Ok(String::new());
-    };
-    match std::fs::read(&file) {
-        Ok(bytes) => Ok(String::from_utf8_lossy(&bytes).into_owned()),
-        Err(fault) if fault.kind() == ErrorKind::NotFound => Ok(String::new()),
-        Err(fault) => Err(format!(
-            "its materials {} cannot be read: {fault}",
-            file.display()
-        )),
+/// What stands in a file.
+#[derive(Default)]
+struct ObjFile {
+    positions: Vec<Vec3>,
+    /// For each position up to the last that has one.
+    colours: Vec<Vec3>,
+    texture: Vec<Vec2>,
+    corners: Vec<Corner>,
+    faces: Vec<Face>,
+    /// Names of materials in their order, and the number of each.
+    materials: Vec<String>,
+    numbers: HashMap<String, u32>,
+    /// What is named as files of materials.
+    libraries: Vec<String>,
+    has_free_form: bool,
+}
+
+/// A corner of a face.
+#[derive(Clone, Copy)]
+struct Corner {
+    position: u32,
+    texture: Option<u32>,
+}
+
+struct Face {
+    /// In the file, from 1.
+    line: usize,
+    /// Number of its first corner.
+    first: usize,
+    /// By number of its name.
+    material: Option<u32>,
+}
+
+impl ObjFile {
+    fn parsed(text: &str) -> Result<Self, String> {
+        let mut file = Self::default();
+        let mut material = None;
+        for (line, statement) in Statements::of(text) {
+            let (key, rest) = keyword(&statement);
+            let read = match key {
+                "v" => file.position(rest),
+                "vt" => file.coordinates(rest),
+                "f" | "fo" => file.face(line, material, rest),
+                "usemtl" => {
+                    material = file.material(rest);
+                    Ok(())
+                }
+                "mtllib" => {
+                    file.libraries.push(rest.to_owned());
+                    Ok(())
+                }
+                "surf" | "bsp" | "bzp" | "cdp" => {
+                    file.has_free_form = true;
+                    Ok(())
+                }
+                _ => Ok(()),
+            };
+            read.map_err(|what| format!("line {line}: {what}"))?;
+        }
+        file.make_colours_linear();
+        Ok(file)
+    }
+
+    /// Colours of vertices are sRGB, from 0 to 1, or in some programs to 255.
+    fn make_colours_linear(&mut self) {
+        let largest = self.colours.iter().map(|colour| colour.max_element());
+        let scale = if largest.fold(0.0, f32::max) > 1.0 {
+            1.0 / 255.0
+        } else {
+            1.0
+        };
+        for colour in &mut self.colours {
+            *colour = colour.map(|level| Srgb::to_linear((scale * level).max(0.0).min(1.0)));
+        }
+    }
+
+    /// Three coordinates, and a colour behind them.
+    fn position(&mut self, text: &str) -> Result<(), String> {
+        let numbers = numbers(text)?;
+        let Some(&[x, y, z]) = numbers.first_chunk() else {
+            let count = numbers.len();
+            return Err(format!("a vertex has {count} coordinates in place of 3"));
+        };
+        // One number more is a weight, which only curves use; one behind a colour is its opacity.
+        if let [_, _, _, red, green, blue] | [_, _, _, red, green, blue, _] = *numbers {
+            self.colours.resize(self.positions.len(), Vec3::ONE);
+            self.colours.push(Vec3::new(red, green, blue));
+        }
+        self.positions.push(Vec3::new(x, y, z));
+        Ok(())
+    }
+
+    fn coordinates(&mut self, text: &str) -> Result<(), String> {
+        let numbers = numbers(text)?;
+        let u = *numbers.first().ok_or("texture coordinates are missing")?;
+        let v = numbers.get(1).copied().unwrap_or(0.0);
+        self.texture.push(Vec2::new(u, v));
+        Ok(())
+    }
+
+    fn face(&mut self, line: usize, material: Option<u32>, text: &str) -> Result<(), String> {
+        let first = self.corners.len();
+        for word in without_comment(text).split_whitespace() {
+            let mut parts = word.split('/');
+            let position = parts.next().unwrap_or_default();
+            let texture = parts.next().filter(|part| !part.is_empty());
+            self.corners.push(Corner {
+                position: index(position, self.positions.len())?,
+                texture: match texture {
+                    Some(part) => Some(index(part, self.texture.len())?),
+                    None => None,
+                },
+            });
+        }
+        if self.corners.len() == first {
+            return Err("a face has no corners".to_owned());
+        }
+        self.faces.push(Face {
+            line,
+            first,
+            material,
+        });
+        Ok(())
+    }
+
+    fn material(&mut self, name: &str) -> Option<u32> {
+        if NO_MATERIAL.contains(&name.to_ascii_lowercase().as_str()) {
+            return None;
+        }
+        if let Some(&number) = self.numbers.get(name) {
+            return Some(number);
+        }
+        let number = u32::try_from(self.materials.len()).ok()?;
+        self.materials.push(name.to_owned());
+        self.numbers.insert(name.to_owned(), number);
+        Some(number)
+    }
+
+    /// The faces as triangles.
+    fn triangles(&self, materials: &Materials) -> Result<RawMesh, String> {
+        let mut raw = RawMesh {
+            positions: self.positions.clone(),
+            ..RawMesh::default()
+        };
+        let mut triangulator = Triangulator::new();
+        let ends = self.faces.iter().skip(1).map(|face| face.first);
+        let ends = ends.chain([self.corners.len()]);
+        for (face, end) in self.faces.iter().zip(ends) {
+            let corners = &self.corners[face.first..end];
+            let told = |what| format!("line {}: {what}", face.line);
+            let places = self.places(corners).map_err(told)?;
+            let material = face.material.map(|number| number as usize);
+            for triangle in triangulator.triangles(&places) {
+                let corners = triangle.map(|at| corners[at]);
+                let colours =
+                    (!self.colours.is_empty()).then(|| corners.map(|one| self.colour(one)));
+                raw.push(RawTriangle {
+                    corners: corners.map(|one| one.position),
+                    texture: self.texture_of(corners),
+                    colours: colours.filter(|_| !materials.has_picture(material)),
+                    material: material.and_then(|number| materials.of(number, colours.is_some())),
+                });
+            }
+        }
+        Ok(raw)
+    }
+
+    /// Where the corners of a face lie.
+    fn places(&self, corners: &[Corner]) -> Result<Vec<Vec3>, String> {
+        let place = |corner: &Corner| {
+            let (number, count) = (corner.position as usize, self.positions.len());
+            let texture = corner.texture.map_or(0, |number| number as usize + 1);
+            // Some programs number coordinates that they do not write.
+            if !self.texture.is_empty() && texture > self.texture.len() {
+                let count = self.texture.len();
+                return Err(format!(
+                    "a face names texture coordinates {texture} of {count}"
+                ));
+            }
+            let found = self.positions.get(number).copied();
+            found.ok_or_else(|| format!("a face names vertex {} of {count}", number + 1))
+        };
+        corners.iter().map(place).collect()
+    }
+
+    fn colour(&self, corner: Corner) -> Vec3 {
+        let colour = self.colours.get(corner.position as usize);
+        colour.copied().unwrap_or(Vec3::ONE)
+    }
+
+    fn texture_of(&self, corners: [Corner; 3]) -> Option<[Vec2; 3]> {
+        let at = |corner: Corner| self.texture.get(corner.texture? as usize).copied();
+        match corners.map(at) {
+            [Some(a), Some(b), Some(c)] => Some([a, b, c]),
+            _ => None,
+        }
     }
 }
 
-/// The materials with the pictures of those that are used, each file read once.
-fn with_pictures(
-    path: &Path,
-    raw: &RawMesh,
-    materials: &[MtlMaterial],
-) -> Result<Vec<MeshMaterial>, String> {
-    let used = raw.materials.used();
-    let mut pictures: HashMap<&str, Arc<TextureImage>> = HashMap::new();
-    let mut all = Vec::with_capacity(materials.len());
-    for (number, of) in materials.iter().enumerate() {
-        let name = of.picture.as_deref().filter(|_| used.contains(&number));
-        let picture = match name {
-            None => None,
-            Some(name) => Some(match pictures.get(name) {
-                Some(picture) => Arc::clone(picture),
-                None => {
-                    let picture = Arc::new(picture(path, name)?);
-                    pictures.insert(name, Arc::clone(&picture));
-                    picture
-                }
-            }),
+fn numbers(text: &str) -> Result<Vec<f32>, String> {
+    let words = without_comment(text).split_whitespace();
+    let number = |word: &str| word.parse().map_err(|_| format!("{word:?} is no number"));
+    words.map(number).collect()
+}
+
+/// The place, from 0, of what a face names: from 1, or backwards from the last of `count`.
+fn index(text: &str, count: usize) -> Result<u32, String> {
+    let number: i64 = text
+        .parse()
+        .map_err(|_| format!("{text:?} is not the number of a corner"))?;
+    let place = match number {
+        1.. => Some(number - 1),
+        0 => None,
+        _ => i64::try_from(count)
+            .ok()
+            .map(|count| count.saturating_add(number)),
+    };
+    let place = place.and_then(|place| u32::try_from(place).ok());
+    place.ok_or_else(|| format!("a face names corner {number}, and {count} are there"))
+}
+
+/// The materials that faces name, by the number of the name.
+struct Materials {
+    /// Those of the names, then the same without a colour, for faces whose vertices have colours.
+    all: Vec<MeshMaterial>,
+    /// Whether a file has a material of the name.
+    is_known: Vec<bool>,
+}
+
+impl Materials {
+    fn read(path: &Path, file: &ObjFile, left_out: &mut Vec<String>) -> Result<Self, String> {
+        let mut used: Vec<bool> = vec![false; file.materials.len()];
+        for face in &file.faces {
+            if let Some(number) = face.material {
+                used[number as usize] = true;
+            }
+        }
+        let (known, missing) = libraries(path, file)?;
+        let known: Vec<Option<&MtlMaterial>> = file
+            .materials
+            .iter()
+            .map(|name| readings(name).find_map(|name| known.get(name)))
+            .collect();
+        let names = file.materials.iter().zip(&known).zip(&used);
+        let unknown = names.filter(|((_, known), used)| known.is_none() && **used);
+        let unknown: Vec<String> = unknown.map(|((name, _), _)| format!("{name:?}")).collect();
+        // Without a file that is named, the names are the program's own: nothing is lost.
+        if !unknown.is_empty() && !file.libraries.is_empty() {
+            left_out.extend(
+                missing
+                    .iter()
+                    .map(|name| format!("its materials {name:?} are not there")),
+            );
+            if missing.is_empty() {
+                let names = unknown.join(", ");
+                left_out.push(format!("none of its .mtl files has the material {names}"));
+            }
+        }
+        let mut pictures = Pictures::new(path);
+        let mut all = Vec::with_capacity(2 * known.len());
+        for (known, used) in known.iter().zip(&used) {
+            all.push(match known.filter(|_| *used) {
+                Some(material) => pictures.material(material, left_out),
+                None => MeshMaterial::default(),
+            });
+        }
+        let plain = all.iter().cloned().map(|one| MeshMaterial {
+            colour: Vec3::ONE,
+            ..one
+        });
+        let plain: Vec<MeshMaterial> = plain.collect();
+        all.extend(plain);
+        Ok(Self {
+            all,
+            is_known: known.iter().map(Option::is_some).collect(),
+        })
+    }
+
+    /// The place of a name's material among all, where a file has it.
+    fn of(&self, number: usize, is_coloured: bool) -> Option<usize> {
+        let is_known = self.is_known.get(number).copied().unwrap_or_default();
+        let of = if is_coloured && !self.has_picture(Some(number)) {
+            number + self.is_known.len()
+        } else {
+            number
         };
+        is_known.then_some(of)
+    }
+
+    fn has_picture(&self, number: Option<usize>) -> bool {
+        let material = number.and_then(|number| self.all.get(number));
+        material.is_some_and(|material| material.picture.is_some())
+    }
+}
+
+/// The materials of all files that a mesh names, by their names, and the files that are not there. Of materials with one name
+/// the first file's counts.
+fn libraries(
+    path: &Path,
+    file: &ObjFile,
+) -> Result<(BTreeMap<String, MtlMaterial>, Vec<String>), String> {
+    let (mut known, mut missing) = (BTreeMap::new(), Vec::new());
+    for named in &file.libraries {
+        for library in split(path, named) {
+            let found = match library {
+                Ok(found) => found,
+                Err(name) => {
+                    if !missing.contains(&name) {
+                        missing.push(name);
+                    }
+                    continue;
+                }
+            };
+            let bytes = std::fs::read(&found).map_err(|fault| {
+                format!("its materials {} cannot be read: {fault}", found.display())
+            })?;
+            let materials = mtl::materials(&decoded(&bytes));
+            let mut own: BTreeMap<String, MtlMaterial> = BTreeMap::new();
+            own.extend(materials.into_iter().map(|one| (one.name.clone(), one)));
+            for (name, material) in own {
+                known.entry(name).or_insert(material);
+            }
+        }
+    }
+    Ok((known, missing))
+}
+
+/// The files that a statement names. Names may hold spaces, and several may stand in one statement: the longest that is there
+/// counts. In place of a file that is not there, its name.
+fn split(mesh: &Path, named: &str) -> Vec<Result<PathBuf, String>> {
+    let unquoted = |name: &str| name.trim().trim_matches('"').to_owned();
+    let mut all = Vec::new();
+    let mut rest = named.trim();
+    while !rest.is_empty() && (all.is_empty() || !rest.starts_with('#')) {
+        let spaces = rest.char_indices().filter(|(_, one)| one.is_whitespace());
+        let is_name = |&end: &usize| {
+            rest[..end]
+                .trim_end_matches('"')
+                .to_ascii_lowercase()
+                .ends_with(".mtl")
+        };
+        let ends = spaces.map(|(at, _)| at).filter(is_name);
+        let ends: Vec<usize> = ends.take(MOST_LIBRARIES).chain([rest.len()]).collect();
+        let there = |&end: &usize| Some((end, by_name(mesh, &unquoted(&rest[..end]))?));
+        let (end, library) = match ends.iter().rev().find_map(there) {
+            Some((end, path)) => (end, Ok(path)),
+            None => (ends[0], Err(unquoted(&rest[..ends[0]]))),
+        };
+        all.push(library);
+        rest = rest[end..].trim_start();
+    }
+    all
+}
+
+/// The pictures of a file's materials, each read once.
+struct Pictures<'a> {
+    path: &'a Path,
+    /// By name; none of those that cannot be used.
+    read: HashMap<String, Option<Arc<TextureImage>>>,
+}
+
+impl<'a> Pictures<'a> {
+    fn new(path: &'a Path) -> Self {
+        Self {
+            path,
+            read: HashMap::new(),
+        }
+    }
+
+    fn material(&mut self, of: &MtlMaterial, left_out: &mut Vec<String>) -> MeshMaterial {
+        let named = of.picture.as_ref();
+        let picture = named.and_then(|named| self.picture(named, left_out));
         // Beside a picture, programs write a colour that they do not multiply by.
         let colour = of.colour.filter(|_| picture.is_none());
-        all.push(MeshMaterial {
+        MeshMaterial {
             colour: colour.unwrap_or(Vec3::ONE),
             picture,
             roughness: of.roughness(),
             ..MeshMaterial::default()
-        });
+        }
     }
-    Ok(all)
+
+    fn picture(&mut self, named: &MtlPicture, left_out: &mut Vec<String>) -> Option<PlacedPicture> {
+        let name = &named.name;
+        if !self.read.contains_key(name) {
+            let read = picture(self.path, name);
+            let read = read.map_err(|why| left_out.push(format!("its picture {name:?} {why}")));
+            self.read.insert(name.clone(), read.ok().map(Arc::new));
+        }
+        let image = self.read.get(name)?.as_ref()?;
+        Some(PlacedPicture {
+            image: Arc::clone(image),
+            placed: named.placed,
+        })
+    }
 }
 
 fn picture(path: &Path, name: &str) -> Result<TextureImage, String> {
-    let unusable = |why: String| format!("its picture {name:?} {why}");
-    let file = near(path, name).ok_or_else(|| unusable("is no file".to_owned()))?;
-    let bytes =
-        std::fs::read(file).map_err(|fault| unusable(format!("cannot be read: {fault}")))?;
-    TextureImage::of_colours(&bytes).map_err(|fault| unusable(format!("cannot be used: {fault}")))
-}
-
-/// Adds a model.
-fn append(raw: &mut RawMesh, mesh: &tobj::Mesh) {
-    let first = raw.positions.len() as u32;
-    let places = mesh.positions.chunks_exact(3);
-    raw.positions
-        .extend(places.map(|p| Vec3::new(p[0], p[1], p[2])));
-    let shifted = |corner: u32| corner.saturating_add(first);
-    let coordinate = |index: u32| {
-        let at = 2 * index as usize;
-        let pair = mesh.texcoords.get(at..at + 2)?;
-        Some(Vec2::new(pair[0], pair[1]))
-    };
-    let mut coordinates = mesh.texcoord_indices.chunks_exact(3);
-    for corners in mesh.indices.chunks_exact(3) {
-        raw.triangles
-            .push([corners[0], corners[1], corners[2]].map(shifted));
-        let found = coordinates
-            .next()
-            .and_then(|c| Some([coordinate(c[0])?, coordinate(c[1])?, coordinate(c[2])?]));
-        raw.texture.push(found.unwrap_or(NO_TEXTURE));
-        raw.materials.push(mesh.material_id);
-    }
+    let file = readings(name).find_map(|name| by_name(path, name));
+    let file = file.ok_or_else(|| "is not there".to_owned())?;
+    let bytes = std::fs::read(file).map_err(|fault| format!("cannot be read: {fault}"))?;
+    TextureImage::of_colours(&bytes).map_err(|fault| format!("cannot be used: {fault}"))
 }
 
 #[cfg(test)]
-mod tests {
-    use crate::{Mesh, SynthError};
-
-    fn read(text: &str) -> Result<Mesh, SynthError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.obj");
-        std::fs::write(&path, text).unwrap();
-        Mesh::read(&path)
-    }
-
-    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
-
-    #[test]
-    fn polygons_become_triangles_and_keep_their_texture_coordinates() {
-        let textured = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nmtllib missing.mtl\nf 1/1 2/2 3/3 4/4\n";
-        let mesh = read(&format!("{SQUARE}{textured}")).unwrap();
-        assert_eq!(mesh.triangles().len(), 2);
-        for (corners, coordinates) in mesh.triangles().iter().zip(mesh.texture().unwrap()) {
-            for (&vertex, uv) in corners.iter().zip(coordinates) {
-                let position = mesh.positions()[vertex as usize];
-                assert_eq!(position.x > 0.0, uv.x > 0.5);
-                assert_eq!(position.y > 0.0, uv.y > 0.5);
-            }
-        }
-    }
-
-    #[test]
-    fn parts_become_one_surface_without_texture_coordinates_where_there_are_none() {
-        let mesh = read(&format!("{SQUARE}o a\nf 1 2 3\no b\nf 1 3 4\n")).unwrap();
-        assert!(mesh.texture().is_none());
-        assert_eq!((mesh.triangles().len(), mesh.positions().len()), (2, 4));
-    }
-
-    #[test]
-    fn materials_and_their_pictures_are_read_from_the_files_beside() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        std::fs::create_dir(at("maps")).unwrap();
-        let picture = image::RgbImage::from_fn(2, 1, |x, _| image::Rgb([255 * x as u8, 0, 255]));
-        picture.save(at("maps/a.png")).unwrap();
-        let materials = "newmtl a\nKd 0.6 0.6 0.6\nKs 1 1 1\nNs 30\nmap_Kd maps\\a.png\nnewmtl b\nKd 0.25 0.5 1\n";
-        std::fs::write(at("a.mtl"), materials).unwrap();
-        let text = format!(
-            "mtllib a.mtl\n{SQUARE}vt 0.25 0.5\nvt 0.75 0.5\nusemtl a\nf 1/1 2/2 3/2\nusemtl b\nf 1/1 3/1 4/1\n"
-        );
-        std::fs::write(at("a.obj"), &text).unwrap();
-        let mesh = Mesh::read(&at("a.obj")).unwrap();
-        let look = |triangle, corner: usize| {
-            let weights = std::array::from_fn(|at| f32::from(u8::from(at == corner)));
-            mesh.own_surface(triangle, weights).unwrap()
-        };
-        assert_eq!(look(0, 0).colour, glam::Vec3::Z);
-        assert_eq!(look(0, 1).colour, glam::Vec3::new(1.0, 0.0, 1.0));
-        assert!((look(0, 0).roughness - 0.5).abs() < 1e-6);
-        assert_eq!(look(1, 2).colour, glam::Vec3::new(0.25, 0.5, 1.0));
-        assert_eq!(look(1, 2).roughness, 1.0);
-        std::fs::write(at("maps/a.png"), "no picture").unwrap();
-        let error = Mesh::read(&at("a.obj")).unwrap_err().to_string();
-        assert!(
-            error.contains("a.png") && error.contains("cannot be used"),
-            "{error}"
-        );
-        for name in ["../../c.png", "b.png", "/etc/passwd"] {
-            std::fs::write(at("a.mtl"), format!("newmtl a\nmap_Kd {name}\n")).unwrap();
-            let error = Mesh::read(&at("a.obj")).unwrap_err().to_string();
-            assert!(
-                error.contains(name) && error.contains("cannot be read"),
-                "{error}"
-            );
-        }
-        // Of a material that no triangle has, it is not missed.
-        let spare = "newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\nnewmtl c\nmap_Kd b.png\n";
-        std::fs::write(at("a.mtl"), spare).unwrap();
-        assert!(Mesh::read(&at("a.obj")).unwrap().has_own_surface());
-        std::fs::remove_file(at("a.mtl")).unwrap();
-        assert!(!Mesh::read(&at("a.obj")).unwrap().has_own_surface());
-    }
-
-    #[test]
-    fn a_damaged_file_is_an_error_that_names_it_and_what_is_wrong() {
-        for text in [
-            "",
-            SQUARE,
-            "v 0 0 x\nf 1 1 1\n",
-            "v 0 0 0\nf 1 2 3\n",
-            "f 1 2 3\n",
-        ] {
-            let error = read(text).unwrap_err().to_string();
-            assert!(error.contains("a.obj"), "{error}");
-        }
-        let nan = read("v nan 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").unwrap_err();
-        assert!(nan.to_string().contains("finite"), "{nan}");
-    }
-}
+mod tests;

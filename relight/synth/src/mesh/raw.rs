@@ -7,7 +7,10 @@ use super::material::MeshMaterials;
 /// Texture coordinates of a triangle that has none.
 pub(crate) const NO_TEXTURE: [Vec2; 3] = [Vec2::NAN; 3];
 
-/// What a file or a generator gives: positions, triangles by index, and texture coordinates for
+/// Colours of a triangle that has none.
+const WHITE: [Vec3; 3] = [Vec3::ONE; 3];
+
+/// What a file or a generator gives: positions, triangles by index, and texture coordinates and colours for
 /// each corner and materials where there are any.
 #[derive(Debug, Default)]
 pub(crate) struct RawMesh {
@@ -15,5 +18,42 @@ pub(crate) struct RawMesh {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// For each triangle, [`NO_TEXTURE`] where it has none; empty of shapes that know none.
     pub(crate) texture: Vec<[Vec2; 3]>,
+    /// For each triangle up to the last that has some: linear colours by which its material's is multiplied.
+    pub(crate) colours: Vec<[Vec3; 3]>,
     pub(crate) materials: MeshMaterials,
+    /// What of the file is not used, in words.
+    pub(crate) left_out: Vec<String>,
+}
+
+/// A triangle of a file.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RawTriangle {
+    /// By index of the positions.
+    pub(crate) corners: [u32; 3],
+    pub(crate) texture: Option<[Vec2; 3]>,
+    pub(crate) colours: Option<[Vec3; 3]>,
+    pub(crate) material: Option<usize>,
+}
+
+impl RawMesh {
+    /// Adds a triangle.
+    pub(crate) fn push(&mut self, triangle: RawTriangle) {
+        if let Some(colours) = triangle.colours {
+            self.colours.resize(self.triangles.len(), WHITE);
+            self.colours.push(colours);
+        }
+        self.triangles.push(triangle.corners);
+        self.texture.push(triangle.texture.unwrap_or(NO_TEXTURE));
+        self.materials.push(triangle.material);
+    }
+
+    /// Whether the file says more of the surface than one colour for all, as programs write for an object that has none.
+    pub(crate) fn has_own_surface(&self) -> bool {
+        let mut colours = self.colours.iter().flatten();
+        let first = colours.next().copied().unwrap_or(Vec3::ONE);
+        let is_partly_white = self.colours.len() < self.triangles.len() && first != Vec3::ONE;
+        self.materials.tell_anything()
+            || (!self.colours.is_empty() && is_partly_white)
+            || colours.any(|&colour| colour != first)
+    }
 }

@@ -1,0 +1,258 @@
+//! glTF 2.0 files: JSON with its buffers beside it or inside, or one binary file. Positions, texture coordinates and colours
+//! of triangles are read, placed as the scene's nodes and the skeletons at rest say, and their materials with pictures.
+//!
+//! Read here and not by a library: the one that is maintained refuses valid files for what is not needed of them, and ends the
+//! program at some that are not.
+
+mod accessor;
+mod document;
+mod file;
+mod materials;
+mod nodes;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use glam::{Mat4, Vec2, Vec3};
+
+use self::document::{Mesh, Node, Primitive};
+use self::file::{File, not_read};
+use self::nodes::Placements;
+use super::raw::{RawMesh, RawTriangle};
+use super::{MOST_TRIANGLES, MeshFault};
+use crate::SynthError;
+
+/// Kinds of primitives.
+const TRIANGLES: u32 = 4;
+const TRIANGLE_STRIP: u32 = 5;
+const TRIANGLE_FAN: u32 = 6;
+/// A compression that libraries alone can take back.
+const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// All triangles of the default scene as one surface.
+pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
+    let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
+    parsed(path, &bytes).map_err(|reason| SynthError::Mesh {
+        path: path.to_owned(),
+        reason,
+    })
+}
+
+fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
+    let file = File::parsed(path, bytes)?;
+    let placements = Placements::of(&file.document)?;
+    let mut reader = Reader {
+        file: &file,
+        placements: &placements,
+        raw: RawMesh::default(),
+    };
+    for &(number, placed) in &placements.nodes {
+        if let Some(node) = file.document.nodes.get(number) {
+            reader.node(node, placed)?;
+        }
+    }
+    let mut raw = reader.raw;
+    raw.materials.all = materials::read(&file, &raw.materials.used(), &mut raw.left_out);
+    Ok(raw)
+}
+
+struct Reader<'a> {
+    file: &'a File<'a>,
+    placements: &'a Placements,
+    raw: RawMesh,
+}
+
+impl Reader<'_> {
+    fn node(&mut self, node: &Node, placed: Mat4) -> Result<(), String> {
+        let Some(number) = node.mesh else {
+            return Ok(());
+        };
+        let meshes = &self.file.document.meshes;
+        let mesh = meshes
+            .get(number)
+            .ok_or_else(|| format!("it names mesh {number} of {}", meshes.len()))?;
+        let joints = match node.skin {
+            Some(skin) => self.placements.joints(self.file, skin)?,
+            None => None,
+        };
+        for primitive in &mesh.primitives {
+            self.primitive(primitive, (node, mesh), placed, joints.as_deref())?;
+        }
+        Ok(())
+    }
+
+    fn primitive(
+        &mut self,
+        primitive: &Primitive,
+        (node, mesh): (&Node, &Mesh),
+        placed: Mat4,
+        joints: Option<&[Mat4]>,
+    ) -> Result<(), String> {
+        let mode = primitive.mode.unwrap_or(TRIANGLES);
+        if !matches!(mode, TRIANGLES | TRIANGLE_STRIP | TRIANGLE_FAN) {
+            return Ok(());
+        }
+        let accessor = primitive.attributes.get("POSITION");
+        let accessor = *accessor.ok_or("a part of it has no positions")?;
+        if primitive.extensions.contains_key(DRACO) && !self.file.has_items(accessor) {
+            return Err(not_read(DRACO));
+        }
+        let weights = [&node.weights, &mesh.weights];
+        let weights = weights.into_iter().find(|all| !all.is_empty());
+        let weights = weights.map_or(&[][..], Vec::as_slice);
+        let positions = self.morphed(accessor, primitive, weights)?;
+        let bound = match joints {
+            Some(joints) => self.bound(primitive, &positions, joints)?,
+            None => None,
+        };
+        let is_mirrored = bound.is_none() && placed.determinant() < 0.0;
+        let positions = bound.unwrap_or_else(|| {
+            let moved = positions.iter().map(|&p| placed.transform_point3(p));
+            moved.collect()
+        });
+        let count = positions.len();
+        let order = match primitive.indices {
+            Some(accessor) => self.file.indices(accessor)?,
+            None => (0..count as u32).collect(),
+        };
+        if let Some(&vertex) = order.iter().find(|&&vertex| vertex as usize >= count) {
+            return Err(format!("a triangle names vertex {vertex} of {count}"));
+        }
+        let first = self.raw.positions.len() as u32;
+        self.raw.positions.extend(positions);
+        let mut triangles = triangles(mode, &order);
+        if is_mirrored {
+            triangles
+                .iter_mut()
+                .for_each(|[_, b, c]| std::mem::swap(b, c));
+        }
+        self.push(primitive, first, &triangles)
+    }
+
+    /// The positions of a part with the displacements that it has from the start.
+    fn morphed(
+        &self,
+        accessor: usize,
+        primitive: &Primitive,
+        weights: &[f32],
+    ) -> Result<Vec<Vec3>, String> {
+        let positions = self.file.vectors(accessor)?;
+        let mut positions: Vec<Vec3> = positions.into_iter().map(Vec3::from).collect();
+        for (target, &weight) in primitive.targets.iter().zip(weights) {
+            let Some(&accessor) = target.get("POSITION").filter(|_| weight != 0.0) else {
+                continue;
+            };
+            let moves = self.file.vectors(accessor)?;
+            for (position, by) in positions.iter_mut().zip(moves) {
+                *position += weight * Vec3::from(by);
+            }
+        }
+        Ok(positions)
+    }
+
+    /// The positions of a part where the joints to which they are bound carry them; none of a part that is not bound.
+    fn bound(
+        &self,
+        primitive: &Primitive,
+        positions: &[Vec3],
+        joints: &[Mat4],
+    ) -> Result<Option<Vec<Vec3>>, String> {
+        let mut sums = vec![Mat4::ZERO; positions.len()];
+        for set in 0.. {
+            let named = |kind: &str| primitive.attributes.get(&format!("{kind}_{set}"));
+            let (Some(&numbers), Some(&weights)) = (named("JOINTS"), named("WEIGHTS")) else {
+                if set == 0 {
+                    return Ok(None);
+                }
+                break;
+            };
+            let (numbers, weights) = (self.file.joints(numbers)?, self.file.weights(weights)?);
+            for (sum, (numbers, weights)) in sums.iter_mut().zip(numbers.iter().zip(weights)) {
+                for (&joint, weight) in numbers.iter().zip(weights).filter(|(_, one)| *one != 0.0) {
+                    let joint = joints.get(joint as usize);
+                    *sum +=
+                        *joint.ok_or("a vertex is bound to a joint that is not there")? * weight;
+                }
+            }
+        }
+        let carried = positions.iter().zip(&sums).map(|(&position, sum)| {
+            // The weights' sum is 1 but for rounding; 0 where a vertex is not bound.
+            let carried = *sum * position.extend(1.0);
+            if carried.w > 0.0 {
+                carried.truncate() / carried.w
+            } else {
+                position
+            }
+        });
+        Ok(Some(carried.collect()))
+    }
+
+    /// Adds triangles of vertices from `first` on, with what the part says of their corners.
+    fn push(&mut self, part: &Primitive, first: u32, triangles: &[[u32; 3]]) -> Result<(), String> {
+        let count = self.raw.triangles.len() + triangles.len();
+        if count > MOST_TRIANGLES {
+            return Err(MeshFault::TooLarge(count).to_string());
+        }
+        let material = part
+            .material
+            .and_then(|number| self.file.document.materials.get(number));
+        let set = material.map_or(0, document::Material::coordinates);
+        let texture = match part.attributes.get(&format!("TEXCOORD_{set}")) {
+            Some(&accessor) => self.file.pairs(accessor)?,
+            None => Vec::new(),
+        };
+        let colours = match part.attributes.get("COLOR_0") {
+            Some(&accessor) => self.file.colours(accessor)?,
+            None => Vec::new(),
+        };
+        // In glTF, v runs downwards.
+        let place = |vertex: u32| {
+            let &[u, v] = texture.get(vertex as usize)?;
+            Some(Vec2::new(u, 1.0 - v))
+        };
+        let colour = |vertex: u32| {
+            let colour = Vec3::from(*colours.get(vertex as usize)?);
+            Some(colour.map(|level| level.max(0.0).min(1.0)))
+        };
+        for &corners in triangles {
+            self.raw.push(RawTriangle {
+                corners: corners.map(|vertex| vertex.saturating_add(first)),
+                texture: all(corners.map(place)),
+                colours: all(corners.map(colour)),
+                material: part.material,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// All three, or none.
+fn all<T>(of: [Option<T>; 3]) -> Option<[T; 3]> {
+    match of {
+        [Some(a), Some(b), Some(c)] => Some([a, b, c]),
+        _ => None,
+    }
+}
+
+fn triangles(mode: u32, order: &[u32]) -> Vec<[u32; 3]> {
+    match mode {
+        TRIANGLE_STRIP => (0..)
+            .zip(order.windows(3))
+            .map(|(k, w)| {
+                if k % 2 == 0 {
+                    [w[0], w[1], w[2]]
+                } else {
+                    [w[1], w[0], w[2]]
+                }
+            })
+            .collect(),
+        TRIANGLE_FAN => order
+            .get(1..)
+            .unwrap_or_default()
+            .windows(2)
+            .map(|w| [order[0], w[0], w[1]])
+            .collect(),
+        _ => order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+    }
+}
