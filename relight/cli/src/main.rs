@@ -3,6 +3,7 @@
 mod command_line;
 mod commands;
 mod folder;
+mod library;
 mod light;
 mod photos;
 mod shipped;

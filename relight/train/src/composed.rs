@@ -11,7 +11,7 @@ use super::sample::TruthBatch;
 use super::settings::{DataSettings, RunSettings};
 use super::shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
 use relight_reader::Rank;
-use relight_synth::{Folders, Library, Recipe, stream};
+use relight_synth::{Folders, LeftOut, Library, Recipe, stream};
 
 /// What samples are composed of, with the files that are named read.
 ///
@@ -51,6 +51,11 @@ pub(super) struct ComposedBatches {
 }
 
 impl ComposedBatches {
+    /// What of the folders is not used.
+    pub(super) fn left_out(&self) -> &[LeftOut] {
+        &self.composition.library.left_out
+    }
+
     /// The batches of a composition, in 32 or 64 bits.
     pub(super) fn new(
         composition: Arc<Composition>,

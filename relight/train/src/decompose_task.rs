@@ -20,7 +20,7 @@ use super::settings::{DecomposeSettings, PrecisionChoice, first_difference};
 use super::sheet::validation_sheet;
 use super::task::{StepLosses, TrainingTask, Validation};
 use relight_nets::{LIGHT_PARAMETERS, PAINT_PARAMETERS, Weights, decomposer_with_heads};
-use relight_synth::AlbedoKind;
+use relight_synth::{AlbedoKind, LeftOut};
 
 /// Samples that are shown.
 const SHOWN: usize = 10;
@@ -121,6 +121,10 @@ impl TrainingTask for DecomposeTask {
 
     fn differing_setting(&self, other: &str) -> Option<String> {
         first_difference(&self.settings, other)
+    }
+
+    fn left_out(&self) -> &[LeftOut] {
+        self.composed.left_out()
     }
 
     fn learners(&mut self) -> Vec<&mut Learner> {

@@ -22,7 +22,7 @@ use super::task::{StepLosses, TrainingTask, Validation};
 use super::turn_reader::{TurnGroup, TurnReader};
 use relight_nets::Weights;
 use relight_reader::Rank;
-use relight_synth::stream;
+use relight_synth::{LeftOut, stream};
 
 /// Training of one of the paper's networks.
 #[derive(Debug)]
@@ -199,6 +199,10 @@ impl TrainingTask for PaperTask {
 
     fn differing_setting(&self, other: &str) -> Option<String> {
         first_difference(&self.settings, other)
+    }
+
+    fn left_out(&self) -> &[LeftOut] {
+        self.composed.left_out()
     }
 
     fn learners(&mut self) -> Vec<&mut Learner> {

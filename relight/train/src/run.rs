@@ -182,6 +182,12 @@ impl<'a> Run<'a> {
         stop: &AtomicBool,
         observer: &mut dyn TrainObserver,
     ) -> Result<BTreeMap<String, f64>, TrainError> {
+        if self.journal.is_some() {
+            for left_out in self.task.left_out() {
+                self.damaged = true;
+                observer.damaged(self.step, &left_out.to_string());
+            }
+        }
         let between = Duration::from_secs_f64(60.0 * self.settings.checkpoint_minutes);
         let mut saved = Instant::now();
         // Where training begins, so that it shows what it has changed.

@@ -8,6 +8,7 @@ use super::error::TrainError;
 use super::learner::Learner;
 use super::process_group::ProcessGroup;
 use super::terms::LossTerms;
+use relight_synth::LeftOut;
 
 /// What a run trains.
 pub trait TrainingTask {
@@ -33,6 +34,11 @@ pub trait TrainingTask {
     /// # Errors
     /// [`TrainError::Indivisible`] where the settings leave no equal parts.
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
+
+    /// What of a user's own files it does not use.
+    fn left_out(&self) -> &[LeftOut] {
+        &[]
+    }
 
     /// The networks that learn.
     fn learners(&mut self) -> Vec<&mut Learner>;

@@ -10,7 +10,9 @@ use super::error::TrainError;
 use super::settings::TransferSettings;
 use relight_core::light::Panorama;
 use relight_nets::TURN_INPUTS;
-use relight_synth::{DrawnTurn, Folders, Library, Rooms, TransferCache, TransferRecipe, stream};
+use relight_synth::{
+    DrawnTurn, Folders, LeftOut, Library, Rooms, TransferCache, TransferRecipe, stream,
+};
 use relight_turn::{NetworkTurn, PhaseHypothesis, network_input};
 
 /// Views that are drawn for training, for validation.
@@ -65,6 +67,11 @@ impl TurnViews {
             ..Folders::default()
         })?;
         Self::new(settings, folder, library, VALIDATION)
+    }
+
+    /// What of the folders is not used.
+    pub(super) fn left_out(&self) -> &[LeftOut] {
+        &self.library.left_out
     }
 
     fn new(

@@ -16,7 +16,7 @@ use super::terms::LossTerms;
 use super::turn_samples::{TurnBatch, TurnViews};
 use relight_nets::{ALBEDO_PARAMETERS, LOG_MEANS, Weights, turn_network};
 use relight_reader::Rank;
-use relight_synth::{DrawnTurn, stream};
+use relight_synth::{DrawnTurn, LeftOut, stream};
 
 /// What the expected error counts beside the normals.
 const EXPECTED_ERROR: f64 = 0.05;
@@ -173,6 +173,10 @@ impl TrainingTask for TurnNetworkTask {
 
     fn inputs(&self) -> Result<String, TrainError> {
         Ok(format!("turns of recipe {}\n", DrawnTurn::RECIPE))
+    }
+
+    fn left_out(&self) -> &[LeftOut] {
+        self.training.left_out()
     }
 
     fn learners(&mut self) -> Vec<&mut Learner> {

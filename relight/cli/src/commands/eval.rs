@@ -18,7 +18,7 @@ use relight_eval::{
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
 use relight_reader::{JudgedImages, TruthLayout, TruthSet};
-use relight_synth::{Folders, Library};
+use relight_synth::Folders;
 use relight_turn::TurnNetwork;
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
@@ -27,6 +27,7 @@ use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
+use crate::library::read_library;
 use crate::shipped;
 use crate::values::{TransferName, YName};
 
@@ -329,17 +330,19 @@ impl SetArguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let table = match &arguments.protocol {
-        Protocol::Mit { set, input } => mit(set, *input, console),
-        Protocol::Normals { set } => normals(set, console),
-        Protocol::Light { set, diffuse } => light(set, *diffuse, console),
-        Protocol::Highlight { set } => highlight(set, console),
+    let whole = |table: ScoreTable| (table, Outcome::Whole);
+    let (table, outcome) = match &arguments.protocol {
+        Protocol::Mit { set, input } => mit(set, *input, console).map(whole),
+        Protocol::Normals { set } => normals(set, console).map(whole),
+        Protocol::Light { set, diffuse } => light(set, *diffuse, console).map(whole),
+        Protocol::Highlight { set } => highlight(set, console).map(whole),
         Protocol::Relighting(arguments) => relighting(arguments, console),
-        Protocol::Whdr(common) => ordinal(common, console),
+        Protocol::Whdr(common) => ordinal(common, console).map(whole),
         Protocol::Insertion(arguments) => insertion(arguments, console),
         Protocol::Turn(arguments) => return turns(arguments, console),
     }?;
-    report(&table, arguments.output(), console)
+    report(&table, arguments.output(), console)?;
+    Ok(outcome)
 }
 
 type Evaluated = Result<ScoreTable, Box<dyn Error>>;
@@ -392,10 +395,15 @@ fn highlight(arguments: &SetArguments, console: Console) -> Evaluated {
     })
 }
 
-fn relighting(arguments: &RelightingArguments, console: Console) -> Evaluated {
-    if arguments.make {
-        make(arguments, console)?;
-    }
+fn relighting(
+    arguments: &RelightingArguments,
+    console: Console,
+) -> Result<(ScoreTable, Outcome), Box<dyn Error>> {
+    let outcome = if arguments.make {
+        make(arguments, console)?
+    } else {
+        Outcome::Whole
+    };
     let common = &arguments.common;
     let set = RelightingSet::open(&common.data)?;
     let network = network(arguments.weights.as_deref())?;
@@ -410,12 +418,13 @@ fn relighting(arguments: &RelightingArguments, console: Console) -> Evaluated {
         RelightMethod::Predictions(folder, SpecularForm::Lobe)
     });
     let steps = set.objects() * methods.len();
-    with_progress(steps, "evaluating", console, |progress| {
+    let table = with_progress(steps, "evaluating", console, |progress| {
         evaluate_relighting(&set, &common.split("all of"), &methods, progress)
-    })
+    })?;
+    Ok((table, outcome))
 }
 
-fn make(arguments: &RelightingArguments, console: Console) -> Result<(), Box<dyn Error>> {
+fn make(arguments: &RelightingArguments, console: Console) -> CommandResult {
     let recipe = RelightingRecipe {
         objects: arguments.objects.into(),
         lights: arguments.lights.into(),
@@ -423,28 +432,34 @@ fn make(arguments: &RelightingArguments, console: Console) -> Result<(), Box<dyn
         seed: arguments.seed,
         shadows: !arguments.no_shadows,
     };
-    let library = Library::read(&Folders {
+    let folders = Folders {
         meshes: arguments.meshes.clone(),
         textures: None,
         panoramas: arguments.panoramas.clone(),
-    })?;
+    };
+    let (library, outcome) = read_library(&folders, console)?;
     with_progress(recipe.objects, "making objects", console, |progress| {
         make_relighting(&recipe, &library, &arguments.common.data, progress)
-    })
+    })?;
+    Ok(outcome)
 }
 
-fn insertion(arguments: &InsertionArguments, console: Console) -> Evaluated {
+fn insertion(
+    arguments: &InsertionArguments,
+    console: Console,
+) -> Result<(ScoreTable, Outcome), Box<dyn Error>> {
     let recipe = InsertionRecipe {
         objects: arguments.objects,
         size: arguments.size,
         seed: arguments.seed,
         black_paint: arguments.black_paint,
     };
-    let library = Library::read(&Folders {
+    let folders = Folders {
         meshes: arguments.meshes.clone(),
         textures: None,
         panoramas: arguments.panoramas.clone(),
-    })?;
+    };
+    let (library, outcome) = read_library(&folders, console)?;
     let network = network(arguments.weights.as_deref())?;
     if let Some(folder) = &arguments.sheets {
         make_folder(folder)?;
@@ -460,12 +475,11 @@ fn insertion(arguments: &InsertionArguments, console: Console) -> Evaluated {
             )?)
         }
     };
-    with_progress(
-        arguments.objects as usize,
-        "inserting",
-        console,
-        |progress| evaluate_insertion(&recipe, &library, &network, &mut show, progress),
-    )
+    let objects = arguments.objects as usize;
+    let table = with_progress(objects, "inserting", console, |progress| {
+        evaluate_insertion(&recipe, &library, &network, &mut show, progress)
+    })?;
+    Ok((table, outcome))
 }
 
 fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
@@ -556,9 +570,13 @@ fn write_json(table: &impl Serialize, output: Option<&Path>) -> Result<(), Box<d
     Ok(())
 }
 
-fn report(table: &ScoreTable, output: Option<&Path>, console: Console) -> CommandResult {
+fn report(
+    table: &ScoreTable,
+    output: Option<&Path>,
+    console: Console,
+) -> Result<(), Box<dyn Error>> {
     write_json(table, output)?;
     let event = json!({ "event": "table", "table": table });
     console.say(table.to_string().trim_end(), &event);
-    Ok(Outcome::Whole)
+    Ok(())
 }

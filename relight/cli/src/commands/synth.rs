@@ -15,6 +15,7 @@ use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
+use crate::library::read_library;
 
 /// Objects on one sheet, at most.
 const LARGEST_SHEET: u64 = 500;
@@ -67,7 +68,7 @@ pub(crate) struct Arguments {
     /// Materials and lightings of each view.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     lightings: u32,
-    /// Objects of one's own: .obj, .gltf, .glb.
+    /// Objects of one's own, also in folders within it: .obj, .gltf, .glb.
     #[arg(long, value_name = "FOLDER")]
     meshes: Option<PathBuf>,
     /// Pictures to lay onto objects: .png, .jpg.
@@ -165,15 +166,16 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     if arguments.write_panoramas {
         return panoramas(&arguments.output, console);
     }
-    let library = Library::read(&Folders {
+    let folders = Folders {
         meshes: arguments.meshes.clone(),
         textures: arguments.textures.clone(),
         panoramas: arguments.panoramas.clone(),
-    })?;
+    };
+    let (library, outcome) = read_library(&folders, console)?;
     if matches!(arguments.albedo, Some(AlbedoName::Own)) {
         tell_of_plain_meshes(&library, console)?;
     }
-    let result = pool.install(|| {
+    let made = pool.install(|| {
         if arguments.preview {
             preview(arguments, &library, console)
         } else if arguments.turn {
@@ -182,10 +184,8 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             samples(arguments, &library, console)
         }
     });
-    match result {
-        Ok(()) => Ok(Outcome::Whole),
-        Err(error) => Err(error),
-    }
+    made?;
+    Ok(outcome)
 }
 
 /// Warns of meshes whose files do not say how they look.
