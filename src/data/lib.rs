@@ -14,6 +14,8 @@
 //! | [`srgb`] | sRGB values to light and back |
 //! | [`turn_light`] | how much light changes over a turn |
 //! | [`naming`] | the names that a session may have |
+//! | [`file_names`] | the names of files: videos, hidden ones, and those that are one file where case is ignored |
+//! | [`mask`] | which pixels a picture of a mask marks |
 //! | [`durable`] | files that appear whole or not at all |
 //! | [`disk`] | a full disk, and what is said of it |
 //! | [`causes`] | errors as text, with their causes |
@@ -156,8 +158,10 @@ pub mod counts;
 pub mod disk;
 #[cfg(feature = "files")]
 pub mod durable;
+pub mod file_names;
 pub mod geometry;
 pub mod image_stats;
+pub mod mask;
 pub mod naming;
 #[cfg(feature = "files")]
 pub mod report;

@@ -1,12 +1,13 @@
 //! Several recordings into one data set: one after the other, each noted when it is done with.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use relit_data::session::{self, recordings};
+use relit_data::file_names::folded;
+use relit_data::session::{self, recording_name, recordings};
 use relit_data::shard::OutputFolder;
 
 use super::catalog::Catalog;
@@ -38,13 +39,17 @@ pub(super) fn extract_recordings(
         folder,
         options,
         pool,
-        names: HashSet::new(),
+        names: HashMap::new(),
         observer,
         storage,
     };
     for (position, recording) in found.iter().enumerate() {
         if options.task.is_none_or(|task| task.takes(position)) {
             run.extract(position, recording, &mut tally)?;
+        } else if recording.exists() {
+            // Another task may be at it right now: of two names that are alike, the first is extracted, whoever has it.
+            let name = recording_name(recording);
+            run.names.entry(folded(&name)).or_insert(name);
         }
     }
     Ok(tally)
@@ -72,8 +77,8 @@ struct Run<'a> {
     catalog: Catalog,
     options: &'a ExtractOptions,
     pool: ThreadPool,
-    /// Names of the recordings so far.
-    names: HashSet<String>,
+    /// Names of the recordings so far, by what they are where case is ignored.
+    names: HashMap<String, String>,
     observer: &'a dyn Observer,
     storage: &'a dyn StorageBackend,
 }
@@ -106,10 +111,24 @@ impl Run<'_> {
         } = self;
         let local = self.storage.fetch(path)?;
         let job = Job::open(&local, options)?;
-        if !self.names.insert(job.id().to_owned()) {
-            return Err(ExtractError::SameName(job.id().to_owned()));
+        let id = job.id().to_owned();
+        if let Some(other) = self.names.get(&folded(&id)) {
+            return Err(match *other == id {
+                true => ExtractError::SameName(id),
+                false => ExtractError::NameAlike {
+                    id,
+                    other: other.clone(),
+                },
+            });
         }
+        self.names.insert(folded(&id), id);
         let dataset = self.catalog.dataset();
+        if let Some(other) = job.alike(dataset) {
+            return Err(ExtractError::NameAlike {
+                id: job.id().to_owned(),
+                other: other.to_owned(),
+            });
+        }
         if options.resume
             && let Some(entry) = job.existing_entry(dataset, options)
             && self.storage.holds(dataset, folder.path(), job.id())

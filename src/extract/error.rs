@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use relit_data::geometry::Rect;
+use relit_data::mask::{MaskFault, size_hint};
 use relit_data::{report, session, shard};
 use relit_video as video;
 
@@ -43,6 +44,16 @@ pub enum ExtractError {
         "another recording of this call is also named {0}: extract them into different folders, or rename one"
     )]
     SameName(String),
+    /// Two recordings have names that are one on some file systems.
+    #[error(
+        "the name {id} is that of {other} where a file system ignores case, and their files would replace each other: rename one, or extract it into another folder"
+    )]
+    NameAlike {
+        /// The recording's id.
+        id: String,
+        /// That of the one before it, of this call or in the data set.
+        other: String,
+    },
     /// There is no mask.
     #[error("{0} has no mask: make one with relit-mask, or name one with --mask")]
     NoMask(PathBuf),
@@ -75,8 +86,9 @@ pub enum ExtractError {
     MaskDoubts(#[from] relit_grabcut::MaskError),
     /// Mask and frames differ in size.
     #[error(
-        "the mask {path} is {} x {} pixels and the frames are {} x {}: make the mask on a frame of this video",
-        mask.0, mask.1, frame.0, frame.1
+        "the mask {path} is {} x {} pixels and the frames are {} x {}: {}",
+        mask.0, mask.1, frame.0, frame.1,
+        size_hint(*mask, *frame).unwrap_or("make the mask on a frame of this video")
     )]
     MaskSize {
         /// The mask's path.
@@ -86,11 +98,14 @@ pub enum ExtractError {
         /// The frames' width and height.
         frame: (u32, u32),
     },
-    /// The mask marks no pixel.
-    #[error(
-        "the mask {0} is empty: none of its pixels is opaque and 128 or brighter; make it again with relit-mask, or paint the object white"
-    )]
-    EmptyMask(PathBuf),
+    /// The mask marks nothing, or is none.
+    #[error("the mask {path} {fault}")]
+    NotAMask {
+        /// The mask's path.
+        path: PathBuf,
+        /// What it is.
+        fault: MaskFault,
+    },
     /// The scaled mask marks no pixel.
     #[error(
         "the object is too small: at {side} pixels it covers half of no pixel of the output; give a larger --size or a smaller --margin"

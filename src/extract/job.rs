@@ -68,7 +68,7 @@ impl Job {
         notices.extend(contradictions(&recording, &video));
         notices.extend(video.damage().iter().map(|d| Notice::Loss(d.to_string())));
         notices.extend(video.notes().iter().cloned().map(Notice::Warning));
-        notices.extend(mask.warning().map(Notice::Warning));
+        notices.extend(mask.warnings().map(Notice::Warning));
         Ok(Self {
             recording,
             video,
@@ -116,6 +116,12 @@ impl Job {
         dataset
             .session(self.id())
             .is_some_and(|entry| entry.input.blake3 != self.input.blake3)
+    }
+
+    /// The session of the data set that has another name, and yet the same files where a file system ignores case.
+    pub(super) fn alike<'a>(&self, dataset: &'a Dataset) -> Option<&'a str> {
+        let entry = dataset.session_alike(self.id())?;
+        (entry.id != self.id()).then_some(&entry.id)
     }
 
     /// Extracts the recording into `folder`.

@@ -1,17 +1,18 @@
 //! The mask of the object, read from a file.
 
+use std::io::Cursor;
 use std::path::Path;
 
-use image::{GrayImage, Luma};
+use image::metadata::Orientation;
+use image::{DynamicImage, GrayImage, ImageDecoder, ImageReader, Limits};
 
 use relit_data::geometry::Rect;
+use relit_data::mask::{MaskPicture, ObjectPixels};
 use relit_data::session::{MASK_FILE, Recording};
 use relit_data::shard::Digest;
 
 use super::{ExtractError, bounding_box};
 
-/// Pixels of the mask file with at least this level and this alpha belong to the object.
-const OBJECT: u8 = 128;
 /// A mask that covers more than this fraction of the frame is suspicious.
 const LARGE: f64 = 0.9;
 
@@ -26,11 +27,12 @@ pub(super) struct ObjectMask {
     pub(super) blake3: Digest,
     /// The frame on which it was made, if the record beside it says so.
     pub(super) frame: Option<u64>,
+    /// What its file was taken for, where that is not plain.
+    note: Option<String>,
 }
 
 impl ObjectMask {
     /// Reads the mask `named`, or else the one in the recording's folder, for frames of this size.
-    /// Transparent pixels do not belong to the object, whatever their colour.
     pub(super) fn open(
         recording: &Recording,
         named: Option<&Path>,
@@ -47,13 +49,12 @@ impl ObjectMask {
             path: path.clone(),
             source,
         })?;
-        let image = image::load_from_memory(&bytes)
-            .map_err(|source| ExtractError::Mask {
-                path: path.clone(),
-                source,
-            })?
-            .into_luma_alpha8();
-        let size = image.dimensions();
+        let picture = decode(&bytes).map_err(|source| ExtractError::Mask {
+            path: path.clone(),
+            source,
+        })?;
+        let picture = MaskPicture::of_image(&picture);
+        let size = picture.size();
         if size != frame {
             return Err(ExtractError::MaskSize {
                 path,
@@ -61,27 +62,32 @@ impl ObjectMask {
                 frame,
             });
         }
-        let mask_image = GrayImage::from_fn(size.0, size.1, |x, y| {
-            let [level, alpha] = image.get_pixel(x, y).0;
-            Luma([if level >= OBJECT && alpha >= OBJECT {
-                255
-            } else {
-                0
-            }])
-        });
+        let no_object = |fault| ExtractError::NotAMask {
+            path: path.clone(),
+            fault,
+        };
+        let ObjectPixels { inside, basis } = picture.object().map_err(no_object)?;
+        let levels = inside.iter().map(|&inside| if inside { 255 } else { 0 });
+        let image = GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default();
         let blake3 = Digest::of(&bytes);
-        let frame = frame_of(&path, &blake3);
-        let bounding_box = bounding_box(&mask_image).ok_or(ExtractError::EmptyMask(path))?;
+        let note = basis
+            .note()
+            .map(|note| format!("the mask {} {note}", path.display()));
         Ok(Self {
-            image: mask_image,
-            bounding_box,
+            bounding_box: bounding_box(&image).unwrap_or_else(|| Rect::new(0, 0, size.0, size.1)),
+            frame: frame_of(&path, &blake3),
+            image,
             blake3,
-            frame,
+            note,
         })
     }
 
-    /// A warning, if the mask is suspicious.
-    pub(super) fn warning(&self) -> Option<String> {
+    /// Warnings, if the mask is suspicious, or one of a kind that may be meant in another way.
+    pub(super) fn warnings(&self) -> impl Iterator<Item = String> {
+        self.note.clone().into_iter().chain(self.is_large())
+    }
+
+    fn is_large(&self) -> Option<String> {
         let levels = self.image.as_raw();
         let covered = levels.iter().filter(|&&level| level != 0).count();
         let fraction = covered as f64 / levels.len() as f64;
@@ -92,6 +98,19 @@ impl ObjectMask {
             )
         })
     }
+}
+
+/// The picture in a mask's file, as it is displayed.
+fn decode(bytes: &[u8]) -> image::ImageResult<DynamicImage> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+    let mut decoder = reader.into_decoder()?;
+    // A file whose orientation cannot be read is shown as it is stored.
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut limits = Limits::default();
+    limits.reserve(decoder.total_bytes())?;
+    let mut image = DynamicImage::from_decoder(decoder)?;
+    image.apply_orientation(orientation);
+    Ok(image)
 }
 
 /// The frame on which a mask was made, by the record beside it (`mask.json` of `mask.png`). A record that is

@@ -67,7 +67,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
+use ffmpeg_next::Dictionary;
 use ffmpeg_next::format::context::Input;
+use ffmpeg_next::format::input_with_dictionary;
 use relit_data::disk::DISK_FULL;
 
 pub use format::{BayerPattern, PixelFormat, StreamFormat};
@@ -237,7 +239,8 @@ pub enum DecodeFault {
     PixelFormat(String),
 }
 
-/// Opens a file, and only a file: FFmpeg takes a name with a colon for a URL.
+/// Opens a file, and only this file: FFmpeg takes a name with a colon for a URL, and that of a picture with a per cent sign
+/// for those of many.
 fn open_input(path: &Path) -> Result<Input, VideoError> {
     initialise();
     let name = path.to_str().filter(|name| !name.contains('\0'));
@@ -246,7 +249,8 @@ fn open_input(path: &Path) -> Result<Input, VideoError> {
         path: path.to_owned(),
         why,
     };
-    ffmpeg_next::format::input(&format!("file:{name}")).map_err(failed)
+    let literally = Dictionary::from_iter([("pattern_type", "none")]);
+    input_with_dictionary(&format!("file:{name}"), literally).map_err(failed)
 }
 
 /// FFmpeg's one-time set-up. Without it FFmpeg prints messages to standard error.

@@ -11,6 +11,7 @@ mod extract;
 mod failure;
 mod forward;
 mod listen;
+mod listen_address;
 mod page;
 mod token;
 
@@ -20,5 +21,6 @@ pub use extract::{BodyLimit, JsonBody, QueryParams};
 pub use failure::{Failure, Problem};
 pub use forward::forward;
 pub use listen::{ConnectionLimits, GRACE, Shutdown, run};
+pub use listen_address::{ListenAddress, ListenAddressFault};
 pub use page::{Entry, Index, PageAsset, SCRIPT, STYLE, asset, index};
 pub use token::{InvalidToken, Token, TokenFileError};

@@ -10,6 +10,7 @@ mod degenerate;
 mod editing;
 mod editor;
 mod engine;
+mod names;
 mod photographs;
 mod program;
 mod scene;

@@ -7,7 +7,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use relit_rig::camera::hold::ManualValues;
 use relit_rig::camera::{CameraAddress, Fourcc};
 use relit_rig::capture::{ModePreference, Settings};
-use relit_rig::serve::Token;
+use relit_rig::serve::{ListenAddress, Token};
 use relit_rig::turntable;
 
 use crate::turntable_arguments::{
@@ -123,9 +123,9 @@ struct RecordArguments {
 
 #[derive(Args)]
 struct ServeArguments {
-    /// Address and port to listen on.
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8420")]
-    listen: SocketAddr,
+    /// Address and port to listen on; a port alone is this machine's own, which no other reaches.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8420")]
+    listen: ListenAddress,
     /// What a client has to know, 16 to 128 letters, digits, '-' and '_' [default: random where other
     /// machines can reach the address]. Other accounts of this machine can see it: prefer --token-file.
     #[arg(long, value_name = "TOKEN", conflicts_with = "token_file")]
@@ -212,10 +212,10 @@ pub(crate) fn parse() -> Arguments {
         })),
         Verb::Serve(line) => Command::Serve(Box::new(Serve {
             settings: line.rig.into(),
-            address: line.listen,
+            address: line.listen.socket(),
             token: line.token,
             token_file: line.token_file,
-            names: line.names,
+            names: line.listen.names(&line.names),
             datasets: line.datasets,
         })),
         Verb::Turntable(line) => Command::Turntable(line),

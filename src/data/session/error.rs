@@ -80,7 +80,7 @@ pub enum SessionError {
     Ended(PathBuf),
     /// The name is not a valid session name.
     #[error(
-        "{0:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most 120 bytes, not starting with '.'"
+        "{0:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most 120 bytes, neither starting nor ending with '.', and no device's name of Windows such as con"
     )]
     BadName(String),
     /// An entry that does not continue the index.

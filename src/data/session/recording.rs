@@ -8,9 +8,10 @@ use super::{
     FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, SessionError, Status,
     is_session_name, object_of,
 };
+use crate::file_names::{composed, is_hidden, is_video};
 
-/// File extensions that count as videos in a folder without manifest.
-const VIDEO_ENDINGS: [&str; 7] = ["mkv", "mp4", "mov", "avi", "webm", "m4v", "nut"];
+/// The longest name of a recording that is made from a file name, bytes.
+const LONGEST_ID: usize = 120;
 
 /// Something about a recording that its user should know.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -178,7 +179,7 @@ pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
     for entry in fs::read_dir(path).map_err(SessionError::io(path, "listed"))? {
         let folder = entry.map_err(SessionError::io(path, "listed"))?.path();
         // One that cannot be listed may hold a session: opening it says why not, and the others go on.
-        if folder.is_dir() && is_session_folder(&folder).unwrap_or(true) {
+        if folder.is_dir() && !is_hidden(&folder) && is_session_folder(&folder).unwrap_or(true) {
             inner.push(folder);
         }
     }
@@ -204,8 +205,7 @@ fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
     let mut videos = Vec::new();
     for entry in fs::read_dir(folder).map_err(SessionError::io(folder, "listed"))? {
         let path = entry.map_err(SessionError::io(folder, "listed"))?.path();
-        let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default();
-        if VIDEO_ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) && path.is_file() {
+        if is_video(&path) && path.is_file() {
             videos.push(path);
         }
     }
@@ -213,9 +213,25 @@ fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
     Ok(videos)
 }
 
+/// The name that the recording at a path has, as far as it can be seen without reading more than the manifest.
+#[must_use]
+pub fn recording_name(path: &Path) -> String {
+    if !path.is_dir() {
+        return name_from(path.file_stem());
+    }
+    let manifest = fs::read(path.join(MANIFEST_FILE)).ok();
+    match manifest.and_then(|bytes| Manifest::from_json(&bytes).ok()) {
+        Some(manifest) => manifest.id,
+        None => {
+            let real = path.canonicalize();
+            name_from(real.as_deref().unwrap_or(path).file_name())
+        }
+    }
+}
+
 /// A session's name made from a file name: invalid characters become '_'.
 fn name_from(name: Option<&OsStr>) -> String {
-    let name = name.unwrap_or_default().to_string_lossy();
+    let name = composed(&name.unwrap_or_default().to_string_lossy());
     let mut id: String = name
         .chars()
         .map(|c| {
@@ -226,14 +242,20 @@ fn name_from(name: Option<&OsStr>) -> String {
             }
         })
         .collect();
-    while id.len() > 120 {
+    while id.len() > LONGEST_ID {
         id.pop();
     }
+    let kept = id.trim_end_matches('.').len();
+    id.replace_range(kept.., &"_".repeat(id.len() - kept));
     if is_session_name(&id) {
-        id
-    } else {
-        format!("_{}", id.trim_start_matches('.'))
+        return id;
     }
+    // It is empty, hidden, or the name of a device.
+    let mut id = format!("_{}", id.trim_start_matches('.'));
+    while id.len() > LONGEST_ID {
+        id.pop();
+    }
+    id
 }
 
 fn read_index(
@@ -288,6 +310,19 @@ mod tests {
         assert_eq!(name("20261120T093015Z-mug"), "20261120T093015Z-mug");
         assert_eq!(name(".hidden"), "_hidden");
         assert_eq!(name(""), "_");
+        assert_eq!(name("mug.."), "mug__");
+        assert_eq!(name("CON"), "_CON");
+        assert_eq!(name("aux.2"), "_aux.2");
+        assert_eq!(name("cafe\u{301}"), "caf\u{e9}");
+        assert_eq!(name("cup%d:1?*[x]"), "cup_d_1___x_");
+        assert_eq!(name("-x"), "-x");
+        for long in [
+            "x".repeat(200),
+            format!("con.{}", "x".repeat(200)),
+            ".".repeat(200),
+        ] {
+            assert!(is_session_name(&name(&long)), "{long}");
+        }
         assert!(is_session_name(&name(&"ä".repeat(200))));
     }
 }

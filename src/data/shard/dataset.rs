@@ -11,6 +11,7 @@ use super::file::FileEntry;
 use super::quality::{MaskMisfit, SessionQuality};
 use super::settings::ExtractionSettings;
 use super::{ShardError, names, output};
+use crate::file_names::folded;
 use crate::geometry::Rect;
 
 /// The schema that this version writes and reads.
@@ -267,6 +268,16 @@ impl Dataset {
     #[must_use]
     pub fn session(&self, id: &str) -> Option<&SessionEntry> {
         self.sessions.iter().find(|session| session.id == id)
+    }
+
+    /// The entry of a session whose files a session of this name would have for its own on a file system that ignores
+    /// case: it has this name, or one that is like it.
+    #[must_use]
+    pub fn session_alike(&self, id: &str) -> Option<&SessionEntry> {
+        let wanted = folded(id);
+        let alike = |session: &&SessionEntry| folded(&session.id) == wanted;
+        self.session(id)
+            .or_else(|| self.sessions.iter().find(alike))
     }
 
     /// The shards of a session.

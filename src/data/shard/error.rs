@@ -72,7 +72,7 @@ pub enum ShardError {
     },
     /// The id is not a valid session name.
     #[error(
-        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most 120 bytes, not starting with '.'"
+        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most 120 bytes, neither starting nor ending with '.', and no device's name of Windows such as con"
     )]
     SessionName {
         /// The name.

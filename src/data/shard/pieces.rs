@@ -236,8 +236,14 @@ fn join(pieces: &[TaskPiece], problems: &mut Vec<String>) -> Option<Merged> {
             }
             Some(TaskOutcome::LeftOut { why }) => left_out.push((name.clone(), why.clone())),
             Some(TaskOutcome::Extracted { session }) => match piece.dataset.session(session) {
-                _ if dataset.session(session).is_some() => {
-                    problems.push(format!("session {session} is there twice"));
+                _ if dataset.session_alike(session).is_some() => {
+                    let other = dataset.session_alike(session).map_or("", |other| &other.id);
+                    problems.push(match other == session {
+                        true => format!("session {session} is there twice"),
+                        false => format!(
+                            "the sessions {other} and {session} are one where a file system ignores case: rename one and extract it again"
+                        ),
+                    });
                 }
                 Some(entry) => dataset.replace(
                     entry.clone(),

@@ -9,6 +9,7 @@ mod verdict;
 use std::path::{Path, PathBuf};
 
 use image::GrayImage;
+use relit_data::mask::{MaskPicture, size_hint};
 use relit_data::session::{MASK_FILE, Recording};
 use relit_grabcut::{Effort, MaskCheck, Registration, TURN_FRAMES, TurnFrames, TurnStatistics};
 use relit_video::Video;
@@ -57,12 +58,6 @@ fn check_recording(
     let (image, png) = read_mask(&files.mask)?;
     let video = Video::open(&recording.video)?;
     check_size(&files.mask, &image, &video)?;
-    if image.pixels().all(|pixel| pixel.0[0] < 128) {
-        return Err(MaskingError::Check {
-            path: files.mask.clone(),
-            why: "it is empty: no pixel is white".to_owned(),
-        });
-    }
     let source = source_frame(&files, &video)?;
     let sampled = video.spread(TURN_FRAMES);
     let statistics = statistics(&video, image.dimensions(), &sampled)?;
@@ -89,14 +84,25 @@ fn check_recording(
     Ok((report, files.page))
 }
 
-/// The mask, and its file.
+/// The mask, 0 or 255, and its file.
 fn read_mask(path: &Path) -> Result<(GrayImage, Vec<u8>), MaskingError> {
     let bytes = std::fs::read(path).map_err(MaskingError::io(path, "read"))?;
-    let image = image::load_from_memory(&bytes).map_err(|error| MaskingError::Check {
+    let check = |why: String| MaskingError::Check {
         path: path.to_owned(),
-        why: error.to_string(),
-    })?;
-    Ok((image.into_luma8(), bytes))
+        why,
+    };
+    let image = image::load_from_memory(&bytes).map_err(|error| check(error.to_string()))?;
+    let picture = MaskPicture::of_image(&image);
+    let object = picture
+        .object()
+        .map_err(|fault| check(format!("it {fault}")))?;
+    let levels = object
+        .inside
+        .iter()
+        .map(|&inside| if inside { 255 } else { 0 });
+    let (width, height) = picture.size();
+    let image = GrayImage::from_raw(width, height, levels.collect()).unwrap_or_default();
+    Ok((image, bytes))
 }
 
 fn check_size(path: &Path, mask: &GrayImage, video: &Video) -> Result<(), MaskingError> {
@@ -105,11 +111,14 @@ fn check_size(path: &Path, mask: &GrayImage, video: &Video) -> Result<(), Maskin
     if (width, height) == (facts.width, facts.height) {
         return Ok(());
     }
+    let hint = size_hint((width, height), (facts.width, facts.height));
     Err(MaskingError::Check {
         path: path.to_owned(),
         why: format!(
-            "it is {width} x {height} pixels and the frames are {} x {}",
-            facts.width, facts.height
+            "it is {width} x {height} pixels and the frames are {} x {}{}",
+            facts.width,
+            facts.height,
+            hint.map(|hint| format!("; {hint}")).unwrap_or_default()
         ),
     })
 }

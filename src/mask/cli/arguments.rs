@@ -1,6 +1,5 @@
 //! The command line of relit-mask.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::error::ErrorKind;
@@ -8,6 +7,7 @@ use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use relit_data::geometry::Rect;
 use relit_grabcut::{Drawing, Feather, Iterations, SegmentSettings};
 use relit_mask::{BoxKind, MaskEngine, MaskFiles, MaskRequest, MaskingError, read_seeds};
+use relit_web::ListenAddress;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -139,14 +139,14 @@ pub(crate) struct MaskArguments {
     #[arg(long)]
     pub(crate) edit: bool,
 
-    /// Address and port at which the page is served; port 0 is any free one
+    /// Address and port at which the page is served; a port alone is this machine's own, and port 0 any free one
     #[arg(
         long,
         value_name = "ADDRESS:PORT",
         default_value = "127.0.0.1:0",
         requires = "edit"
     )]
-    pub(crate) listen: SocketAddr,
+    pub(crate) listen: ListenAddress,
 
     /// The number of the frame to make the mask on, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]

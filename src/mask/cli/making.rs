@@ -34,7 +34,7 @@ fn draw(path: &Path, arguments: &MaskArguments, console: Console) -> Result<Outc
     let request = arguments.request()?;
     let output = arguments.output.clone();
     let announce = |announcement: &Announcement| report::print_editor(announcement, console);
-    match edit(path, output, request, arguments.listen, announce)? {
+    match edit(path, output, request, arguments.listen.socket(), announce)? {
         Some(output) => {
             report::print(&output, console);
             Ok(Outcome::Whole)

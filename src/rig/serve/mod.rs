@@ -42,7 +42,7 @@ use std::sync::Arc;
 use tokio::time::{MissedTickBehavior, interval};
 
 pub use self::options::{ClientLimits, Heartbeat, ServeOptions};
-pub use relit_web::{Announcement, InvalidToken, Shutdown, Token, TokenFileError};
+pub use relit_web::{Announcement, InvalidToken, ListenAddress, Shutdown, Token, TokenFileError};
 use rig::Rig;
 
 /// Threads that carry requests; files and decoding have their own.

@@ -25,6 +25,8 @@ use super::request::ObjectKind;
 pub(super) const MOST_PIXELS: usize = 2_000_000;
 /// Photographs that would take too much memory while they are decoded.
 const MOST_READ: usize = 100_000_000;
+/// How errors name the mask of a photograph.
+const MASK: &str = "mask.png";
 /// The height of an object of which the scene is shown while it is worked on, pixels.
 const PREVIEW_ROWS: usize = 320;
 /// The most that the longest side of its photograph has then.
@@ -100,10 +102,10 @@ impl StudioObject {
     ) -> Result<Self, StudioError> {
         let mut opened = OpenedFile::read(name, bytes)?;
         opened.transfer = transfer.or(opened.transfer);
-        let image = StoredImage::from_bytes(Path::new("the mask"), mask)?;
-        let extent = image.planes.extent();
-        let bytes = image.planes.to_bytes().into_iter().step_by(3).collect();
-        let mask = GrayImage::from_raw(extent.width as u32, extent.height as u32, bytes);
+        let image = StoredImage::from_bytes(Path::new(MASK), mask)?;
+        let (mask, _) = image.object_mask(Path::new(MASK))?;
+        let Extent { width, height } = mask.extent();
+        let mask = GrayImage::from_raw(width as u32, height as u32, levels(&mask));
         Self::of_file(opened, mask)
     }
 
@@ -215,7 +217,7 @@ impl StudioObject {
         if cut.photo.is_none() {
             let mask = cut.mask.as_ref().map(stored).transpose()?;
             let hints = PhotoHints {
-                mask: mask.as_ref(),
+                mask: mask.as_ref().map(|mask| (Path::new(MASK), mask)),
                 transfer: self.transfer,
                 rectangle: None,
             };

@@ -283,6 +283,9 @@ impl Run {
     fn decompose(&self, input: &PhotoInput) -> Result<Decomposed, DecomposeError> {
         let photo = input.load(&self.reading)?;
         let out = if self.own_folders {
+            // Frames of one turn have a folder together.
+            let first = photo.name.split('/').next().unwrap_or_default();
+            PhotoInput::check_result(&self.output.join(first))?;
             self.output.join(&photo.name)
         } else {
             self.output.clone()
@@ -306,13 +309,15 @@ impl Run {
             MaskSource::Rectangle => "; the object is the whole rectangle",
             MaskSource::File | MaskSource::Alpha | MaskSource::Shard => "",
         };
+        let note = photo.mask_note.as_ref();
+        let note = note.map_or_else(String::new, |note| format!("; the mask {note}"));
         let highlights = if found.is_glossy {
             "separated"
         } else {
             "not separated"
         };
         let text = format!(
-            "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; residual {:.1} % of the picture{source}",
+            "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; residual {:.1} % of the picture{source}{note}",
             out.display(),
             100.0 * found.saturated_fraction,
             100.0 * found.residual,

@@ -302,8 +302,10 @@ impl Run<'_> {
             }
         };
         let seconds = start.elapsed().as_secs_f64();
+        let note = photo.mask_note.as_ref();
+        let note = note.map_or_else(String::new, |note| format!("; the mask {note}"));
         let text = format!(
-            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposing",
+            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposing{note}",
             output.display(),
         );
         let event = json!({
@@ -320,8 +322,11 @@ impl Run<'_> {
     }
 
     /// Nothing that is read may be overwritten, and the folders of what is written are made.
-    fn check_outputs(&self, output: &Path, name: &str) -> Result<(), String> {
+    fn check_outputs(&self, output: &Path, name: &str) -> Result<(), Box<dyn Error>> {
         let arguments = self.arguments;
+        if arguments.is_set() {
+            PhotoInput::check_result(output)?;
+        }
         let mask = arguments
             .mask
             .as_deref()

@@ -1,13 +1,12 @@
 //! `relight serve`: the app's page, handed out or written to a folder.
 
 use std::env;
-use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
 use relight_app::server::{PageFiles, PageServerOptions, installed_page, serve_page};
 use relit_console::{Console, Outcome};
-use relit_web::{Shutdown, Token};
+use relit_web::{ListenAddress, Shutdown, Token};
 use serde_json::json;
 
 use crate::commands::CommandResult;
@@ -23,9 +22,9 @@ Examples:
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Where to listen. Browsers other than this machine's get in by a token.
+    /// Where to listen; a port alone is this machine's own. Browsers other than this machine's get in by a token.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8430")]
-    listen: SocketAddr,
+    listen: ListenAddress,
     /// A file that holds the token, which only its owner and its group can read. Where there is none, it is made with a random
     /// token [default: a random token, where other machines can reach the address].
     #[arg(long, value_name = "FILE")]
@@ -61,9 +60,9 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         None => None,
     };
     let options = PageServerOptions {
-        address: arguments.listen,
+        address: arguments.listen.socket(),
         token,
-        names: arguments.name.clone(),
+        names: arguments.listen.names(&arguments.name),
     };
     let announce = |announcement: &relit_web::Announcement| {
         let url = &announcement.url;

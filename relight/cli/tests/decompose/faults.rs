@@ -133,6 +133,23 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
             .to_string()
             .contains("holds no photographs")
     );
-    let twice = find(&[&grey, &masks.join("grey.jpg")]).unwrap_err();
-    assert!(twice.to_string().contains("would both be written to grey"));
+    for second in ["grey.jpg", "GREY.png", "Grey.jpg"] {
+        let twice = find(&[&grey, &masks.join(second)]).unwrap_err();
+        assert!(matches!(twice, DecomposeError::SameName { .. }), "{twice}");
+    }
+}
+
+#[test]
+fn a_result_never_has_the_place_of_another_photographs_where_case_is_ignored() {
+    let folder = Folder::new();
+    for name in ["out", "out/Mug", "out/caf\u{e9}"] {
+        fs::create_dir(folder.path(name)).unwrap();
+    }
+    for name in ["out/mug", "out/MUG", "out/Mug. ", "out/CAFE\u{301}"] {
+        let fault = PhotoInput::check_result(&folder.path(name)).unwrap_err();
+        assert!(matches!(fault, DecomposeError::NameAlike { .. }), "{fault}");
+    }
+    for name in ["out/Mug", "out/mug2", "none/mug"] {
+        PhotoInput::check_result(&folder.path(name)).unwrap();
+    }
 }

@@ -3,8 +3,11 @@
 use std::io::Cursor;
 
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageBuffer, ImageFormat, Rgb as Pixel, RgbImage, Rgba};
-use relight_photo::decompose::{MaskSource, Rectangle, SpecularGate};
+use image::{
+    DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma, Rgb as Pixel, RgbImage, Rgba,
+};
+use relight_core::image::ImageError;
+use relight_photo::decompose::{DecomposeError, MaskSource, Rectangle, SpecularGate};
 use relight_photo::files::PhotoReading;
 
 use crate::support::{Folder, HEIGHT, WIDTH, decomposed, is_inside, load, mask, object, with_mask};
@@ -66,6 +69,28 @@ fn a_mask_is_a_files_brightest_channel_or_its_alpha() {
         let found = load(&photo, &with_mask(path)).unwrap();
         assert_eq!(found.mask, wanted, "{name}");
     }
+}
+
+#[test]
+fn masks_of_other_programs_are_read_for_what_they_are() {
+    let folder = Folder::new();
+    let photo = folder.save("photo.png", |path| object(90).save(path).unwrap());
+    let plain = folder.save("plain.png", |path| mask().save(path).unwrap());
+    let wanted = load(&photo, &with_mask(plain)).unwrap();
+    assert_eq!(wanted.mask_note, None);
+    let label = folder.save("label.png", |path| {
+        let level = |x, y| Luma([u8::from(is_inside(x, y))]);
+        GrayImage::from_fn(WIDTH, HEIGHT, level).save(path).unwrap();
+    });
+    let found = load(&photo, &with_mask(label)).unwrap();
+    assert_eq!(found.mask, wanted.mask);
+    assert!(found.mask_note.is_some());
+    let error = load(&photo, &with_mask(photo.clone())).unwrap_err();
+    let is_refused = matches!(
+        &error,
+        DecomposeError::Image(ImageError::NotAMask { path, .. }) if *path == photo
+    );
+    assert!(is_refused, "{error}");
 }
 
 /// A JPEG of a picture as a camera stores it that is held so that Exif has this orientation.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::read_planes;
-use crate::image::{Extent, ImageError, Linear, Planes, Rgb, Samples, Transfer};
+use crate::image::{Extent, ImageError, Linear, Planes, Rgb, Samples, StoredImage, Transfer};
 use crate::light::{Normals, NormalsFrame, YDown, YUp};
 use crate::render::{Gloss, Surface};
 
@@ -63,8 +63,9 @@ impl MapFiles {
         let normals = match &self.mask {
             None => normals,
             Some(path) => {
-                let (grey, _) = read_planes(path)?;
-                normals.masked(&first_channel(grey)?)?
+                let image = StoredImage::read(path)?;
+                check_extent(image.planes.extent(), normals.extent())?;
+                normals.masked(&image.object_mask(path)?.0)?
             }
         };
         if normals.is_empty() {
@@ -104,6 +105,18 @@ impl MapFiles {
                 Ok(first_channel(planes)?.map(|value| value * scale))
             }
         }
+    }
+}
+
+/// That a mask is as large as the map that it cuts.
+fn check_extent(found: Extent, expected: Extent) -> Result<(), ImageError> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(ImageError::Extent {
+            what: "mask",
+            found,
+            expected,
+        }),
     }
 }
 
@@ -209,14 +222,17 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_that_leaves_nothing_is_refused_with_the_map_s_name() {
+    fn a_mask_that_marks_nothing_is_refused_with_its_name() {
         let folder = tempfile::tempdir().unwrap();
         let mut files = files(folder.path());
         let path = folder.path().join("mask.png");
         write_png(&path, &Planes::zeros(Extent::new(4, 2)), Depth::Eight).unwrap();
-        files.mask = Some(path);
-        let error = files.read().unwrap_err().to_string();
-        assert!(error.contains("normal.png shows no surface"), "{error}");
+        files.mask = Some(path.clone());
+        let error = files.read().unwrap_err();
+        assert!(
+            matches!(&error, ImageError::NotAMask { path: named, .. } if *named == path),
+            "{error}"
+        );
     }
 
     #[test]

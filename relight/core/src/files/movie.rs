@@ -157,7 +157,7 @@ impl MovieWriter {
             .args(["-pix_fmt", "yuv420p", "-colorspace", "bt709"])
             .args(["-color_primaries", "bt709", "-color_trc", "iec61966-2-1"])
             .args(format.arguments())
-            .arg(&partial)
+            .arg(file_url(&partial))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -297,7 +297,7 @@ impl MovieReader {
         let (extent, frames_per_second) = probe(path)?;
         let mut program = Command::new("ffmpeg")
             .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-i"])
-            .arg(path)
+            .arg(file_url(path))
             .args(["-map", "0:v:0", "-f", "rawvideo", "-pix_fmt", "rgb24"])
             // Frames that are turned on the screen are turned here; all have the size of the first.
             .args([
@@ -391,7 +391,7 @@ fn probe(path: &Path) -> Result<(Extent, u32), MovieError> {
     let output = Command::new("ffprobe")
         .args(["-v", "error", "-select_streams", "v:0", "-of", "csv=p=0"])
         .args(["-show_entries", "stream=width,height,r_frame_rate"])
-        .arg(path)
+        .arg(file_url(path))
         .stdin(Stdio::null())
         .output()
         .map_err(MovieError::NoProgram)?;
@@ -421,7 +421,6 @@ fn probe(path: &Path) -> Result<(Extent, u32), MovieError> {
     }
 }
 
-/// The name under which a video is written, in the same folder.
 /// A size whose sides are even.
 const fn even(extent: Extent) -> Extent {
     Extent::new(
@@ -448,6 +447,15 @@ fn filled_up(bytes: Vec<u8>, extent: Extent) -> Vec<u8> {
     filled
 }
 
+/// A file as FFmpeg's programs take it, whatever its name: one with a colon may look like a protocol, one that begins with
+/// `-` like an option.
+fn file_url(path: &Path) -> OsString {
+    let mut url = OsString::from("file:");
+    url.push(path);
+    url
+}
+
+/// The name under which a video is written, in the same folder.
 fn partial_name(path: &Path) -> PathBuf {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let counter = COUNTER.fetch_add(1, Ordering::Relaxed);
@@ -530,6 +538,24 @@ mod tests {
                 (frame.planes().pixel(x, y)[1] - 0.5).abs() < 0.03,
                 "{x} {y}"
             );
+        }
+    }
+
+    #[test]
+    fn a_video_is_written_and_read_whatever_its_name() {
+        assert_eq!(file_url(Path::new("-x.mp4")), "file:-x.mp4");
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a:b.mp4", "cup%d.mp4", "-x.mp4", "[x]?*.mp4", "pipe:0.mp4"] {
+            let path = folder.path().join(name);
+            let extent = Extent::new(32, 32);
+            let mut movie = MovieWriter::create(&path, MovieFormat::Mp4, extent, 30).unwrap();
+            movie.push(&grey(32)).unwrap();
+            movie.finish().unwrap();
+            let mut clip = MovieReader::open(&path).unwrap();
+            assert!(clip.frame().unwrap().is_some(), "{name}");
         }
     }
 

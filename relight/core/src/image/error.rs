@@ -3,6 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
+use relit_data::mask::MaskFault;
+
 use super::Extent;
 
 /// What is wrong with an image or its file.
@@ -26,6 +28,14 @@ pub enum ImageError {
         found: Extent,
         /// The size that it should have.
         expected: Extent,
+    },
+    /// A file is no mask of an object.
+    #[error("the mask {} {fault}", path.display())]
+    NotAMask {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        fault: MaskFault,
     },
     /// A map of normals is empty.
     #[error("{} shows no surface: it has no normals, or none inside the mask", path.display())]

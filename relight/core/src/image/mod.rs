@@ -4,6 +4,7 @@ mod codec;
 mod colour;
 mod error;
 mod extent;
+mod mask;
 mod planes;
 mod png_rows;
 mod reduced;

@@ -12,6 +12,7 @@ use relight_core::light::{LightError, LightFileError};
 use relight_nets::NetError;
 #[cfg(feature = "files")]
 use relight_reader::{DamagedSample, OpenError};
+use relit_data::mask::size_hint;
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]
@@ -24,7 +25,10 @@ pub enum DecomposeError {
     #[error(transparent)]
     Image(#[from] ImageError),
     /// A mask belongs to another picture.
-    #[error("the mask has {} x {} pixels, and the photograph {} x {}", found.width, found.height, expected.width, expected.height)]
+    #[error(
+        "the mask has {} x {} pixels, and the photograph {} x {}{}",
+        found.width, found.height, expected.width, expected.height, hint(*found, *expected)
+    )]
     MaskSize {
         /// The mask's size.
         found: Extent,
@@ -154,7 +158,8 @@ pub enum DecomposeError {
     },
     /// Two photographs, or two turns, would be written into one folder.
     #[error(
-        "{} and {} would both be written to {name}: decompose them into different folders, one after the other",
+        "{} and {} would both be written to {name}, at least where a file system ignores case: rename one, or give them \
+         different folders by --output, one after the other",
         first.display(), second.display()
     )]
     SameName {
@@ -164,6 +169,17 @@ pub enum DecomposeError {
         second: PathBuf,
         /// The folder of both.
         name: String,
+    },
+    /// A result would have the place of another photograph's where a file system ignores case.
+    #[error(
+        "{} would replace {} where a file system ignores case: rename the photograph, or give another folder by --output",
+        path.display(), other.display()
+    )]
+    NameAlike {
+        /// The result.
+        path: PathBuf,
+        /// What is there.
+        other: PathBuf,
     },
     /// A data set cannot be opened.
     #[cfg(feature = "files")]
@@ -213,6 +229,14 @@ pub enum DecomposeError {
         /// The system's answer.
         source: io::Error,
     },
+}
+
+/// What a mask of another size may be.
+fn hint(found: Extent, expected: Extent) -> String {
+    let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
+    let [found, expected] =
+        [found, expected].map(|extent| (side(extent.width), side(extent.height)));
+    size_hint(found, expected).map_or_else(String::new, |hint| format!(": {hint}"))
 }
 
 #[cfg(feature = "files")]

@@ -1,8 +1,7 @@
 //! Where the object is: what a photograph, a file or a rectangle says of it.
 
 use super::crop::inside;
-use super::error::DecomposeError;
-use relight_core::image::{Extent, Planes, StoredImage, beside};
+use relight_core::image::{Extent, Planes, beside};
 
 /// Encoded values up to this count as nearly black: 12 of 255.
 pub(super) const NEARLY_BLACK: f32 = 12.5 / 255.0;
@@ -53,30 +52,6 @@ impl Rectangle {
         };
         within(x, self.x, self.width) && within(y, self.y, self.height)
     }
-}
-
-/// The mask that a picture shows, 1 where it is at least one half, for a photograph of this size: the file's alpha where that
-/// has both an inside and an outside, else the brightest channel.
-pub(super) fn mask_of(image: StoredImage, extent: Extent) -> Result<Planes<1>, DecomposeError> {
-    let StoredImage { planes, alpha, .. } = image;
-    if planes.extent() != extent {
-        return Err(DecomposeError::MaskSize {
-            found: planes.extent(),
-            expected: extent,
-        });
-    }
-    let has_both = |alpha: &Planes<1>| {
-        let inside = inside(alpha);
-        inside.contains(&true) && inside.contains(&false)
-    };
-    if let Some(alpha) = alpha.filter(has_both) {
-        return Ok(binary(alpha));
-    }
-    let [mut brightest, green, blue] = planes.into_planes();
-    for ((value, green), blue) in brightest.iter_mut().zip(green).zip(blue) {
-        *value = value.max(green).max(blue);
-    }
-    Ok(binary(Planes::from_planes(extent, [brightest])?))
 }
 
 /// Why the colours of a photograph do not show where the object is.

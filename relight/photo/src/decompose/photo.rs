@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::decomposer::{DecomposeOptions, check_size};
 use super::error::DecomposeError;
-use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty, mask_of};
+use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty};
 use relight_core::image::{
     ColourSpace, Extent, Gamma22, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
     exif_orientation,
@@ -28,6 +28,8 @@ pub struct Photo {
     pub mask: Planes<1>,
     /// What said so.
     pub mask_source: MaskSource,
+    /// What the mask's file was taken for, after "the mask", where that is not plain.
+    pub mask_note: Option<String>,
     /// The alpha that its file has, 0 to 1, as it stands there.
     pub alpha: Option<Planes<1>>,
     saturated_from: f32,
@@ -37,8 +39,8 @@ pub struct Photo {
 /// What is known of a photograph beside its file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PhotoHints<'a> {
-    /// A picture of the mask.
-    pub mask: Option<&'a StoredImage>,
+    /// A picture of the mask, and how errors name it.
+    pub mask: Option<(&'a Path, &'a StoredImage)>,
     /// A rectangle around the object.
     pub rectangle: Option<Rectangle>,
     /// How integers are encoded, where the file is not to be asked.
@@ -65,10 +67,12 @@ impl Photo {
             (Samples::Integer, Some(transfer)) => Some(transfer),
             (Samples::Integer, None) => Some(stated_transfer(path, bytes)?),
         };
+        let mut mask_note = None;
         let (mask, mask_source) = match hints.mask {
-            Some(mask) => {
-                check_stored(mask.planes.extent(), image.planes.extent(), bytes)?;
-                let mask = mask_of(mask.clone(), image.planes.extent())?;
+            Some((path, mask)) => {
+                check_extent(mask.planes.extent(), image.planes.extent(), bytes)?;
+                let (mask, basis) = mask.object_mask(path)?;
+                mask_note = basis.note();
                 (mask, MaskSource::File)
             }
             None => {
@@ -88,6 +92,7 @@ impl Photo {
             picture: Rgb::new(image.planes.map(to_linear(transfer))),
             mask,
             mask_source,
+            mask_note,
             alpha: image.alpha,
             saturated_from: match transfer {
                 // There is no largest value in floating point: what a screen shows as white counts.
@@ -114,6 +119,7 @@ impl Photo {
             picture,
             mask,
             mask_source: MaskSource::Shard,
+            mask_note: None,
             alpha: None,
             saturated_from: Srgb::to_linear(SATURATED_VALUE),
             saturated_fraction,
@@ -161,14 +167,18 @@ pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
     Some(Extent::new(sides.0 as usize, sides.1 as usize))
 }
 
-/// Tells a mask of a photograph that was not turned as its Exif orientation says from any other mask that does not fit.
-fn check_stored(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), DecomposeError> {
+/// That a mask has the photograph's size. One of a photograph that was not turned as its Exif orientation says is told from
+/// any other.
+fn check_extent(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), DecomposeError> {
     let is_turned = found == Extent::new(expected.height, expected.width) && found != expected;
     // Exif's orientations from 5 on swap the sides.
     if is_turned && exif_orientation(bytes).is_some_and(|number| number >= 5) {
         return Err(DecomposeError::MaskStored { found, expected });
     }
-    Ok(())
+    match found == expected {
+        true => Ok(()),
+        false => Err(DecomposeError::MaskSize { found, expected }),
+    }
 }
 
 fn check_mask(mask: &Planes<1>, rectangle: Option<Rectangle>) -> Result<(), DecomposeError> {

@@ -5,12 +5,11 @@ use std::path::Path;
 use relight_core::files::MovieReader;
 use relight_core::image::{Extent, Linear, Rgb, StoredImage, Transfer};
 use relight_core::light::Panorama;
+use relit_data::file_names::{VIDEO_EXTENSIONS, has_extension};
 
 use super::InsertionError;
 use crate::insert::{PanoramaView, SceneDescription};
 
-/// How the files of videos end.
-const MOVIES: [&str; 6] = ["mp4", "webm", "mov", "mkv", "avi", "m4v"];
 /// How the files of panoramas end.
 const PANORAMAS: [&str; 2] = ["hdr", "exr"];
 
@@ -31,15 +30,10 @@ impl BackgroundFile {
     /// # Errors
     /// Where it cannot be read, or has values that are no light.
     pub fn read(path: &Path, scene: &SceneDescription) -> Result<Self, InsertionError> {
-        let ends_in = |endings: &[&str]| {
-            let is =
-                |ending: &std::ffi::OsStr| endings.iter().any(|e| ending.eq_ignore_ascii_case(e));
-            path.extension().is_some_and(is)
-        };
-        if ends_in(&MOVIES) {
+        if has_extension(path, &VIDEO_EXTENSIONS) {
             return Ok(Self::Movie(Box::new(MovieReader::open(path)?)));
         }
-        if ends_in(&PANORAMAS) {
+        if has_extension(path, &PANORAMAS) {
             let Extent { width, height } = StoredImage::read(path)?.planes.extent();
             if width == 2 * height {
                 let view = PanoramaView::new(scene.panorama_extent(), scene.field, scene.down);

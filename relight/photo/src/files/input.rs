@@ -9,6 +9,7 @@ use relight_core::image::{
     Extent, ImageError, Planes, Rgb, StoredImage, Transfer, exif_orientation,
 };
 use relight_reader::{Encoding, SampleId, Source, Turns};
+use relit_data::file_names::{alike_beside, folded, has_extension, is_hidden};
 use relit_data::shard::Dataset;
 
 use super::mask_record::check_turned;
@@ -61,7 +62,7 @@ impl PhotoInput {
         for path in paths {
             if path.is_dir() {
                 add_folder(&mut found, path, most)?;
-            } else if has_ending(path, &["tar"]) {
+            } else if has_extension(path, &["tar"]) {
                 add_turns(&mut found, path, most)?;
             } else {
                 found.push((path.clone(), Self::File(path.clone())));
@@ -76,11 +77,26 @@ impl PhotoInput {
     #[must_use]
     pub fn has_frames(path: &Path) -> bool {
         if !path.is_dir() {
-            return has_ending(path, &["tar"]);
+            return has_extension(path, &["tar"]);
         }
-        let is_shard = |path: PathBuf| is_visible(&path) && has_ending(&path, &["tar"]);
+        let is_shard = |path: PathBuf| !is_hidden(&path) && has_extension(&path, &["tar"]);
         let entries = fs::read_dir(path).into_iter().flatten().flatten();
         path.join(Dataset::FILE).is_file() || entries.map(|entry| entry.path()).any(is_shard)
+    }
+
+    /// Whether a result that is named after a photograph, in a folder of several, leaves those of other photographs as they
+    /// are, also where a file system ignores case.
+    ///
+    /// # Errors
+    /// [`DecomposeError::NameAlike`], or where the folder cannot be listed.
+    pub fn check_result(path: &Path) -> Result<(), DecomposeError> {
+        match alike_beside(path).map_err(DecomposeError::read(path))? {
+            None => Ok(()),
+            Some(other) => Err(DecomposeError::NameAlike {
+                path: path.to_owned(),
+                other: path.with_file_name(other),
+            }),
+        }
     }
 
     /// How an error names it.
@@ -115,7 +131,7 @@ fn add_folder(found: &mut Found, folder: &Path, most: Option<u32>) -> Result<(),
     let mut photos = Vec::new();
     for entry in fs::read_dir(folder).map_err(DecomposeError::read(folder))? {
         let path = entry.map_err(DecomposeError::read(folder))?.path();
-        if is_visible(&path) && path.is_file() && has_ending(&path, &PHOTOS) {
+        if !is_hidden(&path) && path.is_file() && has_extension(&path, &PHOTOS) {
             photos.push(path);
         }
     }
@@ -148,20 +164,7 @@ fn add_turns(found: &mut Found, path: &Path, most: Option<u32>) -> Result<(), De
     Ok(())
 }
 
-fn is_visible(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default();
-    !name.as_encoded_bytes().starts_with(b".")
-}
-
-fn has_ending(path: &Path, endings: &[&str]) -> bool {
-    path.extension().is_some_and(|found| {
-        endings
-            .iter()
-            .any(|known| found.eq_ignore_ascii_case(known))
-    })
-}
-
-/// Whether every file and every turn has a folder of its own for its results.
+/// Whether every file and every turn has a folder of its own for its results, also where a file system ignores case.
 fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
     let mut names = BTreeMap::new();
     let mut last_turn = None;
@@ -177,7 +180,7 @@ fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
             }
         };
         let Some(name) = name else { continue };
-        if let Some(first) = names.insert(name.clone(), path) {
+        if let Some(first) = names.insert(folded(&name), path) {
             return Err(DecomposeError::SameName {
                 first: first.clone(),
                 second: path.clone(),
@@ -208,12 +211,13 @@ fn read_file(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErro
         Some(file) => {
             let file = mask_file(file, &stem(path))?;
             check_turned(&file, path, exif_orientation(&bytes))?;
-            Some(StoredImage::read(&file)?)
+            let image = StoredImage::read(&file)?;
+            Some((file, image))
         }
         None => None,
     };
     let hints = PhotoHints {
-        mask: mask.as_ref(),
+        mask: mask.as_ref().map(|(file, image)| (file.as_path(), image)),
         rectangle: reading.rectangle,
         transfer: reading.transfer,
     };

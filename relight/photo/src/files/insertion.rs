@@ -264,9 +264,7 @@ fn given_light(
         return Err(InsertionError::LightInPanorama);
     };
     let path = folder.join(mask);
-    let grey = StoredImage::read(&path)?.planes;
-    let [mask, ..] = grey.clone().into_planes();
-    let mask = Planes::from_planes(grey.extent(), [mask])?.map(|m| f32::from(u8::from(m >= 0.5)));
+    let (mask, _) = StoredImage::read(&path)?.object_mask(&path)?;
     let subject = Subject::new(picture, &mask, None, decomposer, options).map_err(|source| {
         InsertionError::LightObject {
             path,

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::problem::VerifyProblem;
 use crate::causes::with_causes;
+use crate::file_names::folded;
 use crate::shard::dataset::{Dataset, SessionEntry, ShardEntry};
 use crate::shard::{MAX_SAMPLES, ShardError, names, output};
 
@@ -52,6 +53,16 @@ fn entries(dataset: &Dataset) -> Vec<VerifyProblem> {
     for (name, count) in counted(dataset.sessions.iter().map(|session| session.id.as_str())) {
         if count > 1 {
             wrong(format!("session {name:?} is listed {count} times"));
+        }
+    }
+    let mut folded_names = HashMap::new();
+    for session in &dataset.sessions {
+        let id = session.id.as_str();
+        let other = *folded_names.entry(folded(id)).or_insert(id);
+        if other != id {
+            wrong(format!(
+                "the sessions {other:?} and {id:?} are one where a file system ignores case"
+            ));
         }
     }
     for (file, count) in counted(dataset.files()) {

@@ -1,0 +1,150 @@
+//! Which pixels a picture of a mask marks, whatever program made it: a painted mask, a cut-out, or an image of labels.
+//!
+//! A picture is read by the first of these that it has:
+//!
+//! 1. **alpha** that is transparent in some places and opaque in others: a cut-out. Where what is opaque is itself black and
+//!    white, it is a painted mask on a layer, and the white of it counts;
+//! 2. **brightness**: the object is at least half as bright as white. Edges may be soft, and a JPEG's may ring;
+//! 3. **a label**: one colour or level on black, whatever it is, such as 1 on 0.
+//!
+//! A photograph, a picture of several labels, and one that marks nothing are refused: [`MaskFault`]. What
+//! other mistakes look like, such as a mask that is inverted, cannot be seen here.
+//!
+//! Knows pixels only: files are decoded by others.
+
+mod colours;
+mod levels;
+mod picture;
+
+use std::fmt::{self, Display, Formatter};
+
+pub use picture::MaskPicture;
+
+/// By what a mask says where the object is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MaskBasis {
+    /// The object is bright.
+    Brightness,
+    /// The object is opaque, and its colours do not count.
+    Alpha,
+    /// The object has this value or colour, and the rest is black.
+    Label(String),
+}
+
+impl MaskBasis {
+    /// What a person may want to know of it: nothing where the object is bright, as in most masks.
+    #[must_use]
+    pub fn note(&self) -> Option<String> {
+        match self {
+            Self::Brightness => None,
+            Self::Alpha => Some("has colours and alpha: the object is what is opaque".to_owned()),
+            Self::Label(label) => Some(format!("is a label image: the object is what has {label}")),
+        }
+    }
+}
+
+/// What a picture of a mask marks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ObjectPixels {
+    /// Whether each pixel is the object's, row by row; at least one is.
+    pub inside: Vec<bool>,
+    /// What says so.
+    pub basis: MaskBasis,
+}
+
+/// Why a picture is no mask of an object. Each begins with a verb, after "the mask PATH".
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MaskFault {
+    /// Its tones or colours are those of a photograph or a rendering.
+    #[error(
+        "is a picture, not a mask: make a mask with relit-mask, or paint the object white and all else black"
+    )]
+    Photograph,
+    /// It marks several things.
+    #[error(
+        "has {}: paint the one object white and all else black", .0
+    )]
+    Labels(LabelList),
+    /// It marks nothing.
+    #[error(
+        "is empty: its brightest pixel has {brightest} of {white}, and the object has to be at least half as bright as white; make it again with relit-mask, or paint the object white"
+    )]
+    Empty {
+        /// The largest value.
+        brightest: u16,
+        /// The largest that is possible.
+        white: u16,
+    },
+    /// It is transparent, or nearly, where it is not wholly.
+    #[error(
+        "is empty: no pixel of it is more than half opaque; make it again with relit-mask, or paint the object white on black"
+    )]
+    Transparent,
+}
+
+/// Several labels of a picture, as a person may know them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LabelList {
+    /// Values or colours, the smallest first.
+    labels: Vec<String>,
+    /// What they are called.
+    noun: &'static str,
+}
+
+impl LabelList {
+    /// How many are listed.
+    const LISTED: usize = 6;
+
+    fn of_levels(levels: impl IntoIterator<Item = u16>) -> Self {
+        Self {
+            labels: levels.into_iter().map(|level| level.to_string()).collect(),
+            noun: "values",
+        }
+    }
+
+    fn of_colours(colours: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            labels: colours.into_iter().collect(),
+            noun: "colours",
+        }
+    }
+
+    /// The labels, the smallest first.
+    #[must_use]
+    pub fn labels(&self) -> &[String] {
+        &self.labels
+    }
+}
+
+impl Display for LabelList {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { labels, noun } = self;
+        let listed = &labels[..labels.len().min(Self::LISTED)];
+        write!(f, "the {noun} {}", listed.join(", "))?;
+        match labels.len() - listed.len() {
+            0 => Ok(()),
+            more => write!(f, " and {more} more"),
+        }
+    }
+}
+
+/// What a mask of another size than its picture's may be, after "the mask PATH is W x H pixels".
+#[must_use]
+pub fn size_hint(mask: (u32, u32), picture: (u32, u32)) -> Option<&'static str> {
+    let [(w, h), (wide, high)] = [mask, picture].map(|(w, h)| (f64::from(w), f64::from(h)));
+    // Sizes are rounded to whole pixels.
+    let fits =
+        |scale: f64, length: f64, wanted: f64| (scale * length - wanted).abs() < scale.max(1.0);
+    if (mask.1, mask.0) == picture && w != h {
+        Some("it lies on its side: turn it by 90 degrees")
+    } else if mask.0 > 0 && mask.1 > 0 && fits(wide / w, h, high) {
+        Some("it is of a scaled copy: scale it back")
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,197 @@
+//! The address on which a person lets a program listen.
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs};
+use std::str::FromStr;
+
+/// Where to listen, as a person writes it: `127.0.0.1:8430`, `[::1]:8430`, `localhost:8430` or another name of this
+/// machine; `8430` and `:8430` for this machine alone.
+///
+/// ```
+/// use relit_web::ListenAddress;
+///
+/// let address: ListenAddress = "8430".parse()?;
+/// assert_eq!(address.socket().to_string(), "127.0.0.1:8430");
+/// # Ok::<(), relit_web::ListenAddressFault>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ListenAddress {
+    socket: SocketAddr,
+    name: Option<String>,
+}
+
+/// Why an address is none.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ListenAddressFault {
+    /// A URL.
+    #[error("this is a URL: give the address and the port alone, such as localhost:8430")]
+    Url,
+    /// Nothing after the address.
+    #[error("the port is missing: give ADDRESS:PORT, such as {0}:8430")]
+    NoPort(String),
+    /// A port that is no number up to 65535.
+    #[error(
+        "{0:?} is not a port: give a number from 0 to 65535 after the colon, 0 for any free port"
+    )]
+    Port(String),
+    /// An IPv6 address before a port, without brackets.
+    #[error("an IPv6 address stands in brackets: give [{0}]:PORT")]
+    Brackets(Ipv6Addr),
+    /// A name that cannot be looked up.
+    #[error(
+        "{name:?} is not the name of this machine or an address ({why}): give localhost:PORT or 0.0.0.0:PORT"
+    )]
+    Unknown {
+        /// The name.
+        name: String,
+        /// What the system answers.
+        why: io::Error,
+    },
+    /// A name without an address.
+    #[error("the name {0:?} has no address: give localhost:PORT or 0.0.0.0:PORT")]
+    NoAddress(String),
+}
+
+impl ListenAddress {
+    /// The address to listen on.
+    #[must_use]
+    pub fn socket(&self) -> SocketAddr {
+        self.socket
+    }
+
+    /// The names under which clients reach this machine: those that are `given`, and the one in the address.
+    #[must_use]
+    pub fn names(&self, given: &[String]) -> Vec<String> {
+        given.iter().chain(&self.name).cloned().collect()
+    }
+}
+
+impl FromStr for ListenAddress {
+    type Err = ListenAddressFault;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if let Ok(socket) = text.parse() {
+            return Ok(Self { socket, name: None });
+        }
+        if text.contains("://") {
+            return Err(ListenAddressFault::Url);
+        }
+        let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+        let (host, port) = match text.rsplit_once(':') {
+            _ if is_number => ("", text),
+            _ if text.ends_with(']') => return Err(ListenAddressFault::NoPort(text.to_owned())),
+            Some(parts) => parts,
+            None => return Err(ListenAddressFault::NoPort(text.to_owned())),
+        };
+        if let Ok(address) = text.parse::<Ipv6Addr>() {
+            return Err(ListenAddressFault::NoPort(format!("[{address}]")));
+        }
+        if let Ok(address) = host.parse::<Ipv6Addr>() {
+            return Err(ListenAddressFault::Brackets(address));
+        }
+        let port: u16 = port
+            .parse()
+            .map_err(|_| ListenAddressFault::Port(port.to_owned()))?;
+        if host.is_empty() {
+            let socket = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port);
+            return Ok(Self { socket, name: None });
+        }
+        Ok(Self {
+            socket: look_up(host, port)?,
+            // Who asks for this machine by that name, on it, gets in anyway.
+            name: (!host.eq_ignore_ascii_case("localhost")).then(|| host.to_owned()),
+        })
+    }
+}
+
+/// The address of a name: that of IPv4 where there are both, as where no name is given.
+fn look_up(name: &str, port: u16) -> Result<SocketAddr, ListenAddressFault> {
+    let found = (name, port).to_socket_addrs();
+    let found = found.map_err(|why| ListenAddressFault::Unknown {
+        name: name.to_owned(),
+        why,
+    })?;
+    found
+        .min_by_key(SocketAddr::is_ipv6)
+        .ok_or_else(|| ListenAddressFault::NoAddress(name.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn socket(text: &str) -> String {
+        let address: ListenAddress = text.parse().unwrap();
+        address.socket().to_string()
+    }
+
+    fn fault(text: &str) -> ListenAddressFault {
+        text.parse::<ListenAddress>().unwrap_err()
+    }
+
+    #[test]
+    fn an_address_is_what_people_write_for_it() {
+        for (text, meant) in [
+            ("127.0.0.1:8430", "127.0.0.1:8430"),
+            ("0.0.0.0:0", "0.0.0.0:0"),
+            ("[::1]:8430", "[::1]:8430"),
+            ("[::]:8430", "[::]:8430"),
+            ("8430", "127.0.0.1:8430"),
+            (":8430", "127.0.0.1:8430"),
+        ] {
+            assert_eq!(socket(text), meant, "{text}");
+        }
+    }
+
+    #[test]
+    fn localhost_is_this_machine_and_no_further_name_of_it() {
+        for text in ["localhost:8430", "LOCALHOST:8430"] {
+            let address: ListenAddress = text.parse().unwrap();
+            assert!(address.socket().ip().is_loopback(), "{text}");
+            assert_eq!(address.socket().port(), 8430);
+            assert_eq!(address.names(&[]), Vec::<String>::new());
+        }
+    }
+
+    #[test]
+    fn a_name_in_the_address_is_one_under_which_clients_come() {
+        let address = ListenAddress {
+            socket: "192.0.2.7:8430".parse().unwrap(),
+            name: Some("rig.local".to_owned()),
+        };
+        assert_eq!(address.names(&["rig".to_owned()]), ["rig", "rig.local"]);
+    }
+
+    #[test]
+    fn what_is_no_address_is_refused_for_what_it_is() {
+        use ListenAddressFault as Fault;
+        for text in ["http://localhost:8430", "https://0.0.0.0"] {
+            assert!(matches!(fault(text), Fault::Url), "{text}");
+        }
+        for text in ["localhost", "0.0.0.0", "::1", "[::1]", "", "rig.local"] {
+            assert!(matches!(fault(text), Fault::NoPort(_)), "{text}");
+        }
+        for text in [
+            "localhost:",
+            "localhost:84300",
+            "65536",
+            "127.0.0.1:x",
+            ":-1",
+            "[::1]:",
+            "::1:x",
+        ] {
+            let fault = fault(text);
+            assert!(
+                matches!(fault, Fault::Port(_) | Fault::Brackets(_)),
+                "{text}: {fault}"
+            );
+        }
+        assert!(matches!(fault("::1:84300"), Fault::Brackets(_)));
+        assert!(matches!(
+            fault("fe80::1:8430x"),
+            Fault::Port(_) | Fault::Brackets(_)
+        ));
+        assert!(matches!(fault("a b:8430"), Fault::Unknown { .. }));
+    }
+}
