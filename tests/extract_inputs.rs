@@ -255,8 +255,7 @@ fn masks_of_other_programs_mark_the_object_or_are_refused() {
         ("cutout.png", true),
         ("label.png", true),
     ] {
-        let (code, errors) =
-            inputs.extract(&["clip.mkv", "--mask", mask, "-o", "out", "--size", "native"]);
+        let (code, errors) = inputs.extract(&["clip.mkv", "--mask", mask, "-o", "out"]);
         assert_eq!(code, Some(0), "{mask}: {errors}");
         assert_eq!(errors.contains("the mask"), noted, "{mask}: {errors}");
         assert_eq!(inputs.mask_px(), OBJECT_PX, "{mask}");

@@ -84,10 +84,10 @@ impl ObjectMask {
 
     /// Warnings, if the mask is suspicious, or one of a kind that may be meant in another way.
     pub(super) fn warnings(&self) -> impl Iterator<Item = String> {
-        self.note.clone().into_iter().chain(self.is_large())
+        self.note.clone().into_iter().chain(self.large_warning())
     }
 
-    fn is_large(&self) -> Option<String> {
+    fn large_warning(&self) -> Option<String> {
         let levels = self.image.as_raw();
         let covered = levels.iter().filter(|&&level| level != 0).count();
         let fraction = covered as f64 / levels.len() as f64;

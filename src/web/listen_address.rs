@@ -84,11 +84,12 @@ impl FromStr for ListenAddress {
             Some(parts) => parts,
             None => return Err(ListenAddressFault::NoPort(text.to_owned())),
         };
-        if let Ok(address) = text.parse::<Ipv6Addr>() {
-            return Err(ListenAddressFault::NoPort(format!("[{address}]")));
-        }
+        // What follows the last colon may be a port, or belong to the address.
         if let Ok(address) = host.parse::<Ipv6Addr>() {
             return Err(ListenAddressFault::Brackets(address));
+        }
+        if let Ok(address) = text.parse::<Ipv6Addr>() {
+            return Err(ListenAddressFault::NoPort(format!("[{address}]")));
         }
         let port: u16 = port
             .parse()
@@ -187,7 +188,9 @@ mod tests {
                 "{text}: {fault}"
             );
         }
-        assert!(matches!(fault("::1:84300"), Fault::Brackets(_)));
+        for text in ["::1:8430", "::1:84300", "fe80::1:8430"] {
+            assert!(matches!(fault(text), Fault::Brackets(_)), "{text}");
+        }
         assert!(matches!(
             fault("fe80::1:8430x"),
             Fault::Port(_) | Fault::Brackets(_)

@@ -55,9 +55,10 @@ fn check_recording(
 ) -> Result<(MaskReport, PathBuf), MaskingError> {
     let folder = recording.folder.clone().unwrap_or_default();
     let files = MaskFiles::of(&mask.map_or_else(|| folder.join(MASK_FILE), Path::to_owned))?;
-    let (image, png) = read_mask(&files.mask)?;
+    let (picture, png) = read_mask(&files.mask)?;
     let video = Video::open(&recording.video)?;
-    check_size(&files.mask, &image, &video)?;
+    check_size(&files.mask, picture.size(), &video)?;
+    let image = object_of(&files.mask, &picture)?;
     let source = source_frame(&files, &video)?;
     let sampled = video.spread(TURN_FRAMES);
     let statistics = statistics(&video, image.dimensions(), &sampled)?;
@@ -84,30 +85,30 @@ fn check_recording(
     Ok((report, files.page))
 }
 
-/// The mask, 0 or 255, and its file.
-fn read_mask(path: &Path) -> Result<(GrayImage, Vec<u8>), MaskingError> {
+/// The picture of the mask, and its file.
+fn read_mask(path: &Path) -> Result<(MaskPicture, Vec<u8>), MaskingError> {
     let bytes = std::fs::read(path).map_err(MaskingError::io(path, "read"))?;
-    let check = |why: String| MaskingError::Check {
+    let image = image::load_from_memory(&bytes).map_err(|error| MaskingError::Check {
         path: path.to_owned(),
-        why,
-    };
-    let image = image::load_from_memory(&bytes).map_err(|error| check(error.to_string()))?;
-    let picture = MaskPicture::of_image(&image);
-    let object = picture
-        .object()
-        .map_err(|fault| check(format!("it {fault}")))?;
-    let levels = object
-        .inside
-        .iter()
-        .map(|&inside| if inside { 255 } else { 0 });
-    let (width, height) = picture.size();
-    let image = GrayImage::from_raw(width, height, levels.collect()).unwrap_or_default();
-    Ok((image, bytes))
+        why: error.to_string(),
+    })?;
+    Ok((MaskPicture::of_image(&image), bytes))
 }
 
-fn check_size(path: &Path, mask: &GrayImage, video: &Video) -> Result<(), MaskingError> {
+/// What the mask marks: 255, and 0 elsewhere.
+fn object_of(path: &Path, picture: &MaskPicture) -> Result<GrayImage, MaskingError> {
+    let object = picture.object().map_err(|fault| MaskingError::Check {
+        path: path.to_owned(),
+        why: format!("it {fault}"),
+    })?;
+    let levels = object.inside.iter().map(|&inside| u8::from(inside) * 255);
+    let (width, height) = picture.size();
+    Ok(GrayImage::from_raw(width, height, levels.collect()).unwrap_or_default())
+}
+
+fn check_size(path: &Path, mask: (u32, u32), video: &Video) -> Result<(), MaskingError> {
     let facts = video.facts();
-    let (width, height) = mask.dimensions();
+    let (width, height) = mask;
     if (width, height) == (facts.width, facts.height) {
         return Ok(());
     }
