@@ -167,7 +167,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
         (
             format!("{one} --mask empty.png --lamp 30,40 -o o.png"),
             1,
-            "the mask is empty",
+            "the mask empty.png is empty",
         ),
         (
             format!("{one} --mask small.png --lamp 30,40 -o o.png"),
