@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use image::{ImageError as FileError, ImageReader, RgbImage};
 
 use super::SynthError;
-use relight_core::image::{ColourSpace, Extent, Linear, Rgb, Srgb, Transfer};
+use relight_core::image::{ColourImage, ColourSpace, Extent, Srgb};
 
 /// Longest side of a mesh's own pictures in memory: larger ones are made smaller.
 const LONGEST_SIDE: usize = 1024;
@@ -36,12 +36,12 @@ impl TextureImage {
         }
     }
 
-    /// Reads a PNG or JPEG, whose values are sRGB.
+    /// Reads a picture, whose values are sRGB where it says nothing else.
     ///
     /// # Errors
     /// [`SynthError::Image`] where it cannot be read or is no picture.
     pub fn read(path: &Path) -> Result<Self, SynthError> {
-        let image = Rgb::<Linear>::read(path, Transfer::Srgb)?;
+        let image = ColourImage::read(path, None)?.into_light();
         let planes = image.planes();
         let Extent { width, height } = planes.extent();
         Ok(Self::from_fn(width, height, |x, y| {
@@ -49,7 +49,8 @@ impl TextureImage {
         }))
     }
 
-    /// A picture of a mesh's own, PNG, JPEG or WebP, whose values are sRGB.
+    /// A picture of a mesh's own, PNG, JPEG or WebP, whose values are sRGB: glTF has readers leave out what a file says
+    /// of its colours and its orientation.
     pub(super) fn of_colours(bytes: &[u8]) -> Result<Self, FileError> {
         let image = decoded(bytes)?;
         Ok(Self::reduced(&image, Srgb::to_linear))

@@ -5,6 +5,7 @@ use std::path::Path;
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Samples, Srgb, encode_exr};
 use relight_core::light::Panorama;
 use relight_photo::insert::{PanoramaView, SceneBackground, SceneDescription, SceneSetting};
+use relit_still::Format;
 
 use super::StudioError;
 use super::object::{OpenedFile, png_of, stem};
@@ -91,11 +92,9 @@ impl StudioBackground {
     /// # Errors
     /// Where it cannot be read, or has values that are no light.
     pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
-        let mut opened = OpenedFile::read(name, bytes)?;
-        let (name, file) = (opened.name.clone(), std::mem::take(&mut opened.bytes));
-        // relight insert reads backgrounds of integers as sRGB.
-        opened.transfer = None;
-        let picture = opened.light();
+        let opened = OpenedFile::read(name, bytes, None)?;
+        let (name, file) = (opened.name, opened.bytes);
+        let picture = opened.image.into_light();
         let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
         if !picture.planes().planes().into_iter().all(is_light) {
             return Err(StudioError::NotLight { name });
@@ -115,8 +114,8 @@ impl StudioBackground {
     /// # Errors
     /// Where it cannot be read or has another shape.
     pub(super) fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
-        let mut opened = OpenedFile::read(name, bytes)?;
-        let Extent { width, height } = opened.image.planes.extent();
+        let opened = OpenedFile::read(name, bytes, None)?;
+        let Extent { width, height } = opened.image.stored().planes.extent();
         // Making it smaller rounds its sides.
         if width.abs_diff(2 * height) > 2 || height < 4 {
             return Err(StudioError::PanoramaShape {
@@ -125,9 +124,9 @@ impl StudioBackground {
                 height,
             });
         }
-        let is_float = opened.image.samples == Samples::Float;
-        let own_file = std::mem::take(&mut opened.bytes);
-        let panorama = Panorama::new(opened.light())?;
+        let is_float = opened.image.stored().samples == Samples::Float;
+        let own_file = opened.bytes;
+        let panorama = Panorama::new(opened.image.into_light())?;
         let columns = width.min(MOST_COLUMNS) / 2 * 2;
         let wanted = Extent::new(columns, columns / 2);
         let is_as_kept = is_float && wanted == Extent::new(width, height);
@@ -171,12 +170,10 @@ impl StudioBackground {
                 return Ok(background);
             }
         }
-        let is_panorama = ["exr", "hdr"]
-            .iter()
-            .any(|ending| name.to_ascii_lowercase().ends_with(&format!(".{ending}")));
+        let is_radiance = matches!(Format::of(&bytes), Some(Format::Exr | Format::Radiance));
         let is_wide = relight_photo::decompose::stated_extent(&bytes)
             .is_some_and(|extent| extent.width == 2 * extent.height);
-        if is_panorama && is_wide {
+        if is_radiance && is_wide {
             Self::panorama(name, bytes)
         } else {
             Self::photo(name, bytes)

@@ -5,13 +5,9 @@ use std::path::Path;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, GrayImage, ImageEncoder, RgbImage};
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::{
-    ColourSpace, Extent, Gamma22, ImageError, Linear, ReducedFile, Rgb, Samples, Srgb, StoredImage,
-    Transfer,
-};
+use relight_core::image::{ColourImage, Extent, ImageError, ReducedFile, StoredImage, Transfer};
 use relight_photo::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, PhotoHints, stated_extent,
-    stated_transfer,
 };
 use relight_photo::insert::{ObjectDescription, SceneSetting, Subject};
 use relit_data::geometry::Rect;
@@ -86,7 +82,7 @@ impl StudioObject {
                 content: Content::Captured(Box::new((captured, subject))),
             });
         }
-        let opened = OpenedFile::read(name, bytes)?;
+        let opened = OpenedFile::read(name, bytes, None)?;
         Self::of_file(opened, None)
     }
 
@@ -100,8 +96,7 @@ impl StudioObject {
         mask: &[u8],
         transfer: Option<Transfer>,
     ) -> Result<Self, StudioError> {
-        let mut opened = OpenedFile::read(name, bytes)?;
-        opened.transfer = transfer.or(opened.transfer);
+        let opened = OpenedFile::read(name, bytes, transfer)?;
         let image = StoredImage::from_bytes(Path::new(MASK), mask)?;
         let (mask, _) = image.object_mask(Path::new(MASK))?;
         let Extent { width, height } = mask.extent();
@@ -116,7 +111,7 @@ impl StudioObject {
             transfer: opened.transfer,
             reduced: opened.reduced,
             content: Content::Photo(Box::new(Cut {
-                shown: opened.shown,
+                shown: on_screen(&opened.image),
                 mask,
                 photo: None,
                 preview: None,
@@ -302,17 +297,21 @@ pub(super) struct OpenedFile {
     pub(super) name: String,
     pub(super) bytes: Vec<u8>,
     pub(super) transfer: Option<Transfer>,
-    pub(super) shown: RgbImage,
-    pub(super) image: StoredImage,
+    pub(super) image: ColourImage,
     pub(super) reduced: bool,
 }
 
 impl OpenedFile {
-    /// Decodes a file, after it was made smaller where it is too large.
+    /// Decodes a file, after it was made smaller where it is too large. `transfer` says how integers are encoded, where the
+    /// file is not to be asked.
     ///
     /// # Errors
     /// Where it is no picture that can be read.
-    pub(super) fn read(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+    pub(super) fn read(
+        name: &str,
+        bytes: Vec<u8>,
+        transfer: Option<Transfer>,
+    ) -> Result<Self, StudioError> {
         let path = Path::new(name);
         let extent = stated_extent(&bytes);
         let has_at_most = |most: usize| {
@@ -328,39 +327,27 @@ impl OpenedFile {
                 most: MOST_READ,
             });
         }
-        let stated = stated_transfer(path, &bytes)?;
         // What says that it is small is not decoded to see whether it is.
         let smaller = if has_at_most(MOST_PIXELS) {
             None
         } else {
-            ReducedFile::of(path, &bytes, MOST_PIXELS)?
+            ReducedFile::of(path, &bytes, MOST_PIXELS, transfer)?
         };
         let reduced = smaller.is_some();
-        let (name, bytes) = match smaller {
-            Some(smaller) => (format!("{}.{}", stem(name), smaller.ending), smaller.bytes),
-            None => (name.to_owned(), bytes),
+        let (name, bytes, transfer) = match smaller {
+            Some(smaller) => {
+                let name = format!("{}.{}", stem(name), smaller.ending);
+                (name, smaller.bytes, None)
+            }
+            None => (name.to_owned(), bytes, transfer),
         };
-        let image = StoredImage::from_bytes(Path::new(&name), &bytes)?;
-        let transfer =
-            (image.samples == Samples::Integer && stated != Transfer::Srgb).then_some(stated);
         Ok(Self {
-            shown: on_screen(&image, transfer),
+            image: ColourImage::from_bytes(Path::new(&name), &bytes, transfer)?,
             transfer,
             name,
             bytes,
-            image,
             reduced,
         })
-    }
-
-    /// Its light.
-    pub(super) fn light(self) -> Rgb<Linear> {
-        let to_linear = match (self.image.samples, self.transfer) {
-            (Samples::Float, _) | (_, Some(Transfer::Linear)) => |value: f32| value,
-            (_, Some(Transfer::Gamma22)) => Gamma22::to_linear,
-            _ => Srgb::to_linear,
-        };
-        Rgb::new(self.image.planes.map(to_linear))
     }
 }
 

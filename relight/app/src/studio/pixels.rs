@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use image::{GrayImage, RgbImage};
 use relight_core::image::{
-    ColourSpace, Extent, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
+    ColourImage, ColourSpace, Extent, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage,
 };
 
 const OPAQUE: u8 = 255;
@@ -100,19 +100,12 @@ pub(super) fn without_alpha(rgba: &[u8]) -> (Vec<u8>, bool) {
     (colours, pixels().any(|p| p[3] != OPAQUE))
 }
 
-/// A stored picture in 8 bits, as a screen shows it.
-pub(super) fn on_screen(image: &StoredImage, transfer: Option<Transfer>) -> RgbImage {
-    let is_linear = match image.samples {
-        Samples::Float => true,
-        Samples::Integer => transfer == Some(Transfer::Linear),
-    };
-    let planes = if is_linear {
-        image.planes.clone().map(Srgb::from_linear).to_bytes()
-    } else {
-        image.planes.to_bytes()
-    };
-    let extent = image.planes.extent();
-    RgbImage::from_raw(extent.width as u32, extent.height as u32, planes).unwrap_or_default()
+/// A picture in 8 bits, as a screen shows it.
+pub(super) fn on_screen(image: &ColourImage) -> RgbImage {
+    let planes = image.to_srgb().into_planes();
+    let extent = planes.extent();
+    RgbImage::from_raw(extent.width as u32, extent.height as u32, planes.to_bytes())
+        .unwrap_or_default()
 }
 
 /// A picture in 8 bits with full alpha.

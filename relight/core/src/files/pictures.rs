@@ -9,8 +9,8 @@ use relit_data::durable::{Partial, write_whole};
 use super::parent::make_parent;
 use crate::captured_object::{CapturedObject, CapturedObjectError};
 use crate::image::{
-    Depth, Extent, Gamma22, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
-    encode_exr, encode_jpeg, encode_png, encode_png_of,
+    ColourImage, Depth, Extent, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage,
+    Transfer, encode_exr, encode_jpeg, encode_png, encode_png_of,
 };
 use crate::light::{LightFileError, Normals, Panorama, PanoramaError, ShLight, YAxis};
 
@@ -83,19 +83,28 @@ impl StoredImage {
     }
 }
 
+impl ColourImage {
+    /// Reads a picture; see [`ColourImage::from_bytes`].
+    ///
+    /// # Errors
+    /// Where the file cannot be read or is no image of a known format, or its colours cannot be converted.
+    pub fn read(path: &Path, transfer: Option<Transfer>) -> Result<Self, ImageError> {
+        let bytes = fs::read(path).map_err(|source| ImageError::Open {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::from_bytes(path, &bytes, transfer)
+    }
+}
+
 impl Rgb<Linear> {
-    /// Reads a PNG, JPEG or WebP, whose values are encoded as `transfer` says, or an EXR or HDR, which are
-    /// linear. Alpha is left out; grey becomes three equal channels.
+    /// Reads the light of a file whose integers are encoded as `transfer` says, whatever the file says; see
+    /// [`ColourImage::from_bytes`]. Alpha is left out; grey becomes three equal channels.
     ///
     /// # Errors
     /// Where the file cannot be read or is no image of these formats.
     pub fn read(path: &Path, transfer: Transfer) -> Result<Self, ImageError> {
-        let (planes, samples) = read_planes(path)?;
-        Ok(match (samples, transfer) {
-            (Samples::Float, _) | (Samples::Integer, Transfer::Linear) => Self::new(planes),
-            (Samples::Integer, Transfer::Srgb) => Rgb::<Srgb>::new(planes).to_linear(),
-            (Samples::Integer, Transfer::Gamma22) => Rgb::<Gamma22>::new(planes).to_linear(),
-        })
+        Ok(ColourImage::read(path, Some(transfer))?.into_light())
     }
 
     /// Writes the light as it is, in 32-bit floating point values.

@@ -1,16 +1,11 @@
-//! Encoded pictures: PNG, JPEG, WebP, EXR and HDR in, JPEG and EXR out. Knows bytes only: a path is how errors name a picture.
+//! Encoded pictures: what `relit-still` decodes in, JPEG and EXR out. Knows bytes only: a path is how errors name a picture.
 
 use std::io::Cursor;
 use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
-use image::metadata::Orientation;
-use image::{
-    DynamicImage, ImageBuffer, ImageDecoder, ImageEncoder, ImageFormat, ImageReader, Limits, Pixel,
-    Rgb,
-};
+use image::{DynamicImage, ImageBuffer, ImageEncoder, ImageFormat, Pixel, Rgb};
 
-use super::wholeness::is_cut_off;
 use super::{Extent, ImageError, Planes};
 
 /// The quality of a JPEG, 1 to 100: differences are not seen, and a file is a third of a PNG's.
@@ -82,7 +77,8 @@ impl Planes<3> {
     }
 }
 
-/// An image as it is stored, without any conversion of colour.
+/// An image as it is stored, without any conversion of colour: a mask, normals, or what else has no colours. Where it has
+/// some see [`ColourImage`](super::ColourImage).
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredImage {
     /// The colours: integers scaled to 0 to 1, floating point values as they are. Grey is three equal
@@ -95,7 +91,7 @@ pub struct StoredImage {
 }
 
 impl StoredImage {
-    /// Decodes the content of a file, turned as its Exif orientation says. Colours of an EXR with alpha, which that
+    /// Decodes the content of a file, turned as it is displayed. Colours of an EXR with alpha, which that
     /// format holds multiplied with it, are divided by it. Errors name it as `path`.
     ///
     /// # Errors
@@ -136,47 +132,9 @@ impl StoredImage {
     }
 }
 
-/// Exif's number, 2 to 8, by which [`StoredImage::from_bytes`] turns a picture; none where it stands as it is stored, or its
-/// orientation cannot be read.
-#[must_use]
-pub fn exif_orientation(bytes: &[u8]) -> Option<u8> {
-    let reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .ok()?;
-    let stated = reader.into_decoder().ok()?.orientation().ok()?;
-    (stated != Orientation::NoTransforms).then(|| stated.to_exif())
-}
-
 /// The picture as it is displayed.
 pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<DynamicImage, ImageError> {
-    let open = |source| ImageError::Open {
-        path: path.to_owned(),
-        source,
-    };
-    let decode = |source| {
-        let path = path.to_owned();
-        match source {
-            ::image::ImageError::Limits(_) => ImageError::TooLarge { path },
-            source => ImageError::Decode { path, source },
-        }
-    };
-    let reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(open)?;
-    let format = reader.format();
-    let mut decoder = reader.into_decoder().map_err(decode)?;
-    let mut limits = Limits::default();
-    limits.reserve(decoder.total_bytes()).map_err(decode)?;
-    if is_cut_off(format, bytes) {
-        return Err(ImageError::CutOff {
-            path: path.to_owned(),
-        });
-    }
-    // A file whose orientation cannot be read is shown as it is stored.
-    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let mut image = DynamicImage::from_decoder(decoder).map_err(decode)?;
-    image.apply_orientation(orientation);
-    Ok(image)
+    relit_still::decode(bytes).map_err(ImageError::still(path))
 }
 
 fn split<P: Pixel<Subpixel = f32>, const C: usize>(image: &ImageBuffer<P, Vec<f32>>) -> Planes<C> {

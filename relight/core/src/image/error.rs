@@ -1,7 +1,9 @@
 //! What can be wrong with an image or its file.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use relit_still::{ColourError, StillError};
 
 use relit_data::mask::MaskFault;
 
@@ -52,7 +54,7 @@ pub enum ImageError {
         source: io::Error,
     },
     /// The file is not an image of a known format.
-    #[error("{} is not a readable PNG, JPEG, WebP, EXR or HDR image", path.display())]
+    #[error("{} is not a readable PNG, JPEG, WebP, TIFF, BMP, GIF, EXR or HDR image", path.display())]
     Decode {
         /// The file.
         path: PathBuf,
@@ -64,6 +66,22 @@ pub enum ImageError {
     CutOff {
         /// The file.
         path: PathBuf,
+    },
+    /// The image is in a format or form that is known and not read.
+    #[error("{} {fault}", path.display())]
+    Form {
+        /// The file.
+        path: PathBuf,
+        /// What it is, and what to do.
+        fault: StillError,
+    },
+    /// The image's colours cannot be converted.
+    #[error("{} {fault}: convert it to sRGB", path.display())]
+    Colour {
+        /// The file.
+        path: PathBuf,
+        /// What it says of its colours.
+        fault: ColourError,
     },
     /// The image has more pixels than are read.
     #[error("{} is too large: its pixels would take more than 512 MiB of memory", path.display())]
@@ -95,4 +113,17 @@ pub enum ImageError {
         /// What the system answers.
         source: io::Error,
     },
+}
+
+impl ImageError {
+    /// Puts the path to what is wrong with its content.
+    pub(super) fn still(path: &Path) -> impl FnOnce(StillError) -> Self {
+        let path = path.to_owned();
+        |fault| match fault {
+            StillError::Decode(source) => Self::Decode { path, source },
+            StillError::CutOff => Self::CutOff { path },
+            StillError::TooLarge => Self::TooLarge { path },
+            fault => Self::Form { path, fault },
+        }
+    }
 }

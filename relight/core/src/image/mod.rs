@@ -2,6 +2,7 @@
 
 mod codec;
 mod colour;
+mod colour_image;
 mod error;
 mod extent;
 mod mask;
@@ -9,10 +10,10 @@ mod planes;
 mod png_rows;
 mod reduced;
 mod resize;
-mod wholeness;
 
-pub use codec::{Depth, Samples, StoredImage, encode_exr, encode_jpeg, exif_orientation};
+pub use codec::{Depth, Samples, StoredImage, encode_exr, encode_jpeg};
 pub use colour::{ColourSpace, Gamma22, Linear, Rgb, Srgb, Transfer};
+pub use colour_image::ColourImage;
 pub use error::ImageError;
 pub use extent::Extent;
 pub use planes::Planes;

@@ -6,8 +6,11 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::imageops::FilterType as Kernel;
 use image::{ColorType, DynamicImage};
 
-use super::codec::{decode, encode_exr};
-use super::{Extent, ImageError, StoredImage};
+use relit_still::Colour;
+
+use super::codec::{decode, encode_exr, to_integer};
+use super::colour_image::colour_of;
+use super::{ColourImage, ColourSpace, Extent, ImageError, Srgb, Transfer};
 
 /// A picture that was made smaller.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,13 +22,18 @@ pub struct ReducedFile {
 }
 
 impl ReducedFile {
-    /// The picture of a file with at most so many pixels, turned as its Exif orientation says; none where the file has no
-    /// more, or has floating point values with alpha. Integers stay encoded as they are, and are averaged so. Errors name it as
-    /// `path`.
+    /// The picture of a file with at most so many pixels, turned as it is displayed; none where the file has no more, or has
+    /// floating point values with alpha. Integers are averaged as they are encoded, and become sRGB where they are none;
+    /// what they stand for says `transfer`, or else the file. Errors name it as `path`.
     ///
     /// # Errors
-    /// Where it is no image of a known format, too large, or cut off.
-    pub fn of(path: &Path, bytes: &[u8], most: usize) -> Result<Option<Self>, ImageError> {
+    /// Where it is no image of a known format, too large or cut off, or its colours cannot be converted.
+    pub fn of(
+        path: &Path,
+        bytes: &[u8],
+        most: usize,
+        transfer: Option<Transfer>,
+    ) -> Result<Option<Self>, ImageError> {
         let image = decode(path, bytes)?;
         let [width, height] = [image.width(), image.height()];
         let pixels = f64::from(width) * f64::from(height);
@@ -39,9 +47,9 @@ impl ReducedFile {
             // What resizes integers clips values beyond 1.
             ColorType::Rgb32F => {
                 let extent = Extent::new(width as usize, height as usize);
-                let planes = StoredImage::from_bytes(path, bytes)?.planes;
+                let light = ColourImage::from_bytes(path, bytes, None)?.into_light();
                 Ok(Some(Self {
-                    bytes: encode_exr(path, &planes.resized(extent))?,
+                    bytes: encode_exr(path, &light.planes().resized(extent))?,
                     ending: "exr",
                 }))
             }
@@ -49,6 +57,7 @@ impl ReducedFile {
                 let smaller = image.resize_exact(width, height, Kernel::Triangle);
                 // Half of the memory is free again before the picture is encoded.
                 drop(image);
+                let smaller = in_srgb(smaller, &colour_of(path, bytes, transfer)?);
                 Ok(Some(Self {
                     bytes: png(path, smaller)?,
                     ending: "png",
@@ -70,6 +79,31 @@ fn png(path: &Path, image: DynamicImage) -> Result<Vec<u8>, ImageError> {
     Ok(file)
 }
 
+/// The same in sRGB, with 16 bits where anything changes.
+fn in_srgb(image: DynamicImage, colour: &Colour) -> DynamicImage {
+    if colour.is_srgb() {
+        return image;
+    }
+    let has_alpha = image.color().has_alpha();
+    let mut pixels = image.into_rgba16();
+    let planes: [Vec<f32>; 3] = [0, 1, 2].map(|channel| {
+        let values = pixels.pixels().map(|pixel| pixel.0[channel]);
+        values.map(|value| f32::from(value) / 65535.0).collect()
+    });
+    let [mut red, mut green, mut blue] = planes;
+    colour.to_light([&mut red, &mut green, &mut blue]);
+    for (channel, plane) in [red, green, blue].into_iter().enumerate() {
+        for (pixel, light) in pixels.pixels_mut().zip(plane) {
+            pixel.0[channel] = to_integer(Srgb::from_linear(light), 65535.0) as u16;
+        }
+    }
+    if has_alpha {
+        DynamicImage::ImageRgba16(pixels)
+    } else {
+        DynamicImage::ImageRgb16(DynamicImage::ImageRgba16(pixels).into_rgb16())
+    }
+}
+
 /// Colours with alpha where there is some.
 fn plain(image: DynamicImage) -> DynamicImage {
     match image.color() {
@@ -82,7 +116,7 @@ fn plain(image: DynamicImage) -> DynamicImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::{Planes, encode_jpeg};
+    use crate::image::{Planes, StoredImage, encode_jpeg};
 
     fn ramp(extent: Extent) -> Planes<3> {
         Planes::from_fn(extent, |x, y| {
@@ -98,8 +132,8 @@ mod tests {
     fn a_large_picture_is_made_as_small_as_it_has_to_be() {
         let path = Path::new("a.jpg");
         let file = encode_jpeg(path, &ramp(Extent::new(300, 200))).unwrap();
-        assert_eq!(ReducedFile::of(path, &file, 60_000).unwrap(), None);
-        let reduced = ReducedFile::of(path, &file, 15_000).unwrap().unwrap();
+        assert_eq!(ReducedFile::of(path, &file, 60_000, None).unwrap(), None);
+        let reduced = ReducedFile::of(path, &file, 15_000, None).unwrap().unwrap();
         assert_eq!(reduced.ending, "png");
         let image = StoredImage::from_bytes(path, &reduced.bytes).unwrap();
         assert_eq!(image.planes.extent(), Extent::new(150, 100));
@@ -115,7 +149,7 @@ mod tests {
         let path = Path::new("a.exr");
         let bright = ramp(Extent::new(40, 40)).map(|value| value * 7.0);
         let file = encode_exr(path, &bright).unwrap();
-        let reduced = ReducedFile::of(path, &file, 400).unwrap().unwrap();
+        let reduced = ReducedFile::of(path, &file, 400, None).unwrap().unwrap();
         assert_eq!(reduced.ending, "exr");
         let image = StoredImage::from_bytes(path, &reduced.bytes).unwrap();
         assert!(image.planes.pixel(19, 0)[0] > 6.0);
@@ -123,6 +157,6 @@ mod tests {
 
     #[test]
     fn what_is_no_picture_is_refused() {
-        assert!(ReducedFile::of(Path::new("a.png"), b"no picture", 1).is_err());
+        assert!(ReducedFile::of(Path::new("a.png"), b"no picture", 1, None).is_err());
     }
 }

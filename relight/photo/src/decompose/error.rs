@@ -13,6 +13,7 @@ use relight_nets::NetError;
 #[cfg(feature = "files")]
 use relight_reader::{DamagedSample, OpenError};
 use relit_data::mask::size_hint;
+use relit_still::ColourError;
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]
@@ -23,7 +24,7 @@ pub enum DecomposeError {
     Net(#[from] NetError),
     /// An image cannot be read or written.
     #[error(transparent)]
-    Image(#[from] ImageError),
+    Image(ImageError),
     /// A mask belongs to another picture.
     #[error(
         "the mask has {} x {} pixels, and the photograph {} x {}{}",
@@ -128,27 +129,13 @@ pub enum DecomposeError {
         /// Where it should be.
         path: PathBuf,
     },
-    /// A file says that its values are encoded in a way that is not known here.
-    #[error(
-        "{} says that its values are encoded by the power 1 / {gamma}: say by --transfer how to read them",
-        path.display()
-    )]
-    UnknownGamma {
+    /// A file says of its colours what is not converted.
+    #[error("{} {fault}: convert it to sRGB or EXR, or say by --transfer how to read it", path.display())]
+    Colour {
         /// The photograph.
         path: PathBuf,
-        /// The gamma of its file.
-        gamma: f32,
-    },
-    /// A file says that its values are encoded by a transfer function that is not read.
-    #[error(
-        "{} says that its values are encoded by {transfer}: convert it to sRGB or EXR, or say by --transfer how to read it",
-        path.display()
-    )]
-    UnknownTransfer {
-        /// The photograph.
-        path: PathBuf,
-        /// The transfer function's name.
-        transfer: String,
+        /// What it says.
+        fault: ColourError,
     },
     /// There are no photographs.
     #[error("{} holds no photographs (.png, .jpg, .webp, .exr, .hdr) and no shards (.tar)", path.display())]
@@ -262,6 +249,15 @@ impl From<FolderFault> for DecomposeError {
             FolderFault::NoFolder(path) => Self::NoFolder { path },
             FolderFault::Read(path, source) => Self::Read { path, source },
             FolderFault::Write(path, source) => Self::Write { path, source },
+        }
+    }
+}
+
+impl From<ImageError> for DecomposeError {
+    fn from(fault: ImageError) -> Self {
+        match fault {
+            ImageError::Colour { path, fault } => Self::Colour { path, fault },
+            fault => Self::Image(fault),
         }
     }
 }

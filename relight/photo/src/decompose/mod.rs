@@ -35,4 +35,4 @@ pub use light::PredictedLight;
 pub use mask::{MaskSource, Rectangle};
 #[cfg(feature = "files")]
 pub(crate) use photo::stem;
-pub use photo::{Photo, PhotoHints, stated_extent, stated_transfer};
+pub use photo::{Photo, PhotoHints, stated_extent};

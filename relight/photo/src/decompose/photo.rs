@@ -1,21 +1,14 @@
 //! A photograph with its mask, out of the content of its file.
 
-use std::io::Cursor;
 use std::path::Path;
 
 use super::decomposer::{DecomposeOptions, check_size};
 use super::error::DecomposeError;
 use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty};
 use relight_core::image::{
-    ColourSpace, Extent, Gamma22, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer,
-    exif_orientation,
+    ColourImage, ColourSpace, Extent, Linear, Planes, Rgb, Srgb, StoredImage, Transfer,
 };
 use relit_data::image_stats::SATURATED_VALUE;
-
-/// The transfer function of ITU-T H.273 that says nothing.
-const UNSPECIFIED: u8 = 2;
-/// How far a gamma may be from one that is known.
-const SAME_GAMMA: f32 = 0.02;
 
 /// A picture with its mask.
 #[derive(Debug, Clone)]
@@ -61,23 +54,20 @@ impl Photo {
         if let Some(extent) = stated_extent(bytes) {
             check_size("photograph", extent)?;
         }
-        let image = StoredImage::from_bytes(path, bytes)?;
-        let transfer = match (image.samples, hints.transfer) {
-            (Samples::Float, _) => None,
-            (Samples::Integer, Some(transfer)) => Some(transfer),
-            (Samples::Integer, None) => Some(stated_transfer(path, bytes)?),
-        };
+        let image = ColourImage::from_bytes(path, bytes, hints.transfer)?;
+        let extent = image.stored().planes.extent();
+        let alpha = image.stored().alpha.clone();
         let mut mask_note = None;
         let (mask, mask_source) = match hints.mask {
             Some((path, mask)) => {
-                check_extent(mask.planes.extent(), image.planes.extent(), bytes)?;
+                check_extent(mask.planes.extent(), extent, bytes)?;
                 let (mask, basis) = mask.object_mask(path)?;
                 mask_note = basis.note();
                 (mask, MaskSource::File)
             }
             None => {
-                let encoded = shown(&image.planes, transfer);
-                find_mask(&encoded, image.alpha.as_ref(), hints.rectangle).map_err(|why| {
+                let encoded = image.to_srgb().into_planes();
+                find_mask(&encoded, alpha.as_ref(), hints.rectangle).map_err(|why| {
                     let path = path.to_owned();
                     match why {
                         NoObject::Background => DecomposeError::NoMask { path },
@@ -89,16 +79,13 @@ impl Photo {
         check_mask(&mask, hints.rectangle)?;
         Ok(Self {
             name: stem(path),
-            picture: Rgb::new(image.planes.map(to_linear(transfer))),
+            // There is no largest value in floating point: what a screen shows as white counts.
+            saturated_from: image.light_at(SATURATED_VALUE),
+            picture: image.into_light(),
             mask,
             mask_source,
             mask_note,
-            alpha: image.alpha,
-            saturated_from: match transfer {
-                // There is no largest value in floating point: what a screen shows as white counts.
-                None => Srgb::to_linear(SATURATED_VALUE),
-                Some(_) => to_linear(transfer)(SATURATED_VALUE),
-            },
+            alpha,
             saturated_fraction: None,
         })
     }
@@ -162,9 +149,8 @@ pub(crate) fn stem(path: &Path) -> String {
 /// The size that a file says it has; none where it cannot be read.
 #[must_use]
 pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
-    let reader = ::image::ImageReader::new(Cursor::new(bytes));
-    let sides = reader.with_guessed_format().ok()?.into_dimensions().ok()?;
-    Some(Extent::new(sides.0 as usize, sides.1 as usize))
+    let (width, height) = relit_still::stored_size(bytes)?;
+    Some(Extent::new(width as usize, height as usize))
 }
 
 /// That a mask has the photograph's size. One of a photograph that was not turned as its Exif orientation says is told from
@@ -172,7 +158,8 @@ pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
 fn check_extent(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), DecomposeError> {
     let is_turned = found == Extent::new(expected.height, expected.width) && found != expected;
     // Exif's orientations from 5 on swap the sides.
-    if is_turned && exif_orientation(bytes).is_some_and(|number| number >= 5) {
+    let orientation = relit_still::orientation(bytes).map(relit_still::Orientation::to_exif);
+    if is_turned && orientation.is_some_and(|number| number >= 5) {
         return Err(DecomposeError::MaskStored { found, expected });
     }
     match found == expected {
@@ -211,77 +198,4 @@ fn check_mask(mask: &Planes<1>, rectangle: Option<Rectangle>) -> Result<(), Deco
             photo: mask.extent(),
         }),
     }
-}
-
-/// What turns a file's values into light.
-fn to_linear(transfer: Option<Transfer>) -> fn(f32) -> f32 {
-    match transfer {
-        None | Some(Transfer::Linear) => Linear::to_linear,
-        Some(Transfer::Srgb) => Srgb::to_linear,
-        Some(Transfer::Gamma22) => Gamma22::to_linear,
-    }
-}
-
-/// The picture's values as a screen takes them.
-fn shown(planes: &Planes<3>, transfer: Option<Transfer>) -> Planes<3> {
-    match transfer {
-        None | Some(Transfer::Linear) => planes.clone().map(Srgb::from_linear),
-        Some(_) => planes.clone(),
-    }
-}
-
-/// How a file of integers says that they are encoded; sRGB where it says nothing. Errors name it as `path`.
-///
-/// A PNG says it by the chunks cICP, sRGB or gAMA. 1 / 2.2 in gAMA is what programs write for sRGB.
-///
-/// # Errors
-/// Where it says what is not read.
-pub fn stated_transfer(path: &Path, bytes: &[u8]) -> Result<Transfer, DecomposeError> {
-    // What is no PNG says nothing.
-    let Ok(reader) = png::Decoder::new(Cursor::new(bytes)).read_info() else {
-        return Ok(Transfer::Srgb);
-    };
-    let info = reader.info();
-    if let Some(points) = info.coding_independent_code_points
-        && points.transfer_function != UNSPECIFIED
-    {
-        return transfer_of_points(points.transfer_function).map_err(|transfer| {
-            DecomposeError::UnknownTransfer {
-                path: path.to_owned(),
-                transfer,
-            }
-        });
-    }
-    let gamma = match info.gama_chunk {
-        Some(gamma) if info.srgb.is_none() => gamma.into_value(),
-        _ => return Ok(Transfer::Srgb),
-    };
-    let near = |known: f32| (gamma / known - 1.0).abs() < SAME_GAMMA;
-    if near(1.0) {
-        Ok(Transfer::Linear)
-    } else if near(1.0 / 2.2) {
-        Ok(Transfer::Srgb)
-    } else {
-        Err(DecomposeError::UnknownGamma {
-            path: path.to_owned(),
-            gamma: 1.0 / gamma,
-        })
-    }
-}
-
-/// What a transfer function of ITU-T H.273 is read as, or its name where it is not read. Those of BT.709 and its like
-/// are shown as sRGB is.
-fn transfer_of_points(function: u8) -> Result<Transfer, String> {
-    let name = match function {
-        8 => return Ok(Transfer::Linear),
-        4 => return Ok(Transfer::Gamma22),
-        1 | 6 | 7 | 11..=15 => return Ok(Transfer::Srgb),
-        5 => "the power 1 / 2.8",
-        9 | 10 => "a logarithm",
-        16 => "PQ",
-        17 => "SMPTE ST 428-1",
-        18 => "HLG",
-        _ => "an unknown function",
-    };
-    Err(format!("{name} (transfer function {function} in cICP)"))
 }

@@ -1,17 +1,18 @@
 //! What objects are put before, out of a file.
 
+use std::fs;
 use std::path::Path;
 
 use relight_core::files::MovieReader;
-use relight_core::image::{Extent, Linear, Rgb, StoredImage, Transfer};
+use relight_core::image::{ColourImage, Extent, ImageError, Linear, Rgb};
 use relight_core::light::Panorama;
 use relit_data::file_names::{VIDEO_EXTENSIONS, has_extension};
+use relit_still::Format;
 
 use super::InsertionError;
+use crate::decompose::stated_extent;
 use crate::insert::{PanoramaView, SceneDescription};
 
-/// How the files of panoramas end.
-const PANORAMAS: [&str; 2] = ["hdr", "exr"];
 
 /// A background out of a file.
 #[derive(Debug)]
@@ -33,14 +34,16 @@ impl BackgroundFile {
         if has_extension(path, &VIDEO_EXTENSIONS) {
             return Ok(Self::Movie(Box::new(MovieReader::open(path)?)));
         }
-        if has_extension(path, &PANORAMAS) {
-            let Extent { width, height } = StoredImage::read(path)?.planes.extent();
-            if width == 2 * height {
-                let view = PanoramaView::new(scene.panorama_extent(), scene.field, scene.down);
-                return Ok(Self::Panorama(Box::new((view, Panorama::read(path)?))));
-            }
+        let bytes = fs::read(path).map_err(|source| ImageError::Open {
+            path: path.to_owned(),
+            source,
+        })?;
+        if is_panorama(&bytes) {
+            let view = PanoramaView::new(scene.panorama_extent(), scene.field, scene.down);
+            let panorama = Panorama::from_bytes(path, &bytes)?;
+            return Ok(Self::Panorama(Box::new((view, panorama))));
         }
-        let picture = Rgb::<Linear>::read(path, Transfer::Srgb)?;
+        let picture = ColourImage::from_bytes(path, &bytes, None)?.into_light();
         let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
         if !picture.planes().planes().into_iter().all(is_light) {
             return Err(InsertionError::NotLight {
@@ -49,4 +52,11 @@ impl BackgroundFile {
         }
         Ok(Self::Photo(picture))
     }
+}
+
+/// Whether a file is a picture of radiance that is twice as wide as high.
+fn is_panorama(bytes: &[u8]) -> bool {
+    let is_radiance = matches!(Format::of(bytes), Some(Format::Exr | Format::Radiance));
+    let is_wide = |extent: Extent| extent.width == 2 * extent.height;
+    is_radiance && stated_extent(bytes).is_some_and(is_wide)
 }

@@ -5,12 +5,11 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use relight_core::image::{
-    Extent, ImageError, Planes, Rgb, StoredImage, Transfer, exif_orientation,
-};
+use relight_core::image::{Extent, ImageError, Planes, Rgb, StoredImage, Transfer};
 use relight_reader::{Encoding, SampleId, Source, Turns};
 use relit_data::file_names::{alike_beside, folded, has_extension, is_hidden};
 use relit_data::shard::Dataset;
+use relit_still::Orientation;
 
 use super::mask_record::check_turned;
 use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
@@ -210,7 +209,8 @@ fn read_file(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErro
     let mask = match &reading.mask {
         Some(file) => {
             let file = mask_file(file, &stem(path))?;
-            check_turned(&file, path, exif_orientation(&bytes))?;
+            let orientation = relit_still::orientation(&bytes).map(Orientation::to_exif);
+            check_turned(&file, path, orientation)?;
             let image = StoredImage::read(&file)?;
             Some((file, image))
         }

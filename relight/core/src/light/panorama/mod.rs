@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use super::{Direction, LightError, ShLight};
 pub use sampler::{DrawnLight, LightSampler};
 
-use crate::image::{Extent, ImageError, Linear, Planes, Rgb, Samples, StoredImage};
+use crate::image::{ColourImage, Extent, ImageError, Linear, Planes, Rgb, Samples};
 
 /// Linear radiance from all around, as an equirectangular image of which every pixel has one radiance.
 ///
@@ -87,22 +87,20 @@ impl Panorama {
     /// # Errors
     /// Where it is no image, is of integers, is not twice as wide as high, or has values that are not finite.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, PanoramaError> {
-        let StoredImage {
-            planes, samples, ..
-        } = StoredImage::from_bytes(path, bytes)?;
-        if samples == Samples::Integer {
+        let image = ColourImage::from_bytes(path, bytes, None)?;
+        if image.stored().samples == Samples::Integer {
             return Err(PanoramaError::NotRadiance {
                 path: path.to_owned(),
             });
         }
-        let extent = planes.extent();
+        let extent = image.stored().planes.extent();
         if extent.width != 2 * extent.height || extent.height < LEAST_HEIGHT {
             return Err(PanoramaError::Shape {
                 path: path.to_owned(),
                 extent,
             });
         }
-        Self::new(Rgb::new(planes)).map_err(|source| PanoramaError::Light {
+        Self::new(image.into_light()).map_err(|source| PanoramaError::Light {
             path: path.to_owned(),
             source,
         })

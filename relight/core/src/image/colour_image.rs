@@ -1,0 +1,113 @@
+//! Pictures of colours, with what their files say that the numbers stand for.
+
+use std::path::Path;
+
+use relit_still::Colour;
+
+use super::{ColourSpace, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer};
+
+/// A picture of colours: its numbers as they are stored, and what they stand for.
+///
+/// ```
+/// use std::path::Path;
+/// use relight_core::image::{ColourImage, Depth, Extent, Planes, encode_png};
+///
+/// let path = Path::new("grey.png");
+/// let grey = Planes::filled(Extent::new(2, 2), [0.5; 3]);
+/// let file = encode_png(path, &grey, Depth::Eight).unwrap();
+/// let light = ColourImage::from_bytes(path, &file, None).unwrap().into_light();
+/// assert!((light.planes().pixel(0, 0)[0] - 0.216).abs() < 1e-3);
+/// ```
+#[derive(Debug, Clone)]
+pub struct ColourImage {
+    stored: StoredImage,
+    colour: Colour,
+}
+
+impl ColourImage {
+    /// Decodes the content of a file. What integers stand for says `transfer`, or else the file: a colour profile or a
+    /// statement of another kind; without any they are sRGB. Floating point values are light, in the primaries that the
+    /// file states. Errors name it as `path`.
+    ///
+    /// # Errors
+    /// Where it is no image of a known format, too large or cut off, or its colours cannot be converted.
+    pub fn from_bytes(
+        path: &Path,
+        bytes: &[u8],
+        transfer: Option<Transfer>,
+    ) -> Result<Self, ImageError> {
+        let stored = StoredImage::from_bytes(path, bytes)?;
+        let transfer = transfer.filter(|_| stored.samples == Samples::Integer);
+        let colour = colour_of(path, bytes, transfer)?;
+        Ok(Self { stored, colour })
+    }
+
+    /// The numbers and alpha as they are stored.
+    #[must_use]
+    pub const fn stored(&self) -> &StoredImage {
+        &self.stored
+    }
+
+    /// The light.
+    #[must_use]
+    pub fn into_light(self) -> Rgb<Linear> {
+        let Self { stored, colour } = self;
+        in_light(stored.planes, &colour, stored.samples)
+    }
+
+    /// The light, while the picture is kept.
+    #[must_use]
+    pub fn to_light(&self) -> Rgb<Linear> {
+        in_light(
+            self.stored.planes.clone(),
+            &self.colour,
+            self.stored.samples,
+        )
+    }
+
+    /// The values as a screen takes them: sRGB. Beyond 1 in floating point.
+    #[must_use]
+    pub fn to_srgb(&self) -> Rgb<Srgb> {
+        if self.colour.is_srgb() {
+            return Rgb::new(self.stored.planes.clone());
+        }
+        self.to_light().encode()
+    }
+
+    /// The light of a neutral pixel that is stored as `level`. Where values are floating point, of one that a screen shows
+    /// with that level.
+    #[must_use]
+    pub fn light_at(&self, level: f32) -> f32 {
+        if self.stored.samples == Samples::Float {
+            return Srgb::to_linear(level);
+        }
+        let [mut red, mut green, mut blue] = [[level]; 3];
+        self.colour.to_light([&mut red, &mut green, &mut blue]);
+        red[0].min(green[0]).min(blue[0])
+    }
+}
+
+fn in_light(mut planes: Planes<3>, colour: &Colour, samples: Samples) -> Rgb<Linear> {
+    match samples {
+        Samples::Integer => colour.to_light(planes.planes_mut()),
+        Samples::Float => colour.to_open_light(planes.planes_mut()),
+    }
+    Rgb::new(planes)
+}
+
+/// What the numbers of a file stand for: as `transfer` says, or else the file.
+pub(super) fn colour_of(
+    path: &Path,
+    bytes: &[u8],
+    transfer: Option<Transfer>,
+) -> Result<Colour, ImageError> {
+    match transfer {
+        Some(Transfer::Linear) => Ok(Colour::LINEAR),
+        Some(Transfer::Srgb) => Ok(Colour::SRGB),
+        Some(Transfer::Gamma22) => Ok(Colour::GAMMA22),
+        None => Colour::of_file(bytes).map_err(|fault| ImageError::Colour {
+            path: path.to_owned(),
+            fault,
+        }),
+    }
+}

@@ -1,0 +1,149 @@
+//! Colour profiles of the International Color Consortium, by the library moxcms.
+
+use moxcms::{
+    ColorProfile, DataColorSpace, Layout, LocalizableString, ProfileClass, ProfileText,
+    ToneReprCurve, TransferCharacteristics, TransformOptions,
+};
+
+use super::primaries::{inverse, multiply, significant};
+use super::{Colour, Curve, Curves, Model, srgb_of_light};
+use crate::ColourError;
+
+/// How far a curve may be from sRGB's, encoded: about half a level of 8 bits.
+const SAME_CURVE: f32 = 0.6 / 255.0;
+
+/// What a profile says; `is_grey`: the picture has no colours.
+pub(super) fn colour_of_profile(icc: &[u8], is_grey: bool) -> Result<Colour, ColourError> {
+    let profile = ColorProfile::new_from_slice(icc).map_err(|_| ColourError::Profile)?;
+    check(&profile, is_grey)?;
+    if profile.color_space == DataColorSpace::Gray {
+        let curve = profile.gray_trc.as_ref().ok_or(ColourError::Profile)?;
+        return Ok(Colour::new(curve_of(curve)?, None));
+    }
+    let has_table = profile.lut_a_to_b_perceptual.is_some()
+        || profile.lut_a_to_b_colorimetric.is_some()
+        || profile.lut_a_to_b_saturation.is_some();
+    if has_table || !profile.is_matrix_shaper() {
+        return of_table(&profile);
+    }
+    of_matrix(&profile)
+}
+
+/// Refuses by its name what is not converted.
+fn check(profile: &ColorProfile, is_grey: bool) -> Result<(), ColourError> {
+    let wrong = |space| {
+        Err(ColourError::ProfileSpace {
+            name: name_of(profile),
+            space,
+        })
+    };
+    match profile.color_space {
+        DataColorSpace::Rgb => {}
+        DataColorSpace::Gray if is_grey => {}
+        DataColorSpace::Gray => return wrong("pictures without colours"),
+        DataColorSpace::Cmyk => return wrong("inks (CMYK)"),
+        DataColorSpace::Lab => return wrong("Lab"),
+        _ => return wrong("another kind of numbers"),
+    }
+    match profile.profile_class {
+        ProfileClass::InputDevice | ProfileClass::DisplayDevice | ProfileClass::ColorSpace => {}
+        _ => return wrong("conversions"),
+    }
+    let transfer = profile.cicp.map(|points| points.transfer_characteristics);
+    let transfer = match transfer {
+        Some(TransferCharacteristics::Smpte2084) => "PQ",
+        Some(TransferCharacteristics::Hlg) => "HLG",
+        _ => return Ok(()),
+    };
+    Err(ColourError::ProfileTransfer {
+        name: name_of(profile),
+        transfer,
+    })
+}
+
+fn of_matrix(profile: &ColorProfile) -> Result<Colour, ColourError> {
+    let own = profile.colorant_matrix().v;
+    let to_rec709 = inverse(&ColorProfile::new_srgb().colorant_matrix().v);
+    let matrix = multiply(&to_rec709.ok_or(ColourError::Profile)?, &own);
+    if inverse(&own).is_none() || matrix.iter().flatten().any(|value| !value.is_finite()) {
+        return Err(ColourError::Profile);
+    }
+    let curves = [&profile.red_trc, &profile.green_trc, &profile.blue_trc];
+    let curves = curves.map(|curve| curve_of(curve.as_ref().ok_or(ColourError::Profile)?));
+    let [red, green, blue] = curves;
+    let curves = match [red?, green?, blue?] {
+        [Curve::Srgb, Curve::Srgb, Curve::Srgb] => Curves::Same(Curve::Srgb),
+        [Curve::Linear, Curve::Linear, Curve::Linear] => Curves::Same(Curve::Linear),
+        curves => Curves::Each(curves),
+    };
+    Ok(Colour(Model::Shaper {
+        curves,
+        matrix: significant(matrix),
+    }))
+}
+
+fn of_table(profile: &ColorProfile) -> Result<Colour, ColourError> {
+    let srgb = ColorProfile::new_srgb();
+    let options = TransformOptions::default();
+    let table = profile.create_transform_f32(Layout::Rgb, &srgb, Layout::Rgb, options);
+    Ok(Colour(Model::Table(
+        table.map_err(|_| ColourError::Profile)?,
+    )))
+}
+
+/// A profile's curve, which is sRGB's or none where it is nearly that.
+fn curve_of(curve: &ToneReprCurve) -> Result<Curve, ColourError> {
+    let evaluator = curve
+        .make_linear_evaluator()
+        .map_err(|_| ColourError::Profile)?;
+    let at = |value: f32| evaluator.evaluate_value(value).clamp(0.0, 1.0);
+    let levels = (0..=255_u8).map(|level| f32::from(level) / 255.0);
+    if levels.clone().any(|value| !at(value).is_finite()) {
+        return Err(ColourError::Profile);
+    }
+    let is = |known: fn(f32) -> f32| {
+        let mut levels = levels.clone();
+        levels.all(|value| (known(at(value)) - value).abs() <= SAME_CURVE)
+    };
+    Ok(if is(srgb_of_light) {
+        Curve::Srgb
+    } else if is(|light| light) {
+        Curve::Linear
+    } else {
+        Curve::of_table(at)
+    })
+}
+
+/// What a profile calls itself.
+fn name_of(profile: &ColorProfile) -> String {
+    let english = |texts: &[LocalizableString]| {
+        let mut texts = texts.iter();
+        let first = texts.clone().next();
+        texts
+            .find(|text| text.language == "en")
+            .or(first)
+            .map(|text| text.value.clone())
+    };
+    let name = match &profile.description {
+        Some(ProfileText::PlainString(name)) => Some(name.clone()),
+        Some(ProfileText::Localizable(texts)) => english(texts),
+        Some(ProfileText::Description(text)) if !text.ascii_string.is_empty() => {
+            Some(text.ascii_string.clone())
+        }
+        Some(ProfileText::Description(text)) => Some(text.unicode_string.clone()),
+        None => None,
+    };
+    let is_printed = |c: &char| !c.is_control();
+    let name: String = name
+        .unwrap_or_default()
+        .chars()
+        .filter(is_printed)
+        .take(80)
+        .collect();
+    let name = name.trim();
+    if name.is_empty() {
+        "without a name".to_owned()
+    } else {
+        format!("\"{name}\"")
+    }
+}

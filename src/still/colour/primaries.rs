@@ -1,0 +1,239 @@
+//! Primaries and white, and the matrix that turns light in them into Rec. 709.
+
+use crate::ColourError;
+
+/// A matrix whose rows give red, green and blue of Rec. 709.
+pub(crate) type Matrix = [[f32; 3]; 3];
+type Exact = [[f64; 3]; 3];
+
+/// How far a matrix may be from one that changes nothing: half a level of 8 bits.
+const NOTHING: f64 = 2e-3;
+/// Bradford's cone responses.
+const BRADFORD: Exact = [
+    [0.8951, 0.2664, -0.1614],
+    [-0.7502, 1.7135, 0.0367],
+    [0.0389, -0.0685, 1.0296],
+];
+const D65: [f64; 2] = [0.3127, 0.3290];
+const EQUAL_ENERGY: [f64; 2] = [1.0 / 3.0, 1.0 / 3.0];
+
+/// The chromaticities x and y of three primaries and white.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Primaries {
+    pub(crate) red: [f64; 2],
+    pub(crate) green: [f64; 2],
+    pub(crate) blue: [f64; 2],
+    pub(crate) white: [f64; 2],
+}
+
+impl Primaries {
+    pub(crate) const REC709: Self = Self::d65([0.64, 0.33], [0.30, 0.60], [0.15, 0.06]);
+    pub(crate) const REC2020: Self = Self::d65([0.708, 0.292], [0.170, 0.797], [0.131, 0.046]);
+    pub(crate) const DISPLAY_P3: Self = Self::d65([0.680, 0.320], [0.265, 0.690], [0.150, 0.060]);
+    pub(crate) const ADOBE_RGB: Self = Self::d65([0.64, 0.33], [0.21, 0.71], [0.15, 0.06]);
+    /// CIE XYZ itself.
+    pub(crate) const XYZ: Self = Self {
+        red: [1.0, 0.0],
+        green: [0.0, 1.0],
+        blue: [0.0, 0.0],
+        white: EQUAL_ENERGY,
+    };
+
+    const fn d65(red: [f64; 2], green: [f64; 2], blue: [f64; 2]) -> Self {
+        Self {
+            red,
+            green,
+            blue,
+            white: D65,
+        }
+    }
+
+    /// The primaries of a number of ITU-T H.273; none where that says nothing.
+    pub(crate) fn of_code(code: u8) -> Result<Option<Self>, ColourError> {
+        let c = [0.310, 0.316];
+        Ok(Some(match code {
+            1 => Self::REC709,
+            2 => return Ok(None),
+            4 => Self {
+                red: [0.67, 0.33],
+                green: [0.21, 0.71],
+                blue: [0.14, 0.08],
+                white: c,
+            },
+            5 => Self::d65([0.64, 0.33], [0.29, 0.60], [0.15, 0.06]),
+            6 | 7 => Self::d65([0.630, 0.340], [0.310, 0.595], [0.155, 0.070]),
+            8 => Self {
+                red: [0.681, 0.319],
+                green: [0.243, 0.692],
+                blue: [0.145, 0.049],
+                white: c,
+            },
+            9 => Self::REC2020,
+            10 => Self::XYZ,
+            11 => Self {
+                white: [0.314, 0.351],
+                ..Self::DISPLAY_P3
+            },
+            12 => Self::DISPLAY_P3,
+            22 => Self::d65([0.630, 0.340], [0.295, 0.605], [0.155, 0.077]),
+            _ => {
+                let text = format!("unknown primaries (number {code} in cICP)");
+                return Err(ColourError::Space(text));
+            }
+        }))
+    }
+
+    /// The eight numbers in the order of files.
+    pub(crate) const fn from_numbers(n: [f64; 8]) -> Self {
+        Self {
+            red: [n[0], n[1]],
+            green: [n[2], n[3]],
+            blue: [n[4], n[5]],
+            white: [n[6], n[7]],
+        }
+    }
+
+    /// The matrix to Rec. 709, whose white these become; none where nothing would change.
+    pub(crate) fn to_rec709(self) -> Result<Option<Matrix>, ColourError> {
+        let impossible = || {
+            let pairs = [self.red, self.green, self.blue, self.white];
+            let pairs = pairs.map(|[x, y]| format!("{x:.4} {y:.4}"));
+            ColourError::Primaries(pairs.join(", "))
+        };
+        let matrix = self.matrix().ok_or_else(impossible)?;
+        Ok(significant(matrix))
+    }
+
+    fn matrix(self) -> Option<Exact> {
+        let own = multiply(&adaptation(self.white)?, &self.to_xyz()?);
+        Some(multiply(&inverse(&Self::REC709.to_xyz()?)?, &own))
+    }
+
+    /// From these primaries to XYZ.
+    fn to_xyz(self) -> Option<Exact> {
+        let columns = [self.red, self.green, self.blue].map(|[x, y]| [x, y, 1.0 - x - y]);
+        let rows = std::array::from_fn(|row| columns.map(|column| column[row]));
+        let scales = apply(&inverse(&rows)?, white_xyz(self.white)?);
+        Some(rows.map(|row| std::array::from_fn(|at| row[at] * scales[at])))
+    }
+}
+
+/// A matrix to Rec. 709; none where it changes nothing.
+pub(crate) fn significant(matrix: Exact) -> Option<Matrix> {
+    let changes = (0..3).any(|row| {
+        (0..3).any(|column| {
+            let same = f64::from(u8::from(row == column));
+            (matrix[row][column] - same).abs() > NOTHING
+        })
+    });
+    changes.then(|| matrix.map(|row| row.map(|value| value as f32)))
+}
+
+/// What makes a white D65, by Bradford's cone responses.
+fn adaptation(white: [f64; 2]) -> Option<Exact> {
+    let cones = |white| Some(apply(&BRADFORD, white_xyz(white)?));
+    let (from, to) = (cones(white)?, cones(D65)?);
+    let scaled: Exact =
+        std::array::from_fn(|row| BRADFORD[row].map(|value| value * to[row] / from[row]));
+    let adapted = multiply(&inverse(&BRADFORD)?, &scaled);
+    let is_finite = adapted.iter().flatten().all(|value| value.is_finite());
+    is_finite.then_some(adapted)
+}
+
+fn white_xyz([x, y]: [f64; 2]) -> Option<[f64; 3]> {
+    let is_possible = x.is_finite() && y > 1e-3 && x > 0.0 && x + y < 1.0;
+    is_possible.then(|| [x / y, 1.0, (1.0 - x - y) / y])
+}
+
+fn apply(matrix: &Exact, vector: [f64; 3]) -> [f64; 3] {
+    matrix.map(|row| row.iter().zip(vector).map(|(m, v)| m * v).sum())
+}
+
+pub(crate) fn multiply(a: &Exact, b: &Exact) -> Exact {
+    a.map(|row| std::array::from_fn(|column| (0..3).map(|k| row[k] * b[k][column]).sum()))
+}
+
+/// None where there is no inverse, or a number is none.
+pub(crate) fn inverse(m: &Exact) -> Option<Exact> {
+    let minor = |row: usize, column: usize| {
+        let (r, c) = (
+            [(row + 1) % 3, (row + 2) % 3],
+            [(column + 1) % 3, (column + 2) % 3],
+        );
+        m[r[0]][c[0]] * m[r[1]][c[1]] - m[r[0]][c[1]] * m[r[1]][c[0]]
+    };
+    let determinant: f64 = (0..3).map(|column| m[0][column] * minor(0, column)).sum();
+    let is_regular = determinant.is_finite() && determinant.abs() > 1e-6;
+    is_regular.then(|| {
+        std::array::from_fn(|row| std::array::from_fn(|column| minor(column, row) / determinant))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn light(primaries: Primaries, rgb: [f64; 3]) -> [f64; 3] {
+        apply(&primaries.matrix().unwrap(), rgb)
+    }
+
+    fn is_near(a: [f64; 3], b: [f64; 3], by: f64) -> bool {
+        a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by)
+    }
+
+    #[test]
+    fn the_matrices_are_those_of_the_literature() {
+        // BT.2087 and SMPTE EG 432.
+        let green = light(Primaries::REC2020, [0.0, 1.0, 0.0]);
+        assert!(
+            is_near(green, [-0.5876, 1.1329, -0.1006], 2e-4),
+            "{green:?}"
+        );
+        let red = light(Primaries::DISPLAY_P3, [1.0, 0.0, 0.0]);
+        assert!(is_near(red, [1.2249, -0.0420, -0.0197], 2e-4), "{red:?}");
+        // ACEScg to linear sRGB with Bradford.
+        let ap1 =
+            Primaries::from_numbers([0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767]);
+        let red = light(ap1, [1.0, 0.0, 0.0]);
+        assert!(is_near(red, [1.70505, -0.13026, -0.02400], 2e-4), "{red:?}");
+    }
+
+    #[test]
+    fn white_stays_white() {
+        for primaries in [Primaries::XYZ, Primaries::ADOBE_RGB, Primaries::REC2020] {
+            assert!(is_near(light(primaries, [1.0; 3]), [1.0; 3], 1e-9));
+        }
+    }
+
+    #[test]
+    fn what_would_change_nothing_is_no_matrix() {
+        assert_eq!(Primaries::REC709.to_rec709(), Ok(None));
+        let rounded = Primaries {
+            white: [0.312_71, 0.329_02],
+            ..Primaries::REC709
+        };
+        assert_eq!(rounded.to_rec709(), Ok(None));
+    }
+
+    #[test]
+    fn impossible_primaries_are_refused() {
+        let flat = Primaries {
+            green: [0.64, 0.33],
+            ..Primaries::REC709
+        };
+        let dark = Primaries {
+            white: [0.0, 0.0],
+            ..Primaries::REC709
+        };
+        let odd = Primaries {
+            red: [f64::NAN, 0.3],
+            ..Primaries::REC709
+        };
+        for primaries in [flat, dark, odd] {
+            assert!(matches!(
+                primaries.to_rec709(),
+                Err(ColourError::Primaries(_))
+            ));
+        }
+    }
+}

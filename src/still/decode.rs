@@ -1,0 +1,108 @@
+//! The content of a file as the picture that is displayed.
+
+use std::io::Cursor;
+
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+
+use crate::{Format, StillError, exr, isobmff, jpeg, png_exif, radiance};
+
+/// Decodes the content of a file, turned as it is displayed. The numbers stay as they are stored; what they stand for
+/// says [`crate::Colour::of_file`].
+///
+/// # Errors
+/// Where it is no picture of a format that is read, too large, or cut off.
+pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
+    let format = Format::of(bytes);
+    match format {
+        Some(Format::Radiance) => return radiance::decode(bytes),
+        Some(Format::Exr) => return exr::decode(bytes),
+        Some(format) if !format.is_read() => return Err(StillError::NotRead(format)),
+        _ => {}
+    }
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let reader = reader.map_err(|fault| StillError::Decode(ImageError::IoError(fault)))?;
+    let decoder = reader.into_decoder().map_err(decoding)?;
+    reserve(decoder.total_bytes())?;
+    let mut image = match format {
+        Some(Format::Jpeg) => {
+            let whole = jpeg::whole(bytes).ok_or(StillError::CutOff)?;
+            let reader = ImageReader::with_format(Cursor::new(&whole[..]), ImageFormat::Jpeg);
+            DynamicImage::from_decoder(reader.into_decoder().map_err(decoding)?)
+        }
+        Some(Format::WebP) if !fills_its_container(bytes) => return Err(StillError::CutOff),
+        _ => DynamicImage::from_decoder(decoder),
+    }
+    .map_err(decoding)?;
+    if let Some(orientation) = orientation(bytes) {
+        image.apply_orientation(orientation);
+    }
+    Ok(image)
+}
+
+/// How a picture is turned for display: by Exif, TIFF's tag, or the properties of AVIF and HEIF. None where it stands as
+/// it is stored, or where its orientation cannot be read.
+#[must_use]
+pub fn orientation(bytes: &[u8]) -> Option<Orientation> {
+    let stated = match Format::of(bytes)? {
+        Format::Avif | Format::Heic => isobmff::orientation(bytes)?,
+        Format::Png => Orientation::from_exif_chunk(png_exif::find(bytes)?)?,
+        Format::Jpeg | Format::WebP | Format::Tiff => {
+            let reader = ImageReader::new(Cursor::new(bytes))
+                .with_guessed_format()
+                .ok()?;
+            reader.into_decoder().ok()?.orientation().ok()?
+        }
+        _ => return None,
+    };
+    (stated != Orientation::NoTransforms).then_some(stated)
+}
+
+/// Width and height that a file says it has, before it is turned; none where they cannot be read.
+#[must_use]
+pub fn stored_size(bytes: &[u8]) -> Option<(u32, u32)> {
+    match Format::of(bytes)? {
+        Format::Radiance => radiance::size(bytes),
+        Format::Exr => exr::size(bytes),
+        _ => {
+            let reader = ImageReader::new(Cursor::new(bytes));
+            reader.with_guessed_format().ok()?.into_dimensions().ok()
+        }
+    }
+}
+
+/// Refuses pictures that take too much memory.
+pub(crate) fn reserve(bytes: u64) -> Result<(), StillError> {
+    Limits::default()
+        .reserve(bytes)
+        .map_err(|_| StillError::TooLarge)
+}
+
+fn decoding(fault: ImageError) -> StillError {
+    match fault {
+        ImageError::Limits(_) => StillError::TooLarge,
+        fault => StillError::Decode(fault),
+    }
+}
+
+/// Whether a WebP is as long as its RIFF header says.
+fn fills_its_container(bytes: &[u8]) -> bool {
+    match bytes.get(4..8) {
+        Some(&[a, b, c, d]) => {
+            bytes.len() as u64 >= 8 + u64::from(u32::from_le_bytes([a, b, c, d]))
+        }
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_webp_is_as_long_as_it_says() {
+        let whole = b"RIFF\x08\0\0\0WEBPVP8 ";
+        assert!(fills_its_container(whole));
+        assert!(!fills_its_container(&whole[..15]));
+    }
+}

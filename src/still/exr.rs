@@ -1,0 +1,259 @@
+//! OpenEXR: which of its channels are the picture, and their primaries.
+
+use std::io::Cursor;
+
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, Chromaticities, Text};
+use exr::meta::header::Header;
+use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, Vec2, read};
+use image::error::{DecodingError, ImageFormatHint};
+use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat, Rgb, Rgba};
+
+use crate::colour::{Matrix, Primaries};
+use crate::decode::reserve;
+use crate::{ColourError, StillError};
+
+/// Names of layers that are the picture itself, next to those that it was made of.
+const BEAUTY: [&str; 4] = ["combined", "beauty", "rgba", "main"];
+/// Bytes in which the names of channels stand.
+const HEAD: usize = 65_536;
+
+/// The names of the channels that are the picture.
+#[derive(Debug, Clone, PartialEq)]
+struct Channels {
+    colours: [Text; 3],
+    alpha: Option<Text>,
+}
+
+/// The matrix from the primaries that the file states to Rec. 709, which it has without a statement.
+pub(crate) fn to_rec709(bytes: &[u8]) -> Result<Option<Matrix>, ColourError> {
+    let Ok(meta) = MetaData::read_from_buffered(Cursor::new(bytes), false) else {
+        return Ok(None);
+    };
+    let Some(header) = choose(&meta)
+        .ok()
+        .and_then(|channels| header_of(&meta, &channels))
+    else {
+        return Ok(None);
+    };
+    let shared = &header.shared_attributes;
+    match (shared.chromaticities, interoperability(header)) {
+        (Some(chromaticities), _) => primaries_of(chromaticities).to_rec709(),
+        (None, Some(id)) => primaries_of_id(&id)?.to_rec709(),
+        (None, None) => Ok(None),
+    }
+}
+
+fn primaries_of(chromaticities: Chromaticities) -> Primaries {
+    let pair = |pair: Vec2<f32>| [pair.x(), pair.y()].map(f64::from);
+    Primaries {
+        red: pair(chromaticities.red),
+        green: pair(chromaticities.green),
+        blue: pair(chromaticities.blue),
+        white: pair(chromaticities.white),
+    }
+}
+
+/// The name of the colour space that newer programs write.
+fn interoperability(header: &Header) -> Option<String> {
+    let name = Text::from("colorInteropID");
+    let own = header.own_attributes.other.get(&name);
+    match own.or_else(|| header.shared_attributes.other.get(&name)) {
+        Some(AttributeValue::Text(text)) => Some(text.to_string()),
+        _ => None,
+    }
+}
+
+fn primaries_of_id(id: &str) -> Result<Primaries, ColourError> {
+    Ok(match id {
+        "lin_rec709_scene" | "data" | "unknown" | "" => Primaries::REC709,
+        "lin_rec2020_scene" => Primaries::REC2020,
+        "lin_p3d65_scene" => Primaries::DISPLAY_P3,
+        "lin_adobergb_scene" => Primaries::ADOBE_RGB,
+        "lin_ap1_scene" => {
+            Primaries::from_numbers([0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767])
+        }
+        "lin_ap0_scene" => {
+            Primaries::from_numbers([0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.0770, 0.32168, 0.33767])
+        }
+        _ => return Err(ColourError::Space(format!("{id} (colorInteropID)"))),
+    })
+}
+
+/// Width and height of what is displayed.
+pub(crate) fn size(bytes: &[u8]) -> Option<(u32, u32)> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).ok()?;
+    let size = meta.headers.first()?.shared_attributes.display_window.size;
+    Some((u32::try_from(size.x()).ok()?, u32::try_from(size.y()).ok()?))
+}
+
+/// The picture: colours, with alpha where there is some; a single channel becomes three equal ones.
+pub(crate) fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|fault| {
+        if has_chroma(bytes) {
+            StillError::Chroma
+        } else {
+            decoding(fault)
+        }
+    })?;
+    let channels = choose(&meta)?;
+    let header = header_of(&meta, &channels).ok_or_else(|| StillError::Channels(names(&meta)))?;
+    let window = header.shared_attributes.display_window;
+    let count = if channels.alpha.is_some() { 4 } else { 3 };
+    reserve((window.size.area() as u64).saturating_mul(4 * count as u64))?;
+    reserve((header.layer_size.area() as u64).saturating_mul(4 * count as u64))?;
+    let offset = header.own_attributes.layer_position - window.position;
+    let [red, green, blue] = channels.colours.clone();
+    let alpha = channels.alpha.clone();
+    let (width, height) = (window.size.x(), window.size.y());
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .specific_channels()
+        .required(red)
+        .required(green)
+        .required(blue)
+        .optional(alpha.unwrap_or_else(|| Text::from("A")), 1.0_f32)
+        .collect_pixels(
+            move |_, _| vec![0.0_f32; width * height * count],
+            move |pixels: &mut Vec<f32>, place, (r, g, b, a): (f32, f32, f32, f32)| {
+                let (x, y) = (
+                    place.x() as i64 + i64::from(offset.x()),
+                    place.y() as i64 + i64::from(offset.y()),
+                );
+                let inside =
+                    |at: i64, size: usize| usize::try_from(at).ok().filter(|&at| at < size);
+                if let (Some(x), Some(y)) = (inside(x, width), inside(y, height)) {
+                    let start = (y * width + x) * count;
+                    pixels[start..start + count].copy_from_slice(&[r, g, b, a][..count]);
+                }
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(decoding)?;
+    let values = image.layer_data.channel_data.pixels;
+    let side = |side: usize| u32::try_from(side).map_err(|_| StillError::TooLarge);
+    let (width, height) = (side(width)?, side(height)?);
+    let image = if count == 4 {
+        ImageBuffer::<Rgba<f32>, _>::from_raw(width, height, values).map(DynamicImage::ImageRgba32F)
+    } else {
+        ImageBuffer::<Rgb<f32>, _>::from_raw(width, height, values).map(DynamicImage::ImageRgb32F)
+    };
+    image.ok_or(StillError::TooLarge)
+}
+
+fn decoding(fault: exr::error::Error) -> StillError {
+    let format = ImageFormatHint::Exact(ImageFormat::OpenExr);
+    StillError::Decode(ImageError::Decoding(DecodingError::new(format, fault)))
+}
+
+/// Whether there are channels of chroma, which have fewer samples: the library refuses them.
+fn has_chroma(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(HEAD)];
+    [&b"\0RY\0"[..], b"\0BY\0"]
+        .iter()
+        .all(|name| head.windows(4).any(|at| at == *name))
+}
+
+/// The first layer that has the channels, which is the one that is read.
+fn header_of<'a>(meta: &'a MetaData, channels: &Channels) -> Option<&'a Header> {
+    let has = |header: &&Header| {
+        let mut all = channels.colours.iter();
+        !header.deep && all.all(|name| header.channels.find_index_of_channel(name).is_some())
+    };
+    meta.headers.iter().find(has)
+}
+
+fn names(meta: &MetaData) -> Vec<String> {
+    flat_names(meta).iter().map(ToString::to_string).collect()
+}
+
+fn flat_names(meta: &MetaData) -> Vec<Text> {
+    let flat = meta.headers.iter().filter(|header| !header.deep);
+    flat.flat_map(|header| {
+        header
+            .channels
+            .list
+            .iter()
+            .map(|channel| channel.name.clone())
+    })
+    .collect()
+}
+
+/// The one sensible picture: R, G and B, or those of the only layer that has them or is called so, or one channel alone.
+fn choose(meta: &MetaData) -> Result<Channels, StillError> {
+    let names = flat_names(meta);
+    let text: Vec<(String, &Text)> = names.iter().map(|name| (name.to_string(), name)).collect();
+    let layers: Vec<(String, Channels)> = text
+        .iter()
+        .filter(|(name, _)| role(name) == Some('r'))
+        .filter_map(|(name, _)| {
+            let layer = layer(name);
+            let find = |wanted| {
+                let mut all = text.iter();
+                let is_it = |(name, _): &&(String, &Text)| {
+                    self::layer(name) == layer && role(name) == Some(wanted)
+                };
+                all.find(is_it).map(|(_, text)| (*text).clone())
+            };
+            let channels = Channels {
+                colours: [find('r')?, find('g')?, find('b')?],
+                alpha: find('a'),
+            };
+            Some((layer.to_ascii_lowercase(), channels))
+        })
+        .collect();
+    let is_beauty = |layer: &str| {
+        let last = layer.rsplit('.').next().unwrap_or_default();
+        BEAUTY.contains(&last)
+    };
+    let plain = layers.iter().find(|(layer, _)| layer.is_empty());
+    let mut beauties = layers.iter().filter(|(layer, _)| is_beauty(layer));
+    let chosen = match (plain, &layers[..], beauties.next(), beauties.next()) {
+        (Some(plain), ..) => Some(plain),
+        (None, [only], ..) => Some(only),
+        (None, _, Some(beauty), None) => Some(beauty),
+        _ => None,
+    };
+    if let Some((_, channels)) = chosen {
+        return Ok(channels.clone());
+    }
+    let is_grey =
+        |name: &str| ["y", "l", "grey", "gray"].contains(&last(name).to_ascii_lowercase().as_str());
+    let grey = match &text[..] {
+        [(_, only)] => Some((*only, None)),
+        [(a, alpha), (y, grey)] | [(y, grey), (a, alpha)] if role(a) == Some('a') && is_grey(y) => {
+            Some((*grey, Some((*alpha).clone())))
+        }
+        _ => None,
+    };
+    match grey {
+        Some((grey, alpha)) if layers.is_empty() => Ok(Channels {
+            colours: [grey.clone(), grey.clone(), grey.clone()],
+            alpha,
+        }),
+        _ => Err(StillError::Channels(
+            text.into_iter().map(|(name, _)| name).collect(),
+        )),
+    }
+}
+
+fn layer(name: &str) -> &str {
+    name.rsplit_once('.').map_or("", |(layer, _)| layer)
+}
+
+fn last(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(_, last)| last)
+}
+
+fn role(name: &str) -> Option<char> {
+    match last(name).to_ascii_lowercase().as_str() {
+        "r" | "red" => Some('r'),
+        "g" | "green" => Some('g'),
+        "b" | "blue" => Some('b'),
+        "a" | "alpha" => Some('a'),
+        _ => None,
+    }
+}

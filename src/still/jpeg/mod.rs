@@ -1,0 +1,121 @@
+//! The segments of a JPEG, and whether all of its picture is there: decoders fill up what is missing with grey, and say
+//! nothing.
+
+mod huffman;
+mod scans;
+
+use std::borrow::Cow;
+
+const SOI: u8 = 0xd8;
+const EOI: u8 = 0xd9;
+const SOS: u8 = 0xda;
+const APP2: u8 = 0xe2;
+
+/// The file, which ends with the marker EOI; where only the marker is missing it is put behind the last scan. None where a
+/// part of the picture is missing.
+pub(crate) fn whole(bytes: &[u8]) -> Option<Cow<'_, [u8]>> {
+    if has_end(bytes) {
+        return Some(Cow::Borrowed(bytes));
+    }
+    let end = scans::end(bytes)?;
+    Some(Cow::Owned([&bytes[..end], &[0xff, EOI]].concat()))
+}
+
+/// How many components its pixels have.
+pub(crate) fn components(bytes: &[u8]) -> Option<u8> {
+    let (_, frame) = segments(bytes).find(|&(marker, _)| is_frame(marker))?;
+    frame.get(5).copied()
+}
+
+/// Whether a segment has a part of a colour profile.
+pub(crate) fn has_profile(bytes: &[u8]) -> bool {
+    let is_part =
+        |(marker, content): (u8, &[u8])| marker == APP2 && content.starts_with(b"ICC_PROFILE\0");
+    segments(bytes).any(is_part)
+}
+
+/// Whether a marker begins a frame's header: SOF, and not DHT, JPG or DAC.
+fn is_frame(marker: u8) -> bool {
+    matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc)
+}
+
+/// The segments before the first scan: markers and contents.
+fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
+    let mut at = 2;
+    let next = move || {
+        let (marker, content, after) = segment(bytes, at)?;
+        at = after;
+        Some((marker, content))
+    };
+    std::iter::from_fn(next).take_while(|&(marker, _)| marker != SOS)
+}
+
+/// The next segment from a place on: its marker, its content, and the place behind it.
+fn segment(bytes: &[u8], from: usize) -> Option<(u8, &[u8], usize)> {
+    let (marker, after) = next_marker(bytes, from)?;
+    let length = bytes.get(after..after + 2)?;
+    let length = usize::from(u16::from_be_bytes([length[0], length[1]])).max(2);
+    let content = bytes.get(after + 2..after + length)?;
+    Some((marker, content, after + length))
+}
+
+/// Whether a JPEG has a marker EOI of its own; those of thumbnails lie in segments, which are passed over. Where another
+/// JPEG begins the first has ended without one.
+fn has_end(bytes: &[u8]) -> bool {
+    let mut at = 2;
+    while let Some((marker, after)) = next_marker(bytes, at) {
+        at = match marker {
+            EOI => return true,
+            SOI => return false,
+            // Markers without a length, and bytes 0xff of a scan.
+            0x00 | 0x01 | 0xd0..=0xd7 => after,
+            _ => match segment(bytes, at) {
+                Some((_, _, after)) => after,
+                None => return false,
+            },
+        };
+    }
+    false
+}
+
+/// The next marker from a place on, and the place behind it.
+fn next_marker(bytes: &[u8], from: usize) -> Option<(u8, usize)> {
+    let rest = bytes.get(from..)?;
+    let prefix = from + rest.iter().position(|&byte| byte == 0xff)?;
+    // A marker may have more than one 0xff before it.
+    let length = bytes[prefix..].iter().position(|&byte| byte != 0xff)?;
+    Some((bytes[prefix + length], prefix + length + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A JPEG with a thumbnail in a segment, one scan with an escaped 0xff and a restart marker, and fill bytes.
+    const WHOLE: [u8; 32] = [
+        0xff, 0xd8, 0xff, 0xe1, 0, 8, 0xff, 0xd8, 0xff, 0xd9, 1, 2, 0xff, 0xda, 0, 4, 1, 2, 7,
+        0xff, 0x00, 8, 0xff, 0xd0, 9, 10, 11, 0xff, 0xff, 0xff, 0xd9, 0,
+    ];
+
+    #[test]
+    fn a_jpeg_ends_with_its_own_marker_and_not_with_that_of_a_thumbnail() {
+        assert!(has_end(&WHOLE));
+        assert!(has_end(&WHOLE[..31]));
+        for length in 0..31 {
+            assert!(!has_end(&WHOLE[..length]), "{length}");
+        }
+    }
+
+    #[test]
+    fn the_end_of_another_picture_behind_it_is_not_its_own() {
+        let second = [&WHOLE[..27], &WHOLE[..]].concat();
+        assert!(!has_end(&second));
+    }
+
+    #[test]
+    fn a_length_that_leads_beyond_the_file_is_no_end() {
+        assert!(!has_end(&[0xff, 0xd8, 0xff, 0xe1, 0xff, 0xff, 0xff, 0xd9]));
+        assert!(!has_end(&[0xff; 9]));
+        assert!(!has_end(&[]));
+    }
+}
