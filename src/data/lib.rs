@@ -12,6 +12,7 @@
 //! | [`geometry`] | pixel rectangles |
 //! | [`image_stats`] | statistics of an image's pixels, all or under a mask |
 //! | [`srgb`] | sRGB values to light and back |
+//! | [`text`] | text in files, with or without a byte order mark |
 //! | [`turn_light`] | how much light changes over a turn |
 //! | [`naming`] | the names that a session may have |
 //! | [`file_names`] | the names of files: videos, hidden ones, and those that are one file where case is ignored |
@@ -170,4 +171,5 @@ pub mod session;
 #[cfg(feature = "files")]
 pub mod shard;
 pub mod srgb;
+pub mod text;
 pub mod turn_light;

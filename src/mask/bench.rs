@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use image::{GrayImage, Luma, RgbImage};
 use relit_data::geometry::Rect;
+use relit_data::text;
 use relit_grabcut::{
     Effort, Hints, Iterations, MaskError, MaskScore, Seeds, SegmentSettings, StartRule, score,
     segment_with, start_cuts,
@@ -246,7 +247,7 @@ impl BenchImage {
         if !path.is_file() {
             return Ok(None);
         }
-        let text = fs::read_to_string(&path).map_err(MaskingError::io(&path, "read"))?;
+        let text = text::read(&path).map_err(MaskingError::io(&path, "read"))?;
         let numbers: Result<Vec<i32>, _> = text.split_whitespace().map(str::parse).collect();
         match numbers.as_deref() {
             Ok(&[left, top, right, bottom]) if right >= left && bottom >= top => {

@@ -21,6 +21,14 @@ pub enum MaskingError {
         /// What is wrong with it.
         fault: relit_grabcut::SeedsFault,
     },
+    /// A photograph's colours cannot be converted.
+    #[error("{path} {fault}: convert it to sRGB")]
+    Colour {
+        /// The photograph.
+        path: PathBuf,
+        /// What it says of its colours.
+        fault: relit_still::ColourError,
+    },
     /// A name for the mask that does not end in `.png`.
     #[error("{0} cannot be the mask's name: give one that ends in .png")]
     OutputName(PathBuf),

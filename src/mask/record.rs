@@ -142,7 +142,7 @@ impl MaskRecord {
     /// # Errors
     /// [`RecordFault::Json`] or [`RecordFault::Schema`].
     pub fn from_json(bytes: &[u8]) -> Result<Self, RecordFault> {
-        let value: Value = serde_json::from_slice(bytes)?;
+        let value: Value = serde_json::from_slice(relit_data::text::unmarked(bytes))?;
         let schema = value.get("schema").unwrap_or(&Value::Null);
         if schema != MASK_SCHEMA {
             return Err(RecordFault::Schema {

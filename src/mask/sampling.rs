@@ -1,7 +1,10 @@
 //! Frames of a video: the one on which a mask is made, and those spread over it that tell what the turn shows.
 
+use std::fs;
+
 use image::RgbImage;
 use relit_grabcut::{TURN_FRAMES, TurnFrames, TurnStatistics};
+use relit_still::Colour;
 use relit_video::Video;
 
 use super::request::TurnRequest;
@@ -41,7 +44,8 @@ pub(super) fn read_frame(
     video: &Video,
     number: u64,
 ) -> Result<(RgbImage, SourceFrame), MaskingError> {
-    let frame = video.frame(number)?;
+    let mut frame = video.frame(number)?;
+    to_srgb(video, &mut frame)?;
     let info = video.frames().iter().find(|info| info.number == number);
     let name = video.path().file_name().unwrap_or_default();
     let source = SourceFrame {
@@ -54,6 +58,21 @@ pub(super) fn read_frame(
         frame_blake3: blake3::hash(frame.as_raw()).to_hex().to_string(),
     };
     Ok((frame, source))
+}
+
+/// Turns a photograph into sRGB, whose file says that its colours are others.
+fn to_srgb(video: &Video, frame: &mut RgbImage) -> Result<(), MaskingError> {
+    if video.frames().len() != 1 {
+        return Ok(());
+    }
+    let path = video.path();
+    let bytes = fs::read(path).map_err(MaskingError::io(path, "read"))?;
+    let colour = Colour::of_file(&bytes).map_err(|fault| MaskingError::Colour {
+        path: path.to_owned(),
+        fault,
+    })?;
+    colour.to_srgb8(frame);
+    Ok(())
 }
 
 /// Whether two frames have the same pixels.

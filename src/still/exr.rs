@@ -20,9 +20,9 @@ const HEAD: usize = 65_536;
 
 /// The names of the channels that are the picture.
 #[derive(Debug, Clone, PartialEq)]
-struct Channels {
-    colours: [Text; 3],
-    alpha: Option<Text>,
+enum Channels {
+    Colours([Text; 3], Option<Text>),
+    Grey(Text, Option<Text>),
 }
 
 /// The matrix from the primaries that the file states to Rec. 709, which it has without a statement.
@@ -98,50 +98,106 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     })?;
     let channels = choose(&meta)?;
     let header = header_of(&meta, &channels).ok_or_else(|| StillError::Channels(names(&meta)))?;
-    let window = header.shared_attributes.display_window;
-    let count = if channels.alpha.is_some() { 4 } else { 3 };
-    reserve((window.size.area() as u64).saturating_mul(4 * count as u64))?;
-    reserve((header.layer_size.area() as u64).saturating_mul(4 * count as u64))?;
-    let offset = header.own_attributes.layer_position - window.position;
-    let [red, green, blue] = channels.colours.clone();
-    let alpha = channels.alpha.clone();
-    let (width, height) = (window.size.x(), window.size.y());
-    let image = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .specific_channels()
-        .required(red)
-        .required(green)
-        .required(blue)
-        .optional(alpha.unwrap_or_else(|| Text::from("A")), 1.0_f32)
-        .collect_pixels(
-            move |_, _| vec![0.0_f32; width * height * count],
-            move |pixels: &mut Vec<f32>, place, (r, g, b, a): (f32, f32, f32, f32)| {
-                let (x, y) = (
-                    place.x() as i64 + i64::from(offset.x()),
-                    place.y() as i64 + i64::from(offset.y()),
-                );
-                let inside =
-                    |at: i64, size: usize| usize::try_from(at).ok().filter(|&at| at < size);
-                if let (Some(x), Some(y)) = (inside(x, width), inside(y, height)) {
-                    let start = (y * width + x) * count;
-                    pixels[start..start + count].copy_from_slice(&[r, g, b, a][..count]);
-                }
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(decoding)?;
-    let values = image.layer_data.channel_data.pixels;
-    let side = |side: usize| u32::try_from(side).map_err(|_| StillError::TooLarge);
-    let (width, height) = (side(width)?, side(height)?);
-    let image = if count == 4 {
-        ImageBuffer::<Rgba<f32>, _>::from_raw(width, height, values).map(DynamicImage::ImageRgba32F)
-    } else {
-        ImageBuffer::<Rgb<f32>, _>::from_raw(width, height, values).map(DynamicImage::ImageRgb32F)
-    };
-    image.ok_or(StillError::TooLarge)
+    let canvas = Canvas::of(header, &channels)?;
+    canvas.image(canvas.read(bytes, channels)?)
+}
+
+/// What is displayed, and where the pixels of the file lie in it.
+#[derive(Clone, Copy)]
+struct Canvas {
+    width: usize,
+    height: usize,
+    offset: [i64; 2],
+    has_alpha: bool,
+}
+
+impl Canvas {
+    fn of(header: &Header, channels: &Channels) -> Result<Self, StillError> {
+        let (Channels::Colours(_, alpha) | Channels::Grey(_, alpha)) = channels;
+        let window = header.shared_attributes.display_window;
+        let offset = header.own_attributes.layer_position - window.position;
+        let canvas = Self {
+            width: window.size.x(),
+            height: window.size.y(),
+            offset: [offset.x(), offset.y()].map(i64::from),
+            has_alpha: alpha.is_some(),
+        };
+        let bytes = 4 * canvas.channels() as u64;
+        reserve((window.size.area() as u64).saturating_mul(bytes))?;
+        reserve((header.layer_size.area() as u64).saturating_mul(bytes))?;
+        Ok(canvas)
+    }
+
+    const fn channels(self) -> usize {
+        if self.has_alpha { 4 } else { 3 }
+    }
+
+    fn read(self, bytes: &[u8], channels: Channels) -> Result<Vec<f32>, StillError> {
+        let source = Cursor::new(bytes);
+        let length = self.width * self.height * self.channels();
+        let read = read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .specific_channels();
+        // Every channel needs a name of its own, so that one is asked for which no file has.
+        let name_of = |alpha: Option<Text>| alpha.unwrap_or_else(|| Text::from("no alpha"));
+        match channels {
+            Channels::Colours([red, green, blue], alpha) => read
+                .required(red)
+                .required(green)
+                .required(blue)
+                .optional(name_of(alpha), 1.0_f32)
+                .collect_pixels(
+                    move |_, _| vec![0.0_f32; length],
+                    move |pixels, place, (r, g, b, a): (f32, f32, f32, f32)| {
+                        self.put(pixels, place, [r, g, b, a])
+                    },
+                )
+                .first_valid_layer()
+                .all_attributes()
+                .from_buffered(source)
+                .map(|image| image.layer_data.channel_data.pixels),
+            Channels::Grey(grey, alpha) => read
+                .required(grey)
+                .optional(name_of(alpha), 1.0_f32)
+                .collect_pixels(
+                    move |_, _| vec![0.0_f32; length],
+                    move |pixels, place, (y, a): (f32, f32)| self.put(pixels, place, [y, y, y, a]),
+                )
+                .first_valid_layer()
+                .all_attributes()
+                .from_buffered(source)
+                .map(|image| image.layer_data.channel_data.pixels),
+        }
+        .map_err(decoding)
+    }
+
+    fn put(self, pixels: &mut Vec<f32>, place: Vec2<usize>, values: [f32; 4]) {
+        let inside = |at: usize, offset: i64, size: usize| {
+            let at = usize::try_from(at as i64 + offset).ok()?;
+            (at < size).then_some(at)
+        };
+        let x = inside(place.x(), self.offset[0], self.width);
+        let y = inside(place.y(), self.offset[1], self.height);
+        if let (Some(x), Some(y)) = (x, y) {
+            let count = self.channels();
+            let start = (y * self.width + x) * count;
+            pixels[start..start + count].copy_from_slice(&values[..count]);
+        }
+    }
+
+    fn image(self, values: Vec<f32>) -> Result<DynamicImage, StillError> {
+        let side = |side: usize| u32::try_from(side).map_err(|_| StillError::TooLarge);
+        let (width, height) = (side(self.width)?, side(self.height)?);
+        let image = if self.has_alpha {
+            ImageBuffer::<Rgba<f32>, _>::from_raw(width, height, values)
+                .map(DynamicImage::ImageRgba32F)
+        } else {
+            ImageBuffer::<Rgb<f32>, _>::from_raw(width, height, values)
+                .map(DynamicImage::ImageRgb32F)
+        };
+        image.ok_or(StillError::TooLarge)
+    }
 }
 
 fn decoding(fault: exr::error::Error) -> StillError {
@@ -160,8 +216,12 @@ fn has_chroma(bytes: &[u8]) -> bool {
 /// The first layer that has the channels, which is the one that is read.
 fn header_of<'a>(meta: &'a MetaData, channels: &Channels) -> Option<&'a Header> {
     let has = |header: &&Header| {
-        let mut all = channels.colours.iter();
-        !header.deep && all.all(|name| header.channels.find_index_of_channel(name).is_some())
+        let has = |name: &Text| header.channels.find_index_of_channel(name).is_some();
+        let has_all = match channels {
+            Channels::Colours(colours, _) => colours.iter().all(has),
+            Channels::Grey(grey, _) => has(grey),
+        };
+        !header.deep && has_all
     };
     meta.headers.iter().find(has)
 }
@@ -198,10 +258,7 @@ fn choose(meta: &MetaData) -> Result<Channels, StillError> {
                 };
                 all.find(is_it).map(|(_, text)| (*text).clone())
             };
-            let channels = Channels {
-                colours: [find('r')?, find('g')?, find('b')?],
-                alpha: find('a'),
-            };
+            let channels = Channels::Colours([find('r')?, find('g')?, find('b')?], find('a'));
             Some((layer.to_ascii_lowercase(), channels))
         })
         .collect();
@@ -230,10 +287,7 @@ fn choose(meta: &MetaData) -> Result<Channels, StillError> {
         _ => None,
     };
     match grey {
-        Some((grey, alpha)) if layers.is_empty() => Ok(Channels {
-            colours: [grey.clone(), grey.clone(), grey.clone()],
-            alpha,
-        }),
+        Some((grey, alpha)) if layers.is_empty() => Ok(Channels::Grey(grey.clone(), alpha)),
         _ => Err(StillError::Channels(
             text.into_iter().map(|(name, _)| name).collect(),
         )),

@@ -1,20 +1,30 @@
 //! What the file of a photograph says beside its pixels, which FFmpeg does not tell.
 
+use std::fs::{self, File};
+use std::io::Read;
 use std::path::Path;
 
 use ffmpeg_next::format::context::Input;
 use image::metadata::Orientation as Exif;
-use image::{ImageDecoder, ImageReader};
+use relit_still::Format;
+
+/// Bytes of a file that show its format.
+const HEAD: u64 = 4096;
 
 /// How a photograph is to be turned for display; nothing for a video, and for a picture that stands as it is stored.
 pub(super) fn exif_orientation(input: &Input, path: &Path) -> Option<Exif> {
-    if !is_photograph(input) {
+    if !is_photograph(input) && !is_photograph_in_boxes(path) {
         return None;
     }
-    let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
     // A file whose orientation cannot be read is shown as it is stored.
-    let stated = reader.into_decoder().ok()?.orientation().ok()?;
-    (stated != Exif::NoTransforms).then_some(stated)
+    relit_still::orientation(&fs::read(path).ok()?)
+}
+
+/// Whether a file is AVIF or HEIF, which FFmpeg reads as it reads MP4.
+fn is_photograph_in_boxes(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    read.is_ok() && matches!(Format::of(&head), Some(Format::Avif | Format::Heic))
 }
 
 /// Whether FFmpeg reads the file as one picture.

@@ -8,6 +8,9 @@ use relight_core::files::OutputKind;
 use relight_core::image::Depth;
 use relight_nets::Weights;
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer};
+use relight_photo::files::UnusedFile;
+use relit_console::Console;
+use serde_json::json;
 
 use crate::shipped;
 use crate::values::GateName;
@@ -74,6 +77,15 @@ impl From<Bits> for Depth {
             Bits::Eight => Self::Eight,
             Bits::Sixteen => Self::Sixteen,
         }
+    }
+}
+
+/// Names the files of folders that are not used.
+pub(crate) fn name_unused(unused: &[UnusedFile], console: Console) {
+    for file in unused {
+        let text = file.to_string();
+        let event = json!({ "event": "unused", "file": file.path(), "message": text });
+        console.warn_with(&text, &event);
     }
 }
 

@@ -11,6 +11,7 @@ use relight_core::image::{Extent, Linear, Planes, Rgb, Samples, Transfer};
 use relight_core::light::NormalsFrame;
 use relight_core::light::{Normals, ShLight, YDown, YUp};
 use relight_core::render::{Gloss, Surface};
+use relit_data::text;
 
 /// A folder with a folder for each image of the ground truth, of the same name, in which the estimates lie:
 /// `albedo`, `shading`, `highlight` (or `specular`), `normal` as `.exr` (linear, or vectors) or `.png` (8 or 16
@@ -88,7 +89,7 @@ impl Predictions {
             Err(source) if source.kind() == ErrorKind::NotFound => return Ok(None),
             Err(source) => return Err(EvalError::Read { path, source }),
         };
-        let parsed: Result<Encoding, _> = serde_json::from_slice(&bytes);
+        let parsed: Result<Encoding, _> = serde_json::from_slice(text::unmarked(&bytes));
         let encoding = match parsed {
             Ok(encoding) => encoding,
             Err(source) => return Err(EvalError::Description { path, source }),
@@ -219,7 +220,7 @@ fn check_size(path: PathBuf, found: Extent, expected: Extent) -> Result<(), Eval
 
 /// A light in a file of coefficients.
 pub(crate) fn read_light(path: &Path) -> Result<ShLight, EvalError> {
-    let text = std::fs::read_to_string(path).map_err(|source| EvalError::Read {
+    let text = text::read(path).map_err(|source| EvalError::Read {
         path: path.to_owned(),
         source,
     })?;

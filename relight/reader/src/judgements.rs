@@ -75,7 +75,8 @@ impl JudgedImages {
         let path = &self.files[index];
         let read = || -> Result<Vec<Judgement>, SampleFault> {
             let bytes = fs::read(path).map_err(SampleFault::read(path))?;
-            let file: File = serde_json::from_slice(&bytes).map_err(SampleFault::numbers(path))?;
+            let file: File = serde_json::from_slice(relit_data::text::unmarked(&bytes))
+                .map_err(SampleFault::numbers(path))?;
             Ok(file.judgements())
         };
         read().map_err(|fault| DamagedSample {

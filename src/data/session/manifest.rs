@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::is_session_name;
+use crate::text;
 
 /// The schema that this version reads and writes.
 pub const MANIFEST_SCHEMA: &str = "relit.session/1";
@@ -193,6 +194,7 @@ impl Manifest {
     /// # Errors
     /// [`ManifestFault`] with the first fault found.
     pub fn from_json(bytes: &[u8]) -> Result<Self, ManifestFault> {
+        let bytes = text::unmarked(bytes);
         // The schema first: complaints about the fields of another version would mislead.
         let schema: SchemaOnly = serde_json::from_slice(bytes)?;
         if schema.schema != MANIFEST_SCHEMA {

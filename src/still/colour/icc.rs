@@ -12,9 +12,11 @@ use crate::ColourError;
 /// How far a curve may be from sRGB's, encoded: about half a level of 8 bits.
 const SAME_CURVE: f32 = 0.6 / 255.0;
 
+const INKS: &str = "inks (CMYK)";
+
 /// What a profile says; `is_grey`: the picture has no colours.
 pub(super) fn colour_of_profile(icc: &[u8], is_grey: bool) -> Result<Colour, ColourError> {
-    let profile = ColorProfile::new_from_slice(icc).map_err(|_| ColourError::Profile)?;
+    let profile = ColorProfile::new_from_slice(icc).map_err(|_| unread(icc))?;
     check(&profile, is_grey)?;
     if profile.color_space == DataColorSpace::Gray {
         let curve = profile.gray_trc.as_ref().ok_or(ColourError::Profile)?;
@@ -29,6 +31,17 @@ pub(super) fn colour_of_profile(icc: &[u8], is_grey: bool) -> Result<Colour, Col
     of_matrix(&profile)
 }
 
+/// What is wrong with a profile that the library does not read.
+fn unread(icc: &[u8]) -> ColourError {
+    match icc.get(16..20) {
+        Some(b"CMYK") => ColourError::ProfileSpace {
+            name: "without a name".to_owned(),
+            space: INKS,
+        },
+        _ => ColourError::Profile,
+    }
+}
+
 /// Refuses by its name what is not converted.
 fn check(profile: &ColorProfile, is_grey: bool) -> Result<(), ColourError> {
     let wrong = |space| {
@@ -41,7 +54,7 @@ fn check(profile: &ColorProfile, is_grey: bool) -> Result<(), ColourError> {
         DataColorSpace::Rgb => {}
         DataColorSpace::Gray if is_grey => {}
         DataColorSpace::Gray => return wrong("pictures without colours"),
-        DataColorSpace::Cmyk => return wrong("inks (CMYK)"),
+        DataColorSpace::Cmyk => return wrong(INKS),
         DataColorSpace::Lab => return wrong("Lab"),
         _ => return wrong("another kind of numbers"),
     }

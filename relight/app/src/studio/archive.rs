@@ -6,6 +6,7 @@ use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
 use relight_photo::insert::SceneDescription;
+use relit_data::text;
 use relit_grabcut::grey_png;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
@@ -104,7 +105,7 @@ impl SceneFiles {
     /// Where it is no archive, too large, or its scene names a file that it has not.
     pub(super) fn unpacked(archive: &[u8]) -> Result<(SceneDescription, Self), StudioError> {
         let mut archive = ZipArchive::new(Cursor::new(archive))?;
-        let text = String::from_utf8(entry(&mut archive, SCENE)?);
+        let text = text::decode(entry(&mut archive, SCENE)?);
         let scene = SceneDescription::parse(&text.map_err(|_| StudioError::NoText)?)?;
         let mut files = Self::default();
         let mut all = 0;

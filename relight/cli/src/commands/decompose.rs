@@ -12,12 +12,15 @@ use relight_nets::{InferenceEngine, NetError, OnnxRuntime, Weights};
 use relight_photo::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, WORKING_SIDE, WorkingSize,
 };
-use relight_photo::files::{DecompositionFigures, DecompositionFiles, PhotoInput, PhotoReading};
+use relight_photo::files::{
+    DecompositionFigures, DecompositionFiles, FoundPhotos, PhotoInput, PhotoReading,
+};
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
 use crate::commands::CommandResult;
+use crate::photos::name_unused;
 use crate::shipped;
 use crate::values::{GateName, TransferName, YName};
 
@@ -37,7 +40,7 @@ Examples:
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs (.png, .jpg, .webp, .exr, .hdr), folders of them, or shards (.tar).
+    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
     #[arg(required = true, value_name = "PHOTO")]
     photos: Vec<PathBuf>,
     /// The folder for the results; several photographs have a folder each in it.
@@ -208,7 +211,8 @@ impl EngineName {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let inputs = PhotoInput::find(&arguments.photos, arguments.count)?;
+    let FoundPhotos { inputs, unused } = PhotoInput::find(&arguments.photos, arguments.count)?;
+    name_unused(&unused, console);
     let own_folders = inputs.len() > 1 || arguments.has_set();
     let run = Run::new(arguments, own_folders, console)?;
     if !run.own_folders
@@ -241,7 +245,8 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let lost = whole.iter().filter(|is_whole| !**is_whole).count();
     bar.finish_and_clear();
     match lost {
-        0 => Ok(Outcome::Whole),
+        0 if unused.is_empty() => Ok(Outcome::Whole),
+        0 => Ok(Outcome::Incomplete),
         _ if lost == inputs.len() => Err("no photograph could be decomposed".into()),
         _ => Ok(Outcome::Incomplete),
     }

@@ -8,7 +8,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use relight_core::files::{MovieFormat, MovieWriter, OutputKind, write_picture};
 use relight_photo::decompose::Rectangle;
-use relight_photo::files::{InsertionError, PhotoInput, PhotoReading};
+use relight_photo::files::{FoundPhotos, InsertionError, PhotoInput, PhotoReading};
 use relight_photo::insert::{
     Backdrop, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, ShotCompanions,
     Subject, WhiteBalance, likeness,
@@ -21,7 +21,7 @@ use super::decompose::rectangle;
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::light::NewLightArguments;
-use crate::photos::{Bits, Network, NetworkArguments, globbed, not_an_input};
+use crate::photos::{Bits, Network, NetworkArguments, globbed, name_unused, not_an_input};
 use crate::values::{TransferName, WhiteName};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -40,7 +40,7 @@ const MOVIE_SIDE: usize = 1080;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs (.png, .jpg, .webp, .exr, .hdr), folders of them, patterns such as 'photos/*.jpg', or shards (.tar).
+    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, patterns such as 'photos/*.jpg', or shards (.tar).
     #[arg(required = true, value_name = "PHOTO")]
     photos: Vec<PathBuf>,
     /// The picture (.png, .jpg, .exr), or for --turn a video (.mp4, .webm); of several photographs a folder. It is made where
@@ -222,7 +222,8 @@ struct Run<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let inputs = PhotoInput::find(&globbed(&arguments.photos)?, None)?;
+    let FoundPhotos { inputs, unused } = PhotoInput::find(&globbed(&arguments.photos)?, None)?;
+    name_unused(&unused, console);
     let run = Run {
         arguments,
         light: match arguments.light.read()? {
@@ -252,7 +253,8 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         }
     }
     match lost {
-        0 => Ok(Outcome::Whole),
+        0 if unused.is_empty() => Ok(Outcome::Whole),
+        0 => Ok(Outcome::Incomplete),
         _ if lost == inputs.len() => Err("no photograph could be relit".into()),
         _ => Ok(Outcome::Incomplete),
     }

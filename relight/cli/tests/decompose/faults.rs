@@ -125,7 +125,7 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
     assert!(error.unwrap_err().to_string().ends_with("masks/grey.png"));
     let find = |paths: &[&PathBuf]| {
         let paths: Vec<PathBuf> = paths.iter().map(|path| (*path).clone()).collect();
-        PhotoInput::find(&paths, None).map(|found| found.len())
+        PhotoInput::find(&paths, None).map(|found| found.inputs.len())
     };
     assert!(
         find(&[&masks])

@@ -43,9 +43,11 @@ fn frames_of_a_shard_have_its_mask_and_the_saturation_that_was_counted_on_the_vi
     let folder = Folder::new();
     let name = SESSION;
     let shard = write_shard(folder.0.path());
-    let inputs = PhotoInput::find(std::slice::from_ref(&shard), None).unwrap();
+    let inputs = PhotoInput::find(std::slice::from_ref(&shard), None)
+        .unwrap()
+        .inputs;
     assert_eq!(inputs.len(), 3);
-    assert_eq!(PhotoInput::find(&[shard], Some(2)).unwrap().len(), 2);
+    assert_eq!(PhotoInput::find(&[shard], Some(2)).unwrap().inputs.len(), 2);
     let photos = inputs
         .iter()
         .map(|input| input.load(&PhotoReading::default()).unwrap());
@@ -71,7 +73,7 @@ fn shards_whose_frames_have_the_same_names_are_refused_together() {
     });
     let find = |paths: &[&Path]| {
         let paths: Vec<PathBuf> = paths.iter().map(|path| path.to_path_buf()).collect();
-        PhotoInput::find(&paths, None).map(|found| found.len())
+        PhotoInput::find(&paths, None).map(|found| found.inputs.len())
     };
     assert_eq!(find(&[&first]).unwrap(), 3);
     let renamed = folder.path("second/other.tar");
@@ -90,7 +92,9 @@ fn a_folder_of_photographs_and_shards_gives_both() {
     let folder = Folder::new();
     write_shard(folder.0.path());
     folder.save("cup.png", |path| object(0).save(path).unwrap());
-    let found = PhotoInput::find(&[folder.0.path().to_owned()], Some(2)).unwrap();
+    let found = PhotoInput::find(&[folder.0.path().to_owned()], Some(2))
+        .unwrap()
+        .inputs;
     let names = found
         .iter()
         .map(|input| input.load(&PhotoReading::default()).unwrap().name);

@@ -5,6 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use relit_data::durable::{Partial, write_whole};
+use relit_data::text;
 
 use super::parent::make_parent;
 use crate::captured_object::{CapturedObject, CapturedObjectError};
@@ -171,7 +172,7 @@ impl ShLight {
     /// Where the file cannot be read or holds something else.
     pub fn read(path: &Path) -> Result<Self, LightFileError> {
         let path = path.to_owned();
-        match fs::read_to_string(&path) {
+        match text::read(&path) {
             Err(source) => Err(LightFileError::Read { path, source }),
             Ok(text) => text
                 .parse()

@@ -138,10 +138,15 @@ pub enum DecomposeError {
         fault: ColourError,
     },
     /// There are no photographs.
-    #[error("{} holds no photographs (.png, .jpg, .webp, .exr, .hdr) and no shards (.tar)", path.display())]
+    #[error(
+        "{} holds no photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR) and no shards (.tar){}",
+        path.display(), other.as_ref().map(|other| format!("; {other}")).unwrap_or_default()
+    )]
     NoPhotos {
         /// The folder.
         path: PathBuf,
+        /// What another file of it is.
+        other: Option<String>,
     },
     /// Two photographs, or two turns, would be written into one folder.
     #[error(

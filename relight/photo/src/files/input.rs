@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,13 +10,13 @@ use relight_core::image::{Extent, ImageError, Planes, Rgb, StoredImage, Transfer
 use relight_reader::{Encoding, SampleId, Source, Turns};
 use relit_data::file_names::{alike_beside, folded, has_extension, is_hidden};
 use relit_data::shard::Dataset;
-use relit_still::Orientation;
+use relit_still::{Format, Orientation, is_left_behind, is_named};
 
 use super::mask_record::check_turned;
 use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
 
-/// How the files of photographs end.
-const PHOTOS: [&str; 6] = ["png", "jpg", "jpeg", "webp", "exr", "hdr"];
+/// Bytes of a file that show its format.
+const HEAD: u64 = 4096;
 
 /// How photographs are read.
 #[derive(Debug, Clone, Default)]
@@ -49,6 +50,44 @@ pub enum PhotoInput {
     Frame(Arc<Turns>, SampleId),
 }
 
+/// The photographs that paths lead to.
+#[derive(Default)]
+pub struct FoundPhotos {
+    /// The photographs.
+    pub inputs: Vec<PhotoInput>,
+    /// The other files of the folders, apart from what operating systems leave behind.
+    pub unused: Vec<UnusedFile>,
+}
+
+/// A file of a folder of photographs that is none of those that are read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum UnusedFile {
+    /// It is in a format that is not read.
+    #[error("{} is {}, which is not read: {}", path.display(), format.name(), format.advice())]
+    NotRead {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: Format,
+    },
+    /// It is no picture.
+    #[error("{} is not used: it is not a picture", path.display())]
+    NoPicture {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl UnusedFile {
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::NotRead { path, .. } | Self::NoPicture { path } => path,
+        }
+    }
+}
+
 impl PhotoInput {
     /// The photographs of files, of folders of photographs or shards, and of shards (`*.tar`), of each
     /// turn the first `most`.
@@ -56,11 +95,11 @@ impl PhotoInput {
     /// # Errors
     /// Where a folder cannot be read or holds none, a shard cannot be opened, or two photographs would
     /// be written to one folder.
-    pub fn find(paths: &[PathBuf], most: Option<u32>) -> Result<Vec<Self>, DecomposeError> {
-        let mut found = Vec::new();
+    pub fn find(paths: &[PathBuf], most: Option<u32>) -> Result<FoundPhotos, DecomposeError> {
+        let (mut found, mut unused) = (Vec::new(), Vec::new());
         for path in paths {
             if path.is_dir() {
-                add_folder(&mut found, path, most)?;
+                add_folder(&mut found, &mut unused, path, most)?;
             } else if has_extension(path, &["tar"]) {
                 add_turns(&mut found, path, most)?;
             } else {
@@ -68,7 +107,10 @@ impl PhotoInput {
             }
         }
         check_names(&found)?;
-        Ok(found.into_iter().map(|(_, input)| input).collect())
+        Ok(FoundPhotos {
+            inputs: found.into_iter().map(|(_, input)| input).collect(),
+            unused,
+        })
     }
 
     /// Whether a path is a shard, or a folder with shards or another data set of turns: their frames have
@@ -78,7 +120,7 @@ impl PhotoInput {
         if !path.is_dir() {
             return has_extension(path, &["tar"]);
         }
-        let is_shard = |path: PathBuf| !is_hidden(&path) && has_extension(&path, &["tar"]);
+        let is_shard = |path: PathBuf| !is_left_behind(&path) && has_extension(&path, &["tar"]);
         let entries = fs::read_dir(path).into_iter().flatten().flatten();
         path.join(Dataset::FILE).is_file() || entries.map(|entry| entry.path()).any(is_shard)
     }
@@ -126,30 +168,55 @@ impl PhotoInput {
 /// Photographs, each with the path under which it was found: its own, or that of its data set.
 type Found = Vec<(PathBuf, PhotoInput)>;
 
-fn add_folder(found: &mut Found, folder: &Path, most: Option<u32>) -> Result<(), DecomposeError> {
-    let mut photos = Vec::new();
+fn add_folder(
+    found: &mut Found,
+    unused: &mut Vec<UnusedFile>,
+    folder: &Path,
+    most: Option<u32>,
+) -> Result<(), DecomposeError> {
+    let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(DecomposeError::read(folder))? {
         let path = entry.map_err(DecomposeError::read(folder))?.path();
-        if !is_hidden(&path) && path.is_file() && has_extension(&path, &PHOTOS) {
-            photos.push(path);
+        if !is_left_behind(&path) && path.is_file() {
+            files.push(path);
         }
     }
+    files.sort();
     let has_frames = PhotoInput::has_frames(folder);
-    if photos.is_empty() && !has_frames {
+    let (before, unused_before) = (found.len(), unused.len());
+    for path in files {
+        match use_of(path.clone()) {
+            None => found.push((path.clone(), PhotoInput::File(path))),
+            // A data set has files of other kinds too.
+            Some(_) if has_frames => {}
+            Some(file) => unused.push(file),
+        }
+    }
+    if found.len() == before && !has_frames {
         return Err(DecomposeError::NoPhotos {
             path: folder.to_owned(),
+            other: unused.get(unused_before).map(ToString::to_string),
         });
     }
-    photos.sort();
-    found.extend(
-        photos
-            .into_iter()
-            .map(|path| (path.clone(), PhotoInput::File(path))),
-    );
     if has_frames {
         add_turns(found, folder, most)?;
     }
     Ok(())
+}
+
+/// Why a file of a folder is left out; none where it is taken for a photograph: by its content, or by a name that
+/// promises one, so that reading it says what is wrong.
+fn use_of(path: PathBuf) -> Option<UnusedFile> {
+    let mut head = Vec::new();
+    let file = fs::File::open(&path);
+    // What cannot be read is known by its name alone.
+    let _ = file.and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    match Format::of(&head) {
+        Some(format) if format.is_read() => None,
+        Some(format) => Some(UnusedFile::NotRead { path, format }),
+        None if is_named(&path) => None,
+        None => Some(UnusedFile::NoPicture { path }),
+    }
 }
 
 fn add_turns(found: &mut Found, path: &Path, most: Option<u32>) -> Result<(), DecomposeError> {

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use relit_data::text::unmarked;
 use serde::Deserialize;
 
 use crate::decompose::DecomposeError;
@@ -34,7 +35,7 @@ pub(super) fn check_turned(
     orientation: Option<u8>,
 ) -> Result<(), DecomposeError> {
     let bytes = fs::read(mask.with_extension("json")).unwrap_or_default();
-    let Ok(record) = serde_json::from_slice::<MaskRecord>(&bytes) else {
+    let Ok(record) = serde_json::from_slice::<MaskRecord>(unmarked(&bytes)) else {
         return Ok(());
     };
     let is_of_photo = photo

@@ -11,7 +11,7 @@ mod networks;
 mod results;
 
 pub use background::BackgroundFile;
-pub use input::{PhotoInput, PhotoReading};
+pub use input::{FoundPhotos, PhotoInput, PhotoReading, UnusedFile};
 pub use insertion::{InsertSource, Insertion, InsertionOutput};
 pub use insertion_error::InsertionError;
 pub use results::{DecompositionFigures, DecompositionFiles, bright, write_light};

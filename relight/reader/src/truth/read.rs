@@ -15,6 +15,7 @@ use crate::error::check_extent;
 use relight_core::files::read_planes;
 use relight_core::image::{Extent, ImageError, Linear, Planes, Rgb};
 use relight_core::light::{Normals, ShLight, YDown, YUp};
+use relit_data::text;
 
 pub(super) fn sample(entry: &Entry, layout: TruthLayout) -> Result<TruthSample, SampleFault> {
     let parts = Parts { entry, layout };
@@ -113,7 +114,7 @@ impl Parts<'_> {
             });
         };
         let bytes = fs::read(path).map_err(SampleFault::read(path))?;
-        let parsed: Result<Description, _> = serde_json::from_slice(&bytes);
+        let parsed: Result<Description, _> = serde_json::from_slice(text::unmarked(&bytes));
         Ok(parsed.map_err(SampleFault::numbers(path))?.white)
     }
 
@@ -121,7 +122,7 @@ impl Parts<'_> {
         let Some(path) = self.path(Role::Light) else {
             return Ok(None);
         };
-        let text = fs::read_to_string(path).map_err(SampleFault::read(path))?;
+        let text = text::read(path).map_err(SampleFault::read(path))?;
         text.parse().map(Some).map_err(SampleFault::numbers(path))
     }
 

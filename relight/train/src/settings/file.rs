@@ -1,8 +1,8 @@
 //! Settings in TOML: a file, or the text that a checkpoint keeps.
 
-use std::fs;
 use std::path::Path;
 
+use relit_data::text;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -45,7 +45,7 @@ pub(super) fn read_with<S>(
     path: &Path,
     parse: impl FnOnce(&str) -> Result<S, toml::de::Error>,
 ) -> Result<SettingsFile<S>, TrainError> {
-    let text = fs::read_to_string(path).map_err(|source| TrainError::Io {
+    let text = text::read(path).map_err(|source| TrainError::Io {
         path: path.to_owned(),
         doing: "read",
         source,

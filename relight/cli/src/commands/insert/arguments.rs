@@ -1,7 +1,6 @@
 //! The arguments of `relight insert`, and the scene that they describe.
 
 use std::error::Error;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
@@ -11,6 +10,8 @@ use relight_photo::files::{InsertionOutput, PhotoReading};
 use relight_photo::insert::{
     LightDescription, LightSource, ObjectDescription, SceneDescription, WhiteBalance,
 };
+
+use relit_data::text;
 
 use crate::commands::relight::{degrees, gloss_numbers, tint};
 use crate::photos::{Bits, NetworkArguments};
@@ -215,7 +216,7 @@ impl Arguments {
     /// The scene that is asked for, and the folder that its paths are relative to.
     pub(super) fn description(&self) -> Result<(SceneDescription, PathBuf), Box<dyn Error>> {
         if let Some(path) = &self.scene {
-            let text = fs::read_to_string(path)
+            let text = text::read(path)
                 .map_err(|error| format!("{} cannot be read: {error}", path.display()))?;
             let scene = SceneDescription::parse(&text)
                 .map_err(|error| format!("{}: {error}", path.display()))?;
