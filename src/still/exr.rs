@@ -123,8 +123,10 @@ impl Canvas {
             has_alpha: alpha.is_some(),
         };
         let bytes = 4 * canvas.channels() as u64;
-        reserve((window.size.area() as u64).saturating_mul(bytes))?;
-        reserve((header.layer_size.area() as u64).saturating_mul(bytes))?;
+        for size in [window.size, header.layer_size] {
+            let pixels = (size.x() as u64).saturating_mul(size.y() as u64);
+            reserve(pixels.saturating_mul(bytes))?;
+        }
         Ok(canvas)
     }
 

@@ -96,3 +96,66 @@ fn a_webp_is_masked_as_a_jpeg_is() {
         .into_luma8();
     assert_eq!(mask.get_pixel(WIDTH - 36, HEIGHT - 31).0, [255]);
 }
+
+/// Adds an orientation to a TIFF: another directory behind the file, of the same entries and that.
+fn tiff_with_orientation(mut bytes: Vec<u8>, orientation: u16) -> Vec<u8> {
+    assert_eq!(&bytes[..4], b"II*\0");
+    let start = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
+    let count = usize::from(u16::from_le_bytes(
+        bytes[start..start + 2].try_into().unwrap(),
+    ));
+    let entries = &bytes[start + 2..start + 2 + 12 * count];
+    let mut entries: Vec<Vec<u8>> = entries.chunks_exact(12).map(<[u8]>::to_vec).collect();
+    let [low, high] = orientation.to_le_bytes();
+    entries.push(vec![0x12, 1, 3, 0, 1, 0, 0, 0, low, high, 0, 0]);
+    entries.sort_by_key(|entry| u16::from_le_bytes([entry[0], entry[1]]));
+    bytes.resize(bytes.len().next_multiple_of(2), 0);
+    let place = bytes.len() as u32;
+    bytes[4..8].copy_from_slice(&place.to_le_bytes());
+    bytes.extend((entries.len() as u16).to_le_bytes());
+    bytes.extend(entries.concat());
+    bytes.extend([0; 4]);
+    bytes
+}
+
+#[test]
+fn a_tiff_is_masked_as_its_tag_turns_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let tiff = tiff_with_orientation(stored(6, ImageFormat::Tiff), 6);
+    fs::write(folder.join("scan.tif"), tiff).unwrap();
+    let arguments = ["scan.tif", "--rect", "12,8,46,44", "-o", "scan.png"];
+    let done = relit_mask(folder, &arguments);
+    assert_eq!(code(&done), 0, "{}", said(&done));
+    let mask = image::load_from_memory(&read(folder, "scan.png"))
+        .unwrap()
+        .into_luma8();
+    assert_eq!(mask.dimensions(), (WIDTH, HEIGHT));
+    assert_eq!(mask.get_pixel(35, 30).0, [255]);
+    assert_eq!(
+        record_of(folder, "scan.json")["source"]["exif_orientation"],
+        6
+    );
+}
+
+#[test]
+fn a_photograph_whose_colours_cannot_be_converted_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut bytes = Vec::new();
+    let image = displayed();
+    let mut encoder = png::Encoder::new(&mut bytes, image.width(), image.height());
+    encoder.set_color(png::ColorType::Rgb);
+    let mut writer = encoder.write_header().unwrap();
+    let points = png::chunk::ChunkType(*b"cICP");
+    writer.write_chunk(points, &[9, 16, 0, 1]).unwrap();
+    writer.write_image_data(image.as_raw()).unwrap();
+    drop(writer);
+    fs::write(folder.join("hdr.png"), bytes).unwrap();
+    let done = relit_mask(
+        folder,
+        &["hdr.png", "--rect", "12,8,46,44", "-o", "mask.png"],
+    );
+    assert_eq!(code(&done), 1, "{}", said(&done));
+    assert!(said(&done).contains("PQ"), "{}", said(&done));
+}

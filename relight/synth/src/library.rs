@@ -15,6 +15,7 @@ use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
 use relight_core::statistics::ranked;
+use relit_still::is_left_behind;
 
 /// Size of the panoramas that are made here.
 pub const PANORAMA_EXTENT: Extent = Extent::new(256, 128);
@@ -56,7 +57,7 @@ impl fmt::Display for LeftOut {
 pub struct Folders {
     /// `.obj`, `.gltf` and `.glb`, also in folders within it.
     pub meshes: Option<PathBuf>,
-    /// `.png` and `.jpg`, sRGB.
+    /// `.png`, `.jpg`, `.webp`, `.tif` and `.bmp`; sRGB where they say nothing else.
     pub textures: Option<PathBuf>,
     /// `.hdr` and `.exr`; none: those that are made here.
     pub panoramas: Option<PathBuf>,
@@ -158,7 +159,9 @@ const MESHES: Wanted = Wanted {
 };
 const TEXTURES: Wanted = Wanted {
     what: "textures",
-    extensions: &["png", "jpg", "jpeg"],
+    extensions: &[
+        "png", "jpg", "jpeg", "jpe", "jfif", "webp", "tif", "tiff", "bmp",
+    ],
 };
 const PANORAMAS: Wanted = Wanted {
     what: "panoramas",
@@ -236,9 +239,9 @@ fn files_below(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
 fn members(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(SynthError::read(folder))? {
-        let entry = entry.map_err(SynthError::read(folder))?;
-        if !entry.file_name().as_encoded_bytes().starts_with(b".") {
-            paths.push(entry.path());
+        let path = entry.map_err(SynthError::read(folder))?.path();
+        if !is_left_behind(&path) {
+            paths.push(path);
         }
     }
     Ok(paths)

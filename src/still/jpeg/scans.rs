@@ -5,6 +5,9 @@ use super::{EOI, SOS, is_frame, segment};
 
 /// Coefficients of a block.
 const BLOCK: usize = 64;
+/// Pictures have no more components, and no more scans.
+const MOST_COMPONENTS: u8 = 4;
+const MOST_SCANS: usize = 100;
 /// Blocks of which it is remembered where they are not zero.
 const MOST_BLOCKS: usize = 1 << 24;
 const DHT: u8 = 0xc4;
@@ -17,7 +20,7 @@ const PROGRESSIVE: u8 = 0xc2;
 pub(super) fn end(bytes: &[u8]) -> Option<usize> {
     let mut tables = Tables::default();
     let mut frame = None;
-    let mut at = 2;
+    let (mut at, mut scans) = (2, 0);
     loop {
         let (marker, content, after) = segment(bytes, at)?;
         at = after;
@@ -28,6 +31,10 @@ pub(super) fn end(bytes: &[u8]) -> Option<usize> {
                 tables.restart = u32::from(u16::from_be_bytes(content.get(..2)?.try_into().ok()?))
             }
             SOS => {
+                scans += 1;
+                if scans > MOST_SCANS {
+                    return None;
+                }
                 let frame: &mut Frame = frame.as_mut()?;
                 let scan = Scan::read(content, frame)?;
                 at = frame.pass(&scan, &tables, Bits::new(bytes, after))?;
@@ -94,7 +101,8 @@ impl Frame {
             )))
         };
         let size = [side(3)?, side(1)?];
-        let parts = content.get(6..6 + 3 * usize::from(*content.get(5)?))?;
+        let count = *content.get(5).filter(|&&count| count <= MOST_COMPONENTS)?;
+        let parts = content.get(6..6 + 3 * usize::from(count))?;
         let sampling = |part: &[u8]| [usize::from(part[1] >> 4), usize::from(part[1] & 15)];
         let parts = parts.chunks_exact(3);
         let mut most = [0; 2];

@@ -42,11 +42,9 @@ fn a_file_says_itself_whether_it_is_linear() {
     assert!((value(1.0 / 2.2, None).unwrap() - 0.2140).abs() < 1e-3);
     assert!((value(1.0, Some(Transfer::Srgb)).unwrap() - 0.2140).abs() < 1e-3);
     assert!((value(1.0, Some(Transfer::Gamma22)).unwrap() - 0.2176).abs() < 1e-3);
-    let text = value(1.0 / 1.8, None).unwrap_err().to_string();
-    assert!(
-        text.contains("1 / 1.8") && text.contains("--transfer"),
-        "{text}"
-    );
+    assert!((value(1.0 / 1.8, None).unwrap() - 0.2892).abs() < 1e-3);
+    let fault = value(1e-4, None).unwrap_err();
+    assert!(matches!(fault, DecomposeError::Colour { .. }), "{fault}");
 
     let exr = folder.save("photo.exr", |path| {
         let bright = ImageBuffer::from_fn(WIDTH, HEIGHT, |_, _| Pixel([3.0_f32, 0.5, 0.25]));
@@ -66,7 +64,7 @@ fn a_png_of_high_dynamic_range_is_not_taken_for_srgb() {
             let mut encoder = png::Encoder::new(file, WIDTH, HEIGHT);
             encoder.set_color(png::ColorType::Rgb);
             let mut writer = encoder.write_header().unwrap();
-            let points = [9, function, 0, 1];
+            let points = [1, function, 0, 1];
             let cicp = png::chunk::ChunkType(*b"cICP");
             writer.write_chunk(cicp, &points).unwrap();
             writer.write_image_data(object(0).as_raw()).unwrap();

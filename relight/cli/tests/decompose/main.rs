@@ -9,6 +9,7 @@
 
 mod encodings;
 mod faults;
+mod forms;
 mod masks;
 mod networks;
 mod onnx_file;

@@ -22,6 +22,34 @@ fn code_and_errors(output: &Output) -> (i32, String) {
 }
 
 #[test]
+fn a_file_of_a_folder_that_is_not_used_is_named_and_the_code_says_so() {
+    let folder = Folder::new();
+    let weights = Weights::initial(&decomposer(), 3);
+    weights
+        .write(&folder.path("w.safetensors"), WeightPrecision::Half)
+        .unwrap();
+    fs::create_dir(folder.path("photos")).unwrap();
+    object(0).save(folder.path("photos/black.png")).unwrap();
+    fs::write(folder.path("photos/._black.png"), "of macOS").unwrap();
+    let command = "decompose photos -o out --weights w.safetensors --no-mirror --json";
+    assert_eq!(code_and_errors(&relight(&folder, command)).0, 0);
+    fs::write(
+        folder.path("photos/x.avif"),
+        b"\0\0\0\x18ftypavif\0\0\0\0avifmif1",
+    )
+    .unwrap();
+    let output = relight(&folder, command);
+    let (code, errors) = code_and_errors(&output);
+    assert_eq!(code, 3, "{errors}");
+    let events = String::from_utf8(output.stdout).unwrap();
+    let mut events = events
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let unused = events.find(|event| event["event"] == "unused").unwrap();
+    assert_eq!(unused["file"], "photos/x.avif");
+}
+
+#[test]
 fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
     let folder = Folder::new();
     let weights = Weights::initial(&decomposer(), 3);

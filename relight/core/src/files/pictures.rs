@@ -357,6 +357,20 @@ mod tests {
     }
 
     #[test]
+    fn light_with_a_byte_order_mark_is_the_same_light() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("light.txt");
+        let light = ShLight::even(crate::light::Order::TWO, [0.25, 0.5, 1.0]);
+        let text = light.to_string();
+        std::fs::write(&path, format!("\u{feff}{}", text.replace('\n', "\r\n"))).unwrap();
+        assert_eq!(ShLight::read(&path).unwrap(), light);
+        let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        std::fs::write(&path, [&b"\xff\xfe"[..], &wide].concat()).unwrap();
+        let fault = ShLight::read(&path).unwrap_err();
+        assert!(matches!(fault, LightFileError::Read { .. }), "{fault}");
+    }
+
+    #[test]
     fn an_image_without_pixels_is_not_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("empty.exr");
