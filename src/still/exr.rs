@@ -151,7 +151,7 @@ impl Canvas {
                 .optional(name_of(alpha), 1.0_f32)
                 .collect_pixels(
                     move |_, _| vec![0.0_f32; length],
-                    move |pixels, place, (r, g, b, a): (f32, f32, f32, f32)| {
+                    move |pixels: &mut Vec<f32>, place, (r, g, b, a): (f32, f32, f32, f32)| {
                         self.put(pixels, place, [r, g, b, a])
                     },
                 )
@@ -164,7 +164,9 @@ impl Canvas {
                 .optional(name_of(alpha), 1.0_f32)
                 .collect_pixels(
                     move |_, _| vec![0.0_f32; length],
-                    move |pixels, place, (y, a): (f32, f32)| self.put(pixels, place, [y, y, y, a]),
+                    move |pixels: &mut Vec<f32>, place, (y, a): (f32, f32)| {
+                        self.put(pixels, place, [y, y, y, a])
+                    },
                 )
                 .first_valid_layer()
                 .all_attributes()
@@ -174,7 +176,7 @@ impl Canvas {
         .map_err(decoding)
     }
 
-    fn put(self, pixels: &mut Vec<f32>, place: Vec2<usize>, values: [f32; 4]) {
+    fn put(self, pixels: &mut [f32], place: Vec2<usize>, values: [f32; 4]) {
         let inside = |at: usize, offset: i64, size: usize| {
             let at = usize::try_from(at as i64 + offset).ok()?;
             (at < size).then_some(at)
