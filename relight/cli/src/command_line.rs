@@ -6,10 +6,8 @@ use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, Error, FromArgMatches, Parser, Subcommand};
 use relit_console::Console;
 
-#[cfg(feature = "train")]
-use crate::commands::train;
 use crate::commands::{
-    decompose, eval, export, insert, relight, render, serve, synth, turn, weights,
+    decompose, eval, export, insert, relight, render, serve, synth, train, turn, weights,
 };
 
 /// Single-view relighting: photographs decomposed and relit, rendering, synthetic data with ground truth, measures of the results.
@@ -47,8 +45,7 @@ enum Verb {
     /// Render synthetic objects with their ground truth: samples, whole turns, panoramas.
     #[command(after_help = synth::EXAMPLES)]
     Synth(synth::Arguments),
-    /// Train networks (built with the feature `train`).
-    #[cfg(feature = "train")]
+    /// Train networks (in a build with the feature `train`).
     #[command(after_help = train::EXAMPLES)]
     Train(train::Arguments),
     /// Decompose a whole turn: normals, albedo and light from the angle that the light turns by.
@@ -75,9 +72,7 @@ impl Verb {
             Self::Render(arguments) => arguments.fault(),
             Self::Eval(arguments) => arguments.fault(),
             Self::Synth(arguments) => arguments.fault(),
-            #[cfg(feature = "train")]
-            Self::Train(_) => None,
-            Self::Turn(_) | Self::Serve(_) => None,
+            Self::Train(_) | Self::Turn(_) | Self::Serve(_) => None,
             Self::Export(arguments) => arguments.fault(),
             Self::Weights(arguments) => arguments.fault(),
         }
@@ -102,7 +97,6 @@ pub(crate) fn run() -> ExitCode {
         Verb::Render(arguments) => render::run(&arguments, console),
         Verb::Eval(arguments) => eval::run(&arguments, console),
         Verb::Synth(arguments) => synth::run(&arguments, console),
-        #[cfg(feature = "train")]
         Verb::Train(arguments) => train::run(&arguments, console),
         Verb::Turn(arguments) => turn::run(&arguments, console),
         Verb::Export(arguments) => export::run(&arguments, console),

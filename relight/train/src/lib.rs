@@ -16,6 +16,8 @@
 //! | `turn_reader`, `labelled` | turns, and frames with labels |
 //! | [`RunSettings`] and others, `settings/` | TOML, also with the keys of earlier releases |
 
+#![cfg(feature = "libtorch")]
+
 mod adam;
 mod agreement;
 mod all_reduced;

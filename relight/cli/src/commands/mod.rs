@@ -12,7 +12,7 @@ pub(super) mod relight;
 pub(super) mod render;
 pub(super) mod serve;
 pub(super) mod synth;
-#[cfg(feature = "train")]
+#[cfg_attr(not(feature = "train"), path = "without_training.rs")]
 pub(super) mod train;
 pub(super) mod turn;
 pub(super) mod weights;
