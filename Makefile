@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-train train-turn test test-day test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-app setup-train train-turn test test-day test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -46,6 +46,9 @@ setup: ## Install the system packages that are missing
 setup-programs:
 	@.ci/setup --programs
 
+setup-app:
+	@.ci/setup --app
+
 setup-train: ## Install libtorch, which relight's training is built with (544 MB, once)
 	@.ci/setup-train
 
@@ -80,13 +83,13 @@ train-turn: setup-train ## Train the network of relight turn, all of its runs, f
 	done
 
 # Cargo builds the programs before it runs the first test: those of the package relit-tests run several.
-test: setup ## Run all tests
+test: setup ## Run all tests; those of training where libtorch is installed
 	@if rig-firmware/build --can && [[ -e /usr/include/simavr/sim_avr.h ]]; then \
 	    $(MAKE) --no-print-directory firmware emulator; \
 	else \
 	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' printed why"; \
 	fi
-	cargo test --locked --workspace --exclude relit-fuzz $(EXTRAS) $$(.ci/setup-train --features)
+	cargo test --locked --workspace $(EXTRAS) $$(.ci/setup-train --features)
 
 test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a virtual machine
 	@tests/rig-vm/run
@@ -143,7 +146,7 @@ release: packages wheel image static ## Make all that a release has: packages, w
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
 	cargo run -q --locked -p relit-house
-	cargo clippy --locked --workspace --all-targets $(EXTRAS),relit-extract/object-store \
+	cargo clippy --locked --workspace --all-targets $(EXTRAS),relit-extract/object-store,relit-fuzz/fuzzer \
 	    $$(.ci/setup-train --features) -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings
 	cargo clippy --locked $(PROGRAMS) --all-targets -- -D warnings
@@ -163,7 +166,7 @@ lint: setup ## Check formatting, lints and documentation
 	cargo fmt --manifest-path rig-firmware/uno/Cargo.toml --check
 	@if rig-firmware/build --can; then rig-firmware/build --clippy; fi
 
-app: ## Build the app's page into target/page: its engine for WebAssembly, its weights and its files
+app: setup-app ## Build the app's page into target/page: its engine for WebAssembly, its weights and its files
 	@.ci/app
 
 test-app: app ## Test the page in headless Chromium, and hold it against the programs
@@ -224,7 +227,7 @@ fuzz: setup ## Run each fuzz target for FUZZ_SECONDS (60)
 	for target in $$targets; do \
 	    echo "fuzz: $$target"; \
 	    mkdir -p "tests/fuzz/corpus/$$target"; \
-	    RUSTC_BOOTSTRAP=1 cargo fuzz run --fuzz-dir tests/fuzz "$$target" \
+	    RUSTC_BOOTSTRAP=1 cargo fuzz run --fuzz-dir tests/fuzz --features fuzzer "$$target" \
 	        "tests/fuzz/corpus/$$target" "tests/fuzz/seeds/$$target" -- \
 	        -max_total_time=$(FUZZ_SECONDS) \
 	        -malloc_limit_mb=$$([[ $$target == shard_reader ]] && echo $(FUZZ_SHARD_PIECE) || echo 2048); \
