@@ -185,11 +185,11 @@ flash: firmware ## Flash the firmware to the Arduino at PORT (/dev/ttyACM0)
 	avrdude -p atmega328p -c arduino -P $(PORT) -b $(FLASH_BAUD) -D \
 	    -U flash:w:$(FIRMWARE)/rig-firmware-uno.hex:i
 
-demo: setup-programs ## Record the turn in fixtures/ on a simulated rig, make a shard of it, list the results
+demo: setup-programs ## Record the turn in fixtures/ on a simulated rig faster than real time, make a shard of it, list the results
 	cargo build --locked --release $(PROGRAMS) --bins
 	rm -rf $(DEMO)
 	$(TARGET)/release/relit-capture record --yes --object cow --root $(DEMO)/sessions \
-	    --camera 'replay:fixtures/$(SESSION)?loop=1' --turntable sim:
+	    --camera 'replay:fixtures/$(SESSION)?loop=1&speed=0' --turntable 'sim:?speed=0'
 	@session=$$(echo $(DEMO)/sessions/*-cow); \
 	$(TARGET)/release/relit-mask "$$session" --auto; \
 	$(TARGET)/release/relit-extract "$$session" -o $(DEMO)/out; \

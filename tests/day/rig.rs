@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader};
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -45,7 +46,7 @@ pub(crate) const LONG_TURN: Turn = Turn {
 impl Turn {
     /// The address of the recording as a camera.
     pub(crate) fn camera(&self) -> String {
-        format!("replay:{}?loop=1", recording(self).display())
+        format!("replay:fixtures/{}?loop=1", self.recording)
     }
 }
 
@@ -87,12 +88,14 @@ impl Rig {
         Self::serve(command, turn, folder)
     }
 
+    /// In a folder of its own, by relative paths: the page shows them, and its pictures no path of this machine.
     fn serve(mut command: Command, turn: &'static Turn, folder: tempfile::TempDir) -> Self {
+        symlink(fixtures(), folder.path().join("fixtures")).unwrap();
         command
             .args(["--json", "--listen", "127.0.0.1:0"])
             .args(["--degrees-per-second", &turn.degrees_per_second.to_string()])
-            .arg("--root")
-            .arg(folder.path().join("sessions"))
+            .args(["--root", "sessions", "--datasets", "."])
+            .current_dir(&folder)
             .stdout(Stdio::piped());
         let mut child = command.spawn().unwrap();
         let mut line = String::new();
@@ -144,8 +147,12 @@ impl Rig {
 }
 
 fn recording(turn: &Turn) -> PathBuf {
+    fixtures().join(turn.recording)
+}
+
+fn fixtures() -> PathBuf {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures");
-    fixtures.join(turn.recording).canonicalize().unwrap()
+    fixtures.canonicalize().unwrap()
 }
 
 impl Drop for Rig {
