@@ -17,7 +17,14 @@ pub const VIDEO_EXTENSIONS: [&str; 43] = [
 ];
 
 /// Files that file managers leave in folders, and that nobody sees.
-const HIDDEN: [&str; 3] = ["desktop.ini", "ehthumbs.db", "thumbs.db"];
+const HIDDEN: [&str; 6] = [
+    "desktop.ini",
+    "ehthumbs.db",
+    "folder.htt",
+    "icon\r",
+    "picasa.ini",
+    "thumbs.db",
+];
 
 /// Whether a file's name ends as that of a video, in any case, and is not hidden.
 #[must_use]

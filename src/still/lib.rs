@@ -26,4 +26,4 @@ pub use decode::{decode, orientation, stored_size};
 pub use error::{ColourError, StillError};
 pub use format::{ENDINGS, Format};
 pub use image::metadata::Orientation;
-pub use names::{is_left_behind, is_named};
+pub use names::is_named;

@@ -15,7 +15,7 @@ use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
 use relight_core::statistics::ranked;
-use relit_still::is_left_behind;
+use relit_data::file_names::is_hidden;
 
 /// Size of the panoramas that are made here.
 pub const PANORAMA_EXTENT: Extent = Extent::new(256, 128);
@@ -240,7 +240,7 @@ fn members(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(SynthError::read(folder))? {
         let path = entry.map_err(SynthError::read(folder))?.path();
-        if !is_left_behind(&path) {
+        if !is_hidden(&path) {
             paths.push(path);
         }
     }

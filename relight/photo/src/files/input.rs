@@ -10,7 +10,7 @@ use relight_core::image::{Extent, ImageError, Planes, Rgb, StoredImage, Transfer
 use relight_reader::{Encoding, SampleId, Source, Turns};
 use relit_data::file_names::{alike_beside, folded, has_extension, is_hidden};
 use relit_data::shard::Dataset;
-use relit_still::{Format, Orientation, is_left_behind, is_named};
+use relit_still::{Format, Orientation, is_named};
 
 use super::mask_record::check_turned;
 use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
@@ -120,7 +120,7 @@ impl PhotoInput {
         if !path.is_dir() {
             return has_extension(path, &["tar"]);
         }
-        let is_shard = |path: PathBuf| !is_left_behind(&path) && has_extension(&path, &["tar"]);
+        let is_shard = |path: PathBuf| !is_hidden(&path) && has_extension(&path, &["tar"]);
         let entries = fs::read_dir(path).into_iter().flatten().flatten();
         path.join(Dataset::FILE).is_file() || entries.map(|entry| entry.path()).any(is_shard)
     }
@@ -177,7 +177,7 @@ fn add_folder(
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(DecomposeError::read(folder))? {
         let path = entry.map_err(DecomposeError::read(folder))?.path();
-        if !is_left_behind(&path) && path.is_file() {
+        if !is_hidden(&path) && path.is_file() {
             files.push(path);
         }
     }
