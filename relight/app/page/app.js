@@ -4,11 +4,12 @@ import { $, make } from "./dom.js";
 import { Backgrounds } from "./backgrounds.js";
 import { bindControls } from "./controls.js";
 import { Cutter } from "./cutter.js";
-import { Engine } from "./engine.js";
-import { opens, takeFiles } from "./fields.js";
+import { Engine, MODULE, NETWORKS } from "./engine.js";
+import * as fields from "./fields.js";
 import { isZip } from "./files.js";
 import { Lamp } from "./lamp.js";
 import { Library } from "./library.js";
+import { Loading, sayFault } from "./loading.js";
 import * as notices from "./notices.js";
 import { Objects } from "./objects.js";
 import { keepOffline } from "./offline.js";
@@ -27,15 +28,16 @@ const LONG = 300;
 const FIRST = "room";
 
 notices.listen();
+fields.listen();
 bindTabs();
 begin().catch((error) => {
   document.body.classList.add("dead");
-  notices.alert(error.message);
-  $("loading").textContent = error.message;
+  sayFault(error.message);
+  return fields.refuseFiles(error.message);
 });
 
 async function begin() {
-  const engine = await Engine.start(notices.say);
+  const engine = await Engine.start(new Loading(MODULE, NETWORKS));
   const library = new Library(engine);
   const bundled = await library.bundled();
   const work = new Work(emptyScene((bundled.find(({ key }) => key === FIRST) ?? bundled[0]).key));
@@ -50,14 +52,14 @@ async function begin() {
   bindControls(work);
   bindSteps(work, cutter);
   bindBefore(rendering);
-  bindIncoming(objects, saving);
+  takeObjects(objects, saving);
   showState(engine, rendering);
   rendering.refresh();
   document.body.classList.remove("starting");
   performance.mark("relight:usable");
+  fields.takeWaiting();
   await firstPicture(rendering);
-  await notices.attempt(() => engine.prepare());
-  notices.say("");
+  await engine.prepare();
   await keepOffline();
 }
 
@@ -107,22 +109,10 @@ function bindBefore(rendering) {
   });
 }
 
-/** Files that come by a button, are dropped or pasted. */
-function bindIncoming(objects, saving) {
+/** A file may be a photograph, a captured object or a kept scene. */
+function takeObjects(objects, saving) {
   const take = async (file) => ((await isZip(file)) ? saving.reopen(file) : objects.add(file));
-  opens("photo-file", "choose", "welcome-choose");
-  opens("camera-file", "camera", "welcome-camera");
-  for (const field of ["photo-file", "camera-file"]) takeFiles(field, take);
-  document.addEventListener("dragover", (event) => event.preventDefault());
-  document.addEventListener("drop", (event) => {
-    event.preventDefault();
-    const [file] = event.dataTransfer.files;
-    if (file) notices.attempt(() => take(file));
-  });
-  document.addEventListener("paste", (event) => {
-    const [file] = event.clipboardData.files;
-    if (file) notices.attempt(() => take(file));
-  });
+  for (const field of ["photo-file", "camera-file"]) fields.takeFiles(field, take);
 }
 
 /** What the engine does, and what it says of the picture. */

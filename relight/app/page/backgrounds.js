@@ -2,7 +2,7 @@
 
 import { $, make } from "./dom.js";
 import { copyOf } from "./files.js";
-import { opens, takeFiles } from "./fields.js";
+import { takeFiles } from "./fields.js";
 import { calm, say } from "./notices.js";
 
 export class Backgrounds {
@@ -13,8 +13,6 @@ export class Backgrounds {
 
   constructor(work, library, rendering) {
     [this.#work, this.#library, this.#rendering] = [work, library, rendering];
-    opens("own-photo-file", "own-photo");
-    opens("own-panorama-file", "own-panorama");
     takeFiles("own-photo-file", (file) => this.open(file, "photo"));
     takeFiles("own-panorama-file", (file) => this.open(file, "panorama_file"));
     work.addEventListener("scene", () => this.#show());

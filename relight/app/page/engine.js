@@ -6,6 +6,10 @@ import { Held } from "./held.js";
 const SIMD = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];
 const NO_WASM = "This browser cannot run relight: it needs WebAssembly with SIMD, which browsers have had since 2023.";
 
+/** The engine, and the weights of its networks. */
+export const MODULE = "relight.wasm";
+export const NETWORKS = "weights.safetensors";
+
 /** Questions after which the networks will be needed. */
 const NEED_NETWORKS = new Set(["open_photo", "open_pixels", "import"]);
 
@@ -18,9 +22,9 @@ export class Engine extends EventTarget {
   memory = 0;
 
   #module;
-  #progress;
-  /** The file of the networks and its way into the engine, as promises, from when they are first wanted. */
-  #weights = null;
+  #loading;
+  /** The file of the networks, from when the engine has it, and its way into the engine from when they are first wanted. */
+  #networks = null;
   #prepared = null;
   #worker;
   #held = new Held();
@@ -28,25 +32,25 @@ export class Engine extends EventTarget {
   #number = 0;
   #restarting = null;
 
-  /** Loads the engine, without its networks; `progress` is told a sentence now and then. */
-  static async start(progress) {
+  /** Loads the engine, without its networks. */
+  static async start(loading) {
     if (!canRun()) throw new Error(NO_WASM);
     const engine = new Engine();
-    engine.#progress = progress;
-    engine.#module = await compiled("relight.wasm");
-    await engine.#begin();
+    engine.#loading = loading;
+    await loading.file("The engine", MODULE, async (file) => {
+      engine.#module = await compiled(file);
+      await engine.#begin();
+    });
     return engine;
   }
 
   /** Loads the networks, once. */
-  async prepare() {
-    this.#prepared ??= this.#load();
-    try {
-      await this.#prepared;
-    } catch (error) {
-      this.#prepared = this.#weights = null;
-      throw error;
-    }
+  prepare() {
+    this.#prepared ??= this.#loading.file("The networks", NETWORKS, async (file) => {
+      await this.#load(file);
+      this.#networks = file;
+    });
+    return this.#prepared;
   }
 
   /** Asks the engine. Its answer's parts are in `parts`; its refusals and faults are thrown as sentences. */
@@ -62,17 +66,16 @@ export class Engine extends EventTarget {
   async #begin() {
     this.#worker = new Worker("worker.js", { type: "module" });
     await new Promise((resolve, reject) => {
-      this.#worker.onmessage = ({ data }) => (data.ready ? resolve() : reject(new Error(`The engine does not start: ${data.broken}.`)));
-      this.#worker.onerror = () => reject(new Error("The engine's worker does not start."));
+      this.#worker.onmessage = ({ data }) => (data.ready ? resolve() : reject(new Error(`it does not start (${data.broken}).`)));
+      this.#worker.onerror = () => reject(new Error("its worker does not start."));
       this.#worker.postMessage({ module: this.#module });
     });
     this.#worker.onmessage = ({ data }) => this.#answered(data);
     this.#worker.onerror = (event) => this.#failed(event);
   }
 
-  async #load() {
-    this.#weights ??= download("weights.safetensors", this.#progress);
-    return this.#send({ fields: { op: "load" }, parts: [await this.#weights] });
+  #load(file) {
+    return this.#send({ fields: { op: "load" }, parts: [file] });
   }
 
   #send(request) {
@@ -126,7 +129,7 @@ export class Engine extends EventTarget {
       this.#open.clear();
       this.#worker.terminate();
       await this.#begin();
-      if (this.#prepared) await (this.#prepared = this.#load());
+      if (this.#networks) await this.#load(this.#networks);
       const bad = await this.#giveAgain();
       if (!bad) break;
       lost.push(this.#held.drop(bad));
@@ -156,30 +159,10 @@ function canRun() {
   return typeof WebAssembly === "object" && WebAssembly.validate(new Uint8Array(SIMD)) && typeof Worker === "function";
 }
 
-async function compiled(name) {
-  const response = await get(name);
+async function compiled(file) {
   try {
-    return await WebAssembly.compile(await response.arrayBuffer());
+    return await WebAssembly.compile(await file.arrayBuffer());
   } catch (error) {
-    throw new Error(`${NO_WASM} (${error.message})`);
+    throw new Error(`the file is damaged, or this browser cannot run it (${error.message}).`);
   }
-}
-
-/** A file; how much of it is here is told every now and then. */
-async function download(name, progress) {
-  const reader = (await get(name)).body.getReader();
-  const chunks = [];
-  let bytes = 0;
-  for (let part = await reader.read(); !part.done; part = await reader.read()) {
-    chunks.push(part.value);
-    bytes += part.value.length;
-    progress(`Loading the networks: ${(bytes / 1e6).toFixed(0)} MB`);
-  }
-  return new Blob(chunks);
-}
-
-async function get(name) {
-  const response = await fetch(name).catch(() => null);
-  if (!response?.ok) throw new Error(`The page is incomplete: ${name} cannot be loaded.`);
-  return response;
 }

@@ -1,7 +1,7 @@
 // What leaves the page, by the browser's own ways: pictures and kept scenes as downloads or through its share sheet.
 
 import { $ } from "./dom.js";
-import { opens, takeFiles } from "./fields.js";
+import { takeFiles } from "./fields.js";
 import { copyOf, isZip } from "./files.js";
 import { attempt, calm, say } from "./notices.js";
 import { forEngine, fromEngine } from "./scene.js";
@@ -18,7 +18,6 @@ export class Saving {
     for (const format of ["png", "jpeg"]) $(`save-${format}`).addEventListener("click", () => attempt(() => this.#save(format)));
     $("share").addEventListener("click", () => attempt(() => this.#share()));
     $("keep").addEventListener("click", () => attempt(() => this.#keep()));
-    opens("reopen-file", "reopen");
     takeFiles("reopen-file", (file) => this.reopen(file));
     window.addEventListener("beforeunload", (event) => {
       if (work.unsaved) event.preventDefault();

@@ -11,7 +11,7 @@ self.addEventListener("fetch", (event) => {
 
 async function keep() {
   const { files } = await (await fetch("files.json", { cache: "no-cache" })).json();
-  const names = [...new Set([...files, "files.json", "index.html"])].filter((name) => name !== "sw.js");
+  const names = [...Object.keys(files), "files.json"].filter((name) => name !== "sw.js");
   await (await caches.open(CACHE)).addAll(names.map((name) => new Request(name, { cache: "no-cache" })));
 }
 
@@ -21,10 +21,10 @@ async function takeOver() {
   await self.clients.claim();
 }
 
-/** Which version there is, the network knows better; all else is handed out as it was kept. */
+/** Which version there is, the network knows better where somebody asks for news; all else is handed out as it was kept. */
 async function answer(request, url) {
   const cache = await caches.open(CACHE);
-  if (url.pathname.endsWith("/files.json")) return fetch(request).catch(() => cache.match("files.json"));
+  if (url.pathname.endsWith("/files.json") && request.cache === "no-cache") return fetch(request).catch(() => cache.match("files.json"));
   const kept = await cache.match(request.mode === "navigate" ? "index.html" : request, { ignoreSearch: true });
   return kept ?? fetch(request);
 }

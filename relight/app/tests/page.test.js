@@ -461,7 +461,7 @@ test("a browser without WebAssembly is told so in a sentence", async () => {
 });
 
 test("after a fault the engine is started again with all that it held", async () => {
-  const server = await serve(FOLDER, FAULTY_WORKER);
+  const server = await serve(FOLDER, { instead: FAULTY_WORKER });
   const { page } = await open(browser, server.address, "desk");
   await settled(page);
   await steps.addBall(page, photo);

@@ -11,8 +11,9 @@ const run = promisify(execFile);
 /** Starts an engine of the page in the page: `ask` asks it. */
 export async function startEngine(page) {
   await page.evaluate(async () => {
-    const { Engine } = await import("./engine.js");
-    window.testedEngine = await Engine.start(() => {});
+    const { Engine, MODULE, NETWORKS } = await import("./engine.js");
+    const { Loading } = await import("./loading.js");
+    window.testedEngine = await Engine.start(new Loading(MODULE, NETWORKS));
   });
 }
 

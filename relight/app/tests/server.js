@@ -17,13 +17,19 @@ const HEADERS = {
   "Cross-Origin-Resource-Policy": "same-origin", "X-Content-Type-Options": "nosniff", "Cache-Control": "no-cache",
 };
 
-/** Serves a folder under a path of its own: { address, stop }. `instead` makes other texts of some files, by their names. */
-export async function serve(folder, instead = {}) {
-  const server = createServer(async ({ url }, response) => {
+/** Serves a folder under a path of its own, compressed where it is and the browser takes it: { address, stop }. `instead` makes other
+ * texts of some files, by their names, `slowly` sends some in ways of its own, and `missing` are not there. */
+export async function serve(folder, { instead = {}, slowly = {}, missing = new Set() } = {}) {
+  const server = createServer(async ({ url, headers }, response) => {
     const path = normalize(new URL(url, "http://localhost").pathname).replace(/^\/app\/?/, "") || "index.html";
+    if (missing.has(path)) return response.writeHead(404, HEADERS).end();
     try {
-      const bytes = instead[path] ? instead[path](await readFile(join(folder, path), "utf8").catch(() => "")) : await readFile(join(folder, path));
-      response.writeHead(200, { ...HEADERS, "Content-Type": TYPES[extname(path)] ?? "application/octet-stream" }).end(bytes);
+      const { bytes, coding } = instead[path] ? await madeOf(folder, path, instead[path]) : await encoded(folder, path, headers["accept-encoding"] ?? "");
+      response.writeHead(200, { ...HEADERS, ...coding, "Content-Type": TYPES[extname(path)] ?? "application/octet-stream", "Content-Length": bytes.length });
+      const send = (part) => new Promise((resolve) => response.write(part, resolve));
+      if (slowly[path]) await slowly[path]({ bytes, response, send });
+      else send(bytes);
+      response.end();
     } catch {
       response.writeHead(404, HEADERS).end();
     }
@@ -34,4 +40,18 @@ export async function serve(folder, instead = {}) {
     server.closeAllConnections();
   });
   return { address: `http://127.0.0.1:${server.address().port}/app/`, stop };
+}
+
+async function madeOf(folder, path, make) {
+  const text = await readFile(join(folder, path), "utf8").catch(() => "");
+  return { bytes: Buffer.from(make(text)), coding: {} };
+}
+
+async function encoded(folder, path, accepted) {
+  for (const [coding, ending] of [["br", "br"], ["gzip", "gz"]]) {
+    if (!accepted.split(", ").includes(coding)) continue;
+    const bytes = await readFile(join(folder, `${path}.${ending}`)).catch(() => null);
+    if (bytes) return { bytes, coding: { "Content-Encoding": coding } };
+  }
+  return { bytes: await readFile(join(folder, path)), coding: {} };
 }
