@@ -354,7 +354,7 @@ impl Server {
         fs::create_dir_all(&page).unwrap();
         fs::write(
             page.join("files.json"),
-            r#"{"version": "1", "files": ["index.html", "a.wasm"]}"#,
+            r#"{"version": "1", "files": {"index.html": 38, "a.wasm": 4}}"#,
         )
         .unwrap();
         fs::write(
@@ -363,6 +363,7 @@ impl Server {
         )
         .unwrap();
         fs::write(page.join("a.wasm"), b"\0asm").unwrap();
+        fs::write(page.join("a.wasm.gz"), "compressed").unwrap();
         let mut child = Command::new(env!("CARGO_BIN_EXE_relight"))
             .args(["--json", "serve", "--page", "page"])
             .args(arguments)
@@ -444,6 +445,17 @@ fn the_page_is_handed_out_and_nothing_is_taken() {
         .unwrap();
     let again = format!("GET /a.wasm HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: {tag}");
     assert_eq!(of(&again), 304);
+    let accepting = format!("{again}\r\nAccept-Encoding: gzip, br");
+    let (status, compressed) = ask(&url, &accepting);
+    assert_eq!(status, 200, "another encoding is another answer");
+    for part in [
+        "content-encoding: gzip",
+        "vary: accept-encoding",
+        "content-length: 10",
+        "\r\n\r\ncompressed",
+    ] {
+        assert!(compressed.contains(part), "{compressed}");
+    }
 }
 
 #[test]
@@ -489,8 +501,15 @@ fn the_page_is_exported_for_any_server_and_what_is_missing_is_named() {
             .unwrap()
             .contains("require-corp")
     );
-    let (code, errors) = relight(folder.path(), &["serve", "--page", "nowhere"]);
-    assert!(code == 1 && errors.contains("make app"), "{errors}");
+    assert_eq!(fs::read(site.join("a.wasm.gz")).unwrap(), b"compressed");
+    fs::write(site.join("index.html"), "half").unwrap();
+    for page in ["nowhere", "a/site"] {
+        let (code, errors) = relight(folder.path(), &["serve", "--page", page]);
+        assert!(
+            code == 1 && errors.contains(page) && errors.contains("make app"),
+            "{errors}"
+        );
+    }
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
     let (code, errors) = relight(

@@ -19,7 +19,8 @@ pub enum WeightPrecision {
 
 impl Weights {
     /// Weights out of the bytes of a safetensors file, or of a state dict that PyTorch saved (`.pth`, `.pt`); the first
-    /// bytes show which of them it is. Half precision becomes single.
+    /// bytes show which of them it is. Half precision becomes single. Integers of 8 bits (`I8`) become what they are times
+    /// the scale of their output channel, which the tensor `NAME.scale` has.
     ///
     /// # Errors
     /// A sentence that says what is wrong.
@@ -88,15 +89,49 @@ fn encode(tensor: &Tensor, precision: WeightPrecision) -> Vec<u8> {
 fn from_safetensors(bytes: &[u8]) -> Result<Weights, String> {
     let file = SafeTensors::deserialize(bytes)
         .map_err(|error| format!("it is no safetensors file and no state dict ({error})"))?;
-    file.iter()
+    let views = file.iter();
+    let views = views.filter(|(name, _)| !is_of_integers(&file, name));
+    views
         .map(|(name, view)| {
-            let values = decode(view.dtype(), view.data())
+            let mut values = decode(view.dtype(), view.data())
                 .ok_or_else(|| format!("{name} holds {:?}, which is not read", view.dtype()))?;
+            if view.dtype() == Dtype::I8 {
+                scale(&mut values, &file, name)?;
+            }
             let tensor = Tensor::new(view.shape().to_vec(), values)
                 .ok_or_else(|| format!("{name} is not as long as its shape says"))?;
             Ok((name.to_owned(), tensor))
         })
         .collect()
+}
+
+/// How the name of the scales of a tensor of integers ends.
+const SCALES: &str = ".scale";
+
+/// Whether a tensor has the scales of another one, which holds integers.
+fn is_of_integers(file: &SafeTensors<'_>, name: &str) -> bool {
+    let integers = name.strip_suffix(SCALES);
+    let integers = integers.and_then(|name| file.tensor(name).ok());
+    integers.is_some_and(|view| view.dtype() == Dtype::I8)
+}
+
+/// Multiplies integers by the scales of the same file, one for each output channel, which is the first dimension.
+fn scale(integers: &mut [f32], file: &SafeTensors<'_>, name: &str) -> Result<(), String> {
+    let missing = || format!("{name} holds integers without a scale for each output channel");
+    let view = file.tensor(name).map_err(|error| error.to_string())?;
+    let channels = view.shape().first().copied().unwrap_or_default();
+    let scales = file
+        .tensor(&format!("{name}{SCALES}"))
+        .map_err(|_| missing())?;
+    let scales = decode(scales.dtype(), scales.data()).ok_or_else(missing)?;
+    if scales.len() != channels {
+        return Err(missing());
+    }
+    let count = integers.len().checked_div(channels).unwrap_or_default();
+    for (channel, scale) in integers.chunks_exact_mut(count.max(1)).zip(scales) {
+        channel.iter_mut().for_each(|value| *value *= scale);
+    }
+    Ok(())
 }
 
 fn decode(kind: Dtype, bytes: &[u8]) -> Option<Vec<f32>> {
@@ -112,6 +147,7 @@ fn decode(kind: Dtype, bytes: &[u8]) -> Option<Vec<f32>> {
         Dtype::BF16 => halves()
             .map(|pair| half::bf16::from_le_bytes(pair).to_f32())
             .collect(),
+        Dtype::I8 => bytes.iter().map(|&byte| f32::from(byte as i8)).collect(),
         _ => return None,
     })
 }
@@ -125,5 +161,48 @@ mod tests {
         for bytes in [&b""[..], b"hello", b"PK\x03\x04", &[0xff; 100]] {
             assert!(Weights::from_bytes(bytes).is_err());
         }
+    }
+
+    /// A file of one tensor of integers with its scales.
+    fn quantised(shape: &[usize], integers: &[i8], scales: &[f32]) -> Vec<u8> {
+        let integers: Vec<u8> = integers.iter().map(|&value| value as u8).collect();
+        let bytes: Vec<u8> = scales
+            .iter()
+            .flat_map(|scale| scale.to_le_bytes())
+            .collect();
+        let views = [
+            ("a", TensorView::new(Dtype::I8, shape.to_vec(), &integers)),
+            (
+                "a.scale",
+                TensorView::new(Dtype::F32, vec![scales.len()], &bytes),
+            ),
+        ];
+        let views = views.map(|(name, view)| (name, view.unwrap()));
+        safetensors::serialize(views, None).unwrap()
+    }
+
+    #[test]
+    fn integers_are_multiplied_by_the_scale_of_their_output_channel() {
+        let bytes = quantised(&[2, 1, 2], &[127, -128, 3, 0], &[0.5, 2.0]);
+        let tensor = Tensor::new(vec![2, 1, 2], vec![63.5, -64.0, 6.0, 0.0]).unwrap();
+        let expected: Weights = [("a".to_owned(), tensor)].into_iter().collect();
+        assert_eq!(Weights::from_bytes(&bytes), Ok(expected));
+    }
+
+    #[test]
+    fn integers_without_fitting_scales_are_an_error() {
+        for (shape, count) in [
+            (&[2, 2][..], 1),
+            (&[2, 2], 4),
+            (&[4], 1),
+            (&[0, 4], 1),
+            (&[], 1),
+        ] {
+            let integers = vec![1; shape.iter().product()];
+            let bytes = quantised(shape, &integers, &vec![1.0; count]);
+            assert!(Weights::from_bytes(&bytes).is_err(), "{shape:?}");
+        }
+        let empty = quantised(&[2, 0], &[], &[1.0, 1.0]);
+        assert!(Weights::from_bytes(&empty).is_ok());
     }
 }

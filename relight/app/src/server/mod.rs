@@ -10,13 +10,13 @@ mod files;
 mod routes;
 
 use std::net::{SocketAddr, TcpListener};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use relit_web::{AccessPolicy, Announcement, ConnectionLimits, Shutdown, Token};
 use tokio::sync::Semaphore;
 
-pub use files::{PageFault, PageFiles};
+pub use files::{PageFault, PageFiles, PageSize};
 
 /// Threads that carry requests: files are in memory.
 const THREADS: usize = 2;
@@ -93,13 +93,17 @@ pub fn serve_page(
     })
 }
 
-/// Where the page is that was built or installed with a program: `share/relight/page` beside the folder of programs, or
-/// `page` beside the folder of a build.
-#[must_use]
-pub fn installed_page(program: &std::path::Path) -> Option<PathBuf> {
-    let above = program.parent()?.parent()?;
-    let places = [above.join("share/relight/page"), above.join("page")];
-    places
-        .into_iter()
-        .find(|place| place.join(files::LIST).is_file())
+/// The folder of the page that was built or installed with a program: `share/relight/page` next to the folder of programs, or
+/// `page` next to the folder of a build.
+///
+/// # Errors
+/// [`PageFault::NotInstalled`] where neither is there.
+pub fn installed_page(program: &Path) -> Result<PathBuf, PageFault> {
+    let above = program.parent().and_then(Path::parent);
+    let above = above.unwrap_or_else(|| Path::new("/"));
+    let mut places = vec![above.join("share/relight/page"), above.join("page")];
+    match places.iter().position(|place| place.is_dir()) {
+        Some(at) => Ok(places.swap_remove(at)),
+        None => Err(PageFault::NotInstalled { places }),
+    }
 }

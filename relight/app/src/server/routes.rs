@@ -11,7 +11,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::get;
 use relit_web::{AccessPolicy, Entry, Failure, QueryParams, guard};
 
-use super::files::{POLICY, PageFile, PageFiles};
+use super::files::{Encoding, POLICY, PageFiles};
 
 /// The page itself.
 const INDEX: &str = "index.html";
@@ -85,12 +85,28 @@ fn refused() -> Response {
 }
 
 fn answer(files: &PageFiles, name: &str, headers: &HeaderMap) -> Response {
-    let Some(PageFile { content, kind, tag }) = files.get(name) else {
+    let accept = headers.get_all(header::ACCEPT_ENCODING);
+    let accept: Vec<_> = accept
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .collect();
+    let file = files.get(name);
+    let found = file.and_then(|file| Some((file.kind, file.accepted(&accept.join(","))?)));
+    let Some((
+        kind,
+        Encoding {
+            coding,
+            content,
+            tag,
+        },
+    )) = found
+    else {
         return Failure::not_found("there is no such file").into_response();
     };
     let about = [
         (header::CONTENT_SECURITY_POLICY, POLICY),
         (header::ETAG, tag),
+        (header::VARY, "accept-encoding"),
         // Asked for again each time, and not sent again where it is the same.
         (header::CACHE_CONTROL, "no-cache"),
         (
@@ -102,6 +118,7 @@ fn answer(files: &PageFiles, name: &str, headers: &HeaderMap) -> Response {
     if known.is_some_and(|known| known.as_bytes() == tag.as_bytes()) {
         return (StatusCode::NOT_MODIFIED, about).into_response();
     }
-    let kind = [(header::CONTENT_TYPE, *kind)];
-    (about, kind, content.clone()).into_response()
+    let kind = [(header::CONTENT_TYPE, kind)];
+    let coding = coding.map(|coding| [(header::CONTENT_ENCODING, coding)]);
+    (about, kind, coding, content.clone()).into_response()
 }

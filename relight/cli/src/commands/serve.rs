@@ -41,17 +41,24 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let files = PageFiles::read(&arguments.folder()?)?;
-    let (count, bytes) = files.size();
+    let folder = match &arguments.page {
+        Some(folder) => folder.clone(),
+        None => installed_page(&env::current_exe()?)?,
+    };
+    let files = PageFiles::read(&folder)?;
     if let Some(folder) = &arguments.export {
         files.export(folder)?;
-        let megabytes = bytes as f64 / 1e6;
+        let size = files.size();
+        let megabytes = |bytes: u64| bytes as f64 / 1e6;
         let text = format!(
-            "{}: {count} files, {megabytes:.1} MB; README.txt says which headers the server should send",
-            folder.display()
+            "{}: {} files, {:.1} MB ({:.1} MB compressed); README.txt says what the server should send",
+            folder.display(),
+            size.files,
+            megabytes(size.bytes),
+            megabytes(size.compressed)
         );
-        let event =
-            json!({ "event": "exported", "folder": folder, "files": count, "bytes": bytes });
+        let event = json!({ "event": "exported", "folder": folder, "files": size.files, "bytes": size.bytes,
+            "compressed": size.compressed });
         console.say(&text, &event);
         return Ok(Outcome::Whole);
     }
@@ -78,17 +85,4 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     };
     serve_page(files, options, announce, &Shutdown::new())?;
     Ok(Outcome::Whole)
-}
-
-impl Arguments {
-    fn folder(&self) -> Result<PathBuf, String> {
-        if let Some(folder) = &self.page {
-            return Ok(folder.clone());
-        }
-        let program = env::current_exe().ok();
-        program.as_deref().and_then(installed_page).ok_or_else(|| {
-            "the page is not installed beside this program: build it by 'make app', or give its folder by --page"
-                .to_owned()
-        })
-    }
 }
