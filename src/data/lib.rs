@@ -13,6 +13,7 @@
 //! | [`image_stats`] | statistics of an image's pixels, all or under a mask |
 //! | [`srgb`] | sRGB values to light and back |
 //! | [`text`] | text in files, with or without a byte order mark |
+//! | [`colour`] | colours as videos code them (HDR, wide gamut) to sRGB |
 //! | [`turn_light`] | how much light changes over a turn |
 //! | [`naming`] | the names that a session may have |
 //! | [`file_names`] | the names of files: videos, hidden ones, and those that are one file where case is ignored |
@@ -117,6 +118,7 @@
 //!         frames: u64::from(SAMPLES),
 //!         bytes: 5,
 //!         blake3: Digest::of(b"video"),
+//!         colour_conversion: None,
 //!         index_blake3: None,
 //!     },
 //!     mask: MaskInfo {
@@ -155,6 +157,7 @@
 //! ```
 
 pub mod causes;
+pub mod colour;
 pub mod counts;
 pub mod disk;
 #[cfg(feature = "files")]

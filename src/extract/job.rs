@@ -61,6 +61,7 @@ impl Job {
             frames: video.frames().len() as u64,
             bytes,
             blake3,
+            colour_conversion: video.facts().colour_conversion.clone(),
             index_blake3: index_digest(&recording)?,
         };
         let mut notices = recording.notices.clone();

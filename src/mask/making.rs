@@ -167,6 +167,8 @@ fn record_of(
 ) -> Result<MaskRecord, MaskingError> {
     let result = RecordedResult::new(mask.statistics(), png);
     let mut warnings: Vec<String> = mask.warnings().iter().map(Warning::to_string).collect();
+    let conversion = source.colour_conversion.as_ref();
+    warnings.extend(conversion.map(|by| format!("the colours were converted: {by}")));
     let software = MaskSoftware::of(request.engine);
     if let Some(Recipe { path, record }) = &request.recipe
         && record.result.mask_blake3 != result.mask_blake3

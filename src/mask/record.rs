@@ -69,6 +69,9 @@ pub struct SourceFrame {
     /// Exif's number, 2 to 8, by which a photograph was turned for display before; width, height and mask are those after.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exif_orientation: Option<u8>,
+    /// How the video's colours were converted to sRGB, in words; none where they were taken as sRGB.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub colour_conversion: Option<String>,
     /// BLAKE3 of its 8-bit RGB values, row by row, in hexadecimal.
     pub frame_blake3: String,
 }
@@ -266,6 +269,7 @@ mod tests {
                 width: 64,
                 height: 48,
                 exif_orientation: None,
+                colour_conversion: None,
                 frame_blake3: "00".to_owned(),
             },
             hints: RecordedHints::new(&Hints::Rect(Rect::new(-1, 2, 30, 40)).into(), &[]).unwrap(),

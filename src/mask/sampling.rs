@@ -55,6 +55,7 @@ pub(super) fn read_frame(
         width: frame.width(),
         height: frame.height(),
         exif_orientation: video.facts().exif_orientation,
+        colour_conversion: video.facts().colour_conversion.clone(),
         frame_blake3: blake3::hash(frame.as_raw()).to_hex().to_string(),
     };
     Ok((frame, source))

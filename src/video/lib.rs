@@ -1,14 +1,16 @@
 //! Reading and writing videos with FFmpeg: a file becomes frames with numbers and time stamps, and
 //! frames become RGB pictures; a [`Muxer`] writes a camera's stream to a file.
 //!
-//! Opening a [`Video`] reads through the file once without decoding: which frames it has, in order of
-//! presentation, the time of each, and whether the file is complete. A [`Reader`] then returns the
+//! Opening a [`Video`] reads through the file once: which frames it has, in order of presentation, the time of each, and
+//! whether the file is complete. It decodes only where packets do not tell which pictures there are (fields, streams that
+//! were cut or joined, some older codecs). A [`Reader`] then returns the
 //! wanted frames. If each frame is coded on its own (Motion JPEG, raw video), it returns compressed
 //! frames, which any number of threads can decode in parallel; otherwise FFmpeg's own threads decode
 //! ahead. Memory does not grow with the length of the video, except for about 30 bytes a frame.
 //!
-//! Colour range (limited, full) and matrix are respected, a display rotation is applied (of a photograph: Exif's), variable
-//! frame rate and gaps in the time stamps are kept. [`PixelFormat`] is the one type for how a
+//! Colour range (limited, full), matrix, primaries and transfer function are respected: pictures are sRGB, of HDR with
+//! 203 cd/m² as white. They are turned and their pixels are square, as players show them. Variable frame rate and gaps in
+//! the time stamps are kept. [`PixelFormat`] is the one type for how a
 //! camera's frames are coded. This crate knows nothing of sessions, masks or angles.
 //!
 //! ```
@@ -41,7 +43,10 @@
 //! ```
 
 mod annexb;
+mod colour;
+mod contents;
 mod decoder;
+mod display;
 mod ffv1;
 mod format;
 mod jpeg;
@@ -61,6 +66,7 @@ mod reader;
 mod sampling;
 mod scan;
 mod seek;
+mod survey;
 mod track;
 
 use std::io;
@@ -70,6 +76,7 @@ use std::sync::Once;
 use ffmpeg_next::Dictionary;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::input_with_dictionary;
+use relit_data::colour::ColourFault;
 use relit_data::disk::DISK_FULL;
 
 pub use format::{BayerPattern, PixelFormat, StreamFormat};
@@ -116,6 +123,16 @@ pub enum VideoError {
         codec: String,
         /// FFmpeg's answer.
         why: ffmpeg_next::Error,
+    },
+    /// Colours that are not known here.
+    #[error(
+        "{path}: {fault} cannot be converted to sRGB: convert the video to SDR with BT.709 colours first"
+    )]
+    Colour {
+        /// The file.
+        path: PathBuf,
+        /// What cannot be converted.
+        fault: ColourFault,
     },
     /// A frame beyond the end.
     #[error("{path} has no frame {number}: give one of 0 to {last}")]
@@ -237,6 +254,9 @@ pub enum DecodeFault {
     /// The pixel format cannot be converted to RGB.
     #[error("its pixel format {0} cannot be converted to RGB")]
     PixelFormat(String),
+    /// Its colours cannot be converted to sRGB.
+    #[error("{0} cannot be converted to sRGB")]
+    Colour(#[from] ColourFault),
 }
 
 /// Opens a file, and only this file: FFmpeg takes a name with a colon for a URL, and that of a picture with a per cent sign

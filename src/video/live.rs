@@ -3,10 +3,11 @@
 use ffmpeg_next::codec::{self, decoder};
 use ffmpeg_next::{Packet, frame};
 
+use super::colour::Stated;
 use super::decoder::VideoDecoder;
+use super::display::Display;
 use super::lossless;
-use super::orientation::Orientation;
-use super::picture::{Colour, Picture};
+use super::picture::Picture;
 use super::{DecodeFault, PixelFormat, initialise};
 
 /// Decodes one frame after the other, in the order in which the camera delivers them.
@@ -62,11 +63,10 @@ impl LiveDecoder {
             None => lossless::frame(self.format, data, self.width, self.height)
                 .ok_or(DecodeFault::NotWhole)?,
         };
-        let (range, space) = (frame.color_range(), frame.color_space());
-        let colour = Colour::stated(frame.format(), range, space, frame.height());
+        let colour = Stated::by_picture(&frame).colour()?;
         self.number += 1;
-        let upright = Orientation::default();
-        Ok(Some(Picture::new(self.number - 1, frame, colour, upright)))
+        let display = Display::default();
+        Ok(Some(Picture::new(self.number - 1, frame, colour, display)))
     }
 }
 

@@ -1,6 +1,7 @@
 //! H.264 as cameras deliver it: NAL units behind start codes (ITU-T H.264, annex B).
 
 /// The kinds of NAL unit that matter here (ITU-T H.264, table 7-1).
+const SLICES: std::ops::RangeInclusive<u8> = 1..=IDR_SLICE;
 const IDR_SLICE: u8 = 5;
 const SEQUENCE_PARAMETERS: u8 = 7;
 const PICTURE_PARAMETERS: u8 = 8;
@@ -14,6 +15,11 @@ pub(super) fn is_annex_b(packet: &[u8]) -> bool {
 #[must_use]
 pub fn is_key(packet: &[u8]) -> bool {
     units(packet).any(|unit| kind(unit) == Some(IDR_SLICE))
+}
+
+/// True if the packet has any part of a picture.
+pub(super) fn has_slice(packet: &[u8]) -> bool {
+    units(packet).any(|unit| kind(unit).is_some_and(|kind| SLICES.contains(&kind)))
 }
 
 /// The parameter sets seen so far, which a decoder needs before the first picture.
@@ -90,6 +96,7 @@ mod tests {
     fn a_packet_with_an_idr_slice_is_a_key_frame() {
         assert!(is_key(&packet(&[&SPS, &PPS, &[0x65, 1, 2]])));
         assert!(!is_key(&packet(&[&SPS, &PPS])));
+        assert!(!has_slice(&packet(&[&SPS, &PPS])) && has_slice(&packet(&[&SPS, &[0x41, 9]])));
         assert!(!is_key(&packet(&[&[0x41, 0x65, 0x65]])));
         assert!(!is_key(b""));
     }

@@ -1,9 +1,12 @@
 //! From the packets of a file to frames in order of presentation.
 
+use std::ops::Range;
+
 use ffmpeg_next::codec::Id;
 use ffmpeg_next::packet::Ref;
 use ffmpeg_next::{Packet, Rational, ffi};
 
+use super::contents::{Contents, Inspector};
 use super::ffv1::slices_are_whole;
 
 /// What is known of one frame before it is decoded.
@@ -25,27 +28,90 @@ pub(super) struct Stamp {
     /// When it is decoded.
     dts: Option<i64>,
     damaged: bool,
-    /// True if it can be decoded without any other frame.
+    /// True if decoding can begin with it.
     key: bool,
     /// For FFV1: whether its checksums are right; `None` where it has none.
     checked: Option<bool>,
+    contents: Contents,
     /// False if it is only decoded because others depend on it: the frames before the start of a
     /// clip that was trimmed without encoding it again.
     shown: bool,
 }
 
 impl Stamp {
-    pub(super) fn of(packet: &Packet, codec: Id) -> Self {
+    pub(super) fn of(packet: &Packet, codec: Id, inspector: &mut Inspector) -> Self {
         let data = packet.data().filter(|_| codec == Id::FFV1);
+        let (contents, key) = inspector.inspect(packet);
         Self {
-            key: packet.is_key(),
+            key,
             checked: data.and_then(slices_are_whole),
             pts: packet.pts(),
             dts: packet.dts(),
             damaged: packet.is_corrupt(),
+            contents,
             shown: raw_flags(packet) & ffi::AV_PKT_FLAG_DISCARD == 0,
         }
     }
+
+    fn is_picture(&self) -> bool {
+        self.shown && self.contents != Contents::Hidden
+    }
+}
+
+/// Whether the pictures of a file can only be known by decoding it: where a packet is unclear, where the file does not begin
+/// with a key frame or shows pictures before it that need what came before, and where time stamps are missing or not
+/// unique.
+pub(super) fn needs_decoding(stamps: &[Stamp]) -> bool {
+    let unclear = |stamp: &Stamp| stamp.contents == Contents::Unclear;
+    let Some(first) = stamps.first() else {
+        return false;
+    };
+    if !first.key || stamps.iter().any(unclear) || recordings(stamps).len() > 1 {
+        return true;
+    }
+    let shown = stamps.iter().filter(|stamp| stamp.is_picture());
+    let times: Option<Vec<i64>> = shown.map(|stamp| stamp.pts).collect();
+    let Some(mut times) = times else {
+        return true;
+    };
+    if times
+        .iter()
+        .any(|&time| first.pts.is_none_or(|first| time < first))
+    {
+        return true;
+    }
+    times.sort_unstable();
+    times.windows(2).any(|pair| pair[0] == pair[1])
+}
+
+/// By how many frames the time of decoding must go back for a new recording to begin; less is jitter.
+const MAX_JITTER: i64 = 4;
+
+/// The recordings of which a file was joined, one after the other: where the time of decoding begins again.
+fn recordings(stamps: &[Stamp]) -> Vec<Range<usize>> {
+    let timed = (0..)
+        .zip(stamps)
+        .filter_map(|(at, stamp)| Some((at, stamp.dts?)));
+    let timed: Vec<(usize, i64)> = timed.collect();
+    let steps = timed
+        .windows(2)
+        .map(|pair| pair[1].1.saturating_sub(pair[0].1));
+    let mut forward: Vec<i64> = steps.clone().filter(|&step| step > 0).collect();
+    forward.sort_unstable();
+    let step = forward.get(forward.len() / 2).copied().unwrap_or(0);
+    let least = -step.saturating_mul(MAX_JITTER);
+    let joints = timed.iter().skip(1).zip(steps);
+    let joints = joints.filter(|&(_, step)| step < least);
+    let begins: Vec<usize> = [0]
+        .into_iter()
+        .chain(joints.map(|(&(at, _), _)| at))
+        .collect();
+    let ends = begins.iter().copied().skip(1).chain([stamps.len()]);
+    begins
+        .iter()
+        .zip(ends)
+        .map(|(&from, to)| from..to)
+        .collect()
 }
 
 /// Marks packets with wrong FFV1 checksums, if the file has checksums, and those after them up to the
@@ -74,10 +140,9 @@ pub(super) struct Ordered {
     pub(super) frames: Vec<FrameInfo>,
     /// The frame number of each packet, in the order of the file; `None` if it is not shown.
     pub(super) number_of_packet: Vec<Option<u64>>,
-    /// Time stamps and numbers, sorted; empty if frames have none or share them. Frames are then
-    /// numbered in the order in which the decoder returns them.
-    pub(super) number_at: Vec<(i64, u64)>,
-    /// Numbers of the frames that can be decoded without any other, sorted.
+    /// The time stamp of each frame, by number.
+    pub(super) stamps: Vec<Option<i64>>,
+    /// Numbers of the frames with which decoding can begin, sorted.
     pub(super) keys: Vec<u64>,
     /// What had to be assumed, for the user.
     pub(super) note: Option<String>,
@@ -86,19 +151,20 @@ pub(super) struct Ordered {
 impl Ordered {
     /// `rate` is the stream's frames per second, or 0 / anything where it is not known.
     pub(super) fn from(stamps: &[Stamp], time_base: Rational, rate: Rational) -> Self {
-        let mut order: Vec<usize> = (0..stamps.len()).filter(|&at| stamps[at].shown).collect();
-        let all_pts: Option<Vec<i64>> = order.iter().map(|&at| stamps[at].pts).collect();
-        if all_pts.is_some() {
-            order.sort_by_key(|&at| stamps[at].pts);
-        }
-        let (times, note) = match all_pts.clone().or_else(|| all_dts(&order, stamps)) {
-            Some(mut times) => {
-                times.sort_unstable();
-                let in_us = |&units: &i64| microseconds(units, time_base);
-                (times.iter().map(in_us).collect(), None)
+        let mut order = Vec::with_capacity(stamps.len());
+        let recordings = recordings(stamps);
+        for range in &recordings {
+            let mut part: Vec<usize> = range
+                .clone()
+                .filter(|&at| stamps[at].is_picture())
+                .collect();
+            if part.iter().all(|&at| stamps[at].pts.is_some()) {
+                part.sort_by_key(|&at| stamps[at].pts);
             }
-            None => by_rate(order.len(), rate),
-        };
+            order.extend(part);
+        }
+        let pts: Vec<Option<i64>> = order.iter().map(|&at| stamps[at].pts).collect();
+        let (times, mut note) = frame_times(&pts, stamps, time_base, rate);
         let mut number_of_packet = vec![None; stamps.len()];
         let mut frames = Vec::with_capacity(order.len());
         let mut keys = Vec::new();
@@ -113,27 +179,110 @@ impl Ordered {
                 damaged: stamps[at].damaged,
             });
         }
-        let mut sorted = all_pts.unwrap_or_default();
-        sorted.sort_unstable();
-        let mut note = note;
-        if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
-            sorted.clear();
-            let shared = "some frames share a time stamp: is this more than one recording?";
-            note = Some(shared.to_owned());
+        let shared = pts
+            .windows(2)
+            .any(|pair| pair[0].is_some() && pair[0] == pair[1]);
+        if recordings.len() > 1 {
+            note = Some(JOINED.to_owned());
+        } else if shared {
+            note =
+                Some("some frames share a time stamp: is this more than one recording?".to_owned());
         }
-        let number_at = sorted.into_iter().zip(0..).collect();
         Self {
             frames,
             number_of_packet,
-            number_at,
+            stamps: pts,
             keys,
+            note,
+        }
+    }
+
+    /// Whether every frame has a time stamp of its own.
+    pub(super) fn stamps_are_unique(&self) -> bool {
+        let mut stamps = self.stamps.clone();
+        stamps.sort_unstable();
+        let unique = stamps.windows(2).all(|pair| pair[0] < pair[1]);
+        unique && stamps.first().is_none_or(Option::is_some)
+    }
+
+    /// The frames that a decoder returned, with their time stamps and whether each is damaged.
+    pub(super) fn from_pictures(
+        pictures: &[(Option<i64>, bool)],
+        stamps: &[Stamp],
+        time_base: Rational,
+        rate: Rational,
+    ) -> Self {
+        let pts: Vec<Option<i64>> = pictures.iter().map(|&(stamp, _)| stamp).collect();
+        let (times, mut note) = frame_times(&pts, stamps, time_base, rate);
+        let mut incomplete: Vec<Option<i64>> = Vec::new();
+        if recordings(stamps).len() > 1 {
+            // To the container, the last packet before a joint looks incomplete.
+            note = Some(JOINED.to_owned());
+        } else {
+            incomplete.extend(stamps.iter().filter(|s| s.damaged).map(|s| s.pts));
+        }
+        let numbered = (0_u64..).zip(pictures).zip(times);
+        let frames = numbered.map(|((number, &(stamp, damaged)), t_us)| FrameInfo {
+            number,
+            t_us,
+            damaged: damaged || (stamp.is_some() && incomplete.contains(&stamp)),
+        });
+        Self {
+            frames: frames.collect(),
+            number_of_packet: Vec::new(),
+            stamps: pts,
+            keys: Vec::new(),
             note,
         }
     }
 }
 
-fn all_dts(order: &[usize], stamps: &[Stamp]) -> Option<Vec<i64>> {
-    order.iter().map(|&at| stamps[at].dts).collect()
+const JOINED: &str = "its time stamps begin again: several recordings were joined; their frames are numbered one after the other";
+
+/// The time of each frame, microseconds, and what had to be assumed for it. `pts`: their time stamps, in order of
+/// presentation.
+fn frame_times(
+    pts: &[Option<i64>],
+    stamps: &[Stamp],
+    time_base: Rational,
+    rate: Rational,
+) -> (Vec<i64>, Option<String>) {
+    let in_us = |units: &i64| microseconds(*units, time_base);
+    let shown = || stamps.iter().filter(|stamp| stamp.is_picture());
+    // Where packets lack time stamps, a decoder's are a guess.
+    let stated = shown().all(|stamp| stamp.pts.is_some()) || stamps.iter().all(|s| s.dts.is_none());
+    let all: Option<Vec<i64>> = pts.iter().copied().collect();
+    if let Some(all) = all.as_ref().filter(|_| stated) {
+        return (in_one_run(all.iter().map(in_us).collect()), None);
+    }
+    let dts: Option<Vec<i64>> = shown().map(|stamp| stamp.dts).collect();
+    if let Some(mut dts) = dts.filter(|dts| dts.len() == pts.len()) {
+        if recordings(stamps).len() == 1 {
+            dts.sort_unstable();
+        }
+        return (in_one_run(dts.iter().map(in_us).collect()), None);
+    }
+    match all.filter(|all| all.is_sorted()) {
+        Some(all) => (all.iter().map(in_us).collect(), None),
+        None => by_rate(pts.len(), rate),
+    }
+}
+
+/// Where times go back, a joined recording begins: it is moved behind the one before.
+fn in_one_run(mut times: Vec<i64>) -> Vec<i64> {
+    let (mut begin, mut offset) = (0, 0_i64);
+    for at in 1..times.len() {
+        let moved = times[at].saturating_add(offset);
+        if moved < times[at - 1] {
+            let steps = (at - 1 - begin).max(1) as i64;
+            let step = times[at - 1].saturating_sub(times[begin]) / steps;
+            offset =
+                offset.saturating_add(times[at - 1].saturating_add(step).saturating_sub(moved));
+            begin = at;
+        }
+        times[at] = times[at].saturating_add(offset);
+    }
+    times
 }
 
 /// Evenly spaced times for a file without time stamps.
@@ -169,6 +318,7 @@ mod tests {
             damaged: false,
             key: true,
             checked: None,
+            contents: Contents::Picture,
             shown: true,
         }
     }
@@ -186,14 +336,14 @@ mod tests {
         let found = ordered(&[0, 80, 40].map(|pts| stamp(Some(pts), None)));
         assert_eq!(found.number_of_packet, [Some(0), Some(2), Some(1)]);
         assert_eq!(times(&found), [0, 40_000, 80_000]);
-        assert_eq!(found.number_at, [(0, 0), (40, 1), (80, 2)]);
+        assert_eq!(found.stamps, [Some(0), Some(40), Some(80)]);
         assert_eq!(found.keys, [0, 1, 2]);
     }
 
     #[test]
     fn where_only_decoding_times_are_known_the_decoders_order_counts() {
         let found = ordered(&[0, 40, 80].map(|dts| stamp(None, Some(dts))));
-        assert!(found.number_at.is_empty() && found.note.is_none());
+        assert!(found.note.is_none());
         assert_eq!(times(&found), [0, 40_000, 80_000]);
     }
 
@@ -236,10 +386,67 @@ mod tests {
     }
 
     #[test]
-    fn shared_time_stamps_identify_no_frame() {
-        let found = ordered(&[0, 40, 40].map(|pts| stamp(Some(pts), None)));
-        assert!(found.number_at.is_empty());
+    fn shared_time_stamps_are_told_and_only_a_decoder_can_tell_the_frames() {
+        let stamps = [0, 40, 40].map(|pts| stamp(Some(pts), None));
+        let found = ordered(&stamps);
+        assert!(found.note.is_some() && needs_decoding(&stamps));
         assert_eq!(found.frames.len(), 3);
+    }
+
+    #[test]
+    fn hidden_pictures_have_no_number() {
+        let mut stamps = [0, 40, 41, 80].map(|pts| stamp(Some(pts), Some(pts)));
+        stamps[2].contents = Contents::Hidden;
+        assert!(!needs_decoding(&stamps));
+        let found = ordered(&stamps);
+        assert_eq!(times(&found), [0, 40_000, 80_000]);
+        assert_eq!(found.number_of_packet, [Some(0), Some(1), None, Some(2)]);
+    }
+
+    #[test]
+    fn what_a_decoder_has_to_tell_is_noticed() {
+        let whole = [0, 80, 40].map(|pts| stamp(Some(pts), None));
+        assert!(!needs_decoding(&whole));
+        let mut begins_late = whole;
+        begins_late[0].key = false;
+        let mut field = whole;
+        field[1].contents = Contents::Unclear;
+        let mut without_time = whole;
+        without_time[2].pts = None;
+        let mut leading = whole;
+        leading[2].pts = Some(-40);
+        for stamps in [begins_late, field, without_time, leading] {
+            assert!(needs_decoding(&stamps));
+        }
+    }
+
+    #[test]
+    fn joined_recordings_follow_each_other() {
+        let both = [0, 80, 40, 160, 120, 200, 3, 83, 43];
+        let dts = [0, 40, 80, 120, 160, 200, 0, 40, 80];
+        let stamps = both
+            .into_iter()
+            .zip(dts)
+            .map(|(pts, dts)| stamp(Some(pts), Some(dts)));
+        let stamps: Vec<Stamp> = stamps.collect();
+        assert!(needs_decoding(&stamps) && !needs_decoding(&stamps[..6]));
+        let found = ordered(&stamps);
+        assert_eq!(times(&found)[5..], [200_000, 240_000, 280_000, 320_000]);
+        assert_eq!(found.number_of_packet[6..], [Some(6), Some(8), Some(7)]);
+        assert!(found.note.is_some());
+    }
+
+    #[test]
+    fn the_times_of_decoded_pictures_are_those_of_the_packets() {
+        let stamps = [0, 40, 80].map(|dts| stamp(None, Some(dts)));
+        let pictures = [(Some(40), false), (Some(0), false), (Some(90), true)];
+        let base = (Rational::new(1, 1000), Rational::new(25, 1));
+        let found = Ordered::from_pictures(&pictures, &stamps, base.0, base.1);
+        assert_eq!(times(&found), [0, 40_000, 80_000]);
+        assert!(found.frames[2].damaged);
+        let found = Ordered::from_pictures(&pictures[..2], &stamps, base.0, base.1);
+        assert_eq!(times(&found), [0, 40_000]);
+        assert!(found.note.is_some());
     }
 
     #[test]

@@ -3,9 +3,9 @@
 use ffmpeg_next::Packet;
 use ffmpeg_next::codec::Id;
 use ffmpeg_next::format::context::Input;
-use ffmpeg_next::format::stream::Stream;
 
 use super::annexb::ByteStream;
+use super::contents::extra_data;
 use super::scan::Video;
 use super::{VideoError, open_input};
 
@@ -46,7 +46,7 @@ impl Video {
         let input = open_input(self.path())?;
         let stream = input.stream(self.track.stream);
         let byte_stream = stream.and_then(|stream| match self.track.codec {
-            Id::H264 => ByteStream::from_extra_data(&extra_data(&stream)),
+            Id::H264 => ByteStream::from_extra_data(&extra_data(&stream.parameters())),
             _ => Some(ByteStream::AsIs),
         });
         let byte_stream = byte_stream.ok_or_else(|| VideoError::NoVideo(self.path().to_owned()))?;
@@ -58,10 +58,10 @@ impl Video {
         })
     }
 
-    /// True if the file has the frames in order of presentation, as a camera delivers them.
+    /// True if each packet of the file is a frame, in order of presentation, as a camera delivers them.
     #[must_use]
     pub fn is_in_order(&self) -> bool {
-        self.track.number_of_packet.iter().flatten().is_sorted()
+        self.track.is_by_packets() && self.track.number_of_packet.iter().flatten().is_sorted()
     }
 
     /// Width and height as coded, before any rotation, pixels.
@@ -93,23 +93,6 @@ impl Iterator for Packets {
                 key: packet.is_key(),
                 damaged: packet.is_corrupt(),
             });
-        }
-    }
-}
-
-/// The container's data for the decoder, which `ffmpeg-next` does not expose.
-#[allow(unsafe_code)]
-fn extra_data(stream: &Stream<'_>) -> Vec<u8> {
-    let parameters = stream.parameters();
-    // SAFETY: the pointer is that of live parameters; FFmpeg keeps `extradata` and its size
-    // together, and the bytes are copied while both live.
-    unsafe {
-        let parameters = &*parameters.as_ptr();
-        match usize::try_from(parameters.extradata_size) {
-            Ok(size) if !parameters.extradata.is_null() => {
-                std::slice::from_raw_parts(parameters.extradata, size).to_vec()
-            }
-            _ => Vec::new(),
         }
     }
 }

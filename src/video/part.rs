@@ -7,7 +7,6 @@ use image::{Rgba, RgbaImage};
 use yuv::YuvStandardMatrix;
 
 use super::jpeg::decode_part;
-use super::orientation::Orientation;
 use super::reader::Pending;
 use super::scan::Video;
 use super::track::Track;
@@ -145,7 +144,7 @@ impl Track {
     /// Whether its frames are JPEGs that are shown as they are, with JFIF's colours.
     fn is_plain_jpeg(&self) -> bool {
         let jfif = self.colour.full_range && self.colour.matrix == YuvStandardMatrix::Bt601;
-        self.codec == Id::MJPEG && jfif && self.orientation == Orientation::default()
+        self.codec == Id::MJPEG && jfif && self.display.is_plain() && self.colour.is_srgb()
     }
 }
 

@@ -28,7 +28,7 @@ fn is_photograph_in_boxes(path: &Path) -> bool {
 }
 
 /// Whether FFmpeg reads the file as one picture.
-fn is_photograph(input: &Input) -> bool {
+pub(super) fn is_photograph(input: &Input) -> bool {
     let format = input.format();
     format.name() == "image2" || format.name().ends_with("_pipe")
 }

@@ -1,99 +1,17 @@
 //! A decoded frame, and its conversion to RGB.
 
-use ffmpeg_next::color;
 use ffmpeg_next::format::Pixel;
 use ffmpeg_next::frame;
 use ffmpeg_next::software::scaling;
 use image::{GenericImage, RgbImage};
-use yuv::{YuvGrayImage, YuvPlanarImage, YuvRange, YuvStandardMatrix};
+use yuv::{YuvGrayImage, YuvPlanarImage};
 
 use super::DecodeFault;
-use super::orientation::Orientation;
+use super::colour::Colour;
+use super::display::Display;
 use relit_data::geometry::Rect;
 
-/// How luma and colour differences become RGB: range and matrix (ITU-T H.273).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Colour {
-    pub(super) full_range: bool,
-    pub(super) matrix: YuvStandardMatrix,
-    pub(super) matrix_from: MatrixFrom,
-}
-
-/// Where the matrix comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum MatrixFrom {
-    /// The file states it, or its format has none.
-    File,
-    /// The file does not state it: it was chosen by the picture's size.
-    Size,
-    /// The file states one that is not known here: it was chosen by the picture's size.
-    SizeForUnknown,
-}
-
-impl Colour {
-    /// What a stream or frame states. JPEG's own colours are full-range BT.601 (JFIF); of other
-    /// video that states no matrix, up to 576 rows are BT.601 and more are BT.709, as players do.
-    pub(super) fn stated(
-        format: Pixel,
-        range: color::Range,
-        space: color::Space,
-        height: u32,
-    ) -> Self {
-        let jpeg = is_jpeg_format(format);
-        let stated = match space {
-            color::Space::BT709 => Some(YuvStandardMatrix::Bt709),
-            color::Space::BT470BG | color::Space::SMPTE170M => Some(YuvStandardMatrix::Bt601),
-            color::Space::BT2020NCL | color::Space::BT2020CL => Some(YuvStandardMatrix::Bt2020),
-            color::Space::SMPTE240M => Some(YuvStandardMatrix::Smpte240),
-            color::Space::FCC => Some(YuvStandardMatrix::Fcc),
-            _ if jpeg => Some(YuvStandardMatrix::Bt601),
-            _ => None,
-        };
-        let by_size = if height > 576 {
-            YuvStandardMatrix::Bt709
-        } else {
-            YuvStandardMatrix::Bt601
-        };
-        let has_matrix = !is_rgb(format) && !is_grey(format);
-        let matrix_from = match space {
-            _ if stated.is_some() || !has_matrix => MatrixFrom::File,
-            color::Space::Unspecified | color::Space::Reserved => MatrixFrom::Size,
-            _ => MatrixFrom::SizeForUnknown,
-        };
-        // Grey pictures are full-range unless the file states otherwise.
-        let full_grey = is_grey(format) && range != color::Range::MPEG;
-        Self {
-            full_range: jpeg || full_grey || range == color::Range::JPEG,
-            matrix: stated.unwrap_or(by_size),
-            matrix_from,
-        }
-    }
-}
-
-impl Colour {
-    fn range(self) -> YuvRange {
-        if self.full_range {
-            YuvRange::Full
-        } else {
-            YuvRange::Limited
-        }
-    }
-
-    /// What had to be assumed, as a remark for the user.
-    pub(super) fn note(self) -> Option<String> {
-        let why = match self.matrix_from {
-            MatrixFrom::File => return None,
-            MatrixFrom::Size => "the file does not state its colour matrix",
-            MatrixFrom::SizeForUnknown => "the file's colour matrix is not known here",
-        };
-        Some(format!(
-            "{why}; {:?} is assumed from the picture's size",
-            self.matrix
-        ))
-    }
-}
-
-fn is_jpeg_format(format: Pixel) -> bool {
+pub(super) fn is_jpeg_format(format: Pixel) -> bool {
     use Pixel::{YUVJ411P, YUVJ420P, YUVJ422P, YUVJ440P, YUVJ444P};
     matches!(format, YUVJ411P | YUVJ420P | YUVJ422P | YUVJ440P | YUVJ444P)
 }
@@ -104,14 +22,14 @@ fn name_of(format: Pixel) -> &'static str {
         .map_or("unknown", |descriptor| descriptor.name())
 }
 
-fn is_rgb(format: Pixel) -> bool {
+pub(super) fn is_rgb(format: Pixel) -> bool {
     let name = name_of(format);
     ["rgb", "bgr", "gbr", "bayer", "pal8", "mono"]
         .iter()
         .any(|part| name.contains(part))
 }
 
-fn is_grey(format: Pixel) -> bool {
+pub(super) fn is_grey(format: Pixel) -> bool {
     let name = name_of(format);
     name.starts_with("gray") || name.starts_with("ya8") || name.starts_with("ya16")
 }
@@ -121,7 +39,7 @@ pub struct Picture {
     number: u64,
     pub(super) frame: frame::Video,
     pub(super) colour: Colour,
-    pub(super) orientation: Orientation,
+    pub(super) display: Display,
 }
 
 impl std::fmt::Debug for Picture {
@@ -136,17 +54,12 @@ impl std::fmt::Debug for Picture {
 }
 
 impl Picture {
-    pub(super) fn new(
-        number: u64,
-        frame: frame::Video,
-        colour: Colour,
-        orientation: Orientation,
-    ) -> Self {
+    pub(super) fn new(number: u64, frame: frame::Video, colour: Colour, display: Display) -> Self {
         Self {
             number,
             frame,
             colour,
-            orientation,
+            display,
         }
     }
 
@@ -159,7 +72,7 @@ impl Picture {
     /// Width and height as displayed, pixels.
     #[must_use]
     pub fn size(&self) -> (u32, u32) {
-        self.orientation
+        self.display
             .displayed(self.frame.width(), self.frame.height())
     }
 
@@ -173,10 +86,10 @@ impl Picture {
         let Some(inside) = region.clipped_to(width, height) else {
             return Ok(RgbImage::new(region.w, region.h));
         };
-        let coded = self
-            .orientation
-            .to_coded(inside, self.frame.width(), self.frame.height());
-        let piece = self.orientation.apply(self.coded_rgb(coded)?);
+        let coded = (self.frame.width(), self.frame.height());
+        let piece = self
+            .display
+            .part(inside, coded, |rect| self.coded_rgb(rect))?;
         if inside == region {
             return Ok(piece);
         }
@@ -190,13 +103,17 @@ impl Picture {
     /// The RGB of a rectangle that lies inside the coded picture.
     fn coded_rgb(&self, rect: Rect) -> Result<RgbImage, DecodeFault> {
         let format = self.frame.format();
+        if !self.colour.is_srgb() {
+            let wide = self.colour.wide_rgb(&self.frame, rect);
+            return wide.ok_or_else(|| unconvertible(format));
+        }
         if is_direct(format) && strides_are_forward(&self.frame) {
-            return planes_to_rgb(&self.frame, format, self.colour, rect)
+            return planes_to_rgb(&self.frame, format, &self.colour, rect)
                 .ok_or_else(|| unconvertible(format));
         }
         let plain = plain_format(format, self.colour.full_range);
         let converted = convert(&self.frame, plain).map_err(|_| unconvertible(format))?;
-        planes_to_rgb(&converted, plain, self.colour, rect).ok_or_else(|| unconvertible(format))
+        planes_to_rgb(&converted, plain, &self.colour, rect).ok_or_else(|| unconvertible(format))
     }
 }
 
@@ -210,7 +127,7 @@ impl Picture {
     ) -> Option<()> {
         let format = self.frame.format();
         let direct = is_planar(format) && strides_are_forward(&self.frame);
-        if !direct || self.orientation != Orientation::default() {
+        if !direct || !self.display.is_plain() || !self.colour.is_srgb() {
             return None;
         }
         let (left, top) = (usize::try_from(rect.x).ok()?, usize::try_from(rect.y).ok()?);
@@ -226,7 +143,7 @@ impl Picture {
             let height = STRIP.min(top + rect.h as usize - y);
             let strip = &mut strip[..4 * width * height];
             let size = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
-            planes_to_rgba(&self.frame, format, self.colour, (x, y), size, strip)?;
+            planes_to_rgba(&self.frame, format, &self.colour, (x, y), size, strip)?;
             for row in strip.chunks_exact(4 * width).skip(top.saturating_sub(y)) {
                 take(row.get(skipped..skipped + bytes)?)?;
             }
@@ -243,7 +160,7 @@ const STRIP: usize = 16;
 fn planes_to_rgba(
     frame: &frame::Video,
     format: Pixel,
-    colour: Colour,
+    colour: &Colour,
     (x, y): (usize, usize),
     (width, height): (u32, u32),
     rgba: &mut [u8],
@@ -330,7 +247,10 @@ fn plain_format(format: Pixel, full_range: bool) -> Pixel {
     }
 }
 
-fn convert(source: &frame::Video, plain: Pixel) -> Result<frame::Video, ffmpeg_next::Error> {
+pub(super) fn convert(
+    source: &frame::Video,
+    plain: Pixel,
+) -> Result<frame::Video, ffmpeg_next::Error> {
     use scaling::Flags;
     let (width, height) = (source.width(), source.height());
     let flags = Flags::BILINEAR | Flags::ACCURATE_RND | Flags::BITEXACT | Flags::FULL_CHR_H_INP;
@@ -371,7 +291,7 @@ pub(super) fn plane(
 fn planes_to_rgb(
     frame: &frame::Video,
     format: Pixel,
-    colour: Colour,
+    colour: &Colour,
     rect: Rect,
 ) -> Option<RgbImage> {
     use Pixel::{GRAY8, RGB24};

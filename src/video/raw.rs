@@ -2,19 +2,19 @@
 
 use ffmpeg_next::format::Pixel;
 
-use super::orientation::Orientation;
 use super::picture::{Picture, plane};
 use super::{DecodeFault, PixelFormat};
 use relit_data::geometry::Rect;
 
 impl Picture {
     /// The picture in the raw format with the same samples, if there is one; otherwise, and if the
-    /// picture is rotated or its YUV is full-range, as RGB. Its size is [`Self::size`].
+    /// picture is rotated or stretched, its YUV is full-range or not SDR, as RGB. Its size is [`Self::size`].
     ///
     /// # Errors
     /// [`DecodeFault::PixelFormat`] where the format cannot be converted.
     pub fn raw(&self) -> Result<(PixelFormat, Vec<u8>), DecodeFault> {
-        if self.orientation == Orientation::default()
+        if self.display.is_plain()
+            && self.colour.is_srgb()
             && let Some(raw) = self.same_samples()
         {
             return Ok(raw);

@@ -5,11 +5,12 @@ use std::path::Path;
 
 use ffmpeg_next::codec::{Parameters, decoder};
 use ffmpeg_next::format::context::Input;
+use ffmpeg_next::picture::Type;
 use ffmpeg_next::{Packet, frame};
 
 use super::decoder::{self as opening, Pool};
 use super::picture::Picture;
-use super::track::Track;
+use super::track::{Numbering, Track};
 use super::{DecodeFault, VideoError, open_input};
 
 /// A wanted frame on its way to a picture: still compressed, decoded, or lost.
@@ -98,9 +99,9 @@ impl<'a> Reader<'a> {
                 why,
             })?)
         };
-        let is_key = |number: &u64| track.keys.binary_search(number).is_ok();
+        let is_key = |number: &u64| track.is_key(*number);
         Ok(Self {
-            keys_only: !track.number_at.is_empty() && wanted.iter().all(is_key),
+            keys_only: track.stamps_are_unique() && wanted.iter().all(is_key),
             track,
             input,
             packets: 0,
@@ -129,7 +130,8 @@ impl<'a> Reader<'a> {
         let number = track.number_of_packet.get(self.packets).copied().flatten();
         self.packets += 1;
         match &mut self.chain {
-            Some(_) if self.keys_only && !packet.is_key() => {}
+            // The container's flag of a key frame can also mean a recovery point.
+            Some(_) if self.keys_only && !number.is_some_and(|number| track.is_key(number)) => {}
             Some(chain) => chain.feed(&packet, track, &mut self.wanted, &mut self.ready),
             None => {
                 if let Some(number) = number.filter(|&number| self.wanted.take(number)) {
@@ -281,24 +283,27 @@ impl Chain {
         wanted: &mut Wanted,
         ready: &mut VecDeque<Pending>,
     ) {
-        let stamped = picture.timestamp().or_else(|| picture.pts());
-        let number = stamped
-            .and_then(|pts| track.number_at(pts))
-            .unwrap_or(self.given);
-        // Frames come in order of presentation: skipped numbers were lost.
-        if number > self.given {
-            self.broken_by = self.broken_by.or(Some(self.given));
-        }
+        let stamp = picture.timestamp().or_else(|| picture.pts());
+        let Some(number) = track.number_of(stamp, self.given) else {
+            return;
+        };
+        let fault = match &track.numbering {
+            Numbering::Decoder(faults) => {
+                faults.get(&number).cloned().or_else(|| concealed(&picture))
+            }
+            numbering => {
+                // Frames come in order of presentation: skipped numbers were lost.
+                if number > self.given {
+                    self.broken_by = self.broken_by.or(Some(self.given));
+                }
+                // Without time stamps the numbers after a lost frame would be a guess.
+                let known = matches!(numbering, Numbering::Stamps) || self.broken_by.is_none();
+                fault_of(&picture, number, known, &mut self.broken_by)
+            }
+        };
         self.given = number + 1;
-        // Without time stamps the numbers after a lost frame would be a guess.
-        if picture.is_key() && !track.number_at.is_empty() {
-            self.broken_by = None;
-        }
-        if picture.is_corrupt() || picture.has_decode_errors() {
-            return self.lose(number, DecodeFault::Concealed, wanted, ready);
-        }
-        if let Some(damaged) = self.broken_by {
-            return self.lose(number, DecodeFault::BuildsOnDamaged(damaged), wanted, ready);
+        if let Some(fault) = fault {
+            return lose(number, fault, wanted, ready);
         }
         if wanted.take(number) {
             let state = match track.picture(number, picture) {
@@ -308,20 +313,39 @@ impl Chain {
             ready.push_back(Pending { number, state });
         }
     }
+}
 
-    fn lose(
-        &mut self,
-        number: u64,
-        fault: DecodeFault,
-        wanted: &mut Wanted,
-        ready: &mut VecDeque<Pending>,
-    ) {
-        self.broken_by = self.broken_by.or(Some(number));
-        if wanted.take(number) {
-            ready.push_back(Pending {
-                number,
-                state: State::Lost(fault),
-            });
-        }
+fn lose(number: u64, fault: DecodeFault, wanted: &mut Wanted, ready: &mut VecDeque<Pending>) {
+    if wanted.take(number) {
+        let state = State::Lost(fault);
+        ready.push_back(Pending { number, state });
     }
+}
+
+/// What is wrong with a decoded picture, by itself or by what it builds on. `restart`: whether a key frame ends the damage
+/// before it.
+pub(super) fn fault_of(
+    picture: &frame::Video,
+    number: u64,
+    restart: bool,
+    broken_by: &mut Option<u64>,
+) -> Option<DecodeFault> {
+    // A recovery point without a whole intra picture is marked as key, too; the pictures after it are only complete
+    // later.
+    let is_predicted = matches!(picture.kind(), Type::P | Type::B);
+    if restart && picture.is_key() && !is_predicted {
+        *broken_by = None;
+    }
+    let fault = concealed(picture);
+    if fault.is_some() {
+        *broken_by = broken_by.or(Some(number));
+        return fault;
+    }
+    broken_by.map(DecodeFault::BuildsOnDamaged)
+}
+
+/// Whether the decoder covered up missing parts.
+fn concealed(picture: &frame::Video) -> Option<DecodeFault> {
+    let covered = picture.is_corrupt() || picture.has_decode_errors();
+    covered.then_some(DecodeFault::Concealed)
 }

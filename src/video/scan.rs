@@ -4,18 +4,22 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use ffmpeg_next::codec::packet::side_data;
+use ffmpeg_next::codec::Parameters;
 use ffmpeg_next::format::context::Input;
-use ffmpeg_next::{Packet, codec, format, media};
+use ffmpeg_next::format::stream::Stream;
+use ffmpeg_next::{Packet, Rational, ffi, frame, media};
 use image::RgbImage;
 use image::metadata::Orientation as Exif;
 
+use super::colour::{Colour, Stated};
+use super::contents::Inspector;
 use super::decoder::{self, Pool, VideoDecoder};
-use super::order::{FrameInfo, Ordered, Stamp, mark_wrong_checksums};
-use super::orientation::Orientation;
+use super::display::Display;
+use super::order::{FrameInfo, Ordered, Stamp, mark_wrong_checksums, microseconds, needs_decoding};
 use super::photograph::exif_orientation;
-use super::picture::Colour;
-use super::track::Track;
+use super::seek::first_frame;
+use super::survey::Survey;
+use super::track::{Numbering, Track};
 use super::{DecodeFault, Pending, Reader, Truncation, VideoError, find_truncation, open_input};
 use relit_data::geometry::Rect;
 
@@ -36,6 +40,8 @@ pub struct Facts {
     /// Exif's number, 2 to 8, by which a photograph is turned for display; none for a video, and for a photograph that is
     /// displayed as it is stored.
     pub exif_orientation: Option<u8>,
+    /// How the colours are converted to sRGB, in words; none for SDR with BT.709 primaries, which is taken as sRGB.
+    pub colour_conversion: Option<String>,
 }
 
 /// A sign that a video is incomplete or damaged.
@@ -74,6 +80,12 @@ pub enum Damage {
         count: u64,
         /// The first one's number.
         first: u64,
+    },
+    /// Packets of pictures that the decoder refuses.
+    #[error("the decoder refuses {count} packets of the file")]
+    RefusedPackets {
+        /// How many.
+        count: u64,
     },
     /// Reading stopped with an error.
     #[error("reading stopped after {found} frames: {why}")]
@@ -117,7 +129,8 @@ impl Video {
     /// Opens a file and reads through it once.
     ///
     /// # Errors
-    /// [`VideoError::Open`], [`VideoError::NoVideo`], [`VideoError::NoFrames`] or [`VideoError::Decoder`]. A file that
+    /// [`VideoError::Open`], [`VideoError::NoVideo`], [`VideoError::NoFrames`], [`VideoError::Decoder`] or
+    /// [`VideoError::Colour`]. A file that
     /// is damaged but has frames is opened; see [`Self::damage`].
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let mut input = open_input(path)?;
@@ -127,54 +140,66 @@ impl Video {
             .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
         let index = stream.index();
         let (time_base, rate) = (stream.time_base(), stream.avg_frame_rate());
-        let promised = Promised {
-            // AVI counts empty chunks too.
-            frames: match input.format().name() {
-                "avi" => 0,
-                _ => u64::try_from(stream.frames()).unwrap_or(0),
-            },
-            duration_us: input.duration(),
-        };
+        let promised = Promised::of(&input, &stream);
         let parameters = stream.parameters();
-        let exif = exif_orientation(&input, path);
-        let (orientation, mut notes) = orientation(&stream, exif);
+        let codec = format!("{:?}", parameters.id());
+        let mut decoder =
+            decoder::open(parameters.clone(), 1).map_err(|why| VideoError::Decoder {
+                path: path.to_owned(),
+                codec: codec.clone(),
+                why,
+            })?;
 
-        let (mut stamps, read_error) = read_through(&mut input, index, parameters.id());
-        mark_wrong_checksums(&mut stamps);
-        let ordered = Ordered::from(&stamps, time_base, rate);
+        let mut packets = read_through(&mut input, index, &parameters);
+        mark_wrong_checksums(&mut packets.stamps);
+        let stamps = &packets.stamps;
+        let mut refused = 0;
+        let (ordered, numbering) = if packets.are_pictures || !needs_decoding(stamps) {
+            let ordered = Ordered::from(stamps, time_base, rate);
+            let numbering = match ordered.stamps_are_unique() {
+                true => Numbering::Stamps,
+                false => Numbering::Packets,
+            };
+            (ordered, numbering)
+        } else {
+            let survey = Survey::decode(path, index, &codec)?;
+            refused = survey.refused;
+            let pictures = survey.pictures();
+            let ordered = Ordered::from_pictures(&pictures, stamps, time_base, rate);
+            (ordered, Numbering::Decoder(survey.faults))
+        };
         if ordered.frames.is_empty() {
             return Err(VideoError::NoFrames(path.to_owned()));
         }
-        let decoder = decoder::open(parameters.clone(), 1).map_err(|why| {
-            let codec = format!("{:?}", parameters.id());
-            VideoError::Decoder {
-                path: path.to_owned(),
-                codec,
-                why,
-            }
+        let first = open_input(path).ok();
+        let first = first.and_then(|mut input| first_frame(&mut input, index, &mut decoder));
+        let first = first.as_ref();
+        let colour = colour(&decoder, first).map_err(|fault| VideoError::Colour {
+            path: path.to_owned(),
+            fault,
         })?;
-        let colour = Colour::stated(
-            decoder.format(),
-            decoder.color_range(),
-            decoder.color_space(),
-            decoder.height(),
-        );
+        let exif = exif_orientation(&input, path);
+        let stream = input.stream(index);
+        let stream = stream.ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
+        let (display, mut notes) = Display::of(&input, &stream, first, exif);
         notes.extend(ordered.note);
-        notes.extend(colour.note());
+        notes.extend(colour.notes());
+        let coded = (decoder.width(), decoder.height());
         Ok(Self {
             path: path.to_owned(),
-            facts: facts(&decoder, colour, orientation, exif),
-            damage: find_damage(path, &ordered.frames, stamps.len(), &promised, read_error),
+            facts: facts(&decoder, &colour, display, exif),
+            damage: find_damage(path, &ordered.frames, &packets, refused, &promised),
             frames: ordered.frames,
             notes,
             track: Track {
                 stream: index,
                 codec: decoder.id(),
-                coded: (decoder.width(), decoder.height()),
+                coded,
                 colour,
-                orientation,
+                display,
+                numbering,
                 number_of_packet: ordered.number_of_packet,
-                number_at: ordered.number_at,
+                stamps: ordered.stamps,
                 keys: ordered.keys,
             },
             pool: Pool::new(parameters),
@@ -200,7 +225,8 @@ impl Video {
     }
 
     /// Numbers of the frames that can be decoded without any other, sorted: all of Motion JPEG, the key frames of
-    /// H.264. A [`Reader`] that is asked for none but these decodes no other.
+    /// H.264; none where only a decoder tells which frames there are. A [`Reader`] that is asked for none but these decodes
+    /// no other.
     #[must_use]
     pub fn key_frames(&self) -> &[u64] {
         &self.track.keys
@@ -273,13 +299,18 @@ impl Video {
     }
 }
 
-fn facts(
+/// What the first picture states of its colours, or else the stream.
+fn colour(
     decoder: &VideoDecoder,
-    colour: Colour,
-    orientation: Orientation,
-    exif: Option<Exif>,
-) -> Facts {
-    let (width, height) = orientation.displayed(decoder.width(), decoder.height());
+    first: Option<&frame::Video>,
+) -> Result<Colour, relit_data::colour::ColourFault> {
+    let by_stream = Stated::by_stream(decoder);
+    let stated = first.map_or(by_stream, |first| Stated::by_picture(first).or(by_stream));
+    stated.colour()
+}
+
+fn facts(decoder: &VideoDecoder, colour: &Colour, display: Display, exif: Option<Exif>) -> Facts {
+    let (width, height) = display.displayed(decoder.width(), decoder.height());
     let codec = decoder.codec().map(|codec| codec.name().to_owned());
     let format = decoder
         .format()
@@ -292,61 +323,84 @@ fn facts(
         pixel_format: format.unwrap_or_else(|| "unknown".to_owned()),
         full_range: colour.full_range,
         exif_orientation: exif.map(Exif::to_exif),
+        colour_conversion: colour.conversion(),
     }
 }
 
-/// The rotation that the stream or a photograph's Exif asks for, and remarks about it.
-pub(super) fn orientation(
-    stream: &format::stream::Stream<'_>,
-    exif: Option<Exif>,
-) -> (Orientation, Vec<String>) {
-    if let Some(exif) = exif {
-        return (Orientation::from_exif(exif), Vec::new());
-    }
-    let mut side_data = stream.side_data();
-    let matrix = side_data.find(|data| data.kind() == side_data::Type::DisplayMatrix);
-    match matrix.map(|matrix| Orientation::from_display_matrix(matrix.data())) {
-        None => (Orientation::default(), Vec::new()),
-        Some(Some(orientation)) => (orientation, Vec::new()),
-        Some(None) => {
-            let note = "the file asks for a rotation that is not a multiple of 90 degrees, which is left out";
-            (Orientation::default(), vec![note.to_owned()])
-        }
-    }
+/// What reading through a file found.
+struct FoundPackets {
+    /// The stream's packets, in the order of the file.
+    stamps: Vec<Stamp>,
+    /// Whether each of them is a picture, whatever stands in it.
+    are_pictures: bool,
+    /// When the last of all streams ends, microseconds.
+    end_us: i64,
+    error: Option<ffmpeg_next::Error>,
 }
 
-fn read_through(
-    input: &mut Input,
-    stream: usize,
-    codec: codec::Id,
-) -> (Vec<Stamp>, Option<ffmpeg_next::Error>) {
-    let mut stamps = Vec::new();
+fn read_through(input: &mut Input, stream: usize, parameters: &Parameters) -> FoundPackets {
+    let bases: Vec<Rational> = input.streams().map(|stream| stream.time_base()).collect();
+    let mut inspector = Inspector::new(parameters);
+    let mut found = FoundPackets {
+        stamps: Vec::new(),
+        are_pictures: inspector.packets_are_pictures(),
+        end_us: i64::MIN,
+        error: None,
+    };
     loop {
         // A packet that is read into again would keep the memory of what it held.
         let mut packet = Packet::empty();
         match packet.read(input) {
-            Ok(()) if packet.stream() == stream && packet.size() > 0 => {
-                stamps.push(Stamp::of(&packet, codec));
-            }
             Ok(()) => {}
-            Err(ffmpeg_next::Error::Eof) => return (stamps, None),
-            Err(why) => return (stamps, Some(why)),
+            Err(ffmpeg_next::Error::Eof) => return found,
+            Err(why) => {
+                found.error = Some(why);
+                return found;
+            }
+        }
+        if let (Some(at), Some(&base)) = (packet.pts().or(packet.dts()), bases.get(packet.stream()))
+        {
+            let end = at.saturating_add(packet.duration().max(0));
+            found.end_us = found.end_us.max(microseconds(end, base));
+        }
+        if packet.stream() == stream && packet.size() > 0 {
+            let stamp = Stamp::of(&packet, parameters.id(), &mut inspector);
+            found.stamps.push(stamp);
         }
     }
 }
 
 /// The length that the container states; 0 if it states none.
 struct Promised {
-    frames: u64,
+    packets: u64,
     duration_us: i64,
+}
+
+impl Promised {
+    #[allow(unsafe_code)]
+    fn of(input: &Input, stream: &Stream<'_>) -> Self {
+        // SAFETY: the function reads the length of a live stream's index.
+        let indexed = unsafe { ffi::avformat_index_get_entries_count(stream.as_ptr()) };
+        let packets = match input.format().name() {
+            // AVI counts empty chunks, too.
+            "avi" => 0,
+            // The frames that are stored; a trimmed clip's index has those that belong to it.
+            name if name.contains("mp4") => i64::from(indexed),
+            _ => stream.frames(),
+        };
+        Self {
+            packets: u64::try_from(packets).unwrap_or(0),
+            duration_us: input.duration(),
+        }
+    }
 }
 
 fn find_damage(
     path: &Path,
     frames: &[FrameInfo],
-    packets: usize,
+    packets: &FoundPackets,
+    refused: u64,
     promised: &Promised,
-    read_error: Option<ffmpeg_next::Error>,
 ) -> Vec<Damage> {
     let found = frames.len() as u64;
     let mut damage = Vec::new();
@@ -354,16 +408,18 @@ fn find_damage(
     if let Ok(Some(cut)) = cut {
         damage.push(Damage::Truncated(cut));
     }
-    if let Some(why) = read_error {
+    if let Some(why) = packets.error {
         damage.push(Damage::ReadError { found, why });
     }
-    // The container also counts what a trimmed clip does not show.
-    let packets = packets as u64;
-    if promised.frames > packets {
+    let read = packets.stamps.len() as u64;
+    if promised.packets > read {
         damage.push(Damage::FewerFrames {
-            promised: promised.frames,
-            found: packets,
+            promised: promised.packets,
+            found: read,
         });
+    }
+    if refused > 0 {
+        damage.push(Damage::RefusedPackets { count: refused });
     }
     let mut damaged = frames.iter().filter(|frame| frame.damaged);
     if let Some(first) = damaged.next() {
@@ -372,24 +428,24 @@ fn find_damage(
             first: first.number,
         });
     }
-    if let [first, .., last] = frames
-        && damage.is_empty()
-    {
-        let step = last.t_us.saturating_sub(first.t_us) / (frames.len() as i64 - 1);
-        let promised_us = promised.duration_us;
-        let found_us = last.t_us.saturating_add(step);
-        // Sound that is longer than the picture, or a slow last frame, is no damage; a tenth of the
-        // length is.
-        if promised_us
-            > found_us
-                .saturating_add(promised_us / 10)
-                .saturating_add(step.saturating_mul(2))
-        {
-            damage.push(Damage::Shorter {
-                promised_us,
-                found_us,
-            });
-        }
+    if damage.is_empty() {
+        damage.extend(shorter(frames, packets.end_us, promised.duration_us));
     }
     damage
+}
+
+/// Whether the file is shorter than it promises. A slow last frame is no damage; a tenth of the length is.
+fn shorter(frames: &[FrameInfo], end_us: i64, promised_us: i64) -> Option<Damage> {
+    let [first, .., last] = frames else {
+        return None;
+    };
+    let step = last.t_us.saturating_sub(first.t_us) / (frames.len() as i64 - 1);
+    // The promise counts from the first time stamp, which can be negative, and holds for all streams.
+    let span = end_us.saturating_sub(first.t_us.min(0));
+    let found_us = span.max(last.t_us.saturating_add(step));
+    let tolerance = promised_us / 10 + step.saturating_mul(2);
+    (promised_us > found_us.saturating_add(tolerance)).then_some(Damage::Shorter {
+        promised_us,
+        found_us,
+    })
 }

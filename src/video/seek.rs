@@ -8,10 +8,12 @@ use ffmpeg_next::format::context::Input;
 use ffmpeg_next::{Packet, frame, media};
 use image::RgbImage;
 
+use super::colour::Stated;
 use super::decoder::{self as opening, VideoDecoder};
+use super::display::Display;
 use super::photograph::exif_orientation;
-use super::picture::{Colour, Picture};
-use super::scan::{Video, orientation};
+use super::picture::Picture;
+use super::scan::Video;
 use super::{DecodeFault, VideoError, open_input};
 use relit_data::geometry::Rect;
 
@@ -29,28 +31,26 @@ pub fn first_picture(path: &Path) -> Result<RgbImage, VideoError> {
         .streams()
         .best(media::Type::Video)
         .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
-    let (index, parameters) = (stream.index(), stream.parameters());
-    let (orientation, _) = orientation(&stream, exif_orientation(&input, path));
-    let codec = format!("{:?}", parameters.id());
-    let mut decoder = opening::open(parameters, 1).map_err(|why| VideoError::Decoder {
+    let index = stream.index();
+    let codec = format!("{:?}", stream.parameters().id());
+    let mut decoder = opening::open(stream.parameters(), 1).map_err(|why| VideoError::Decoder {
         path: path.to_owned(),
         codec,
         why,
     })?;
-    let colour = Colour::stated(
-        decoder.format(),
-        decoder.color_range(),
-        decoder.color_space(),
-        decoder.height(),
-    );
-    let frame = search(&mut input, index, &mut decoder, |frame| {
-        match is_whole(frame) {
-            true => Found::This,
-            false => Found::Earlier,
-        }
-    });
+    let frame = first_frame(&mut input, index, &mut decoder);
     let frame = frame.ok_or_else(|| VideoError::NoFrames(path.to_owned()))?;
-    let picture = Picture::new(0, frame, colour, orientation);
+    let stated = Stated::by_picture(&frame).or(Stated::by_stream(&decoder));
+    let colour = stated.colour().map_err(|fault| VideoError::Colour {
+        path: path.to_owned(),
+        fault,
+    })?;
+    let stream = input
+        .stream(index)
+        .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
+    let exif = exif_orientation(&input, path);
+    let (display, _) = Display::of(&input, &stream, Some(&frame), exif);
+    let picture = Picture::new(0, frame, colour, display);
     let (width, height) = picture.size();
     let wrong = |fault: DecodeFault| VideoError::Frame {
         path: path.to_owned(),
@@ -64,14 +64,23 @@ impl Video {
     /// The picture of a frame, found by the container's own index. `None` if that fails or the result
     /// is doubtful; the caller then reads from the start.
     pub(super) fn sought(&self, number: u64) -> Option<Picture> {
-        let info = *self.frames().get(usize::try_from(number).ok()?)?;
-        let mut stamps = self.track.number_at.iter();
-        let &(wanted, _) = stamps.find(|&&(_, at)| at == number)?;
+        if !self.track.stamps_are_unique() {
+            return None;
+        }
+        let at = usize::try_from(number).ok()?;
+        let info = *self.frames().get(at)?;
+        let wanted = (*self.track.stamps.get(at)?)?;
         let mut input = open_input(self.path()).ok()?;
         input.seek(info.t_us, ..info.t_us.saturating_add(1)).ok()?;
         let parameters: Parameters = input.stream(self.track.stream)?.parameters();
         let mut decoder = opening::open(parameters, 1).ok()?;
-        let frame = search(&mut input, self.track.stream, &mut decoder, |frame| {
+        // What the container's index takes for a key frame may be a recovery point.
+        let is_begin = |packet: &Packet| {
+            let number = self.track.number_of(packet.pts(), 0);
+            number.is_some_and(|number| self.track.is_key(number))
+        };
+        let stream = self.track.stream;
+        let frame = search(&mut input, stream, &mut decoder, is_begin, |frame| {
             let stamp = frame.timestamp().or_else(|| frame.pts());
             match stamp.map(|stamp| stamp.cmp(&wanted)) {
                 // What builds on a damaged frame is not taken.
@@ -89,6 +98,24 @@ fn is_whole(frame: &frame::Video) -> bool {
     !frame.is_corrupt() && !frame.has_decode_errors()
 }
 
+/// The first frame of a stream that can be decoded.
+pub(super) fn first_frame(
+    input: &mut Input,
+    stream: usize,
+    decoder: &mut VideoDecoder,
+) -> Option<frame::Video> {
+    search(
+        input,
+        stream,
+        decoder,
+        |_| true,
+        |frame| match is_whole(frame) {
+            true => Found::This,
+            false => Found::Earlier,
+        },
+    )
+}
+
 /// What a search does with a decoded frame.
 enum Found {
     This,
@@ -96,19 +123,22 @@ enum Found {
     Nothing,
 }
 
-/// Decodes on from where the input stands, up to the frame that `judge` takes by its time stamp.
+/// Decodes on from where the input stands, if decoding can begin with its first packet, up to the frame that `judge` takes
+/// by its time stamp.
 fn search(
     input: &mut Input,
     stream: usize,
     decoder: &mut VideoDecoder,
+    is_begin: impl Fn(&Packet) -> bool,
     judge: impl Fn(&frame::Video) -> Found,
 ) -> Option<frame::Video> {
-    let mut ended = false;
+    let (mut begun, mut ended) = (false, false);
     for _ in 0..MOST_PACKETS {
         // A packet that is read into again would keep the memory of what it held.
         let mut packet = Packet::empty();
         match packet.read(input) {
             Ok(()) if packet.stream() != stream || packet.size() == 0 => continue,
+            Ok(()) if !begun && !is_begin(&packet) => return None,
             // A damaged packet gives no frame; the next ones may.
             Ok(()) => drop(decoder.send_packet(&packet)),
             Err(_) => {
@@ -116,6 +146,7 @@ fn search(
                 ended = true;
             }
         }
+        begun = true;
         let mut picture = frame::Video::empty();
         while decoder.receive_frame(&mut picture).is_ok() {
             match judge(&picture) {

@@ -106,6 +106,7 @@ fn entry(
             frames: u64::from(SAMPLES),
             bytes: 0,
             blake3: Digest::of(b""),
+            colour_conversion: None,
             index_blake3: None,
         },
         mask: MaskInfo {

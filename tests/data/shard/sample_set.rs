@@ -93,6 +93,7 @@ pub(crate) fn entry(
             frames: 50,
             bytes: 5,
             blake3,
+            colour_conversion: None,
             index_blake3: Some(blake3),
         },
         mask: MaskInfo {

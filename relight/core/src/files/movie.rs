@@ -1,6 +1,7 @@
-//! Frames into a video file and out of one, by the programs `ffmpeg` and `ffprobe`. Knows nothing of what the frames show.
+//! Frames into a video file, by the program `ffmpeg`. Knows nothing of what the frames show.
 
 use std::ffi::OsString;
+use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -8,6 +9,7 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 
+use relit_data::colour::ColourFault;
 use relit_data::durable;
 
 use super::parent::make_parent;
@@ -48,6 +50,14 @@ pub enum MovieError {
         path: PathBuf,
         /// What the program says.
         said: String,
+    },
+    /// Colours that are not known here.
+    #[error("{}: {fault} cannot be converted to sRGB: convert the video to SDR with BT.709 colours first", path.display())]
+    Colour {
+        /// The file.
+        path: PathBuf,
+        /// What cannot be converted.
+        fault: ColourFault,
     },
     /// A frame has another size than the first.
     #[error("a frame of {} x {} pixels was given for a video of {} x {}", found.width, found.height, expected.width, expected.height)]
@@ -104,6 +114,54 @@ impl MovieFormat {
     }
 }
 
+/// Frames a second, as a ratio: 29.97 is 30000/1001.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameRate {
+    numerator: u32,
+    denominator: u32,
+}
+
+impl FrameRate {
+    /// The fastest that a video may have, frames a second.
+    const MAX: u32 = 240;
+
+    /// `None` unless it is above 0, and within what videos have.
+    #[must_use]
+    pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
+        let is_rate = numerator > 0 && denominator > 0 && numerator / denominator <= Self::MAX;
+        if is_rate {
+            Some(Self {
+                numerator,
+                denominator,
+            })
+        } else {
+            None
+        }
+    }
+
+    /// Frames a second.
+    #[must_use]
+    pub fn per_second(self) -> f64 {
+        f64::from(self.numerator) / f64::from(self.denominator)
+    }
+}
+
+/// So many frames a second, at least one.
+impl From<u32> for FrameRate {
+    fn from(frames: u32) -> Self {
+        Self {
+            numerator: frames.max(1),
+            denominator: 1,
+        }
+    }
+}
+
+impl fmt::Display for FrameRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.numerator, self.denominator)
+    }
+}
+
 /// A video that is being written. It appears under its name when it is finished, whole; dropped before, it
 /// leaves nothing.
 #[derive(Debug)]
@@ -140,7 +198,7 @@ impl MovieWriter {
         path: &Path,
         format: MovieFormat,
         extent: Extent,
-        frames_per_second: u32,
+        frame_rate: impl Into<FrameRate>,
     ) -> Result<Self, MovieError> {
         make_parent(path).map_err(|source| MovieError::Write {
             path: path.to_owned(),
@@ -152,7 +210,7 @@ impl MovieWriter {
             .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"])
             .args(["-f", "rawvideo", "-pixel_format", "rgb24", "-video_size"])
             .arg(format!("{}x{}", shown.width, shown.height))
-            .args(["-framerate", &frames_per_second.to_string(), "-i", "pipe:0"])
+            .args(["-framerate", &frame_rate.into().to_string(), "-i", "pipe:0"])
             .args(["-vf", "scale=out_color_matrix=bt709"])
             .args(["-pix_fmt", "yuv420p", "-colorspace", "bt709"])
             .args(["-color_primaries", "bt709", "-color_trc", "iec61966-2-1"])
@@ -275,152 +333,6 @@ impl Drop for MovieWriter {
     }
 }
 
-/// The most pixels of a video's frame.
-const MOST_PIXELS: usize = 1 << 26;
-
-/// A video that is read, frame by frame.
-#[derive(Debug)]
-pub struct MovieReader {
-    path: PathBuf,
-    extent: Extent,
-    frames_per_second: u32,
-    program: Child,
-    errors: Option<JoinHandle<Option<String>>>,
-}
-
-impl MovieReader {
-    /// Starts `ffmpeg` for a file.
-    ///
-    /// # Errors
-    /// Where a program cannot be started, or the file is no video.
-    pub fn open(path: &Path) -> Result<Self, MovieError> {
-        let (extent, frames_per_second) = probe(path)?;
-        let mut program = Command::new("ffmpeg")
-            .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-i"])
-            .arg(file_url(path))
-            .args(["-map", "0:v:0", "-f", "rawvideo", "-pix_fmt", "rgb24"])
-            // Frames that are turned on the screen are turned here; all have the size of the first.
-            .args([
-                "-vf",
-                &format!("scale={}:{}", extent.width, extent.height),
-                "pipe:1",
-            ])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .map_err(MovieError::NoProgram)?;
-        let errors = program
-            .stderr
-            .take()
-            .map(|pipe| thread::spawn(|| last_line(pipe)));
-        Ok(Self {
-            path: path.to_owned(),
-            extent,
-            frames_per_second,
-            program,
-            errors,
-        })
-    }
-
-    /// Width and height of its frames.
-    #[must_use]
-    pub const fn extent(&self) -> Extent {
-        self.extent
-    }
-
-    /// Frames a second, rounded.
-    #[must_use]
-    pub const fn frames_per_second(&self) -> u32 {
-        self.frames_per_second
-    }
-
-    /// The next frame; none after the last.
-    ///
-    /// # Errors
-    /// Where the program fails, or the file ends in the middle of a frame.
-    pub fn frame(&mut self) -> Result<Option<Rgb<Srgb>>, MovieError> {
-        let Some(pipe) = &mut self.program.stdout else {
-            return Ok(None);
-        };
-        let mut bytes = Vec::with_capacity(3 * self.extent.pixels());
-        let read = pipe
-            .take(3 * self.extent.pixels() as u64)
-            .read_to_end(&mut bytes);
-        if read.is_err() || (!bytes.is_empty() && bytes.len() < 3 * self.extent.pixels()) {
-            return Err(self.failure());
-        }
-        if bytes.is_empty() {
-            let is_done = self.program.wait().is_ok_and(|status| status.success());
-            return if is_done {
-                Ok(None)
-            } else {
-                Err(self.failure())
-            };
-        }
-        let mut planes = Planes::zeros(self.extent);
-        for (channel, plane) in planes.planes_mut().into_iter().enumerate() {
-            for (value, pixel) in plane.iter_mut().zip(bytes.chunks_exact(3)) {
-                *value = f32::from(pixel[channel]) / 255.0;
-            }
-        }
-        Ok(Some(Rgb::new(planes)))
-    }
-
-    fn failure(&mut self) -> MovieError {
-        drop(self.program.stdout.take());
-        // What is not read any more cannot end by itself.
-        let _ = self.program.kill();
-        let said = self.errors.take().and_then(|thread| thread.join().ok());
-        MovieError::NoVideo {
-            path: self.path.clone(),
-            said: said.flatten().unwrap_or_else(|| SILENT.to_owned()),
-        }
-    }
-}
-
-impl Drop for MovieReader {
-    fn drop(&mut self) {
-        let _ = self.program.kill();
-        let _ = self.program.wait();
-    }
-}
-
-/// Size and rate of a video's frames, by `ffprobe`.
-fn probe(path: &Path) -> Result<(Extent, u32), MovieError> {
-    let output = Command::new("ffprobe")
-        .args(["-v", "error", "-select_streams", "v:0", "-of", "csv=p=0"])
-        .args(["-show_entries", "stream=width,height,r_frame_rate"])
-        .arg(file_url(path))
-        .stdin(Stdio::null())
-        .output()
-        .map_err(MovieError::NoProgram)?;
-    let errors = String::from_utf8_lossy(&output.stderr);
-    let text = String::from_utf8_lossy(&output.stdout);
-    let mut parts = text
-        .trim()
-        .split([',', '/'])
-        .map(|part| part.trim().parse::<usize>().ok());
-    let mut next = || parts.next().flatten().filter(|&number| number > 0);
-    match (next(), next(), next(), next()) {
-        (Some(width), Some(height), Some(rate), Some(seconds))
-            if width.saturating_mul(height) <= MOST_PIXELS =>
-        {
-            let rate = (rate as f64 / seconds as f64).round().clamp(1.0, 240.0) as u32;
-            Ok((Extent::new(width, height), rate))
-        }
-        _ => Err(MovieError::NoVideo {
-            path: path.to_owned(),
-            said: errors
-                .lines()
-                .last()
-                .unwrap_or("it has no frames of a known size")
-                .trim()
-                .to_owned(),
-        }),
-    }
-}
-
 /// A size whose sides are even.
 const fn even(extent: Extent) -> Extent {
     Extent::new(
@@ -449,7 +361,7 @@ fn filled_up(bytes: Vec<u8>, extent: Extent) -> Vec<u8> {
 
 /// A file as FFmpeg's programs take it, whatever its name: one with a colon may look like a protocol, one that begins with
 /// `-` like an option.
-fn file_url(path: &Path) -> OsString {
+pub(super) fn file_url(path: &Path) -> OsString {
     let mut url = OsString::from("file:");
     url.push(path);
     url
@@ -466,10 +378,10 @@ fn partial_name(path: &Path) -> PathBuf {
 }
 
 /// What is said of a program that said nothing.
-const SILENT: &str = "it ended without a word";
+pub(super) const SILENT: &str = "it ended without a word";
 
 /// Reads all that a program writes, and keeps its last line.
-fn last_line(mut pipe: ChildStderr) -> Option<String> {
+pub(super) fn last_line(mut pipe: ChildStderr) -> Option<String> {
     let mut bytes = Vec::new();
     // What was read before an error is all there is to say.
     let _ = pipe.read_to_end(&mut bytes);
@@ -481,6 +393,7 @@ fn last_line(mut pipe: ChildStderr) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::{FrameTiming, MovieReader};
     use crate::image::Planes;
 
     fn has_ffmpeg() -> bool {
@@ -531,7 +444,7 @@ mod tests {
             .unwrap();
         assert_eq!(String::from_utf8_lossy(&probed.stdout).trim(), "34,34,7");
         // What the even size has more shows the edge, and no black line.
-        let mut clip = MovieReader::open(&path).unwrap();
+        let mut clip = MovieReader::open(&path, FrameTiming::Each).unwrap();
         let frame = clip.frame().unwrap().unwrap();
         for (x, y) in [(33, 5), (5, 33), (33, 33)] {
             assert!(
@@ -653,10 +566,10 @@ mod tests {
             movie.push(&frame).unwrap();
         }
         movie.finish().unwrap();
-        let mut clip = MovieReader::open(&path).unwrap();
+        let mut clip = MovieReader::open(&path, FrameTiming::Each).unwrap();
         assert_eq!(
-            (clip.extent(), clip.frames_per_second()),
-            (Extent::new(32, 16), 12)
+            (clip.extent(), clip.frame_rate()),
+            (Extent::new(32, 16), FrameRate::from(12))
         );
         for level in [0.2, 0.6] {
             let frame = clip.frame().unwrap().unwrap();
@@ -664,7 +577,9 @@ mod tests {
         }
         assert!(clip.frame().unwrap().is_none());
         fs::write(&path, "no video").unwrap();
-        let error = MovieReader::open(&path).unwrap_err().to_string();
+        let error = MovieReader::open(&path, FrameTiming::Each)
+            .unwrap_err()
+            .to_string();
         assert!(
             error.contains("clip.mp4 is not a readable video"),
             "{error}"

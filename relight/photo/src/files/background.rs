@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use relight_core::files::MovieReader;
+use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::{ColourImage, Extent, ImageError, Linear, Rgb};
 use relight_core::light::Panorama;
 use relit_data::file_names::{VIDEO_EXTENSIONS, has_extension};
@@ -26,13 +26,23 @@ pub enum BackgroundFile {
 }
 
 impl BackgroundFile {
+    /// How the colours of a video are converted to sRGB, in words; none where they are taken as sRGB.
+    #[must_use]
+    pub fn colour_conversion(&self) -> Option<String> {
+        match self {
+            Self::Movie(movie) => movie.colour_conversion(),
+            Self::Photo(_) | Self::Panorama(_) => None,
+        }
+    }
+
     /// Reads the background of a scene: a video, an HDR or EXR file twice as wide as high as a panorama, or a photograph.
     ///
     /// # Errors
     /// Where it cannot be read, or has values that are no light.
     pub fn read(path: &Path, scene: &SceneDescription) -> Result<Self, InsertionError> {
         if has_extension(path, &VIDEO_EXTENSIONS) {
-            return Ok(Self::Movie(Box::new(MovieReader::open(path)?)));
+            let movie = MovieReader::open(path, FrameTiming::Even)?;
+            return Ok(Self::Movie(Box::new(movie)));
         }
         let bytes = fs::read(path).map_err(|source| ImageError::Open {
             path: path.to_owned(),

@@ -194,7 +194,7 @@ impl<'a> Insertion<'a> {
         let BackgroundFile::Movie(movie) = &mut self.background else {
             return Err(InsertionError::NoFrame);
         };
-        let rate = movie.frames_per_second();
+        let rate = movie.frame_rate();
         let mut film = MovieWriter::create(path, format, self.setting.extent, rate)?;
         let mut frames = 0;
         while let Some(background) = next {

@@ -160,6 +160,7 @@ impl<'a> SimulatedTurn<'a> {
             frames: u64::from(self.description.frames),
             bytes: bytes.len() as u64,
             blake3: Digest::of(&bytes),
+            colour_conversion: None,
             index_blake3: None,
         }
     }

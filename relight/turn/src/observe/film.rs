@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use relight_core::files::MovieReader;
+use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
 use relight_core::statistics::median;
 use relit_data::geometry::Rect;
@@ -63,7 +63,7 @@ pub fn film(
     if let Some(probe) = &probe {
         check_mask(probe.place, turn)?;
     }
-    let mut movie = MovieReader::open(&recording.video)?;
+    let mut movie = MovieReader::open(&recording.video, FrameTiming::Each)?;
     let angles: HashMap<u64, f64> = turn.sources.iter().copied().collect();
     let mut likeness = Likeness::new(turn);
     let mut strip = StripBuilder::new(movie.extent())?;

@@ -26,6 +26,13 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         .collect::<Result<Vec<_>, _>>()?;
     let background = BackgroundFile::read(&file(&scene.background), &scene)?;
     check_output(&background, arguments)?;
+    if let Some(conversion) = background.colour_conversion() {
+        let path = file(&scene.background);
+        console.warn(&format!(
+            "{}: the colours are converted: {conversion}",
+            path.display()
+        ));
+    }
     let inputs: Vec<PathBuf> = scene.files().map(file).collect();
     not_an_input(&arguments.output, &inputs)?;
     let network = arguments.network.read()?;

@@ -1,4 +1,4 @@
-use relight_core::files::MovieReader;
+use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::Planes;
 
 use crate::test_turns::{SIDE, SOLVED, known, metal_ball, read};
@@ -18,7 +18,7 @@ fn film_of(turn: &ReadTurn, solution: &TurnSolution, out: &std::path::Path) -> V
         has_movie: true,
     };
     files.write(out).unwrap();
-    let mut movie = MovieReader::open(&out.join("relit.mp4")).unwrap();
+    let mut movie = MovieReader::open(&out.join("relit.mp4"), FrameTiming::Each).unwrap();
     let mut frames = Vec::new();
     while let Some(frame) = movie.frame().unwrap() {
         frames.push(frame.planes().clone());

@@ -1,0 +1,460 @@
+//! Colours as videos code them to sRGB: the transfer characteristics and primaries of ITU-T H.273, by their numbers.
+//!
+//! HDR is scaled as Report ITU-R BT.2408 maps it to SDR: reference white, 203 cd/m², becomes white, and what is brighter
+//! is clipped.
+
+use crate::srgb;
+
+/// Luminance of diffuse white in HDR (BT.2408), which becomes white, cd/m².
+const HDR_WHITE: f64 = 203.0;
+/// Luminance of the brightest value of PQ (SMPTE ST 2084), cd/m².
+const PQ_PEAK: f64 = 10_000.0;
+/// Luminance of the brightest value on HLG's nominal display, cd/m², and that display's system gamma (BT.2100).
+const HLG_PEAK: f64 = 1000.0;
+const HLG_GAMMA: f64 = 1.2;
+/// Values that are looked up.
+const LEVELS: usize = 1 << 16;
+
+/// Colours that cannot be converted.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ColourFault {
+    /// By their transfer characteristics.
+    #[error("its transfer function {0}")]
+    Transfer(String),
+    /// By their primaries.
+    #[error("its colour primaries {0}")]
+    Primaries(String),
+    /// By their matrix.
+    #[error("its colour matrix {0}")]
+    Matrix(String),
+}
+
+/// ITU-T H.273's number for what a file does not state.
+const NOT_STATED: u32 = 2;
+
+fn numbered(code: u32) -> String {
+    format!("number {code} of ITU-T H.273")
+}
+
+/// How values become light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Transfer {
+    /// They are shown as sRGB, as players do with BT.709 and its relatives.
+    Sdr,
+    Linear,
+    Gamma28,
+    /// SMPTE ST 428-1.
+    Cinema,
+    Pq,
+    Hlg,
+}
+
+impl Transfer {
+    fn from_code(code: u32) -> Result<Self, ColourFault> {
+        Ok(match code {
+            // BT.709, not stated, gamma 2.2, BT.601, SMPTE 240M, xvYCC, BT.1361, sRGB, BT.2020 of 10 and 12 bits.
+            0..=4 | 6 | 7 | 11..=15 => Self::Sdr,
+            5 => Self::Gamma28,
+            8 => Self::Linear,
+            16 => Self::Pq,
+            17 => Self::Cinema,
+            18 => Self::Hlg,
+            9 => return Err(ColourFault::Transfer("logarithmic 100:1".to_owned())),
+            10 => return Err(ColourFault::Transfer("logarithmic 316:1".to_owned())),
+            _ => return Err(ColourFault::Transfer(numbered(code))),
+        })
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Sdr => "SDR",
+            Self::Linear => "linear",
+            Self::Gamma28 => "gamma 2.8",
+            Self::Cinema => "SMPTE 428",
+            Self::Pq => "PQ",
+            Self::Hlg => "HLG",
+        }
+    }
+
+    /// Light of a value, with white as 1; of HLG the scene's light, with its brightest value as 1.
+    fn to_light(self, value: f64) -> f64 {
+        match self {
+            Self::Sdr => srgb::to_linear(value),
+            Self::Linear => value,
+            Self::Gamma28 => value.powf(2.8),
+            Self::Cinema => value.powf(2.6) * 52.37 / 48.0,
+            Self::Pq => pq_to_luminance(value) / HDR_WHITE,
+            Self::Hlg => hlg_to_scene(value),
+        }
+    }
+}
+
+/// SMPTE ST 2084, equation 5.1.
+fn pq_to_luminance(value: f64) -> f64 {
+    const M1: f64 = 2610.0 / 16384.0;
+    const M2: f64 = 2523.0 / 4096.0 * 128.0;
+    const C1: f64 = 3424.0 / 4096.0;
+    const C2: f64 = 2413.0 / 4096.0 * 32.0;
+    const C3: f64 = 2392.0 / 4096.0 * 32.0;
+    let root = value.powf(1.0 / M2);
+    PQ_PEAK * ((root - C1).max(0.0) / (C2 - C3 * root)).powf(1.0 / M1)
+}
+
+/// The inverse of HLG's opto-electronic transfer function (BT.2100, table 5).
+fn hlg_to_scene(value: f64) -> f64 {
+    const A: f64 = 0.178_832_77;
+    const B: f64 = 1.0 - 4.0 * A;
+    const C: f64 = 0.559_910_73;
+    if value <= 0.5 {
+        value * value / 3.0
+    } else {
+        (((value - C) / A).exp() + B) / 12.0
+    }
+}
+
+/// Chromaticities of red, green, blue and white (ITU-T H.273, table 2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Primaries {
+    name: &'static str,
+    chromaticities: [[f64; 2]; 4],
+}
+
+const D65: [f64; 2] = [0.3127, 0.3290];
+const BT709: Primaries = Primaries {
+    name: "BT.709",
+    chromaticities: [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], D65],
+};
+
+impl Primaries {
+    fn from_code(code: u32) -> Result<Self, ColourFault> {
+        let c = [0.310, 0.316];
+        let (name, [red, green, blue, white]) = match code {
+            0..=3 => return Ok(BT709),
+            4 => ("BT.470 M", [[0.67, 0.33], [0.21, 0.71], [0.14, 0.08], c]),
+            5 => (
+                "BT.601 (625 lines)",
+                [[0.64, 0.33], [0.29, 0.60], [0.15, 0.06], D65],
+            ),
+            6 | 7 => (
+                "BT.601 (525 lines)",
+                [[0.630, 0.340], [0.310, 0.595], [0.155, 0.070], D65],
+            ),
+            8 => ("film", [[0.681, 0.319], [0.243, 0.692], [0.145, 0.049], c]),
+            9 => (
+                "BT.2020",
+                [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046], D65],
+            ),
+            10 => (
+                "XYZ",
+                [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0 / 3.0, 1.0 / 3.0]],
+            ),
+            11 => (
+                "DCI-P3",
+                [
+                    [0.680, 0.320],
+                    [0.265, 0.690],
+                    [0.150, 0.060],
+                    [0.314, 0.351],
+                ],
+            ),
+            12 => (
+                "Display P3",
+                [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060], D65],
+            ),
+            22 => (
+                "EBU 3213",
+                [[0.630, 0.340], [0.295, 0.605], [0.155, 0.077], D65],
+            ),
+            _ => return Err(ColourFault::Primaries(numbered(code))),
+        };
+        Ok(Self {
+            name,
+            chromaticities: [red, green, blue, white],
+        })
+    }
+
+    /// From these primaries to CIE XYZ, with white at a luminance of 1 (SMPTE RP 177).
+    fn to_xyz(self) -> Matrix {
+        let [red, green, blue, white] = self.chromaticities;
+        let columns = transposed([red, green, blue].map(|[x, y]| [x, y, 1.0 - x - y]));
+        let sums = times(inverse(columns), xyz_of(white));
+        columns.map(|row| [row[0] * sums[0], row[1] * sums[1], row[2] * sums[2]])
+    }
+}
+
+fn xyz_of([x, y]: [f64; 2]) -> [f64; 3] {
+    [x / y, 1.0, (1.0 - x - y) / y]
+}
+
+type Matrix = [[f64; 3]; 3];
+
+/// Bradford's matrix, for the adaptation to another white.
+const BRADFORD: Matrix = [
+    [0.8951, 0.2664, -0.1614],
+    [-0.7502, 1.7135, 0.0367],
+    [0.0389, -0.0685, 1.0296],
+];
+
+fn times(matrix: Matrix, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    matrix.map(|row| row[0] * x + row[1] * y + row[2] * z)
+}
+
+fn transposed(m: Matrix) -> Matrix {
+    [0, 1, 2].map(|column| [m[0][column], m[1][column], m[2][column]])
+}
+
+fn product(a: Matrix, b: Matrix) -> Matrix {
+    transposed(transposed(b).map(|column| times(a, column)))
+}
+
+fn inverse(m: Matrix) -> Matrix {
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    };
+    let rows = [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])];
+    let determinant = m[0][0] * rows[0][0] + m[0][1] * rows[0][1] + m[0][2] * rows[0][2];
+    transposed(rows).map(|row| row.map(|entry| entry / determinant))
+}
+
+/// From light of these primaries to that of BT.709, which sRGB shares.
+fn to_bt709(from: Primaries) -> Matrix {
+    let cone = |white| times(BRADFORD, xyz_of(white));
+    let (source, target) = (cone(from.chromaticities[3]), cone(BT709.chromaticities[3]));
+    let mut scale = [[0.0; 3]; 3];
+    for at in 0..3 {
+        scale[at][at] = target[at] / source[at];
+    }
+    let adapted = product(inverse(BRADFORD), product(scale, BRADFORD));
+    product(inverse(BT709.to_xyz()), product(adapted, from.to_xyz()))
+}
+
+/// The conversion of coded RGB to sRGB.
+pub struct ToSrgb {
+    transfer: Transfer,
+    primaries: Primaries,
+    /// Light by value.
+    light: Vec<f32>,
+    /// The sRGB level by light.
+    level: Vec<u8>,
+    matrix: [[f32; 3]; 3],
+    /// Weights of light in luminance, for HLG.
+    luminance: [f32; 3],
+}
+
+impl std::fmt::Debug for ToSrgb {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "ToSrgb({self})")
+    }
+}
+
+impl PartialEq for ToSrgb {
+    fn eq(&self, other: &Self) -> bool {
+        (self.transfer, self.primaries) == (other.transfer, other.primaries)
+    }
+}
+
+/// What is converted, and how.
+impl std::fmt::Display for ToSrgb {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (transfer, primaries) = (self.transfer.name(), self.primaries.name);
+        write!(f, "{transfer} with {primaries} primaries to sRGB")?;
+        match self.transfer {
+            Transfer::Pq | Transfer::Hlg => write!(f, ", {HDR_WHITE} cd/m² as white (BT.2408)"),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl ToSrgb {
+    /// For transfer characteristics and primaries by their numbers in ITU-T H.273; `None` if the values are sRGB as they
+    /// are. What is not stated (2) counts as BT.709.
+    ///
+    /// # Errors
+    /// [`ColourFault`] for those that are not known here.
+    pub fn new(transfer: u32, primaries: u32) -> Result<Option<Self>, ColourFault> {
+        let transfer = Transfer::from_code(transfer)?;
+        let primaries = Primaries::from_code(primaries)?;
+        if transfer == Transfer::Sdr && primaries == BT709 {
+            return Ok(None);
+        }
+        let part = |level: usize| level as f64 / (LEVELS - 1) as f64;
+        let light = (0..LEVELS).map(|level| transfer.to_light(part(level)) as f32);
+        let level = (0..LEVELS).map(|light| (255.0 * srgb::from_linear(part(light))).round() as u8);
+        let narrow = |row: [f64; 3]| row.map(|entry| entry as f32);
+        Ok(Some(Self {
+            transfer,
+            primaries,
+            light: light.collect(),
+            level: level.collect(),
+            matrix: to_bt709(primaries).map(narrow),
+            luminance: narrow(primaries.to_xyz()[1]),
+        }))
+    }
+
+    /// As [`Self::new`], by the names that FFmpeg gives them.
+    ///
+    /// # Errors
+    /// [`ColourFault`] for those that are not known here.
+    pub fn named(
+        transfer: Option<&str>,
+        primaries: Option<&str>,
+    ) -> Result<Option<Self>, ColourFault> {
+        const TRANSFERS: [(&str, u32); 16] = [
+            ("bt709", 1),
+            ("bt470m", 4),
+            ("gamma22", 4),
+            ("bt470bg", 5),
+            ("gamma28", 5),
+            ("smpte170m", 6),
+            ("smpte240m", 7),
+            ("linear", 8),
+            ("iec61966-2-4", 11),
+            ("bt1361e", 12),
+            ("iec61966-2-1", 13),
+            ("bt2020-10", 14),
+            ("bt2020-12", 15),
+            ("smpte2084", 16),
+            ("smpte428", 17),
+            ("arib-std-b67", 18),
+        ];
+        const PRIMARIES: [(&str, u32); 11] = [
+            ("bt709", 1),
+            ("bt470m", 4),
+            ("bt470bg", 5),
+            ("smpte170m", 6),
+            ("smpte240m", 7),
+            ("film", 8),
+            ("bt2020", 9),
+            ("smpte428", 10),
+            ("smpte431", 11),
+            ("smpte432", 12),
+            ("ebu3213", 22),
+        ];
+        let code = |known: &[(&str, u32)], name: Option<&str>| match name {
+            None => Ok(NOT_STATED),
+            Some(name) => known
+                .iter()
+                .find(|(known, _)| *known == name)
+                .map(|&(_, code)| code)
+                .ok_or_else(|| name.to_owned()),
+        };
+        Self::new(
+            code(&TRANSFERS, transfer).map_err(ColourFault::Transfer)?,
+            code(&PRIMARIES, primaries).map_err(ColourFault::Primaries)?,
+        )
+    }
+
+    /// The sRGB levels of a coded colour, whose values are 0 to 1; others are clipped.
+    #[must_use]
+    pub fn levels(&self, coded: [f32; 3]) -> [u8; 3] {
+        let index = |value: f32| (value * (LEVELS - 1) as f32 + 0.5) as usize;
+        let mut light = coded.map(|value| self.light[index(value).min(LEVELS - 1)]);
+        if self.transfer == Transfer::Hlg {
+            let [r, g, b] = self.luminance;
+            let luminance = r * light[0] + g * light[1] + b * light[2];
+            // The system's gamma of the nominal display (BT.2100, table 5).
+            let scale = (HLG_PEAK / HDR_WHITE) as f32 * luminance.powf(HLG_GAMMA as f32 - 1.0);
+            light = light.map(|light| light * scale);
+        }
+        self.matrix.map(|row| {
+            let light = row[0] * light[0] + row[1] * light[1] + row[2] * light[2];
+            self.level[index(light).min(LEVELS - 1)]
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WHITE: [f64; 3] = [1.0; 3];
+
+    fn near(found: [u8; 3], wanted: [u8; 3], most: u8) {
+        let off = found.iter().zip(wanted).map(|(a, b)| a.abs_diff(b)).max();
+        assert!(off <= Some(most), "{found:?} {wanted:?}");
+    }
+
+    #[test]
+    fn bt709_and_srgb_stay_as_they_are() {
+        for transfer in [0, 1, 2, 6, 13, 14, 15] {
+            assert!(ToSrgb::new(transfer, 1).unwrap().is_none());
+        }
+        assert!(ToSrgb::new(2, 2).unwrap().is_none());
+    }
+
+    #[test]
+    fn white_of_203_nits_is_white_in_pq_and_hlg() {
+        // BT.2408: reference white is 58 % of PQ and 75 % of HLG.
+        for (transfer, value) in [(16, 0.5807), (18, 0.75)] {
+            let by = ToSrgb::new(transfer, 9).unwrap().unwrap();
+            near(by.levels([value; 3]), [255; 3], 1);
+            near(by.levels([1.0; 3]), [255; 3], 0);
+            near(by.levels([0.0; 3]), [0; 3], 0);
+        }
+    }
+
+    #[test]
+    fn greys_keep_their_level_where_only_the_primaries_differ() {
+        for primaries in [4, 5, 6, 8, 9, 11, 12, 22] {
+            let by = ToSrgb::new(13, primaries).unwrap().unwrap();
+            near(by.levels([128.0 / 255.0; 3]), [128; 3], 1);
+            let white = times(to_bt709(Primaries::from_code(primaries).unwrap()), WHITE);
+            assert!(white.iter().all(|part| (part - 1.0).abs() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn bt2020_becomes_bt709_by_the_published_matrix() {
+        // BT.2087, annex 1, rounded to four digits.
+        let published = [
+            [1.6605, -0.5876, -0.0728],
+            [-0.1246, 1.1329, -0.0083],
+            [-0.0182, -0.1006, 1.1187],
+        ];
+        let found = to_bt709(Primaries::from_code(9).unwrap());
+        for (found, published) in found
+            .into_iter()
+            .flatten()
+            .zip(published.into_iter().flatten())
+        {
+            assert!((found - published).abs() < 2e-4, "{found} {published}");
+        }
+    }
+
+    #[test]
+    fn display_p3_is_what_littlecms_makes_of_it() {
+        let by = ToSrgb::new(13, 12).unwrap().unwrap();
+        let coded = |levels: [u8; 3]| levels.map(|level| f32::from(level) / 255.0);
+        near(by.levels(coded([200, 60, 50])), [217, 42, 39], 2);
+        near(by.levels(coded([60, 180, 70])), [0, 183, 49], 2);
+    }
+
+    #[test]
+    fn linear_values_are_encoded() {
+        let by = ToSrgb::new(8, 1).unwrap().unwrap();
+        near(by.levels([0.215_86; 3]), [128; 3], 0);
+    }
+
+    #[test]
+    fn what_is_not_known_is_refused() {
+        assert!(matches!(ToSrgb::new(9, 1), Err(ColourFault::Transfer(_))));
+        assert!(matches!(ToSrgb::new(77, 1), Err(ColourFault::Transfer(_))));
+        assert!(matches!(ToSrgb::new(1, 77), Err(ColourFault::Primaries(_))));
+        let named = |transfer, primaries| ToSrgb::named(Some(transfer), Some(primaries));
+        assert!(named("log100", "bt709").is_err() && named("bt709", "mars").is_err());
+        assert_eq!(named("smpte2084", "bt2020"), ToSrgb::new(16, 9));
+    }
+
+    #[test]
+    fn values_beyond_the_range_are_clipped() {
+        let by = ToSrgb::new(16, 9).unwrap().unwrap();
+        for value in [f32::NEG_INFINITY, -1.0, 2.0, f32::INFINITY, f32::NAN] {
+            let _ = by.levels([value; 3]);
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! How luma and colour differences become sRGB: range and matrix, and for other video than SDR of BT.709 the transfer
+//! characteristics and primaries (ITU-T H.273).
+
+use std::sync::Arc;
+
+use ffmpeg_next::codec::decoder;
+use ffmpeg_next::format::Pixel;
+use ffmpeg_next::{color, ffi, frame};
+use image::RgbImage;
+use relit_data::colour::{ColourFault, ToSrgb};
+use relit_data::geometry::Rect;
+use yuv::{YuvRange, YuvStandardMatrix};
+
+use super::picture::{convert, is_grey, is_jpeg_format, is_rgb, plane};
+
+/// How a stream's values become sRGB.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Colour {
+    pub(super) full_range: bool,
+    pub(super) matrix: YuvStandardMatrix,
+    /// False where the matrix was chosen by the picture's size.
+    matrix_is_stated: bool,
+    /// `None` where RGB is sRGB already.
+    to_srgb: Option<Arc<ToSrgb>>,
+}
+
+/// What a stream or a frame states.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stated {
+    format: Pixel,
+    height: u32,
+    range: color::Range,
+    matrix: color::Space,
+    transfer: color::TransferCharacteristic,
+    primaries: color::Primaries,
+}
+
+impl Stated {
+    /// What a decoder states before its first frame, by the container.
+    pub(super) fn by_stream(decoder: &decoder::Video) -> Self {
+        Self {
+            format: decoder.format(),
+            height: decoder.height(),
+            range: decoder.color_range(),
+            matrix: decoder.color_space(),
+            transfer: decoder.color_transfer_characteristic(),
+            primaries: decoder.color_primaries(),
+        }
+    }
+
+    pub(super) fn by_picture(picture: &frame::Video) -> Self {
+        Self {
+            format: picture.format(),
+            height: picture.height(),
+            range: picture.color_range(),
+            matrix: picture.color_space(),
+            transfer: picture.color_transfer_characteristic(),
+            primaries: picture.color_primaries(),
+        }
+    }
+
+    /// With what another source states, where this one states nothing.
+    pub(super) fn or(self, other: Self) -> Self {
+        use color::{Primaries, Range, Space, TransferCharacteristic as Transfer};
+        Self {
+            range: match self.range {
+                Range::Unspecified => other.range,
+                stated => stated,
+            },
+            matrix: match self.matrix {
+                Space::Unspecified => other.matrix,
+                stated => stated,
+            },
+            transfer: match self.transfer {
+                Transfer::Unspecified => other.transfer,
+                stated => stated,
+            },
+            primaries: match self.primaries {
+                Primaries::Unspecified => other.primaries,
+                stated => stated,
+            },
+            ..self
+        }
+    }
+
+    /// JPEG's own colours are full-range BT.601 (JFIF); of other video that states no matrix, up to 576 rows are BT.601 and
+    /// more are BT.709, as players do.
+    ///
+    /// # Errors
+    /// [`ColourFault`] for a matrix, transfer characteristics or primaries that are not known here.
+    pub(super) fn colour(self) -> Result<Colour, ColourFault> {
+        let (format, jpeg) = (self.format, is_jpeg_format(self.format));
+        let has_matrix = !is_rgb(format) && !is_grey(format);
+        let stated = match self.matrix {
+            color::Space::BT709 => Some(YuvStandardMatrix::Bt709),
+            color::Space::BT470BG | color::Space::SMPTE170M => Some(YuvStandardMatrix::Bt601),
+            color::Space::BT2020NCL => Some(YuvStandardMatrix::Bt2020),
+            color::Space::SMPTE240M => Some(YuvStandardMatrix::Smpte240),
+            color::Space::FCC => Some(YuvStandardMatrix::Fcc),
+            _ if jpeg => Some(YuvStandardMatrix::Bt601),
+            color::Space::Unspecified | color::Space::Reserved | color::Space::RGB => None,
+            other if has_matrix => return Err(ColourFault::Matrix(format!("{other:?}"))),
+            _ => None,
+        };
+        let by_size = if self.height > 576 {
+            YuvStandardMatrix::Bt709
+        } else {
+            YuvStandardMatrix::Bt601
+        };
+        // Grey pictures are full-range unless the file states otherwise.
+        let full_grey = is_grey(format) && self.range != color::Range::MPEG;
+        let transfer = ffi::AVColorTransferCharacteristic::from(self.transfer) as u32;
+        let primaries = ffi::AVColorPrimaries::from(self.primaries) as u32;
+        Ok(Colour {
+            full_range: jpeg || full_grey || self.range == color::Range::JPEG,
+            matrix: stated.unwrap_or(by_size),
+            matrix_is_stated: stated.is_some() || !has_matrix,
+            to_srgb: ToSrgb::new(transfer, primaries)?.map(Arc::new),
+        })
+    }
+}
+
+impl Colour {
+    pub(super) fn range(&self) -> YuvRange {
+        if self.full_range {
+            YuvRange::Full
+        } else {
+            YuvRange::Limited
+        }
+    }
+
+    /// Whether RGB is sRGB, without another conversion.
+    pub(super) fn is_srgb(&self) -> bool {
+        self.to_srgb.is_none()
+    }
+
+    /// The conversion to sRGB, in words.
+    pub(super) fn conversion(&self) -> Option<String> {
+        self.to_srgb.as_ref().map(|by| by.to_string())
+    }
+
+    /// What had to be assumed or is converted, as remarks for the user.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if !self.matrix_is_stated {
+            let matrix = self.matrix;
+            notes.push(format!(
+                "the file does not state its colour matrix; {matrix:?} is assumed from the picture's size"
+            ));
+        }
+        if let Some(conversion) = self.conversion() {
+            notes.push(format!("the colours are converted: {conversion}"));
+        }
+        notes
+    }
+
+    /// sRGB of `rect`, which lies inside a frame whose RGB is not sRGB, with all bits that it has. `None` where its pixel
+    /// format cannot be converted.
+    pub(super) fn wide_rgb(&self, frame: &frame::Video, rect: Rect) -> Option<RgbImage> {
+        let to_srgb = self.to_srgb.as_ref()?;
+        let format = frame.format();
+        if is_rgb(format) {
+            let rgb = convert(frame, Pixel::RGB48LE).ok()?;
+            return samples(&rgb, rect, [(0, 0), (0, 1), (0, 2)], 3, |rgb| {
+                to_srgb.levels(rgb.map(|value| value / 65535.0))
+            });
+        }
+        let yuv = convert(frame, Pixel::YUV444P16LE).ok()?;
+        // swscale expands no range, except of the formats that are full-range by name, which it makes limited.
+        let full_range = self.full_range && !is_jpeg_format(format);
+        let decode = YuvDecoding::new(self.matrix, full_range);
+        samples(&yuv, rect, [(0, 0), (1, 0), (2, 0)], 1, |yuv| {
+            to_srgb.levels(decode.rgb(yuv))
+        })
+    }
+}
+
+/// From luma and colour differences of 16 bits to RGB, 0 to 1.
+struct YuvDecoding {
+    /// What black and the span to white are.
+    luma: [f32; 2],
+    /// The span of colour differences around their middle.
+    chroma: f32,
+    red: f32,
+    blue: f32,
+    weights: [f32; 3],
+}
+
+impl YuvDecoding {
+    fn new(matrix: YuvStandardMatrix, full_range: bool) -> Self {
+        // ITU-T H.273, table 4: the weights of red and blue in luma.
+        let (red, blue) = match matrix {
+            YuvStandardMatrix::Bt709 => (0.2126, 0.0722),
+            YuvStandardMatrix::Bt2020 => (0.2627, 0.0593),
+            YuvStandardMatrix::Smpte240 => (0.212, 0.087),
+            YuvStandardMatrix::Fcc => (0.30, 0.11),
+            _ => (0.299, 0.114),
+        };
+        let (luma, chroma) = match full_range {
+            true => ([0.0, 65535.0], 65535.0),
+            false => ([4096.0, 219.0 * 256.0], 224.0 * 256.0),
+        };
+        Self {
+            luma,
+            chroma,
+            red: 2.0 * (1.0 - red),
+            blue: 2.0 * (1.0 - blue),
+            weights: [red, 1.0 - red - blue, blue],
+        }
+    }
+
+    fn rgb(&self, [luma, blue, red]: [f32; 3]) -> [f32; 3] {
+        let luma = (luma - self.luma[0]) / self.luma[1];
+        let difference = |value: f32| (value - 32768.0) / self.chroma;
+        let red = luma + self.red * difference(red);
+        let blue = luma + self.blue * difference(blue);
+        let green = (luma - self.weights[0] * red - self.weights[2] * blue) / self.weights[1];
+        [red, green, blue]
+    }
+}
+
+/// The pixels of `rect`, each by `pixel` of its three samples of 16 bits. `at`: plane and place of each sample in a pixel
+/// of `step` samples.
+fn samples(
+    frame: &frame::Video,
+    rect: Rect,
+    at: [(usize, usize); 3],
+    step: usize,
+    pixel: impl Fn([f32; 3]) -> [u8; 3],
+) -> Option<RgbImage> {
+    let (left, top) = (usize::try_from(rect.x).ok()?, usize::try_from(rect.y).ok()?);
+    let mut rgb = RgbImage::new(rect.w, rect.h);
+    for (y, row) in rgb.rows_mut().enumerate() {
+        let mut rows = [[].as_slice(); 3];
+        for (row, (index, place)) in rows.iter_mut().zip(at) {
+            *row = plane(frame, index, 2 * (left * step + place), top + y)?.0;
+        }
+        for (x, to) in row.enumerate() {
+            let mut values = [0.0; 3];
+            for (value, row) in values.iter_mut().zip(rows) {
+                let bytes = row.get(2 * step * x..2 * step * x + 2)?;
+                *value = f32::from(u16::from_le_bytes(bytes.try_into().ok()?));
+            }
+            to.0 = pixel(values);
+        }
+    }
+    Some(rgb)
+}
