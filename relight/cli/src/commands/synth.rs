@@ -184,8 +184,10 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             samples(arguments, &library, console)
         }
     });
-    made?;
-    Ok(outcome)
+    match made {
+        Ok(()) => Ok(outcome),
+        Err(error) => Err(error),
+    }
 }
 
 /// Warns of meshes whose files do not say how they look.

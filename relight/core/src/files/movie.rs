@@ -13,7 +13,7 @@ use relit_data::colour::ColourFault;
 use relit_data::durable;
 
 use super::parent::make_parent;
-use crate::image::{Extent, Planes, Rgb, Srgb};
+use crate::image::{Extent, Rgb, Srgb};
 use crate::parallel;
 
 /// How many frames each thread computes before they are encoded.
