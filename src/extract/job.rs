@@ -52,7 +52,8 @@ impl Job {
         let recording = Recording::open(path)?;
         let video = Video::open(&recording.video)?;
         let size = (video.facts().width, video.facts().height);
-        let mask = ObjectMask::open(&recording, options.mask.as_deref(), size)?;
+        let stored = video.facts().stored_size;
+        let mask = ObjectMask::open(&recording, options.mask.as_deref(), size, stored)?;
         let (bytes, blake3) = digest(&recording.video)?;
         let name = recording.video.file_name().unwrap_or_default();
         let input = SourceVideo {

@@ -3,6 +3,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use image::imageops::{FilterType, resize};
 use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage, ImageDecoder, ImageReader, Limits};
 
@@ -33,10 +34,12 @@ pub(super) struct ObjectMask {
 
 impl ObjectMask {
     /// Reads the mask `named`, or else the one in the recording's folder, for frames of this size.
+    /// A mask of the size in which the frames are `stored`, with pixels that are not square, is stretched as they are.
     pub(super) fn open(
         recording: &Recording,
         named: Option<&Path>,
         frame: (u32, u32),
+        stored: (u32, u32),
     ) -> Result<Self, ExtractError> {
         let path = match (named, &recording.folder) {
             (Some(named), _) if named.is_file() => named.to_owned(),
@@ -55,7 +58,7 @@ impl ObjectMask {
         })?;
         let picture = MaskPicture::of_image(&picture);
         let size = picture.size();
-        if size != frame {
+        if size != frame && size != stored {
             return Err(ExtractError::MaskSize {
                 path,
                 mask: size,
@@ -68,13 +71,19 @@ impl ObjectMask {
         };
         let ObjectPixels { inside, basis } = picture.object().map_err(no_object)?;
         let levels = inside.iter().map(|&inside| if inside { 255 } else { 0 });
-        let image = GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default();
+        let mut image = GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default();
+        if size != frame {
+            image = resize(&image, frame.0, frame.1, FilterType::Triangle);
+            for level in image.iter_mut() {
+                *level = if *level < 128 { 0 } else { 255 };
+            }
+        }
         let blake3 = Digest::of(&bytes);
         let note = basis
             .note()
             .map(|note| format!("the mask {} {note}", path.display()));
         Ok(Self {
-            bounding_box: bounding_box(&image).unwrap_or_else(|| Rect::new(0, 0, size.0, size.1)),
+            bounding_box: bounding_box(&image).unwrap_or_else(|| Rect::new(0, 0, frame.0, frame.1)),
             frame: frame_of(&path, &blake3),
             image,
             blake3,

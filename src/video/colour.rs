@@ -161,17 +161,37 @@ impl Colour {
         let format = frame.format();
         if is_rgb(format) {
             let rgb = convert(frame, Pixel::RGB48LE).ok()?;
-            return samples(&rgb, rect, [(0, 0), (0, 1), (0, 2)], 3, |rgb| {
+            let at = [0, 1, 2].map(|place| Samples {
+                plane: 0,
+                step: 3,
+                place,
+                shift: (0, 0),
+            });
+            return pixels(&rgb, rect, at, |rgb| {
                 to_srgb.levels(rgb.map(|value| value / 65535.0))
             });
         }
-        let yuv = convert(frame, Pixel::YUV444P16LE).ok()?;
+        // Colour differences stay as they are; each counts for the pixels that share it.
+        let (deep, shift) = match format
+            .descriptor()
+            .map(|d| (d.log2_chroma_w(), d.log2_chroma_h()))
+        {
+            Some((1, 1)) => (Pixel::YUV420P16LE, (1, 1)),
+            Some((1, 0)) => (Pixel::YUV422P16LE, (1, 0)),
+            _ => (Pixel::YUV444P16LE, (0, 0)),
+        };
+        let yuv = convert(frame, deep).ok()?;
         // swscale expands no range, except of the formats that are full-range by name, which it makes limited.
         let full_range = self.full_range && !is_jpeg_format(format);
         let decode = YuvDecoding::new(self.matrix, full_range);
-        samples(&yuv, rect, [(0, 0), (1, 0), (2, 0)], 1, |yuv| {
-            to_srgb.levels(decode.rgb(yuv))
-        })
+        let at = [(0, (0, 0)), (1, shift), (2, shift)];
+        let at = at.map(|(plane, shift)| Samples {
+            plane,
+            step: 1,
+            place: 0,
+            shift,
+        });
+        pixels(&yuv, rect, at, |yuv| to_srgb.levels(decode.rgb(yuv)))
     }
 }
 
@@ -219,26 +239,36 @@ impl YuvDecoding {
     }
 }
 
-/// The pixels of `rect`, each by `pixel` of its three samples of 16 bits. `at`: plane and place of each sample in a pixel
-/// of `step` samples.
-fn samples(
+/// Where the samples of a channel stand.
+#[derive(Clone, Copy)]
+struct Samples {
+    plane: usize,
+    /// Samples from one to the next, and those before the first.
+    step: usize,
+    place: usize,
+    /// Halvings across and down.
+    shift: (usize, usize),
+}
+
+/// The pixels of `rect`, each by `pixel` of its three samples of 16 bits.
+fn pixels(
     frame: &frame::Video,
     rect: Rect,
-    at: [(usize, usize); 3],
-    step: usize,
+    at: [Samples; 3],
     pixel: impl Fn([f32; 3]) -> [u8; 3],
 ) -> Option<RgbImage> {
     let (left, top) = (usize::try_from(rect.x).ok()?, usize::try_from(rect.y).ok()?);
     let mut rgb = RgbImage::new(rect.w, rect.h);
     for (y, row) in rgb.rows_mut().enumerate() {
         let mut rows = [[].as_slice(); 3];
-        for (row, (index, place)) in rows.iter_mut().zip(at) {
-            *row = plane(frame, index, 2 * (left * step + place), top + y)?.0;
+        for (row, channel) in rows.iter_mut().zip(at) {
+            *row = plane(frame, channel.plane, 0, (top + y) >> channel.shift.1)?.0;
         }
         for (x, to) in row.enumerate() {
             let mut values = [0.0; 3];
-            for (value, row) in values.iter_mut().zip(rows) {
-                let bytes = row.get(2 * step * x..2 * step * x + 2)?;
+            for ((value, row), channel) in values.iter_mut().zip(rows).zip(at) {
+                let sample = ((left + x) >> channel.shift.0) * channel.step + channel.place;
+                let bytes = row.get(2 * sample..2 * sample + 2)?;
                 *value = f32::from(u16::from_le_bytes(bytes.try_into().ok()?));
             }
             to.0 = pixel(values);

@@ -37,7 +37,7 @@ enum Coding {
 impl Coding {
     fn from_codec(codec: Id) -> Self {
         match codec {
-            Id::FFV1 | Id::MJPEG | Id::RAWVIDEO => Self::OneEach,
+            Id::FFV1 | Id::MJPEG | Id::RAWVIDEO | Id::PNG | Id::BMP | Id::TIFF => Self::OneEach,
             Id::AV1 | Id::HEVC | Id::MPEG1VIDEO | Id::MPEG2VIDEO => Self::OneEachInOrder,
             Id::H264 => Self::H264,
             Id::VP8 => Self::Vp8,

@@ -72,6 +72,21 @@ impl Display {
         self.orientation.displayed(width, height)
     }
 
+    /// As [`Self::displayed`], in pixels as they are stored.
+    pub(super) fn stored(self, width: u32, height: u32) -> (u32, u32) {
+        self.orientation.displayed(width, height)
+    }
+
+    /// That pixels are not square, as a remark for the user.
+    pub(super) fn note(self, width: u32, height: u32) -> Option<String> {
+        let (w, h) = self.pixel?;
+        let (stored, shown) = (self.stored(width, height), self.displayed(width, height));
+        Some(format!(
+            "its pixels are not square ({w}:{h}): its frames of {} x {} are shown as {} x {}, as players do",
+            stored.0, stored.1, shown.0, shown.1
+        ))
+    }
+
     /// Width and height in square pixels, before the picture is turned: one of them grows, so that nothing is lost.
     fn square(self, width: u32, height: u32) -> (u32, u32) {
         let grown = |size: u32, by: u32, over: u32| {

@@ -249,10 +249,14 @@ fn frame_times(
 ) -> (Vec<i64>, Option<String>) {
     let in_us = |units: &i64| microseconds(*units, time_base);
     let shown = || stamps.iter().filter(|stamp| stamp.is_picture());
-    // Where packets lack time stamps, a decoder's are a guess.
-    let stated = shown().all(|stamp| stamp.pts.is_some()) || stamps.iter().all(|s| s.dts.is_none());
     let all: Option<Vec<i64>> = pts.iter().copied().collect();
-    if let Some(all) = all.as_ref().filter(|_| stated) {
+    // A decoder guesses those that packets lack, from some that are stated and from the times of decoding.
+    let stated = shown().all(|stamp| stamp.pts.is_some());
+    let guessed = |all: &[i64]| {
+        let rising = all.windows(2).all(|pair| pair[0] < pair[1]);
+        rising && shown().any(|stamp| stamp.pts.is_some())
+    };
+    if let Some(all) = all.as_ref().filter(|all| stated || guessed(all)) {
         return (in_one_run(all.iter().map(in_us).collect()), None);
     }
     let dts: Option<Vec<i64>> = shown().map(|stamp| stamp.dts).collect();

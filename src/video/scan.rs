@@ -33,6 +33,8 @@ pub struct Facts {
     pub width: u32,
     /// Height as displayed, pixels.
     pub height: u32,
+    /// Width and height in the file's own pixels, turned for display; others where these are not square.
+    pub stored_size: (u32, u32),
     /// FFmpeg's name of the pixel format, such as `yuvj422p`.
     pub pixel_format: String,
     /// True where black is 0 and white is 255; false where they are 16 and 235 and are expanded.
@@ -183,6 +185,7 @@ impl Video {
         let stream = stream.ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
         let (display, mut notes) = Display::of(&input, &stream, first, exif);
         notes.extend(ordered.note);
+        notes.extend(display.note(decoder.width(), decoder.height()));
         notes.extend(colour.notes());
         let coded = (decoder.width(), decoder.height());
         Ok(Self {
@@ -320,6 +323,7 @@ fn facts(decoder: &VideoDecoder, colour: &Colour, display: Display, exif: Option
         codec: codec.unwrap_or_else(|| format!("{:?}", decoder.id())),
         width,
         height,
+        stored_size: display.stored(decoder.width(), decoder.height()),
         pixel_format: format.unwrap_or_else(|| "unknown".to_owned()),
         full_range: colour.full_range,
         exif_orientation: exif.map(Exif::to_exif),

@@ -369,6 +369,173 @@ fn the_rotation_that_the_file_asks_for_is_applied() {
     }
 }
 
+/// A lossless video of 10 bits, each frame one colour (luma, blue and red difference), with these statements.
+fn plain_10_bit(colour: [u16; 3], statements: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let plane = |value: u16, count: usize| value.to_le_bytes().repeat(count);
+    let frame = [
+        plane(colour[0], 32 * 16),
+        plane(colour[1], 16 * 8),
+        plane(colour[2], 16 * 8),
+    ];
+    fs::write(folder.path().join("plain.yuv"), frame.concat().repeat(3)).unwrap();
+    let source = "-f rawvideo -pix_fmt yuv420p10le -video_size 32x16 -i plain.yuv -c:v ffv1";
+    let mut arguments: Vec<&str> = source.split(' ').collect();
+    arguments.extend(statements.split(' '));
+    arguments.push("a.mkv");
+    ffmpeg(folder.path(), &arguments);
+    let path = folder.path().join("a.mkv");
+    (folder, path)
+}
+
+fn colour_of(path: &Path) -> [u8; 3] {
+    Video::open(path)
+        .unwrap()
+        .frame(1)
+        .unwrap()
+        .get_pixel(9, 9)
+        .0
+}
+
+#[test]
+fn hdr_and_wide_gamut_become_srgb() {
+    const HDR: &str = "-color_range tv -colorspace bt2020nc -color_primaries bt2020 -color_trc";
+    let near = |found: [u8; 3], wanted: [u8; 3]| {
+        found
+            .iter()
+            .zip(wanted)
+            .all(|(found, wanted)| found.abs_diff(wanted) <= 1)
+    };
+    // BT.2408: 203 cd/m2 are 58 % of PQ and 75 % of HLG.
+    for (transfer, luma) in [("smpte2084", 573), ("arib-std-b67", 721)] {
+        let (_folder, path) = plain_10_bit([luma, 512, 512], &format!("{HDR} {transfer}"));
+        let video = Video::open(&path).unwrap();
+        assert!(video.facts().colour_conversion.is_some());
+        assert_eq!(video.notes().len(), 1, "{:?}", video.notes());
+        assert!(
+            near(colour_of(&path), [255; 3]),
+            "{transfer}: {:?}",
+            colour_of(&path)
+        );
+    }
+    // The same values are grey without a statement.
+    let (_folder, path) = plain_10_bit([573, 512, 512], "-color_range tv -colorspace bt709");
+    assert!(
+        Video::open(&path)
+            .unwrap()
+            .facts()
+            .colour_conversion
+            .is_none()
+    );
+    assert!(near(colour_of(&path), [148; 3]), "{:?}", colour_of(&path));
+    // Red (200, 60, 50) of Display P3, and what it is in sRGB.
+    const P3: &str = "-color_range tv -colorspace bt709 -color_primaries smpte432 -color_trc";
+    let (_folder, path) = plain_10_bit([372, 453, 706], &format!("{P3} iec61966-2-1"));
+    let found = colour_of(&path);
+    let off = found
+        .iter()
+        .zip([217, 42, 39])
+        .map(|(found, wanted)| found.abs_diff(wanted));
+    assert!(off.max() <= Some(4), "{found:?}");
+}
+
+#[test]
+fn colours_that_are_not_known_are_refused_by_name() {
+    for (statements, name) in [
+        ("-colorspace bt2020nc -color_trc log100", "logarithmic"),
+        ("-colorspace ictcp -color_trc smpte2084", "ICTCP"),
+    ] {
+        let (_folder, path) = plain_10_bit([400, 512, 512], statements);
+        let error = Video::open(&path).unwrap_err();
+        assert!(matches!(error, VideoError::Colour { .. }), "{error}");
+        assert!(error.to_string().contains(name), "{error}");
+    }
+}
+
+#[test]
+fn pixels_that_are_not_square_are_shown_as_squares() {
+    for (ratio, size) in [("4/3", (93, 50)), ("1/2", (70, 100))] {
+        let encoding = format!("-vf setsar={ratio} -pix_fmt yuv444p -c:v libx264 -qp 0");
+        let (_folder, path) = made(PATTERN, "a.mp4", &encoding);
+        let video = Video::open(&path).unwrap();
+        let facts = video.facts();
+        assert_eq!((facts.width, facts.height), size);
+        assert_eq!(facts.stored_size, (70, 50));
+        assert!(video.notes().iter().any(|note| note.contains("not square")));
+        let whole = video.frame(2).unwrap();
+        let plain = ffmpeg_frame(&path, "scale=iw:ih,setsar=1", 2, (70, 50));
+        let wanted = image::imageops::resize(
+            &plain,
+            size.0,
+            size.1,
+            image::imageops::FilterType::Triangle,
+        );
+        assert!(mean_difference(&whole, &wanted) < 3.0, "{ratio}");
+        let region = Rect::new(11, 7, 20, 21);
+        let wanted = image::imageops::crop_imm(&whole, 11, 7, 20, 21).to_image();
+        assert!(part(&video, 2, region).unwrap() == wanted, "{ratio}");
+    }
+}
+
+/// One frame as the ffmpeg program gives it through a filter.
+fn ffmpeg_frame(path: &Path, filter: &str, number: usize, (width, height): (u32, u32)) -> RgbImage {
+    let name = path.file_name().unwrap().to_str().unwrap();
+    let arguments = [
+        "-i", name, "-vf", filter, "-pix_fmt", "rgb24", "-f", "rawvideo", "-",
+    ];
+    let raw = ffmpeg(path.parent().unwrap(), &arguments);
+    let size = (width * height * 3) as usize;
+    RgbImage::from_raw(
+        width,
+        height,
+        raw[number * size..(number + 1) * size].to_vec(),
+    )
+    .unwrap()
+}
+
+#[test]
+fn frames_that_say_themselves_how_to_be_turned_are_turned() {
+    // H.264's message.
+    let (folder, _) = made(PATTERN, "up.mp4", "-pix_fmt yuv444p -c:v libx264 -qp 0");
+    let arguments =
+        "-i up.mp4 -c copy -bsf:v h264_metadata=display_orientation=insert:rotate=90 turned.mp4";
+    ffmpeg(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    check_turned(&folder.path().join("turned.mp4"));
+    // Exif in each frame of Motion JPEG.
+    let (folder, path) = made(PATTERN, "up.mjpeg", "-pix_fmt yuvj444p -c:v mjpeg -q:v 2");
+    let turned = with_exif_orientation(&fs::read(&path).unwrap(), 6);
+    fs::write(folder.path().join("turned.mjpeg"), turned).unwrap();
+    let arguments = "-f mjpeg -r 25 -i turned.mjpeg -c copy turned.mkv";
+    ffmpeg(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    check_turned(&folder.path().join("turned.mkv"));
+}
+
+fn check_turned(path: &Path) {
+    let video = Video::open(path).unwrap();
+    assert_eq!((video.facts().width, video.facts().height), (50, 70));
+    let frame = video.frame(2).unwrap();
+    let off = largest_difference(&frame, &reference(path, 50, 70)[2]);
+    assert!(off <= 4, "{off}");
+    let region = Rect::new(11, 7, 20, 21);
+    let wanted = image::imageops::crop_imm(&frame, 11, 7, 20, 21).to_image();
+    assert!(part(&video, 2, region).unwrap() == wanted);
+}
+
+/// Puts an Exif segment with this orientation into each of a row of JPEGs.
+fn with_exif_orientation(jpegs: &[u8], orientation: u8) -> Vec<u8> {
+    let mut segment =
+        b"\xff\xe1\x00\x22Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec();
+    segment.extend([orientation, 0, 0, 0, 0, 0, 0, 0]);
+    let mut turned = Vec::new();
+    for (at, &byte) in jpegs.iter().enumerate() {
+        turned.push(byte);
+        if jpegs[..=at].ends_with(&[0xff, 0xd8]) {
+            turned.extend(&segment);
+        }
+    }
+    turned
+}
+
 #[test]
 fn gaps_and_jitter_in_the_time_stamps_are_kept() {
     let (folder, _) = made(PATTERN, "even.mkv", "-c:v mjpeg -pix_fmt yuvj422p");

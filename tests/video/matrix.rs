@@ -100,7 +100,7 @@ const CASES: &[Case] = &[
     case("a.mp4", "-c:v mpeg4 -bf 2 -g 9"),
     case("a.avi", "-c:v libxvid -bf 2 -g 9"),
     case("a.avi", "-c:v msmpeg4 -g 9"),
-    case("a.3gp", "-c:v h263 -s 128x96 -r 25"),
+    case("a.avi", "-c:v h263p -g 9"),
     case("a.wmv", "-c:v wmv2 -g 9"),
     case("a.flv", "-c:v flv -g 9"),
     case("a.rm", "-c:v rv20 -g 9"),
@@ -150,7 +150,7 @@ const CASES: &[Case] = &[
     case("a.ts", "-c:v mpeg2video -q:v 2 -output_ts_offset 7000"),
     case(
         "a.mkv",
-        "-c:v libx264 -bf 2 -vf setpts=N*N/20/25/TB -fps_mode passthrough",
+        "-c:v libx264 -bf 2 -vf setpts=(N+N*N/20)/25/TB -fps_mode passthrough",
     ),
 ];
 
@@ -188,7 +188,7 @@ const DERIVED: &[Derived] = &[
         from: "a.mp4",
         encoding: "-c:v mjpeg -q:v 2 -pix_fmt yuvj420p",
         file: "trimmed.mov",
-        change: Change::Ffmpeg("-ss 0.3", "-t 0.6 -c copy"),
+        change: Change::Ffmpeg("-ss 0.28", "-t 0.6 -c copy"),
     },
     Derived {
         from: "a.ts",
@@ -323,6 +323,7 @@ fn reference(folder: &Path, file: &str) -> Reference {
         luma,
         times: times
             .lines()
+            .filter(|line| !line.trim().is_empty())
             .map(|line| line.trim_end_matches(',').parse().ok())
             .collect(),
     }
@@ -431,7 +432,8 @@ fn faults(folder: &Path, file: &str) -> Vec<String> {
     {
         faults.push("the times do not rise".to_owned());
     }
-    if !file.starts_with("joined") {
+    // Of joined files and AVI with frames out of order, FFmpeg has no times of their own.
+    if !file.starts_with("joined") && !file.ends_with(".avi") {
         let times = video.frames().iter().zip(&wanted.times);
         let off =
             times.filter_map(|(frame, time)| Some((frame.t_us as f64 / 1e6 - (*time)?).abs()));

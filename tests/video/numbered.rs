@@ -1,23 +1,23 @@
 //! Pictures that show their number, so that each is known wherever it comes out.
 
 /// Width and height, pixels.
-pub const WIDTH: usize = 96;
+pub(crate) const WIDTH: usize = 96;
 /// Height, pixels.
-pub const HEIGHT: usize = 64;
+pub(crate) const HEIGHT: usize = 64;
 /// Sides of the blocks that show the number, bit by bit, across the upper 32 rows.
 const BLOCK: usize = 16;
 const BITS: usize = WIDTH / BLOCK;
 
 /// A picture in three planes, with colour halved across and down.
-pub struct Planes {
-    pub luma: Vec<u8>,
-    pub blue: Vec<u8>,
-    pub red: Vec<u8>,
+pub(crate) struct Planes {
+    pub(crate) luma: Vec<u8>,
+    pub(crate) blue: Vec<u8>,
+    pub(crate) red: Vec<u8>,
 }
 
 impl Planes {
     /// The picture with this number, above a texture that moves.
-    pub fn of(number: u64) -> Self {
+    pub(crate) fn of(number: u64) -> Self {
         let mut luma = Vec::with_capacity(WIDTH * HEIGHT);
         for y in 0..HEIGHT {
             for x in 0..WIDTH {
@@ -37,13 +37,13 @@ impl Planes {
         }
     }
 
-    pub fn bytes(&self) -> Vec<u8> {
+    pub(crate) fn bytes(&self) -> Vec<u8> {
         [&self.luma[..], &self.blue, &self.red].concat()
     }
 }
 
 /// The number that a picture shows; `luma` gives the brightness at a pixel.
-pub fn number_of(luma: impl Fn(usize, usize) -> u8) -> u64 {
+pub(crate) fn number_of(luma: impl Fn(usize, usize) -> u8) -> u64 {
     let bit = |at: usize| u64::from(luma(BLOCK * at + BLOCK / 2, BLOCK) > 125);
     (0..BITS).map(|at| bit(at) << at).sum()
 }

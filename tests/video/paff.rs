@@ -122,7 +122,7 @@ fn field(number: u64, bottom: usize, planes: &Planes) -> Vec<u8> {
 }
 
 /// A stream of so many frames.
-pub fn stream(frames: u64) -> Vec<u8> {
+pub(crate) fn stream(frames: u64) -> Vec<u8> {
     let delimiter = || {
         let mut bits = Bits::default();
         bits.fixed(3, 7);

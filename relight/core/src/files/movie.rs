@@ -585,4 +585,99 @@ mod tests {
             "{error}"
         );
     }
+
+    /// A video of one colour, made by `ffmpeg`.
+    fn clip(folder: &Path, arguments: &str) -> PathBuf {
+        let path = folder.join("clip.mp4");
+        let made = Command::new("ffmpeg")
+            .args(["-nostdin", "-loglevel", "error", "-y"])
+            .args(arguments.split(' '))
+            .arg(&path)
+            .status();
+        assert!(made.unwrap().success(), "{arguments}");
+        path
+    }
+
+    fn extents(path: &Path) -> (Extent, u32) {
+        let mut movie = MovieReader::open(path, FrameTiming::Even).unwrap();
+        let mut frames = 0;
+        while let Some(frame) = movie.frame().unwrap() {
+            assert_eq!(frame.planes().extent(), movie.extent());
+            frames += 1;
+        }
+        (movie.extent(), frames)
+    }
+
+    #[test]
+    fn a_video_is_read_upright_with_square_pixels_and_at_its_own_rate() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let source = "-f lavfi -i testsrc2=size=64x32:rate=15/2:duration=1.2";
+        let path = clip(
+            folder.path(),
+            &format!("{source} -c:v libx264 -vf setsar=3/2"),
+        );
+        assert_eq!(extents(&path), (Extent::new(96, 32), 9));
+        let movie = MovieReader::open(&path, FrameTiming::Even).unwrap();
+        let rate = movie.frame_rate();
+        assert_eq!(rate.to_string(), "15/2");
+        let turned = folder.path().join("turned.mp4");
+        let copied = Command::new("ffmpeg")
+            .args(["-nostdin", "-loglevel", "error", "-y", "-i"])
+            .arg(&path)
+            .args([
+                "-c",
+                "copy",
+                "-bsf:v",
+                "h264_metadata=display_orientation=insert:rotate=90",
+            ])
+            .arg(&turned)
+            .status();
+        assert!(copied.unwrap().success());
+        assert_eq!(extents(&turned), (Extent::new(32, 96), 9));
+        // What is written has the rate as well.
+        let written = folder.path().join("written.mp4");
+        let extent = Extent::new(32, 32);
+        let mut movie = MovieWriter::create(&written, MovieFormat::Mp4, extent, rate).unwrap();
+        for _ in 0..5 {
+            movie.push(&grey(32)).unwrap();
+        }
+        movie.finish().unwrap();
+        let movie = MovieReader::open(&written, FrameTiming::Each).unwrap();
+        assert_eq!(movie.frame_rate(), rate);
+    }
+
+    #[test]
+    fn hdr_is_read_with_its_reference_white_as_white() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        // 58 % of PQ, as limited luma of 8 bits; a lossless video keeps it.
+        let source =
+            "-f lavfi -i color=black:size=32x32:rate=5:duration=1,geq=lum=143:cb=128:cr=128";
+        let encoding = "-c:v libx264 -qp 0 -pix_fmt yuv420p -color_range tv -colorspace bt2020nc";
+        let hdr = "-color_primaries bt2020 -color_trc smpte2084";
+        let path = clip(folder.path(), &format!("{source} {encoding} {hdr}"));
+        let mut movie = MovieReader::open(&path, FrameTiming::Each).unwrap();
+        assert!(
+            movie
+                .colour_conversion()
+                .is_some_and(|by| by.contains("PQ"))
+        );
+        let frame = movie.frame().unwrap().unwrap();
+        let value = frame.planes().pixel(9, 9)[1];
+        assert!((value - 1.0).abs() < 0.03, "{value}");
+        let path = clip(
+            folder.path(),
+            &format!("{source} {encoding} -color_trc log100"),
+        );
+        let refused = MovieReader::open(&path, FrameTiming::Each);
+        assert!(
+            matches!(refused, Err(MovieError::Colour { .. })),
+            "{refused:?}"
+        );
+    }
 }
