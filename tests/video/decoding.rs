@@ -430,7 +430,7 @@ fn hdr_and_wide_gamut_become_srgb() {
     assert!(near(colour_of(&path), [148; 3]), "{:?}", colour_of(&path));
     // Red (200, 60, 50) of Display P3, and what it is in sRGB.
     const P3: &str = "-color_range tv -colorspace bt709 -color_primaries smpte432 -color_trc";
-    let (_folder, path) = plain_10_bit([372, 453, 706], &format!("{P3} iec61966-2-1"));
+    let (_folder, path) = plain_10_bit([370, 438, 760], &format!("{P3} iec61966-2-1"));
     let found = colour_of(&path);
     let off = found
         .iter()
@@ -513,9 +513,11 @@ fn frames_that_say_themselves_how_to_be_turned_are_turned() {
 fn check_turned(path: &Path) {
     let video = Video::open(path).unwrap();
     assert_eq!((video.facts().width, video.facts().height), (50, 70));
-    let frame = video.frame(2).unwrap();
-    let off = largest_difference(&frame, &reference(path, 50, 70)[2]);
+    // The ffmpeg program forgets the message of H.264 after the first frame.
+    let first = video.frame(0).unwrap();
+    let off = largest_difference(&first, &reference(path, 50, 70)[0]);
     assert!(off <= 4, "{off}");
+    let frame = video.frame(2).unwrap();
     let region = Rect::new(11, 7, 20, 21);
     let wanted = image::imageops::crop_imm(&frame, 11, 7, 20, 21).to_image();
     assert!(part(&video, 2, region).unwrap() == wanted);
