@@ -4,6 +4,8 @@
 //! `avcC`). A camera sends start codes between units, and the parameter sets in the stream
 //! (ITU-T H.264, annex B).
 
+use super::nal;
+
 const START_CODE: [u8; 4] = [0, 0, 0, 1];
 const TYPE_SEQUENCE_SET: u8 = 7;
 
@@ -38,6 +40,11 @@ impl ByteStream {
             length_bytes,
             parameter_sets,
         })
+    }
+
+    /// Whether a packet has a picture: of a file with lengths each has, unless it is damaged.
+    pub(super) fn has_picture(&self, packet: &[u8]) -> bool {
+        *self != Self::AsIs || nal::has_slice(packet)
     }
 
     /// A packet as a byte stream. Before a key frame stand the parameter sets, unless it brings

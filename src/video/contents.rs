@@ -67,6 +67,20 @@ struct H264 {
     byte_stream: ByteStream,
 }
 
+impl H264 {
+    fn contents(&mut self, packet: &Packet) -> Contents {
+        if self.parser.is_field(packet) {
+            return Contents::Unclear;
+        }
+        // Between pictures, a byte stream can have packets without any.
+        let data = packet.data().unwrap_or_default();
+        match self.byte_stream.has_picture(data) {
+            true => Contents::Picture,
+            false => Contents::Hidden,
+        }
+    }
+}
+
 impl Inspector {
     pub(super) fn new(parameters: &Parameters) -> Self {
         let coding = Coding::from_codec(parameters.id());
@@ -99,13 +113,10 @@ impl Inspector {
             Coding::OneEach | Coding::OneEachInOrder => Contents::Picture,
             Coding::Vp8 => shown(vp8_is_shown(data)),
             Coding::Vp9 => shown(vp9_is_shown(data)),
-            Coding::H264 => {
-                let frame = self
-                    .h264
-                    .as_mut()
-                    .is_some_and(|h264| h264.parser.is_frame(packet));
-                shown(frame.then_some(true))
-            }
+            Coding::H264 => match &mut self.h264 {
+                Some(h264) => h264.contents(packet),
+                None => Contents::Unclear,
+            },
             Coding::Any => Contents::Unclear,
         };
         // The container's flag also means a recovery point, after which some pictures are incomplete.
@@ -193,9 +204,9 @@ impl Parser {
         Some(Self { parser, context })
     }
 
-    /// Whether the packet's picture is a frame, and not a field or something else.
+    /// Whether the packet's picture is a field.
     #[allow(unsafe_code)]
-    fn is_frame(&mut self, packet: &Packet) -> bool {
+    fn is_field(&mut self, packet: &Packet) -> bool {
         let Some(data) = packet.data() else {
             return false;
         };
@@ -222,7 +233,10 @@ impl Parser {
             );
             (*parser).picture_structure
         };
-        structure == ffi::AVPictureStructure::AV_PICTURE_STRUCTURE_FRAME
+        use ffi::AVPictureStructure::{
+            AV_PICTURE_STRUCTURE_BOTTOM_FIELD as BOTTOM, AV_PICTURE_STRUCTURE_TOP_FIELD as TOP,
+        };
+        structure == TOP || structure == BOTTOM
     }
 }
 

@@ -11,7 +11,6 @@ use ffmpeg_next::{Packet, frame};
 use super::annexb::ByteStream;
 use super::contents::extra_data;
 use super::decoder::{self, VideoDecoder};
-use super::nal;
 use super::reader::fault_of;
 use super::{DecodeFault, VideoError, open_input};
 
@@ -70,10 +69,9 @@ impl Survey {
                 Err(_) => break,
             }
             begun |= packet.is_key();
-            if let Some(byte_stream) = byte_stream.as_ref().filter(|_| begun) {
-                let data = byte_stream.convert(packet.data().unwrap_or_default(), false);
-                silent += u64::from(!nal::has_slice(&data));
-            }
+            let data = packet.data().unwrap_or_default();
+            let has_picture = byte_stream.as_ref().is_none_or(|by| by.has_picture(data));
+            silent += u64::from(begun && !has_picture);
             let sent = u64::from(decoder.send_packet(&packet).is_err());
             let failed = sent + survey.drain(&mut decoder);
             errors += if begun { failed } else { 0 };
