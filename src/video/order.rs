@@ -249,7 +249,7 @@ fn frame_times(
 ) -> (Vec<i64>, Option<String>) {
     let in_us = |units: &i64| microseconds(*units, time_base);
     let shown = || stamps.iter().filter(|stamp| stamp.is_picture());
-    let all: Option<Vec<i64>> = pts.iter().copied().collect();
+    let all = filled_at_the_end(pts);
     // A decoder guesses those that packets lack, from some that are stated and from the times of decoding.
     let stated = shown().all(|stamp| stamp.pts.is_some());
     let guessed = |all: &[i64]| {
@@ -270,6 +270,23 @@ fn frame_times(
         Some(all) => (all.iter().map(in_us).collect(), None),
         None => by_rate(pts.len(), rate),
     }
+}
+
+/// Time stamps of which the last are missing, as a decoder leaves them that has no packet left; `None` if others are.
+fn filled_at_the_end(stamps: &[Option<i64>]) -> Option<Vec<i64>> {
+    let mut filled: Vec<i64> = stamps.iter().map_while(|&stamp| stamp).collect();
+    let missing = stamps.get(filled.len()..).unwrap_or_default();
+    if missing.is_empty() {
+        return Some(filled);
+    }
+    let (&first, &last) = (filled.first()?, filled.last()?);
+    let step = last.saturating_sub(first) / (filled.len() as i64 - 1).max(1);
+    if missing.iter().any(Option::is_some) || step == 0 {
+        return None;
+    }
+    let further = (1..=missing.len() as i64).map(|at| last.saturating_add(step.saturating_mul(at)));
+    filled.extend(further);
+    Some(filled)
 }
 
 /// Where times go back, a joined recording begins: it is moved behind the one before.
@@ -451,6 +468,11 @@ mod tests {
         let found = Ordered::from_pictures(&pictures[..2], &stamps, base.0, base.1);
         assert_eq!(times(&found), [0, 40_000]);
         assert!(found.note.is_some());
+        // Where some packets have time stamps, the decoder's count, and the last ones that it lacks follow.
+        let stamps = [None, Some(40), None].map(|pts| stamp(pts, Some(0)));
+        let pictures = [Some(40), Some(80), None].map(|stamp| (stamp, false));
+        let found = Ordered::from_pictures(&pictures, &stamps, base.0, base.1);
+        assert_eq!(times(&found), [40_000, 80_000, 120_000]);
     }
 
     #[test]
