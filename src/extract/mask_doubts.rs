@@ -12,6 +12,7 @@ use relit_grabcut::{
 use relit_video::{Video, VideoError};
 
 use super::ExtractError;
+use super::object::LARGE;
 
 /// Frames that are looked at.
 const FRAMES: usize = 12;
@@ -38,6 +39,11 @@ pub fn mask_doubts(
     mask: &GrayImage,
     frame: Option<u64>,
 ) -> Result<MaskDoubts, ExtractError> {
+    let inside = mask.pixels().filter(|level| level.0 != [0]).count();
+    if inside as f64 > LARGE * mask.len() as f64 {
+        // Too little background is left to be compared with.
+        return Ok(MaskDoubts::default());
+    }
     let halvings = halvings(mask.dimensions());
     let small = halved(mask, halvings);
     let mut turn = TurnFrames::new(small.width(), small.height());

@@ -15,7 +15,7 @@ use relit_data::shard::Digest;
 use super::{ExtractError, bounding_box};
 
 /// A mask that covers more than this fraction of the frame is suspicious.
-const LARGE: f64 = 0.9;
+pub(super) const LARGE: f64 = 0.9;
 
 /// The mask of a video.
 #[derive(Debug)]
