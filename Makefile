@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-app setup-train train-turn test test-day test-rig test-slurm test-objects packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-app setup-train train-turn test test-day test-rig test-slurm test-objects test-field packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -24,6 +24,7 @@ BENCH_RUNS ?= 3
 BENCH_VENV := $(TARGET)/bench-venv
 OBJECTS_VENV := $(TARGET)/objects-venv
 PYTHON_VENV := $(TARGET)/python-venv
+FIELD_VENV := $(TARGET)/field-venv
 
 # The turntable's firmware, and the emulated chip that its tests run on.
 FIRMWARE := $(TARGET)/firmware
@@ -111,6 +112,10 @@ test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, 
 	cargo test --locked -p relit-extract --features object-store --test objects
 	cargo build --locked -p relit-extract --features object-store
 	tests/objects/s3 $(TARGET)/debug/relit-extract $(abspath $(OBJECTS_VENV))/bin/python
+
+test-field: setup $(FIELD_VENV)/ready ## Run the programs on files as the world makes them; prints case, seen, verdict
+	cargo build --locked --release $(PROGRAMS) -p relight --bins
+	$(FIELD_VENV)/bin/python tests/field/run --programs $(TARGET)/release
 
 packages: setup-programs ## Make the Debian packages relit-rig, relit and relight
 	@.ci/packages
@@ -243,6 +248,11 @@ $(DEMO)/mask.png:
 $(OBJECTS_VENV)/ready: tests/objects/requirements.txt
 	python3 -m venv $(OBJECTS_VENV)
 	$(OBJECTS_VENV)/bin/pip install --quiet -r $<
+	touch $@
+
+$(FIELD_VENV)/ready: tests/field/requirements.txt
+	python3 -m venv $(FIELD_VENV)
+	$(FIELD_VENV)/bin/pip install --quiet -r $<
 	touch $@
 
 $(PYTHON_VENV)/ready: relight/python/requirements.txt

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use ffmpeg_next::codec::decoder;
 use ffmpeg_next::format::Pixel;
-use ffmpeg_next::software::scaling::Flags;
 use ffmpeg_next::{color, ffi, frame};
 use image::RgbImage;
 use relit_data::colour::{ColourFault, ToSrgb};
@@ -161,7 +160,7 @@ impl Colour {
         let to_srgb = self.to_srgb.as_ref()?;
         let format = frame.format();
         if is_rgb(format) {
-            let rgb = convert(frame, Pixel::RGB48LE, Flags::POINT).ok()?;
+            let rgb = convert(frame, Pixel::RGB48LE).ok()?;
             let at = [0, 1, 2].map(|place| Samples {
                 plane: 0,
                 step: 3,

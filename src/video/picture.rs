@@ -112,7 +112,7 @@ impl Picture {
                 .ok_or_else(|| unconvertible(format));
         }
         let plain = plain_format(format, self.colour.full_range);
-        let converted = convert(&self.frame, plain, scaling::Flags::BILINEAR).map_err(|_| unconvertible(format))?;
+        let converted = convert(&self.frame, plain).map_err(|_| unconvertible(format))?;
         planes_to_rgb(&converted, plain, &self.colour, rect).ok_or_else(|| unconvertible(format))
     }
 }
@@ -250,11 +250,10 @@ fn plain_format(format: Pixel, full_range: bool) -> Pixel {
 pub(super) fn convert(
     source: &frame::Video,
     plain: Pixel,
-    chroma: scaling::Flags,
 ) -> Result<frame::Video, ffmpeg_next::Error> {
     use scaling::Flags;
     let (width, height) = (source.width(), source.height());
-    let flags = chroma | Flags::ACCURATE_RND | Flags::BITEXACT | Flags::FULL_CHR_H_INP;
+    let flags = Flags::BILINEAR | Flags::ACCURATE_RND | Flags::BITEXACT | Flags::FULL_CHR_H_INP;
     let mut scaler =
         scaling::Context::get(source.format(), width, height, plain, width, height, flags)?;
     let mut target = frame::Video::empty();

@@ -6,14 +6,19 @@ use thiserror::Error;
 
 use super::CommandResult;
 
-pub(crate) const EXAMPLES: &str = "This program was built without training. In relit's source folder:
+pub(crate) const EXAMPLES: &str =
+    "This program was built without training. In relit's source folder:
   make setup-train
   cargo build --release -p relight --features train";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Whatever the verb takes in a program that trains.
-    #[arg(value_name = "ARGUMENTS", trailing_var_arg = true, allow_hyphen_values = true)]
+    #[arg(
+        value_name = "ARGUMENTS",
+        trailing_var_arg = true,
+        allow_hyphen_values = true
+    )]
     _arguments: Vec<String>,
 }
 

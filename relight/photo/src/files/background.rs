@@ -13,7 +13,6 @@ use super::InsertionError;
 use crate::decompose::stated_extent;
 use crate::insert::{PanoramaView, SceneDescription};
 
-
 /// A background out of a file.
 #[derive(Debug)]
 pub enum BackgroundFile {
