@@ -17,6 +17,7 @@ pub(crate) fn findings(
     let name = |file: FileId| shown(&source.files[file]);
     let mut findings = circles(ties)
         .into_iter()
+        .filter(|circle| crosses_folders(circle.iter().map(|file| source.files[*file].as_path())))
         .map(|circle| Finding {
             what: format!(
                 "a circle of {} files in {crate_name}: {}",
@@ -49,6 +50,14 @@ pub(crate) fn findings(
         ))
     }));
     findings
+}
+
+/// Whether files lie in folders of which none holds all others. Files of one folder, and of those within it, are one concern
+/// and may know each other.
+fn crosses_folders<'a>(files: impl Iterator<Item = &'a Path>) -> bool {
+    let folders: BTreeSet<&Path> = files.filter_map(Path::parent).collect();
+    let holds_all = |outer: &&Path| folders.iter().all(|folder| folder.starts_with(outer));
+    !folders.iter().any(holds_all)
 }
 
 /// Each set of several files that all reach each other.
@@ -144,20 +153,38 @@ mod tests {
     #[test]
     fn a_finding_names_what_ties_the_files() {
         let source = in_memory::load(&[
-            ("lib.rs", "mod a; pub struct Shared; fn f() { a::work() }"),
+            ("lib.rs", "mod a; mod b;"),
+            ("a/mod.rs", "pub struct Shared; fn f() { crate::b::work() }"),
             (
-                "a.rs",
-                "use super::Shared; pub fn work() -> Shared { Shared }",
+                "b/mod.rs",
+                "use crate::a::Shared; pub fn work() -> Shared { Shared }",
             ),
         ]);
         let ties = Ties::of(&source, &Names::of(&source));
         let findings = findings("x", &source, &ties, &|path| path.display().to_string());
         assert_eq!(findings.len(), 1);
-        assert_eq!(findings[0].what, "a circle of 2 files in x: lib.rs, a.rs");
+        assert_eq!(
+            findings[0].what,
+            "a circle of 2 files in x: a/mod.rs, b/mod.rs"
+        );
         assert_eq!(
             findings[0].details,
-            ["lib.rs -> a.rs: work", "a.rs -> lib.rs: Shared"]
+            ["a/mod.rs -> b/mod.rs: work", "b/mod.rs -> a/mod.rs: Shared"]
         );
+    }
+
+    #[test]
+    fn files_of_one_folder_may_know_each_other() {
+        let source = in_memory::load(&[
+            ("lib.rs", "mod a;"),
+            ("a/mod.rs", "mod b; pub struct Shared; fn f() { b::work() }"),
+            (
+                "a/b.rs",
+                "use super::Shared; pub fn work() -> Shared { Shared }",
+            ),
+        ]);
+        let ties = Ties::of(&source, &Names::of(&source));
+        assert!(findings("x", &source, &ties, &|path| path.display().to_string()).is_empty());
     }
 
     #[test]
