@@ -368,6 +368,57 @@ impl ToSrgb {
     }
 }
 
+/// From luma and colour differences of 16 bits to RGB, 0 to 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct YuvDecoding {
+    /// Black, and the span to white.
+    luma: [f32; 2],
+    /// The span of colour differences.
+    chroma: f32,
+    /// What the differences of red and blue are multiplied by.
+    differences: [f32; 2],
+    /// The weights of red, green and blue in luma.
+    weights: [f32; 3],
+}
+
+impl YuvDecoding {
+    /// For matrix coefficients by their number in ITU-T H.273. Full range: black is 0 and white 65535.
+    ///
+    /// # Errors
+    /// [`ColourFault::Matrix`] for those that are not known here.
+    pub fn new(matrix: u32, full_range: bool) -> Result<Self, ColourFault> {
+        let (red, blue) = match matrix {
+            1 => (0.2126, 0.0722),
+            4 => (0.30, 0.11),
+            5 | 6 => (0.299, 0.114),
+            7 => (0.212, 0.087),
+            9 => (0.2627, 0.0593),
+            _ => return Err(ColourFault::Matrix(numbered(matrix))),
+        };
+        let (luma, chroma) = match full_range {
+            true => ([0.0, 65535.0], 65535.0),
+            false => ([4096.0, 219.0 * 256.0], 224.0 * 256.0),
+        };
+        Ok(Self {
+            luma,
+            chroma,
+            differences: [2.0 * (1.0 - red), 2.0 * (1.0 - blue)],
+            weights: [red, 1.0 - red - blue, blue],
+        })
+    }
+
+    /// RGB of luma and the differences of blue and red.
+    #[must_use]
+    pub fn rgb(&self, [luma, blue, red]: [f32; 3]) -> [f32; 3] {
+        let luma = (luma - self.luma[0]) / self.luma[1];
+        let difference = |value: f32| (value - 32768.0) / self.chroma;
+        let red = luma + self.differences[0] * difference(red);
+        let blue = luma + self.differences[1] * difference(blue);
+        let green = (luma - self.weights[0] * red - self.weights[2] * blue) / self.weights[1];
+        [red, green, blue]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -438,6 +489,37 @@ mod tests {
     fn linear_values_are_encoded() {
         let by = ToSrgb::new(8, 1).unwrap().unwrap();
         near(by.levels([0.215_86; 3]), [128; 3], 0);
+    }
+
+    #[test]
+    fn luma_and_differences_become_rgb() {
+        for (matrix, full_range) in [(1, false), (6, true), (9, false), (7, false), (4, true)] {
+            let by = YuvDecoding::new(matrix, full_range).unwrap();
+            let (black, white) = if full_range {
+                (0.0, 65535.0)
+            } else {
+                (4096.0, 60160.0)
+            };
+            for (luma, wanted) in [(black, 0.0), (white, 1.0)] {
+                for value in by.rgb([luma, 32768.0, 32768.0]) {
+                    assert!((value - wanted).abs() < 1e-5, "{matrix}: {value}");
+                }
+            }
+        }
+        // Red of BT.709.
+        let by = YuvDecoding::new(1, false).unwrap();
+        let found = by.rgb([
+            4096.0 + 0.2126 * 56064.0,
+            32768.0 - 0.2126 / 1.8556 * 57344.0,
+            61440.0,
+        ]);
+        for (found, wanted) in found.into_iter().zip([1.0, 0.0, 0.0]) {
+            assert!((found - wanted).abs() < 1e-4, "{found}");
+        }
+        assert!(matches!(
+            YuvDecoding::new(14, false),
+            Err(ColourFault::Matrix(_))
+        ));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use ffmpeg_next::codec::decoder;
 use ffmpeg_next::format::Pixel;
 use ffmpeg_next::{color, ffi, frame};
 use image::RgbImage;
-use relit_data::colour::{ColourFault, ToSrgb};
+use relit_data::colour::{ColourFault, ToSrgb, YuvDecoding};
 use relit_data::geometry::Rect;
 use yuv::{YuvRange, YuvStandardMatrix};
 
@@ -154,28 +154,15 @@ impl Colour {
         notes
     }
 
-    /// sRGB of `rect`, which lies inside a frame whose RGB is not sRGB, with all bits that it has. `None` where its pixel
-    /// format cannot be converted.
+    /// sRGB of `rect`, which lies inside a YUV frame whose RGB is not sRGB, with all bits that it has. `None` where its
+    /// pixel format cannot be converted.
     pub(super) fn wide_rgb(&self, frame: &frame::Video, rect: Rect) -> Option<RgbImage> {
         let to_srgb = self.to_srgb.as_ref()?;
         let format = frame.format();
-        if is_rgb(format) {
-            let rgb = convert(frame, Pixel::RGB48LE).ok()?;
-            let at = [0, 1, 2].map(|place| Samples {
-                plane: 0,
-                step: 3,
-                place,
-                shift: (0, 0),
-            });
-            return pixels(&rgb, rect, at, |rgb| {
-                to_srgb.levels(rgb.map(|value| value / 65535.0))
-            });
-        }
         // Colour differences stay as they are; each counts for the pixels that share it.
-        let (deep, shift) = match format
-            .descriptor()
-            .map(|d| (d.log2_chroma_w(), d.log2_chroma_h()))
-        {
+        let halved = format.descriptor();
+        let halved = halved.map(|format| (format.log2_chroma_w(), format.log2_chroma_h()));
+        let (deep, shift) = match halved {
             Some((1, 1)) => (Pixel::YUV420P16LE, (1, 1)),
             Some((1, 0)) => (Pixel::YUV422P16LE, (1, 0)),
             _ => (Pixel::YUV444P16LE, (0, 0)),
@@ -183,59 +170,31 @@ impl Colour {
         let yuv = convert(frame, deep).ok()?;
         // swscale expands no range, except of the formats that are full-range by name, which it makes limited.
         let full_range = self.full_range && !is_jpeg_format(format);
-        let decode = YuvDecoding::new(self.matrix, full_range);
+        let decoding = YuvDecoding::new(matrix_code(self.matrix), full_range).ok()?;
         let at = [(0, (0, 0)), (1, shift), (2, shift)];
-        let at = at.map(|(plane, shift)| Samples {
-            plane,
-            step: 1,
-            place: 0,
-            shift,
-        });
-        pixels(&yuv, rect, at, |yuv| to_srgb.levels(decode.rgb(yuv)))
+        let at = at.map(|(plane, shift)| Samples { plane, shift });
+        pixels(&yuv, rect, at, |yuv| to_srgb.levels(decoding.rgb(yuv)))
     }
-}
 
-/// From luma and colour differences of 16 bits to RGB, 0 to 1.
-struct YuvDecoding {
-    /// What black and the span to white are.
-    luma: [f32; 2],
-    /// The span of colour differences around their middle.
-    chroma: f32,
-    red: f32,
-    blue: f32,
-    weights: [f32; 3],
-}
-
-impl YuvDecoding {
-    fn new(matrix: YuvStandardMatrix, full_range: bool) -> Self {
-        // ITU-T H.273, table 4: the weights of red and blue in luma.
-        let (red, blue) = match matrix {
-            YuvStandardMatrix::Bt709 => (0.2126, 0.0722),
-            YuvStandardMatrix::Bt2020 => (0.2627, 0.0593),
-            YuvStandardMatrix::Smpte240 => (0.212, 0.087),
-            YuvStandardMatrix::Fcc => (0.30, 0.11),
-            _ => (0.299, 0.114),
+    /// Makes coded RGB sRGB.
+    pub(super) fn make_srgb(&self, rgb: &mut RgbImage) {
+        let Some(to_srgb) = &self.to_srgb else {
+            return;
         };
-        let (luma, chroma) = match full_range {
-            true => ([0.0, 65535.0], 65535.0),
-            false => ([4096.0, 219.0 * 256.0], 224.0 * 256.0),
-        };
-        Self {
-            luma,
-            chroma,
-            red: 2.0 * (1.0 - red),
-            blue: 2.0 * (1.0 - blue),
-            weights: [red, 1.0 - red - blue, blue],
+        for pixel in rgb.pixels_mut() {
+            pixel.0 = to_srgb.levels(pixel.0.map(|level| f32::from(level) / 255.0));
         }
     }
+}
 
-    fn rgb(&self, [luma, blue, red]: [f32; 3]) -> [f32; 3] {
-        let luma = (luma - self.luma[0]) / self.luma[1];
-        let difference = |value: f32| (value - 32768.0) / self.chroma;
-        let red = luma + self.red * difference(red);
-        let blue = luma + self.blue * difference(blue);
-        let green = (luma - self.weights[0] * red - self.weights[2] * blue) / self.weights[1];
-        [red, green, blue]
+/// The number of ITU-T H.273.
+fn matrix_code(matrix: YuvStandardMatrix) -> u32 {
+    match matrix {
+        YuvStandardMatrix::Bt709 => 1,
+        YuvStandardMatrix::Fcc => 4,
+        YuvStandardMatrix::Smpte240 => 7,
+        YuvStandardMatrix::Bt2020 => 9,
+        _ => 6,
     }
 }
 
@@ -243,9 +202,6 @@ impl YuvDecoding {
 #[derive(Clone, Copy)]
 struct Samples {
     plane: usize,
-    /// Samples from one to the next, and those before the first.
-    step: usize,
-    place: usize,
     /// Halvings across and down.
     shift: (usize, usize),
 }
@@ -267,7 +223,7 @@ fn pixels(
         for (x, to) in row.enumerate() {
             let mut values = [0.0; 3];
             for ((value, row), channel) in values.iter_mut().zip(rows).zip(at) {
-                let sample = ((left + x) >> channel.shift.0) * channel.step + channel.place;
+                let sample = (left + x) >> channel.shift.0;
                 let bytes = row.get(2 * sample..2 * sample + 2)?;
                 *value = f32::from(u16::from_le_bytes(bytes.try_into().ok()?));
             }

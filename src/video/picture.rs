@@ -103,17 +103,25 @@ impl Picture {
     /// The RGB of a rectangle that lies inside the coded picture.
     fn coded_rgb(&self, rect: Rect) -> Result<RgbImage, DecodeFault> {
         let format = self.frame.format();
-        if !self.colour.is_srgb() {
-            let wide = self.colour.wide_rgb(&self.frame, rect);
-            return wide.ok_or_else(|| unconvertible(format));
+        if !self.colour.is_srgb() && !is_rgb(format) && !is_grey(format) {
+            let rgb = self.colour.wide_rgb(&self.frame, rect);
+            return rgb.ok_or_else(|| unconvertible(format));
         }
+        let rgb = self.plain_rgb(rect);
+        let mut rgb = rgb.ok_or_else(|| unconvertible(format))?;
+        self.colour.make_srgb(&mut rgb);
+        Ok(rgb)
+    }
+
+    /// As coded, with 8 bits a value.
+    fn plain_rgb(&self, rect: Rect) -> Option<RgbImage> {
+        let format = self.frame.format();
         if is_direct(format) && strides_are_forward(&self.frame) {
-            return planes_to_rgb(&self.frame, format, &self.colour, rect)
-                .ok_or_else(|| unconvertible(format));
+            return planes_to_rgb(&self.frame, format, &self.colour, rect);
         }
         let plain = plain_format(format, self.colour.full_range);
-        let converted = convert(&self.frame, plain).map_err(|_| unconvertible(format))?;
-        planes_to_rgb(&converted, plain, &self.colour, rect).ok_or_else(|| unconvertible(format))
+        let converted = convert(&self.frame, plain).ok()?;
+        planes_to_rgb(&converted, plain, &self.colour, rect)
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::thread::{self, JoinHandle};
 
-use relit_data::colour::{ColourFault, ToSrgb};
+use relit_data::colour::{ColourFault, ToSrgb, YuvDecoding};
 use serde::Deserialize;
 
 use super::movie::{FrameRate, MovieError, SILENT, file_url, last_line};
@@ -36,8 +36,8 @@ pub struct MovieReader {
     path: PathBuf,
     extent: Extent,
     frame_rate: FrameRate,
-    /// The conversion of colours that are not sRGB; frames then come with 16 bits.
-    to_srgb: Option<ToSrgb>,
+    /// The conversion of colours that are not sRGB; frames then come as YUV with 16 bits.
+    wide: Option<WideColour>,
     program: Child,
     errors: Option<JoinHandle<Option<String>>>,
 }
@@ -53,20 +53,25 @@ impl MovieReader {
             path: path.to_owned(),
             said: "it has no known frame rate".to_owned(),
         })?;
-        let to_srgb = facts.to_srgb().map_err(|fault| MovieError::Colour {
+        let extent = displayed_extent(path)?;
+        let wide = facts.wide_colour(extent.height);
+        let wide = wide.map_err(|fault| MovieError::Colour {
             path: path.to_owned(),
             fault,
         })?;
-        let extent = displayed_extent(path)?;
         // All frames get the size of the first.
         let mut scale = format!("scale={}:{}", extent.width, extent.height);
-        if facts.lacks_matrix() && extent.height > MAX_SD_ROWS {
+        if wide.is_some() {
+            // RGB becomes YUV of BT.709; YUV keeps its matrix.
+            scale.push_str(":out_range=tv:out_color_matrix=");
+            scale.push_str(if facts.is_rgb() { "bt709" } else { "auto" });
+        } else if facts.matrix().is_none() && extent.height > MAX_SD_ROWS {
             scale.push_str(":in_color_matrix=bt709");
         }
         let mut program = ffmpeg(path)
             .args(["-f", "rawvideo", "-pix_fmt"])
-            .arg(if to_srgb.is_some() {
-                "rgb48le"
+            .arg(if wide.is_some() {
+                "yuv444p16le"
             } else {
                 "rgb24"
             })
@@ -87,7 +92,7 @@ impl MovieReader {
             path: path.to_owned(),
             extent,
             frame_rate,
-            to_srgb,
+            wide,
             program,
             errors,
         })
@@ -108,7 +113,7 @@ impl MovieReader {
     /// How its colours are converted to sRGB, in words; none where they are taken as sRGB.
     #[must_use]
     pub fn colour_conversion(&self) -> Option<String> {
-        self.to_srgb.as_ref().map(ToSrgb::to_string)
+        self.wide.as_ref().map(|wide| wide.to_srgb.to_string())
     }
 
     /// The next frame; none after the last.
@@ -119,7 +124,7 @@ impl MovieReader {
         let Some(pipe) = &mut self.program.stdout else {
             return Ok(None);
         };
-        let sample = if self.to_srgb.is_some() { 2 } else { 1 };
+        let sample = if self.wide.is_some() { 2 } else { 1 };
         let size = 3 * sample * self.extent.pixels();
         let mut bytes = Vec::with_capacity(size);
         let read = pipe.take(size as u64).read_to_end(&mut bytes);
@@ -134,8 +139,8 @@ impl MovieReader {
                 Err(self.failure())
             };
         }
-        if let Some(to_srgb) = &self.to_srgb {
-            bytes = levels(&bytes, to_srgb);
+        if let Some(wide) = &self.wide {
+            bytes = wide.levels(&bytes);
         }
         let mut planes = Planes::zeros(self.extent);
         for (channel, plane) in planes.planes_mut().into_iter().enumerate() {
@@ -165,14 +170,27 @@ impl Drop for MovieReader {
     }
 }
 
-/// sRGB of coded RGB with 16 bits, little end first.
-fn levels(bytes: &[u8], to_srgb: &ToSrgb) -> Vec<u8> {
-    let pixels = bytes.as_chunks::<6>().0.iter();
-    let levels = pixels.flat_map(|&[r0, r1, g0, g1, b0, b1]| {
-        let value = |low, high| f32::from(u16::from_le_bytes([low, high])) / 65535.0;
-        to_srgb.levels([value(r0, r1), value(g0, g1), value(b0, b1)])
-    });
-    levels.collect()
+/// How frames of YUV become sRGB.
+#[derive(Debug, PartialEq)]
+struct WideColour {
+    decoding: YuvDecoding,
+    to_srgb: ToSrgb,
+}
+
+impl WideColour {
+    /// sRGB of three planes of limited range with 16 bits, little end first.
+    fn levels(&self, bytes: &[u8]) -> Vec<u8> {
+        let samples = bytes.as_chunks::<2>().0;
+        let (luma, differences) = samples.split_at(samples.len() / 3);
+        let (blue, red) = differences.split_at(luma.len());
+        let value = |sample: &[u8; 2]| f32::from(u16::from_le_bytes(*sample));
+        let pixels = luma.iter().zip(blue).zip(red);
+        let levels = pixels.flat_map(|((luma, blue), red)| {
+            let coded = self.decoding.rgb([luma, blue, red].map(value));
+            self.to_srgb.levels(coded)
+        });
+        levels.collect()
+    }
 }
 
 /// `ffmpeg` with a file's video as its input.
@@ -278,19 +296,33 @@ impl Facts {
         }
     }
 
-    fn lacks_matrix(&self) -> bool {
-        self.stated(|stated| stated.color_space.as_ref()).is_none()
+    fn matrix(&self) -> Option<&str> {
+        self.stated(|stated| stated.color_space.as_ref())
     }
 
-    fn to_srgb(&self) -> Result<Option<ToSrgb>, ColourFault> {
-        match self.stated(|stated| stated.color_space.as_ref()) {
-            None => {}
-            Some("gbr" | "bt709" | "bt470bg" | "smpte170m" | "smpte240m" | "fcc" | "bt2020nc") => {}
+    fn is_rgb(&self) -> bool {
+        self.matrix() == Some("gbr")
+    }
+
+    /// The conversion of colours that are not sRGB. `rows`: the height of the frames, by which players take the matrix
+    /// that is not stated.
+    fn wide_colour(&self, rows: usize) -> Result<Option<WideColour>, ColourFault> {
+        let matrix = match self.matrix() {
+            None if rows <= MAX_SD_ROWS => 6,
+            None | Some("gbr" | "bt709") => 1,
+            Some("fcc") => 4,
+            Some("bt470bg" | "smpte170m") => 6,
+            Some("smpte240m") => 7,
+            Some("bt2020nc") => 9,
             Some(other) => return Err(ColourFault::Matrix(other.to_owned())),
-        }
+        };
         let transfer = self.stated(|stated| stated.color_transfer.as_ref());
         let primaries = self.stated(|stated| stated.color_primaries.as_ref());
-        ToSrgb::named(transfer, primaries)
+        let Some(to_srgb) = ToSrgb::named(transfer, primaries)? else {
+            return Ok(None);
+        };
+        let decoding = YuvDecoding::new(matrix, false)?;
+        Ok(Some(WideColour { decoding, to_srgb }))
     }
 }
 
@@ -331,20 +363,14 @@ mod tests {
 
     #[test]
     fn colours_are_known_by_ffmpeg_s_names_or_refused() {
-        let to_srgb = |colours| facts(["25/1", "25/1"], colours).to_srgb();
-        assert_eq!(to_srgb(["bt709", "bt709", "bt709"]), Ok(None));
-        assert_eq!(to_srgb(["unknown", "unknown", "unknown"]), Ok(None));
-        let hdr = to_srgb(["bt2020nc", "smpte2084", "bt2020"])
-            .unwrap()
-            .unwrap();
-        assert!(hdr.to_string().contains("PQ"), "{hdr}");
-        assert!(matches!(
-            to_srgb(["ictcp", "smpte2084", "bt2020"]),
-            Err(ColourFault::Matrix(_))
-        ));
-        assert!(matches!(
-            to_srgb(["bt709", "log100", "bt709"]),
-            Err(ColourFault::Transfer(_))
-        ));
+        let wide = |colours| facts(["25/1", "25/1"], colours).wide_colour(100);
+        assert_eq!(wide(["bt709", "bt709", "bt709"]), Ok(None));
+        assert_eq!(wide(["unknown", "unknown", "unknown"]), Ok(None));
+        let hdr = wide(["bt2020nc", "smpte2084", "bt2020"]).unwrap().unwrap();
+        assert!(hdr.to_srgb.to_string().contains("PQ"), "{hdr:?}");
+        let refused = wide(["ictcp", "smpte2084", "bt2020"]);
+        assert!(matches!(refused, Err(ColourFault::Matrix(_))));
+        let refused = wide(["bt709", "log100", "bt709"]);
+        assert!(matches!(refused, Err(ColourFault::Transfer(_))));
     }
 }
