@@ -336,25 +336,28 @@ fn a_part_of_other_video_is_that_of_its_picture() {
     }
 }
 
+/// Replaces the four numbers of the display matrix that turn the picture of an MP4 file (ISO/IEC 14496-12, `tkhd`).
+fn with_display_matrix(mut mp4: Vec<u8>, [a, b, c, d]: [i32; 4]) -> Vec<u8> {
+    const TO_MATRIX: usize = 4 + 4 + 5 * 4 + 8 + 8;
+    let header = mp4.windows(4).position(|name| name == b"tkhd").unwrap();
+    let matrix = [a, b, 0, c, d].map(i32::to_be_bytes).concat();
+    let at = header + TO_MATRIX;
+    mp4[at..at + matrix.len()].copy_from_slice(&matrix);
+    mp4
+}
+
 #[test]
 fn the_rotation_that_the_file_asks_for_is_applied() {
     let (folder, _) = made(PATTERN, "up.mp4", "-pix_fmt yuv444p -c:v libx264 -qp 0");
-    for degrees in ["90", "180", "270"] {
-        let name = format!("turned{degrees}.mp4");
-        let rotate = format!("rotate={degrees}");
-        ffmpeg(
-            folder.path(),
-            &[
-                "-i",
-                "up.mp4",
-                "-c",
-                "copy",
-                "-metadata:s:v:0",
-                &rotate,
-                &name,
-            ],
-        );
-        let path = folder.path().join(&name);
+    let up = fs::read(folder.path().join("up.mp4")).unwrap();
+    const ONE: i32 = 1 << 16;
+    for (degrees, matrix) in [
+        ("90", [0, ONE, -ONE, 0]),
+        ("180", [-ONE, 0, 0, -ONE]),
+        ("270", [0, -ONE, ONE, 0]),
+    ] {
+        let path = folder.path().join(format!("turned{degrees}.mp4"));
+        fs::write(&path, with_display_matrix(up.clone(), matrix)).unwrap();
         let video = Video::open(&path).unwrap();
         let (width, height) = (video.facts().width, video.facts().height);
         assert_eq!(
@@ -379,9 +382,21 @@ fn plain_10_bit(colour: [u16; 3], statements: &str) -> (TempDir, PathBuf) {
         plane(colour[2], 16 * 8),
     ];
     fs::write(folder.path().join("plain.yuv"), frame.concat().repeat(3)).unwrap();
-    let source = "-f rawvideo -pix_fmt yuv420p10le -video_size 32x16 -i plain.yuv -c:v ffv1";
+    let source = "-f rawvideo -pix_fmt yuv420p10le -video_size 32x16 -i plain.yuv -c:v ffv1 -vf";
     let mut arguments: Vec<&str> = source.split(' ').collect();
-    arguments.extend(statements.split(' '));
+    let filter = format!("setparams={statements}");
+    arguments.push(&filter);
+    // What filters state counts in newer versions of the program, what options state in older ones.
+    let options: Vec<(String, &str)> = statements
+        .split(':')
+        .filter_map(|statement| statement.split_once('='))
+        .map(|(name, value)| (format!("-{}", name.replace("range", "color_range")), value))
+        .collect();
+    arguments.extend(
+        options
+            .iter()
+            .flat_map(|(name, value)| [name.as_str(), value]),
+    );
     arguments.push("a.mkv");
     ffmpeg(folder.path(), &arguments);
     let path = folder.path().join("a.mkv");
@@ -399,7 +414,7 @@ fn colour_of(path: &Path) -> [u8; 3] {
 
 #[test]
 fn hdr_and_wide_gamut_become_srgb() {
-    const HDR: &str = "-color_range tv -colorspace bt2020nc -color_primaries bt2020 -color_trc";
+    const HDR: &str = "range=tv:colorspace=bt2020nc:color_primaries=bt2020:color_trc";
     let near = |found: [u8; 3], wanted: [u8; 3]| {
         found
             .iter()
@@ -408,7 +423,7 @@ fn hdr_and_wide_gamut_become_srgb() {
     };
     // BT.2408: 203 cd/m2 are 58 % of PQ and 75 % of HLG.
     for (transfer, luma) in [("smpte2084", 573), ("arib-std-b67", 721)] {
-        let (_folder, path) = plain_10_bit([luma, 512, 512], &format!("{HDR} {transfer}"));
+        let (_folder, path) = plain_10_bit([luma, 512, 512], &format!("{HDR}={transfer}"));
         let video = Video::open(&path).unwrap();
         assert!(video.facts().colour_conversion.is_some());
         assert_eq!(video.notes().len(), 1, "{:?}", video.notes());
@@ -419,7 +434,7 @@ fn hdr_and_wide_gamut_become_srgb() {
         );
     }
     // The same values are grey without a statement.
-    let (_folder, path) = plain_10_bit([573, 512, 512], "-color_range tv -colorspace bt709");
+    let (_folder, path) = plain_10_bit([573, 512, 512], "range=tv:colorspace=bt709");
     assert!(
         Video::open(&path)
             .unwrap()
@@ -429,8 +444,8 @@ fn hdr_and_wide_gamut_become_srgb() {
     );
     assert!(near(colour_of(&path), [148; 3]), "{:?}", colour_of(&path));
     // Red (200, 60, 50) of Display P3, and what it is in sRGB.
-    const P3: &str = "-color_range tv -colorspace bt709 -color_primaries smpte432 -color_trc";
-    let (_folder, path) = plain_10_bit([370, 438, 760], &format!("{P3} iec61966-2-1"));
+    const P3: &str = "range=tv:colorspace=bt709:color_primaries=smpte432:color_trc";
+    let (_folder, path) = plain_10_bit([370, 438, 760], &format!("{P3}=iec61966-2-1"));
     let found = colour_of(&path);
     let off = found
         .iter()
@@ -442,8 +457,8 @@ fn hdr_and_wide_gamut_become_srgb() {
 #[test]
 fn colours_that_are_not_known_are_refused_by_name() {
     for (statements, name) in [
-        ("-colorspace bt2020nc -color_trc log100", "logarithmic"),
-        ("-colorspace ictcp -color_trc smpte2084", "ICTCP"),
+        ("colorspace=bt2020nc:color_trc=log100", "logarithmic"),
+        ("colorspace=ictcp:color_trc=smpte2084", "ICTCP"),
     ] {
         let (_folder, path) = plain_10_bit([400, 512, 512], statements);
         let error = Video::open(&path).unwrap_err();

@@ -267,7 +267,7 @@ fn with_repeated_pictures(mut stream: Vec<u8>) -> Vec<u8> {
         .filter(|&at| stream[at..].starts_with(&[0, 0, 1, 0xb6]))
         .collect();
     assert_eq!(starts.len() as u64, FRAMES);
-    for at in starts.into_iter().step_by(3).map(|at| at + 4) {
+    for at in starts.into_iter().skip(1).step_by(3).map(|at| at + 4) {
         let predicted = stream[at] >> 6 == 1;
         let seconds = (stream[at] << 2).leading_ones() as usize;
         if predicted {

@@ -16,6 +16,8 @@ use super::parent::make_parent;
 use crate::image::{Extent, Rgb, Srgb};
 use crate::parallel;
 
+/// The colours of what is written, as a filter.
+const COLOURS: &str = "setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1";
 /// How many frames each thread computes before they are encoded.
 const FRAMES_A_THREAD: u32 = 2;
 
@@ -211,7 +213,8 @@ impl MovieWriter {
             .args(["-f", "rawvideo", "-pixel_format", "rgb24", "-video_size"])
             .arg(format!("{}x{}", shown.width, shown.height))
             .args(["-framerate", &frame_rate.into().to_string(), "-i", "pipe:0"])
-            .args(["-vf", "scale=out_color_matrix=bt709"])
+            // Older versions of the program take what options state of the colours, newer ones what the frames do.
+            .args(["-vf", &format!("scale=out_color_matrix=bt709,{COLOURS}")])
             .args(["-pix_fmt", "yuv420p", "-colorspace", "bt709"])
             .args(["-color_primaries", "bt709", "-color_trc", "iec61966-2-1"])
             .args(format.arguments())
@@ -656,11 +659,14 @@ mod tests {
         }
         let folder = tempfile::tempdir().unwrap();
         // 58 % of PQ, as limited luma of 8 bits; a lossless video keeps it.
-        let source =
-            "-f lavfi -i color=black:size=32x32:rate=5:duration=1,geq=lum=143:cb=128:cr=128";
-        let encoding = "-c:v libx264 -qp 0 -pix_fmt yuv420p -color_range tv -colorspace bt2020nc";
-        let hdr = "-color_primaries bt2020 -color_trc smpte2084";
-        let path = clip(folder.path(), &format!("{source} {encoding} {hdr}"));
+        let encoded = |transfer: &str| {
+            let stated = format!("colorspace=bt2020nc:color_primaries=bt2020:color_trc={transfer}");
+            let options = stated.replace(':', " -").replace('=', " ");
+            let source = "-f lavfi -i color=black:size=32x32:rate=5:duration=1";
+            let level = "geq=lum=143:cb=128:cr=128,format=yuv420p";
+            format!("{source} -vf {level},setparams={stated} -c:v libx264 -qp 0 -{options}")
+        };
+        let path = clip(folder.path(), &encoded("smpte2084"));
         let mut movie = MovieReader::open(&path, FrameTiming::Each).unwrap();
         assert!(
             movie
@@ -670,10 +676,7 @@ mod tests {
         let frame = movie.frame().unwrap().unwrap();
         let value = frame.planes().pixel(9, 9)[1];
         assert!((value - 1.0).abs() < 0.03, "{value}");
-        let path = clip(
-            folder.path(),
-            &format!("{source} {encoding} -color_trc log100"),
-        );
+        let path = clip(folder.path(), &encoded("log100"));
         let refused = MovieReader::open(&path, FrameTiming::Each);
         assert!(
             matches!(refused, Err(MovieError::Colour { .. })),
