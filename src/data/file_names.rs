@@ -92,7 +92,9 @@ pub fn alike_beside(path: &Path) -> io::Result<Option<OsString>> {
         folder
     };
     let entries = match fs::read_dir(folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            return Ok(None);
+        }
         entries => entries?,
     };
     for entry in entries {
