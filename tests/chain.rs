@@ -15,7 +15,9 @@ const HELD_OUT: &str = "20261120T102000Z-bust-short";
 /// The program relight, which cargo builds beside this test, if it was built, and with training.
 fn relight() -> Result<PathBuf, String> {
     let program = relit_tests::beside_this_test("relight").unwrap();
-    let answer = Command::new(&program).args(["train", "--help"]).output();
+    let answer = Command::new(&program)
+        .args(["train", "normal", "--help"])
+        .output();
     match answer {
         Ok(output) if output.status.success() => Ok(program),
         _ => Err(format!(
