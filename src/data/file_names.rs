@@ -92,7 +92,12 @@ pub fn alike_beside(path: &Path) -> io::Result<Option<OsString>> {
         folder
     };
     let entries = match fs::read_dir(folder) {
-        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+        Err(error)
+            if matches!(
+                error.kind(),
+                io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+            ) =>
+        {
             return Ok(None);
         }
         entries => entries?,
