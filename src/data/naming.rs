@@ -38,8 +38,7 @@ fn is_device(name: &str) -> bool {
             )
             && rest.next().is_none()
     };
-    DEVICES.iter().any(|device| is(device))
-        || NUMBERED_DEVICES.iter().any(|device| is_numbered(device))
+    DEVICES.iter().any(is) || NUMBERED_DEVICES.iter().any(is_numbered)
 }
 
 #[cfg(test)]

@@ -301,7 +301,7 @@ fn a_video_of_which_ffmpeg_says_that_it_failed_is_not_left() {
 
     let folder = Folder::new();
     fs::create_dir(folder.path("bin")).unwrap();
-    let script = "#!/bin/sh\ncat > /dev/null\nfor last; do :; done\necho part > \"$last\"\n\
+    let script = "#!/bin/sh\ncat > /dev/null\nfor last; do :; done\necho part > \"${last#file:}\"\n\
                   echo 'Error writing trailer: No space left on device' >&2\n";
     fs::write(folder.path("bin/ffmpeg"), script).unwrap();
     fs::set_permissions(folder.path("bin/ffmpeg"), fs::Permissions::from_mode(0o755)).unwrap();

@@ -290,7 +290,7 @@ impl Tensor {
         })?;
         // As `TensorProto.DataType` numbers them.
         let bits: u64 = match self.data_type {
-            22 | 21 | 23 => 4,
+            21..=23 => 4,
             25 | 26 => 2,
             2 | 3 | 9 | 17..=20 | 24 => 8,
             4 | 5 | 10 | 16 => 16,

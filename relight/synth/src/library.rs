@@ -175,8 +175,10 @@ const OTHER_MESHES: [&str; 35] = [
     "stp", "usd", "usda", "usdc", "usdz", "vrm", "wrl", "x", "x3d",
 ];
 
+type NamedMeshes = Vec<(String, Mesh)>;
+
 /// All meshes of a folder and those within it, and what of them is not used.
-fn read_meshes(folder: &Path) -> Result<(Vec<(String, Mesh)>, Vec<LeftOut>), SynthError> {
+fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<LeftOut>), SynthError> {
     let files = files_below(folder)?;
     let (wanted, others): (Vec<PathBuf>, Vec<PathBuf>) =
         files.into_iter().partition(|path| MESHES.includes(path));

@@ -116,7 +116,7 @@ impl ObjFile {
             1.0
         };
         for colour in &mut self.colours {
-            *colour = colour.map(|level| Srgb::to_linear((scale * level).max(0.0).min(1.0)));
+            *colour = colour.map(|level| Srgb::to_linear((scale * level).max(0.0).clamp(0.0, 1.0)));
         }
     }
 

@@ -213,7 +213,7 @@ impl Reader<'_> {
         };
         let colour = |vertex: u32| {
             let colour = Vec3::from(*colours.get(vertex as usize)?);
-            Some(colour.map(|level| level.max(0.0).min(1.0)))
+            Some(colour.map(|level| level.max(0.0).clamp(0.0, 1.0)))
         };
         for &corners in triangles {
             self.raw.push(RawTriangle {
