@@ -64,12 +64,12 @@ pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
     let workshop = workshop();
     fs::create_dir(workshop.path("x")).unwrap();
     fs::copy(workshop.path("a.mkv"), workshop.path("x/a.mkv")).unwrap();
-    for index in 0..2 {
+    for (index, code) in [(0, 0), (1, 1)] {
         let line = format!("a.mkv x/a.mkv {SETTINGS} -o twice --task-id {index} --task-count 2");
-        workshop.errors(0, &line);
+        workshop.errors(code, &line);
     }
     let errors = workshop.errors(1, "merge twice");
-    assert!(errors.contains("session a is there twice"), "{errors}");
+    assert!(errors.contains("task 1 failed with x/a.mkv"), "{errors}");
 
     fs::write(workshop.path("bad.mkv"), "no video").unwrap();
     workshop.errors(

@@ -354,7 +354,7 @@ impl Server {
         fs::create_dir_all(&page).unwrap();
         fs::write(
             page.join("files.json"),
-            r#"{"version": "1", "files": {"index.html": 38, "a.wasm": 4}}"#,
+            r#"{"version": "1", "files": {"index.html": 37, "a.wasm": 4}}"#,
         )
         .unwrap();
         fs::write(
