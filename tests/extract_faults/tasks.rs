@@ -69,7 +69,7 @@ pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
         workshop.errors(code, &line);
     }
     let errors = workshop.errors(1, "merge twice");
-    assert!(errors.contains("task 1 failed with x/a.mkv"), "{errors}");
+    assert!(errors.contains("task 1 failed with a.mkv"), "{errors}");
 
     fs::write(workshop.path("bad.mkv"), "no video").unwrap();
     workshop.errors(
