@@ -15,7 +15,6 @@ use std::time::Duration;
 use jiff::Timestamp;
 use serde::Serialize;
 use tokio::sync::watch;
-use utoipa::ToSchema;
 
 use advice::Situation;
 pub use advice::{Advice, AdvisedAction, AdvisedButton, Obstacle};
@@ -35,7 +34,7 @@ const FAULTS_KEPT: usize = 50;
 const LOG_KEPT: usize = 40;
 
 /// All that a viewer may know.
-#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 #[non_exhaustive]
 pub struct RigState {
     /// Counts changes: a viewer that has seen this number has seen this state.
@@ -67,14 +66,12 @@ pub struct RigState {
     /// What the last preflight found.
     pub checks: Vec<Check>,
     /// Newest last.
-    #[schema(value_type = Vec<FaultLine>)]
     pub faults: VecDeque<FaultLine>,
     /// The last finished take.
     pub last_take: Option<TakeSummary>,
     /// How takes are captured.
     pub settings: CaptureSettings,
     /// What happened last, newest last.
-    #[schema(value_type = Vec<LogLine>)]
     pub log: VecDeque<LogLine>,
     /// What is made of the sessions.
     pub processing: ProcessingState,

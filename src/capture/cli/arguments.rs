@@ -44,7 +44,6 @@ pub(crate) enum Command {
     Serve(Box<Serve>),
     Turntable(TurntableArguments),
     Simulate(SimulateArguments),
-    Token { file: PathBuf },
 }
 
 /// One capture.
@@ -94,13 +93,6 @@ enum Verb {
     /// Look at the turntable, or move it.
     #[command(after_help = TURNTABLE_EXAMPLES)]
     Turntable(TurntableArguments),
-    /// Show the token that lets a browser or a script in.
-    #[command(after_help = "Example:\n  sudo relit-capture token")]
-    Token {
-        /// The file that `serve --token-file` has.
-        #[arg(long, value_name = "FILE", default_value = "/var/lib/relit/token")]
-        token_file: PathBuf,
-    },
     /// Run a turntable without hardware: the firmware on a pseudoterminal.
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(SimulateArguments),
@@ -131,7 +123,7 @@ struct ServeArguments {
     #[arg(long, value_name = "TOKEN", conflicts_with = "token_file")]
     token: Option<Token>,
     /// A file that holds the token, which only its owner and its group can read. Where there is none,
-    /// it is made with a random token; `relit-capture token` shows it.
+    /// it is made with a random token.
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
     /// A name under which clients reach this machine, such as rig.local; may be given several times.
@@ -220,7 +212,6 @@ pub(crate) fn parse() -> Arguments {
         })),
         Verb::Turntable(line) => Command::Turntable(line),
         Verb::Simulate(line) => Command::Simulate(line),
-        Verb::Token { token_file } => Command::Token { file: token_file },
     };
     Arguments {
         json: line.json,

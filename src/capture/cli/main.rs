@@ -7,7 +7,6 @@ mod environment;
 mod recording;
 mod serving;
 mod simulate;
-mod token;
 mod turntable;
 mod turntable_arguments;
 
@@ -27,7 +26,6 @@ fn main() -> ExitCode {
         Command::Record(record) => console.finish(recording::run(console, *record)),
         Command::Serve(serve) => console.finish(serving::run(console, *serve)),
         Command::Turntable(asked) => console.finish(turntable::run(console, &asked)),
-        Command::Token { file } => console.finish(token::run(console, &file)),
         Command::Simulate(asked) => console.finish(simulate::run(console, &asked)),
     }
 }

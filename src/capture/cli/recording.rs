@@ -15,7 +15,7 @@ use serde_json::json;
 
 use crate::arguments::Record;
 use crate::environment::at_end;
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 use relit_data::durable::MadeFolder;
 
 /// How often progress is looked at.
@@ -141,7 +141,11 @@ impl Reporter {
             let mark = if check.good { "ok" } else { "note" };
             self.console.say(
                 &format!("{mark:>4}  {}: {}", check.what, check.found),
-                &json!({ "event": "check", "what": check.what, "good": check.good, "found": check.found }),
+                &Event::Check(relit_console::Check::Rig {
+                    what: check.what.clone(),
+                    good: check.good,
+                    found: check.found.clone(),
+                }),
             );
         }
         self.checks = state.checks.len();
@@ -167,7 +171,9 @@ impl Reporter {
         };
         self.console.say_phase(
             &state.phase.to_string(),
-            &json!({ "event": "phase", "phase": state.phase }),
+            &Event::Phase {
+                phase: json!(state.phase),
+            },
         );
     }
 }
@@ -182,7 +188,10 @@ fn report(console: Console, captured: &Captured, folder: &str) -> Outcome {
             "{folder}: {} frames, {} dropped, {verdict}{reason}",
             take.frames, take.dropped
         ),
-        &json!({ "event": "done", "session": folder, "take": take }),
+        &Event::Done(relit_console::Done::Capture {
+            session: folder.to_owned(),
+            take: json!(take),
+        }),
     );
     outcome
 }

@@ -3,19 +3,18 @@
 use std::sync::Arc;
 
 use relit_rig::capture::CaptureError;
+use relit_rig::command::Rig;
 use relit_rig::daemon::Daemon;
 use relit_rig::lockfile::LockFile;
 use relit_rig::processing::{Processing, ProcessingError, ProcessingOptions};
-use relit_rig::serve::rig::Rig;
 use relit_rig::serve::{
     Announcement, ServeError, ServeOptions, Shutdown, Token, TokenFileError, check_address, serve,
 };
 use sd_notify::NotifyState;
-use serde_json::json;
 
 use crate::arguments::Serve;
 use crate::environment::{at_end, heartbeat, notify_service, programs};
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 use relit_data::durable::MadeFolder;
 
 /// Why the rig is not served.
@@ -96,6 +95,9 @@ fn announce(console: Console, announcement: &Announcement) {
     }
     console.say(
         &text,
-        &json!({ "event": "serving", "url": announcement.url, "address": announcement.address.to_string() }),
+        &Event::Serving {
+            url: announcement.url.clone(),
+            address: announcement.address.to_string(),
+        },
     );
 }

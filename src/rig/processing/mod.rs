@@ -28,7 +28,7 @@ pub use commands::{ProcessingCommands, ProcessingPrograms};
 pub use editor::EditorTarget;
 pub use shared::ProcessingOptions;
 
-use crate::serve::rig::Refused;
+use crate::command::Refused;
 use crate::state::{Monitor, ProcessingStep};
 use editor::OpenEditor;
 use queue::{PendingWork, ProcessingQueue};
@@ -65,12 +65,13 @@ pub enum ProcessingError {
     Thread(#[source] io::Error),
 }
 
-/// What a request changes of the settings.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+/// What a request changes of the settings; what is left out stays.
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ProcessingChange {
     /// Whether each usable take is processed once the rig rests.
     pub when_done: Option<bool>,
-    /// The data set's name.
+    /// The data set's name: a folder beside that of the sessions.
     pub dataset: Option<String>,
 }
 

@@ -9,7 +9,7 @@ use super::commands::ProcessingPrograms;
 use super::editor::OpenEditor;
 use super::queue::{NotQueued, PendingWork, ProcessingQueue};
 use super::store::{self, KeptProcessing, ProcessingSettings};
-use crate::serve::rig::Refused;
+use crate::command::Refused;
 use crate::state::{Monitor, ProcessingState, ProcessingStep};
 
 /// Where data sets and programs are.

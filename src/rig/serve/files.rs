@@ -12,31 +12,17 @@ use futures_util::StreamExt;
 use http_range_header::parse_range_header;
 use serde::Deserialize;
 use tower_http::services::ServeFile;
-use utoipa::IntoParams;
 
 use super::archive::Archive;
 use super::library::Library;
 use super::permits::{Permits, Work, permit};
-use relit_web::{Failure, Problem, QueryParams};
+use relit_web::{Failure, QueryParams};
 
 const NO_RANGE: &str = "there is one range at a time, and it has to begin inside the file";
 
 /// The video file
 ///
 /// As the camera's stream was written, for download. Takes one `Range` of bytes, with `If-Range`.
-#[utoipa::path(
-    get, path = "/api/v1/sessions/{id}/video", tag = "sessions",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 200, description = "The file", content_type = "video/x-matroska"),
-        (status = 206, description = "A part of it", content_type = "video/x-matroska"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session", body = Problem),
-        (status = 409, description = "Still being recorded", body = Problem),
-        (status = 416, description = "The range lies beyond the end", body = Problem),
-        (status = 503, description = "Too many downloads", body = Problem),
-    )
-)]
 pub(super) async fn video(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
@@ -67,19 +53,6 @@ pub(super) async fn video(
 /// All its files as one tar file, under `<session>/`: unpacked it is a session that `relit-mask` and
 /// `relit-extract` take. Takes one `Range` of bytes, with `If-Range`. The length is sent before: a
 /// download that broke off is shorter.
-#[utoipa::path(
-    get, path = "/api/v1/sessions/{id}.tar", tag = "sessions",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 200, description = "The file", content_type = "application/x-tar"),
-        (status = 206, description = "A part of it", content_type = "application/x-tar"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session", body = Problem),
-        (status = 409, description = "Still being recorded", body = Problem),
-        (status = 416, description = "The range lies beyond the end", body = Problem),
-        (status = 503, description = "Too many downloads", body = Problem),
-    )
-)]
 pub(super) async fn session_tar(
     library: Arc<Library>,
     permits: Arc<Permits>,
@@ -95,11 +68,9 @@ pub(super) async fn session_tar(
 }
 
 /// Which day.
-#[derive(Debug, Deserialize, IntoParams)]
-#[into_params(parameter_in = Query)]
+#[derive(Debug, Deserialize)]
 pub(super) struct Day {
     /// Its date, UTC, as session names begin.
-    #[param(example = "20261120")]
     day: String,
 }
 
@@ -107,18 +78,6 @@ pub(super) struct Day {
 ///
 /// As one tar file, without those that are being recorded. Takes one `Range` of bytes, with
 /// `If-Range`.
-#[utoipa::path(
-    get, path = "/api/v1/sessions.tar", tag = "sessions", params(Day),
-    responses(
-        (status = 200, description = "The file", content_type = "application/x-tar"),
-        (status = 206, description = "A part of it", content_type = "application/x-tar"),
-        (status = 400, description = "No day is given", body = Problem),
-        (status = 401, body = Problem),
-        (status = 404, description = "No session of that day", body = Problem),
-        (status = 416, description = "The range lies beyond the end", body = Problem),
-        (status = 503, description = "Too many downloads", body = Problem),
-    )
-)]
 pub(super) async fn day_tar(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
@@ -186,15 +145,6 @@ fn part_of(
 }
 
 /// The mask
-#[utoipa::path(
-    get, path = "/api/v1/sessions/{id}/mask.png", tag = "sessions",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 200, description = "A PNG file", content_type = "image/png"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session, or it has no mask", body = Problem),
-    )
-)]
 pub(super) async fn mask(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,

@@ -1,7 +1,6 @@
-//! The rig over HTTP: a page for the phone beside the turntable, the same as JSON for scripts, and
-//! figures for Prometheus.
+//! The rig over HTTP: a page for the phone beside the turntable, and the same as JSON for scripts.
 //!
-//! It stands on [`rig::Rig`]: it hands commands on, shows what the [`Monitor`](crate::state::Monitor)
+//! It stands on [`Rig`]: it hands commands on, shows what the [`Monitor`](crate::state::Monitor)
 //! holds and reads what lies in the session folder. It knows nothing of cameras, tables or how a
 //! capture goes. The capture is never held up by it: one task reads the state, at most ten times a
 //! second whatever the number of clients, its threads give way to all others of the process, and
@@ -17,7 +16,6 @@ mod cache;
 mod editor;
 mod files;
 mod library;
-mod metrics;
 mod options;
 mod page;
 mod permits;
@@ -25,7 +23,6 @@ mod pictures;
 mod preview;
 mod processing;
 mod results;
-pub mod rig;
 mod routes;
 mod sessions;
 mod snapshots;
@@ -42,8 +39,8 @@ use std::sync::Arc;
 use tokio::time::{MissedTickBehavior, interval};
 
 pub use self::options::{ClientLimits, Heartbeat, ServeOptions};
+use crate::command::Rig;
 pub use relit_web::{Announcement, InvalidToken, ListenAddress, Shutdown, Token, TokenFileError};
-use rig::Rig;
 
 /// Threads that carry requests; files and decoding have their own.
 const THREADS: usize = 2;

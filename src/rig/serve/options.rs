@@ -48,7 +48,7 @@ pub struct Heartbeat {
     /// Time between two beats.
     pub period: Duration,
     /// Called while requests are worked on, the rig's state can be read, and the
-    /// [rig runs](super::rig::Rig::is_running); dropped when that is over.
+    /// [rig runs](crate::command::Rig::is_running); dropped when that is over.
     pub beat: Box<dyn Fn() + Send + Sync>,
 }
 

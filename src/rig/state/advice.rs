@@ -5,7 +5,6 @@ use std::fmt;
 
 use relit_data::session::object_of;
 use serde::Serialize;
-use utoipa::ToSchema;
 
 use super::parts::{CameraState, Phase, TableState, TakeSummary, Verdict};
 
@@ -99,7 +98,7 @@ impl fmt::Display for Obstacle {
 }
 
 /// What the one button does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AdvisedAction {
     /// Captures the object that a person names: command `start`.
@@ -115,7 +114,7 @@ pub enum AdvisedAction {
 }
 
 /// The one button at the rig.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct AdvisedButton {
     /// What stands on it.
     pub text: String,
@@ -126,7 +125,7 @@ pub struct AdvisedButton {
 }
 
 /// What a person at the rig is told, and the one thing to do next.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Advice {
     /// How the rig stands, in a few words.
     pub headline: String,

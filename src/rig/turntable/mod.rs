@@ -48,8 +48,6 @@
 mod address;
 mod codes;
 mod error;
-#[cfg(test)]
-mod fake_grbl;
 mod family;
 mod grbl_client;
 mod greeting;

@@ -1,7 +1,7 @@
 //! Grbl's relatives: each works, and none makes the table believe in a position that is lost.
 
+use super::fake_grbl::Dialect;
 use super::*;
-use crate::turntable::fake_grbl::Dialect;
 
 fn opened(dialect: Dialect) -> Rig {
     open(FakeGrbl::relative(dialect))
