@@ -26,10 +26,7 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
         },
         faults: asked.fault.join(",").parse::<TableFaults>()?,
         seed: asked.seed,
-        start_angle: asked.start_angle,
         index_at: asked.index_at,
-        battery: asked.battery,
-        drift_ppm: asked.drift_ppm,
         reset_on_open: !asked.no_reset,
         ..SimulatorOptions::default()
     };

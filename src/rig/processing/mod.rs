@@ -42,27 +42,16 @@ const LOOK: Duration = Duration::from_millis(10);
 
 /// Why sessions cannot be processed at all.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProcessingError {
-    /// The folder of sessions cannot be used.
-    #[error("the folder of sessions {path} could not be found")]
-    Root {
-        /// The folder.
-        path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
-    },
-    /// What an earlier run kept cannot be read.
-    #[error("{path} could not be read: mend it, or remove it and set again what it held")]
-    Kept {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: io::Error,
-    },
-    /// No thread.
-    #[error("a thread for processing could not be started")]
-    Thread(#[source] io::Error),
+#[error("{what}")]
+pub struct ProcessingError {
+    what: String,
+    source: io::Error,
+}
+
+impl ProcessingError {
+    fn of(what: String) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self { what, source }
+    }
 }
 
 /// What a request changes of the settings; what is left out stays.
@@ -92,16 +81,15 @@ impl Processing {
         monitor: Monitor,
         options: ProcessingOptions,
     ) -> Result<Self, ProcessingError> {
-        let root = root
-            .canonicalize()
-            .map_err(|source| ProcessingError::Root {
-                path: root.to_owned(),
-                source,
-            })?;
-        let kept = KeptProcessing::read(&root).map_err(|source| ProcessingError::Kept {
-            path: store::path(&root),
-            source,
-        })?;
+        let missing = format!(
+            "the folder of sessions {} could not be found",
+            root.display()
+        );
+        let root = root.canonicalize().map_err(ProcessingError::of(missing))?;
+        let kept = KeptProcessing::read(&root).map_err(ProcessingError::of(format!(
+            "{} could not be read: mend it, or remove it and set again what it held",
+            store::path(&root).display()
+        )))?;
         let beside = || root.parent().unwrap_or(&root).to_owned();
         let datasets = options.datasets.clone().unwrap_or_else(beside);
         let mut settings = kept.settings;
@@ -132,7 +120,9 @@ impl Processing {
         let thread = thread::Builder::new()
             .name("relit-processing".to_owned())
             .spawn(move || runner::run(&worked))
-            .map_err(ProcessingError::Thread)?;
+            .map_err(ProcessingError::of(
+                "a thread for processing could not be started".to_owned(),
+            ))?;
         Ok(Self {
             shared,
             thread: Mutex::new(Some(thread)),

@@ -40,7 +40,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 pub use self::options::{ClientLimits, Heartbeat, ServeOptions};
 use crate::command::Rig;
-pub use relit_web::{Announcement, InvalidToken, ListenAddress, Shutdown, Token, TokenFileError};
+pub use relit_web::{Announcement, ListenAddress, Shutdown, Token};
 
 /// Threads that carry requests; files and decoding have their own.
 const THREADS: usize = 2;
@@ -62,12 +62,9 @@ pub enum ServeError {
         /// The system's answer.
         source: io::Error,
     },
-    /// No threads.
-    #[error("the threads of the HTTP server could not be started: {0}; close other programs")]
-    Threads(io::Error),
-    /// No random numbers for a token.
-    #[error("the system gave no random numbers for a token: {0}; give a token yourself")]
-    Random(io::Error),
+    /// The system lacks something; what, and what to do.
+    #[error("{0}: {1}")]
+    System(&'static str, io::Error),
 }
 
 /// Whether the address can be listened on, as things are.
@@ -101,7 +98,12 @@ pub fn serve(
     let token = match options.token {
         Some(token) => Some(token),
         None if address.ip().is_loopback() => None,
-        None => Some(Token::random().map_err(ServeError::Random)?),
+        None => Some(Token::random().map_err(|error| {
+            ServeError::System(
+                "no random numbers for a token could be had: give a token with --token-file",
+                error,
+            )
+        })?),
     };
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(THREADS)
@@ -111,7 +113,10 @@ pub fn serve(
         .enable_io()
         .enable_time()
         .build()
-        .map_err(ServeError::Threads)?;
+        .map_err(|error| {
+            let what = "the threads of the HTTP server could not be started: close other programs";
+            ServeError::System(what, error)
+        })?;
     let announcement = Announcement::new(address, &options.names, token.as_ref());
     let policy = relit_web::AccessPolicy::new(address.port(), token, options.names, page::paths());
     let app = routes::App::new(
@@ -128,7 +133,7 @@ pub fn serve(
         if let Some(heartbeat) = options.heartbeat {
             tokio::spawn(beat(heartbeat, app.rig.clone()));
         }
-        let (limits, connections) = (app.limits.of_connections(), &app.permits.connections);
+        let (limits, connections) = (app.limits.connections, &app.permits.connections);
         relit_web::run(
             listener,
             routes::router(&app),

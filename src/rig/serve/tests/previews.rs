@@ -38,7 +38,7 @@ fn who_has_the_newest_picture_waits_for_the_next() {
 fn a_client_that_stopped_reading_loses_its_place() {
     let serving = Serving::with(|options| {
         options.limits.subscribers = 1;
-        options.limits.stall = Duration::from_millis(500);
+        options.limits.connections.stall = Duration::from_millis(500);
     });
     let stream = begin(&serving, "/api/v1/events");
     assert_eq!(serving.get("/api/v1/events").status, 503);

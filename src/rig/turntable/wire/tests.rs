@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
+mod printed;
 mod properties;
 
 use super::*;
