@@ -56,7 +56,6 @@ impl Scripted {
                 driver: "none".to_owned(),
                 bus: String::new(),
                 modes: Vec::new(),
-                other_formats: Vec::new(),
                 problems: Vec::new(),
             },
             steps: Box::new(steps),
@@ -188,6 +187,7 @@ fn manifest() -> Manifest {
             controls: BTreeMap::new(),
         },
         turntable: None,
+        rig: None,
         video: VideoFacts {
             file: String::new(),
             codec: String::new(),

@@ -26,12 +26,15 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use relit_data::causes::with_causes;
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::Value;
 
+mod event;
 mod lines;
 mod manual;
 mod progress;
 
+pub use event::{Check, Done, Event};
 use lines::{lost_line, print_error_line, print_line};
 pub use manual::written_manual;
 pub use progress::ProgressBar;
@@ -89,10 +92,10 @@ impl Console {
         self.json
     }
 
-    /// A result: `text` for a person, `event` as one JSON line for a machine.
-    pub fn say(self, text: &str, event: &Value) {
+    /// A result: `text` for a person, `event`, such as an [`Event`], as one JSON line for a machine.
+    pub fn say(self, text: &str, event: &impl Serialize) {
         if self.json {
-            print_line(&event.to_string());
+            print_line(&json_of(event));
         } else {
             print_line(text);
         }
@@ -106,9 +109,9 @@ impl Console {
     }
 
     /// What is being done: on standard error for a person, as a JSON line for a machine.
-    pub fn say_phase(self, text: &str, event: &Value) {
+    pub fn say_phase(self, text: &str, event: &impl Serialize) {
         if self.json {
-            print_line(&event.to_string());
+            print_line(&json_of(event));
         } else {
             print_error_line(text);
         }
@@ -127,13 +130,14 @@ impl Console {
 
     /// A warning.
     pub fn warn(self, text: &str) {
-        self.warn_with(text, &json!({ "event": "warning", "message": text }));
+        let message = text.to_owned();
+        self.warn_with(text, &Event::Warning { message });
     }
 
     /// A warning that is an event of its own for a machine.
-    pub fn warn_with(self, text: &str, event: &Value) {
+    pub fn warn_with(self, text: &str, event: &impl Serialize) {
         if self.json {
-            print_line(&event.to_string());
+            print_line(&json_of(event));
         }
         print_error_line(&format!("warning: {text}"));
     }
@@ -150,8 +154,11 @@ impl Console {
 
     fn print_error(self, text: &str, input: Option<&Path>) {
         if self.json {
-            let event = json!({ "event": "error", "message": text, "input": input.map(Path::to_string_lossy) });
-            print_line(&event.to_string());
+            let event = Event::Error {
+                message: text.to_owned(),
+                input: input.map(|input| input.to_string_lossy().into_owned()),
+            };
+            print_line(&json_of(&event));
         }
         match input {
             Some(input) if !text.contains(&*input.to_string_lossy()) => {
@@ -188,4 +195,11 @@ impl Console {
             (false, _) => ProgressBar::visible(length, label),
         }
     }
+}
+
+/// An event as a line: its fields in the order of their names.
+pub(crate) fn json_of(event: &impl Serialize) -> String {
+    // Plain values of text and numbers: nothing in them that JSON lacks.
+    let value: Value = serde_json::to_value(event).unwrap_or_default();
+    value.to_string()
 }

@@ -4,9 +4,9 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressStyle;
-use serde_json::json;
 
 use super::lines::print_line;
+use super::{Event, json_of};
 
 /// Shortest time between two lines.
 const BETWEEN_LINES: Duration = Duration::from_millis(500);
@@ -37,9 +37,12 @@ impl Lines {
             return;
         }
         self.printed = Some(now);
-        let event =
-            json!({ "event": "progress", "what": self.what, "done": self.done, "of": self.of });
-        print_line(&event.to_string());
+        let event = Event::Progress {
+            what: self.what.clone(),
+            done: self.done,
+            of: self.of,
+        };
+        print_line(&json_of(&event));
     }
 }
 

@@ -248,6 +248,4 @@ fn pid_in(file: &File) -> Option<u32> {
 }
 
 #[cfg(test)]
-pub(crate) mod accounts;
-#[cfg(test)]
-mod tests;
+pub(crate) mod tests;

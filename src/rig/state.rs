@@ -15,9 +15,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 use serde::Serialize;
 use tokio::sync::watch;
-use utoipa::ToSchema;
 
-use advice::Situation;
 pub use advice::{Advice, AdvisedAction, AdvisedButton, Obstacle};
 pub use parts::{
     CameraState, CaptureSettings, Check, FaultLine, LogLine, Phase, TableState, TakeSummary,
@@ -35,7 +33,7 @@ const FAULTS_KEPT: usize = 50;
 const LOG_KEPT: usize = 40;
 
 /// All that a viewer may know.
-#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 #[non_exhaustive]
 pub struct RigState {
     /// Counts changes: a viewer that has seen this number has seen this state.
@@ -67,14 +65,12 @@ pub struct RigState {
     /// What the last preflight found.
     pub checks: Vec<Check>,
     /// Newest last.
-    #[schema(value_type = Vec<FaultLine>)]
     pub faults: VecDeque<FaultLine>,
     /// The last finished take.
     pub last_take: Option<TakeSummary>,
     /// How takes are captured.
     pub settings: CaptureSettings,
     /// What happened last, newest last.
-    #[schema(value_type = Vec<LogLine>)]
     pub log: VecDeque<LogLine>,
     /// What is made of the sessions.
     pub processing: ProcessingState,
@@ -83,45 +79,6 @@ pub struct RigState {
 }
 
 impl RigState {
-    fn situation(&self) -> Situation<'_> {
-        Situation {
-            phase: self.phase,
-            has_table: self.has_table(),
-            table: &self.table,
-            degrees_per_second: self.settings.degrees_per_second,
-            camera: &self.camera,
-            disk_fault: self.disk_fault.as_deref(),
-            free_bytes: self.free_bytes,
-            needed_bytes: self.needed_bytes,
-            next: self.queue.first().map(String::as_str),
-            last_take: self.last_take.as_ref(),
-        }
-    }
-
-    /// Whether nothing is captured at the moment.
-    #[must_use]
-    pub fn rests(&self) -> bool {
-        self.situation().rests()
-    }
-
-    /// What keeps a take from beginning: of several obstacles the first that a person has to remove.
-    #[must_use]
-    pub fn obstacle_to_take(&self) -> Option<Obstacle> {
-        self.situation().obstacle_to_take()
-    }
-
-    /// What keeps the table from moving, other than that there is to be none.
-    #[must_use]
-    pub fn obstacle_to_motion(&self) -> Option<Obstacle> {
-        self.situation().obstacle_to_motion()
-    }
-
-    /// What is wrong with the table, other than that there is to be none.
-    #[must_use]
-    pub fn obstacle_of_table(&self) -> Option<Obstacle> {
-        self.situation().obstacle_of_table()
-    }
-
     /// Whether the rig has a table, be it there at the moment or not.
     #[must_use]
     pub fn has_table(&self) -> bool {
@@ -180,7 +137,7 @@ impl Monitor {
             let phase = state.phase.to_string();
             state.note(phase);
         }
-        state.advice = Advice::of(&state.situation());
+        state.advice = Advice::of(&state);
         state.version = state.version.wrapping_add(1);
         self.shared.changed.notify_all();
         self.shared.version.send_replace(state.version);
@@ -253,6 +210,6 @@ mod tests {
     #[test]
     fn a_rig_of_which_nothing_is_known_has_its_own_advice() {
         let state = RigState::default();
-        assert_eq!(Advice::default(), Advice::of(&state.situation()));
+        assert_eq!(Advice::default(), Advice::of(&state));
     }
 }

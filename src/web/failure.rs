@@ -5,7 +5,6 @@ use axum::extract::rejection::QueryRejection;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
-use utoipa::ToSchema;
 
 /// Why a request was not served.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -16,10 +15,9 @@ pub struct Failure {
 }
 
 /// What the client gets to read.
-#[derive(Debug, Serialize, ToSchema)]
+#[derive(Debug, Serialize)]
 pub struct Problem {
     /// What failed, on what, what to do.
-    #[schema(example = "a capture is under way: stop it first")]
     error: String,
 }
 

@@ -46,23 +46,13 @@ pub enum TokenFileError {
         /// The system's answer.
         source: io::Error,
     },
-    /// Other accounts can read or change it.
-    #[error(
-        "the token's file {path} is open to other accounts (mode {mode:03o}): `chmod 600` it, or 640 for a group that may know it"
-    )]
-    Exposed {
-        /// The file.
-        path: PathBuf,
-        /// Its permissions.
-        mode: u32,
-    },
-    /// What it holds is no token.
-    #[error("the token's file {path} holds no token")]
+    /// It is open to other accounts, or holds no token.
+    #[error("the token's file {path} {why}")]
     Invalid {
         /// The file.
         path: PathBuf,
-        /// What a token is.
-        source: InvalidToken,
+        /// What is wrong with it, and what to do.
+        why: String,
     },
 }
 
@@ -90,8 +80,12 @@ impl Token {
         let file = File::open(path).map_err(failed)?;
         let mode = file.metadata().map_err(failed)?.mode() & 0o777;
         if mode & FORBIDDEN != 0 {
-            let path = path.to_owned();
-            return Err(TokenFileError::Exposed { path, mode });
+            return Err(TokenFileError::Invalid {
+                path: path.to_owned(),
+                why: format!(
+                    "is open to other accounts (mode {mode:03o}): `chmod 600` it, or 640 for a group that may know it"
+                ),
+            });
         }
         let mut text = String::new();
         file.take(LONGEST_FILE)
@@ -99,9 +93,9 @@ impl Token {
             .map_err(failed)?;
         text.trim()
             .parse()
-            .map_err(|source| TokenFileError::Invalid {
+            .map_err(|wrong: InvalidToken| TokenFileError::Invalid {
                 path: path.to_owned(),
-                source,
+                why: format!("holds no token: {wrong}"),
             })
     }
 

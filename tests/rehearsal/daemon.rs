@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use relit_data::session::{Manifest, SessionWriter};
 use relit_rig::capture::{CaptureError, Settings};
+use relit_rig::command::{Command, Refused, Rig};
 use relit_rig::daemon::Daemon;
-use relit_rig::serve::rig::{Command, Refused, Rig};
 use relit_rig::state::{Phase, RigState, Verdict};
 
 use crate::support::{SHORT, fixture};

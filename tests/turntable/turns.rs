@@ -49,8 +49,7 @@ fn turn_and_compare(rig: &Rig) -> f64 {
     println!(
         "angle error, degrees: median {median:.4}, p99 {p99:.4}, largest {largest:.4}; {} polls, \
          half a round trip {:.0} us",
-        track.polls(),
-        track.half_round_trip_us()
+        track.polls, track.half_round_trip_us
     );
     assert!((rig.truth() - zero).abs() <= STEP_DEG, "it was not unwound");
     p99

@@ -1,13 +1,12 @@
 //! The command line, and what it asks for.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use relit_rig::camera::hold::ManualValues;
 use relit_rig::camera::{CameraAddress, Fourcc};
 use relit_rig::capture::{ModePreference, Settings};
-use relit_rig::serve::{ListenAddress, Token};
+use relit_rig::serve::ListenAddress;
 use relit_rig::turntable;
 
 use crate::turntable_arguments::{
@@ -31,53 +30,19 @@ Addresses: --camera v4l2:/dev/video0 | nokhwa:0 | replay:PATH, --turntable seria
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
 
-/// What the command line asks for.
-pub(crate) struct Arguments {
-    pub(crate) json: bool,
-    pub(crate) command: Command,
-}
-
-/// What the program does.
-pub(crate) enum Command {
-    Devices,
-    Record(Box<Record>),
-    Serve(Box<Serve>),
-    Turntable(TurntableArguments),
-    Simulate(SimulateArguments),
-    Token { file: PathBuf },
-}
-
-/// One capture.
-pub(crate) struct Record {
-    pub(crate) settings: Settings,
-    pub(crate) object: String,
-    pub(crate) meter: bool,
-    pub(crate) yes: bool,
-}
-
-/// The daemon.
-pub(crate) struct Serve {
-    pub(crate) settings: Settings,
-    pub(crate) address: SocketAddr,
-    pub(crate) token: Option<Token>,
-    pub(crate) token_file: Option<PathBuf>,
-    pub(crate) names: Vec<String>,
-    pub(crate) datasets: Option<PathBuf>,
-}
-
 /// Record turns of objects on a turntable as session folders.
 #[derive(Parser)]
 #[command(name = "relit-capture", version, after_help = EXAMPLES)]
-struct CommandLine {
+pub(crate) struct CommandLine {
     #[command(subcommand)]
-    verb: Verb,
+    pub(crate) verb: Verb,
     /// Print JSON lines on standard output, for machines.
     #[arg(long, global = true)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 #[derive(Subcommand)]
-enum Verb {
+pub(crate) enum Verb {
     /// List cameras with their modes and controls, and the turntable's port.
     #[command(after_help = "Example:\n  relit-capture devices --json")]
     Devices,
@@ -85,68 +50,58 @@ enum Verb {
     #[command(
         after_help = "Example:\n  relit-capture record --object mug --turntable serial: --meter"
     )]
-    Record(RecordArguments),
+    Record(Box<RecordArguments>),
     /// Serve the rig: a page for a phone or a browser, and an interface for scripts.
     #[command(
         after_help = "Example:\n  relit-capture serve --turntable serial: --listen 0.0.0.0:8420"
     )]
-    Serve(ServeArguments),
+    Serve(Box<ServeArguments>),
     /// Look at the turntable, or move it.
     #[command(after_help = TURNTABLE_EXAMPLES)]
     Turntable(TurntableArguments),
-    /// Show the token that lets a browser or a script in.
-    #[command(after_help = "Example:\n  sudo relit-capture token")]
-    Token {
-        /// The file that `serve --token-file` has.
-        #[arg(long, value_name = "FILE", default_value = "/var/lib/relit/token")]
-        token_file: PathBuf,
-    },
     /// Run a turntable without hardware: the firmware on a pseudoterminal.
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(SimulateArguments),
 }
 
 #[derive(Args)]
-struct RecordArguments {
+pub(crate) struct RecordArguments {
     /// The object's name, as it goes into the session's: letters, digits, '-', '_', '.'.
     #[arg(long, value_name = "NAME")]
-    object: String,
+    pub(crate) object: String,
     /// Find the exposure on a slow metering turn first.
     #[arg(long)]
-    meter: bool,
+    pub(crate) meter: bool,
     /// Do not ask before the table turns.
     #[arg(long)]
-    yes: bool,
+    pub(crate) yes: bool,
     #[command(flatten)]
-    rig: RigArguments,
+    pub(crate) rig: RigArguments,
 }
 
 #[derive(Args)]
-struct ServeArguments {
+pub(crate) struct ServeArguments {
     /// Address and port to listen on; a port alone is this machine's own, which no other reaches.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8420")]
-    listen: ListenAddress,
-    /// What a client has to know, 16 to 128 letters, digits, '-' and '_' [default: random where other
-    /// machines can reach the address]. Other accounts of this machine can see it: prefer --token-file.
-    #[arg(long, value_name = "TOKEN", conflicts_with = "token_file")]
-    token: Option<Token>,
+    pub(crate) listen: ListenAddress,
     /// A file that holds the token, which only its owner and its group can read. Where there is none,
-    /// it is made with a random token; `relit-capture token` shows it.
+    /// it is made with a random token [default: a new one at each start, where other machines can reach the
+    /// address].
     #[arg(long, value_name = "FILE")]
-    token_file: Option<PathBuf>,
+    pub(crate) token_file: Option<PathBuf>,
     /// A name under which clients reach this machine, such as rig.local; may be given several times.
     #[arg(long = "name", value_name = "NAME")]
-    names: Vec<String>,
+    pub(crate) names: Vec<String>,
     /// The folder in which data sets are made, where relit-mask and relit-extract are installed [default: the
     /// one that holds --root].
     #[arg(long, value_name = "DIR")]
-    datasets: Option<PathBuf>,
+    pub(crate) datasets: Option<PathBuf>,
     #[command(flatten)]
-    rig: RigArguments,
+    pub(crate) rig: RigArguments,
 }
 
 #[derive(Args)]
-struct RigArguments {
+pub(crate) struct RigArguments {
     /// The folder in which session folders are made.
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     root: PathBuf,
@@ -180,9 +135,6 @@ struct RigArguments {
     /// Focus to hold [default: as it is].
     #[arg(long, value_name = "VALUE")]
     focus: Option<i64>,
-    /// Part of the pixels in the middle, per cent, that metering lets saturate.
-    #[arg(long, value_name = "PERCENT", default_value_t = 0.5, value_parser = percent)]
-    meter_clip: f64,
     /// Least voltage of the table's battery [default: not looked at].
     #[arg(long, value_name = "VOLTS", value_parser = volts)]
     min_battery: Option<f64>,
@@ -192,40 +144,6 @@ struct RigArguments {
     /// How often a take that came out bad is repeated; the bad ones are kept.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=100))]
     retries: u32,
-}
-
-/// The command line as its manual shows it.
-pub(crate) fn command() -> clap::Command {
-    CommandLine::command()
-}
-
-/// Reads the command line; ends the program with exit code 2 where it is wrong.
-pub(crate) fn parse() -> Arguments {
-    let line = CommandLine::parse();
-    let command = match line.verb {
-        Verb::Devices => Command::Devices,
-        Verb::Record(line) => Command::Record(Box::new(Record {
-            settings: line.rig.into(),
-            object: line.object,
-            meter: line.meter,
-            yes: line.yes,
-        })),
-        Verb::Serve(line) => Command::Serve(Box::new(Serve {
-            settings: line.rig.into(),
-            address: line.listen.socket(),
-            token: line.token,
-            token_file: line.token_file,
-            names: line.listen.names(&line.names),
-            datasets: line.datasets,
-        })),
-        Verb::Turntable(line) => Command::Turntable(line),
-        Verb::Simulate(line) => Command::Simulate(line),
-        Verb::Token { token_file } => Command::Token { file: token_file },
-    };
-    Arguments {
-        json: line.json,
-        command,
-    }
 }
 
 impl From<RigArguments> for Settings {
@@ -247,7 +165,6 @@ impl From<RigArguments> for Settings {
         settings.min_battery_v = line.min_battery;
         settings.max_dropped = line.max_dropped;
         settings.retries = line.retries;
-        settings.meter_clip = line.meter_clip / 100.0;
         settings.commit = option_env!("RELIT_COMMIT").unwrap_or_default().to_owned();
         settings
     }
@@ -283,10 +200,6 @@ fn speed(text: &str) -> Result<f64, String> {
 
 fn rate(text: &str) -> Result<f64, String> {
     figure(text, 1.0, 1000.0, "frames a second")
-}
-
-fn percent(text: &str) -> Result<f64, String> {
-    figure(text, 0.0, 100.0, "per cent")
 }
 
 fn volts(text: &str) -> Result<f64, String> {

@@ -8,7 +8,7 @@ use relit_rig::clock::Clock;
 use relit_rig::turntable::{TurntableError, find_serial};
 use serde_json::{Value, json};
 
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 
 pub(crate) fn run(console: Console) -> ExitCode {
     let cameras = camera::list();
@@ -31,7 +31,7 @@ fn report_camera(console: Console, info: &DeviceInfo) {
         Ok(controls) => (controls, None),
         Err(error) => (Vec::new(), Some(with_causes(&error))),
     };
-    let problems: Vec<&String> = info.problems.iter().chain(&problem).collect();
+    let problems: Vec<String> = info.problems.iter().cloned().chain(problem).collect();
     let mut text = format!(
         "{}: {} ({}, {})",
         info.address, info.name, info.driver, info.bus
@@ -49,16 +49,15 @@ fn report_camera(console: Console, info: &DeviceInfo) {
     let controls: Vec<Value> = controls.iter().map(as_json).collect();
     console.say(
         &text,
-        &json!({
-            "event": "camera",
-            "address": info.address.to_string(),
-            "name": info.name,
-            "driver": info.driver,
-            "bus": info.bus,
-            "modes": modes,
-            "controls": controls,
-            "problems": problems,
-        }),
+        &Event::Camera {
+            address: info.address.to_string(),
+            name: info.name.clone(),
+            driver: info.driver.clone(),
+            bus: info.bus.clone(),
+            modes,
+            controls,
+            problems,
+        },
     );
 }
 
@@ -103,23 +102,15 @@ fn as_json(control: &Control) -> Value {
 }
 
 fn report_turntable(console: Console) {
-    match find_serial() {
-        Ok(path) => {
-            let address = format!("serial:{}", path.display());
-            let text = format!("{address}: a port that a turntable's controller may be at");
-            console.say(
-                &text,
-                &json!({ "event": "turntable", "addresses": [address] }),
-            );
-        }
-        Err(TurntableError::SeveralCandidates(ports)) => {
-            let addresses: Vec<String> =
-                ports.iter().map(|port| format!("serial:{port}")).collect();
-            console.say(
-                &addresses.join("\n"),
-                &json!({ "event": "turntable", "addresses": addresses }),
-            );
-        }
-        Err(error) => console.warn(&with_causes(&error)),
-    }
+    let ports = match find_serial() {
+        Ok(path) => vec![path.display().to_string()],
+        Err(TurntableError::SeveralCandidates(ports)) => ports,
+        Err(error) => return console.warn(&with_causes(&error)),
+    };
+    let addresses: Vec<String> = ports.iter().map(|port| format!("serial:{port}")).collect();
+    let text = match addresses.as_slice() {
+        [address] => format!("{address}: a port that a turntable's controller may be at"),
+        several => several.join("\n"),
+    };
+    console.say(&text, &Event::Turntable { addresses });
 }

@@ -7,27 +7,26 @@ mod environment;
 mod recording;
 mod serving;
 mod simulate;
-mod token;
 mod turntable;
 mod turntable_arguments;
 
 use std::process::ExitCode;
 
-use arguments::Command;
+use arguments::{CommandLine, Verb};
+use clap::{CommandFactory, Parser};
 use relit_console::Console;
 
 fn main() -> ExitCode {
-    if let Some(code) = relit_console::written_manual(arguments::command()) {
+    if let Some(code) = relit_console::written_manual(CommandLine::command()) {
         return code;
     }
-    let arguments = arguments::parse();
-    let console = Console::new(arguments.json);
-    match arguments.command {
-        Command::Devices => devices::run(console),
-        Command::Record(record) => console.finish(recording::run(console, *record)),
-        Command::Serve(serve) => console.finish(serving::run(console, *serve)),
-        Command::Turntable(asked) => console.finish(turntable::run(console, &asked)),
-        Command::Token { file } => console.finish(token::run(console, &file)),
-        Command::Simulate(asked) => console.finish(simulate::run(console, &asked)),
+    let line = CommandLine::parse();
+    let console = Console::new(line.json);
+    match line.verb {
+        Verb::Devices => devices::run(console),
+        Verb::Record(record) => console.finish(recording::run(console, *record)),
+        Verb::Serve(serve) => console.finish(serving::run(console, *serve)),
+        Verb::Turntable(asked) => console.finish(turntable::run(console, &asked)),
+        Verb::Simulate(asked) => console.finish(simulate::run(console, &asked)),
     }
 }

@@ -13,21 +13,22 @@ use relit_rig::state::{Monitor, Phase, RigState, Verdict};
 use relit_rig::turntable::TurntableAddress;
 use serde_json::json;
 
-use crate::arguments::Record;
+use crate::arguments::RecordArguments;
 use crate::environment::at_end;
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 use relit_data::durable::MadeFolder;
 
 /// How often progress is looked at.
 const UPDATE: Duration = Duration::from_millis(100);
 
-pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureError> {
-    let Record {
-        settings,
+pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, CaptureError> {
+    let RecordArguments {
+        rig,
         object,
         meter,
         yes,
     } = record;
+    let settings: Settings = rig.into();
     let _made = make_root(&settings)?;
     if !yes && matches!(settings.turntable, TurntableAddress::Serial(_)) && !agreed(console)? {
         console.warn("the table was not turned: nobody agreed; --yes agrees beforehand");
@@ -38,7 +39,8 @@ pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureEr
     let mut equipment = Equipment::new(settings)?;
     let stop = StopRequest::new(&equipment.clock());
     let asked = stop.clone();
-    at_end(move || asked.ask(Stopped::Shutdown)).map_err(system("the signals", "listened to"))?;
+    at_end(move || asked.ask(Stopped::Shutdown))
+        .map_err(CaptureError::system("the signals", "listened to"))?;
     let monitor = Monitor::default();
     let request = CaptureRequest { object, meter };
     let context = CaptureContext {
@@ -53,21 +55,10 @@ pub(crate) fn run(console: Console, record: Record) -> Result<Outcome, CaptureEr
     Ok(report(console, &captured, &folder.display().to_string()))
 }
 
-fn system(what: &'static str, doing: &'static str) -> impl FnOnce(io::Error) -> CaptureError {
-    move |source| CaptureError::System {
-        what: what.to_owned(),
-        doing,
-        source,
-    }
-}
-
 /// Makes the folder of sessions; one that stays empty is removed at the end.
 fn make_root(settings: &Settings) -> Result<MadeFolder, CaptureError> {
-    MadeFolder::make(&settings.root).map_err(|source| CaptureError::System {
-        what: settings.root.display().to_string(),
-        doing: "made",
-        source,
-    })
+    let root = settings.root.display().to_string();
+    MadeFolder::make(&settings.root).map_err(CaptureError::system(root, "made"))
 }
 
 /// Asks the person at the terminal; where there is none, nobody agrees.
@@ -80,7 +71,7 @@ fn agreed(console: Console) -> Result<bool, CaptureError> {
     );
     let mut answer = String::new();
     let read = io::stdin().read_line(&mut answer);
-    read.map_err(system("the answer", "read"))?;
+    read.map_err(CaptureError::system("the answer", "read"))?;
     Ok(matches!(answer.trim(), "y" | "Y" | "yes"))
 }
 
@@ -141,7 +132,11 @@ impl Reporter {
             let mark = if check.good { "ok" } else { "note" };
             self.console.say(
                 &format!("{mark:>4}  {}: {}", check.what, check.found),
-                &json!({ "event": "check", "what": check.what, "good": check.good, "found": check.found }),
+                &Event::Check(relit_console::Check::Rig {
+                    what: check.what.clone(),
+                    good: check.good,
+                    found: check.found.clone(),
+                }),
             );
         }
         self.checks = state.checks.len();
@@ -167,7 +162,9 @@ impl Reporter {
         };
         self.console.say_phase(
             &state.phase.to_string(),
-            &json!({ "event": "phase", "phase": state.phase }),
+            &Event::Phase {
+                phase: json!(state.phase),
+            },
         );
     }
 }
@@ -182,7 +179,10 @@ fn report(console: Console, captured: &Captured, folder: &str) -> Outcome {
             "{folder}: {} frames, {} dropped, {verdict}{reason}",
             take.frames, take.dropped
         ),
-        &json!({ "event": "done", "session": folder, "take": take }),
+        &Event::Done(relit_console::Done::Capture {
+            session: folder.to_owned(),
+            take: json!(take),
+        }),
     );
     outcome
 }

@@ -1,64 +1,39 @@
 //! `relit-capture serve`: the daemon and its page.
 
+use std::error::Error;
 use std::sync::Arc;
 
-use relit_rig::capture::CaptureError;
+use relit_rig::capture::{CaptureError, Settings};
+use relit_rig::command::Rig;
 use relit_rig::daemon::Daemon;
 use relit_rig::lockfile::LockFile;
-use relit_rig::processing::{Processing, ProcessingError, ProcessingOptions};
-use relit_rig::serve::rig::Rig;
-use relit_rig::serve::{
-    Announcement, ServeError, ServeOptions, Shutdown, Token, TokenFileError, check_address, serve,
-};
+use relit_rig::processing::{Processing, ProcessingOptions};
+use relit_rig::serve::{Announcement, ServeOptions, Shutdown, Token, check_address, serve};
 use sd_notify::NotifyState;
-use serde_json::json;
 
-use crate::arguments::Serve;
+use crate::arguments::ServeArguments;
 use crate::environment::{at_end, heartbeat, notify_service, programs};
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 use relit_data::durable::MadeFolder;
 
-/// Why the rig is not served.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum Error {
-    /// The rig.
-    #[error(transparent)]
-    Rig(#[from] CaptureError),
-    /// The server.
-    #[error(transparent)]
-    Serve(#[from] ServeError),
-    /// The token's file.
-    #[error(transparent)]
-    Token(#[from] TokenFileError),
-    /// The processing of sessions.
-    #[error(transparent)]
-    Processing(#[from] ProcessingError),
-}
-
-pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
-    let root = &asked.settings.root.clone();
-    let failed = |what: String, doing| {
-        move |source| CaptureError::System {
-            what,
-            doing,
-            source,
-        }
-    };
-    let token = match &asked.token_file {
-        Some(path) => Some(Token::from_file_or_new(path)?),
-        None => asked.token,
-    };
+pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Box<dyn Error>> {
+    let settings: Settings = asked.rig.into();
+    let root = &settings.root.clone();
+    let address = asked.listen.socket();
+    let token = asked.token_file.as_deref().map(Token::from_file_or_new);
+    let token = token.transpose()?;
     // An address that is taken is known before anything is made or moved.
-    check_address(asked.address)?;
-    let made = MadeFolder::make(root).map_err(failed(root.display().to_string(), "made"))?;
+    check_address(address)?;
+    let made =
+        MadeFolder::make(root).map_err(CaptureError::system(root.display().to_string(), "made"))?;
     let shutdown = Shutdown::new();
     let ending = shutdown.clone();
     let end = move || {
         notify_service(&[NotifyState::Stopping]);
         ending.cancel();
     };
-    at_end(end).map_err(failed("the signals".to_owned(), "listened to"))?;
-    let rig = Daemon::start(asked.settings).inspect_err(|_| {
+    at_end(end).map_err(CaptureError::system("the signals", "listened to"))?;
+    let rig = Daemon::start(settings).inspect_err(|_| {
         if made.is_new() {
             LockFile::forget_root(root);
         }
@@ -73,9 +48,9 @@ pub(crate) fn run(console: Console, asked: Serve) -> Result<Outcome, Error> {
     let options = ServeOptions {
         processing: Some(Arc::clone(&processing)),
         token,
-        names: asked.names,
+        names: asked.listen.names(&asked.names),
         heartbeat: heartbeat(),
-        ..ServeOptions::at(asked.address)
+        ..ServeOptions::at(address)
     };
     serve(rig.clone(), options, &shutdown, |announcement| {
         let status = format!("Serving on {}", announcement.address);
@@ -96,6 +71,9 @@ fn announce(console: Console, announcement: &Announcement) {
     }
     console.say(
         &text,
-        &json!({ "event": "serving", "url": announcement.url, "address": announcement.address.to_string() }),
+        &Event::Serving {
+            url: announcement.url.clone(),
+            address: announcement.address.to_string(),
+        },
     );
 }

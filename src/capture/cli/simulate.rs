@@ -13,7 +13,7 @@ use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::turntable_arguments::SimulateArguments;
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 
 /// Interval at which the end conditions are checked.
 const LOOK: Duration = Duration::from_millis(50);
@@ -26,10 +26,7 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
         },
         faults: asked.fault.join(",").parse::<TableFaults>()?,
         seed: asked.seed,
-        start_angle: asked.start_angle,
         index_at: asked.index_at,
-        battery: asked.battery,
-        drift_ppm: asked.drift_ppm,
         reset_on_open: !asked.no_reset,
         ..SimulatorOptions::default()
     };
@@ -40,7 +37,10 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
             "a simulated turntable is at {}; end it with Ctrl-C",
             port.display()
         ),
-        &json!({ "event": "ready", "port": port, "speed": asked.speed }),
+        &Event::Ready {
+            port: port.to_string_lossy().into_owned(),
+            speed: asked.speed,
+        },
     );
     wait(console, asked.for_seconds);
     report(console, &simulator.stop());
@@ -73,7 +73,8 @@ fn report(console: Console, counts: &SimulatorCounts) {
         of_the_wire(&counts.to_chip),
         of_the_wire(&counts.from_chip),
     );
-    console.say(&text, &json!({ "event": "ended", "counts": counts }));
+    let counts = json!(counts);
+    console.say(&text, &Event::Ended { counts });
 }
 
 fn of_the_wire(counts: &WireCounts) -> String {

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use relit_rig::turntable::{
     Homed, Owner, Table, TableOptions, TableStatus, TurntableAddress, TurntableError, find_serial,
 };
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::environment::at_end;
 use crate::turntable_arguments::{Action, TurntableArguments};
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 
 pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcome, TurntableError> {
     let port = match &asked.turntable {
@@ -34,12 +34,12 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
             if with_home {
                 home(console, &table)?;
             }
-            report(console, "jogged", &table.jog(degrees, speed)?);
+            report(console, Event::Jogged, &table.jog(degrees, speed)?);
             Ok(Outcome::Whole)
         }
         Action::Unlock => {
             let table = open(console, &port, &options)?;
-            report(console, "unlocked", &table.unlock()?);
+            report(console, Event::Unlocked, &table.unlock()?);
             Ok(Outcome::Whole)
         }
     }
@@ -95,7 +95,7 @@ fn status(
         Some(owner) => owner.status()?,
         None => open(console, port, options)?.status()?,
     };
-    report(console, "status", &status);
+    report(console, Event::Status, &status);
     Ok(Outcome::Whole)
 }
 
@@ -104,7 +104,7 @@ fn stop(console: Console, port: &Path, options: &TableOptions) -> Result<Outcome
         Some(owner) => owner.stop()?,
         None => Table::open_serial(port, options)?.stop()?,
     };
-    report(console, "stopped", &status);
+    report(console, Event::Stopped, &status);
     Ok(Outcome::Whole)
 }
 
@@ -117,18 +117,12 @@ fn home(console: Console, table: &Table) -> Result<Outcome, TurntableError> {
              stands, for as long as it is not switched off or reset",
         );
     }
-    report(console, "homed", &status);
+    report(console, Event::Homed, &status);
     Ok(Outcome::Whole)
 }
 
-fn report(console: Console, event: &str, status: &TableStatus) {
-    let mut value = json!({ "event": event });
-    if let (Some(map), Ok(facts)) = (value.as_object_mut(), serde_json::to_value(status))
-        && let Some(facts) = facts.as_object()
-    {
-        map.extend(facts.clone());
-    }
-    console.say(&in_words(status), &value);
+fn report(console: Console, event: fn(Value) -> Event, status: &TableStatus) {
+    console.say(&in_words(status), &event(json!(status)));
 }
 
 fn in_words(status: &TableStatus) -> String {

@@ -79,14 +79,6 @@ pub(crate) struct SimulateArguments {
     /// Seed of the random faults.
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Angle at which the table stands when it is switched on, degrees.
-    #[arg(
-        long,
-        value_name = "DEGREES",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    pub(crate) start_angle: f64,
     /// Angle of the index sensor, degrees.
     #[arg(
         long,
@@ -95,17 +87,6 @@ pub(crate) struct SimulateArguments {
         allow_negative_numbers = true
     )]
     pub(crate) index_at: f64,
-    /// Volts of its battery.
-    #[arg(long, value_name = "VOLTS", default_value_t = 12.0)]
-    pub(crate) battery: f64,
-    /// How much faster than the host's clock its own goes, parts in a million.
-    #[arg(
-        long,
-        value_name = "PPM",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    pub(crate) drift_ppm: f64,
     /// Opening the port does not reset the controller, as an Arduino's does.
     #[arg(long)]
     pub(crate) no_reset: bool,

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 use relit_extract::ExtractError;
 use relit_extract::card::{CardFacts, write_card};
 use relit_extract::objects::{ObjectError, is_url};
-use serde_json::json;
 
 pub(crate) fn run(
     console: Console,
@@ -27,7 +26,9 @@ pub(crate) fn run(
         let path = out.join(file);
         console.say(
             &path.display().to_string(),
-            &json!({ "event": "described", "output": path.to_string_lossy() }),
+            &Event::Described {
+                output: path.to_string_lossy().into_owned(),
+            },
         );
     }
     Ok(Outcome::Whole)

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use relit_console::ProgressBar;
 use relit_console::{Console, Outcome};
+use relit_console::{Done, Event, ProgressBar};
 use relit_data::causes::with_causes;
 use relit_data::counts::count_of;
 use relit_data::shard::SessionEntry;
@@ -29,7 +29,9 @@ pub(crate) fn run(
                 "task {task}: every {}th recording is this one's",
                 task.count()
             ),
-            &json!({ "event": "task", "task": task.to_string() }),
+            &Event::Task {
+                task: task.to_string(),
+            },
         );
     }
     let tally = extract(inputs, out, options, &reporter)?;
@@ -54,15 +56,14 @@ pub(crate) fn run(
             tally.left_out,
             tally.failed
         ),
-        &json!({
-            "event": "done",
-            "out": out.to_string_lossy(),
-            "extracted": tally.extracted,
-            "lossy": tally.lossy,
-            "misfits": tally.misfits,
-            "skipped": tally.skipped,
-            "left_out": tally.left_out,
-            "failed": tally.failed,
+        &Event::Done(Done::Extraction {
+            out: out.to_string_lossy().into_owned(),
+            extracted: tally.extracted as u64,
+            lossy: tally.lossy as u64,
+            misfits: tally.misfits as u64,
+            skipped: tally.skipped as u64,
+            left_out: tally.left_out as u64,
+            failed: tally.failed as u64,
         }),
     );
     let nothing_came_out = tally.extracted + tally.skipped == 0;
@@ -95,20 +96,20 @@ impl Reporter<'_> {
         };
         self.console.say(
             &format!("{}: already extracted, skipped{flaw}", entry.id),
-            &json!({
-                "event": "skipped",
-                "id": entry.id,
-                "lossy": entry.lossy,
-                "misfit": entry.has_misfit(),
-            }),
+            &Event::Skipped {
+                id: entry.id.clone(),
+                lossy: entry.lossy,
+                misfit: entry.has_misfit(),
+            },
         );
     }
 
     fn left_out(&self, recording: &Path, error: &ExtractError) {
-        let (input, why) = (recording.to_string_lossy(), with_causes(error));
+        let input = recording.to_string_lossy().into_owned();
+        let message = with_causes(error);
         self.console.say(
-            &format!("{input}: left out: {why}"),
-            &json!({ "event": "left_out", "input": input, "message": why }),
+            &format!("{input}: left out: {message}"),
+            &Event::LeftOut { input, message },
         );
     }
 
@@ -126,7 +127,9 @@ impl Reporter<'_> {
                 entry.spec_net,
                 report.display()
             ),
-            &json!({ "event": "extracted", "session": entry }),
+            &Event::Extracted {
+                session: json!(entry),
+            },
         );
     }
 }

@@ -2,18 +2,20 @@
 
 use std::path::Path;
 
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
 use relit_extract::ExtractError;
 use relit_extract::objects::merge;
-use serde_json::json;
 
 pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
     let merged = merge(out)?;
     for (name, why) in &merged.left_out {
         console.say(
             &format!("{name}: left out: {why}"),
-            &json!({ "event": "left_out", "input": name, "message": why }),
+            &Event::LeftOut {
+                input: name.clone(),
+                message: why.clone(),
+            },
         );
     }
     let (sessions, tasks) = (merged.dataset.sessions.len(), merged.tasks);
@@ -31,13 +33,12 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
             count_of(samples, "sample"),
             count_of(tasks.into(), "task")
         ),
-        &json!({
-            "event": "merged",
-            "out": out.to_string_lossy(),
-            "sessions": sessions,
-            "samples": samples,
-            "tasks": tasks,
-        }),
+        &Event::Merged {
+            out: out.to_string_lossy().into_owned(),
+            sessions: sessions as u64,
+            samples,
+            tasks: tasks.into(),
+        },
     );
     let mut sessions = merged.dataset.sessions.iter();
     let is_flawed = sessions.any(|session| session.lossy || session.has_misfit());

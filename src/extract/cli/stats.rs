@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
 use relit_data::durable;
 use relit_data::report::render_overview;
@@ -144,13 +144,12 @@ fn percent(part: u64, whole: u64) -> f64 {
 }
 
 /// One session for a machine.
-fn event(session: &SessionOverview) -> Value {
+fn event(session: &SessionOverview) -> Event {
     let entry = &session.entry;
     let mut quality = json!(session.quality);
     quality["verdict"] = json!(session.verdict());
     quality["reasons"] = json!(session.reasons());
-    json!({
-        "event": "session",
+    Event::Session(json!({
         "id": entry.id,
         "object": entry.object,
         "samples": entry.samples,
@@ -160,7 +159,7 @@ fn event(session: &SessionOverview) -> Value {
         "warnings": entry.warnings,
         "quality": quality,
         "histogram": session.histogram,
-    })
+    }))
 }
 
 /// The samples by saturated fraction, as bars.
@@ -218,14 +217,13 @@ fn sums(out: &Path, overview: &Overview, totals: &OverviewTotals) -> String {
     )
 }
 
-fn sums_event(out: &Path, overview: &Overview, totals: &OverviewTotals) -> Value {
+fn sums_event(out: &Path, overview: &Overview, totals: &OverviewTotals) -> Event {
     let verdicts: serde_json::Map<String, Value> = QualityVerdict::ALL
         .into_iter()
         .map(|verdict| (verdict.to_string(), overview.count(Some(verdict)).into()))
         .chain([("not_judged".to_owned(), overview.count(None).into())])
         .collect();
-    json!({
-        "event": "stats",
+    Event::Stats(json!({
         "out": out.to_string_lossy(),
         "sessions": overview.sessions.len(),
         "verdicts": verdicts,
@@ -242,5 +240,5 @@ fn sums_event(out: &Path, overview: &Overview, totals: &OverviewTotals) -> Value
         "warnings": totals.warnings,
         "bounds": SATURATION_BOUNDS,
         "histogram": totals.histogram,
-    })
+    }))
 }

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
 use relit_data::shard::verify;
 use relit_extract::ExtractError;
 use relit_extract::objects::{ObjectError, is_url};
-use serde_json::json;
 
 /// Number of problems that are printed for a person.
 const MAX_PRINTED: usize = 50;
@@ -28,7 +27,11 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         let (file, sample, what) = (&problem.file, &problem.sample, &problem.what);
         console.say(
             &problem.to_string(),
-            &json!({ "event": "problem", "file": file, "sample": sample, "message": what }),
+            &Event::Problem {
+                file: file.clone(),
+                sample: sample.clone(),
+                message: what.clone(),
+            },
         );
     }
     if count > console.most_lines(MAX_PRINTED) {
@@ -49,14 +52,13 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
             count_of(report.shards as u64, "shard"),
             count_of(report.samples as u64, "sample")
         ),
-        &json!({
-            "event": "verified",
-            "out": out.to_string_lossy(),
-            "sessions": report.sessions,
-            "shards": report.shards,
-            "samples": report.samples,
-            "problems": count,
-        }),
+        &Event::Verified {
+            out: out.to_string_lossy().into_owned(),
+            sessions: report.sessions,
+            shards: report.shards,
+            samples: report.samples,
+            problems: count as u64,
+        },
     );
     Ok(if count == 0 {
         Outcome::Whole

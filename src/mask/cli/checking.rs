@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use relit_console::{Console, Outcome};
+use relit_console::{Check, Console, Event, Outcome};
 use relit_data::session::recordings;
 use relit_mask::{CheckOutput, MaskVerdict, MaskingError, check_mask};
 use serde_json::json;
@@ -59,11 +59,10 @@ fn print(output: &CheckOutput, console: Console) {
     for reason in &report.reasons {
         text += &format!("\n  {reason}");
     }
-    let event = json!({
-        "event": "check",
-        "recording": id,
-        "page": output.page.to_string_lossy(),
-        "report": report,
+    let event = Event::Check(Check::Mask {
+        recording: id.clone(),
+        page: output.page.to_string_lossy().into_owned(),
+        report: json!(report),
     });
     console.say(&text, &event);
 }

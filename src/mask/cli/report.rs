@@ -1,6 +1,8 @@
 //! What `relit-mask` prints about a mask.
 
-use relit_console::Console;
+use std::path::Path;
+
+use relit_console::{Console, Event};
 use relit_mask::MaskOutput;
 use relit_web::Announcement;
 use serde_json::json;
@@ -27,18 +29,17 @@ pub(crate) fn print(output: &MaskOutput, console: Console) {
         output.files.preview.display(),
     );
     let alpha = output.record.settings.alpha;
-    let alpha = alpha.then(|| output.files.alpha.to_string_lossy());
-    let event = json!({
-        "event": "mask",
-        "recording": id,
-        "mask": output.files.mask.to_string_lossy(),
-        "record": output.files.record.to_string_lossy(),
-        "preview": output.files.preview.to_string_lossy(),
-        "alpha": alpha,
-        "source": source,
-        "result": result,
-        "warnings": output.record.warnings,
-    });
+    let path = |path: &Path| path.to_string_lossy().into_owned();
+    let event = Event::Mask {
+        recording: id.clone(),
+        mask: path(&output.files.mask),
+        record: path(&output.files.record),
+        preview: path(&output.files.preview),
+        alpha: alpha.then(|| path(&output.files.alpha)),
+        source: json!(source),
+        result: json!(result),
+        warnings: output.record.warnings.clone(),
+    };
     console.say(&text, &event);
 }
 
@@ -51,6 +52,9 @@ pub(crate) fn print_editor(announcement: &Announcement, console: Console) {
     };
     console.say(
         &format!("{qr}Open in a browser: {url}"),
-        &json!({ "event": "editor", "address": announcement.address.to_string(), "url": url }),
+        &Event::Editor {
+            address: announcement.address.to_string(),
+            url: url.clone(),
+        },
     );
 }

@@ -5,10 +5,12 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use super::{AddressFault, CameraError};
+use super::CameraError;
 
 /// Fastest possible replay, times real time.
 const FASTEST: f64 = 1000.0;
+const NO_SCHEME: &str = "write v4l2:/dev/video0, nokhwa:0 or replay:PATH";
+const NO_PATH: &str = "a device is named by its path, such as /dev/video0";
 /// Most frames in a list.
 const MOST_FRAMES: usize = 10_000;
 
@@ -102,28 +104,30 @@ impl FromStr for CameraAddress {
     }
 }
 
-fn parse(text: &str) -> Result<CameraAddress, AddressFault> {
-    let (scheme, rest) = text.split_once(':').ok_or(AddressFault::Scheme)?;
+fn parse(text: &str) -> Result<CameraAddress, String> {
+    let (scheme, rest) = text.split_once(':').ok_or(NO_SCHEME)?;
     match scheme {
-        "v4l2" | "nokhwa" | "replay" if rest.is_empty() => Err(AddressFault::Empty),
-        "v4l2" if rest.contains('\0') => Err(AddressFault::Path),
+        "v4l2" | "nokhwa" | "replay" if rest.is_empty() => {
+            Err("nothing follows the colon".to_owned())
+        }
+        "v4l2" if rest.contains('\0') => Err(NO_PATH.to_owned()),
         "v4l2" => Ok(CameraAddress::V4l2(rest.into())),
         "nokhwa" => rest
             .parse()
             .map(CameraAddress::Nokhwa)
-            .map_err(|_| AddressFault::Number),
+            .map_err(|_| "nokhwa: is followed by a number from 0".to_owned()),
         "replay" => parse_replay(rest).map(CameraAddress::Replay),
-        _ => Err(AddressFault::Scheme),
+        _ => Err(NO_SCHEME.to_owned()),
     }
 }
 
-fn parse_replay(text: &str) -> Result<ReplayAddress, AddressFault> {
+fn parse_replay(text: &str) -> Result<ReplayAddress, String> {
     let (path, options) = text.rsplit_once('?').unwrap_or((text, ""));
     if path.is_empty() {
-        return Err(AddressFault::Empty);
+        return Err("nothing follows the colon".to_owned());
     }
     if path.contains('\0') {
-        return Err(AddressFault::Path);
+        return Err(NO_PATH.to_owned());
     }
     let mut replay = ReplayAddress {
         path: path.into(),
@@ -136,12 +140,9 @@ fn parse_replay(text: &str) -> Result<ReplayAddress, AddressFault> {
     for option in options.split('&').filter(|option| !option.is_empty()) {
         let (name, value) = option.split_once('=').unwrap_or((option, ""));
         if !seen.insert(name) {
-            return Err(AddressFault::Twice(name.to_owned()));
+            return Err(format!("the option {name:?} is given twice"));
         }
-        let wrong = || AddressFault::Value {
-            option: name.to_owned(),
-            value: value.to_owned(),
-        };
+        let wrong = || format!("{name} does not take the value {value:?}");
         let number = || value.parse().map(Some).map_err(|_| wrong());
         match name {
             "speed" => replay.speed = parse_speed(value).ok_or_else(wrong)?,
@@ -152,7 +153,11 @@ fn parse_replay(text: &str) -> Result<ReplayAddress, AddressFault> {
             "unplug" => faults.unplug = number()?,
             "stall" => faults.stall = number()?,
             "resize" => faults.resize = number()?,
-            _ => return Err(AddressFault::Option(name.to_owned())),
+            _ => {
+                return Err(format!(
+                    "the option {name:?} is unknown; the options are speed, loop, drop, damage, flag, unplug, resize and stall"
+                ));
+            }
         }
     }
     Ok(replay)
@@ -314,16 +319,17 @@ mod tests {
     #[test]
     fn a_wrong_address_names_the_mistake() {
         for (text, fault) in [
-            ("/dev/video0", AddressFault::Scheme),
-            ("usb:0", AddressFault::Scheme),
-            ("v4l2:", AddressFault::Empty),
-            ("replay:?speed=1", AddressFault::Empty),
-            ("v4l2:a\0b", AddressFault::Path),
-            ("nokhwa:-1", AddressFault::Number),
-            ("replay:a?fast=1", AddressFault::Option("fast".into())),
-            ("replay:a?loop=1&loop=1", AddressFault::Twice("loop".into())),
+            ("/dev/video0", NO_SCHEME),
+            ("usb:0", NO_SCHEME),
+            ("v4l2:", "nothing follows"),
+            ("replay:?speed=1", "nothing follows"),
+            ("v4l2:a\0b", NO_PATH),
+            ("nokhwa:-1", "a number from 0"),
+            ("replay:a?fast=1", "\"fast\" is unknown"),
+            ("replay:a?loop=1&loop=1", "\"loop\" is given twice"),
         ] {
-            assert_eq!(parse(text), Err(fault), "{text}");
+            let found = parse(text).unwrap_err();
+            assert!(found.contains(fault), "{text}: {found}");
         }
         for option in [
             "speed=-1",
@@ -335,8 +341,11 @@ mod tests {
             "drop=1,,2",
             "unplug=x",
         ] {
-            let found = parse(&format!("replay:a?{option}"));
-            assert!(matches!(found, Err(AddressFault::Value { .. })), "{option}");
+            let found = parse(&format!("replay:a?{option}")).unwrap_err();
+            assert!(
+                found.contains("does not take the value"),
+                "{option}: {found}"
+            );
         }
     }
 }

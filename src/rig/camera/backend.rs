@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::address::CameraAddress;
 use super::control::{Control, ControlId};
 use super::error::CameraError;
-use super::format::{Fourcc, Mode};
+use super::format::Mode;
 use super::frame::Frame;
 use super::request::{GrantedMode, ModeRequest};
 
@@ -37,7 +37,7 @@ pub trait Camera: Send {
     /// [`GrantedMode::differences`]. A running stream is stopped first.
     ///
     /// # Errors
-    /// [`CameraError::InUse`], [`CameraError::Format`], [`CameraError::Unplugged`], or another
+    /// [`CameraError::InUse`], [`CameraError::Unsupported`], [`CameraError::Unplugged`], or another
     /// error of the device; the camera is then stopped and may be started again.
     fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError>;
 
@@ -69,8 +69,6 @@ pub struct DeviceInfo {
     pub bus: String,
     /// The modes it offers, in formats that can be recorded.
     pub modes: Vec<Mode>,
-    /// Other formats it offers.
-    pub other_formats: Vec<Fourcc>,
     /// What could not be read, and why.
     pub problems: Vec<String>,
 }

@@ -26,7 +26,7 @@ pub enum CameraError {
         /// The text.
         text: String,
         /// What is wrong in it.
-        fault: AddressFault,
+        fault: String,
     },
     /// No such device.
     #[error(
@@ -112,24 +112,16 @@ pub enum CameraError {
         device: String,
     },
     /// The device refused a request.
-    #[error("{device} refused when {doing}: unplug it and plug it in again if this stays")]
+    #[error(
+        "{device} refused when {doing}: close other programs that use it; unplug it and plug it in again if this stays"
+    )]
     Refused {
         /// The device.
         device: String,
         /// What was done: "its formats were read".
         doing: &'static str,
-        /// The system's answer.
-        source: io::Error,
-    },
-    /// A pixel format that cannot be recorded.
-    #[error(
-        "{fourcc} frames cannot be recorded: ask {device} for MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer"
-    )]
-    Format {
-        /// The device.
-        device: String,
-        /// The format.
-        fourcc: Fourcc,
+        /// What the system, or a library, answers.
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A control could not be read or set.
     #[error("control {control} of {device} cannot be {doing}: {fault}")]
@@ -151,17 +143,7 @@ pub enum CameraError {
         /// The device.
         device: String,
         /// What it cannot do, and what can.
-        what: &'static str,
-    },
-    /// The portable camera library failed.
-    #[error("{device} failed when {doing}: check that no other program uses it")]
-    Backend {
-        /// The device.
-        device: String,
-        /// What was done: "it was opened".
-        doing: &'static str,
-        /// What the library, or the system under it, says.
-        source: Box<dyn std::error::Error + Send + Sync>,
+        what: String,
     },
     /// A replay has come to its end.
     #[error(
@@ -189,41 +171,14 @@ pub enum CameraError {
     Video(#[from] video::VideoError),
 }
 
-/// What is wrong in an address or mode.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum AddressFault {
-    /// No known scheme.
-    #[error("write v4l2:/dev/video0, nokhwa:0 or replay:PATH")]
-    Scheme,
-    /// Nothing after the colon.
-    #[error("nothing follows the colon")]
-    Empty,
-    /// Not a device's path.
-    #[error("a device is named by its path, such as /dev/video0")]
-    Path,
-    /// Not a camera's number.
-    #[error("nokhwa: is followed by a number from 0")]
-    Number,
-    /// An unknown option.
-    #[error(
-        "the option {0:?} is unknown; the options are speed, loop, drop, damage, flag, unplug, resize and stall"
-    )]
-    Option(String),
-    /// An option that is given twice.
-    #[error("the option {0:?} is given twice")]
-    Twice(String),
-    /// A value that the option does not take.
-    #[error("{option} does not take the value {value:?}")]
-    Value {
-        /// The option.
-        option: String,
-        /// Its value.
-        value: String,
-    },
-    /// Not a mode.
-    #[error("a mode is written as format:widthxheight@rate, such as MJPG:1920x1080@30")]
-    Mode,
+impl CameraError {
+    /// That frames of a format cannot be recorded.
+    pub(crate) fn format(device: String, fourcc: Fourcc) -> Self {
+        let what = format!(
+            "{fourcc} frames cannot be recorded; ask for MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer"
+        );
+        Self::Unsupported { device, what }
+    }
 }
 
 /// Why a control could not be read or set.

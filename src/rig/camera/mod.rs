@@ -46,7 +46,7 @@ use std::path::Path;
 pub use address::{CameraAddress, ReplayAddress, ReplayFaults};
 pub use backend::{Camera, DeviceInfo};
 pub use control::{Control, ControlFlags, ControlId, ControlKind, MenuItem, snake_case};
-pub use error::{AddressFault, CameraError, ControlFault};
+pub use error::{CameraError, ControlFault};
 pub use format::{Fourcc, Mode, Rates, Sizes};
 pub use frame::{Frame, FrameFault, SequenceUnwrapper};
 pub use rate::Rate;
@@ -76,7 +76,7 @@ fn open_v4l2(path: &Path) -> Result<Box<dyn Camera>, CameraError> {
 fn open_v4l2(path: &Path) -> Result<Box<dyn Camera>, CameraError> {
     Err(CameraError::Unsupported {
         device: path.display().to_string(),
-        what: "V4L2 is Linux's; give the camera as nokhwa:0",
+        what: "V4L2 is Linux's; give the camera as nokhwa:0".to_owned(),
     })
 }
 
@@ -94,7 +94,8 @@ fn open_nokhwa(number: u32) -> Result<Box<dyn Camera>, CameraError> {
             false => {
                 "this program was built without it; build it with the feature `nokhwa`, or give v4l2:/dev/video0"
             }
-        },
+        }
+        .to_owned(),
     })
 }
 

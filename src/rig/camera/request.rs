@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{AddressFault, CameraError, Fourcc, Rate};
+use super::{CameraError, Fourcc, Rate};
 
 /// The mode requested of a camera, written `MJPG:1920x1080@30`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +36,8 @@ impl FromStr for ModeRequest {
     fn from_str(text: &str) -> Result<Self, CameraError> {
         parse_request(text).ok_or_else(|| CameraError::Address {
             text: text.to_owned(),
-            fault: AddressFault::Mode,
+            fault: "a mode is written as format:widthxheight@rate, such as MJPG:1920x1080@30"
+                .to_owned(),
         })
     }
 }

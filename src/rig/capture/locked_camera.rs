@@ -57,7 +57,11 @@ impl LockedCamera {
         let plan = ManualPlan::new(&camera.controls()?, &settings.wanted);
         let not_held = plan.without(&settings.wanted);
         if !not_held.is_empty() {
-            return Err(Refusal::NotHeld(not_held).into());
+            return Err(Refusal::Other(format!(
+                "the camera cannot be set to {}: leave that out, or set it at the camera",
+                not_held.join(", ")
+            ))
+            .into());
         }
         require_kept(plan.apply(camera)?)?;
         let mut clock = FrameClock::default();
@@ -75,7 +79,7 @@ impl LockedCamera {
         let fourcc = mode.fourcc;
         let format = fourcc.pixel_format();
         let stream = StreamFormat {
-            format: format.ok_or(CameraError::Format { device, fourcc })?,
+            format: format.ok_or_else(|| CameraError::format(device, fourcc))?,
             width: mode.width,
             height: mode.height,
             fps: mode.rate.unwrap_or(request.rate).per_second(),
@@ -116,7 +120,13 @@ impl LockedCamera {
 fn require_kept(moved: Vec<ControlDrift>) -> Result<(), Refusal> {
     match moved.is_empty() {
         true => Ok(()),
-        false => Err(Refusal::NotKept(moved)),
+        false => {
+            let moved: Vec<String> = moved.iter().map(ControlDrift::to_string).collect();
+            Err(Refusal::Other(format!(
+                "the camera does not keep its settings: {}; close other programs that use it, or give values that it takes",
+                moved.join(", ")
+            )))
+        }
     }
 }
 
@@ -127,7 +137,10 @@ fn mode_check(request: &ModeRequest, mode: &GrantedMode) -> Result<Check, Refusa
     };
     let differences = with_rate.differences(request);
     if !differences.is_empty() {
-        return Err(Refusal::OtherMode(differences));
+        return Err(Refusal::Other(format!(
+            "the camera grants {}: ask for a mode that `relit-capture devices` lists",
+            differences.join(", ")
+        )));
     }
     Ok(match mode.rate {
         Some(_) => Check::passed("camera mode", mode.to_string()),
@@ -153,7 +166,10 @@ fn warm_up(camera: &mut dyn Camera, stop: &StopRequest) -> Result<f64, CaptureEr
         }
     }
     match last_fault.filter(|_| sizes.is_empty()) {
-        Some(fault) => Err(Refusal::Damaged(WARM_UP, fault).into()),
+        Some(fault) => Err(Refusal::Other(format!(
+            "the camera's first {WARM_UP} frames were damaged ({fault}): check its cable, or ask for another mode"
+        ))
+        .into()),
         None => Ok(sizes.iter().sum::<f64>() / sizes.len() as f64),
     }
 }

@@ -12,7 +12,6 @@
 mod context;
 mod equipment;
 mod error;
-mod journal;
 mod locked_camera;
 mod manifest;
 mod metering;

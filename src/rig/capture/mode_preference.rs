@@ -56,7 +56,7 @@ impl ModePreference {
     /// one whose frames take the least space.
     ///
     /// # Errors
-    /// [`Refusal::NoMode`] with what there is.
+    /// [`Refusal::Other`] with what there is.
     pub fn choose(&self, modes: &[Mode]) -> Result<ModeRequest, Refusal> {
         let requests = modes.iter().filter_map(|mode| self.of(mode));
         let rank = |fourcc: Fourcc| PREFERRED.iter().position(|&known| known == fourcc);
@@ -66,9 +66,12 @@ impl ModePreference {
                 let rank = rank(request.fourcc).unwrap_or(PREFERRED.len());
                 (std::cmp::Reverse(pixels), rank)
             })
-            .ok_or_else(|| Refusal::NoMode {
-                preferred: self.to_string(),
-                offered: modes.iter().map(Mode::to_string).collect(),
+            .ok_or_else(|| {
+                let offered: Vec<String> = modes.iter().map(Mode::to_string).collect();
+                Refusal::Other(format!(
+                    "the camera does not offer {self}; it offers {}",
+                    first_of(&offered)
+                ))
             })
     }
 
@@ -106,6 +109,16 @@ impl ModePreference {
             }
             Rates::Unknown => Rate::from_per_second(self.fps),
         }
+    }
+}
+
+/// The first of a long list.
+fn first_of(offered: &[String]) -> String {
+    const MOST: usize = 12;
+    match offered.len() {
+        0 => "nothing that can be recorded".to_owned(),
+        n if n > MOST => format!("{} and {} more", offered[..MOST].join("; "), n - MOST),
+        _ => offered.join("; "),
     }
 }
 

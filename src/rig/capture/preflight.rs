@@ -51,7 +51,9 @@ pub(crate) fn free_bytes(root: &Path) -> Result<u64, CaptureError> {
 /// Checks that the time of day is one in which this program can run.
 pub(super) fn check_clock(now: Timestamp) -> Result<Check, Refusal> {
     match now.as_second() < EARLIEST {
-        true => Err(Refusal::Clock(now)),
+        true => Err(Refusal::Other(format!(
+            "the system's clock says {now}, before this program was written: set it, or the session's name would be wrong"
+        ))),
         false => Ok(Check::passed("clock", format!("{now:.0}"))),
     }
 }
@@ -60,7 +62,9 @@ pub(super) fn check_clock(now: Timestamp) -> Result<Check, Refusal> {
 pub(crate) fn check_object(name: &str) -> Result<(), Refusal> {
     match is_session_name(name) && name.len() <= LONGEST_OBJECT {
         true => Ok(()),
-        false => Err(Refusal::Object(name.to_owned())),
+        false => Err(Refusal::Other(format!(
+            "{name:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most {LONGEST_OBJECT} bytes"
+        ))),
     }
 }
 
@@ -68,7 +72,7 @@ pub(crate) fn check_object(name: &str) -> Result<(), Refusal> {
 pub(super) fn check_speed(table: &Table, set: f64) -> Result<(), Refusal> {
     let highest = table.identity().max_degrees_per_second;
     match Obstacle::of_speed(set, highest) {
-        Some(_) => Err(Refusal::TooFast { set, highest }),
+        Some(obstacle) => Err(Refusal::Other(obstacle.to_string())),
         None => Ok(()),
     }
 }
@@ -87,9 +91,14 @@ pub(super) fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Chec
     }
     let mut checks = Vec::new();
     if let Some(least) = settings.min_battery_v {
-        let volts = status.battery_v.ok_or(Refusal::NoBattery)?;
+        let none = "the table does not report its battery's voltage: leave --min-battery out";
+        let volts = status.battery_v;
+        let volts = volts.ok_or_else(|| Refusal::Other(none.to_owned()))?;
         if volts < least {
-            return Err(Refusal::Battery { volts, least }.into());
+            let low = format!(
+                "the table's battery has {volts:.2} V and {least:.2} V are demanded: charge it"
+            );
+            return Err(Refusal::Other(low).into());
         }
         checks.push(Check::passed("battery", format!("{volts:.2} V")));
     }
@@ -152,7 +161,7 @@ pub(super) fn plan_turn(
 
 /// Time at constant speed before the turn's first frame, microseconds.
 pub(super) fn margin_us(plan: &TurnPlan) -> i64 {
-    (MARGIN_DEG / plan.degrees_per_second() * 1e6).round() as i64
+    (MARGIN_DEG / plan.degrees_per_second * 1e6).round() as i64
 }
 
 #[cfg(test)]

@@ -31,8 +31,6 @@ pub struct Settings {
     pub max_dropped: u64,
     /// How often a take that came out bad is repeated.
     pub retries: u32,
-    /// The part of the pixels in the middle that metering lets saturate, 0 to 1.
-    pub meter_clip: f64,
     /// Where those who use cameras and serial ports leave their locks.
     pub runtime_folder: PathBuf,
     /// The commit that the program was built from, or nothing.
@@ -54,7 +52,6 @@ impl Settings {
             min_battery_v: None,
             max_dropped: 0,
             retries: 1,
-            meter_clip: 0.005,
             runtime_folder: lockfile::standard_folder(),
             commit: String::new(),
         }

@@ -17,7 +17,6 @@ use relit_data::turn_light::LEAST_MODULATION;
 use super::context::{CaptureContext, CaptureRequest};
 use super::equipment::Equipment;
 use super::error::{CaptureError, Refusal};
-use super::journal::track_of;
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::manifest::manifest;
 use super::metering::meter;
@@ -26,10 +25,13 @@ use super::recording::{End, Recorder, RecordingPlan};
 use super::turn::{TurnRecording, unwind};
 use crate::camera::CameraAddress;
 use crate::state::{Check, Phase, TakeSummary, Verdict};
-use crate::turntable::{TurnPlan, TurntableError};
+use crate::turntable::{Track, TurnPlan, TurntableError};
 
 /// How long a replayed camera waits for the disk, so that a rehearsal on a slow disk loses nothing.
 const REPLAY_WAIT: Duration = Duration::from_secs(60);
+
+const WITHOUT_TABLE: &str =
+    "metering turns the table, and there is none: give --turntable, or set the exposure";
 
 /// What a capture left.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,7 +84,10 @@ fn run_take(
     let plan = plan_recording(equipment, request, begun, &locked, context);
     let clock = equipment.clock();
     let turn_us = equipment.settings().turn_us();
-    let camera = equipment.camera.take().ok_or(CaptureError::NoCamera)?;
+    let camera = equipment
+        .camera
+        .take()
+        .ok_or_else(CaptureError::no_camera)?;
     let recorder = Recorder::start(camera, plan)?;
     let recording = TurnRecording {
         recorder: &recorder,
@@ -111,7 +116,7 @@ fn run_take(
         if matches!(recorded.end(), End::Over | End::Stopped) {
             recorded.interrupted(with_causes(&error));
         }
-        recorded.journal().and_then(track_of)
+        recorded.journal().and_then(Track::of_journal)
     });
     let mut repeatable = matches!(recorded.end(), End::Over);
     let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));
@@ -186,7 +191,7 @@ fn prepare(
     }
     equipment.open_camera()?;
     let (Some(camera), table) = (equipment.camera.as_mut(), equipment.table.as_ref()) else {
-        return Err(CaptureError::NoCamera);
+        return Err(CaptureError::no_camera());
     };
     let camera = camera.as_mut();
     let mut locked = LockedCamera::lock(camera, &settings, context.stop)?;
@@ -196,7 +201,7 @@ fn prepare(
     context.note([preflight::check_disk(&settings.root, needed)?]);
     let Some(table) = table else {
         return match with_metering {
-            true => Err(Refusal::MeterWithoutTable.into()),
+            true => Err(Refusal::Other(WITHOUT_TABLE.to_owned()).into()),
             false => Ok((locked, None)),
         };
     };
@@ -205,7 +210,7 @@ fn prepare(
     context.note(stop.explain(ready)?);
     if with_metering {
         context.enter(Phase::Metering);
-        let exposure = meter(camera, table, &mut locked, &settings, stop)?;
+        let exposure = meter(camera, table, &mut locked, stop)?;
         let found = format!("metered: {exposure}");
         context.note([Check::passed("exposure", found)]);
     }

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use super::context::CaptureContext;
 use super::error::CaptureError;
-use super::journal::{journaled_report, journaled_turn};
 use super::preflight;
 use super::recording::{Recorder, Window};
 use crate::clock::Clock;
@@ -60,8 +59,7 @@ impl TurnRecording<'_> {
         self.context.enter(Phase::Starting);
         let part = turn.wait_constant()?;
         let from_us = part.from_us.saturating_add(margin_us);
-        self.recorder
-            .begin_journal(journaled_turn(&turn.expected()));
+        self.recorder.begin_journal(turn.expected());
         let mut seen = 0;
         let recorded = self.record_from(from_us, || {
             turn.state()?;
@@ -87,8 +85,8 @@ impl TurnRecording<'_> {
     /// Hands the reports after the first `seen` to the journal; returns how many there are now.
     fn keep_journal(&self, turn: &Turn<'_>, seen: usize) -> usize {
         let (reports, all) = turn.reports_after(seen);
-        for report in &reports {
-            self.recorder.add_report(journaled_report(report));
+        for report in reports {
+            self.recorder.add_report(report);
         }
         all
     }

@@ -15,12 +15,11 @@
 //! - [`Clock::sleep`] and [`Clock::sleep_until`] replace `thread::sleep`;
 //! - a [`Waitable`] replaces a mutex with a condition variable, and the timeouts of channels;
 //! - [`Clock::spawn`] and [`Clock::scope`] start participating threads and wait for their ends;
-//! - [`Clock::away`] encloses a wait for an event from outside, such as a request of a user;
 //! - a thread never waits while it holds a lock that another participant may want.
 //!
 //! If all participants wait and none of them has a deadline, every wait panics with a report of the
 //! threads and the places where they wait. This includes a wait without deadline for a thread that
-//! does not participate, unless it is in [`Clock::away`].
+//! does not participate.
 //!
 //! On the monotonic clock these do the same as their counterparts in the standard library.
 //!

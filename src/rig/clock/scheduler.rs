@@ -65,8 +65,6 @@ struct State {
     members: HashMap<ThreadId, usize>,
     /// Number of participants that are not in a wait, including threads about to start.
     running: usize,
-    /// Number of threads in [`Clock::away`](super::Clock::away).
-    away: usize,
     waiters: BTreeMap<u64, Waiter>,
     next_ticket: u64,
     /// The report of a deadlock, once there is one.
@@ -139,24 +137,6 @@ impl Scheduler {
         self.advance(&mut state);
     }
 
-    /// Suspends this thread's participation; returns what [`Scheduler::come_back`] needs.
-    pub(super) fn go_away(&self) -> Option<usize> {
-        let mut state = self.lock();
-        let depth = state.members.remove(&thread::current().id())?;
-        state.running -= 1;
-        state.away += 1;
-        self.advance(&mut state);
-        Some(depth)
-    }
-
-    /// Ends [`Scheduler::go_away`].
-    pub(super) fn come_back(&self, depth: usize) {
-        let mut state = self.lock();
-        state.members.insert(thread::current().id(), depth);
-        state.running += 1;
-        state.away -= 1;
-    }
-
     /// Registers a wait of this participating thread: no notification after this call is missed.
     /// `None` if the deadline has passed.
     pub(super) fn register(
@@ -219,12 +199,10 @@ impl Scheduler {
             return;
         }
         let Some((first, deadline_us)) = state.first_deadline() else {
-            if state.away == 0 {
-                state.deadlock = Some(state.report());
-                state.waiters.values().for_each(|waiter| {
-                    waiter.wake.notify_one();
-                });
-            }
+            state.deadlock = Some(state.report());
+            state.waiters.values().for_each(|waiter| {
+                waiter.wake.notify_one();
+            });
             return;
         };
         let left = self.pace.as_ref().map(|pace| pace.left(deadline_us));

@@ -135,16 +135,6 @@ impl Clock {
             body(&scope)
         })
     }
-
-    /// Runs `wait`, which waits for an event from outside. On a virtual clock, time passes without this
-    /// thread meanwhile.
-    pub fn away<T>(&self, wait: impl FnOnce() -> T) -> T {
-        let _back = self.scheduler().and_then(|scheduler| {
-            let depth = scheduler.go_away()?;
-            Some(ComeBack { clock: self, depth })
-        });
-        wait()
-    }
 }
 
 impl<'scope> Scope<'scope, '_> {
@@ -227,19 +217,5 @@ struct WaitForAll(Arc<Waitable<usize>>);
 impl Drop for WaitForAll {
     fn drop(&mut self) {
         self.0.wait(|open| (*open == 0).then_some(()));
-    }
-}
-
-/// Ends [`Clock::away`].
-struct ComeBack<'a> {
-    clock: &'a Clock,
-    depth: usize,
-}
-
-impl Drop for ComeBack<'_> {
-    fn drop(&mut self) {
-        if let Some(scheduler) = self.clock.scheduler() {
-            scheduler.come_back(self.depth);
-        }
     }
 }

@@ -19,9 +19,9 @@ use relit_data::causes::with_causes;
 
 use crate::capture::{CaptureError, Equipment, Settings, preflight, salvage};
 use crate::clock::{Clock, JoinHandle};
+use crate::command::{Command, Refused, Rig};
 use crate::lockfile::LockFile;
 use crate::preview::Preview;
-use crate::serve::rig::{Command, Refused, Rig};
 use crate::simulator::SimulatedTable;
 use crate::state::{CaptureSettings, Monitor, Obstacle, RigState, TableState};
 use dispatcher::Dispatcher;

@@ -14,7 +14,7 @@
 
 use std::collections::VecDeque;
 
-use crate::serve::rig::Refused;
+use crate::command::Refused;
 use crate::state::CaptureSettings;
 
 /// Objects that can wait for their turn.

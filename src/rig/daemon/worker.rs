@@ -116,7 +116,8 @@ impl Worker {
         motion: impl FnOnce(&Table) -> Result<T, TurntableError> + Send,
     ) -> Result<T, CaptureError> {
         let Some(table) = self.equipment.table.as_ref() else {
-            return Err(CaptureError::NoTable);
+            let none = "there is no turntable at the moment: plug it in, or look at its fault";
+            return Err(CaptureError::Missing(none.to_owned()));
         };
         let clock = self.equipment.clock();
         let (camera, idle) = (&mut self.equipment.camera, &mut self.idle);
@@ -150,7 +151,7 @@ impl Worker {
 
     fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {
         let camera = self.equipment.camera.as_mut();
-        let camera = camera.ok_or(CaptureError::NoCamera)?.as_mut();
+        let camera = camera.ok_or_else(CaptureError::no_camera)?.as_mut();
         let set = match set_by_name(camera, name, value) {
             // An automatic may rule it: that is switched off, as it is for every capture.
             Err(CaptureError::Camera(_)) => {
@@ -168,7 +169,11 @@ impl Worker {
 fn set_by_name(camera: &mut dyn Camera, name: &str, value: i64) -> Result<(), CaptureError> {
     let controls = camera.controls()?;
     let found = controls.iter().find(|control| control.name == name);
-    let control = found.ok_or_else(|| CaptureError::NoControl(name.to_owned()))?;
+    let control = found.ok_or_else(|| {
+        CaptureError::Missing(format!(
+            "the camera has no control {name:?}: `relit-capture devices` lists those that it has"
+        ))
+    })?;
     camera.set_control(control.id, value)?;
     Ok(())
 }

@@ -1,9 +1,11 @@
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
+pub(crate) mod accounts;
+
 use std::os::unix::fs::{chown, symlink};
 
-use super::accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
 use super::*;
+use accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
 
 fn own_pid() -> Option<Holder> {
     let pid = Some(std::process::id());

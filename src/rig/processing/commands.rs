@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde::Serialize;
-use utoipa::ToSchema;
 
 use crate::state::ProcessingStep;
 
@@ -21,7 +20,7 @@ pub struct ProcessingPrograms {
 }
 
 /// The same work for a terminal, to be copied.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ProcessingCommands {
     /// Makes the mask by the turn.
     pub mask: String,

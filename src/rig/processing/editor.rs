@@ -10,7 +10,7 @@ use relit_data::session::MASK_FILE;
 use super::child::Worker;
 use super::commands::ProcessingPrograms;
 use super::heard::Heard;
-use crate::serve::rig::Refused;
+use crate::command::Refused;
 
 /// Its niceness: a person waits for it, and the rig comes first.
 const ATTENDED: i32 = 5;

@@ -1,5 +1,6 @@
 //! What the programs say on standard output, one JSON object a line, and what follows from it. Without I/O.
 
+use relit_console::{Check, Event};
 use serde::Deserialize;
 
 use super::queue::StepEnd;
@@ -7,24 +8,6 @@ use crate::state::{ProcessingOutcome, ProcessingStep};
 
 /// Warnings and reasons that are kept.
 const KEPT: usize = 8;
-
-/// A line, as far as it is needed: the programs may say more.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-struct Line {
-    event: String,
-    message: Option<String>,
-    done: u64,
-    of: u64,
-    /// Of `relit-mask check`.
-    report: Option<CheckReport>,
-    /// Of `relit-extract`.
-    session: Option<ExtractedSession>,
-    lossy: bool,
-    misfit: bool,
-    url: Option<String>,
-    address: Option<String>,
-}
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
@@ -56,13 +39,6 @@ pub(super) struct EditorPlace {
     pub(super) url: String,
 }
 
-/// A session that was not extracted again.
-#[derive(Debug, Clone, Copy)]
-struct Skipped {
-    is_lossy: bool,
-    has_misfit: bool,
-}
-
 /// All that was heard of a program.
 #[derive(Debug, Default)]
 pub(super) struct Heard {
@@ -71,7 +47,8 @@ pub(super) struct Heard {
     warnings: Vec<String>,
     check: Option<CheckReport>,
     extracted: Option<ExtractedSession>,
-    skipped: Option<Skipped>,
+    /// A session that was not extracted again: whether it is lossy, and has the mask of something else.
+    skipped: Option<(bool, bool)>,
     left_out: Option<String>,
     problems: Vec<String>,
     problem_count: u64,
@@ -83,34 +60,26 @@ pub(super) struct Heard {
 impl Heard {
     /// Takes in a line. What cannot be understood is passed over: newer programs say more.
     pub(super) fn line(&mut self, line: &[u8]) {
-        let Ok(line) = serde_json::from_slice::<Line>(line) else {
+        let Ok(event) = serde_json::from_slice(line) else {
             return;
         };
-        match line.event.as_str() {
-            "progress" => self.progress = Some((line.done, line.of)),
-            "error" => self.error = line.message,
-            "warning" => keep(&mut self.warnings, line.message),
-            "mask" => self.has_mask = true,
-            "check" => self.check = line.report,
-            "extracted" => self.extracted = line.session,
-            "skipped" => {
-                self.skipped = Some(Skipped {
-                    is_lossy: line.lossy,
-                    has_misfit: line.misfit,
-                });
+        match event {
+            Event::Progress { done, of, .. } => self.progress = Some((done, of)),
+            Event::Error { message, .. } => self.error = Some(message),
+            Event::Warning { message } => keep(&mut self.warnings, message),
+            Event::Mask { .. } => self.has_mask = true,
+            Event::Check(Check::Mask { report, .. }) => {
+                self.check = serde_json::from_value(report).ok();
             }
-            "left_out" => self.left_out = line.message,
-            "problem" => {
+            Event::Extracted { session } => self.extracted = serde_json::from_value(session).ok(),
+            Event::Skipped { lossy, misfit, .. } => self.skipped = Some((lossy, misfit)),
+            Event::LeftOut { message, .. } => self.left_out = Some(message),
+            Event::Problem { message, .. } => {
                 self.problem_count += 1;
-                keep(&mut self.problems, line.message);
+                keep(&mut self.problems, message);
             }
-            "verified" => self.is_verified = true,
-            "editor" => {
-                self.editor = line
-                    .address
-                    .zip(line.url)
-                    .map(|(address, url)| EditorPlace { address, url });
-            }
+            Event::Verified { .. } => self.is_verified = true,
+            Event::Editor { address, url } => self.editor = Some(EditorPlace { address, url }),
             _ => {}
         }
     }
@@ -179,13 +148,11 @@ impl Heard {
     }
 
     fn extracted(&mut self, code: i32) -> Option<StepEnd> {
-        if let Some(skipped) = self.skipped {
-            let fault = match skipped {
-                Skipped {
-                    has_misfit: true, ..
-                } => "its mask is not that of the object",
-                Skipped { is_lossy: true, .. } => "something of it is lost",
-                _ => return Some(good("it is in the data set already")),
+        if let Some((is_lossy, has_misfit)) = self.skipped {
+            let fault = match (is_lossy, has_misfit) {
+                (_, true) => "its mask is not that of the object",
+                (true, false) => "something of it is lost",
+                (false, false) => return Some(good("it is in the data set already")),
             };
             let what = format!("it is in the data set already; {fault}: see its report");
             return Some(doubtful(&what, true));
@@ -230,9 +197,9 @@ fn doubtful(what: &str, goes_on: bool) -> StepEnd {
     }
 }
 
-fn keep(list: &mut Vec<String>, text: Option<String>) {
+fn keep(list: &mut Vec<String>, text: String) {
     if list.len() < KEPT {
-        list.extend(text);
+        list.push(text);
     }
 }
 

@@ -28,7 +28,7 @@ pub use commands::{ProcessingCommands, ProcessingPrograms};
 pub use editor::EditorTarget;
 pub use shared::ProcessingOptions;
 
-use crate::serve::rig::Refused;
+use crate::command::Refused;
 use crate::state::{Monitor, ProcessingStep};
 use editor::OpenEditor;
 use queue::{PendingWork, ProcessingQueue};
@@ -42,35 +42,25 @@ const LOOK: Duration = Duration::from_millis(10);
 
 /// Why sessions cannot be processed at all.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProcessingError {
-    /// The folder of sessions cannot be used.
-    #[error("the folder of sessions {path} could not be found")]
-    Root {
-        /// The folder.
-        path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
-    },
-    /// What an earlier run kept cannot be read.
-    #[error("{path} could not be read: mend it, or remove it and set again what it held")]
-    Kept {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: io::Error,
-    },
-    /// No thread.
-    #[error("a thread for processing could not be started")]
-    Thread(#[source] io::Error),
+#[error("{what}")]
+pub struct ProcessingError {
+    what: String,
+    source: io::Error,
 }
 
-/// What a request changes of the settings.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+impl ProcessingError {
+    fn of(what: String) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self { what, source }
+    }
+}
+
+/// What a request changes of the settings; what is left out stays.
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ProcessingChange {
     /// Whether each usable take is processed once the rig rests.
     pub when_done: Option<bool>,
-    /// The data set's name.
+    /// The data set's name: a folder beside that of the sessions.
     pub dataset: Option<String>,
 }
 
@@ -91,16 +81,15 @@ impl Processing {
         monitor: Monitor,
         options: ProcessingOptions,
     ) -> Result<Self, ProcessingError> {
-        let root = root
-            .canonicalize()
-            .map_err(|source| ProcessingError::Root {
-                path: root.to_owned(),
-                source,
-            })?;
-        let kept = KeptProcessing::read(&root).map_err(|source| ProcessingError::Kept {
-            path: store::path(&root),
-            source,
-        })?;
+        let missing = format!(
+            "the folder of sessions {} could not be found",
+            root.display()
+        );
+        let root = root.canonicalize().map_err(ProcessingError::of(missing))?;
+        let kept = KeptProcessing::read(&root).map_err(ProcessingError::of(format!(
+            "{} could not be read: mend it, or remove it and set again what it held",
+            store::path(&root).display()
+        )))?;
         let beside = || root.parent().unwrap_or(&root).to_owned();
         let datasets = options.datasets.clone().unwrap_or_else(beside);
         let mut settings = kept.settings;
@@ -131,7 +120,9 @@ impl Processing {
         let thread = thread::Builder::new()
             .name("relit-processing".to_owned())
             .spawn(move || runner::run(&worked))
-            .map_err(ProcessingError::Thread)?;
+            .map_err(ProcessingError::of(
+                "a thread for processing could not be started".to_owned(),
+            ))?;
         Ok(Self {
             shared,
             thread: Mutex::new(Some(thread)),

@@ -12,6 +12,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use crate::command::Refused;
 use crate::state::{
     FinishedJob, ProcessingJob, ProcessingOutcome, ProcessingStatus, ProcessingStep,
 };
@@ -20,17 +21,6 @@ use crate::state::{
 const LONGEST: usize = 200;
 /// Ended jobs that are remembered.
 const REMEMBERED: usize = 30;
-
-/// Why a job is not taken.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(super) enum NotQueued {
-    #[error("{0} is being processed already: wait for it, or cancel it")]
-    Already(String),
-    #[error("{LONGEST} jobs wait already: let some of them end")]
-    Full,
-    #[error("no step is named: name mask, check or extract")]
-    Nothing,
-}
 
 /// A session and what is still to be done with it: what is kept when the program ends.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -85,16 +75,19 @@ pub(super) struct ProcessingQueue {
 
 impl ProcessingQueue {
     /// Appends work; returns its number.
-    pub(super) fn submit(&mut self, work: PendingWork) -> Result<u64, NotQueued> {
+    pub(super) fn submit(&mut self, work: PendingWork) -> Result<u64, Refused> {
         if work.steps.is_empty() {
-            return Err(NotQueued::Nothing);
+            let none = "no step is named: name mask, check or extract";
+            return Err(Refused::Invalid(none.to_owned()));
         }
         if self.has(work.session.as_deref()) {
-            let what = work.session.unwrap_or_else(|| "the data set".to_owned());
-            return Err(NotQueued::Already(what));
+            let what = work.session.as_deref().unwrap_or("the data set");
+            let already = format!("{what} is being processed already: wait for it, or cancel it");
+            return Err(Refused::Busy(already));
         }
         if self.waiting.len() >= LONGEST {
-            return Err(NotQueued::Full);
+            let full = format!("{LONGEST} jobs wait already: let some of them end");
+            return Err(Refused::Busy(full));
         }
         self.numbers += 1;
         self.waiting.push_back(Entry {
@@ -401,12 +394,16 @@ mod tests {
         let mut queue = ProcessingQueue::default();
         queue.submit(work("mug", &[Mask])).unwrap();
         let again = queue.submit(work("mug", &[Check])).unwrap_err();
-        assert_eq!(again, NotQueued::Already("mug".to_owned()));
+        assert!(
+            matches!(&again, Refused::Busy(why) if why.contains("mug")),
+            "{again}"
+        );
         begun(&mut queue).unwrap();
         assert!(queue.submit(work("mug", &[Check])).is_err());
         queue.finish(end(GOOD, true));
         queue.submit(work("mug", &[Check])).unwrap();
-        assert_eq!(queue.submit(work("cow", &[])), Err(NotQueued::Nothing));
+        let nothing = queue.submit(work("cow", &[]));
+        assert!(matches!(nothing, Err(Refused::Invalid(_))), "{nothing:?}");
         queue.cancel_session("mug");
         assert!(queue.jobs().is_empty());
     }
@@ -429,6 +426,7 @@ mod tests {
         for n in 0..LONGEST {
             queue.submit(work(&n.to_string(), &[Mask])).unwrap();
         }
-        assert_eq!(queue.submit(work("mug", &[Mask])), Err(NotQueued::Full));
+        let full = queue.submit(work("mug", &[Mask]));
+        assert!(matches!(full, Err(Refused::Busy(_))), "{full:?}");
     }
 }

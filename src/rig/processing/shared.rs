@@ -7,9 +7,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::commands::ProcessingPrograms;
 use super::editor::OpenEditor;
-use super::queue::{NotQueued, PendingWork, ProcessingQueue};
+use super::queue::{PendingWork, ProcessingQueue};
 use super::store::{self, KeptProcessing, ProcessingSettings};
-use crate::serve::rig::Refused;
+use crate::command::Refused;
 use crate::state::{Monitor, ProcessingState, ProcessingStep};
 
 /// Where data sets and programs are.
@@ -109,10 +109,7 @@ impl Shared {
                 let error = format!("{program} is not installed on this machine: install the package relit, or copy the command");
                 return Err(Refused::Unavailable(error));
             }
-            plan.queue.submit(work).map_err(|refusal| match refusal {
-                NotQueued::Already(_) | NotQueued::Full => Refused::Busy(refusal.to_string()),
-                NotQueued::Nothing => Refused::Invalid(refusal.to_string()),
-            })
+            plan.queue.submit(work)
         })
     }
 

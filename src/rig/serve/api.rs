@@ -13,11 +13,10 @@ use tokio::time::timeout;
 use tokio_stream::wrappers::WatchStream;
 
 use super::permits::{Permits, Work, permit};
-use super::rig::{Command, Rig};
 use super::snapshots::{PERIOD, Snapshots};
-use crate::state::RigState;
+use crate::command::{Command, Refused, Rig};
 use relit_web::Shutdown;
-use relit_web::{Failure, JsonBody, Problem};
+use relit_web::{Failure, JsonBody};
 
 /// A subscriber hears something at least so often: silence means a lost connection.
 const BEAT: Duration = Duration::from_secs(2);
@@ -27,10 +26,6 @@ const COMMAND: Duration = Duration::from_secs(15);
 /// The rig's state
 ///
 /// Phase, progress, table, camera, disk space, queue, faults and the last take.
-#[utoipa::path(
-    get, path = "/api/v1/state", tag = "rig",
-    responses((status = 200, body = RigState), (status = 401, body = Problem))
-)]
 pub(super) async fn state(State(snapshots): State<Snapshots>) -> Response {
     newest(&snapshots)
 }
@@ -45,14 +40,6 @@ fn newest(snapshots: &Snapshots) -> Response {
 /// Server-sent events. `state` holds the whole state as JSON and comes at once, then on change, at most
 /// ten times a second; who reads slowly gets fewer, never old ones. `beat` comes where nothing changed
 /// for two seconds.
-#[utoipa::path(
-    get, path = "/api/v1/events", tag = "rig",
-    responses(
-        (status = 200, body = String, content_type = "text/event-stream"),
-        (status = 401, body = Problem),
-        (status = 503, description = "Too many subscribers", body = Problem),
-    )
-)]
 pub(super) async fn events(
     State(snapshots): State<Snapshots>,
     State(permits): State<Arc<Permits>>,
@@ -73,22 +60,6 @@ pub(super) async fn events(
 ///
 /// Answers once the rig has taken or refused it; what comes of it shows in the state. Of several starts at
 /// once, one is taken.
-#[utoipa::path(
-    post, path = "/api/v1/command", tag = "rig", request_body = Command,
-    responses(
-        (status = 202, description = "Taken; the state after it", body = RigState),
-        (status = 400, description = "No such command", body = Problem),
-        (status = 401, body = Problem),
-        (status = 403, description = "Asked for by a page of another site", body = Problem),
-        (status = 408, description = "The body did not come in time", body = Problem),
-        (status = 409, description = "Something else is under way", body = Problem),
-        (status = 413, description = "More than 16 kB", body = Problem),
-        (status = 415, description = "Not JSON", body = Problem),
-        (status = 422, description = "The command makes no sense as given", body = Problem),
-        (status = 503, description = "Camera, table or disk is not there", body = Problem),
-        (status = 504, description = "The rig does not answer", body = Problem),
-    )
-)]
 pub(super) async fn command(
     State(rig): State<Arc<dyn Rig>>,
     State(snapshots): State<Snapshots>,
@@ -103,4 +74,15 @@ pub(super) async fn command(
     })??;
     snapshots.refresh();
     Ok((StatusCode::ACCEPTED, newest(&snapshots)).into_response())
+}
+
+impl From<Refused> for Failure {
+    fn from(refused: Refused) -> Self {
+        let (status, error) = match refused {
+            Refused::Busy(error) => (StatusCode::CONFLICT, error),
+            Refused::Invalid(error) => (StatusCode::UNPROCESSABLE_ENTITY, error),
+            Refused::Unavailable(error) => (StatusCode::SERVICE_UNAVAILABLE, error),
+        };
+        Self::new(status, error)
+    }
 }

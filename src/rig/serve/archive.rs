@@ -1,5 +1,5 @@
-//! Sessions as one tar file that is made while it is sent: its length is known beforehand, so that a
-//! download that broke off shows, and can go on where it ended.
+//! What is downloaded: a file, or sessions as one tar file that is made while it is sent. The length is
+//! known beforehand, so that a download that broke off shows, and can go on where it ended.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -35,6 +35,19 @@ struct Part {
 }
 
 impl Part {
+    /// A file as it is now; its time goes into `version`.
+    fn of(path: PathBuf, version: &mut blake3::Hasher) -> io::Result<Self> {
+        let data = fs::metadata(&path)?;
+        let modified = data.modified()?;
+        let since_epoch = modified.duration_since(UNIX_EPOCH).unwrap_or_default();
+        version.update(&since_epoch.as_nanos().to_le_bytes());
+        Ok(Self {
+            path,
+            bytes: data.len(),
+            modified,
+        })
+    }
+
     /// Opens it, if it is still the same.
     fn open(&self) -> io::Result<File> {
         let file = File::open(&self.path)?;
@@ -55,7 +68,7 @@ impl Piece {
     }
 }
 
-/// A tar file that is not there yet.
+/// A file, or a tar file that is not there yet.
 #[derive(Debug, Clone)]
 pub(super) struct Archive {
     pieces: Vec<Piece>,
@@ -63,6 +76,17 @@ pub(super) struct Archive {
 }
 
 impl Archive {
+    /// A file as it is.
+    pub(super) fn of_file(path: &Path) -> io::Result<Self> {
+        let mut version = blake3::Hasher::new();
+        let part = Part::of(path.to_owned(), &mut version)?;
+        version.update(&part.bytes.to_le_bytes());
+        Ok(Self {
+            version: version.finalize(),
+            pieces: vec![Piece::File(part)],
+        })
+    }
+
     /// The tar file of session folders: all their files but hidden ones, each under
     /// `<session>/<file>`.
     pub(super) fn of(folders: &[(String, PathBuf)]) -> io::Result<Self> {
@@ -70,25 +94,19 @@ impl Archive {
         let mut version = blake3::Hasher::new();
         for (session, folder) in folders {
             for (name, path) in files_of(folder)? {
-                let data = fs::metadata(&path)?;
-                let modified = data.modified()?;
-                let since_epoch = modified.duration_since(UNIX_EPOCH).unwrap_or_default();
+                let part = Part::of(path, &mut version)?;
+                let bytes = part.bytes;
+                let since_epoch = part.modified.duration_since(UNIX_EPOCH);
                 let mut header = tar::Header::new_ustar();
                 header.set_path(format!("{session}/{name}"))?;
                 header.set_entry_type(tar::EntryType::Regular);
                 header.set_mode(0o644);
-                header.set_mtime(since_epoch.as_secs());
-                header.set_size(data.len());
+                header.set_mtime(since_epoch.unwrap_or_default().as_secs());
+                header.set_size(bytes);
                 header.set_cksum();
                 version.update(header.as_bytes());
-                version.update(&since_epoch.subsec_nanos().to_le_bytes());
                 pieces.push(Piece::Bytes(header.as_bytes().to_vec()));
-                let bytes = data.len();
-                pieces.push(Piece::File(Part {
-                    path,
-                    bytes,
-                    modified,
-                }));
+                pieces.push(Piece::File(part));
                 let padding = bytes.next_multiple_of(BLOCK) - bytes;
                 pieces.push(Piece::Bytes(vec![0; padding as usize]));
             }

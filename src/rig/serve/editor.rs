@@ -10,10 +10,9 @@ use axum::body::{Body, to_bytes};
 use axum::extract::{Path, Request, State};
 use axum::http::{HeaderValue, Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
-use relit_web::{Failure, Problem, forward};
+use relit_web::{Failure, forward};
 use serde::Serialize;
 use tokio::time::timeout;
-use utoipa::ToSchema;
 
 use super::library::Library;
 use super::permits::{Permits, Work};
@@ -30,10 +29,9 @@ const SKETCH: Duration = Duration::from_secs(20);
 const ANSWER: Duration = Duration::from_secs(300);
 
 /// Where the editor is.
-#[derive(Debug, Serialize, ToSchema)]
+#[derive(Debug, Serialize)]
 pub(super) struct EditorPath {
     /// Its path on this server, for a browser.
-    #[schema(example = "/edit/")]
     path: String,
 }
 
@@ -41,17 +39,6 @@ pub(super) struct EditorPath {
 ///
 /// The page at the path that is returned is served until the mask is accepted or discarded there, or nobody has
 /// used it for 15 minutes. One mask is open at a time. While the rig captures, the editor is held.
-#[utoipa::path(
-    post, path = "/api/v1/sessions/{id}/edit", tag = "processing",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 200, description = "It is open", body = EditorPath),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session", body = Problem),
-        (status = 409, description = "The rig is busy, the session is being processed, or another mask is open", body = Problem),
-        (status = 503, description = "The program is not installed, or does not open the session", body = Problem),
-    )
-)]
 pub(super) async fn open(
     State(library): State<Arc<Library>>,
     State(processing): State<MayProcess>,
@@ -71,10 +58,6 @@ pub(super) async fn open(
 /// Close the editor
 ///
 /// Without a mask: what was drawn is lost.
-#[utoipa::path(
-    delete, path = "/api/v1/processing/editor", tag = "processing",
-    responses((status = 204, description = "Done"), (status = 401, body = Problem))
-)]
 pub(super) async fn close(
     State(processing): State<MayProcess>,
     State(permits): State<Arc<Permits>>,

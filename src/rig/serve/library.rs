@@ -6,7 +6,6 @@ use std::{fmt, fs, io};
 
 use axum::http::StatusCode;
 use serde::Serialize;
-use utoipa::ToSchema;
 
 use super::cache::Cache;
 use super::results::{CHECK_PAGE, ResultsReader, SessionResults};
@@ -25,7 +24,7 @@ const LONGEST_NOTE: usize = 2000;
 const SUMMARIES: usize = 4096;
 
 /// How far a session has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum SessionStatus {
     /// Being written, or waiting to be salvaged.
@@ -39,10 +38,9 @@ pub(super) enum SessionStatus {
 }
 
 /// A session in the list.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct SessionSummary {
     /// Its name.
-    #[schema(example = "20261120T093015Z-mug")]
     pub(super) id: String,
     /// The object's name.
     pub(super) object: String,
@@ -66,12 +64,11 @@ pub(super) struct SessionSummary {
 }
 
 /// All that is known of a session.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct SessionDetail {
     #[serde(flatten)]
     pub(super) summary: SessionSummary,
     /// The manifest, `session.json`.
-    #[schema(value_type = Object)]
     pub(super) manifest: serde_json::Value,
     /// Whether it has a mask.
     pub(super) has_mask: bool,
@@ -86,7 +83,7 @@ pub(super) struct SessionDetail {
 }
 
 /// Frames that are missing.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct DroppedFrames {
     /// Number of the frame after the gap.
     pub(super) before: u64,

@@ -1,7 +1,6 @@
-//! The rig over HTTP: a page for the phone beside the turntable, the same as JSON for scripts, and
-//! figures for Prometheus.
+//! The rig over HTTP: a page for the phone beside the turntable, and the same as JSON for scripts.
 //!
-//! It stands on [`rig::Rig`]: it hands commands on, shows what the [`Monitor`](crate::state::Monitor)
+//! It stands on [`Rig`]: it hands commands on, shows what the [`Monitor`](crate::state::Monitor)
 //! holds and reads what lies in the session folder. It knows nothing of cameras, tables or how a
 //! capture goes. The capture is never held up by it: one task reads the state, at most ten times a
 //! second whatever the number of clients, its threads give way to all others of the process, and
@@ -17,7 +16,6 @@ mod cache;
 mod editor;
 mod files;
 mod library;
-mod metrics;
 mod options;
 mod page;
 mod permits;
@@ -25,7 +23,6 @@ mod pictures;
 mod preview;
 mod processing;
 mod results;
-pub mod rig;
 mod routes;
 mod sessions;
 mod snapshots;
@@ -42,8 +39,8 @@ use std::sync::Arc;
 use tokio::time::{MissedTickBehavior, interval};
 
 pub use self::options::{ClientLimits, Heartbeat, ServeOptions};
-pub use relit_web::{Announcement, InvalidToken, ListenAddress, Shutdown, Token, TokenFileError};
-use rig::Rig;
+use crate::command::Rig;
+pub use relit_web::{Announcement, ListenAddress, Shutdown, Token};
 
 /// Threads that carry requests; files and decoding have their own.
 const THREADS: usize = 2;
@@ -65,12 +62,9 @@ pub enum ServeError {
         /// The system's answer.
         source: io::Error,
     },
-    /// No threads.
-    #[error("the threads of the HTTP server could not be started: {0}; close other programs")]
-    Threads(io::Error),
-    /// No random numbers for a token.
-    #[error("the system gave no random numbers for a token: {0}; give a token yourself")]
-    Random(io::Error),
+    /// The system lacks something; what, and what to do.
+    #[error("{0}: {1}")]
+    System(&'static str, io::Error),
 }
 
 /// Whether the address can be listened on, as things are.
@@ -104,7 +98,12 @@ pub fn serve(
     let token = match options.token {
         Some(token) => Some(token),
         None if address.ip().is_loopback() => None,
-        None => Some(Token::random().map_err(ServeError::Random)?),
+        None => Some(Token::random().map_err(|error| {
+            ServeError::System(
+                "no random numbers for a token could be had: give a token with --token-file",
+                error,
+            )
+        })?),
     };
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(THREADS)
@@ -114,7 +113,10 @@ pub fn serve(
         .enable_io()
         .enable_time()
         .build()
-        .map_err(ServeError::Threads)?;
+        .map_err(|error| {
+            let what = "the threads of the HTTP server could not be started: close other programs";
+            ServeError::System(what, error)
+        })?;
     let announcement = Announcement::new(address, &options.names, token.as_ref());
     let policy = relit_web::AccessPolicy::new(address.port(), token, options.names, page::paths());
     let app = routes::App::new(
@@ -131,7 +133,7 @@ pub fn serve(
         if let Some(heartbeat) = options.heartbeat {
             tokio::spawn(beat(heartbeat, app.rig.clone()));
         }
-        let (limits, connections) = (app.limits.of_connections(), &app.permits.connections);
+        let (limits, connections) = (app.limits.connections, &app.permits.connections);
         relit_web::run(
             listener,
             routes::router(&app),

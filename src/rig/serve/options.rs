@@ -48,7 +48,7 @@ pub struct Heartbeat {
     /// Time between two beats.
     pub period: Duration,
     /// Called while requests are worked on, the rig's state can be read, and the
-    /// [rig runs](super::rig::Rig::is_running); dropped when that is over.
+    /// [rig runs](crate::command::Rig::is_running); dropped when that is over.
     pub beat: Box<dyn Fn() + Send + Sync>,
 }
 
@@ -64,49 +64,23 @@ impl fmt::Debug for Heartbeat {
 /// What all clients together may take up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClientLimits {
-    /// Connections at once; further ones wait to be accepted.
-    pub connections: usize,
-    /// Connections from one address at once; further ones are closed.
-    pub per_address: usize,
+    /// Their connections, whatever is asked for on them.
+    pub connections: ConnectionLimits,
     /// Requests for the preview at once.
     pub viewers: usize,
     /// Subscribers to the events at once.
     pub subscribers: usize,
-    /// Time in which the first byte has to come after connecting.
-    pub first_byte: Duration,
-    /// Time in which a request's head has to come, and how long a connection may lie idle.
-    pub head: Duration,
     /// Time in which a request's body has to come.
     pub body: Duration,
-    /// Longest time in which a client takes not a single byte of an answer.
-    pub stall: Duration,
-}
-
-impl ClientLimits {
-    /// Those that concern connections, whatever is asked for on them.
-    pub(super) fn of_connections(&self) -> ConnectionLimits {
-        ConnectionLimits {
-            connections: self.connections,
-            per_address: self.per_address,
-            first_byte: self.first_byte,
-            head: self.head,
-            stall: self.stall,
-        }
-    }
 }
 
 impl Default for ClientLimits {
     fn default() -> Self {
-        let of_connections = ConnectionLimits::default();
         Self {
-            connections: of_connections.connections,
-            per_address: of_connections.per_address,
+            connections: ConnectionLimits::default(),
             viewers: 16,
             subscribers: 32,
-            first_byte: of_connections.first_byte,
-            head: of_connections.head,
             body: Duration::from_secs(10),
-            stall: of_connections.stall,
         }
     }
 }

@@ -44,7 +44,7 @@ impl Permits {
     pub(super) fn new(limits: &ClientLimits) -> Self {
         let permits = |count| Arc::new(Semaphore::new(count));
         Self {
-            connections: permits(limits.connections),
+            connections: permits(limits.connections.connections),
             viewers: permits(limits.viewers),
             subscribers: permits(limits.subscribers),
             downloads: permits(DOWNLOADS),

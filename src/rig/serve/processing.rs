@@ -7,15 +7,14 @@ use axum::extract::{Path, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 use super::library::Library;
 use super::permits::{Permits, Work};
-use super::rig::Refused;
 use super::snapshots::Snapshots;
+use crate::command::Refused;
 use crate::processing::{Processing, ProcessingChange};
 use crate::state::{ProcessingState, ProcessingStep};
-use relit_web::{Failure, JsonBody, Problem};
+use relit_web::{Failure, JsonBody};
 
 /// The pages hold their own style and pictures, no scripts, and load nothing.
 const PAGE_POLICY: &str =
@@ -32,7 +31,7 @@ pub(super) fn present(processing: MayProcess) -> Result<Arc<Processing>, Failure
 }
 
 /// Steps for a session, in their order.
-#[derive(Debug, Deserialize, ToSchema)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct WantedSteps {
     /// `mask`, `check`, `extract`, or several of them.
@@ -40,20 +39,10 @@ pub(super) struct WantedSteps {
 }
 
 /// A job that was queued.
-#[derive(Debug, Serialize, ToSchema)]
+#[derive(Debug, Serialize)]
 pub(super) struct QueuedJob {
     /// Its number.
     number: u64,
-}
-
-/// What is changed of the settings; what is left out stays.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ProcessingSettingsChange {
-    /// Whether each usable take is masked, checked and extracted once the rig rests.
-    when_done: Option<bool>,
-    /// The data set's name: a folder beside that of the sessions.
-    dataset: Option<String>,
 }
 
 /// Process a session
@@ -61,20 +50,6 @@ pub(super) struct ProcessingSettingsChange {
 /// Queues steps, which are done one after the other at the lowest priority, and only while the rig rests. What
 /// comes of them shows in the state (`processing`) and in the session's `results`. A check that does not fit
 /// ends the steps of its session.
-#[utoipa::path(
-    post, path = "/api/v1/sessions/{id}/process", tag = "processing", request_body = WantedSteps,
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 202, description = "Queued", body = QueuedJob),
-        (status = 400, description = "Not understood", body = Problem),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session", body = Problem),
-        (status = 409, description = "It is being recorded or processed", body = Problem),
-        (status = 415, description = "Not JSON", body = Problem),
-        (status = 422, description = "No step is named", body = Problem),
-        (status = 503, description = "A program is not installed", body = Problem),
-    )
-)]
 pub(super) async fn process(
     State(library): State<Arc<Library>>,
     State(processing): State<MayProcess>,
@@ -98,15 +73,6 @@ pub(super) async fn process(
 /// Verify the data set
 ///
 /// Queues a job that reads every file of it back.
-#[utoipa::path(
-    post, path = "/api/v1/processing/verify", tag = "processing",
-    responses(
-        (status = 202, description = "Queued", body = QueuedJob),
-        (status = 401, body = Problem),
-        (status = 409, description = "It is being verified", body = Problem),
-        (status = 503, description = "The program is not installed", body = Problem),
-    )
-)]
 pub(super) async fn verify(
     State(processing): State<MayProcess>,
     State(permits): State<Arc<Permits>>,
@@ -121,15 +87,6 @@ pub(super) async fn verify(
 /// Cancel a job
 ///
 /// Its program is ended; what follows in its session is not begun.
-#[utoipa::path(
-    delete, path = "/api/v1/processing/jobs/{number}", tag = "processing",
-    params(("number" = u64, Path, description = "The job's number")),
-    responses(
-        (status = 204, description = "Done"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such job waits or is under way", body = Problem),
-    )
-)]
 pub(super) async fn cancel(
     State(processing): State<MayProcess>,
     State(permits): State<Arc<Permits>>,
@@ -146,10 +103,6 @@ pub(super) async fn cancel(
 }
 
 /// Jobs, programs and settings
-#[utoipa::path(
-    get, path = "/api/v1/processing", tag = "processing",
-    responses((status = 200, body = ProcessingState), (status = 401, body = Problem))
-)]
 pub(super) async fn state(State(snapshots): State<Snapshots>) -> Json<ProcessingState> {
     snapshots.refresh();
     Json(snapshots.newest().state.processing.clone())
@@ -158,43 +111,19 @@ pub(super) async fn state(State(snapshots): State<Snapshots>) -> Json<Processing
 /// Change how sessions are processed
 ///
 /// The settings are kept on the disk.
-#[utoipa::path(
-    put, path = "/api/v1/processing", tag = "processing", request_body = ProcessingSettingsChange,
-    responses(
-        (status = 200, body = ProcessingState),
-        (status = 400, description = "Not understood", body = Problem),
-        (status = 401, body = Problem),
-        (status = 415, description = "Not JSON", body = Problem),
-        (status = 422, description = "A data set cannot have that name", body = Problem),
-        (status = 503, description = "Sessions are not processed here", body = Problem),
-    )
-)]
 pub(super) async fn configure(
     State(processing): State<MayProcess>,
     State(snapshots): State<Snapshots>,
     State(permits): State<Arc<Permits>>,
-    JsonBody(change): JsonBody<ProcessingSettingsChange>,
+    JsonBody(change): JsonBody<ProcessingChange>,
 ) -> Result<Json<ProcessingState>, Failure> {
     let processing = present(processing)?;
-    let change = ProcessingChange {
-        when_done: change.when_done,
-        dataset: change.dataset,
-    };
     let changed = permits.run(Work::Command, move || Ok(processing.configure(change)?));
     changed.await?;
     Ok(state(State(snapshots)).await)
 }
 
 /// The page about the check of a session's mask
-#[utoipa::path(
-    get, path = "/api/v1/sessions/{id}/check.html", tag = "processing",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 200, description = "A page without scripts", content_type = "text/html"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session, or its mask was not checked", body = Problem),
-    )
-)]
 pub(super) async fn check_page(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
@@ -205,15 +134,6 @@ pub(super) async fn check_page(
 }
 
 /// The page about a session in the data set
-#[utoipa::path(
-    get, path = "/api/v1/sessions/{id}/report.html", tag = "processing",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 200, description = "A page without scripts", content_type = "text/html"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session, or it was not extracted", body = Problem),
-    )
-)]
 pub(super) async fn report_page(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,

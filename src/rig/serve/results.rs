@@ -10,7 +10,6 @@ use std::sync::Arc;
 use relit_data::session::MASK_FILE;
 use relit_data::shard::{Dataset, QualityVerdict};
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 use super::cache::Cache;
 use super::version::FileVersion;
@@ -26,7 +25,7 @@ const KEPT: usize = 4096;
 const DATASETS: usize = 2;
 
 /// How far a session has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum SessionStage {
     /// There is its recording.
@@ -40,7 +39,7 @@ pub(super) enum SessionStage {
 }
 
 /// How a mask came to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum MaskOrigin {
     /// By the turn alone.
@@ -52,7 +51,7 @@ pub(super) enum MaskOrigin {
 }
 
 /// A session's mask.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(super) struct MaskState {
     /// How it came to be.
     pub(super) origin: MaskOrigin,
@@ -61,7 +60,7 @@ pub(super) struct MaskState {
 }
 
 /// What `relit-mask check` found.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(super) struct CheckState {
     /// `fits`, `drifts`, `wrong`, `unknown`.
     pub(super) verdict: String,
@@ -72,7 +71,7 @@ pub(super) struct CheckState {
 }
 
 /// What `relit-extract` made.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(super) struct ExtractionState {
     /// `good`, `usable`, `broken`, or `not judged`.
     pub(super) verdict: String,
@@ -87,7 +86,7 @@ pub(super) struct ExtractionState {
 }
 
 /// What was made of a session.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(super) struct SessionResults {
     /// How far it has come.
     pub(super) stage: SessionStage,

@@ -2,26 +2,20 @@
 
 use std::sync::Arc;
 
+use axum::Router;
 use axum::extract::{FromRef, Request};
 use axum::http::StatusCode;
 use axum::middleware::from_fn_with_state;
-use axum::routing::{any, get};
-use axum::{Json, Router};
-use utoipa::OpenApi as _;
-use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
-use utoipa::openapi::{Components, InfoBuilder, OpenApi, OpenApiBuilder};
-use utoipa_axum::router::OpenApiRouter;
-use utoipa_axum::routes;
+use axum::routing::{any, delete, get, post, put};
 
 use super::library::Library;
-use super::metrics::Responses;
 use super::options::ClientLimits;
 use super::permits::Permits;
 use super::pictures::Pictures;
 use super::processing::MayProcess;
-use super::rig::Rig;
 use super::snapshots::Snapshots;
-use super::{api, editor, files, metrics, page, preview, processing, sessions};
+use super::{api, editor, files, page, preview, processing, sessions};
+use crate::command::Rig;
 use crate::state::Monitor;
 use relit_web::Shutdown;
 use relit_web::{AccessPolicy, BodyLimit, Failure, Index, guard};
@@ -40,7 +34,6 @@ pub(super) struct App {
     pub(super) permits: Arc<Permits>,
     pub(super) library: Arc<Library>,
     pub(super) pictures: Arc<Pictures>,
-    pub(super) responses: Arc<Responses>,
     pub(super) shutdown: Shutdown,
     pub(super) processing: MayProcess,
 }
@@ -65,7 +58,6 @@ impl App {
             permits: Arc::new(Permits::new(&limits)),
             library: Arc::new(Library::new(root, Box::new(dataset))),
             pictures: Arc::new(Pictures::new()),
-            responses: Arc::default(),
             shutdown,
             processing,
             rig,
@@ -88,79 +80,28 @@ impl FromRef<App> for BodyLimit {
     }
 }
 
-/// The interface for programs, with its description.
-pub(super) fn interface() -> OpenApiRouter<App> {
-    OpenApiRouter::with_openapi(description())
-        .routes(routes!(api::state))
-        .routes(routes!(api::events))
-        .routes(routes!(api::command))
-        .routes(routes!(preview::picture))
-        .routes(routes!(preview::stream))
-        .routes(routes!(sessions::list))
-        .routes(routes!(sessions::detail, sessions::put_away))
-        .routes(routes!(sessions::restore))
-        .routes(routes!(sessions::trash))
-        .routes(routes!(sessions::remark))
-        .routes(routes!(files::day_tar))
-        .routes(routes!(files::mask))
-        .routes(routes!(sessions::thumbnail))
-        .routes(routes!(sessions::frame))
-        .routes(routes!(sessions::objects))
-        .routes(routes!(files::video))
-        .routes(routes!(processing::state, processing::configure))
-        .routes(routes!(processing::process))
-        .routes(routes!(processing::verify))
-        .routes(routes!(processing::cancel))
-        .routes(routes!(processing::check_page))
-        .routes(routes!(processing::report_page))
-        .routes(routes!(editor::open))
-        .routes(routes!(editor::close))
-        .routes(routes!(metrics::metrics))
-        .routes(routes!(document))
-}
-
-/// This description
-#[utoipa::path(
-    get, path = "/api/v1/openapi.json", tag = "description",
-    responses((status = 200, description = "OpenAPI 3.1", content_type = "application/json"))
-)]
-async fn document() -> Json<OpenApi> {
-    Json(interface().into_openapi())
-}
-
-/// What the description says besides the paths.
-fn description() -> OpenApi {
-    let token = HttpBuilder::new()
-        .scheme(HttpAuthScheme::Bearer)
-        .description(Some("Demanded on every address but loopback."))
-        .build();
-    let mut components = Components::new();
-    components.add_security_scheme("token", SecurityScheme::Http(token));
-    let none: [&str; 0] = [];
-    OpenApiBuilder::new()
-        .info(
-            InfoBuilder::new()
-                .title("relit-capture")
-                .version(env!("CARGO_PKG_VERSION"))
-                .description(Some(
-                    "A turntable rig: its state, commands to it, and what it recorded.",
-                ))
-                .build(),
-        )
-        .components(Some(components))
-        .security(Some([SecurityRequirement::new("token", none)]))
-        .paths(TarPath::openapi().paths)
-        .build()
-}
-
-/// The path that the router has in common with that of a session.
-#[derive(utoipa::OpenApi)]
-#[openapi(paths(files::session_tar))]
-struct TarPath;
-
 /// Everything that is served.
 pub(super) fn router(app: &App) -> Router {
-    let mut router = Router::from(interface())
+    let mut router = Router::new()
+        .route("/api/v1/state", get(api::state))
+        .route("/api/v1/events", get(api::events))
+        .route("/api/v1/command", post(api::command))
+        .route("/api/v1/preview.jpg", get(preview::picture))
+        .route("/api/v1/objects", get(sessions::objects))
+        .route("/api/v1/trash", get(sessions::trash))
+        .route("/api/v1/sessions", get(sessions::list))
+        .route("/api/v1/sessions.tar", get(files::day_tar))
+        .merge(of_a_session())
+        .route(
+            "/api/v1/processing",
+            get(processing::state).put(processing::configure),
+        )
+        .route("/api/v1/processing/verify", post(processing::verify))
+        .route(
+            "/api/v1/processing/jobs/{number}",
+            delete(processing::cancel),
+        )
+        .route("/api/v1/processing/editor", delete(editor::close))
         .route("/", get(relit_web::index))
         .route("/edit", get(editor::with_slash))
         .route(editor::PLACE, get(editor::pass_on))
@@ -172,21 +113,34 @@ pub(super) fn router(app: &App) -> Router {
         .fallback(no_such_path)
         .method_not_allowed_fallback(no_such_method)
         .layer(from_fn_with_state(app.clone(), guard))
-        .layer(from_fn_with_state(app.clone(), metrics::count))
         .with_state(app.clone())
+}
+
+fn of_a_session() -> Router<App> {
+    let path = |rest: &str| format!("/api/v1/sessions/{{id}}{rest}");
+    Router::new()
+        .route(&path(""), get(sessions::detail).delete(sessions::put_away))
+        .route(&path("/restore"), post(sessions::restore))
+        .route(&path("/remarks"), put(sessions::remark))
+        .route(&path("/mask.png"), get(files::mask))
+        .route(&path("/thumbnail.jpg"), get(sessions::thumbnail))
+        .route(&path("/frames/{frame}"), get(sessions::frame))
+        .route(&path("/video"), get(files::video))
+        .route(&path("/process"), post(processing::process))
+        .route(&path("/check.html"), get(processing::check_page))
+        .route(&path("/report.html"), get(processing::report_page))
+        .route(&path("/edit"), post(editor::open))
 }
 
 async fn no_such_path(request: Request) -> Failure {
     let path = request.uri().path();
     Failure::not_found(format!(
-        "there is nothing at {path}: /api/v1/openapi.json describes what there is"
+        "there is nothing at {path}: the manual lists what there is"
     ))
 }
 
 async fn no_such_method(request: Request) -> Failure {
     let (method, path) = (request.method(), request.uri().path());
-    let error = format!(
-        "{path} cannot be asked with {method}: /api/v1/openapi.json describes with what it can"
-    );
+    let error = format!("{path} cannot be asked with {method}: the manual lists with what it can");
     Failure::new(StatusCode::METHOD_NOT_ALLOWED, error)
 }

@@ -7,14 +7,13 @@ use axum::extract::{Path, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
-use utoipa::{IntoParams, ToSchema};
 
 use super::files::session_tar;
-use super::library::{Library, SessionDetail, SessionSummary};
+use super::library::{Library, SessionSummary};
 use super::permits::{Permits, Work};
 use super::pictures::Pictures;
 use super::processing::MayProcess;
-use relit_web::{Failure, JsonBody, Problem, QueryParams};
+use relit_web::{Failure, JsonBody, QueryParams};
 
 /// Sessions in one answer, unless asked otherwise, and at most.
 const SESSIONS: usize = 100;
@@ -28,23 +27,17 @@ const WIDTHS: std::ops::RangeInclusive<u32> = 64..=1920;
 const KEEP: &str = "private, max-age=86400";
 
 /// Which part of the list.
-#[derive(Debug, Deserialize, IntoParams)]
-#[into_params(parameter_in = Query)]
+#[derive(Debug, Deserialize)]
 pub(super) struct Part {
     /// Only sessions whose name comes before this one: the last of the part before.
     before: Option<String>,
     /// How many, up to 1000; 100 if left out.
     limit: Option<usize>,
     /// Only those of a day (UTC), as session names begin.
-    #[param(example = "20261120")]
     day: Option<String>,
 }
 
 /// The sessions, newest first
-#[utoipa::path(
-    get, path = "/api/v1/sessions", tag = "sessions", params(Part),
-    responses((status = 200, body = [SessionSummary]), (status = 401, body = Problem))
-)]
 pub(super) async fn list(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
@@ -58,14 +51,6 @@ pub(super) async fn list(
 }
 
 /// One session, with each frame's time and angle
-#[utoipa::path(
-    get, path = "/api/v1/sessions/{id}", tag = "sessions",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 200, body = SessionDetail), (status = 401, body = Problem),
-        (status = 404, description = "No such session", body = Problem),
-    )
-)]
 pub(super) async fn detail(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
@@ -85,16 +70,6 @@ pub(super) async fn detail(
 /// Put a session away
 ///
 /// Into the folder `.trash` beside the sessions, which nobody empties but a person. Work on it is cancelled.
-#[utoipa::path(
-    delete, path = "/api/v1/sessions/{id}", tag = "sessions",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 204, description = "Done"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session", body = Problem),
-        (status = 409, description = "Still being recorded, or one of that name is there", body = Problem),
-    )
-)]
 pub(super) async fn put_away(
     State(library): State<Arc<Library>>,
     State(processing): State<MayProcess>,
@@ -110,16 +85,6 @@ pub(super) async fn put_away(
 }
 
 /// Take a session back out of `.trash`
-#[utoipa::path(
-    post, path = "/api/v1/sessions/{id}/restore", tag = "sessions",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 204, description = "Done"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session was put away", body = Problem),
-        (status = 409, description = "One of that name is there", body = Problem),
-    )
-)]
 pub(super) async fn restore(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
@@ -130,10 +95,6 @@ pub(super) async fn restore(
 }
 
 /// The sessions in `.trash`, newest first
-#[utoipa::path(
-    get, path = "/api/v1/trash", tag = "sessions",
-    responses((status = 200, body = [SessionSummary]), (status = 401, body = Problem))
-)]
 pub(super) async fn trash(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
@@ -143,7 +104,7 @@ pub(super) async fn trash(
 }
 
 /// What a person says of a take; a field that is left out or `null` is removed.
-#[derive(Debug, Deserialize, ToSchema)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Remarks {
     /// A note of up to 2000 characters.
@@ -155,18 +116,6 @@ pub(super) struct Remarks {
 /// Note and rating of a session
 ///
 /// Written to its manifest.
-#[utoipa::path(
-    put, path = "/api/v1/sessions/{id}/remarks", tag = "sessions", request_body = Remarks,
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 204, description = "Done"),
-        (status = 400, description = "Not understood", body = Problem),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session", body = Problem),
-        (status = 409, description = "Still being recorded", body = Problem),
-        (status = 415, description = "Not JSON", body = Problem),
-    )
-)]
 pub(super) async fn remark(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
@@ -180,16 +129,6 @@ pub(super) async fn remark(
 }
 
 /// The first frame, small
-#[utoipa::path(
-    get, path = "/api/v1/sessions/{id}/thumbnail.jpg", tag = "sessions",
-    params(("id" = String, Path, description = "The session's name")),
-    responses(
-        (status = 200, description = "A JPEG file", content_type = "image/jpeg"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session", body = Problem),
-        (status = 409, description = "Still being recorded", body = Problem),
-    )
-)]
 pub(super) async fn thumbnail(
     State(library): State<Arc<Library>>,
     State(pictures): State<Arc<Pictures>>,
@@ -203,28 +142,13 @@ pub(super) async fn thumbnail(
 }
 
 /// How large.
-#[derive(Debug, Deserialize, IntoParams)]
-#[into_params(parameter_in = Query)]
+#[derive(Debug, Deserialize)]
 pub(super) struct Size {
     /// Greatest width, 64 to 1920 pixels; 960 if left out.
     width: Option<u32>,
 }
 
 /// One frame
-#[utoipa::path(
-    get, path = "/api/v1/sessions/{id}/frames/{frame}", tag = "sessions",
-    params(
-        ("id" = String, Path, description = "The session's name"),
-        ("frame" = String, Path, description = "The frame's number, 0-based, and `.jpg`", example = "0.jpg"),
-        Size,
-    ),
-    responses(
-        (status = 200, description = "A JPEG file", content_type = "image/jpeg"),
-        (status = 401, body = Problem),
-        (status = 404, description = "No such session or frame", body = Problem),
-        (status = 409, description = "Still being recorded", body = Problem),
-    )
-)]
 pub(super) async fn frame(
     State(library): State<Arc<Library>>,
     State(pictures): State<Arc<Pictures>>,
@@ -251,10 +175,6 @@ fn picture(jpeg: axum::body::Bytes) -> Response {
 }
 
 /// Names of objects captured last, newest first
-#[utoipa::path(
-    get, path = "/api/v1/objects", tag = "sessions",
-    responses((status = 200, body = [String]), (status = 401, body = Problem))
-)]
 pub(super) async fn objects(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,

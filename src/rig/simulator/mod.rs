@@ -74,7 +74,7 @@ impl Simulator {
     /// Starts a table. `link`: path of a symbolic link to its port, to be created.
     ///
     /// # Errors
-    /// [`SimulatorError::Terminal`], [`SimulatorError::Link`] or [`SimulatorError::Thread`].
+    /// [`SimulatorError::System`].
     pub fn start(
         options: &SimulatorOptions,
         link: Option<&Path>,
@@ -96,7 +96,11 @@ impl Simulator {
         let thread = options.clock.spawn("simulator", move || {
             carry(&clock, &table, terminal, &stop);
         });
-        simulator.thread = Some(thread.map_err(SimulatorError::Thread)?);
+        simulator.thread = Some(thread.map_err(|error| {
+            SimulatorError::System(format!(
+                "could not start the simulated table's thread: {error}; end other programs and try again"
+            ))
+        })?);
         Ok(simulator)
     }
 
@@ -159,9 +163,11 @@ fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &A
 
 /// Creates the link. A link that exists is replaced, any other file is not.
 fn make_link(port: &Path, link: &Path) -> Result<(), SimulatorError> {
-    let failed = |source| SimulatorError::Link {
-        path: link.to_owned(),
-        source,
+    let failed = |error: std::io::Error| {
+        SimulatorError::System(format!(
+            "could not make {} a link to the simulated port: {error}; choose another name",
+            link.display()
+        ))
     };
     if fs::read_link(link).is_ok() {
         fs::remove_file(link).map_err(failed)?;

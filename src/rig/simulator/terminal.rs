@@ -23,7 +23,13 @@ pub(super) struct Terminal {
 
 impl Terminal {
     pub(super) fn open() -> Result<Terminal, SimulatorError> {
-        let failed = |step| move |errno: Errno| SimulatorError::Terminal { step, errno };
+        let failed = |step| {
+            move |errno: Errno| {
+                SimulatorError::System(format!(
+                    "could not {step} a pseudoterminal: {errno}; see that /dev/pts is mounted and not full"
+                ))
+            }
+        };
         let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).map_err(failed("open"))?;
         fcntl_setfd(&line, FdFlags::CLOEXEC).map_err(failed("set up"))?;
         grantpt(&line).map_err(failed("grant"))?;

@@ -5,9 +5,9 @@ use std::fmt;
 
 use relit_data::session::object_of;
 use serde::Serialize;
-use utoipa::ToSchema;
 
-use super::parts::{CameraState, Phase, TableState, TakeSummary, Verdict};
+use super::RigState;
+use super::parts::{Phase, TakeSummary, Verdict};
 
 /// A take needs its expected size and a fifth more.
 const RESERVE: f64 = 1.2;
@@ -99,7 +99,7 @@ impl fmt::Display for Obstacle {
 }
 
 /// What the one button does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AdvisedAction {
     /// Captures the object that a person names: command `start`.
@@ -115,7 +115,7 @@ pub enum AdvisedAction {
 }
 
 /// The one button at the rig.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct AdvisedButton {
     /// What stands on it.
     pub text: String,
@@ -126,7 +126,7 @@ pub struct AdvisedButton {
 }
 
 /// What a person at the rig is told, and the one thing to do next.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Advice {
     /// How the rig stands, in a few words.
     pub headline: String,
@@ -144,7 +144,7 @@ impl Default for Advice {
 }
 
 impl Advice {
-    pub(super) fn of(state: &Situation<'_>) -> Self {
+    pub(super) fn of(state: &RigState) -> Self {
         if !state.rests() {
             return Self::stopping(doing(state.phase));
         }
@@ -177,9 +177,9 @@ impl Advice {
         }
     }
 
-    fn of_ready(state: &Situation<'_>) -> Self {
-        let next = state.next;
-        if let Some(take) = state.last_take.filter(|take| is_aborted(take)) {
+    fn of_ready(state: &RigState) -> Self {
+        let next = state.queue.first().map(String::as_str);
+        if let Some(take) = state.last_take.as_ref().filter(|take| is_aborted(take)) {
             return Self::after_an_abort(take, next);
         }
         let (headline, text, action) = match next {
@@ -221,32 +221,16 @@ impl Advice {
     }
 }
 
-/// What the advice is about.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Situation<'a> {
-    pub(super) phase: Phase,
-    /// Whether there is to be a table.
-    pub(super) has_table: bool,
-    pub(super) table: &'a TableState,
-    /// Speed of the turn that is set, degrees a second.
-    pub(super) degrees_per_second: f64,
-    pub(super) camera: &'a CameraState,
-    pub(super) disk_fault: Option<&'a str>,
-    pub(super) free_bytes: u64,
-    pub(super) needed_bytes: u64,
-    /// The next object of the queue.
-    pub(super) next: Option<&'a str>,
-    pub(super) last_take: Option<&'a TakeSummary>,
-}
-
-impl Situation<'_> {
+impl RigState {
     /// Whether nothing is captured at the moment.
-    pub(super) fn rests(&self) -> bool {
+    #[must_use]
+    pub fn rests(&self) -> bool {
         matches!(self.phase, Phase::Idle | Phase::WaitingForObject)
     }
 
     /// What keeps a take from beginning: of several obstacles the first that a person has to remove.
-    pub(super) fn obstacle_to_take(&self) -> Option<Obstacle> {
+    #[must_use]
+    pub fn obstacle_to_take(&self) -> Option<Obstacle> {
         self.obstacle_of_table()
             .or_else(|| self.obstacle_of_speed())
             .or_else(|| self.table.no_room.clone().map(Obstacle::NoRoom))
@@ -255,36 +239,38 @@ impl Situation<'_> {
     }
 
     /// What keeps the table from moving, other than that there is to be none.
-    pub(super) fn obstacle_to_motion(&self) -> Option<Obstacle> {
+    #[must_use]
+    pub fn obstacle_to_motion(&self) -> Option<Obstacle> {
         self.obstacle_of_table()
             .filter(|obstacle| !matches!(obstacle, Obstacle::Locked(_)))
     }
 
-    /// What is wrong with the table.
-    pub(super) fn obstacle_of_table(&self) -> Option<Obstacle> {
-        let table = self.table;
+    /// What is wrong with the table, other than that there is to be none.
+    #[must_use]
+    pub fn obstacle_of_table(&self) -> Option<Obstacle> {
+        let table = &self.table;
         if table.emergency_stop {
             return Some(Obstacle::EmergencyStop);
         }
         if table.locked {
             return Some(Obstacle::Locked(table.fault.clone().unwrap_or_default()));
         }
-        (self.has_table && !table.present).then(|| Obstacle::NoTable(table.fault.clone()))
+        (self.has_table() && !table.present).then(|| Obstacle::NoTable(table.fault.clone()))
     }
 
     fn obstacle_of_speed(&self) -> Option<Obstacle> {
         let highest = self.table.max_degrees_per_second?;
-        Obstacle::of_speed(self.degrees_per_second, highest)
+        Obstacle::of_speed(self.settings.degrees_per_second, highest)
     }
 
     fn obstacle_of_camera(&self) -> Option<Obstacle> {
-        let camera = self.camera;
+        let camera = &self.camera;
         (!camera.present).then(|| Obstacle::NoCamera(camera.fault.clone()))
     }
 
     fn obstacle_of_disk(&self) -> Option<Obstacle> {
-        if let Some(why) = self.disk_fault {
-            return Some(Obstacle::NoFolder(why.to_owned()));
+        if let Some(why) = &self.disk_fault {
+            return Some(Obstacle::NoFolder(why.clone()));
         }
         let needed = (self.needed_bytes as f64 * RESERVE).ceil() as u64;
         (self.free_bytes < needed).then_some(Obstacle::NoSpace(self.free_bytes, needed))

@@ -3,10 +3,9 @@
 use std::fmt;
 
 use serde::Serialize;
-use utoipa::ToSchema;
 
 /// Where a capture stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Default, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
     /// Nothing is under way.
@@ -47,7 +46,7 @@ impl fmt::Display for Phase {
 }
 
 /// How a take came out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// All frames of the turn, nothing moved.
@@ -59,7 +58,7 @@ pub enum Verdict {
 }
 
 /// The last take, or the one before the present one.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TakeSummary {
     /// The session's name.
     pub session: String,
@@ -74,7 +73,7 @@ pub struct TakeSummary {
 }
 
 /// The turntable as last heard.
-#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 #[non_exhaustive]
 pub struct TableState {
     /// Whether there is a table at all.
@@ -107,7 +106,7 @@ pub struct TableState {
 }
 
 /// The camera as last seen.
-#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 #[non_exhaustive]
 pub struct CameraState {
     /// Whether it can be reached.
@@ -129,7 +128,7 @@ pub struct CameraState {
 }
 
 /// Something that went wrong, in plain words.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct FaultLine {
     /// Microseconds of the capture's clock.
@@ -139,7 +138,7 @@ pub struct FaultLine {
 }
 
 /// Something that happened, with the time of day.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct LogLine {
     /// When, RFC 3339, UTC.
@@ -149,7 +148,7 @@ pub struct LogLine {
 }
 
 /// How takes are captured. All but the addresses can be changed by the command `configure`.
-#[derive(Debug, Clone, PartialEq, Serialize, Default, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct CaptureSettings {
     /// The folder of sessions.
     pub root: String,
@@ -170,7 +169,7 @@ pub struct CaptureSettings {
 }
 
 /// Something that was checked before the table turned.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Check {
     /// What was checked.
     pub what: String,

@@ -3,10 +3,9 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 /// One thing that is done with a session, or with the data set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ProcessingStep {
     /// Its mask is made by the turn: `relit-mask SESSION --auto`.
@@ -31,7 +30,7 @@ impl fmt::Display for ProcessingStep {
 }
 
 /// How far a job has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ProcessingStatus {
     /// It waits for those before it, or for the rig to rest.
@@ -45,7 +44,7 @@ pub enum ProcessingStatus {
 }
 
 /// Something that waits or is done just now.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ProcessingJob {
     /// Its number, by which it is cancelled.
     pub number: u64,
@@ -64,7 +63,7 @@ pub struct ProcessingJob {
 }
 
 /// How a job ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ProcessingOutcome {
     /// All is well.
@@ -78,7 +77,7 @@ pub enum ProcessingOutcome {
 }
 
 /// A job that has ended.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct FinishedJob {
     /// Its number.
     pub number: u64,
@@ -93,7 +92,7 @@ pub struct FinishedJob {
 }
 
 /// What is made of recorded sessions on this machine.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Default, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Default)]
 pub struct ProcessingState {
     /// Whether `relit-mask` is installed.
     pub has_mask_program: bool,

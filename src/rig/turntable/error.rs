@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use super::codes::{Alarm, meaning_of_error};
-use super::family::Family;
 use super::wire::{ControllerState, LineFault, RestartCause, SendError};
 use crate::lockfile::LockError;
 
@@ -43,9 +42,6 @@ pub enum TurntableError {
         /// The owner.
         pid: u32,
     },
-    /// The I/O thread could not be started.
-    #[error("no thread could be started for the port: {0}; end other programs and try again")]
-    Thread(#[source] std::io::Error),
     /// The port could not be opened.
     #[error(
         "{path} could not be opened: {source}; check that the controller is plugged in, that no other program has the port, and that you may use it (group dialout)"
@@ -59,23 +55,15 @@ pub enum TurntableError {
     /// Lock, socket or folder of the port's owner could not be used.
     #[error(transparent)]
     Lock(#[from] LockError),
-    /// The process that owns the port could not be asked.
-    #[error("process {pid}, which has {path}, did not answer: {why}; ask again, or end it")]
+    /// The process that owns the port could not be asked, or reports an error.
+    #[error("process {pid}, which has {path}, {why}")]
     Owner {
         /// The port.
         path: PathBuf,
         /// The owner.
         pid: u32,
-        /// What went wrong.
+        /// What it did, and what to do.
         why: String,
-    },
-    /// The port's owner reports an error.
-    #[error("process {pid}, which has the port, says: {message}")]
-    OwnerSays {
-        /// The owner.
-        pid: u32,
-        /// Its message.
-        message: String,
     },
     /// There is no Grbl controller at the port.
     #[error(
@@ -91,18 +79,7 @@ pub enum TurntableError {
     #[error(
         "the controller does not report {0}: send `$$` and `$I` to it by hand and look at the answers"
     )]
-    NotReported(&'static str),
-    /// The controller's settings lack some that are needed.
-    #[error(
-        "the controller ({family}) does not report {}, which the table needs: set up its X axis, send `$$` to it by hand and look at the answer",
-        listed(.settings)
-    )]
-    MissingSettings {
-        /// Its firmware.
-        family: Family,
-        /// The settings' numbers.
-        settings: Vec<u16>,
-    },
+    NotReported(String),
     /// No report or answer came.
     #[error("the table did not answer `?` within {milliseconds} ms: check cable and power")]
     Silent {
@@ -152,9 +129,6 @@ pub enum TurntableError {
     /// The position is not known.
     #[error("the table's position is not known: home it first")]
     NotHomed,
-    /// The search for the index failed.
-    #[error("homing failed: {0}")]
-    Homing(Alarm),
     /// A speed or angle that the table cannot follow.
     #[error("{what} cannot be {value}: {range}")]
     OutOfRange {
@@ -269,11 +243,6 @@ pub enum MotionFault {
     /// A stop was requested.
     #[error("a stop was asked for")]
     Stopped,
-}
-
-fn listed(settings: &[u16]) -> String {
-    let settings: Vec<_> = settings.iter().map(|n| format!("${n}")).collect();
-    settings.join(", ")
 }
 
 fn advice(state: ControllerState, alarm: Option<&Alarm>) -> String {

@@ -184,9 +184,8 @@ fn about(link: &Link) -> Result<Vec<Message>, TurntableError> {
         }
         last = messages;
     }
-    Err(TurntableError::NotReported(
-        lacks(&last).unwrap_or("its version and options (`$I`) twice the same"),
-    ))
+    let lacks = lacks(&last).unwrap_or("its version and options (`$I`) twice the same");
+    Err(TurntableError::NotReported(lacks.to_owned()))
 }
 
 fn describes_firmware(message: &Message) -> bool {
@@ -228,13 +227,14 @@ fn settings(link: &Link, family: Family, extras: Extras) -> Result<GrblSettings,
         }
         last = Some(settings);
     }
-    Err(match missing.is_empty() {
-        true => TurntableError::NotReported("its settings (`$$`) twice the same"),
-        false => TurntableError::MissingSettings {
-            family,
-            settings: missing,
-        },
-    })
+    Err(TurntableError::NotReported(match missing.is_empty() {
+        true => "its settings (`$$`) twice the same".to_owned(),
+        false => {
+            let missing: Vec<_> = missing.iter().map(|n| format!("${n}")).collect();
+            let missing = missing.join(", ");
+            format!("{missing}, which a table with {family} needs on its X axis")
+        }
+    }))
 }
 
 fn done(link: &Link, block: &str, outcome: LineOutcome) -> Result<Vec<Message>, TurntableError> {

@@ -1,7 +1,7 @@
 //! Where the angle 0 is: at the index, or where the table stands.
 
 use super::codes::Alarm;
-use super::error::TurntableError;
+use super::error::{MotionFault, TurntableError};
 use super::grbl_client::{Table, refused, require_released};
 use super::supervisor::MotionGoal;
 
@@ -26,7 +26,7 @@ impl Table {
     /// angle 0.
     ///
     /// # Errors
-    /// [`TurntableError::Homing`] if no index was found, [`TurntableError::EmergencyStop`] while it is
+    /// [`TurntableError::Motion`] if no index was found, [`TurntableError::EmergencyStop`] while it is
     /// pressed, or the fault that has ended the search.
     pub fn home(&self) -> Result<Homed, TurntableError> {
         self.clear_emergency_stop()?;
@@ -52,11 +52,8 @@ impl Table {
         // A controller that has not found its index accepts `$H` all the same.
         let status = self.status()?;
         if status.state != ControllerState::Idle {
-            return Err(TurntableError::Homing(
-                status
-                    .alarm
-                    .unwrap_or(Alarm::unknown(self.identity().family)),
-            ));
+            let unknown = Alarm::unknown(self.identity().family);
+            return Err(MotionFault::Alarm(status.alarm.unwrap_or(unknown)).into());
         }
         self.link().supervisor().set_zero_deg(0.0);
         Ok(Homed::Index)

@@ -103,13 +103,9 @@ impl Identity {
                 _ => {}
             }
         }
-        let firmware = firmware.ok_or(TurntableError::NotReported("its version ([VER:..])"))?;
-        let extras = extras.ok_or(TurntableError::NotReported("its options ([OPT:..])"))?;
-        let positive = |number, what| {
-            settings
-                .positive(number)
-                .ok_or(TurntableError::NotReported(what))
-        };
+        let firmware = firmware.ok_or_else(|| not_reported("its version ([VER:..])"))?;
+        let extras = extras.ok_or_else(|| not_reported("its options ([OPT:..])"))?;
+        let positive = |number, what| settings.positive(number).ok_or_else(|| not_reported(what));
         Ok(Identity {
             firmware: match family {
                 Family::GrblHal | Family::GrblEsp32 => format!("{firmware} ({family})"),
@@ -127,6 +123,10 @@ impl Identity {
             degrees_per_unit: if settings.is_on(13) { INCH } else { 1.0 },
         })
     }
+}
+
+fn not_reported(what: &str) -> TurntableError {
+    TurntableError::NotReported(what.to_owned())
 }
 
 /// The answer to `$$`: a value for each setting's number.
@@ -173,7 +173,7 @@ impl GrblSettings {
         let reach_deg = match self.is_on(20) {
             true => self
                 .positive(130)
-                .ok_or(TurntableError::NotReported("its soft limit ($130)"))?,
+                .ok_or_else(|| not_reported("its soft limit ($130)"))?,
             false => travel_deg,
         };
         // Stock Grbl's soft limits reach from the far end of the axis to machine zero.

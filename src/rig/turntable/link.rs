@@ -64,7 +64,10 @@ impl Link {
             let (supervisor, quit) = (Arc::clone(&link.supervisor), Arc::clone(&quit));
             move || carry(port, &supervisor, &quit)
         });
-        let thread = Some(thread.map_err(TurntableError::Thread)?);
+        let thread = Some(thread.map_err(|source| TurntableError::Open {
+            path: link.port_name().into(),
+            source,
+        })?);
         Ok((link, IoThread { quit, thread }))
     }
 

@@ -42,14 +42,12 @@
 //! # }
 //! ```
 //!
-//! This module knows nothing of cameras and sessions, and shares no code with the firmware: both
+//! This module knows nothing of cameras, of sessions only what a turn's journal keeps, and shares no code with the firmware: both
 //! sides implement the published interface.
 
 mod address;
 mod codes;
 mod error;
-#[cfg(test)]
-mod fake_grbl;
 mod family;
 mod grbl_client;
 mod greeting;
@@ -83,7 +81,7 @@ pub use owner::Owner;
 pub use plan::{TurnDirection, TurnPlan, TurnRequest};
 pub use port::{Port, SerialPort};
 pub use status::TableStatus;
-pub use sync::{ExpectedTurn, Residuals, TimedReport, Track, TrackError};
+pub use sync::{Track, TrackError};
 
 pub use turn::{ConstantPart, FinishedTurn, Turn, TurnPhase};
 pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};

@@ -66,14 +66,20 @@ impl Default for TurnRequest {
 
 /// A turn that stays inside the limits.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct TurnPlan {
-    degrees_per_second: f64,
-    constant_deg: f64,
+    /// Speed, degrees a second.
+    pub degrees_per_second: f64,
+    /// How far the table turns at constant speed, margins included, degrees.
+    pub constant_deg: f64,
     margin_deg: f64,
     ramp_deg: f64,
-    direction: TurnDirection,
-    unwind: bool,
-    start_deg: f64,
+    /// Its direction.
+    pub direction: TurnDirection,
+    /// Whether it turns back afterwards.
+    pub unwind: bool,
+    /// The angle from which it was planned.
+    pub start_deg: f64,
 }
 
 impl TurnPlan {
@@ -113,36 +119,6 @@ impl TurnPlan {
     fn fits(&self, low: f64, high: f64) -> bool {
         let (a, b) = (self.back_deg(), self.end_deg());
         a.min(b) >= low + PRINTED_DEG && a.max(b) <= high - PRINTED_DEG
-    }
-
-    /// Speed, degrees a second.
-    #[must_use]
-    pub fn degrees_per_second(&self) -> f64 {
-        self.degrees_per_second
-    }
-
-    /// How far the table turns at constant speed, margins included, degrees.
-    #[must_use]
-    pub fn constant_deg(&self) -> f64 {
-        self.constant_deg
-    }
-
-    /// Its direction.
-    #[must_use]
-    pub fn direction(&self) -> TurnDirection {
-        self.direction
-    }
-
-    /// Whether it turns back afterwards.
-    #[must_use]
-    pub fn unwind(&self) -> bool {
-        self.unwind
-    }
-
-    /// The angle from which it was planned.
-    #[must_use]
-    pub fn start_deg(&self) -> f64 {
-        self.start_deg
     }
 
     /// Where it moves first: back by ramp and margin.
@@ -297,7 +273,7 @@ mod tests {
     #[test]
     fn a_turn_from_zero_has_its_ramps_outside_the_constant_part() {
         let plan = plan(0.0).unwrap();
-        assert_eq!(plan.direction(), TurnDirection::Positive);
+        assert_eq!(plan.direction, TurnDirection::Positive);
         // 7.2^2 / (2 * 36) = 0.72 degrees of ramp.
         assert!((plan.back_deg() + 2.0 + 0.72 + RAMP_SLACK_DEG).abs() < 1e-9);
         assert_eq!(plan.constant_from_deg(), -2.0);
@@ -308,7 +284,7 @@ mod tests {
     #[test]
     fn a_table_that_is_wound_up_turns_the_other_way() {
         let plan = plan(200.0).unwrap();
-        assert_eq!(plan.direction(), TurnDirection::Negative);
+        assert_eq!(plan.direction, TurnDirection::Negative);
         assert!(plan.end_deg() > -163.0 && plan.back_deg() > 200.0);
     }
 

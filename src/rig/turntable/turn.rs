@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
+use relit_data::session::{JournaledReport, JournaledTurn};
+
 use super::error::TurntableError;
 use super::grbl_client::{Table, straight};
 use super::plan::TurnPlan;
 use super::status::TableStatus;
 use super::supervisor::PositionReport;
-use super::sync::{self, ExpectedTurn, TimedReport, Track, TrackError};
+use super::sync::{self, Track, TrackError};
 use super::wire::{ControllerState, Message};
 
 /// Rest before the start, until the table has stopped swinging.
@@ -54,7 +56,7 @@ impl Table {
         if !status.homed {
             return Err(TurntableError::NotHomed);
         }
-        let planned_deg = plan.start_deg();
+        let planned_deg = plan.start_deg;
         if (status.angle_deg - planned_deg).abs() > 2.0 * self.identity().step_deg() {
             return Err(TurntableError::MovedSincePlan {
                 planned_deg,
@@ -90,7 +92,7 @@ pub struct Turn<'table> {
 
 impl<'table> Turn<'table> {
     fn start(table: &'table Table, plan: TurnPlan, zero_deg: f64) -> Result<Self, TurntableError> {
-        let speed = plan.degrees_per_second();
+        let speed = plan.degrees_per_second;
         table.go(zero_deg + plan.back_deg(), speed, zero_deg)?;
         table.clock().sleep(SETTLE);
         table.require_zero(zero_deg)?;
@@ -127,25 +129,16 @@ impl<'table> Turn<'table> {
         }
         let gone = supervisor.recorded().last().map(|report| self.gone(report));
         Ok(match gone {
-            Some(gone) if gone > self.plan.constant_deg() => TurnPhase::Ending,
+            Some(gone) if gone > self.plan.constant_deg => TurnPhase::Ending,
             Some(gone) if gone >= 0.0 => TurnPhase::Constant,
             _ => TurnPhase::Starting,
         })
     }
 
-    /// The table's angle in the last report, degrees, and the report's time, microseconds of the
-    /// host's clock.
-    #[must_use]
-    pub fn last_angle(&self) -> Option<(f64, i64)> {
-        let supervisor = self.table.link().supervisor();
-        let report = supervisor.recorded().last()?;
-        Some((report.machine_deg - self.zero_deg, report.came_us))
-    }
-
     /// Degrees since the speed became constant; negative before.
     fn gone(&self, report: &PositionReport) -> f64 {
         let angle = report.machine_deg - self.zero_deg - self.plan.constant_from_deg();
-        angle * self.plan.direction().sign()
+        angle * self.plan.direction.sign()
     }
 
     /// Waits until the speed is constant.
@@ -153,7 +146,7 @@ impl<'table> Turn<'table> {
     /// # Errors
     /// The fault that has ended the turn; the table has been stopped.
     pub fn wait_constant(&mut self) -> Result<ConstantPart, TurntableError> {
-        let speed = self.plan.degrees_per_second();
+        let speed = self.plan.degrees_per_second;
         let ramp = self.table.travel_time(0.0, speed) + RAMP_SLACK;
         let found = self.table.link().wait(ramp, |supervisor| {
             if supervisor.fault().is_some() {
@@ -176,7 +169,7 @@ impl<'table> Turn<'table> {
         let micros = |degrees: f64| (degrees / speed * 1e6).round() as i64;
         Ok(ConstantPart {
             from_us: at_us - micros(gone),
-            to_us: at_us + micros(self.plan.constant_deg() - gone),
+            to_us: at_us + micros(self.plan.constant_deg - gone),
         })
     }
 
@@ -201,12 +194,12 @@ impl<'table> Turn<'table> {
     pub fn wait_rest(mut self) -> (Result<Track, TrackError>, FinishedTurn<'table>) {
         let plan = &self.plan;
         let distance = (plan.end_deg() - plan.back_deg()).abs();
-        let limit = self.table.travel_time(distance, plan.degrees_per_second());
+        let limit = self.table.travel_time(distance, plan.degrees_per_second);
         let arrived = self.table.wait_arrival(limit);
         let reports = self.leave();
         let track = sync::fit(&reports, &self.expected());
-        let back_to = self.plan.unwind();
-        let back_to = back_to.then(|| self.zero_deg + self.plan.start_deg());
+        let back_to = self.plan.unwind;
+        let back_to = back_to.then(|| self.zero_deg + self.plan.start_deg);
         let finished = FinishedTurn {
             table: self.table,
             arrived,
@@ -219,22 +212,22 @@ impl<'table> Turn<'table> {
     /// The reports of the part at constant speed that came after the first `seen` of the turn, and
     /// how many of the turn there are now.
     #[must_use]
-    pub fn reports_after(&self, seen: usize) -> (Vec<TimedReport>, usize) {
+    pub fn reports_after(&self, seen: usize) -> (Vec<JournaledReport>, usize) {
         let expected = self.expected();
         let supervisor = self.table.link().supervisor();
         let recorded = supervisor.recorded();
         let new = recorded.get(seen..).unwrap_or_default().iter();
-        let timed = new.filter_map(|report| TimedReport::of(report, &expected));
+        let timed = new.filter_map(|report| sync::timed(report, &expected));
         (timed.collect(), recorded.len())
     }
 
     /// The turn in machine positions.
     #[must_use]
-    pub fn expected(&self) -> ExpectedTurn {
-        ExpectedTurn {
+    pub fn expected(&self) -> JournaledTurn {
+        JournaledTurn {
             from_deg: self.zero_deg + self.plan.constant_from_deg(),
             to_deg: self.zero_deg + self.plan.constant_to_deg(),
-            degrees_per_second: self.plan.degrees_per_second(),
+            degrees_per_second: self.plan.degrees_per_second,
             zero_deg: self.zero_deg,
             step_deg: self.table.identity().step_deg(),
         }

@@ -60,7 +60,6 @@ fn describe(number: u32, name: String) -> DeviceInfo {
         driver: "nokhwa".to_owned(),
         bus: String::new(),
         modes: Vec::new(),
-        other_formats: Vec::new(),
         problems: Vec::new(),
     }
 }
@@ -162,10 +161,7 @@ impl Camera for NokhwaCamera {
     fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
         self.stop()?;
         let format = want.fourcc.pixel_format().and_then(library_format);
-        let format = format.ok_or_else(|| CameraError::Format {
-            device: self.device(),
-            fourcc: want.fourcc,
-        })?;
+        let format = format.ok_or_else(|| CameraError::format(self.device(), want.fourcc))?;
         let rate = want.rate.per_second().round() as u32;
         let wanted = CameraFormat::new(Resolution::new(want.width, want.height), format, rate);
         let (sender, frames) = sync_channel(WAITING);

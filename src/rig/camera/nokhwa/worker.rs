@@ -140,7 +140,7 @@ fn failed(
     doing: &'static str,
     source: impl Into<Box<dyn std::error::Error + Send + Sync>>,
 ) -> CameraError {
-    CameraError::Backend {
+    CameraError::Refused {
         device: device.to_owned(),
         doing,
         source: source.into(),

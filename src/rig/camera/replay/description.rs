@@ -43,7 +43,6 @@ pub(super) fn describe(
                 .rate
                 .map_or(Rates::Unknown, |rate| Rates::List(vec![rate])),
         }],
-        other_formats: Vec::new(),
         problems: notices.chain(damage).collect(),
     }
 }

@@ -104,7 +104,7 @@ impl Camera for ReplayCamera {
     fn set_control(&mut self, _: ControlId, _: i64) -> Result<i64, CameraError> {
         Err(CameraError::Unsupported {
             device: self.info.address.to_string(),
-            what: "a recording's controls stand as they were recorded",
+            what: "a recording's controls stand as they were recorded".to_owned(),
         })
     }
 

@@ -9,7 +9,7 @@ use v4l::v4l_sys as sys;
 
 use super::ioctl::{Identity, Node};
 use super::{holders, modes};
-use crate::camera::{CameraAddress, CameraError, DeviceInfo, Fourcc, Mode};
+use crate::camera::{CameraAddress, CameraError, DeviceInfo, Mode};
 
 /// A node and its name, for errors.
 #[derive(Debug)]
@@ -39,10 +39,10 @@ impl Device {
 
     fn describe(&self, identity: Identity) -> Result<DeviceInfo, CameraError> {
         let mut problems = Vec::new();
-        let (modes, other_formats) = match self.modes() {
+        let modes = match self.modes() {
             Err(error @ CameraError::Refused { .. }) => {
                 problems.push(with_causes(&error));
-                Default::default()
+                Vec::new()
             }
             answer => answer?,
         };
@@ -52,7 +52,6 @@ impl Device {
             driver: identity.driver,
             bus: identity.bus,
             modes,
-            other_formats,
             problems,
         })
     }
@@ -86,7 +85,7 @@ impl Device {
             _ => CameraError::Refused {
                 device,
                 doing,
-                source,
+                source: source.into(),
             },
         }
     }
@@ -123,8 +122,8 @@ impl Device {
         }
     }
 
-    /// What it offers: formats that can be recorded, with sizes and rates, and the others.
-    pub(super) fn modes(&self) -> Result<(Vec<Mode>, Vec<Fourcc>), CameraError> {
+    /// What it offers: formats that can be recorded, with sizes and rates.
+    pub(super) fn modes(&self) -> Result<Vec<Mode>, CameraError> {
         modes::read(&self.node).map_err(|error| self.error("its modes were read", error))
     }
 }
@@ -163,7 +162,7 @@ fn open_error(path: &Path, error: io::Error) -> CameraError {
         _ => CameraError::Refused {
             device,
             doing: "it was opened",
-            source: error,
+            source: error.into(),
         },
     }
 }

@@ -41,7 +41,6 @@ fn unreadable(path: PathBuf, error: &CameraError) -> DeviceInfo {
         driver: String::new(),
         bus: String::new(),
         modes: Vec::new(),
-        other_formats: Vec::new(),
         problems: vec![with_causes(error)],
     }
 }

@@ -43,8 +43,7 @@ impl Camera for V4l2Camera {
     }
 
     fn modes(&mut self) -> Result<Vec<Mode>, CameraError> {
-        let (modes, _) = self.device.modes()?;
-        Ok(modes)
+        self.device.modes()
     }
 
     fn controls(&mut self) -> Result<Vec<Control>, CameraError> {

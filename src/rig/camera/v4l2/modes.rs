@@ -10,13 +10,12 @@ use crate::camera::{Fourcc, Mode, Rate, Rates};
 /// Most entries that are read of a driver's list, in case a faulty driver's list does not end.
 const MOST_ENTRIES: u32 = 256;
 
-/// Formats that can be recorded, with sizes and rates, and the others.
-pub(super) fn read(node: &Node) -> io::Result<(Vec<Mode>, Vec<Fourcc>)> {
-    let (mut modes, mut others) = (Vec::new(), Vec::new());
+/// Formats that can be recorded, with sizes and rates.
+pub(super) fn read(node: &Node) -> io::Result<Vec<Mode>> {
+    let mut modes = Vec::new();
     for code in entries(|index| node.pixel_format(index))? {
         let fourcc = Fourcc::from_code(code);
         if fourcc.pixel_format().is_none() {
-            others.push(fourcc);
             continue;
         }
         for sizes in entries(|index| node.frame_size(code, index))? {
@@ -29,7 +28,7 @@ pub(super) fn read(node: &Node) -> io::Result<(Vec<Mode>, Vec<Fourcc>)> {
             });
         }
     }
-    Ok((modes, others))
+    Ok(modes)
 }
 
 /// A driver's list from index 0 to its end.

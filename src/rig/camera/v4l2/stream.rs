@@ -43,10 +43,9 @@ impl Stream {
             .set_format(want.fourcc.code(), want.width, want.height)
             .map_err(|error| device.error("its format was set", error))?;
         let fourcc = Fourcc::from_code(layout.pixelformat);
-        let format = fourcc.pixel_format().ok_or_else(|| CameraError::Format {
-            device: device.name(),
-            fourcc,
-        })?;
+        let format = fourcc
+            .pixel_format()
+            .ok_or_else(|| CameraError::format(device.name(), fourcc))?;
         let interval = device
             .node
             .set_interval(sys::v4l2_fract {

@@ -4,9 +4,8 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-use super::error::{CaptureError, MeterFault};
+use super::error::{CaptureError, MeterFault, Refusal};
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
-use super::settings::Settings;
 use super::stop::StopRequest;
 use crate::camera::hold::{Aspect, ControlSetting};
 use crate::camera::{Camera, Control, Frame};
@@ -16,6 +15,8 @@ use relit_data::image_stats::{SATURATION_LEVEL, measure_whole};
 use relit_video::LiveDecoder;
 use search::{Advice, ExposureRange, ExposureSearch};
 
+/// The part of the pixels in the middle that may saturate.
+const MAX_CLIPPED: f64 = 0.005;
 /// Most degrees that the table turns from one frame to the next: two frames of each degree.
 const DEGREES_A_FRAME: f64 = 0.48;
 /// Most degrees of the metering turn: two turns.
@@ -39,7 +40,6 @@ pub(super) fn meter(
     camera: &mut dyn Camera,
     table: &Table,
     locked: &mut LockedCamera,
-    settings: &Settings,
     stop: &StopRequest,
 ) -> Result<i64, CaptureError> {
     let steps = &locked.plan.steps;
@@ -55,7 +55,7 @@ pub(super) fn meter(
     let mut metering = MeteringLoop {
         camera: &mut *camera,
         stop,
-        search: ExposureSearch::new(range, settings.meter_clip),
+        search: ExposureSearch::new(range, MAX_CLIPPED),
         step,
         decoder: decoder.map_err(MeterFault::NoPicture)?,
         late: LATE_FRAMES,
@@ -106,7 +106,10 @@ impl MeteringLoop<'_> {
         let set = self.search.exposure();
         let read = self.camera.set_control(self.step.id, set)?;
         if read != set {
-            return Err(MeterFault::NotTaken { set, read }.into());
+            return Err(Refusal::Other(format!(
+                "the exposure was set to {set} and reads {read}: leave --meter out"
+            ))
+            .into());
         }
         self.late = LATE_FRAMES;
         Ok(())
@@ -126,7 +129,7 @@ impl MeteringLoop<'_> {
 
     fn search_in(&mut self, turn: &mut Turn<'_>) -> Result<i64, CaptureError> {
         let part = turn.wait_constant()?;
-        let speed = turn.plan().degrees_per_second();
+        let speed = turn.plan().degrees_per_second;
         loop {
             self.stop.check()?;
             turn.state()?;

@@ -41,7 +41,6 @@ impl<'a> Scene<'a> {
             driver: String::new(),
             bus: String::new(),
             modes: Vec::new(),
-            other_formats: Vec::new(),
             problems: Vec::new(),
         };
         Self {

@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{SendTimeoutError, Sender};
 
+use relit_data::causes::with_causes;
+
 use super::cutter::{Cutter, TurnFrame};
 use super::finding::Finding;
 use super::outcome::{CameraOutcome, End};
@@ -69,12 +71,17 @@ impl CameraThread {
             Err(CameraError::Timeout { .. }) => {
                 let waited = Duration::from_micros(now_us.abs_diff(*last_us));
                 match waited >= self.stall {
-                    true => Err(End::Stalled { waited }),
+                    true => Err(End::Failed(format!(
+                        "the camera gave no frame for {:.1} s: check its cable",
+                        waited.as_secs_f64()
+                    ))),
                     false => Ok(()),
                 }
             }
-            Err(CameraError::EndOfRecording { .. }) => Err(End::SourceOver),
-            Err(error) => Err(End::Camera(error)),
+            Err(CameraError::EndOfRecording { .. }) => Err(End::Failed(
+                "the recording that plays the camera is over".to_owned(),
+            )),
+            Err(error) => Err(End::Failed(with_causes(&error))),
         }
     }
 
@@ -96,7 +103,8 @@ impl CameraThread {
 
     fn take(&mut self, frame: Frame) -> Result<(), End> {
         if let Some(fault) = frame.fault().filter(is_other_size) {
-            return Err(End::OtherSize(fault));
+            let what = format!("the camera changed what it delivers: {fault}");
+            return Err(End::Failed(what));
         }
         let frame = Arc::new(frame);
         if let Some(preview) = &self.preview {
@@ -130,7 +138,9 @@ impl CameraThread {
                     self.shared.lock().progress.overrun += 1;
                     delivered.map(Finding::QueueFull)
                 }
-                Err(SendTimeoutError::Disconnected(_)) => return Err(End::Disk),
+                Err(SendTimeoutError::Disconnected(_)) => {
+                    return Err(End::Failed("the disk took no more".to_owned()));
+                }
             }
         };
         self.findings.extend(finding);

@@ -12,11 +12,11 @@ use relit_video::VideoError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// The system refused a thread.
-    #[error("a thread for the {what} could not be started: close other programs")]
-    Thread {
-        /// What it was for.
-        what: &'static str,
+    /// A thread could not be started, or a folder of sessions could not be listed.
+    #[error("{what}")]
+    System {
+        /// What could not be done, and what to do.
+        what: String,
         /// The system's answer.
         source: io::Error,
     },
@@ -31,14 +31,6 @@ pub enum RecordingError {
     /// The video could not be made, written or read.
     #[error(transparent)]
     Video(#[from] VideoError),
-    /// A folder of sessions could not be listed.
-    #[error("{path} could not be listed: check that it is there and may be read")]
-    List {
-        /// The folder.
-        path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
-    },
     /// A salvaged session does not read back.
     #[error(
         "{folder} was salvaged to {wanted} frames and {found} read back: look at its video with `ffprobe`"

@@ -68,7 +68,7 @@ impl Recorder {
     /// Makes the session's folder and begins to take frames of a camera that was started.
     ///
     /// # Errors
-    /// [`RecordingError::Thread`], or what making the session's folder and video answers.
+    /// [`RecordingError::System`], or what making the session's folder and video answers.
     pub fn start(camera: Box<dyn Camera>, plan: RecordingPlan) -> Result<Self, RecordingError> {
         let (clock, stream) = (plan.clock, plan.stream);
         let session = SessionWriter::create(&plan.root, with_video(plan.manifest, &stream))?;
@@ -98,7 +98,12 @@ impl Recorder {
             findings: Vec::new(),
         };
         // The disk goes by real time: only the camera's thread takes part in the clock.
-        let refused = |what| move |source| RecordingError::Thread { what, source };
+        let refused = |what| {
+            move |source| RecordingError::System {
+                what: format!("a thread for the {what} could not be started: close other programs"),
+                source,
+            }
+        };
         let thread = thread::Builder::new().name("relit-writer".to_owned());
         let writer = thread.spawn(move || writer.run());
         let writer = writer.map_err(refused("writer"))?;

@@ -8,13 +8,14 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::super::journal::track_of;
 use super::error::RecordingError;
 use relit_data::causes::with_causes;
 use relit_data::session::{
     InterruptedSession, MANIFEST_FILE, Manifest, Recording, SessionError, Status,
 };
 use relit_video::Video;
+
+use crate::turntable::Track;
 
 /// How many frames at the end are tried until one decodes. A power cut can leave blocks of the last
 /// half second without their content.
@@ -64,11 +65,14 @@ impl fmt::Display for Salvaged {
 /// process is recording are left alone.
 ///
 /// # Errors
-/// [`RecordingError::List`] where the folder cannot be listed. What goes wrong with one session
+/// [`RecordingError::System`] where the folder cannot be listed. What goes wrong with one session
 /// is in its [`Salvaged`].
 pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, RecordingError> {
-    let failed = |source| RecordingError::List {
-        path: root.to_owned(),
+    let failed = |source| RecordingError::System {
+        what: format!(
+            "{} could not be listed: check that it is there and may be read",
+            root.display()
+        ),
         source,
     };
     let mut folders = Vec::new();
@@ -114,7 +118,7 @@ pub fn salvage_session(folder: &Path) -> Result<Saved, RecordingError> {
         0 => "recording was interrupted before its first frame was on the disk".to_owned(),
         _ => format!("recording was interrupted: {saved}"),
     };
-    let track = session.journal().and_then(track_of);
+    let track = session.journal().and_then(Track::of_journal);
     let angle = |t_us| track.as_ref()?.angle_at(t_us);
     session.abort(frames, &angle, &reason)?;
     verify(folder, frames)?;

@@ -2,7 +2,7 @@ use std::sync::Barrier;
 use std::thread;
 
 use super::{Serving, begin, wait_until};
-use crate::serve::rig::Command;
+use crate::command::Command;
 use crate::state::Phase;
 
 #[test]
@@ -188,43 +188,4 @@ fn one_subscriber_too_many_is_refused_and_a_place_comes_free_again() {
         begin(&serving, "/api/v1/events").status == 200
     });
     drop(other);
-}
-
-#[test]
-fn figures_for_prometheus_are_well_formed() {
-    let serving = Serving::start();
-    serving.rig.monitor.update(|state| {
-        state.phase = Phase::Recording;
-        state.frames = 512;
-        state.table.battery_v = Some(11.9);
-    });
-    let mut events = begin(&serving, "/api/v1/events");
-    events.until("11.9");
-    let metrics = serving.get("/metrics");
-    assert!(
-        metrics
-            .header("content-type")
-            .unwrap()
-            .starts_with("text/plain; version=0.0.4")
-    );
-    let text = String::from_utf8(metrics.body).unwrap();
-    for line in text.lines().filter(|line| !line.starts_with('#')) {
-        let (name, value) = line.rsplit_once(' ').unwrap();
-        let bare = name.split('{').next().unwrap();
-        assert!(value.parse::<f64>().is_ok(), "{line}");
-        assert!(text.contains(&format!("# TYPE {bare} ")), "{line}");
-    }
-    for line in [
-        "relit_phase{phase=\"recording\"} 1",
-        "relit_phase{phase=\"idle\"} 0",
-        "relit_take_frames 512",
-        "relit_table_battery_volts 11.9",
-        "relit_http_subscribers 1",
-    ] {
-        assert!(text.lines().any(|found| found == line), "{line} in\n{text}");
-    }
-    assert!(
-        !text.contains("relit_camera_focus"),
-        "not known, so left out"
-    );
 }

@@ -28,7 +28,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use super::{Announcement, ServeOptions, Shutdown, serve};
-use crate::serve::rig::{Command, Refused, Rig};
+use crate::command::{Command, Refused, Rig};
 use crate::state::{Monitor, Phase};
 
 /// Longest wait for anything in these tests; all that is waited for comes far sooner.

@@ -55,7 +55,7 @@ impl Owner {
     /// Requests the table's status.
     ///
     /// # Errors
-    /// [`TurntableError::Owner`] if it does not answer, [`TurntableError::OwnerSays`].
+    /// [`TurntableError::Owner`] if it does not answer or reports an error.
     pub fn status(&self) -> Result<TableStatus, TurntableError> {
         self.ask(Question::Status)
     }
@@ -74,16 +74,14 @@ impl Owner {
             pid: self.pid,
             why,
         };
-        let line = self
-            .exchange(question)
-            .map_err(|error| failed(with_causes(&error)))?;
+        let line = self.exchange(question).map_err(|error| {
+            let why = with_causes(&error);
+            failed(format!("did not answer: {why}; ask again, or end it"))
+        })?;
         match serde_json::from_str(&line) {
             Ok(Answer::Status(status)) => Ok(status),
-            Ok(Answer::Error(message)) => Err(TurntableError::OwnerSays {
-                pid: self.pid,
-                message,
-            }),
-            Err(_) => Err(failed("its answer is not valid".to_owned())),
+            Ok(Answer::Error(message)) => Err(failed(format!("says: {message}"))),
+            Err(_) => Err(failed("gave no valid answer: end it".to_owned())),
         }
     }
 

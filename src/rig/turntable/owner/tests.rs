@@ -13,8 +13,8 @@ use serialport::{SerialPort as _, TTYPort};
 use super::claim::Files;
 use super::*;
 use crate::clock::Clock;
-use crate::lockfile::accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
-use crate::turntable::fake_grbl::FakeGrbl;
+use crate::lockfile::tests::accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
+use crate::turntable::tests::fake_grbl::FakeGrbl;
 use crate::turntable::{ControllerState, MotionFault, Table, TableOptions, TurntableError};
 
 /// A fake controller at a pseudoterminal.

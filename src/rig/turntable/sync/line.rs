@@ -98,14 +98,9 @@ fn least_squares(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Lin
     slope.is_finite().then_some(Line { x0, y0, slope })
 }
 
+/// 0 if there are no values.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
-    quantile(&values, 0.5)
-}
-
-/// The `part` quantile of sorted values; 0 if there are none.
-pub(super) fn quantile(sorted: &[f64], part: f64) -> f64 {
-    let last = sorted.len().saturating_sub(1);
-    let place = (part * last as f64).round() as usize;
-    sorted.get(place).copied().unwrap_or_default()
+    let middle = (0.5 * values.len().saturating_sub(1) as f64).round() as usize;
+    values.get(middle).copied().unwrap_or_default()
 }

@@ -11,6 +11,8 @@ mod line;
 #[cfg(test)]
 mod tests;
 
+use relit_data::session::{JournaledReport, JournaledTurn, TurnJournal};
+
 use super::supervisor::PositionReport;
 use super::wire::ControllerState;
 use line::{Fit, Line};
@@ -94,28 +96,21 @@ fn uneven(outliers: usize, polls: usize) -> String {
     }
 }
 
-/// Residuals of the reports from the track, degrees.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Residuals {
-    /// Median.
-    pub median_deg: f64,
-    /// 99th percentile.
-    pub p99_deg: f64,
-    /// Maximum.
-    pub max_deg: f64,
-}
-
 /// The table's angle over time, in the part of a turn at constant speed: a straight line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
     line: Line,
     from_us: i64,
     to_us: i64,
-    residuals: Residuals,
-    polls: usize,
-    outliers: usize,
-    half_round_trip_us: f64,
-    chip_rate: Option<f64>,
+    /// Number of reports used.
+    pub polls: usize,
+    /// Number of reports left out as outliers.
+    pub outliers: usize,
+    /// Half the shortest round trip, microseconds: an upper bound of the track's time error, however
+    /// unequal the delays in the two directions are.
+    pub half_round_trip_us: f64,
+    /// Seconds of the chip's clock per second of the host's; `None` if reports have no stamps.
+    pub chip_rate: Option<f64>,
 }
 
 impl Track {
@@ -147,88 +142,32 @@ impl Track {
     pub fn degrees_per_second(&self) -> f64 {
         self.line.slope * 1e6
     }
-
-    /// Residuals of the reports that were answered fastest.
-    #[must_use]
-    pub fn residuals(&self) -> Residuals {
-        self.residuals
-    }
-
-    /// Number of reports used.
-    #[must_use]
-    pub fn polls(&self) -> usize {
-        self.polls
-    }
-
-    /// Number of reports left out as outliers.
-    #[must_use]
-    pub fn outliers(&self) -> usize {
-        self.outliers
-    }
-
-    /// Half the shortest round trip, microseconds: an upper bound of the track's time error, however
-    /// unequal the delays in the two directions are.
-    #[must_use]
-    pub fn half_round_trip_us(&self) -> f64 {
-        self.half_round_trip_us
-    }
-
-    /// Seconds of the chip's clock per second of the host's; `None` if reports have no stamps.
-    #[must_use]
-    pub fn chip_rate(&self) -> Option<f64> {
-        self.chip_rate
-    }
 }
 
-/// The turn as it was planned, degrees from machine zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ExpectedTurn {
-    /// Where the part at constant speed starts.
-    pub from_deg: f64,
-    /// Where it ends.
-    pub to_deg: f64,
-    /// Speed, degrees/s, without sign.
-    pub degrees_per_second: f64,
-    /// Machine position of the angle 0.
-    pub zero_deg: f64,
-    /// One step.
-    pub step_deg: f64,
-}
-
-/// A report from the part of a turn at constant speed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TimedReport {
-    /// When it was requested, microseconds of the host's clock.
-    pub asked_us: i64,
-    /// When it came, microseconds of the host's clock.
-    pub came_us: i64,
-    /// The chip's time of the position, microseconds; wraps. `None` from a stock board.
-    pub chip_us: Option<u32>,
-    /// Degrees from machine zero.
-    pub machine_deg: f64,
-}
-
-impl TimedReport {
-    /// `None` for a report that shows nothing of the part at constant speed.
-    pub(crate) fn of(report: &PositionReport, expected: &ExpectedTurn) -> Option<Self> {
-        let usable = report.certain
-            && report.state == ControllerState::Run
-            && expected.covers(report.machine_deg);
-        usable.then_some(Self {
-            asked_us: report.asked_us?,
-            came_us: report.came_us,
-            chip_us: report.chip_us,
-            machine_deg: report.machine_deg,
-        })
-    }
+/// A report as the journal keeps it; `None` for one that shows nothing of the part at constant speed.
+pub(crate) fn timed(report: &PositionReport, turn: &JournaledTurn) -> Option<JournaledReport> {
+    let usable =
+        report.certain && report.state == ControllerState::Run && covers(turn, report.machine_deg);
+    usable.then_some(JournaledReport {
+        asked_us: report.asked_us?,
+        came_us: report.came_us,
+        chip_us: report.chip_us,
+        machine_deg: report.machine_deg,
+    })
 }
 
 impl Track {
+    /// The track of an interrupted turn by its journal; `None` where the reports do not determine it.
+    #[must_use]
+    pub fn of_journal(journal: &TurnJournal) -> Option<Self> {
+        Self::of_part(&journal.reports, &journal.turn).ok()
+    }
+
     /// The track of a turn that was interrupted, up to its last report.
     ///
     /// # Errors
     /// [`TrackError`] if there are too few reports, or they do not lie on a line of the planned speed.
-    pub fn of_part(reports: &[TimedReport], expected: &ExpectedTurn) -> Result<Self, TrackError> {
+    fn of_part(reports: &[JournaledReport], expected: &JournaledTurn) -> Result<Self, TrackError> {
         let points = points(reports, expected);
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Err(too_few(&points, LEAST_OF_PART));
@@ -249,17 +188,16 @@ impl Track {
     }
 }
 
-impl ExpectedTurn {
-    fn sign(&self) -> f64 {
-        (self.to_deg - self.from_deg).signum()
-    }
+/// The direction of a turn: 1 or -1.
+fn sign(turn: &JournaledTurn) -> f64 {
+    (turn.to_deg - turn.from_deg).signum()
+}
 
-    /// Whether a position is in the part at constant speed, at least a step away from its ends.
-    fn covers(&self, machine_deg: f64) -> bool {
-        let gone = (machine_deg - self.from_deg) * self.sign();
-        let length = (self.to_deg - self.from_deg).abs();
-        (self.step_deg..=length - self.step_deg).contains(&gone)
-    }
+/// Whether a position is in the part at constant speed, at least a step away from its ends.
+fn covers(turn: &JournaledTurn, machine_deg: f64) -> bool {
+    let gone = (machine_deg - turn.from_deg) * sign(turn);
+    let length = (turn.to_deg - turn.from_deg).abs();
+    (turn.step_deg..=length - turn.step_deg).contains(&gone)
 }
 
 /// A report as a point of the fit: the times of request and arrival, and the angle in the middle of
@@ -285,9 +223,9 @@ impl Point {
 /// Fits the track of a turn to its reports.
 pub(crate) fn fit(
     reports: &[PositionReport],
-    expected: &ExpectedTurn,
+    expected: &JournaledTurn,
 ) -> Result<Track, TrackError> {
-    let timed = |report: &PositionReport| TimedReport::of(report, expected);
+    let timed = |report: &PositionReport| self::timed(report, expected);
     let reports: Vec<_> = reports.iter().filter_map(timed).collect();
     let points = points(&reports, expected);
     enough(&points, expected)?;
@@ -295,7 +233,7 @@ pub(crate) fn fit(
     checked_track(&points, expected, &fitted)
 }
 
-fn by_the_reports(points: &[Point], expected: &ExpectedTurn) -> Result<Fitted, TrackError> {
+fn by_the_reports(points: &[Point], expected: &JournaledTurn) -> Result<Fitted, TrackError> {
     match points.iter().all(|point| point.chip_us.is_some()) {
         true => by_the_chip(points, expected),
         false => Ok(by_the_middle(points, expected)),
@@ -304,7 +242,7 @@ fn by_the_reports(points: &[Point], expected: &ExpectedTurn) -> Result<Fitted, T
 
 fn checked_track(
     points: &[Point],
-    expected: &ExpectedTurn,
+    expected: &JournaledTurn,
     fitted: &Fitted,
 ) -> Result<Track, TrackError> {
     if fitted.outliers as f64 > points.len() as f64 * MOST_OUTLIERS {
@@ -314,7 +252,7 @@ fn checked_track(
         });
     }
     let measured = fitted.line.slope * 1e6;
-    let planned = expected.degrees_per_second * expected.sign();
+    let planned = expected.degrees_per_second * sign(expected);
     if (measured / planned - 1.0).abs() > MOST_OFF {
         return Err(TrackError::Speed { measured, planned });
     }
@@ -328,9 +266,9 @@ struct Fitted {
     chip_rate: Option<f64>,
 }
 
-fn points(reports: &[TimedReport], expected: &ExpectedTurn) -> Vec<Point> {
-    let half_step = expected.sign() * expected.step_deg / 2.0;
-    let point = |report: &TimedReport| Point {
+fn points(reports: &[JournaledReport], expected: &JournaledTurn) -> Vec<Point> {
+    let half_step = sign(expected) * expected.step_deg / 2.0;
+    let point = |report: &JournaledReport| Point {
         asked_us: report.asked_us as f64,
         came_us: report.came_us as f64,
         chip_us: report.chip_us,
@@ -344,7 +282,7 @@ fn too_few(points: &[Point], needed: usize) -> TrackError {
     TrackError::TooFew { polls, needed }
 }
 
-fn enough(points: &[Point], expected: &ExpectedTurn) -> Result<(), TrackError> {
+fn enough(points: &[Point], expected: &JournaledTurn) -> Result<(), TrackError> {
     if points.len() < LEAST_POLLS {
         return Err(too_few(points, LEAST_POLLS));
     }
@@ -359,7 +297,7 @@ fn enough(points: &[Point], expected: &ExpectedTurn) -> Result<(), TrackError> {
     Ok(())
 }
 
-fn by_the_middle(points: &[Point], expected: &ExpectedTurn) -> Fitted {
+fn by_the_middle(points: &[Point], expected: &JournaledTurn) -> Fitted {
     let pair = |point: &Point| (point.middle_us(), point.angle_deg);
     let pairs: Vec<_> = fastest(points).iter().map(pair).collect();
     let Fit { line, .. } = line::robust(&pairs, expected.step_deg);
@@ -367,14 +305,14 @@ fn by_the_middle(points: &[Point], expected: &ExpectedTurn) -> Fitted {
 }
 
 /// The line of the planned speed through the fastest answers.
-fn by_the_plan(points: &[Point], expected: &ExpectedTurn) -> Fitted {
-    let slope = expected.degrees_per_second * expected.sign() / 1e6;
+fn by_the_plan(points: &[Point], expected: &JournaledTurn) -> Fitted {
+    let slope = expected.degrees_per_second * sign(expected) / 1e6;
     let pair = |point: &Point| (point.middle_us(), point.angle_deg);
     let pairs: Vec<_> = fastest(points).iter().map(pair).collect();
     on_line(points, expected, line::through(&pairs, slope))
 }
 
-fn on_line(points: &[Point], expected: &ExpectedTurn, line: Line) -> Fitted {
+fn on_line(points: &[Point], expected: &JournaledTurn, line: Line) -> Fitted {
     // A slow answer lies off the line by its delay; it does not show that the table turned unevenly.
     let allowed =
         |point: &Point| expected.step_deg * 2.0 + point.round_trip_us() / 2.0 * line.slope.abs();
@@ -387,7 +325,7 @@ fn on_line(points: &[Point], expected: &ExpectedTurn, line: Line) -> Fitted {
     }
 }
 
-fn by_the_chip(points: &[Point], expected: &ExpectedTurn) -> Result<Fitted, TrackError> {
+fn by_the_chip(points: &[Point], expected: &JournaledTurn) -> Result<Fitted, TrackError> {
     let stamps = unwrapped(points);
     let angles: Vec<_> = stamps
         .iter()
@@ -455,26 +393,18 @@ fn fastest_by<T: Copy>(items: &[T], point: impl Fn(&T) -> &Point) -> Vec<T> {
     chosen
 }
 
-fn track(points: &[Point], expected: &ExpectedTurn, fitted: &Fitted) -> Track {
+fn track(points: &[Point], expected: &JournaledTurn, fitted: &Fitted) -> Track {
     let line = fitted.line;
     let time = |machine_deg: f64| {
         let t_us = line.inverse(machine_deg - expected.zero_deg);
         t_us.unwrap_or_default()
     };
     let quick = fastest(points);
-    let off = |point: &Point| (point.angle_deg - line.at(point.middle_us())).abs();
-    let mut offs: Vec<f64> = quick.iter().map(off).collect();
-    offs.sort_by(f64::total_cmp);
     let trips = quick.iter().map(Point::round_trip_us);
     Track {
         line,
         from_us: time(expected.from_deg).ceil() as i64,
         to_us: time(expected.to_deg).floor() as i64,
-        residuals: Residuals {
-            median_deg: line::quantile(&offs, 0.5),
-            p99_deg: line::quantile(&offs, 0.99),
-            max_deg: offs.last().copied().unwrap_or_default(),
-        },
         polls: points.len() - fitted.outliers,
         outliers: fitted.outliers,
         half_round_trip_us: trips.fold(f64::MAX, f64::min) / 2.0,

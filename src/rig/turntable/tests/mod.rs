@@ -2,14 +2,15 @@
 
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
+pub(super) mod fake_grbl;
 mod relatives;
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use super::fake_grbl::{FakeGrbl, FakePort, Trouble};
 use super::*;
 use crate::clock::Participant;
+use fake_grbl::{FakeGrbl, FakePort, Trouble};
 
 struct Rig {
     fake_grbl: Arc<Mutex<FakeGrbl>>,

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::error_texts;
-use super::number::{decimal, shown, whole};
+use super::number::{decimal, whole};
 use super::status::StatusReport;
 
 /// Why the controller started.
@@ -234,28 +234,4 @@ fn setting(inside: &str) -> Option<Message> {
             text: text.to_owned(),
         },
     })
-}
-
-impl fmt::Display for Message {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Message::Ok { seq } => write!(f, "ok{}", numbered(*seq)),
-            Message::Error { code, seq } => write!(f, "error:{code}{}", numbered(*seq)),
-            Message::Alarm(code) => write!(f, "ALARM:{code}"),
-            Message::Status(report) => report.fmt(f),
-            Message::Banner(banner) => f.write_str(&banner.text),
-            Message::Version { version, note } => write!(f, "[VER:{version}:{note}]"),
-            Message::Build { letters, sizes } if sizes.is_empty() => write!(f, "[OPT:{letters}]"),
-            Message::Build { letters, sizes } => write!(f, "[OPT:{letters},{sizes}]"),
-            Message::Note(text) => write!(f, "[MSG:{text}]"),
-            Message::Info { tag, text } => write!(f, "[{tag}:{text}]"),
-            Message::Setting { number, value } => write!(f, "${number}={}", shown(*value, 3)),
-            Message::TextSetting { number, text } => write!(f, "${number}={text}"),
-            Message::Startup(text) => write!(f, ">{text}"),
-        }
-    }
-}
-
-fn numbered(seq: Option<u32>) -> String {
-    seq.map_or_else(String::new, |seq| format!(" N{seq}"))
 }

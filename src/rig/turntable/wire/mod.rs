@@ -21,8 +21,6 @@ mod polling;
 mod status;
 
 #[cfg(test)]
-mod properties;
-#[cfg(test)]
 mod tests;
 
 pub use event::{Counts, LineFault, LineOutcome, SendError, WireEvent};

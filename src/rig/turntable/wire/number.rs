@@ -1,7 +1,7 @@
 //! Numbers as Grbl writes them: digits, perhaps a sign and a point, no exponent.
 
 /// Longest accepted number: more digits are noise.
-const LONGEST: usize = 16;
+pub(super) const LONGEST: usize = 16;
 
 /// A decimal number such as `-12.345`.
 pub(super) fn decimal(text: &str) -> Option<f64> {
@@ -18,17 +18,6 @@ pub(super) fn decimal(text: &str) -> Option<f64> {
 pub(super) fn whole(text: &str) -> Option<u32> {
     let usable = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     usable.then(|| text.parse().ok()).flatten()
-}
-
-/// A value as Grbl writes it, with so many digits behind the point; as it is where others wrote more, or where that would be too
-/// long.
-pub(super) fn shown(value: f64, digits: usize) -> String {
-    let usual = format!("{value:.digits$}");
-    if usual.len() <= LONGEST && usual.parse() == Ok(value) {
-        usual
-    } else {
-        value.to_string()
-    }
 }
 
 #[cfg(test)]

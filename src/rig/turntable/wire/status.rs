@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use super::number::{decimal, shown, whole};
+use super::number::{decimal, whole};
 
 /// The controller's state, as Grbl names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -228,39 +228,4 @@ fn first(list: &str) -> Option<f64> {
     let mut numbers = list.split(',').map(decimal);
     let first = numbers.next()??;
     numbers.all(|number| number.is_some()).then_some(first)
-}
-
-impl fmt::Display for StatusReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "<{}", self.state)?;
-        if let Some(code) = self.alarm {
-            write!(f, ":{code}")?;
-        }
-        match self.position {
-            Position::Machine(at) => write!(f, "|MPos:{},0.000,0.000", shown(at, 3))?,
-            Position::Work(at) => write!(f, "|WPos:{},0.000,0.000", shown(at, 3))?,
-        }
-        if let Some(feed) = self.feed {
-            write!(f, "|FS:{feed},0")?;
-        }
-        if let Some(us) = self.chip_us {
-            write!(f, "|T:{us}")?;
-        }
-        if let Some(volts) = self.battery_v {
-            write!(f, "|Bat:{}", shown(volts, 2))?;
-        }
-        match (self.pins.index, self.pins.emergency_stop) {
-            (false, false) => {}
-            (true, false) => f.write_str("|Pn:X")?,
-            (false, true) => f.write_str("|Pn:R")?,
-            (true, true) => f.write_str("|Pn:XR")?,
-        }
-        if let Some(zero) = self.work_zero {
-            write!(f, "|WCO:{},0.000,0.000", shown(zero, 3))?;
-        }
-        if let Some(homed) = self.homed {
-            write!(f, "|H:{}", u8::from(homed))?;
-        }
-        f.write_str(">")
-    }
 }

@@ -1,7 +1,10 @@
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
+mod printed;
+mod properties;
+
 use super::*;
-use crate::turntable::fake_grbl::seal;
+use crate::turntable::tests::fake_grbl::seal;
 
 const HALF_SECOND: i64 = 500_000;
 

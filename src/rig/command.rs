@@ -2,15 +2,12 @@
 
 use std::path::Path;
 
-use axum::http::StatusCode;
-use relit_web::Failure;
 use serde::{Deserialize, Deserializer, Serialize};
-use utoipa::ToSchema;
 
 use crate::state::{Monitor, Obstacle, RigState};
 
 /// Something a person at the rig asks for.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "command", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Command {
     /// Captures one turn of the object that stands on the table.
@@ -63,7 +60,6 @@ pub enum Command {
             deserialize_with = "given",
             skip_serializing_if = "Option::is_none"
         )]
-        #[schema(value_type = Option<(u32, u32)>)]
         size: Option<Option<(u32, u32)>>,
         /// Frames a second, 1 to 1000.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -100,17 +96,6 @@ pub enum Refused {
     /// What is needed is not there: camera, table, disk.
     #[error("{0}")]
     Unavailable(String),
-}
-
-impl From<Refused> for Failure {
-    fn from(refused: Refused) -> Self {
-        let (status, error) = match refused {
-            Refused::Busy(error) => (StatusCode::CONFLICT, error),
-            Refused::Invalid(error) => (StatusCode::UNPROCESSABLE_ENTITY, error),
-            Refused::Unavailable(error) => (StatusCode::SERVICE_UNAVAILABLE, error),
-        };
-        Self::new(status, error)
-    }
 }
 
 impl From<Obstacle> for Refused {

@@ -3,8 +3,6 @@
 //!
 //! It moves with ramps, answers after a delay, and has faults on demand.
 
-#![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
-
 mod dialect;
 mod lines;
 mod port;
@@ -13,8 +11,8 @@ use std::collections::VecDeque;
 
 use crc::{CRC_16_IBM_3740, Crc};
 
-pub(super) use dialect::Dialect;
-pub(super) use port::FakePort;
+pub(in crate::turntable) use dialect::Dialect;
+pub(in crate::turntable) use port::FakePort;
 
 const STEPS: f64 = 88.889;
 const ACCELERATION: f64 = 36.0;
@@ -23,28 +21,28 @@ const TICK_US: i64 = 1000;
 
 /// The faults to inject.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Trouble {
+pub(in crate::turntable) struct Trouble {
     /// From this time on it answers nothing.
-    pub(super) silent_from_us: Option<i64>,
+    pub(in crate::turntable) silent_from_us: Option<i64>,
     /// It restarts at this time.
-    pub(super) reset_at_us: Option<i64>,
+    pub(in crate::turntable) reset_at_us: Option<i64>,
     /// From this time on it reports motion but stands still.
-    pub(super) stall_from_us: Option<i64>,
+    pub(in crate::turntable) stall_from_us: Option<i64>,
     /// It raises this alarm at this time.
-    pub(super) alarm_at_us: Option<(i64, u8)>,
+    pub(in crate::turntable) alarm_at_us: Option<(i64, u8)>,
     /// Somebody presses feed hold at this time.
-    pub(super) hold_at_us: Option<i64>,
+    pub(in crate::turntable) hold_at_us: Option<i64>,
     /// Number of answers to lines that are lost.
-    pub(super) lose_answers: u32,
+    pub(in crate::turntable) lose_answers: u32,
     /// Number of lines with a motion that lose the digit after X.
-    pub(super) wrong_digits: u32,
+    pub(in crate::turntable) wrong_digits: u32,
     /// Its next report has this position.
-    pub(super) wrong_report: Option<f64>,
+    pub(in crate::turntable) wrong_report: Option<f64>,
     /// It leaves out the setting that begins so.
-    pub(super) lose_setting: Option<&'static str>,
+    pub(in crate::turntable) lose_setting: Option<&'static str>,
     /// Its banner was echoed: soon after its first report it answers a part of the echo and keeps the
     /// rest as the beginning of a line.
-    pub(super) echo: bool,
+    pub(in crate::turntable) echo: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,8 +56,8 @@ enum Mode {
 }
 
 #[derive(Debug)]
-pub(super) struct FakeGrbl {
-    pub(super) trouble: Trouble,
+pub(in crate::turntable) struct FakeGrbl {
+    pub(in crate::turntable) trouble: Trouble,
     rig: bool,
     dialect: Dialect,
     homing: bool,
@@ -67,31 +65,31 @@ pub(super) struct FakeGrbl {
     /// The number of its last alarm.
     alarm: Option<u8>,
     now_us: i64,
-    pub(super) rate: f64,
-    pub(super) delay_us: i64,
+    pub(in crate::turntable) rate: f64,
+    pub(in crate::turntable) delay_us: i64,
     mode: Mode,
-    pub(super) at: f64,
+    pub(in crate::turntable) at: f64,
     speed: f64,
     target: f64,
     feed: f64,
     line: Vec<u8>,
     out: VecDeque<(i64, Vec<u8>)>,
     session: Option<(u32, String)>,
-    pub(super) lease: f64,
+    pub(in crate::turntable) lease: f64,
     /// Executed lines, without number and checksum.
-    pub(super) executed: Vec<String>,
-    pub(super) resets: u32,
+    pub(in crate::turntable) executed: Vec<String>,
+    pub(in crate::turntable) resets: u32,
     /// Times and true positions while it moved, every millisecond.
-    pub(super) truth: Vec<(i64, f64)>,
+    pub(in crate::turntable) truth: Vec<(i64, f64)>,
 }
 
 impl FakeGrbl {
-    pub(super) fn new(rig: bool) -> FakeGrbl {
+    pub(in crate::turntable) fn new(rig: bool) -> FakeGrbl {
         FakeGrbl::speaking(Dialect::Grbl, rig)
     }
 
     /// A relative of Grbl.
-    pub(super) fn relative(dialect: Dialect) -> FakeGrbl {
+    pub(in crate::turntable) fn relative(dialect: Dialect) -> FakeGrbl {
         FakeGrbl::speaking(dialect, false)
     }
 
@@ -124,17 +122,17 @@ impl FakeGrbl {
     }
 
     /// With homing enabled; `found`: whether the index sensor works.
-    pub(super) fn with_homing(mut self, found: bool) -> FakeGrbl {
+    pub(in crate::turntable) fn with_homing(mut self, found: bool) -> FakeGrbl {
         self.homing = true;
         self.found = found;
         self
     }
 
-    pub(super) fn is_moving(&self) -> bool {
+    pub(in crate::turntable) fn is_moving(&self) -> bool {
         self.speed > 0.0
     }
 
-    pub(super) fn leave_session_open(&mut self) {
+    pub(in crate::turntable) fn leave_session_open(&mut self) {
         self.session = Some((17, "ok N17".to_owned()));
         self.out.clear();
     }
@@ -209,7 +207,7 @@ impl FakeGrbl {
     }
 
     /// Advances to `now_us`.
-    pub(super) fn advance(&mut self, now_us: i64) {
+    pub(in crate::turntable) fn advance(&mut self, now_us: i64) {
         if self.now_us == 0 {
             self.now_us = now_us;
         }
@@ -283,7 +281,7 @@ impl FakeGrbl {
     }
 
     /// Receives bytes at the time of the last [`FakeGrbl::advance`].
-    pub(super) fn take(&mut self, bytes: &[u8]) {
+    pub(in crate::turntable) fn take(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             match byte {
                 _ if self.silent() => {}
@@ -304,7 +302,7 @@ impl FakeGrbl {
     }
 
     /// The bytes that it has sent by now.
-    pub(super) fn give(&mut self) -> Vec<u8> {
+    pub(in crate::turntable) fn give(&mut self) -> Vec<u8> {
         let mut bytes = Vec::new();
         while let Some((_, text)) = self.out.pop_front_if(|(due, _)| *due <= self.now_us) {
             bytes.extend(text);
@@ -342,11 +340,11 @@ impl FakeGrbl {
     }
 }
 
-pub(super) fn checksum(text: &str) -> String {
+pub(in crate::turntable) fn checksum(text: &str) -> String {
     let crc = Crc::<u16>::new(&CRC_16_IBM_3740);
     format!("{:04X}", crc.checksum(text.as_bytes()))
 }
 
-pub(super) fn seal(text: &str) -> String {
+pub(in crate::turntable) fn seal(text: &str) -> String {
     format!("{text}*{}", checksum(text))
 }

@@ -5,9 +5,9 @@
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-use super::tests::{checked, events, outcome};
-use super::*;
-use crate::turntable::fake_grbl::{FakeGrbl, seal};
+use super::{checked, events, outcome};
+use crate::turntable::tests::fake_grbl::{FakeGrbl, seal};
+use crate::turntable::wire::*;
 
 /// A fault of the wire that changes a line.
 #[derive(Debug, Clone, Copy)]

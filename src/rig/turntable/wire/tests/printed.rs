@@ -1,0 +1,76 @@
+//! Messages as a controller prints them.
+
+use std::fmt;
+
+use crate::turntable::wire::number::LONGEST;
+use crate::turntable::wire::{Message, Position, StatusReport};
+
+impl fmt::Display for Message {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Message::Ok { seq } => write!(f, "ok{}", numbered(*seq)),
+            Message::Error { code, seq } => write!(f, "error:{code}{}", numbered(*seq)),
+            Message::Alarm(code) => write!(f, "ALARM:{code}"),
+            Message::Status(report) => report.fmt(f),
+            Message::Banner(banner) => f.write_str(&banner.text),
+            Message::Version { version, note } => write!(f, "[VER:{version}:{note}]"),
+            Message::Build { letters, sizes } if sizes.is_empty() => write!(f, "[OPT:{letters}]"),
+            Message::Build { letters, sizes } => write!(f, "[OPT:{letters},{sizes}]"),
+            Message::Note(text) => write!(f, "[MSG:{text}]"),
+            Message::Info { tag, text } => write!(f, "[{tag}:{text}]"),
+            Message::Setting { number, value } => write!(f, "${number}={}", shown(*value, 3)),
+            Message::TextSetting { number, text } => write!(f, "${number}={text}"),
+            Message::Startup(text) => write!(f, ">{text}"),
+        }
+    }
+}
+
+fn numbered(seq: Option<u32>) -> String {
+    seq.map_or_else(String::new, |seq| format!(" N{seq}"))
+}
+
+impl fmt::Display for StatusReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "<{}", self.state)?;
+        if let Some(code) = self.alarm {
+            write!(f, ":{code}")?;
+        }
+        match self.position {
+            Position::Machine(at) => write!(f, "|MPos:{},0.000,0.000", shown(at, 3))?,
+            Position::Work(at) => write!(f, "|WPos:{},0.000,0.000", shown(at, 3))?,
+        }
+        if let Some(feed) = self.feed {
+            write!(f, "|FS:{feed},0")?;
+        }
+        if let Some(us) = self.chip_us {
+            write!(f, "|T:{us}")?;
+        }
+        if let Some(volts) = self.battery_v {
+            write!(f, "|Bat:{}", shown(volts, 2))?;
+        }
+        match (self.pins.index, self.pins.emergency_stop) {
+            (false, false) => {}
+            (true, false) => f.write_str("|Pn:X")?,
+            (false, true) => f.write_str("|Pn:R")?,
+            (true, true) => f.write_str("|Pn:XR")?,
+        }
+        if let Some(zero) = self.work_zero {
+            write!(f, "|WCO:{},0.000,0.000", shown(zero, 3))?;
+        }
+        if let Some(homed) = self.homed {
+            write!(f, "|H:{}", u8::from(homed))?;
+        }
+        f.write_str(">")
+    }
+}
+
+/// A value as Grbl writes it, with so many digits behind the point; as it is where others wrote more, or where that would be too
+/// long.
+fn shown(value: f64, digits: usize) -> String {
+    let usual = format!("{value:.digits$}");
+    if usual.len() <= LONGEST && usual.parse() == Ok(value) {
+        usual
+    } else {
+        value.to_string()
+    }
+}
