@@ -188,6 +188,7 @@ fn manifest() -> Manifest {
             controls: BTreeMap::new(),
         },
         turntable: None,
+        rig: None,
         video: VideoFacts {
             file: String::new(),
             codec: String::new(),

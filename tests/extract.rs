@@ -5,6 +5,7 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::shard::{Dataset, FrameRecord, ShardReader};
 use relit_test_support::{ffmpeg, packets};
 use tempfile::TempDir;
@@ -657,6 +658,38 @@ fn a_mask_of_another_session_lowers_the_verdict_and_exits_with_3() {
     bench.errors(3, "merge pieces");
     bench.errors(0, &line(&session, "right"));
     assert_eq!(quality("right")["mask_misfit"], serde_json::Value::Null);
+}
+
+#[test]
+fn what_a_session_knows_of_its_rig_stands_in_the_data_set() {
+    let bench = Bench::new();
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../fixtures/20261120T101500Z-cow-short");
+    let session = bench.path("20261120T101500Z-cow-short");
+    fs::create_dir(&session).unwrap();
+    for name in names_in(&fixture) {
+        fs::copy(fixture.join(&name), session.join(name)).unwrap();
+    }
+    let extracted = |out: &str| {
+        let session = session.display();
+        let line = format!("{session} --mask {session}/mask_gt.png --frames 30 --size 40 -o {out}");
+        bench.errors(0, &line);
+        let mut dataset = Dataset::read(&bench.path(out)).unwrap();
+        bench.verified(0, out);
+        dataset.sessions.remove(0).rig
+    };
+    assert_eq!(extracted("unknown"), None);
+    let path = session.join("session.json");
+    let mut manifest: serde_json::Value =
+        serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    manifest["rig"] =
+        serde_json::json!({ "rotation": "counter-clockwise", "camera_elevation_deg": 17.5 });
+    fs::write(&path, manifest.to_string()).unwrap();
+    let rig = RigFacts {
+        rotation: Some(RotationDirection::CounterClockwise),
+        camera_elevation_deg: Some(17.5),
+    };
+    assert_eq!(extracted("known"), Some(rig));
 }
 
 #[test]

@@ -15,6 +15,7 @@
 //! | [`text`] | text in files, with or without a byte order mark |
 //! | [`colour`] | colours as videos code them (HDR, wide gamut) to sRGB |
 //! | [`turn_light`] | how much light changes over a turn |
+//! | [`rig`] | what is known of a rig |
 //! | [`naming`] | the names that a session may have |
 //! | [`file_names`] | the names of files: videos, hidden ones, and those that are one file where case is ignored |
 //! | [`mask`] | which pixels a picture of a mask marks |
@@ -27,7 +28,7 @@
 //! modules but `session`, `shard`, `report` and `durable`.
 //!
 //! `shard` knows `geometry`, `image_stats`, `naming` and `durable`; `report` knows the records of `shard`
-//! and `image_stats`; `session` and `shard` do not know each other. `docs/formats.md` describes every
+//! and `image_stats`; both know `rig`; `session` and `shard` do not know each other. `docs/formats.md` describes every
 //! file and field.
 //!
 //! The folder `examples/` has programs: `session_angles` prints the angle of each frame of a session, `shard_arrays`
@@ -129,6 +130,7 @@
 //!     selection: SamplingBasis::Angle,
 //!     samples: SAMPLES,
 //!     covered_deg: None,
+//!     rig: None,
 //!     duplicates: 0,
 //!     spec_net: 0,
 //!     lossy: false,
@@ -169,6 +171,7 @@ pub mod mask;
 pub mod naming;
 #[cfg(feature = "files")]
 pub mod report;
+pub mod rig;
 #[cfg(feature = "files")]
 pub mod session;
 #[cfg(feature = "files")]

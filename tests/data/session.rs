@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 use relit_data::session::{
-    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionError,
+    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, ManifestFault, Notice, Recording, SessionError,
     SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
 };
+use relit_data::rig::{RigFacts, RotationDirection};
 use tempfile::TempDir;
 
 const ID: &str = "20261120T093015Z-mug";
@@ -37,6 +38,7 @@ fn manifest() -> Manifest {
             degrees_per_second: 7.2,
             steps_per_degree: 88.889,
         }),
+        rig: None,
         video: VideoFacts {
             file: "video.mkv".to_owned(),
             codec: "mjpeg".to_owned(),
@@ -107,6 +109,28 @@ fn a_session_is_read_as_it_was_written() {
         recording.frames.unwrap().entries(),
         (0..10).map(entry).collect::<Vec<_>>()
     );
+}
+
+#[test]
+fn what_is_known_of_the_rig_comes_back_and_nothing_is_written_of_one_that_is_not_known() {
+    let unknown = String::from_utf8(manifest().to_json().unwrap()).unwrap();
+    assert!(!unknown.contains("rig"), "{unknown}");
+    let with = |rig: &str| {
+        let json = unknown.replace("\"video\":", &format!("\"rig\": {rig}, \"video\":"));
+        Manifest::from_json(json.as_bytes())
+    };
+    assert_eq!(with("null").unwrap().rig, None);
+    let read = with(r#"{"rotation": "clockwise", "camera_elevation_deg": 21.5}"#).unwrap();
+    let rig = RigFacts {
+        rotation: Some(RotationDirection::Clockwise),
+        camera_elevation_deg: Some(21.5),
+    };
+    assert_eq!(read.rig, Some(rig));
+    assert_eq!(Manifest::from_json(&read.to_json().unwrap()).unwrap(), read);
+    let half = with(r#"{"rotation": null}"#).unwrap().rig;
+    assert_eq!(half, Some(RigFacts::default()));
+    let refused = with(r#"{"camera_elevation_deg": 95.0}"#);
+    assert!(matches!(refused, Err(ManifestFault::Elevation(_))));
 }
 
 #[test]

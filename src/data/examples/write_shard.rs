@@ -117,6 +117,7 @@ fn entry(
         selection: SamplingBasis::Angle,
         samples: SAMPLES,
         covered_deg: None,
+        rig: None,
         duplicates: 0,
         spec_net,
         lossy: false,

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::is_session_name;
+use crate::rig::{CAMERA_ELEVATIONS_DEG, RigFacts};
 use crate::text;
 
 /// The schema that this version reads and writes.
@@ -27,6 +28,8 @@ pub struct Manifest {
     pub camera: CameraFacts,
     /// The turntable; `None` if the camera recorded without one.
     pub turntable: Option<TurntableFacts>,
+    /// What is known of the rig; `None` where it was not measured.
+    pub rig: Option<RigFacts>,
     /// The video file.
     pub video: VideoFacts,
     /// What went wrong during the capture, in order of time.
@@ -186,6 +189,9 @@ pub enum ManifestFault {
         /// The value in the file.
         value: f64,
     },
+    /// The camera's elevation cannot be.
+    #[error("its rig.camera_elevation_deg is {0}, but must be 0 to 89")]
+    Elevation(f64),
 }
 
 impl Manifest {
@@ -217,6 +223,7 @@ impl Manifest {
             status,
             camera: file.camera,
             turntable: file.turntable,
+            rig: file.rig,
             video: file.video,
             faults: file.faults,
             software: file.software,
@@ -247,6 +254,7 @@ impl Manifest {
             reason,
             camera: self.camera.clone(),
             turntable: self.turntable.clone(),
+            rig: self.rig,
             video: self.video.clone(),
             faults: self.faults.clone(),
             software: self.software.clone(),
@@ -283,6 +291,11 @@ impl Manifest {
         if let Some(table) = &self.turntable {
             positive("turntable.degrees_per_second", table.degrees_per_second)?;
             positive("turntable.steps_per_degree", table.steps_per_degree)?;
+        }
+        if let Some(degrees) = self.rig.and_then(|rig| rig.camera_elevation_deg)
+            && !CAMERA_ELEVATIONS_DEG.contains(&degrees)
+        {
+            return Err(ManifestFault::Elevation(degrees));
         }
         if self.status == Status::Complete {
             let video = &self.video;
@@ -341,6 +354,8 @@ struct ManifestFile {
     reason: Option<String>,
     camera: CameraFacts,
     turntable: Option<TurntableFacts>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rig: Option<RigFacts>,
     video: VideoFacts,
     #[serde(default)]
     faults: Vec<Fault>,

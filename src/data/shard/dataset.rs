@@ -13,6 +13,7 @@ use super::settings::ExtractionSettings;
 use super::{ShardError, names, output};
 use crate::file_names::folded;
 use crate::geometry::Rect;
+use crate::rig::RigFacts;
 
 /// The schema that this version writes and reads.
 const SCHEMA: &str = "relit.dataset/1";
@@ -111,6 +112,9 @@ pub struct SessionEntry {
     /// there are fewer samples than the settings say, the first ones of the turn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covered_deg: Option<f64>,
+    /// What is known of the rig, as the session has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rig: Option<RigFacts>,
     /// Samples with `duplicate`.
     pub duplicates: u32,
     /// Samples with `spec_net`.

@@ -47,6 +47,7 @@ pub(super) fn manifest(
             .table
             .as_ref()
             .map(|table| facts_of(table, settings)),
+        rig: None,
         video: VideoFacts {
             file: String::new(),
             codec: String::new(),

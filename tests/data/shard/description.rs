@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::shard::{Dataset, Digest, FileEntry, Layout, SessionEntry, ShardError, ShardFiles};
 
 use crate::sample_set::{self, settings};
@@ -26,6 +27,10 @@ fn a_description_comes_back_as_it_was_written() {
     dataset.replace(entry("a"), Vec::new());
     let changed = SessionEntry {
         spec_net: 4,
+        rig: Some(RigFacts {
+            rotation: Some(RotationDirection::Clockwise),
+            camera_elevation_deg: Some(21.5),
+        }),
         warnings: vec!["a warning".to_owned()],
         ..entry("b")
     };

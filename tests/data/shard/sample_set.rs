@@ -104,6 +104,7 @@ pub(crate) fn entry(
         selection: SamplingBasis::Angle,
         samples: SAMPLES,
         covered_deg: None,
+        rig: None,
         duplicates: count(|r| r.duplicate),
         spec_net: count(|r| r.spec_net),
         lossy: false,

@@ -177,6 +177,7 @@ fn write_turn(
         selection: SamplingBasis::Angle,
         samples: frames,
         covered_deg: None,
+        rig: None,
         duplicates: 0,
         spec_net: spec_net as u32,
         lossy: false,
