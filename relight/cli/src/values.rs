@@ -1,11 +1,12 @@
 //! Values of options that several verbs take.
 
 use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_photo::decompose::SpecularGate;
 use relight_photo::insert::WhiteBalance;
-use relight_turn::RotationDirection;
+use relit_data::rig::RotationDirection;
 
 /// How integers in files of colour are encoded.
 #[derive(Clone, Copy, ValueEnum)]
@@ -85,20 +86,11 @@ impl From<GateName> for SpecularGate {
     }
 }
 
-/// Which way a table turns as its angle grows, seen from above.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum DirectionName {
-    /// The background moves to the right.
-    CounterClockwise,
-    /// The background moves to the left.
-    Clockwise,
-}
-
-impl From<DirectionName> for RotationDirection {
-    fn from(name: DirectionName) -> Self {
-        match name {
-            DirectionName::CounterClockwise => Self::CounterClockwise,
-            DirectionName::Clockwise => Self::Clockwise,
-        }
-    }
+/// Which way a table turns as its angle grows, seen from above; the help lists both.
+pub(crate) fn rotation() -> impl TypedValueParser<Value = RotationDirection> {
+    let all = RotationDirection::ALL;
+    PossibleValuesParser::new(all.map(RotationDirection::name)).map(move |name| {
+        let is_it = |direction: &RotationDirection| direction.name() == name;
+        all.into_iter().find(is_it).unwrap_or_default()
+    })
 }

@@ -118,12 +118,6 @@ pub enum TrainError {
         /// The phase.
         phase: &'static str,
     },
-    /// Labels for a phase that learns nothing from them.
-    #[error("relight train {phase} learns nothing from labels: leave --labels away")]
-    NotLabelled {
-        /// The phase.
-        phase: &'static str,
-    },
     /// Turns for a phase that learns nothing from them.
     #[error(
         "relight train {phase} learns from composed samples, not from turns: leave --turns away"
@@ -131,19 +125,6 @@ pub enum TrainError {
     NotTaught {
         /// The phase.
         phase: &'static str,
-    },
-    /// The first of the labels cannot be read.
-    #[error("the first of the labels")]
-    Label(#[source] relight_reader::DamagedSample),
-    /// Labels of a size that the networks do not take.
-    #[error(
-        "the labels have {width} x {height} pixels, and both have to be multiples of 32: extract the turns with another --size"
-    )]
-    LabelSize {
-        /// Their width.
-        width: usize,
-        /// Their height.
-        height: usize,
     },
     /// An environment in which a variable is missing that a launcher sets.
     #[error(

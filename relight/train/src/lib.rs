@@ -13,7 +13,7 @@
 //! | `launch`, `process_group`, `agreement`, `all_reduced` | several processes: their ranks, sums over them, whether they agree, all-reduced losses |
 //! | `paper_layers`, `paper_phases`, `paper_networks`, `paper_task` | the paper's phases: layers on tensors, losses, networks, runs |
 //! | `turn_samples`, `turn_task` | the network of whole turns: views in rooms, its run |
-//! | `turn_reader`, `labelled` | turns, and frames with labels |
+//! | `turn_reader` | turns |
 //! | [`RunSettings`] and others, `settings/` | TOML, also with the keys of earlier releases |
 
 #![cfg(feature = "libtorch")]
@@ -33,7 +33,6 @@ mod error;
 mod guard;
 mod held_out;
 mod journal;
-mod labelled;
 mod launch;
 mod learner;
 pub mod losses;

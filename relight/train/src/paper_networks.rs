@@ -28,8 +28,6 @@ pub struct PaperInputs {
     pub turns: Option<PathBuf>,
     /// A data set of turns that the networks are judged by, and that should not be among `turns`.
     pub held_out: Option<PathBuf>,
-    /// Frames with labels, in the layout of `relight synth`.
-    pub labels: Option<PathBuf>,
     /// Weights to begin with.
     pub weights: Option<Weights>,
     /// Spec-Net's weights.

@@ -9,14 +9,12 @@ use super::agreement::fingerprint;
 use super::composed::{ComposedBatches, buffer_settings, composition};
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, HeldOutTurns};
-use super::labelled::LabelledFrames;
 use super::learner::{Learner, LearnerSettings};
 use super::losses::Mean;
 use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed, precision};
 use super::paper_phases::PaperPhase;
 use super::process_group::ProcessGroup;
 use super::resources::Resources;
-use super::sample::TruthBatch;
 use super::settings::{PaperSettings, first_difference};
 use super::task::{StepLosses, TrainingTask, Validation};
 use super::turn_reader::{TurnGroup, TurnReader};
@@ -34,7 +32,6 @@ pub struct PaperTask {
     learner: Learner,
     composed: ComposedBatches,
     turns: Option<TurnReader>,
-    labels: Option<LabelledFrames>,
     rank: Rank,
     held_out_samples: HeldOutSamples,
     held_out_turns: Option<HeldOutTurns>,
@@ -66,11 +63,6 @@ impl PaperTask {
                 phase: phase.name(),
             });
         }
-        if inputs.labels.is_some() && phase == PaperPhase::Specular {
-            return Err(TrainError::NotLabelled {
-                phase: phase.name(),
-            });
-        }
         let graph = learned(phase);
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = inputs.weights.clone().unwrap_or_else(initial);
@@ -82,7 +74,6 @@ impl PaperTask {
         };
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
-        let labels = |path: &PathBuf| LabelledFrames::open(path, stream(settings.run.seed, 32));
         let held_out = |path: &PathBuf| {
             HeldOutTurns::read(path, precision(&settings).kind(), resources.device)
         };
@@ -105,7 +96,6 @@ impl PaperTask {
                 resources.clone(),
             ),
             turns: inputs.turns.as_ref().map(open).transpose()?,
-            labels: inputs.labels.as_ref().map(labels).transpose()?,
             rank: Rank::ONLY,
             settings,
             resources,
@@ -151,32 +141,6 @@ impl PaperTask {
         Ok(())
     }
 
-    /// The loss on this process's frames with labels of a step.
-    fn on_labels(&self, step: u64, losses: &mut StepLosses) -> Result<(), TrainError> {
-        let Some(labels) = &self.labels else {
-            return Ok(());
-        };
-        let coefficient = self.settings.loss.labels;
-        let drawn = labels.batch(step, self.settings.turns.labelled);
-        losses.add_damage(&drawn.damage);
-        let frames = drawn.drawn();
-        let batch = match frames.as_slice() {
-            [] => None,
-            frames => Some(TruthBatch::new(frames, self.kind(), self.resources.device)?),
-        };
-        let loss = batch
-            .as_ref()
-            .map(|batch| self.networks.on_truth(&self.learner.model, batch));
-        match loss.transpose()?.flatten() {
-            Some(loss) => losses.terms.add_mean("labels", coefficient, loss.mean),
-            None => losses.terms.add_nothing("labels", coefficient),
-        }
-        for (name, tensor) in batch.iter().flat_map(TruthBatch::named) {
-            losses.batch.insert(format!("labels.{name}"), tensor);
-        }
-        Ok(())
-    }
-
     /// The coefficient of the supervised term on composed samples: 1 where there are no turns.
     fn supervised(&self) -> f64 {
         match (&self.networks, &self.turns) {
@@ -214,10 +178,6 @@ impl TrainingTask for PaperTask {
             .turns
             .as_ref()
             .map_or(String::new(), TurnReader::identity);
-        inputs += &self
-            .labels
-            .as_ref()
-            .map_or(String::new(), LabelledFrames::identity);
         for model in self.networks.given() {
             inputs += &fingerprint(model.parameters())?;
         }
@@ -240,9 +200,6 @@ impl TrainingTask for PaperTask {
             }
             reader.set_rank(rank)?;
         }
-        if let Some(labels) = &mut self.labels {
-            labels.set_rank(rank);
-        }
         self.rank = rank;
         Ok(())
     }
@@ -259,7 +216,6 @@ impl TrainingTask for PaperTask {
             losses.batch.extend(batch.named());
         }
         self.on_turns(&mut losses)?;
-        self.on_labels(step, &mut losses)?;
         Ok(losses)
     }
 

@@ -12,7 +12,6 @@ use super::symmetry::Symmetry;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 use relight_nets::{INPUTS, LIGHT_OUTPUTS};
 use relight_photo::decompose::{EncodedPicture, PredictedLight};
-use relight_reader::TruthSample;
 use relight_synth::SynthSample;
 
 /// Planes of a sample: the input, the linear picture, shading, albedo, normals, highlight.
@@ -95,47 +94,6 @@ impl TruthArrays {
             values,
             light: light.numbers().map(|number| number as f32),
         }
-    }
-
-    /// The arrays of a picture whose ground truth was found otherwise. Its colours are taken for light as they stand.
-    ///
-    /// # Errors
-    /// The name of a part of the ground truth that is missing.
-    pub fn of_truth(sample: &TruthSample) -> Result<Self, &'static str> {
-        let picture = sample.image.as_ref().ok_or("image")?.planes();
-        let normals = sample.normals.as_ref().ok_or("normals")?;
-        let albedo = sample.albedo.as_ref().ok_or("albedo")?.planes();
-        let shading = grey(sample.shading.as_ref().ok_or("shading")?.planes());
-        let highlight = grey(sample.highlight.as_ref().ok_or("highlight")?.planes());
-        let encoded = EncodedPicture::new(picture, &sample.mask);
-        let white = encoded.white();
-        let covered = |at: usize| sample.mask.plane(0)[at] > 0.0;
-        let pixels = encoded.extent().pixels();
-        let lit = (0..pixels).filter(|&at| covered(at));
-        let total: f32 = lit.clone().map(|at| shading[at]).sum();
-        let mean = (total / lit.count().max(1) as f32).max(1e-6);
-
-        let mut planes: Vec<(Vec<f32>, f32)> = Vec::with_capacity(PLANES - INPUTS);
-        let whole = |planes: &Planes<3>| planes.planes().map(<[f32]>::to_vec);
-        planes.extend(whole(picture).map(|plane| (plane, 1.0 / white)));
-        planes.push((shading, 1.0 / mean));
-        planes.extend(whole(albedo).map(|plane| (plane, 1.0)));
-        planes.extend(whole(normals.planes()).map(|plane| (plane, 1.0)));
-        planes.push((highlight, 1.0 / white));
-
-        let mut values: Vec<f16> = encoded.values().iter().map(|&v| f16::from_f32(v)).collect();
-        for (plane, (truth, scale)) in planes.into_iter().enumerate() {
-            let is_truth = plane >= 3;
-            values.extend(truth.into_iter().enumerate().map(|(at, value)| {
-                let counts = !is_truth || covered(at);
-                f16::from_f32(if counts { value * scale } else { 0.0 })
-            }));
-        }
-        Ok(Self {
-            extent: encoded.extent(),
-            values,
-            light: [0.0; LIGHT_OUTPUTS],
-        })
     }
 
     /// Width and height.

@@ -11,15 +11,15 @@ use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
     EvalError, HighlightMethod, InsertionRecipe, IntrinsicBaseline, IntrinsicInput,
     IntrinsicMethod, LightMethod, NormalMethod, OrdinalMethod, Predictions, RelightMethod,
-    RelightingRecipe, RelightingSet, ScoreTable, TurnMethod, TurnNetworks, TurnSet,
-    evaluate_highlights, evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals,
-    evaluate_ordinal, evaluate_relighting, evaluate_turns, make_relighting,
+    RelightingRecipe, RelightingSet, ScoreTable, TurnMethod, TurnSet, evaluate_highlights,
+    evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal,
+    evaluate_relighting, evaluate_turns, make_relighting,
 };
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
 use relight_reader::{JudgedImages, TruthLayout, TruthSet};
 use relight_synth::Folders;
-use relight_turn::TurnNetwork;
+use relight_turn::{TurnNetwork, TurnNetworks};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde::Serialize;
@@ -224,13 +224,7 @@ struct InsertionArguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum TurnMethodName {
-    /// From shapes inflated out of the outline.
-    Outline,
-    /// From the network of photographs.
-    Photo,
-    /// The network of turns alone.
-    Network,
-    /// From the network of turns.
+    /// In a light that is not known.
     Turn,
     /// In the true light.
     Light,
@@ -239,10 +233,7 @@ enum TurnMethodName {
 impl From<TurnMethodName> for TurnMethod {
     fn from(name: TurnMethodName) -> Self {
         match name {
-            TurnMethodName::Outline => Self::Outline,
-            TurnMethodName::Photo => Self::Photo,
-            TurnMethodName::Network => Self::Network,
-            TurnMethodName::Turn => Self::NetworkThenSolver,
+            TurnMethodName::Turn => Self::UnknownLight,
             TurnMethodName::Light => Self::KnownLight,
         }
     }

@@ -99,9 +99,6 @@ struct PaperArguments {
     /// Turns that are not trained on: validations say how near to rank one their reflectance is.
     #[arg(long, value_name = "SHARDS")]
     held_out: Option<PathBuf>,
-    /// Frames with labels, as relight turn --labels and relight synth write them, beside turns and composed samples.
-    #[arg(long, value_name = "FOLDER")]
-    labels: Option<PathBuf>,
     /// Spec-Net's weights, for light, joint and specular.
     #[arg(long, value_name = "FILE")]
     spec: Option<PathBuf>,
@@ -247,7 +244,6 @@ fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> Com
     let inputs = PaperInputs {
         turns: arguments.turns.clone(),
         held_out: arguments.held_out.clone(),
-        labels: arguments.labels.clone(),
         weights: read_weights(arguments.run.weights.as_deref())?,
         spec: read_weights(arguments.spec.as_deref())?,
         normal: read_weights(arguments.normal.as_deref())?,

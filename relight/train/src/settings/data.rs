@@ -70,16 +70,11 @@ impl Default for DataSettings {
 pub struct TurnSettings {
     /// Groups of a step, at least 1, each of 12 frames of one turn.
     pub groups: u64,
-    /// Frames with labels of a step, at least 1, where there are labels.
-    pub labelled: u64,
 }
 
 impl Default for TurnSettings {
     fn default() -> Self {
-        Self {
-            groups: 1,
-            labelled: 8,
-        }
+        Self { groups: 1 }
     }
 }
 
@@ -130,18 +125,11 @@ impl TurnSettings {
     /// # Errors
     /// [`TrainError::Setting`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        let setting = |name, value| {
-            let allowed = "from 1 to a million";
-            (
-                name,
-                (1..=MOST_SAMPLES).contains(&value),
-                value.to_string(),
-                allowed,
-            )
-        };
-        all_allowed([
-            setting("turns.groups", self.groups),
-            setting("turns.labelled", self.labelled),
-        ])
+        all_allowed([(
+            "turns.groups",
+            (1..=MOST_SAMPLES).contains(&self.groups),
+            self.groups.to_string(),
+            "from 1 to a million",
+        )])
     }
 }

@@ -13,8 +13,6 @@ pub struct PaperLossCoefficients {
     pub low_rank: f64,
     /// The supervised term: the loss on composed samples beside turns; 0: none is composed.
     pub supervised: f64,
-    /// The loss on frames with labels.
-    pub labels: f64,
     /// Which low-rank loss.
     pub form: LowRankForm,
 }
@@ -24,7 +22,6 @@ impl Default for PaperLossCoefficients {
         Self {
             low_rank: 1.0,
             supervised: 1.0,
-            labels: 1.0,
             form: LowRankForm::Squared,
         }
     }

@@ -145,7 +145,6 @@ impl PaperSettings {
         check_coefficients(&[
             ("loss.low_rank", self.loss.low_rank),
             ("loss.supervised", self.loss.supervised),
-            ("loss.labels", self.loss.labels),
         ])?;
         self.turns.check()
     }
