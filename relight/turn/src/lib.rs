@@ -10,7 +10,7 @@
 //! | --- | --- |
 //! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `metal`, `shading` (one of them) |
 //! | `observe` | what the frames show: `reading`, `curves`, `exposure`, `conditioning`; `film` and `probe` for a ball in the video |
-//! | `network` | `input`, `answer`, `calibration`, `predict`: normals and albedo by the network of turns |
+//! | `network` | `input`, `answer`, `predict`: normals and albedo by the network of turns |
 //! | `fit` | `known_light`: `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the gloss), `robust`, `albedo`, `confidence`; `unknown_light`: `environment`, `photo_albedo` |
 //! | `report` | `files`, `figures`, `maps`, `object`: what is written; `warnings` and `destinations`: what a user should know after and before |
 //!
