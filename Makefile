@@ -150,7 +150,7 @@ release: packages wheel image static ## Make all that a release has: packages, w
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
-	cargo run -q --locked -p relit-house
+	cargo run -q --locked -p relit-tests --bin relit-house
 	cargo clippy --locked --workspace --all-targets $(EXTRAS),relit-extract/object-store,relit-fuzz/fuzzer \
 	    $$(.ci/setup-train --features) -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings
