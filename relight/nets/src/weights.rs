@@ -196,18 +196,6 @@ impl Weights {
         }
         Some(Self { tensors })
     }
-
-    /// The same with those of a graph's parameters under `prefix` that are missing here as [`Self::initial`] has them: a
-    /// network that gets a head more.
-    #[must_use]
-    pub fn completed(mut self, graph: &Graph, prefix: &str, seed: u64) -> Self {
-        for (name, tensor) in Self::initial(graph, seed) {
-            if name.starts_with(prefix) {
-                self.tensors.entry(name).or_insert(tensor);
-            }
-        }
-        self
-    }
 }
 
 /// Normal numbers of mean 0 by Box and Muller's transform.
@@ -267,20 +255,6 @@ mod tests {
         assert_eq!(Weights::mean(std::slice::from_ref(&a)), Some(a.clone()));
         assert_eq!(Weights::mean(&[a, of("b", [1.0, 2.0])]), None);
         assert_eq!(Weights::mean(&[]), None);
-    }
-
-    #[test]
-    fn missing_parameters_are_filled_in_and_the_others_stay() {
-        let graph = normal_net();
-        let mut weights = Weights::initial(&graph, 7);
-        weights.tensors.remove("mid.0.weight");
-        let other = weights.clone().completed(&graph, "last.", 8);
-        assert!(other.fitted_to(&graph).is_err());
-        let completed = weights.clone().completed(&graph, "mid.0.", 8);
-        assert!(completed.fitted_to(&graph).is_ok());
-        assert_eq!(completed.get("mid.3.weight"), weights.get("mid.3.weight"));
-        let fresh = Weights::initial(&graph, 8);
-        assert_eq!(completed.get("mid.0.weight"), fresh.get("mid.0.weight"));
     }
 
     #[test]

@@ -22,6 +22,9 @@ const TAKEN_AS_SRGB: f64 = 0.10;
 /// Views that wait to be taken, for each thread.
 const AHEAD: usize = 2;
 
+/// Why there is no sample.
+pub(super) const NOT_COMPOSED: TrainError = TrainError::Fault("a sample could not be composed");
+
 /// What samples are composed of.
 #[derive(Debug)]
 pub struct Composition {
@@ -56,7 +59,7 @@ impl DataLoader {
     /// `first_view` on.
     ///
     /// # Errors
-    /// [`TrainError::Synth`] where the recipe is out of range, [`TrainError::Threads`].
+    /// [`TrainError::Synth`] where the recipe is out of range, [`TrainError::Io`].
     pub fn start(
         composition: Arc<Composition>,
         rank: Rank,
@@ -86,7 +89,11 @@ impl DataLoader {
                         }
                     }
                 })
-                .map_err(TrainError::Threads)
+                .map_err(|source| TrainError::Io {
+                    path: "the data-loader workers".into(),
+                    doing: "started",
+                    source,
+                })
         };
         let threads = (0..threads).map(spawn).collect::<Result<_, _>>()?;
         Ok(Self {
@@ -102,7 +109,7 @@ impl DataLoader {
     /// The next sample, with its number.
     ///
     /// # Errors
-    /// [`TrainError::DataLoader`] where composing panicked: a fault of the program.
+    /// [`TrainError::Fault`] where composing panicked: a fault of the program.
     pub fn next_sample(&mut self) -> Result<(u64, TruthArrays), TrainError> {
         loop {
             if let Some(sample) = self.current.pop() {
@@ -115,9 +122,8 @@ impl DataLoader {
                 self.next_view += self.stride;
                 continue;
             }
-            let (view, samples) = self.views.recv().map_err(|_| TrainError::DataLoader)?;
-            self.early
-                .insert(view, samples.ok_or(TrainError::DataLoader)?);
+            let (view, samples) = self.views.recv().map_err(|_| NOT_COMPOSED)?;
+            self.early.insert(view, samples.ok_or(NOT_COMPOSED)?);
         }
     }
 }

@@ -16,7 +16,7 @@ use tch::Tensor;
 use super::decompose::{FULL_HIGHLIGHT, HIGHLIGHT_EMPHASIS, spread};
 use super::error::TrainError;
 use super::losses::{Mean, angular, scale_invariant};
-use super::low_rank::{LowRankForm, chromaticity, low_rank_loss};
+use super::low_rank::{chromaticity, low_rank_loss};
 use super::model::Model;
 use super::paper_layers::{
     answered_gloss, answered_light, diffuse_shading, network_input, normals_of_slopes,
@@ -142,9 +142,8 @@ pub(super) fn equal_rows(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainErro
         .f_unsqueeze(0)?)
 }
 
-fn low_rank(of: &Tensor, mask: &Tensor, form: LowRankForm) -> Result<Tensor, TrainError> {
-    let pixels = mask.f_narrow(0, 0, 1)?.f_sum(None)?.f_view([1])?;
-    low_rank_loss(&rows(of, mask)?, &pixels, form)
+fn low_rank(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+    low_rank_loss(&rows(of, mask)?)
 }
 
 /// The frames for which the gate of saturation opens Spec-Net, and their masks; none where they are fewer than two.
@@ -186,15 +185,11 @@ pub fn diffuse_chromaticity(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn spec_on_turns(
-    spec: &Model,
-    turns: &TurnTensors,
-    form: LowRankForm,
-) -> Result<Option<Tensor>, TrainError> {
+pub fn spec_on_turns(spec: &Model, turns: &TurnTensors) -> Result<Option<Tensor>, TrainError> {
     let Some((picture, mask)) = saturated_frames(turns)? else {
         return Ok(None);
     };
-    low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask, form).map(Some)
+    low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask).map(Some)
 }
 
 /// What an answer on composed samples comes to.
@@ -270,9 +265,8 @@ pub fn reflectance_on_turns(
     light: &Model,
     spec: Option<&Model>,
     turns: &TurnTensors,
-    form: LowRankForm,
 ) -> Result<Tensor, TrainError> {
-    low_rank(&reflectance(normal, light, spec, turns)?, &turns.mask, form)
+    low_rank(&reflectance(normal, light, spec, turns)?, &turns.mask)
 }
 
 /// The reflectance of a turn's frames: their diffuse pictures over the shading of the networks' normals and light.
@@ -451,9 +445,7 @@ mod tests {
         let mask = Tensor::ones([frames, 1, side, side], place);
         let residual = |picture: &Tensor| {
             let reflectance = picture / &shading;
-            crate::held_out::rank_figures(&reflectance, &mask)
-                .unwrap()
-                .0
+            crate::held_out::rank_residual(&reflectance, &mask).unwrap()
         };
         let (linear, file) = (residual(&picture), residual(&to_srgb(&picture).unwrap()));
         assert!(linear < 1e-6 && file > 0.002, "{linear} {file}");

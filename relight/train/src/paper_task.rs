@@ -9,14 +9,13 @@ use super::agreement::fingerprint;
 use super::composed::{ComposedBatches, buffer_settings, composition};
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, HeldOutTurns};
-use super::learner::{Learner, LearnerSettings};
+use super::learner::Learner;
 use super::losses::Mean;
-use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed, precision};
+use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed};
 use super::paper_phases::PaperPhase;
-use super::process_group::ProcessGroup;
-use super::resources::Resources;
+use super::process_group::{ProcessGroup, indivisible};
 use super::settings::{PaperSettings, first_difference};
-use super::task::{StepLosses, TrainingTask, Validation};
+use super::task::{Resources, StepLosses, TrainingTask, Validation};
 use super::turn_reader::{TurnGroup, TurnReader};
 use relight_nets::Weights;
 use relight_reader::Rank;
@@ -41,7 +40,7 @@ impl PaperTask {
     /// Reads what samples are composed of, opens the turns, and makes the networks.
     ///
     /// # Errors
-    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Needed`] where the phase
+    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Refused`] where the phase
     /// needs what is not given.
     pub fn new(
         phase: PaperPhase,
@@ -54,29 +53,25 @@ impl PaperTask {
             return Err(needed(phase, "--turns"));
         }
         if inputs.turns.is_some() && !phase.learns_from_turns() {
-            return Err(TrainError::NotTaught {
-                phase: phase.name(),
-            });
+            return Err(TrainError::Refused(format!(
+                "relight train {} learns from composed samples, not from turns: leave --turns away",
+                phase.name()
+            )));
         }
         if inputs.held_out.is_some() && !phase.is_judged_by_turns() {
-            return Err(TrainError::NotJudged {
-                phase: phase.name(),
-            });
+            return Err(TrainError::Refused(format!(
+                "relight train {} has no figures on turns: leave --held-out away",
+                phase.name()
+            )));
         }
         let graph = learned(phase);
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = inputs.weights.clone().unwrap_or_else(initial);
-        let learner = LearnerSettings {
-            adam: settings.run.adam(),
-            ema_decay: settings.run.ema_decay,
-            precision: precision(&settings),
-            device: resources.device,
-        };
+        let learner = settings.run.learner(resources.device);
+        let kind = learner.precision.kind();
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
-        let held_out = |path: &PathBuf| {
-            HeldOutTurns::read(path, precision(&settings).kind(), resources.device)
-        };
+        let held_out = |path: &PathBuf| HeldOutTurns::read(path, kind, resources.device);
         let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
         // On them, nothing is known of the paper's smoothness.
         let samples = match phase {
@@ -84,7 +79,7 @@ impl PaperTask {
             _ => settings.data.validation,
         };
         Ok(Self {
-            held_out_samples: HeldOutSamples::new(&composition, samples, None),
+            held_out_samples: HeldOutSamples::new(&composition, samples),
             held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),
@@ -92,7 +87,7 @@ impl PaperTask {
             composed: ComposedBatches::new(
                 composition,
                 buffer_settings(&settings.data, &settings.run),
-                precision(&settings).kind(),
+                kind,
                 resources.clone(),
             ),
             turns: inputs.turns.as_ref().map(open).transpose()?,
@@ -104,7 +99,7 @@ impl PaperTask {
 
     /// The type of what goes into the network.
     fn kind(&self) -> Kind {
-        precision(&self.settings).kind()
+        self.settings.run.precision.kind()
     }
 
     /// The losses on this process's groups of a step.
@@ -114,7 +109,7 @@ impl PaperTask {
             return Ok(());
         };
         let (mut values, mut damage) = (Vec::new(), Vec::new());
-        for group in 0..self.settings.turns.groups / u64::from(self.rank.world_size()) {
+        for _ in 0..self.settings.turns.groups / u64::from(self.rank.world_size()) {
             let TurnGroup {
                 frames,
                 damage: found,
@@ -122,9 +117,7 @@ impl PaperTask {
             damage.extend(found);
             if let Some(turns) = frames {
                 let own = &self.learner.model;
-                values.extend(self.networks.on_turns(own, &turns, &self.settings)?);
-                let name = format!("turns.{group}");
-                losses.batch.insert(name, turns.picture);
+                values.extend(self.networks.on_turns(own, &turns)?);
             }
         }
         losses.add_damage(&damage);
@@ -191,12 +184,8 @@ impl TrainingTask for PaperTask {
         }
         if let Some(reader) = &mut self.turns {
             if !groups.is_multiple_of(u64::from(rank.world_size())) {
-                return Err(TrainError::Indivisible {
-                    name: "turns.groups",
-                    value: groups,
-                    of: rank.world_size(),
-                    needed: format!("a multiple of {}", rank.world_size()),
-                });
+                let needed = format!("a multiple of {}", rank.world_size());
+                return Err(indivisible("turns.groups", groups, rank, &needed));
             }
             reader.set_rank(rank)?;
         }
@@ -213,7 +202,6 @@ impl TrainingTask for PaperTask {
                 losses.terms.add_mean("supervised", supervised, loss.mean);
                 losses.spreads.insert(loss.head, loss.spread);
             }
-            losses.batch.extend(batch.named());
         }
         self.on_turns(&mut losses)?;
         Ok(losses)

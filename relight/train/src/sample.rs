@@ -1,7 +1,5 @@
 //! One made picture with its truth, as the arrays that a batch is made of.
 
-use std::collections::BTreeMap;
-
 use glam::Vec3;
 use half::f16;
 use rayon::prelude::*;
@@ -203,24 +201,6 @@ impl TruthBatch {
             highlight: part(INPUTS + 10, 1)?,
             light: light.f_to_device(device)?.f_to_kind(kind)?,
         })
-    }
-}
-
-impl TruthBatch {
-    /// The tensors by name. They share their numbers.
-    #[must_use]
-    pub fn named(&self) -> BTreeMap<String, Tensor> {
-        [
-            ("input", &self.input),
-            ("picture", &self.picture),
-            ("shading", &self.shading),
-            ("albedo", &self.albedo),
-            ("normals", &self.normals),
-            ("highlight", &self.highlight),
-            ("light", &self.light),
-        ]
-        .map(|(name, tensor)| (name.to_owned(), tensor.shallow_clone()))
-        .into()
     }
 }
 

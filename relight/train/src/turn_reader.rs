@@ -115,7 +115,7 @@ impl TurnReader {
     /// The next group of this process, in 32 or 64 bits.
     ///
     /// # Errors
-    /// [`TrainError::Torch`]; [`TrainError::NoFrames`] where a whole epoch has no group with two frames.
+    /// [`TrainError::Torch`]; [`TrainError::Refused`] where a whole epoch has no group with two frames.
     pub fn next_group(&mut self, kind: Kind, device: Device) -> Result<TurnGroup, TrainError> {
         let (drawn, damage) = match self.stream.next() {
             Some(Ok(drawn)) => (drawn, None),
@@ -123,7 +123,7 @@ impl TurnReader {
                 let damage = relit_data::causes::with_causes(&damaged);
                 (damaged.rest, Some(damage))
             }
-            None => return Err(TrainError::NoFrames),
+            None => return Err(no_frames()),
         };
         self.cursor = drawn.next;
         let frames = if drawn.batch.frames.len() >= 2 {
@@ -134,10 +134,15 @@ impl TurnReader {
         };
         self.stream.give_back(drawn.batch);
         if self.cursor.epoch > self.readable + 1 {
-            return Err(TrainError::NoFrames);
+            return Err(no_frames());
         }
         Ok(TurnGroup { frames, damage })
     }
+}
+
+/// That a data set has no two frames of one turn that can be read.
+pub(super) fn no_frames() -> TrainError {
+    TrainError::Refused("the turns have no batch of two frames that can be read".to_owned())
 }
 
 fn start(turns: &Arc<Turns>, plan: DrawPlan, from: Cursor) -> Result<Stream<Turns>, TrainError> {

@@ -1,6 +1,5 @@
 //! What the network of turns learns from: views of objects on the table, each in a random room, as tensors.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -186,17 +185,5 @@ impl TurnBatch {
             log_albedo: stacked(3, |turn| &turn.log_albedo)?,
             mask: stacked(1, |turn| &turn.mask)?,
         })
-    }
-
-    /// Its tensors by name.
-    pub(super) fn named(&self) -> BTreeMap<String, Tensor> {
-        [
-            ("input", &self.input),
-            ("normals", &self.normals),
-            ("log_albedo", &self.log_albedo),
-            ("mask", &self.mask),
-        ]
-        .map(|(name, tensor)| (name.to_owned(), tensor.shallow_clone()))
-        .into()
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::allowed::all_allowed;
+use super::{ensure, within};
 use crate::error::TrainError;
 use relight_synth::LightKind;
 
@@ -82,40 +82,19 @@ impl DataSettings {
     /// Whether all numbers are in range; the recipe checks the others.
     ///
     /// # Errors
-    /// [`TrainError::Setting`] names the first that is not.
+    /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        all_allowed([
-            (
-                "data.size",
-                (32..=LARGEST_SIZE).contains(&self.size) && self.size.is_multiple_of(32),
-                self.size.to_string(),
-                "a multiple of 32 up to 1024",
-            ),
-            (
-                "data.shuffle_buffer",
-                (1..=MOST_SAMPLES).contains(&self.shuffle_buffer),
-                self.shuffle_buffer.to_string(),
-                "from 1 to a million",
-            ),
-            (
-                "data.reuse",
-                self.reuse >= 1.0 && self.reuse.is_finite(),
-                self.reuse.to_string(),
-                "at least 1",
-            ),
-            (
-                "data.plain_share",
-                (0.0..=1.0).contains(&self.plain_share),
-                self.plain_share.to_string(),
-                "from 0 to 1",
-            ),
-            (
-                "data.validation",
-                (1..=MOST_SAMPLES).contains(&self.validation),
-                self.validation.to_string(),
-                "from 1 to a million",
-            ),
-        ])
+        let is_right = (32..=LARGEST_SIZE).contains(&self.size) && self.size.is_multiple_of(32);
+        ensure(
+            is_right,
+            "data.size",
+            self.size,
+            "a multiple of 32 up to 1024",
+        )?;
+        within("data.shuffle_buffer", self.shuffle_buffer, 1..=MOST_SAMPLES)?;
+        within("data.reuse", self.reuse, 1.0..=f64::MAX)?;
+        within("data.plain_share", self.plain_share, 0.0..=1.0)?;
+        within("data.validation", self.validation, 1..=MOST_SAMPLES)
     }
 }
 
@@ -123,13 +102,8 @@ impl TurnSettings {
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`TrainError::Setting`] names the first that is not.
+    /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        all_allowed([(
-            "turns.groups",
-            (1..=MOST_SAMPLES).contains(&self.groups),
-            self.groups.to_string(),
-            "from 1 to a million",
-        )])
+        within("turns.groups", self.groups, 1..=MOST_SAMPLES)
     }
 }
