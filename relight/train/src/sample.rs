@@ -70,7 +70,7 @@ impl TruthArrays {
     pub fn new(sample: &SynthSample<'_>, linearisation: Linearisation) -> Self {
         let (picture, mask) = (
             linear(sample, linearisation),
-            sample.view().scene.buffer().mask(),
+            sample.view.scene.buffer().mask(),
         );
         let encoded = EncodedPicture::new(&picture, &mask);
         let extent = encoded.extent();
@@ -85,7 +85,7 @@ impl TruthArrays {
         let mean = mean_shading(sample);
         let truth = &mut values[(INPUTS + 3) * pixels..];
         fill_truth(sample, white, mean, truth, pixels);
-        let light = &sample.description().coefficients;
+        let light = sample.coefficients();
         let light = PredictedLight::of_light(light, f64::from(mean));
         Self {
             extent,
@@ -109,7 +109,7 @@ fn grey(light: &Planes<3>) -> Vec<f32> {
 
 /// The mean of the shading; above 0, also of an object on which no light falls.
 fn mean_shading(sample: &SynthSample<'_>) -> f32 {
-    let shading = &sample.shaded().shading;
+    let shading = &sample.shaded.shading;
     let total: f32 = shading.iter().map(|light| light.element_sum() / 3.0).sum();
     (total / shading.len().max(1) as f32).max(1e-6)
 }
@@ -117,9 +117,9 @@ fn mean_shading(sample: &SynthSample<'_>) -> f32 {
 /// The ground truth at the covered pixels.
 fn fill_truth(sample: &SynthSample<'_>, white: f32, mean: f32, values: &mut [f16], pixels: usize) {
     let grey = |light: &Vec3| light.element_sum() / 3.0;
-    let (shaded, material) = (sample.shaded(), sample.material());
-    let buffer = sample.view().scene.buffer();
-    for (at, &pixel) in buffer.pixels().iter().enumerate() {
+    let (shaded, material) = (&sample.shaded, &sample.material);
+    let buffer = sample.view.scene.buffer();
+    for (at, &pixel) in buffer.pixels.iter().enumerate() {
         let (albedo, normal) = (material.albedo[at], material.normals[at]);
         let truth = [
             grey(&shaded.shading[at]) / mean,
@@ -146,16 +146,15 @@ fn visible_highlight(diffuse: Vec3, highlight: Vec3) -> f32 {
 
 /// The picture's light.
 fn linear(sample: &SynthSample<'_>, linearisation: Linearisation) -> Planes<3> {
-    let response = sample.description().camera.response;
     let level = |level: usize| {
         let value = level as f32 / 255.0;
         match linearisation {
-            Linearisation::Exact => response.decode(value),
+            Linearisation::Exact => sample.light_of(value),
             Linearisation::AsSrgb => Srgb::to_linear(value),
         }
     };
     let levels: [f32; 256] = std::array::from_fn(level);
-    let image = sample.image();
+    let image = &sample.image;
     let extent = Extent::new(image.width() as usize, image.height() as usize);
     Planes::from_fn(extent, |x, y| {
         image

@@ -106,8 +106,7 @@ impl TurnViews {
         let drawn: Result<Vec<Planes>, TrainError> = turns
             .par_iter()
             .map(|&(view, seed)| {
-                let view = self.cache.view(&self.library, view)?;
-                let drawn = DrawnTurn::draw(&view, &self.rooms, seed);
+                let drawn = self.cache.turn(&self.library, view, &self.rooms, seed)?;
                 let drawn = if is_coarse { drawn.halved() } else { drawn };
                 Ok(Planes::new(&drawn, phase_of(stream(seed, 1))))
             })
