@@ -27,14 +27,11 @@ pub(super) fn composition(data: &DataSettings, seed: u64) -> Result<Composition,
         recipe: Recipe {
             seed: stream(seed, 21),
             size: data.size,
-            light: data.light,
-            shadows: data.shadows,
             views: data.views,
             lightings: data.lightings,
             ..Recipe::default()
         },
         library,
-        plain_share: data.plain_share,
     })
 }
 

@@ -19,6 +19,8 @@ use relight_synth::{Library, Recipe, stream};
 /// Part of the pictures whose values are taken for sRGB, whatever the camera's response: the user of a photograph
 /// does not know it either. Hardly more, as albedo times shading is not such a picture.
 const TAKEN_AS_SRGB: f64 = 0.10;
+/// Part of the pictures that a plain camera takes (sRGB, no noise, no compression); the others are taken as the recipe says.
+const PLAIN: f64 = 0.5;
 /// Views that wait to be taken, for each thread.
 const AHEAD: usize = 2;
 
@@ -32,9 +34,6 @@ pub struct Composition {
     pub recipe: Recipe,
     /// What they are made of.
     pub library: Library,
-    /// Part of the pictures that a plain camera takes (sRGB, no noise, no compression), 0..=1; the others are taken as
-    /// the recipe says.
-    pub plain_share: f64,
 }
 
 /// The samples of one view, by the view's number; none where composing them panicked.
@@ -151,7 +150,7 @@ impl Composition {
             .map(|number| {
                 let draw = |which: u64| unit(stream(stream(self.recipe.seed, which), number));
                 let recipe = Recipe {
-                    random_camera: self.recipe.random_camera && draw(11) >= self.plain_share,
+                    random_camera: self.recipe.random_camera && draw(11) >= PLAIN,
                     ..self.recipe.clone()
                 };
                 let linearisation = if draw(12) < TAKEN_AS_SRGB {

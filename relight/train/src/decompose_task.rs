@@ -9,7 +9,7 @@ use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, highlight_figures};
 use super::learner::Learner;
-use super::losses::{angular_degrees, light_degrees, relative_distance, scale_invariant, windowed};
+use super::losses::{angular_degrees, relative_distance, scale_invariant, windowed};
 use super::process_group::ProcessGroup;
 use super::sample::TruthBatch;
 use super::settings::{DecomposeSettings, first_difference};
@@ -157,8 +157,6 @@ fn figures(
     if let Some(light) = &answer.light {
         let distance = relative_distance(light, &batch.light)?.value;
         figures.push(("light", f64::try_from(distance)?));
-        let degrees = light_degrees(light, &batch.light)?;
-        figures.push(("light_deg", f64::try_from(degrees)?));
     }
     Ok(figures)
 }

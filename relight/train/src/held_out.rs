@@ -94,7 +94,6 @@ impl HeldOutSamples {
                 ..Recipe::default()
             },
             library: composition.library.without_meshes(),
-            plain_share: composition.plain_share,
         };
         Self {
             composition,

@@ -162,32 +162,6 @@ pub fn relative_distance(found: &Tensor, truth: &Tensor) -> Result<Mean, TrainEr
     Ok(Mean { value, over })
 }
 
-/// Mean angle between the bands 1 of lights (`batch x 9`), degrees, over those whose truth is known.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub fn light_degrees(found: &Tensor, truth: &Tensor) -> Result<Tensor, TrainError> {
-    let direction = |of: &Tensor| -> Result<(Tensor, Tensor), tch::TchError> {
-        let band = of.f_narrow(1, 1, 3)?;
-        let length = band
-            .f_square()?
-            .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-            .f_add_scalar(TINY * TINY)?
-            .f_sqrt()?;
-        Ok((band.f_div(&length)?, length))
-    };
-    let ((found, _), (truth, length)) = (direction(found)?, direction(truth)?);
-    let angle = found
-        .f_mul(&truth)?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-        .f_clamp(-1.0, 1.0)?
-        .f_acos()?
-        .f_rad2deg()?;
-    let known = length.f_gt(2.0 * TINY)?.f_to_kind(truth.kind())?;
-    let over = known.f_sum(None)?.f_add_scalar(TINY)?;
-    Ok(angle.f_mul(&known)?.f_sum(None)?.f_div(&over)?)
-}
-
 /// Mean angle between unit normals under the weight, degrees.
 ///
 /// # Errors
@@ -251,8 +225,6 @@ mod tests {
         let distance = relative_distance(&found, &truth).unwrap();
         assert!((distance.value.double_value(&[]) - 1.0 / 5.0_f64.sqrt()).abs() < 1e-3);
         assert!((distance.over.double_value(&[]) - 1.0).abs() < 1e-5);
-        let degrees = light_degrees(&found, &truth).unwrap().double_value(&[]);
-        assert!((degrees - 45.0).abs() < 0.01, "{degrees}");
     }
 
     #[test]

@@ -249,7 +249,10 @@ mod tests {
         };
         let batch = |mirrored: bool| {
             let arrays = &arrays;
-            let symmetry = Symmetry::mirror(mirrored);
+            let symmetry = Symmetry {
+                mirrored,
+                ..Symmetry::NONE
+            };
             let sample = DrawnSample { arrays, symmetry };
             TruthBatch::new(&[sample], Kind::Float, Device::Cpu).unwrap()
         };

@@ -33,15 +33,6 @@ impl Symmetry {
         }
     }
 
-    /// The picture or its mirror image.
-    #[must_use]
-    pub fn mirror(mirrored: bool) -> Self {
-        Self {
-            mirrored,
-            ..Self::NONE
-        }
-    }
-
     /// Which pixel of the picture is seen at a place.
     pub(super) fn source(self, extent: Extent, x: usize, y: usize) -> usize {
         let (mut u, mut v) = if self.transposed { (y, x) } else { (x, y) };
@@ -166,6 +157,5 @@ mod tests {
             assert!(!all[..at].contains(one));
         }
         assert_eq!(all[0], Symmetry::NONE);
-        assert_eq!(Symmetry::mirror(true), all[1]);
     }
 }

@@ -305,7 +305,6 @@ fn samples_are_the_same_on_any_number_of_threads() {
             ..Recipe::default()
         },
         library: Library::read(&Folders::default()).unwrap(),
-        plain_share: 0.5,
     });
     let first = |threads: usize| -> Vec<TruthArrays> {
         let composition = Arc::clone(&composition);

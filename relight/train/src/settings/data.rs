@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{ensure, within};
 use crate::error::TrainError;
-use relight_synth::LightKind;
 
 // Nobody trains more: these keep a slip of the pen from filling the memory.
 const MOST_SAMPLES: u64 = 1_000_000;
@@ -22,12 +21,6 @@ pub struct DataSettings {
     pub views: u32,
     /// Materials and lightings of each view.
     pub lightings: u32,
-    /// What light there is.
-    pub light: LightKind,
-    /// Whether objects block light.
-    pub shadows: bool,
-    /// Part of the pictures that a plain camera takes.
-    pub plain_share: f64,
     /// Samples of the shuffle buffer, from which batches are drawn.
     pub shuffle_buffer: u64,
     /// How often each is seen, in the mean.
@@ -51,9 +44,6 @@ impl Default for DataSettings {
             size: 128,
             views: 2,
             lightings: 6,
-            light: LightKind::Mixed,
-            shadows: true,
-            plain_share: 0.5,
             shuffle_buffer: 768,
             reuse: 4.0,
             meshes: None,
@@ -93,7 +83,6 @@ impl DataSettings {
         )?;
         within("data.shuffle_buffer", self.shuffle_buffer, 1..=MOST_SAMPLES)?;
         within("data.reuse", self.reuse, 1.0..=f64::MAX)?;
-        within("data.plain_share", self.plain_share, 0.0..=1.0)?;
         within("data.validation", self.validation, 1..=MOST_SAMPLES)
     }
 }
