@@ -15,7 +15,7 @@ const KEEP: f64 = 0.99;
 
 /// Looks at every step.
 #[derive(Debug, Default)]
-pub struct Guard {
+pub(crate) struct Guard {
     seen: u64,
     loss: f64,
     spreads: BTreeMap<&'static str, f64>,
@@ -26,7 +26,7 @@ impl Guard {
     ///
     /// # Errors
     /// [`TrainError::Ended`].
-    pub fn check(
+    pub(crate) fn check(
         &mut self,
         step: u64,
         losses: &BTreeMap<String, f64>,

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | `model` | a [`relight_nets::Graph`] on tensors: what is trained is what the ONNX file holds |
 //! | `adam`, `learner` | how a network learns; all of it can be saved |
-//! | [`losses`], [`low_rank`], `terms` | what is descended |
+//! | `losses`, `low_rank`, `terms` | what is descended |
 //! | `sample`, `data_loader`, `shuffle_buffer`, `composed` | samples composed while training |
 //! | `decompose`, `decompose_task` | the decomposing network: maps, losses, run |
 //! | `held_out` | turns and samples that networks are judged by while they train |
@@ -34,12 +34,12 @@ mod held_out;
 mod journal;
 mod launch;
 mod learner;
-pub mod losses;
-pub mod low_rank;
+mod losses;
+mod low_rank;
 mod model;
-pub mod paper_layers;
+mod paper_layers;
 mod paper_networks;
-pub mod paper_phases;
+mod paper_phases;
 mod paper_task;
 mod process_group;
 mod run;
@@ -58,10 +58,9 @@ pub use adam::{Adam, AdamSettings};
 pub use checkpoint::{CHECKPOINT, Checkpoint};
 pub use cuda::cuda_device;
 pub use data_loader::{Composition, DataLoader};
-pub use decompose::{AnsweredTensors, DecomposeLossCoefficients, decompose_losses, head_spreads};
+pub use decompose::{AnsweredTensors, DecomposeLossCoefficients};
 pub use decompose_task::DecomposeTask;
 pub use error::TrainError;
-pub use guard::Guard;
 pub use journal::{Journal, TABLE};
 pub use launch::Launch;
 pub use learner::{Learner, LearnerSettings};
@@ -71,16 +70,13 @@ pub use paper_phases::PaperPhase;
 pub use paper_task::PaperTask;
 pub use process_group::ProcessGroup;
 pub use run::{Run, RunOutcome, TrainObserver};
-pub use sample::{DrawnSample, Linearisation, TruthArrays, TruthBatch};
+pub use sample::TruthArrays;
 pub use settings::{
     DataSettings, DecomposeSettings, PaperLossCoefficients, PaperSettings, RunSettings,
     TransferSettings, TurnNetworkSettings, TurnSettings, read_settings,
 };
-pub use shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
-pub use symmetry::Symmetry;
 pub use task::{Resources, StepLosses, TrainingTask, Validation};
 pub use terms::LossTerms;
-pub use turn_reader::{TurnGroup, TurnReader, TurnTensors};
 pub use turn_task::TurnNetworkTask;
 
 /// The examples of the README, so that they are built.

@@ -14,7 +14,7 @@ const CHORD_FLOOR: f64 = 0.02;
 
 /// A mean, and what it is a mean over: so that the mean over several parts of a batch can be made of theirs.
 #[derive(Debug)]
-pub struct Mean {
+pub(crate) struct Mean {
     /// The mean.
     pub value: Tensor,
     /// How much it is taken over, one number without gradient; above 0 where there is a mean.
@@ -26,7 +26,7 @@ pub struct Mean {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn scale_invariant(
+pub(crate) fn scale_invariant(
     found: &Tensor,
     truth: &Tensor,
     weight: &Tensor,
@@ -50,7 +50,7 @@ pub fn scale_invariant(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn windowed(
+pub(crate) fn windowed(
     found: &Tensor,
     truth: &Tensor,
     weight: &Tensor,
@@ -83,7 +83,7 @@ pub fn windowed(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<[Mean; 2], TrainError> {
+pub(crate) fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<[Mean; 2], TrainError> {
     let along = |dimension: i64| -> Result<Mean, tch::TchError> {
         let step = |of: &Tensor| {
             let length = of.size()[dimension as usize] - 1;
@@ -111,7 +111,7 @@ pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<[Mean
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
+pub(crate) fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
     let cosine = found
         .f_mul(truth)?
         .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
@@ -126,7 +126,7 @@ pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, 
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
+pub(crate) fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
     let length = found
         .f_sub(truth)?
         .f_square()?
@@ -144,7 +144,7 @@ pub fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, Tr
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn relative_distance(found: &Tensor, truth: &Tensor) -> Result<Mean, TrainError> {
+pub(crate) fn relative_distance(found: &Tensor, truth: &Tensor) -> Result<Mean, TrainError> {
     let length = |of: &Tensor| {
         of.f_square()?
             .f_sum_dim_intlist([1_i64].as_slice(), false, None)?
@@ -166,7 +166,7 @@ pub fn relative_distance(found: &Tensor, truth: &Tensor) -> Result<Mean, TrainEr
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn angular_degrees(
+pub(crate) fn angular_degrees(
     found: &Tensor,
     truth: &Tensor,
     weight: &Tensor,

@@ -24,7 +24,7 @@ const TINY: f64 = 1e-20;
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn first_singular_vector(rows: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn first_singular_vector(rows: &Tensor) -> Result<Tensor, TrainError> {
     let rows = rows.f_detach()?;
     let mut power = rows.f_matmul(&rows.f_transpose(1, 2)?)?;
     for squared in 0..=SQUARINGS {
@@ -53,7 +53,7 @@ pub fn first_singular_vector(rows: &Tensor) -> Result<Tensor, TrainError> {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn rank_one(rows: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn rank_one(rows: &Tensor) -> Result<Tensor, TrainError> {
     let vector = first_singular_vector(rows)?;
     let shares = vector.f_transpose(1, 2)?.f_matmul(&rows.f_detach()?)?;
     Ok(vector.f_matmul(&shares)?)
@@ -63,7 +63,7 @@ pub fn rank_one(rows: &Tensor) -> Result<Tensor, TrainError> {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn low_rank_loss(rows: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn low_rank_loss(rows: &Tensor) -> Result<Tensor, TrainError> {
     let square = rows
         .f_sub(&rank_one(rows)?)?
         .f_square()?
@@ -77,7 +77,7 @@ pub fn low_rank_loss(rows: &Tensor) -> Result<Tensor, TrainError> {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn chromaticity(diffuse: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn chromaticity(diffuse: &Tensor) -> Result<Tensor, TrainError> {
     let sum = diffuse.f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
     Ok(diffuse.f_narrow(1, 0, 2)?.f_div(&sum.f_clamp_min(1e-5)?)?)
 }

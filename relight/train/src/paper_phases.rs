@@ -94,7 +94,7 @@ impl PaperPhase {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn highlight_of(spec: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn highlight_of(spec: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
     let answer = &spec.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
     let highlight = answer.f_add_scalar(1.0)?.f_mul_scalar(0.5)?;
     Ok(highlight.f_clamp(0.0, 1.0)?.f_mul(mask)?)
@@ -104,7 +104,7 @@ pub fn highlight_of(spec: &Model, picture: &Tensor, mask: &Tensor) -> Result<Ten
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn normals_of(normal: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn normals_of(normal: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
     let slopes = &normal.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
     let (p, q) = (slopes.f_narrow(1, 0, 1)?, slopes.f_narrow(1, 1, 1)?);
     normals_of_slopes(&Tensor::f_cat(&[p, q.f_neg()?], 1)?, mask)
@@ -114,7 +114,7 @@ pub fn normals_of(normal: &Model, picture: &Tensor, mask: &Tensor) -> Result<Ten
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn light_of(light: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn light_of(light: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
     answered_light(&light.forward(&network_input(&to_srgb(picture)?, mask)?)?[0])
 }
 
@@ -171,7 +171,7 @@ pub(super) fn saturated_frames(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn diffuse_chromaticity(
+pub(crate) fn diffuse_chromaticity(
     spec: &Model,
     picture: &Tensor,
     mask: &Tensor,
@@ -185,7 +185,7 @@ pub fn diffuse_chromaticity(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn spec_on_turns(spec: &Model, turns: &TurnTensors) -> Result<Option<Tensor>, TrainError> {
+pub(crate) fn spec_on_turns(spec: &Model, turns: &TurnTensors) -> Result<Option<Tensor>, TrainError> {
     let Some((picture, mask)) = saturated_frames(turns)? else {
         return Ok(None);
     };
@@ -194,7 +194,7 @@ pub fn spec_on_turns(spec: &Model, turns: &TurnTensors) -> Result<Option<Tensor>
 
 /// What an answer on composed samples comes to.
 #[derive(Debug)]
-pub struct TruthLoss {
+pub(crate) struct TruthLoss {
     /// Its loss.
     pub mean: Mean,
     /// What is answered.
@@ -207,7 +207,7 @@ pub struct TruthLoss {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
     let found = highlight_of(spec, &batch.picture, &batch.mask)?;
     let truth = batch.highlight.f_clamp(0.0, 1.0)?;
     let emphasis = truth
@@ -230,7 +230,7 @@ pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, Trai
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
     let found = normals_of(normal, &diffuse_of_truth(batch)?, &batch.mask)?;
     Ok(TruthLoss {
         mean: angular(&found, &batch.normals, &batch.mask)?,
@@ -243,7 +243,7 @@ pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, 
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+pub(crate) fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
     let coefficients = light_of(light, &diffuse_of_truth(batch)?, &batch.mask)?;
     let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released)?;
     let grey = shading.f_mean_dim([1_i64].as_slice(), true, None)?;
@@ -260,7 +260,7 @@ pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, Tr
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn reflectance_on_turns(
+pub(crate) fn reflectance_on_turns(
     normal: &Model,
     light: &Model,
     spec: Option<&Model>,
@@ -273,7 +273,7 @@ pub fn reflectance_on_turns(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn reflectance(
+pub(crate) fn reflectance(
     normal: &Model,
     light: &Model,
     spec: Option<&Model>,
@@ -320,7 +320,7 @@ fn gate(turns: &TurnTensors) -> Result<Tensor, TrainError> {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn specular_on_turns(
+pub(crate) fn specular_on_turns(
     reflectance: &Model,
     (spec, normal, light): (&Model, &Model, &Model),
     turns: &TurnTensors,

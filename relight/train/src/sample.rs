@@ -17,7 +17,7 @@ const PLANES: usize = INPUTS + 3 + 1 + 3 + 3 + 1;
 
 /// How the values of a made picture are taken for light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Linearisation {
+pub(crate) enum Linearisation {
     /// By the response of the camera that made it: the picture is exactly albedo times shading plus highlight.
     Exact,
     /// As sRGB, as a photograph is taken whose camera nobody knows.
@@ -36,7 +36,7 @@ pub struct TruthArrays {
 
 /// A sample in a batch.
 #[derive(Debug, Clone, Copy)]
-pub struct DrawnSample<'a> {
+pub(crate) struct DrawnSample<'a> {
     /// The sample.
     pub arrays: &'a TruthArrays,
     /// How it is seen, normals and all.
@@ -45,7 +45,7 @@ pub struct DrawnSample<'a> {
 
 /// A batch of them on a device, `batch x channels x height x width`.
 #[derive(Debug)]
-pub struct TruthBatch {
+pub(crate) struct TruthBatch {
     /// What the network sees.
     pub input: Tensor,
     /// 1 inside the mask, 1 channel.
@@ -66,8 +66,7 @@ pub struct TruthBatch {
 
 impl TruthArrays {
     /// The arrays of a sample.
-    #[must_use]
-    pub fn new(sample: &SynthSample<'_>, linearisation: Linearisation) -> Self {
+    pub(crate) fn new(sample: &SynthSample<'_>, linearisation: Linearisation) -> Self {
         let (picture, mask) = (
             linear(sample, linearisation),
             sample.view.scene.buffer().mask(),
@@ -99,12 +98,6 @@ impl TruthArrays {
     pub fn extent(&self) -> Extent {
         self.extent
     }
-}
-
-fn grey(light: &Planes<3>) -> Vec<f32> {
-    let [red, green, blue] = light.planes();
-    let channels = red.iter().zip(green).zip(blue);
-    channels.map(|((r, g), b)| (r + g + b) / 3.0).collect()
 }
 
 /// The mean of the shading; above 0, also of an object on which no light falls.
@@ -169,7 +162,7 @@ impl TruthBatch {
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn new(
+    pub(crate) fn new(
         samples: &[DrawnSample<'_>],
         kind: Kind,
         device: Device,

@@ -22,7 +22,7 @@ use relight_synth::stream;
 
 /// How samples are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShuffleBufferSettings {
+pub(crate) struct ShuffleBufferSettings {
     /// Samples that are kept.
     pub capacity: u64,
     /// Samples of a view, at least 1.
@@ -44,7 +44,7 @@ struct SampleDraw {
 
 /// The buffer.
 #[derive(Debug)]
-pub struct ShuffleBuffer {
+pub(crate) struct ShuffleBuffer {
     settings: ShuffleBufferSettings,
     rank: Rank,
     loader: DataLoader,
@@ -58,7 +58,7 @@ impl ShuffleBuffer {
     ///
     /// # Errors
     /// Those of the loader; [`TrainError::Stopped`] where a run of one process is asked to stop meanwhile.
-    pub fn open(
+    pub(crate) fn open(
         settings: ShuffleBufferSettings,
         rank: Rank,
         composition: &Arc<Composition>,
@@ -83,7 +83,7 @@ impl ShuffleBuffer {
     ///
     /// # Errors
     /// Those of the loader.
-    pub fn batch(&mut self, step: u64) -> Result<Vec<DrawnSample<'_>>, TrainError> {
+    pub(crate) fn batch(&mut self, step: u64) -> Result<Vec<DrawnSample<'_>>, TrainError> {
         self.move_to(step, None)?;
         let draws = self.settings.draws(step, self.rank);
         draws
@@ -121,7 +121,7 @@ impl ShuffleBufferSettings {
     ///
     /// # Errors
     /// [`TrainError::Refused`].
-    pub fn check(self, rank: Rank) -> Result<(), TrainError> {
+    pub(crate) fn check(self, rank: Rank) -> Result<(), TrainError> {
         let of = rank.world_size();
         if !self.batch.is_multiple_of(u64::from(of)) {
             let needed = format!("a multiple of {of}");

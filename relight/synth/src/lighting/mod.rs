@@ -67,7 +67,8 @@ impl Lighting {
 
     /// All light but what bounces, as coefficients of an order: where nothing is in the way, their
     /// diffuse layer is the shading, smoothed where lamps are.
-    pub(crate) fn coefficients(&self, order: Order, panoramas: &Panoramas) -> ShLight {
+    #[must_use]
+    pub fn coefficients(&self, order: Order, panoramas: &Panoramas) -> ShLight {
         let even = self
             .ambient
             .to_array()
