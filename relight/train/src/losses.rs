@@ -83,7 +83,11 @@ pub(crate) fn windowed(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<[Mean; 2], TrainError> {
+pub(crate) fn gradient(
+    found: &Tensor,
+    truth: &Tensor,
+    weight: &Tensor,
+) -> Result<[Mean; 2], TrainError> {
     let along = |dimension: i64| -> Result<Mean, tch::TchError> {
         let step = |of: &Tensor| {
             let length = of.size()[dimension as usize] - 1;

@@ -94,7 +94,11 @@ impl PaperPhase {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn highlight_of(spec: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn highlight_of(
+    spec: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
     let answer = &spec.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
     let highlight = answer.f_add_scalar(1.0)?.f_mul_scalar(0.5)?;
     Ok(highlight.f_clamp(0.0, 1.0)?.f_mul(mask)?)
@@ -104,7 +108,11 @@ pub(crate) fn highlight_of(spec: &Model, picture: &Tensor, mask: &Tensor) -> Res
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn normals_of(normal: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn normals_of(
+    normal: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
     let slopes = &normal.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
     let (p, q) = (slopes.f_narrow(1, 0, 1)?, slopes.f_narrow(1, 1, 1)?);
     normals_of_slopes(&Tensor::f_cat(&[p, q.f_neg()?], 1)?, mask)
@@ -114,7 +122,11 @@ pub(crate) fn normals_of(normal: &Model, picture: &Tensor, mask: &Tensor) -> Res
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn light_of(light: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn light_of(
+    light: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
     answered_light(&light.forward(&network_input(&to_srgb(picture)?, mask)?)?[0])
 }
 
@@ -185,7 +197,10 @@ pub(crate) fn diffuse_chromaticity(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn spec_on_turns(spec: &Model, turns: &TurnTensors) -> Result<Option<Tensor>, TrainError> {
+pub(crate) fn spec_on_turns(
+    spec: &Model,
+    turns: &TurnTensors,
+) -> Result<Option<Tensor>, TrainError> {
     let Some((picture, mask)) = saturated_frames(turns)? else {
         return Ok(None);
     };

@@ -74,24 +74,13 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Begins a run in a folder, or goes on with the one that is there (`resume`).
+    /// Begins a run in a folder, or goes on with the one that is there (`resume`); among the processes of a group, all of
+    /// which open it with the same arguments.
     ///
     /// # Errors
-    /// [`TrainError::Occupied`], [`TrainError::Checkpoint`] where it is another run's, [`TrainError::Io`].
+    /// [`TrainError::Occupied`], [`TrainError::Checkpoint`] where it is another run's, [`TrainError::Io`];
+    /// [`TrainError::Refused`], [`TrainError::ProcessLost`].
     pub fn open(
-        task: &'a mut dyn TrainingTask,
-        settings: &'a RunSettings,
-        folder: &'a Path,
-        resume: bool,
-    ) -> Result<Self, TrainError> {
-        Self::open_among(task, settings, folder, resume, None)
-    }
-
-    /// The same among the processes of a group, all of which open the run, with the same arguments.
-    ///
-    /// # Errors
-    /// Those of [`Self::open`]; [`TrainError::Refused`], [`TrainError::ProcessLost`].
-    pub fn open_among(
         task: &'a mut dyn TrainingTask,
         settings: &'a RunSettings,
         folder: &'a Path,

@@ -114,7 +114,11 @@ impl TurnReader {
     ///
     /// # Errors
     /// [`TrainError::Torch`]; [`TrainError::Refused`] where a whole epoch has no group with two frames.
-    pub(crate) fn next_group(&mut self, kind: Kind, device: Device) -> Result<TurnGroup, TrainError> {
+    pub(crate) fn next_group(
+        &mut self,
+        kind: Kind,
+        device: Device,
+    ) -> Result<TurnGroup, TrainError> {
         let (drawn, damage) = match self.stream.next() {
             Some(Ok(drawn)) => (drawn, None),
             Some(Err(damaged)) => {

@@ -199,7 +199,7 @@ fn make_run(
         stop: &stop,
         damage: Vec::new(),
     };
-    Run::open(task, settings, folder, resume)?.finish(&stop, &mut observer)
+    Run::open(task, settings, folder, resume, None)?.finish(&stop, &mut observer)
 }
 
 /// The lines of a run's table, without the header.
@@ -508,7 +508,7 @@ fn a_damaged_sample_of_a_turn_is_told_and_the_run_goes_on() {
         stop: &stop,
         damage: Vec::new(),
     };
-    let outcome = Run::open(&mut task, &run, folder.path(), false)
+    let outcome = Run::open(&mut task, &run, folder.path(), false, None)
         .unwrap()
         .finish(&stop, &mut observer)
         .unwrap();
@@ -655,7 +655,7 @@ fn a_run_that_is_asked_to_stop_while_its_first_samples_are_composed_stops_then()
         stop: &AtomicBool::new(false),
         damage: Vec::new(),
     };
-    let run = Run::open(&mut task, &settings.run, folder.path(), false).unwrap();
+    let run = Run::open(&mut task, &settings.run, folder.path(), false, None).unwrap();
     let outcome = run.finish(&stop, &mut observer).unwrap();
     later.join().unwrap();
     assert_eq!((outcome.steps, outcome.stopped), (0, true));

@@ -301,7 +301,7 @@ fn train(
     let group = processes.group;
     let process = group.as_ref().map_or(0, |group| group.rank().index());
     let folder = arguments.folder()?;
-    let run = Run::open_among(task, settings, folder, arguments.resume, group)?;
+    let run = Run::open(task, settings, folder, arguments.resume, group)?;
     let made = run.steps_made();
     let bar = (process == 0).then(|| console.progress(settings.steps, "train"));
     if let Some(bar) = &bar {

@@ -110,20 +110,10 @@ impl SyntheticLamp {
     /// The lamp, turned about the origin.
     pub(crate) fn turned(&self, turn: &Rotation) -> Self {
         let moved = |v: Vec3| vector(turn.apply(direction(v))) * v.length();
-        let emitter = match self.emitter {
-            Emitter::Distant {
-                towards,
-                half_angle,
-            } => Emitter::Distant {
-                towards: moved(towards),
-                half_angle,
-            },
-            Emitter::Disc { centre, radius } => Emitter::Disc {
-                centre: moved(centre),
-                radius,
-            },
-        };
-        Self { emitter, ..*self }
+        Self {
+            emitter: self.emitter.at(moved),
+            ..*self
+        }
     }
 }
 
@@ -145,16 +135,21 @@ impl Emitter {
             let least = 0.16 * level.length();
             (level + vertical * height.abs().max(least)).normalize_or(vertical) * length
         };
+        self.at(raised)
+    }
+
+    /// The same with its place or direction changed.
+    fn at(self, changed: impl Fn(Vec3) -> Vec3) -> Self {
         match self {
             Self::Distant {
                 towards,
                 half_angle,
             } => Self::Distant {
-                towards: raised(towards),
+                towards: changed(towards),
                 half_angle,
             },
             Self::Disc { centre, radius } => Self::Disc {
-                centre: raised(centre),
+                centre: changed(centre),
                 radius,
             },
         }

@@ -82,7 +82,7 @@ impl DataSettings {
             "a multiple of 32 up to 1024",
         )?;
         within("data.shuffle_buffer", self.shuffle_buffer, 1..=MOST_SAMPLES)?;
-        within("data.reuse", self.reuse, 1.0..=f64::MAX)?;
+        within("data.reuse", self.reuse, 1.0..=1e6)?;
         within("data.validation", self.validation, 1..=MOST_SAMPLES)
     }
 }

@@ -15,7 +15,7 @@ mod tests;
 mod transfer;
 
 use std::fmt::Display;
-use std::ops::RangeInclusive;
+use std::ops::{Bound, RangeBounds};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -136,7 +136,7 @@ impl DecomposeSettings {
         self.data.check()?;
         let loss = &self.loss;
         // A part of others: alone it counts nothing.
-        within("loss.quotient", loss.quotient, 0.0..=f64::MAX)?;
+        check_coefficient("loss.quotient", loss.quotient)?;
         check_coefficients(&[
             ("loss.whole", loss.whole),
             ("loss.windows", loss.windows),
@@ -153,7 +153,7 @@ impl DecomposeSettings {
 /// Whether loss coefficients are in range, and not all of them 0.
 fn check_coefficients(coefficients: &[(&'static str, f64)]) -> Result<(), TrainError> {
     for &(name, coefficient) in coefficients {
-        within(name, coefficient, 0.0..=f64::MAX)?;
+        check_coefficient(name, coefficient)?;
     }
     let is_nothing = coefficients
         .iter()
@@ -161,25 +161,36 @@ fn check_coefficients(coefficients: &[(&'static str, f64)]) -> Result<(), TrainE
     ensure(!is_nothing, "[loss]", 0, "above 0 for one of all others")
 }
 
-/// Whether the value of a setting is in a range.
+fn check_coefficient(name: &str, value: f64) -> Result<(), TrainError> {
+    ensure(
+        value >= 0.0 && value.is_finite(),
+        name,
+        value,
+        "a number from 0",
+    )
+}
+
+/// Whether the value of a setting is in a range, which has a least value.
 fn within<N: PartialOrd + Display>(
     name: &str,
     value: N,
-    range: RangeInclusive<N>,
+    range: impl RangeBounds<N>,
 ) -> Result<(), TrainError> {
-    let (least, most) = (range.start(), range.end());
-    let allowed = format!("from {least} to {most}");
+    let least = match range.start_bound() {
+        Bound::Included(least) | Bound::Excluded(least) => least.to_string(),
+        Bound::Unbounded => String::new(),
+    };
+    let allowed = match range.end_bound() {
+        Bound::Included(most) => format!("from {least} to {most}"),
+        Bound::Excluded(end) => format!("from {least} to below {end}"),
+        Bound::Unbounded => format!("at least {least}"),
+    };
     ensure(range.contains(&value), name, value, &allowed)
 }
 
-/// Whether a part is from 0 to below 1.
-fn below_one(name: &str, value: f64) -> Result<(), TrainError> {
-    ensure(
-        (0.0..1.0).contains(&value),
-        name,
-        value,
-        "from 0 to below 1",
-    )
+/// Whether a number is above 0, and one.
+fn positive(name: &str, value: f64) -> Result<(), TrainError> {
+    ensure(value > 0.0 && value.is_finite(), name, value, "above 0")
 }
 
 /// Says which setting is not allowed, and what is.

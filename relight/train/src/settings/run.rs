@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use tch::Device;
 
-use super::{below_one, within};
+use super::{positive, within};
 use crate::adam::AdamSettings;
 use crate::error::TrainError;
 use crate::learner::LearnerSettings;
@@ -80,23 +80,15 @@ impl RunSettings {
     pub fn check(&self) -> Result<(), TrainError> {
         within("run.steps", self.steps, 1..=MOST_STEPS)?;
         within("run.batch", self.batch, 1..=LARGEST_BATCH)?;
-        within(
-            "run.learning_rate",
-            self.learning_rate,
-            f64::MIN_POSITIVE..=f64::MAX,
-        )?;
+        positive("run.learning_rate", self.learning_rate)?;
         within("run.min_lr_ratio", self.min_lr_ratio, 0.0..=1.0)?;
-        within(
-            "run.max_grad_norm",
-            self.max_grad_norm,
-            f64::MIN_POSITIVE..=f64::MAX,
-        )?;
-        below_one("run.beta1", self.beta1)?;
-        below_one("run.beta2", self.beta2)?;
-        below_one("run.weight_decay", self.weight_decay)?;
-        below_one("run.ema_decay", self.ema_decay)?;
-        within("run.log_every", self.log_every, 1..=u64::MAX)?;
-        within("run.validate_every", self.validate_every, 1..=u64::MAX)?;
+        positive("run.max_grad_norm", self.max_grad_norm)?;
+        within("run.beta1", self.beta1, 0.0..1.0)?;
+        within("run.beta2", self.beta2, 0.0..1.0)?;
+        within("run.weight_decay", self.weight_decay, 0.0..1.0)?;
+        within("run.ema_decay", self.ema_decay, 0.0..1.0)?;
+        within("run.log_every", self.log_every, 1..)?;
+        within("run.validate_every", self.validate_every, 1..)?;
         within(
             "run.checkpoint_minutes",
             self.checkpoint_minutes,

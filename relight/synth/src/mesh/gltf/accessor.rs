@@ -89,7 +89,9 @@ impl File<'_> {
     fn of_kind(&self, number: usize, kind: &str) -> Result<&Accessor, String> {
         let accessor = self.accessor(number)?;
         let is_it = accessor.kind == kind;
-        is_it.then_some(accessor).ok_or_else(|| of_another_kind(number))
+        is_it
+            .then_some(accessor)
+            .ok_or_else(|| of_another_kind(number))
     }
 
     /// Whole numbers that are parts of their largest have `is_normal`.
