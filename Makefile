@@ -53,35 +53,14 @@ setup-app:
 setup-train: ## Install libtorch, which relight's training is built with (544 MB, once)
 	@.ci/setup-train
 
-# The runs of the network of relight turn, each from the weights of the one before. DATA holds the folders meshes,
-# panoramas and held of what relight/cli/weights/README.md names; a run that was stopped goes on.
-TURN_STAGES := turn turn-2 turn-3 turn-4 turn-5 turn-6
-# Then each of these runs is the mean of several seeds.
-TURN_SEEDS := turn-7:31,32,33 turn-8:51,52,53
+# DATA holds the folders meshes, panoramas and held of what relight/cli/weights/README.md names; a run that was stopped goes on.
 RUNS ?= $(CURDIR)/$(TARGET)/train-turn
 
-train-turn: setup-train ## Train the network of relight turn, all of its runs, from the folder DATA into RUNS
+train-turn: setup-train ## Train the network of relight turn from the folder DATA into RUNS
 	@[[ -d "$(DATA)/panoramas" ]] || { echo "say where the data is: make train-turn DATA=FOLDER"; exit 1; }
 	cargo build --locked --release -p relight --features train
-	@program="$$(realpath $(TARGET)/release/relight)"; begin=(); mkdir -p "$(RUNS)"; runs="$$(realpath "$(RUNS)")"; \
-	cd "$(DATA)"; \
-	run() { \
-	    "$$program" train turn --settings "$$1" "$${begin[@]}" --views "$$runs/views" --resume -o "$$2"; \
-	}; \
-	for stage in $(TURN_STAGES); do \
-	    run "$(CURDIR)/relight/cli/weights/$$stage.toml" "$$runs/$$stage" || exit; \
-	    begin=(--weights "$$runs/$$stage/turn-net.safetensors"); \
-	done; \
-	for stage in $(TURN_SEEDS); do \
-	    name="$${stage%%:*}"; seeds=(); \
-	    for seed in $$(tr , ' ' <<< "$${stage#*:}"); do \
-	        sed "s/^seed = .*/seed = $$seed/" "$(CURDIR)/relight/cli/weights/$$name.toml" > "$$runs/$$name-$$seed.toml"; \
-	        run "$$runs/$$name-$$seed.toml" "$$runs/$$name-$$seed" || exit; \
-	        seeds+=("$$runs/$$name-$$seed/turn-net.safetensors"); \
-	    done; \
-	    "$$program" weights export "$${seeds[@]}" --net turn-net --half -o "$$runs/$$name.safetensors" || exit; \
-	    begin=(--weights "$$runs/$$name.safetensors"); \
-	done
+	@program="$$(realpath $(TARGET)/release/relight)"; mkdir -p "$(RUNS)"; runs="$$(realpath "$(RUNS)")"; cd "$(DATA)"; \
+	"$$program" train turn --settings "$(CURDIR)/relight/cli/weights/turn.toml" --resume -o "$$runs"
 
 # Cargo builds the programs before it runs the first test: those of the package relit-tests run several.
 test: setup ## Run all tests; those of training where libtorch is installed
@@ -150,7 +129,7 @@ release: packages wheel image static ## Make all that a release has: packages, w
 
 lint: setup ## Check formatting, lints and documentation
 	cargo fmt --all --check
-	cargo run -q --locked -p relit-house
+	cargo run -q --locked -p relit-tests --bin relit-house
 	cargo clippy --locked --workspace --all-targets $(EXTRAS),relit-extract/object-store,relit-fuzz/fuzzer \
 	    $$(.ci/setup-train --features) -- -D warnings
 	cargo clippy --locked -p relight -- -D warnings

@@ -28,7 +28,7 @@ use relit_rig::capture::{End, Recorder, RecordingPlan, Window, salvage, salvage_
 use relit_rig::clock::Clock;
 use relit_rig::preview::Preview;
 use relit_rig::state::{Monitor, TakeSummary, Verdict};
-use relit_test_support::{ffmpeg, packets};
+use relit_tests::{ffmpeg, packets};
 use relit_video::{PixelFormat, StreamFormat, Video};
 
 /// What the camera of a test does next.

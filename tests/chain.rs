@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Output};
 
-use relit_test_support::trials;
+use relit_tests::trials;
 
 /// The session that is trained on, and the one that judges.
 const TAUGHT: &str = "20261120T101500Z-cow-short";

@@ -3,7 +3,7 @@
 use std::fs;
 
 use relit_data::shard::Dataset;
-use relit_test_support::editor_canvas::EditorCanvas;
+use relit_tests::editor_canvas::EditorCanvas;
 use serde_json::Value;
 
 use crate::phone::Phone;

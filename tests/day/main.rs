@@ -16,9 +16,9 @@ mod trouble;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use relit_test_support::chromium;
-use relit_test_support::trials;
-use relit_test_support::trials::trial;
+use relit_tests::chromium;
+use relit_tests::trials;
+use relit_tests::trials::trial;
 
 use day::Day;
 use phone::Phone;

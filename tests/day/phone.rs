@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 use std::{env, fs};
 
-use relit_test_support::chromium::Chromium;
+use relit_tests::chromium::Chromium;
 use serde_json::Value;
 
 /// Pixels of the screen, and the variable that gives others, as in 844x390.

@@ -1,5 +1,5 @@
 //! What the tests of several crates share: making videos with the `ffmpeg` program, which `make setup`
-//! installs, a browser, and tests that say when they did not run.
+//! installs, a browser, the toolkit's own programs, and tests that say when they did not run.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -9,11 +9,14 @@
 
 pub mod chromium;
 pub mod editor_canvas;
+mod programs;
 pub mod trials;
 
 use std::io::Write;
 use std::path::Path;
 use std::process::Command;
+
+pub use programs::{beside_this_test, program};
 
 /// Runs `ffmpeg` in `folder` with these arguments and returns what it wrote to standard output.
 ///

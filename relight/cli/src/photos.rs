@@ -3,17 +3,17 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use relight_core::files::OutputKind;
 use relight_core::image::Depth;
 use relight_nets::Weights;
-use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer};
+use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, SpecularGate};
 use relight_photo::files::UnusedFile;
 use relit_console::Console;
 use serde_json::json;
 
 use crate::shipped;
-use crate::values::GateName;
+use crate::values::{Choices, GATES, one_of};
 
 /// How photographs are decomposed.
 #[derive(Args)]
@@ -22,8 +22,8 @@ pub(crate) struct NetworkArguments {
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Separate highlights.
-    #[arg(long, value_enum, default_value_t = GateName::Auto)]
-    specular: GateName,
+    #[arg(long, default_value = "auto", value_parser = one_of(GATES))]
+    specular: SpecularGate,
 }
 
 /// The network and how it is used.
@@ -39,7 +39,7 @@ impl NetworkArguments {
             Some(path) => Decomposer::new(&Weights::read(path)?)?,
         };
         let options = DecomposeOptions {
-            specular: self.specular.into(),
+            specular: self.specular,
             ..DecomposeOptions::default()
         };
         Ok(Network {
@@ -50,34 +50,20 @@ impl NetworkArguments {
 }
 
 /// Bits of a PNG.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum Bits {
-    #[value(name = "8")]
-    Eight,
-    #[value(name = "16")]
-    Sixteen,
-}
+pub(crate) const BITS: Choices<Depth> = &[
+    ("8", "Values to 255", Depth::Eight),
+    ("16", "Values to 65535", Depth::Sixteen),
+];
 
-impl Bits {
-    /// What is wrong with so many bits in a file of this name, if anything is.
-    pub(crate) fn fault(self, output: &Path) -> Option<String> {
-        let is_jpeg = OutputKind::of(output) == Some(OutputKind::Jpeg);
-        (is_jpeg && matches!(self, Self::Sixteen)).then(|| {
-            format!(
-                "--output {}: a JPEG has 8 bits; give .png for --bits 16",
-                output.display()
-            )
-        })
-    }
-}
-
-impl From<Bits> for Depth {
-    fn from(bits: Bits) -> Self {
-        match bits {
-            Bits::Eight => Self::Eight,
-            Bits::Sixteen => Self::Sixteen,
-        }
-    }
+/// What is wrong with so many bits in a file of this name, if anything is.
+pub(crate) fn bits_fault(bits: Depth, output: &Path) -> Option<String> {
+    let is_jpeg = OutputKind::of(output) == Some(OutputKind::Jpeg);
+    (is_jpeg && matches!(bits, Depth::Sixteen)).then(|| {
+        format!(
+            "--output {}: a JPEG has 8 bits; give .png for --bits 16",
+            output.display()
+        )
+    })
 }
 
 /// Names the files of folders that are not used.

@@ -1,104 +1,88 @@
 //! Values of options that several verbs take.
 
-use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
+use relight_core::render::DiffuseForm;
 use relight_photo::decompose::SpecularGate;
 use relight_photo::insert::WhiteBalance;
-use relight_turn::RotationDirection;
+use relit_data::rig::RotationDirection;
+
+/// Values of an option: the name on the command line, what the help says of it, and what it stands for.
+pub(crate) type Choices<T> = &'static [(&'static str, &'static str, T)];
 
 /// How integers in files of colour are encoded.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum TransferName {
-    /// The transfer function of sRGB.
-    Srgb,
-    /// The power 1 / 2.2.
-    Gamma22,
-    /// In proportion to light.
-    Linear,
-}
-
-impl From<TransferName> for Transfer {
-    fn from(name: TransferName) -> Self {
-        match name {
-            TransferName::Srgb => Self::Srgb,
-            TransferName::Gamma22 => Self::Gamma22,
-            TransferName::Linear => Self::Linear,
-        }
-    }
-}
+pub(crate) const TRANSFERS: Choices<Transfer> = &[
+    ("srgb", "The transfer function of sRGB", Transfer::Srgb),
+    ("gamma22", "The power 1 / 2.2", Transfer::Gamma22),
+    ("linear", "In proportion to light", Transfer::Linear),
+];
 
 /// Which way y points in maps of normals.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum YName {
-    /// As relight writes them.
-    Up,
-    /// As in the paper's figures and released code and data.
-    Down,
-}
-
-impl From<YName> for NormalsFrame {
-    fn from(name: YName) -> Self {
-        match name {
-            YName::Up => Self::YUp,
-            YName::Down => Self::YDown,
-        }
-    }
-}
+pub(crate) const NORMALS_Y: Choices<NormalsFrame> = &[
+    ("up", "As relight writes them", NormalsFrame::YUp),
+    (
+        "down",
+        "As in the paper's figures and released code and data",
+        NormalsFrame::YDown,
+    ),
+];
 
 /// How the colour of new light is shown.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum WhiteName {
-    /// As the light has it.
-    Light,
-    /// As by a camera that is balanced for it: white is as grey as in the picture around.
-    Auto,
-}
-
-impl From<WhiteName> for WhiteBalance {
-    fn from(name: WhiteName) -> Self {
-        match name {
-            WhiteName::Light => Self::Light,
-            WhiteName::Auto => Self::Auto,
-        }
-    }
-}
+pub(crate) const WHITE_BALANCES: Choices<WhiteBalance> = &[
+    ("light", "As the light has it", WhiteBalance::Light),
+    (
+        "auto",
+        "As by a camera that is balanced for it: white is as grey as in the picture around",
+        WhiteBalance::Auto,
+    ),
+];
 
 /// Whether highlights are separated.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum GateName {
-    /// Where more than 5 % of the object's pixels are saturated.
-    Auto,
-    /// Always.
-    On,
-    /// Never.
-    Off,
+pub(crate) const GATES: Choices<SpecularGate> = &[
+    (
+        "auto",
+        "Where more than 5 % of the object's pixels are saturated",
+        SpecularGate::Auto,
+    ),
+    ("on", "Always", SpecularGate::On),
+    ("off", "Never", SpecularGate::Off),
+];
+
+/// How shading follows from coefficients of light.
+pub(crate) const DIFFUSE_FORMS: Choices<DiffuseForm> = &[
+    (
+        "irradiance",
+        "The light that arrives at the surface",
+        DiffuseForm::Irradiance,
+    ),
+    (
+        "released",
+        "As the paper's released code has it: |L00| and 0.1 more",
+        DiffuseForm::Released,
+    ),
+];
+
+/// The parser of an option that takes one of these values; the help lists them.
+pub(crate) fn one_of<T: Copy + Send + Sync>(
+    choices: Choices<T>,
+) -> impl TypedValueParser<Value = T> {
+    let names = choices
+        .iter()
+        .map(|&(name, help, _)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(names).try_map(move |given| {
+        let found = choices.iter().find(|(name, ..)| *name == given);
+        found
+            .map(|&(.., value)| value)
+            .ok_or("it is none of the possible values")
+    })
 }
 
-impl From<GateName> for SpecularGate {
-    fn from(name: GateName) -> Self {
-        match name {
-            GateName::Auto => Self::Auto,
-            GateName::On => Self::On,
-            GateName::Off => Self::Off,
-        }
-    }
-}
-
-/// Which way a table turns as its angle grows, seen from above.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum DirectionName {
-    /// The background moves to the right.
-    CounterClockwise,
-    /// The background moves to the left.
-    Clockwise,
-}
-
-impl From<DirectionName> for RotationDirection {
-    fn from(name: DirectionName) -> Self {
-        match name {
-            DirectionName::CounterClockwise => Self::CounterClockwise,
-            DirectionName::Clockwise => Self::Clockwise,
-        }
-    }
+/// Which way a table turns as its angle grows, seen from above; the help lists both.
+pub(crate) fn rotation() -> impl TypedValueParser<Value = RotationDirection> {
+    let all = RotationDirection::ALL;
+    PossibleValuesParser::new(all.map(RotationDirection::name)).map(move |name| {
+        let is_it = |direction: &RotationDirection| direction.name() == name;
+        all.into_iter().find(is_it).unwrap_or_default()
+    })
 }

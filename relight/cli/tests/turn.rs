@@ -12,18 +12,15 @@ use std::process::{Command, Output};
 
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Linear, Planes, Rgb, Transfer};
-use relight_core::light::NormalsFrame;
 use relight_core::light::{Normals, Order, ShLight, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::render::Surface;
-use relight_nets::{NetError, Weights, decomposer};
-use relight_reader::{TruthLayout, TruthSet};
 use relight_synth::{
     Folders, FrameTruth, Library, LightKind, Recipe, TurnDescription, TurnRecipe, write_turns,
 };
 use relight_turn::{
-    Elevation, MaterialKind, NormalsSource, TableFrame, TableRotation, TurnError, TurnOptions,
-    fit_turn_light, prior_normals, read_curves, solve_turn,
+    Elevation, MaterialKind, TableFrame, TableRotation, TurnError, fit_turn_light, read_curves,
+    solve_in_light,
 };
 
 /// The light of this seed is positive on every normal: of others the shading is cut off at 0, which no light of order 2 does.
@@ -78,6 +75,19 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
+/// The figures of a run that ended well, but for what it doubts.
+fn figures_of(run: &Output) -> serde_json::Value {
+    assert!(
+        matches!(run.status.code(), Some(0 | 3)),
+        "{}",
+        text(&run.stderr)
+    );
+    let line = text(&run.stdout).lines().next().unwrap().to_owned();
+    let mut event: serde_json::Value = serde_json::from_str(&line).unwrap();
+    assert_eq!(event["event"], "turned");
+    event["figures"].take()
+}
+
 #[test]
 fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     let folder = tempfile::tempdir().unwrap();
@@ -87,12 +97,8 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     let read = read_curves(&shard, TableRotation::default(), &|_, _| {}).unwrap();
     assert_eq!((read.curves.frames(), read.damage.len()), (60, 0));
     assert!(read.has_angles);
-    let options = TurnOptions {
-        elevation: Elevation::given(degrees).unwrap(),
-        light: Some(light.clone()),
-        ..TurnOptions::default()
-    };
-    let found = solve_turn(&read.curves, &options).unwrap();
+    let elevation = Elevation::given(degrees).unwrap();
+    let found = solve_in_light(&read.curves, &light, elevation, None);
     let mask: Vec<bool> = read.mask.plane(0).iter().map(|&m| m >= 0.5).collect();
     let normals = found.normals(&read.curves);
     let error = angular_error(
@@ -110,7 +116,7 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     let own = Comparison::new(surface.extent(), &truth.planes(), &black.planes(), &mask).unwrap();
     let relative = (pair.mse(ScaleFit::None) / own.mse(ScaleFit::None)).sqrt();
     assert!(relative < 0.01, "{relative}");
-    let frame = TableFrame::new(Elevation::given(degrees).unwrap());
+    let frame = TableFrame::new(elevation);
     let solved = fit_turn_light(&read.curves, &surface, MaterialKind::Diffuse, &frame).unwrap();
     let size = |light: &[[f64; 3]]| light.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
     let difference: Vec<[f64; 3]> = solved
@@ -127,35 +133,26 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
 #[test]
 fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
-    let (shard, truth_folder) = turn(folder.path(), 24);
+    let (shard, _) = turn(folder.path(), 24);
     let out = folder.path().join("solved");
-    let normals = truth_folder.join("normal.png");
     let arguments = [
         "turn",
         shard.to_str().unwrap(),
-        "--normals",
-        normals.to_str().unwrap(),
         "--no-video",
         "--json",
         "-o",
         out.to_str().unwrap(),
     ];
     let object = out.join("object.relit");
-    let labels = folder.path().join("labels");
     let mut more = arguments.to_vec();
     more.extend(["--asset", object.to_str().unwrap()]);
-    more.extend(["--labels", labels.to_str().unwrap()]);
     // The third run finds the object of the second among its results.
     for arguments in [&arguments[..], &more, &more] {
-        let run = relight(arguments);
-        assert!(run.status.success(), "{}", text(&run.stderr));
-        assert!(text(&run.stderr).contains("elevation is not known"));
-        let event: serde_json::Value =
-            serde_json::from_str(text(&run.stdout).lines().next().unwrap()).unwrap();
-        assert_eq!(event["event"], "turned");
-        assert_eq!(event["figures"]["elevation"]["source"], "assumed");
-        assert_eq!(event["figures"]["rotation"]["source"], "assumed");
-        assert!(event["figures"]["ambiguity"].is_null());
+        let figures = figures_of(&relight(arguments));
+        assert_eq!(figures["elevation"]["source"], "assumed");
+        assert_eq!(figures["rotation"]["direction"], "counter-clockwise");
+        assert_eq!(figures["conditioning"]["coverage_deg"], 360.0);
+        assert!(figures["light_source"].is_null());
     }
     let taken_for = |name: &str| {
         let mut other = arguments.to_vec();
@@ -187,13 +184,6 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
     );
     let asset = CapturedObject::read(&object).unwrap();
     assert!(!asset.surface().normals().is_empty());
-    assert_eq!(
-        TruthSet::open(&labels, TruthLayout::Synth)
-            .unwrap()
-            .names()
-            .len(),
-        12
-    );
     let mut names: Vec<String> = fs::read_dir(&out)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
@@ -203,7 +193,6 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
         "albedo.png",
         "confidence.png",
         "contact.png",
-        "highlight.png",
         "light.json",
         "light.txt",
         "mask.png",
@@ -232,7 +221,7 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
     fs::create_dir(&foreign).unwrap();
     fs::write(foreign.join("thesis.tex"), "").unwrap();
     let mut other = arguments;
-    other[7] = foreign.to_str().unwrap();
+    other[5] = foreign.to_str().unwrap();
     let run = relight(&other);
     assert_eq!(run.status.code(), Some(1));
     assert!(text(&run.stderr).contains("which is no result of a turn"));
@@ -240,14 +229,14 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
 }
 
 #[test]
-fn an_even_light_makes_no_labels_but_all_else() {
+fn an_even_given_light_is_doubted_and_all_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let (shard, _) = turn(folder.path(), 24);
     let light = folder.path().join("even.txt");
     let mut even = ShLight::even(Order::TWO, [1.0; 3]);
     even.coefficients_mut()[1] = [0.02; 3];
     even.write(&light).unwrap();
-    let (out, labels) = (folder.path().join("solved"), folder.path().join("labels"));
+    let out = folder.path().join("solved");
     let run = relight(&[
         "turn",
         shard.to_str().unwrap(),
@@ -255,31 +244,47 @@ fn an_even_light_makes_no_labels_but_all_else() {
         "20",
         "--light",
         light.to_str().unwrap(),
-        "--labels",
-        labels.to_str().unwrap(),
         "--no-video",
         "--json",
         "-o",
         out.to_str().unwrap(),
     ]);
     assert_eq!(run.status.code(), Some(3), "{}", text(&run.stderr));
-    let said: Vec<serde_json::Value> = text(&run.stdout)
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
-    assert_eq!(
-        said[0]["figures"]["conditioning"]["verdict"], "too_even",
-        "{said:?}"
-    );
-    for sentence in ["the environment light is too even", "no labels are written"] {
-        let has = |line: &serde_json::Value| {
-            let message = line["message"].as_str();
-            line["event"] == "warning" && message.is_some_and(|said| said.starts_with(sentence))
-        };
-        assert_eq!(said.iter().filter(|line| has(line)).count(), 1, "{said:?}");
-    }
+    assert_eq!(figures_of(&run)["conditioning"]["verdict"], "too_even");
     assert!(out.join("normal.png").is_file());
-    assert!(!labels.exists());
+}
+
+#[test]
+fn what_the_data_set_knows_of_the_rig_is_taken_unless_an_option_says_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    let (shard, _) = turn(folder.path(), 24);
+    let description = folder.path().join("dataset.json");
+    let json = fs::read(&description).unwrap();
+    let mut dataset: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    dataset["sessions"][0]["rig"] =
+        serde_json::json!({ "rotation": "clockwise", "camera_elevation_deg": 25.5 });
+    fs::write(&description, dataset.to_string()).unwrap();
+    let out = folder.path().join("solved");
+    let solve = |options: &[&str]| {
+        let (shard, out) = (shard.to_str().unwrap(), out.to_str().unwrap());
+        let arguments = ["turn", shard, "--no-video", "--json", "-o", out];
+        let figures = figures_of(&relight(&[&arguments[..], options].concat()));
+        let of = |name: &str, value: &str| {
+            (
+                figures[name][value].clone(),
+                figures[name]["source"].clone(),
+            )
+        };
+        (of("elevation", "degrees"), of("rotation", "direction"))
+    };
+    let said = |value: serde_json::Value, source: &str| (value, serde_json::json!(source));
+    let (elevation, rotation) = solve(&[]);
+    assert_eq!(elevation, said(25.5.into(), "rig"));
+    assert_eq!(rotation, said("clockwise".into(), "rig"));
+    let options = ["--elevation", "20", "--rotation", "counter-clockwise"];
+    let (elevation, rotation) = solve(&options);
+    assert_eq!(elevation, said(20.0.into(), "given"));
+    assert_eq!(rotation, said("counter-clockwise".into(), "given"));
 }
 
 #[test]
@@ -292,14 +297,6 @@ fn places_that_cannot_be_written_are_told_before_the_work() {
     // The shard is not there: were it read first, this would be what is told.
     let (shard, out) = (path("missing.tar"), path("solved"));
     for (option, place, says) in [
-        ("--labels", "thesis", "thesis.tex, which is no result"),
-        ("--labels", "file/labels", "cannot be the folder"),
-        (
-            "--labels",
-            "solved/labels",
-            "neither in that of the results",
-        ),
-        ("--labels", ".", "neither in that of the results"),
         ("--asset", "nowhere/a.relit", "cannot be written"),
         ("--asset", "file/a.relit", "cannot be written"),
         ("--asset", "solved/a.relit", "is called object.relit"),
@@ -335,18 +332,15 @@ fn places_that_cannot_be_written_are_told_before_the_work() {
 #[test]
 fn a_damaged_frame_is_named_and_the_rest_is_solved() {
     let folder = tempfile::tempdir().unwrap();
-    let (shard, truth_folder) = turn(folder.path(), 24);
+    let (shard, _) = turn(folder.path(), 24);
     let mut bytes = fs::read(&shard).unwrap();
     let png = bytes.windows(4).position(|four| four == b"IDAT").unwrap();
     bytes[png + 20..png + 60].fill(0);
     fs::write(&shard, &bytes).unwrap();
     let out = folder.path().join("solved");
-    let normals = truth_folder.join("normal.png");
     let run = relight(&[
         "turn",
         shard.to_str().unwrap(),
-        "--normals",
-        normals.to_str().unwrap(),
         "--elevation",
         "20",
         "--no-video",
@@ -367,19 +361,10 @@ fn wrong_usage_and_several_turns_are_refused() {
     let run = relight(&["turn", "a.tar", "--elevation", "95", "-o", "out"]);
     assert_eq!(run.status.code(), Some(2));
     assert!(text(&run.stderr).contains("0 to 89 degrees"));
-    let run = relight(&["turn", "a.tar", "--rim", "100,200", "-o", "out"]);
+    let run = relight(&["turn", "a.tar", "--rotation", "left", "-o", "out"]);
     assert_eq!(run.status.code(), Some(2));
-    // The names of before are still taken: it is the shard that is missing.
-    for [direction, material] in [["--direction", "--material"], ["--sense", "--body"]] {
-        let options = [direction, "clockwise", material, "metal", "--no-video"];
-        let run = relight(&[&["turn", "missing.tar", "-o", "missing"], &options[..]].concat());
-        assert_eq!(run.status.code(), Some(1), "{}", text(&run.stderr));
-        assert!(
-            text(&run.stderr).contains("missing.tar"),
-            "{}",
-            text(&run.stderr)
-        );
-    }
+    let run = relight(&["turn", "a.tar", "--session", "mug", "-o", "out"]);
+    assert_eq!(run.status.code(), Some(2));
     let folder = tempfile::tempdir().unwrap();
     let photo = folder.path().join("photo.jpg");
     fs::write(&photo, [0xff; 2000]).unwrap();
@@ -398,27 +383,4 @@ fn wrong_usage_and_several_turns_are_refused() {
         matches!(error, TurnError::ManyTurns { found: 2, .. }),
         "{error}"
     );
-}
-
-fn untrained() -> Result<Weights, NetError> {
-    Ok(Weights::initial(&decomposer(), 1))
-}
-
-#[test]
-fn initial_normals_are_read_from_a_folder_of_maps() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("normal.png");
-    let sphere = Normals::sphere(16);
-    sphere
-        .write_png(&path, relight_core::image::Depth::Sixteen)
-        .unwrap();
-    let source = NormalsSource::of(folder.path());
-    assert_eq!(source, NormalsSource::Map(path));
-    let mask = Planes::filled(sphere.extent(), [1.0]);
-    let read = prior_normals(&source, untrained, NormalsFrame::YUp, &[], &mask).unwrap();
-    assert_eq!(read.extent(), sphere.extent());
-    let net = NormalsSource::of(Path::new("net.onnx"));
-    assert_eq!(net, NormalsSource::Onnx("net.onnx".into()));
-    let missing = NormalsSource::of(Path::new("missing.safetensors"));
-    assert!(prior_normals(&missing, untrained, NormalsFrame::YUp, &[], &mask).is_err());
 }

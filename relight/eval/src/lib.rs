@@ -45,9 +45,7 @@ pub use relighting::{
 pub use retinex::{IntrinsicImages, Retinex};
 pub use run::EvalProgress;
 pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
-pub use turns::{
-    AzimuthScore, TurnLine, TurnMethod, TurnNetworks, TurnScore, TurnSet, TurnTable, evaluate_turns,
-};
+pub use turns::{TurnLine, TurnMethod, TurnScore, TurnSet, TurnTable, evaluate_turns};
 
 /// The examples of the README, so that they are built.
 #[cfg(doctest)]

@@ -7,13 +7,12 @@ use relight_core::files::write_png;
 use relight_core::image::{ColourSpace, Depth, Linear, Planes, Rgb, Srgb, Transfer};
 use relight_core::light::{Normals, Rotation, ShLight, YUp};
 use relight_core::statistics::median;
-use relight_nets::Weights;
 use relight_synth::TurnDescription;
 use relight_turn::{
-    AzimuthSource, Elevation, MaterialKind, NormalsSource, ReadTurn, RotationDirection, TableFrame,
-    TableLight, TableRotation, TurnError, TurnNetwork, TurnOptions, TurnPrediction, TurnPrior,
-    TurnSolution, prior_albedo, prior_normals, read_curves, solve_turn,
+    Elevation, MaterialKind, SolvedTurn, TableFrame, TableRotation, TurnError, TurnLight,
+    TurnNetworks, TurnOptions, TurnVerdict, read_curves, solve_turn,
 };
+use relit_data::rig::RotationDirection;
 use relit_data::shard::Dataset;
 use serde::Serialize;
 
@@ -28,48 +27,24 @@ const AZIMUTHS_DEG: i32 = 90;
 /// How a turn is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TurnMethod {
-    /// From shapes inflated out of the outline.
-    Outline,
-    /// From what the network of photographs says of single frames.
-    Photo,
-    /// The network of turns alone.
-    Network,
-    /// From what the network of turns says.
-    NetworkThenSolver,
+    /// In a light that is not known: what the network of turns answers, and the light that goes with it.
+    UnknownLight,
     /// In its true light, with all bands that the solver knows of.
     KnownLight,
 }
 
 impl TurnMethod {
     /// All of them, in the table's order.
-    pub const ALL: [Self; 5] = [
-        Self::Outline,
-        Self::Photo,
-        Self::Network,
-        Self::NetworkThenSolver,
-        Self::KnownLight,
-    ];
+    pub const ALL: [Self; 2] = [Self::UnknownLight, Self::KnownLight];
 
     /// Its name in the table.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Outline => "outline",
-            Self::Photo => "network of photographs",
-            Self::Network => "network of turns alone",
-            Self::NetworkThenSolver => "network of turns",
+            Self::UnknownLight => "light unknown",
             Self::KnownLight => "light known",
         }
     }
-}
-
-/// The networks that methods start from.
-#[derive(Debug)]
-pub struct TurnNetworks {
-    /// The weights of the network of photographs.
-    pub photo: Weights,
-    /// The network of turns.
-    pub turn: TurnNetwork,
 }
 
 /// The errors of a turn by a method.
@@ -85,28 +60,19 @@ pub struct TurnScore {
     pub azimuth_deg: f64,
     /// That least mean error, degrees.
     pub unturned_deg: f64,
-    /// Squared error of the albedo over its energy, after one scale a channel; none of normals alone.
-    pub albedo: Option<f64>,
+    /// Squared error of the albedo over its energy, after one scale a channel.
+    pub albedo: f64,
     /// For the pixels that are expected to be off by at most 10, 20 and 30 degrees: how many there are, and how many
     /// of them are.
     pub kept: [[usize; 2]; 3],
     /// The pixels by what is expected of them, in steps of 5 degrees.
     pub reliability: Vec<ReliabilityBin>,
-    /// What the object is taken for; none of normals alone.
-    pub material: Option<MaterialKind>,
-    /// By how much each source of the light's azimuth is off, and all together.
-    pub azimuths: Vec<AzimuthScore>,
-}
-
-/// A source of the light's azimuth beside the truth.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct AzimuthScore {
-    /// Which; none for all together.
-    pub source: Option<AzimuthSource>,
-    /// By how much it is off, degrees.
-    pub off_deg: f64,
-    /// Its standard deviation as it is said, degrees.
-    pub uncertainty_deg: f64,
+    /// The median of what is expected of them, degrees.
+    pub expected_deg: f64,
+    /// What is to be thought of the turn.
+    pub verdict: TurnVerdict,
+    /// What the object is taken for.
+    pub material: MaterialKind,
 }
 
 /// A method on all turns.
@@ -137,7 +103,7 @@ pub struct TurnSet {
 
 /// A turn and its ground truth.
 struct TrueTurn {
-    turn: ReadTurn,
+    shard: PathBuf,
     normals: Normals<YUp>,
     albedo: Rgb<Linear>,
     elevation: Elevation,
@@ -189,13 +155,8 @@ impl TurnSet {
             serde_json::from_slice(bytes)
         })?;
         let [_, up, out] = description.axis;
-        let turn = read_curves(
-            shard,
-            TableRotation::given(RotationDirection::CounterClockwise),
-            &|_, _| {},
-        )?;
         Ok(TrueTurn {
-            turn,
+            shard: shard.clone(),
             normals: Normals::<YUp>::read(&truth.join("normal.png"))?,
             albedo: Rgb::<Linear>::read(&truth.join("albedo.png"), Transfer::Linear)?,
             elevation: Elevation::given(out.atan2(up).to_degrees()).map_err(TurnError::from)?,
@@ -209,8 +170,8 @@ impl TurnSet {
     /// # Errors
     /// Where a turn cannot be read or a file cannot be written.
     pub fn write_frames(&self, out: &Path) -> Result<(), EvalError> {
-        for (number, (id, _)) in self.turns.iter().enumerate() {
-            let turn = self.read(number)?.turn;
+        for (id, shard) in &self.turns {
+            let turn = read_curves(shard, TableRotation::default(), &|_, _| {})?;
             let folder = out.join(format!("{id}.data"));
             std::fs::create_dir_all(&folder).map_err(|source| EvalError::Write {
                 path: folder.clone(),
@@ -271,7 +232,7 @@ pub fn evaluate_turns(
     for number in 0..set.len() {
         let truth = set.read(number)?;
         for (line, &method) in lines.iter_mut().zip(methods) {
-            let answer = Answer::new(&truth, method, networks)?;
+            let answer = truth.solve(method, networks)?;
             line.turns
                 .push(score(&set.turns[number].0, &truth, &answer));
             progress();
@@ -283,123 +244,51 @@ pub fn evaluate_turns(
     })
 }
 
-/// What a method says of a turn.
-struct Answer {
-    normals: Normals<YUp>,
-    /// Degrees.
-    expected_errors: Planes<1>,
-    albedo: Option<Rgb<Linear>>,
-    material: Option<MaterialKind>,
-    azimuths: Vec<AzimuthScore>,
-}
-
-impl Answer {
-    fn new(
-        truth: &TrueTurn,
-        method: TurnMethod,
-        networks: &TurnNetworks,
-    ) -> Result<Self, EvalError> {
-        let turn = &truth.turn;
-        let predict = || networks.turn.predict(&turn.curves, truth.elevation);
-        let prior: Option<TurnPrior> = match method {
-            TurnMethod::Network => return Ok(Self::of_network(predict()?)),
-            TurnMethod::NetworkThenSolver => Some(predict()?.into()),
-            TurnMethod::Photo => {
-                let own = || Ok(networks.photo.clone());
-                let source = NormalsSource::Own;
-                let axes = relight_core::light::NormalsFrame::YUp;
-                Some(prior_normals(&source, own, axes, &turn.first, &turn.mask)?.into())
-            }
-            TurnMethod::Outline | TurnMethod::KnownLight => None,
-        };
-        let prior = match prior {
-            Some(prior) => {
-                let seen = prior_albedo(&networks.photo, &turn.first, &turn.mask)?;
-                Some(prior.with_albedo_of_photographs(seen, &turn.mask))
-            }
-            None => None,
-        };
+impl TrueTurn {
+    fn solve(&self, method: TurnMethod, networks: &TurnNetworks) -> Result<SolvedTurn, TurnError> {
         let options = TurnOptions {
-            elevation: truth.elevation,
-            light: (method == TurnMethod::KnownLight).then(|| truth.light.clone()),
-            prior,
-            ..TurnOptions::default()
-        };
-        let solution = solve_turn(&turn.curves, &options)?;
-        Ok(Self {
-            normals: solution.normals(&turn.curves),
-            expected_errors: solution.expected_errors(&turn.curves),
-            albedo: Some(solution.albedo(&turn.curves)),
-            material: Some(solution.material()),
-            azimuths: azimuths(&solution, truth),
-        })
-    }
-
-    fn of_network(found: TurnPrediction) -> Self {
-        Self {
-            normals: found.normals,
-            expected_errors: found.expected_errors,
-            albedo: Some(found.albedo),
+            rotation: Some(RotationDirection::CounterClockwise),
+            elevation: Some(self.elevation),
+            light: match method {
+                TurnMethod::UnknownLight => TurnLight::Unknown,
+                TurnMethod::KnownLight => TurnLight::Given(self.light.clone()),
+            },
             material: None,
-            azimuths: Vec::new(),
-        }
+        };
+        solve_turn(&self.shard, &options, networks, &|_, _| {})
     }
 }
 
-/// The sources of a solution's azimuth beside the bright side of the true light.
-fn azimuths(solution: &TurnSolution, truth: &TrueTurn) -> Vec<AzimuthScore> {
-    let right = TableLight::from_viewer(&truth.light, &TableFrame::new(truth.elevation));
-    let right = right.bright_azimuth_deg();
-    let Some(figures) = solution.azimuth() else {
-        return Vec::new();
-    };
-    let score = |source, azimuth_deg: f64, uncertainty_deg| AzimuthScore {
-        source,
-        off_deg: (azimuth_deg - right + 180.0).rem_euclid(360.0) - 180.0,
-        uncertainty_deg,
-    };
-    let all = score(None, figures.azimuth_deg, figures.uncertainty_deg);
-    let each = figures
-        .evidence
-        .iter()
-        .map(|one| score(Some(one.source), one.azimuth_deg, one.uncertainty_deg));
-    each.chain([all]).collect()
-}
-
-fn score(name: &str, truth: &TrueTurn, answer: &Answer) -> TurnScore {
-    let inside: Vec<usize> = (0..truth.turn.mask.extent().pixels())
-        .filter(|&at| truth.turn.mask.plane(0)[at] >= 0.5)
-        .filter(|&at| {
-            truth
-                .normals
-                .planes()
-                .planes()
-                .iter()
-                .any(|plane| plane[at] != 0.0)
-        })
+fn score(name: &str, truth: &TrueTurn, answer: &SolvedTurn) -> TurnScore {
+    let (curves, solution) = (&answer.turn.curves, &answer.solution);
+    let mask = &answer.turn.mask;
+    let true_normals = truth.normals.planes().planes();
+    let inside: Vec<usize> = (0..mask.extent().pixels())
+        .filter(|&at| mask.plane(0)[at] >= 0.5)
+        .filter(|&at| true_normals.iter().any(|plane| plane[at] != 0.0))
         .collect();
     let vectors = |normals: &Normals<YUp>| -> Vec<[f64; 3]> {
         let planes = normals.planes().planes();
         let at = |&at: &usize| planes.map(|plane| f64::from(plane[at]));
         inside.iter().map(at).collect()
     };
-    let (right, found) = (vectors(&truth.normals), vectors(&answer.normals));
+    let (right, found) = (vectors(&truth.normals), vectors(&solution.normals(curves)));
     let errors: Vec<f64> = right
         .iter()
         .zip(&found)
         .map(|(a, b)| angle_deg(*a, *b))
         .collect();
     let (azimuth_deg, unturned_deg) = best_azimuth(&right, &found, truth.elevation);
+    let expected = solution.expected_errors(curves);
+    let expected: Vec<f64> = (inside.iter())
+        .map(|&at| f64::from(expected.plane(0)[at]))
+        .collect();
+    let pairs = || expected.iter().copied().zip(errors.iter().copied());
     let kept = LIMITS_DEG.map(|limit| {
-        let expected = answer.expected_errors.plane(0);
-        let chosen = inside
-            .iter()
-            .zip(&errors)
-            .filter(|(at, _)| f64::from(expected[**at]) <= limit);
-        let (all, kept) = chosen.fold((0, 0), |(all, kept), (_, error)| {
-            (all + 1, kept + usize::from(*error <= limit))
-        });
-        [all, kept]
+        let chosen = pairs().filter(|(expected, _)| *expected <= limit);
+        chosen.fold([0, 0], |[all, kept], (_, error)| {
+            [all + 1, kept + usize::from(error <= limit)]
+        })
     });
     TurnScore {
         turn: name.to_owned(),
@@ -407,18 +296,12 @@ fn score(name: &str, truth: &TrueTurn, answer: &Answer) -> TurnScore {
         median_deg: median(errors.iter().copied()).unwrap_or(0.0),
         azimuth_deg,
         unturned_deg,
-        albedo: answer
-            .albedo
-            .as_ref()
-            .map(|albedo| albedo_error(&truth.albedo, albedo, &inside)),
+        albedo: albedo_error(&truth.albedo, &solution.albedo(curves), &inside),
         kept,
-        reliability: {
-            let expected = answer.expected_errors.plane(0);
-            let pixels = inside.iter().zip(&errors);
-            reliability(pixels.map(|(&at, &error)| (f64::from(expected[at]), error)))
-        },
-        material: answer.material,
-        azimuths: answer.azimuths.clone(),
+        reliability: reliability(pairs()),
+        expected_deg: solution.expected_error_deg(),
+        verdict: solution.conditioning().verdict,
+        material: solution.material(),
     }
 }
 
@@ -536,15 +419,10 @@ impl fmt::Display for TurnTable {
             let (median, median_error) = line.mean_of(|turn| turn.median_deg);
             let (azimuth, _) = line.mean_of(|turn| turn.azimuth_deg.abs());
             let (unturned, _) = line.mean_of(|turn| turn.unturned_deg);
-            let has_albedo = line.turns.iter().all(|turn| turn.albedo.is_some());
-            let albedo = if has_albedo {
-                format!("{:.3}", line.mean_of(|turn| turn.albedo.unwrap_or(0.0)).0)
-            } else {
-                "-".to_owned()
-            };
+            let (albedo, _) = line.mean_of(|turn| turn.albedo);
             write!(
                 f,
-                "{:24}  {:>12}  {:>12}  {azimuth:>7.1}  {unturned:>8.1}  {albedo:>6} ",
+                "{:24}  {:>12}  {:>12}  {azimuth:>7.1}  {unturned:>8.1}  {albedo:>6.3} ",
                 line.method,
                 format!("{mean:.1} ± {error:.1}"),
                 format!("{median:.1} ± {median_error:.1}"),

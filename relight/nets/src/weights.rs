@@ -170,44 +170,6 @@ impl Weights {
             .map(|(name, tensor)| (name.to_owned(), tensor.clone()))
             .collect()
     }
-
-    /// The mean of several weights of one network: what runs agree on that began with the same weights and learned from other
-    /// samples (Wortsman et al. 2022, *Model soups*). `None` of no weights, or where names or shapes differ.
-    #[must_use]
-    pub fn mean(all: &[Self]) -> Option<Self> {
-        let (first, others) = all.split_first()?;
-        let mut tensors = first.tensors.clone();
-        if others
-            .iter()
-            .any(|other| other.tensors.len() != tensors.len())
-        {
-            return None;
-        }
-        for (name, tensor) in &mut tensors {
-            let same = others.iter().map(|other| other.get(name));
-            let same = same.collect::<Option<Vec<_>>>()?;
-            if same.iter().any(|other| other.shape != tensor.shape) {
-                return None;
-            }
-            for (at, value) in tensor.values.iter_mut().enumerate() {
-                let sum = same.iter().map(|other| f64::from(other.values[at]));
-                *value = ((f64::from(*value) + sum.sum::<f64>()) / all.len() as f64) as f32;
-            }
-        }
-        Some(Self { tensors })
-    }
-
-    /// The same with those of a graph's parameters under `prefix` that are missing here as [`Self::initial`] has them: a
-    /// network that gets a head more.
-    #[must_use]
-    pub fn completed(mut self, graph: &Graph, prefix: &str, seed: u64) -> Self {
-        for (name, tensor) in Self::initial(graph, seed) {
-            if name.starts_with(prefix) {
-                self.tensors.entry(name).or_insert(tensor);
-            }
-        }
-        self
-    }
 }
 
 /// Normal numbers of mean 0 by Box and Muller's transform.
@@ -254,33 +216,6 @@ mod tests {
         let mean_square =
             middle.values().iter().map(|v| v * v).sum::<f32>() / middle.values().len() as f32;
         assert!((mean_square * (256.0 * 9.0) / 2.0 - 1.0).abs() < 0.02);
-    }
-
-    #[test]
-    fn the_mean_of_weights_is_that_of_each_number() {
-        let of = |name: &str, values: [f32; 2]| -> Weights {
-            let tensor = Tensor::new(vec![2], values.to_vec()).unwrap();
-            [(name.to_owned(), tensor)].into_iter().collect()
-        };
-        let (a, b) = (of("a", [1.0, -4.0]), of("a", [3.0, 0.0]));
-        assert_eq!(Weights::mean(&[a.clone(), b]), Some(of("a", [2.0, -2.0])));
-        assert_eq!(Weights::mean(std::slice::from_ref(&a)), Some(a.clone()));
-        assert_eq!(Weights::mean(&[a, of("b", [1.0, 2.0])]), None);
-        assert_eq!(Weights::mean(&[]), None);
-    }
-
-    #[test]
-    fn missing_parameters_are_filled_in_and_the_others_stay() {
-        let graph = normal_net();
-        let mut weights = Weights::initial(&graph, 7);
-        weights.tensors.remove("mid.0.weight");
-        let other = weights.clone().completed(&graph, "last.", 8);
-        assert!(other.fitted_to(&graph).is_err());
-        let completed = weights.clone().completed(&graph, "mid.0.", 8);
-        assert!(completed.fitted_to(&graph).is_ok());
-        assert_eq!(completed.get("mid.3.weight"), weights.get("mid.3.weight"));
-        let fresh = Weights::initial(&graph, 8);
-        assert_eq!(completed.get("mid.0.weight"), fresh.get("mid.0.weight"));
     }
 
     #[test]

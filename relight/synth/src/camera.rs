@@ -12,7 +12,7 @@ use relight_core::statistics::ranked;
 
 /// How a camera turns light into 8-bit values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CameraModel {
+pub(crate) struct CameraModel {
     /// By which all light is multiplied, white balance and exposure: after it, 1 is clipped.
     pub gain: Vec3,
     /// From light to values.
@@ -28,7 +28,7 @@ pub struct CameraModel {
 /// How a value, 0..=1, follows from light, 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Response {
+pub(crate) enum Response {
     /// The transfer function of sRGB.
     Srgb,
     /// The power `1 / gamma`.
@@ -40,8 +40,7 @@ pub enum Response {
 
 impl Response {
     /// The value for a light; both are clipped to 0..=1.
-    #[must_use]
-    pub fn encode(self, light: f32) -> f32 {
+    pub(crate) fn encode(self, light: f32) -> f32 {
         let light = light.clamp(0.0, 1.0);
         match self {
             Self::Srgb => Srgb::from_linear(light),
@@ -50,8 +49,7 @@ impl Response {
     }
 
     /// The light, 0..=1, for a value; both are clipped to 0..=1.
-    #[must_use]
-    pub fn decode(self, value: f32) -> f32 {
+    pub(crate) fn decode(self, value: f32) -> f32 {
         let value = value.clamp(0.0, 1.0);
         match self {
             Self::Srgb => Srgb::to_linear(value),
@@ -62,8 +60,7 @@ impl Response {
 
 impl CameraModel {
     /// Neither noise nor compression; sRGB.
-    #[must_use]
-    pub fn plain() -> Self {
+    pub(crate) fn plain() -> Self {
         Self {
             gain: Vec3::ONE,
             response: Response::Srgb,

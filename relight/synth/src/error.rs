@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use relit_data::{report, shard};
+use relit_data::shard;
 
 use relight_core::image::ImageError;
 use relight_core::light::{LightError, PanoramaError};
@@ -12,49 +12,27 @@ use relight_core::light::{LightError, PanoramaError};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SynthError {
-    /// A file or folder could not be read.
-    #[error("{path} could not be read")]
-    Read {
+    /// A file or folder could not be read or written.
+    #[error("{path} could not be {doing}")]
+    Io {
         /// The file or folder.
         path: PathBuf,
+        /// `read` or `written`.
+        doing: &'static str,
         /// The system's answer.
         source: io::Error,
     },
-    /// A file or folder could not be written.
-    #[error("{path} could not be written")]
-    Write {
+    /// A file or folder is not what it should be.
+    #[error("{path} {fault}")]
+    Unusable {
         /// The file or folder.
         path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
+        /// What is wrong with it, and what to do.
+        fault: String,
     },
-    /// A mesh is damaged, or not a surface.
-    #[error("the mesh {path} cannot be used: {reason}; mend it, or take it out of the folder")]
-    Mesh {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A file is no mesh, or one of another kind.
-    #[error("{path} is not a mesh of a kind that can be read: give .obj, .gltf or .glb")]
-    MeshKind {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A folder holds nothing of what it is for.
-    #[error("{path} holds no {what}: put files in it that end in .{}", extensions.join(", ."))]
-    Nothing {
-        /// The folder.
-        path: PathBuf,
-        /// What was looked for.
-        what: &'static str,
-        /// How such files end.
-        extensions: &'static [&'static str],
-    },
-    /// All panoramas are black.
-    #[error("all panoramas are black: give one with light")]
-    Dark,
+    /// What was given cannot be used.
+    #[error("{0}")]
+    Refused(String),
     /// A texture or an image cannot be read.
     #[error(transparent)]
     Image(#[from] ImageError),
@@ -64,57 +42,12 @@ pub enum SynthError {
     /// Numbers are no light.
     #[error(transparent)]
     Light(#[from] LightError),
-    /// A setting is out of range.
-    #[error("{name} is {value}: give {allowed}")]
-    Setting {
-        /// The setting.
-        name: &'static str,
-        /// What was given.
-        value: u64,
-        /// What is allowed.
-        allowed: &'static str,
-    },
     /// A picture could not be encoded.
     #[error("a picture could not be encoded as PNG")]
     Png(#[from] png::EncodingError),
-    /// The folder was made with other settings.
-    #[error(
-        "{path} holds samples that were made with other settings: give the same ones, or another folder"
-    )]
-    OtherSettings {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// The folder holds something else.
-    #[error(
-        "{path} is not empty and has no {file}: give an empty folder, or one of `relight synth`"
-    )]
-    Foreign {
-        /// The folder.
-        path: PathBuf,
-        /// The description that is missing.
-        file: &'static str,
-    },
-    /// Another process writes into the folder.
-    #[error("another process writes into {path}: wait until it ends, or give another folder")]
-    Locked {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// The description of a folder is damaged.
-    #[error("{path} is damaged")]
-    Description {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
     /// A shard could not be written.
     #[error(transparent)]
     Shard(#[from] shard::ShardError),
-    /// The page of a turn could not be made.
-    #[error(transparent)]
-    Report(#[from] report::ReportError),
     /// An image and its mask differ in size.
     #[error(transparent)]
     Size(#[from] relit_data::image_stats::SizeMismatch),
@@ -123,13 +56,44 @@ pub enum SynthError {
 impl SynthError {
     /// For `map_err` on what reads `path`.
     pub(super) fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
-        let path = path.to_owned();
-        move |source| Self::Read { path, source }
+        Self::io(path, "read")
     }
 
     /// For `map_err` on what writes `path`.
     pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        Self::io(path, "written")
+    }
+
+    fn io(path: &Path, doing: &'static str) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
-        move |source| Self::Write { path, source }
+        move |source| Self::Io {
+            path,
+            doing,
+            source,
+        }
+    }
+
+    /// That a file or folder is not what it should be.
+    pub(super) fn unusable(path: &Path, fault: impl Into<String>) -> Self {
+        Self::Unusable {
+            path: path.to_owned(),
+            fault: fault.into(),
+        }
+    }
+
+    /// For `map_err` on what reads a mesh.
+    pub(super) fn mesh(path: &Path) -> impl FnOnce(String) -> Self {
+        move |reason| {
+            let fault = format!(
+                "is a mesh that cannot be used: {reason}; mend it, or take it out of the folder"
+            );
+            Self::unusable(path, fault)
+        }
+    }
+
+    /// That a folder was made otherwise.
+    pub(super) fn other_settings(path: &Path) -> Self {
+        let fault = "holds samples that were made with other settings: give the same ones, or another folder";
+        Self::unusable(path, fault)
     }
 }

@@ -24,7 +24,7 @@ const ROUGHEST: f32 = 0.9;
 
 /// Paint, relief and gloss.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Finish {
+pub(crate) struct Finish {
     /// Its albedo.
     pub paint: Paint,
     /// Its relief.
@@ -34,22 +34,21 @@ pub struct Finish {
 }
 
 impl Finish {
-    /// A random finish for what a buffer shows; it is glossy with the probability `glossy`, and
-    /// painted as `albedo` says, where that says anything. Half of the objects that come with a look of their own keep it,
-    /// with the gloss of that.
+    /// A random finish for what a buffer shows; it is glossy with the probability `glossy`. Half of the objects that come
+    /// with a look of their own keep it, with the gloss of that; with `own` all do.
     pub(super) fn draw(
         random: &mut Random,
         buffer: &GBuffer,
         library: &Library,
         glossy: f32,
-        albedo: Option<AlbedoKind>,
+        own: bool,
     ) -> Self {
-        if let Some(own) = buffer.own_surface()
-            && (albedo == Some(AlbedoKind::Own) || (albedo.is_none() && random.chance(OWN)))
+        if let Some(surface) = buffer.own_surface()
+            && (own || random.chance(OWN))
         {
-            return Self::own(own);
+            return Self::own(surface);
         }
-        Self::painted(random, buffer, library, glossy, albedo)
+        Self::painted(random, buffer, library, glossy)
     }
 
     /// The same for an object whose own look, if it has one, is painted over.
@@ -58,10 +57,9 @@ impl Finish {
         buffer: &GBuffer,
         library: &Library,
         glossy: f32,
-        albedo: Option<AlbedoKind>,
     ) -> Self {
         let pictures = library.pictures.len();
-        let paint = Paint::draw(random, buffer.object_points(), pictures, albedo);
+        let paint = Paint::draw(random, &buffer.object_points, pictures);
         let relief = random.chance(RELIEF).then(|| Relief::draw(random));
         let gloss = random
             .chance(glossy)
@@ -84,19 +82,20 @@ impl Finish {
     }
 
     /// The finish on what a buffer shows.
-    #[must_use]
-    pub fn apply(&self, buffer: &GBuffer, library: &Library) -> Material {
+    pub(crate) fn apply(&self, buffer: &GBuffer, library: &Library) -> Material {
         let normals = match &self.relief {
             Some(relief) => relief.apply(buffer),
-            None => buffer.normals().to_vec(),
+            None => buffer.normals.clone(),
         };
         let own = buffer.own_surface();
         let own = own.filter(|_| self.paint.kind == AlbedoKind::Own);
         let albedo = match own {
             Some(own) => own.iter().map(|at| possible(own_albedo(at))).collect(),
-            None => self
-                .paint
-                .apply(buffer.object_points(), buffer.texture(), &library.pictures),
+            None => self.paint.apply(
+                &buffer.object_points,
+                buffer.texture.as_deref(),
+                &library.pictures,
+            ),
         };
         Material {
             albedo,

@@ -103,13 +103,11 @@ impl SampleFolder {
         fs::create_dir_all(path).map_err(SynthError::write(path))?;
         let handle = File::open(path).map_err(SynthError::read(path))?;
         handle.try_lock().map_err(|reason| match reason {
-            TryLockError::WouldBlock => SynthError::Locked {
-                path: path.to_owned(),
-            },
-            TryLockError::Error(source) => SynthError::Write {
-                path: path.to_owned(),
-                source,
-            },
+            TryLockError::WouldBlock => SynthError::unusable(
+                path,
+                "is written by another process: wait until it ends, or give another folder",
+            ),
+            TryLockError::Error(source) => SynthError::write(path)(source),
         })?;
         describe(path, origin)?;
         clear_leftovers(path)?;
@@ -160,7 +158,7 @@ impl SampleFolder {
             .join(format!(".{number:06}.{}.partial", process::id()));
         let write = || -> Result<(), SynthError> {
             fs::create_dir(&partial).map_err(SynthError::write(&partial))?;
-            for (name, bytes) in &files.0 {
+            for (name, bytes) in &files {
                 let path = partial.join(name);
                 fs::write(&path, bytes).map_err(SynthError::write(&path))?;
             }
@@ -187,32 +185,26 @@ pub(super) fn holds_samples(folder: &Path) -> bool {
 fn describe(folder: &Path, origin: &Origin) -> Result<(), SynthError> {
     let path = folder.join(FILE);
     let there = match fs::read(&path) {
-        Ok(bytes) => {
-            serde_json::from_slice::<Origin>(&bytes).map_err(|source| SynthError::Description {
-                path: path.clone(),
-                source,
-            })?
-        }
+        Ok(bytes) => serde_json::from_slice::<Origin>(&bytes)
+            .map_err(|fault| SynthError::unusable(&path, format!("is damaged: {fault}")))?,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let mut entries = fs::read_dir(folder).map_err(SynthError::read(folder))?;
             if entries.next().is_some() {
-                return Err(SynthError::Foreign {
-                    path: folder.to_owned(),
-                    file: FILE,
-                });
+                let fault = format!(
+                    "is not empty and has no {FILE}: give an empty folder, or one of `relight synth`"
+                );
+                return Err(SynthError::unusable(folder, fault));
             }
             let mut bytes = serde_json::to_vec_pretty(origin).unwrap_or_default();
             bytes.push(b'\n');
             return write_whole(&path, &bytes).map_err(SynthError::write(&path));
         }
-        Err(source) => return Err(SynthError::Read { path, source }),
+        Err(source) => return Err(SynthError::read(&path)(source)),
     };
     if there == *origin {
         Ok(())
     } else {
-        Err(SynthError::OtherSettings {
-            path: folder.to_owned(),
-        })
+        Err(SynthError::other_settings(folder))
     }
 }
 
@@ -353,7 +345,7 @@ mod tests {
         fs::write(folder.path().join("thesis.tex"), "").unwrap();
         let library = library();
         let error = write_samples(&recipe(), &library, 1, folder.path(), &|| {}).unwrap_err();
-        assert!(matches!(error, SynthError::Foreign { .. }), "{error}");
+        assert!(error.to_string().contains("is not empty"), "{error}");
         let folder = tempfile::tempdir().unwrap();
         write_samples(&recipe(), &library, 1, folder.path(), &|| {}).unwrap();
         let other = Recipe {
@@ -361,7 +353,7 @@ mod tests {
             ..recipe()
         };
         let error = write_samples(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
-        assert!(matches!(error, SynthError::OtherSettings { .. }), "{error}");
+        assert!(error.to_string().contains("other settings"), "{error}");
     }
 
     #[test]

@@ -9,7 +9,7 @@
 //! | `studio` | panoramas out of nothing but a seed |
 //! | `camera` | from light to 8-bit values |
 //! | `library`, `recipe` | what there is to draw from, and what is drawn |
-//! | `sample`, `folder`, `preview` | one sample; a folder, a sheet of them |
+//! | `sample`, `folder` | one sample; a folder of them |
 //! | `turn` | whole turns as shards |
 //! | `transfer` | objects on the table, to be lit by any room over a whole turn without a ray |
 //!
@@ -25,7 +25,7 @@
 //! let (object, mesh) = recipe.object(&library, 0);
 //! let view = recipe.view(&object, &mesh, 1);
 //! let sample = recipe.sample(&library, &view, 2);
-//! assert_eq!(sample.image().width(), 32);
+//! assert_eq!(sample.image.width(), 32);
 //! # Ok::<(), relight_synth::SynthError>(())
 //! ```
 
@@ -41,7 +41,6 @@ mod noise;
 mod object;
 mod paint;
 mod png;
-mod preview;
 mod random;
 mod recipe;
 mod sample;
@@ -53,30 +52,18 @@ mod turn;
 mod vectors;
 mod view;
 
-pub use camera::{CameraModel, Response};
 pub use error::SynthError;
-pub use finish::Finish;
 pub use folder::{SynthTally, write_samples};
 pub use geometry::{GBuffer, Occluder};
-pub use library::{Folders, LeftOut, Library, PANORAMA_EXTENT, made_panoramas};
-pub use lighting::{
-    BlinnPhong, Emitter, Environment, LampShadows, LightKind, Lighting, Material, Method,
-    Panoramas, Shaded, SyntheticLamp, SyntheticScene,
-};
-pub use mesh::{Mesh, MeshFault, OwnSurface};
+pub use library::{Folders, LeftOut, Library, made_panoramas};
+pub use lighting::{BlinnPhong, LightKind, Lighting, Material, Panoramas, Shaded, SyntheticScene};
+pub use mesh::Mesh;
 pub use object::{ObjectSource, SyntheticView};
-pub use paint::{AlbedoKind, Paint, Relief};
-pub use preview::write_preview;
 pub use random::stream;
 pub use recipe::Recipe;
-pub use sample::{Description, SynthSample, Whites};
+pub use sample::SynthSample;
 pub use shape::ShapeKind;
-pub use studio::Surroundings;
-pub use texture::TextureImage;
-pub use transfer::{
-    CURVE_COEFFICIENTS, CurveCoefficients, DrawnTurn, RadianceTransfer, Rooms, TransferCache,
-    TransferFinish, TransferLobe, TransferMaterial, TransferRecipe,
-};
+pub use transfer::{DrawnTurn, Rooms, TransferCache, TransferRecipe};
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
 pub use view::{Pose, Projection};
 

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::SynthError;
 use super::lighting::Panoramas;
-use super::mesh::Mesh;
+use super::mesh::{Mesh, NOT_READ};
 use super::studio::Surroundings;
 use super::texture::TextureImage;
 use relight_core::image::Extent;
@@ -18,7 +18,7 @@ use relight_core::statistics::ranked;
 use relit_data::file_names::is_hidden;
 
 /// Size of the panoramas that are made here.
-pub const PANORAMA_EXTENT: Extent = Extent::new(256, 128);
+pub(crate) const PANORAMA_EXTENT: Extent = Extent::new(256, 128);
 /// Size of panoramas as pictures.
 const PICTURE_EXTENT: Extent = Extent::new(256, 128);
 /// Seeds of which panoramas are made.
@@ -30,7 +30,7 @@ pub struct Library {
     /// By file name, with the folders in which it lies; none: all objects are procedural.
     pub meshes: Vec<(String, Mesh)>,
     /// Textures, and panoramas as textures.
-    pub pictures: Vec<TextureImage>,
+    pub(crate) pictures: Vec<TextureImage>,
     /// The panoramas, never none.
     pub panoramas: Panoramas,
     /// What of the folders of meshes is not used.
@@ -68,7 +68,7 @@ impl Library {
     /// panoramas is given, 13 are made. Meshes of other kinds are left out.
     ///
     /// # Errors
-    /// [`SynthError::Nothing`] where a folder holds no file of its kind; whatever is wrong with a file.
+    /// Where a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
         let (meshes, left_out) = match &folders.meshes {
             Some(folder) => read_meshes(folder)?,
@@ -89,7 +89,8 @@ impl Library {
         pictures.extend(panoramas.iter().map(|(_, panorama)| picture_of(panorama)));
         let panoramas = Panoramas::new(panoramas);
         if panoramas.is_empty() {
-            return Err(SynthError::Dark);
+            let fault = "all panoramas are black: give one with light";
+            return Err(SynthError::Refused(fault.to_owned()));
         }
         Ok(Self {
             meshes,
@@ -196,16 +197,14 @@ fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<LeftOut>), SynthError>
     let mut left_out: Vec<LeftOut> = others.collect();
     if wanted.is_empty() {
         return Err(match left_out.first() {
-            Some(first) => SynthError::MeshKind {
-                path: first.path.clone(),
-            },
+            Some(first) => SynthError::unusable(&first.path, NOT_READ),
             None => MESHES.missing(folder),
         });
     }
     let mut meshes = Vec::with_capacity(wanted.len());
     for path in wanted {
         let mesh = Mesh::read(&path)?;
-        left_out.extend(mesh.left_out().iter().map(|what| LeftOut {
+        left_out.extend(mesh.left_out.iter().map(|what| LeftOut {
             path: path.clone(),
             what: what.clone(),
         }));
@@ -259,11 +258,9 @@ impl Wanted {
     }
 
     fn missing(&self, folder: &Path) -> SynthError {
-        SynthError::Nothing {
-            path: folder.to_owned(),
-            what: self.what,
-            extensions: self.extensions,
-        }
+        let (what, extensions) = (self.what, self.extensions.join(", ."));
+        let fault = format!("holds no {what}: put files in it that end in .{extensions}");
+        SynthError::unusable(folder, fault)
     }
 }
 
@@ -394,7 +391,7 @@ mod tests {
         let error = Library::read(&folders).unwrap_err();
         let first = folder.path().join("a.blend");
         assert!(
-            matches!(&error, SynthError::MeshKind { path } if *path == first),
+            error.to_string().starts_with(first.to_str().unwrap()),
             "{error}"
         );
     }

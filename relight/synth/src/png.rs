@@ -44,16 +44,16 @@ impl Sixteen {
 
 /// The map as PNG, 0 outside the object.
 pub(super) fn encode_sixteen(buffer: &GBuffer, map: &Sixteen) -> Result<Vec<u8>, SynthError> {
-    let side = buffer.size() as usize;
+    let side = buffer.size as usize;
     let mut pixels = vec![0; side * side * 6];
-    for (&pixel, value) in buffer.pixels().iter().zip(&map.values) {
+    for (&pixel, value) in buffer.pixels.iter().zip(&map.values) {
         let at = pixel as usize * 6;
         for (channel, value) in value.iter().enumerate() {
             pixels[at + 2 * channel..at + 2 * channel + 2].copy_from_slice(&value.to_be_bytes());
         }
     }
     let mut bytes = Vec::with_capacity(pixels.len() / 2);
-    let mut encoder = png::Encoder::new(&mut bytes, buffer.size(), buffer.size());
+    let mut encoder = png::Encoder::new(&mut bytes, buffer.size, buffer.size);
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Sixteen);
     encoder.set_compression(Compression::Fastest);

@@ -13,7 +13,6 @@ use super::library::Library;
 use super::lighting::{LightKind, Lighting, Material, SyntheticScene};
 use super::mesh::Mesh;
 use super::object::{ObjectSource, SyntheticView};
-use super::paint::AlbedoKind;
 use super::random::{Random, stream};
 use super::sample::{Description, SynthSample};
 use super::shape::ShapeKind;
@@ -43,9 +42,8 @@ pub struct Recipe {
     pub lightings: u32,
     /// Whether the camera is a random one; else it is [`CameraModel::plain`].
     pub random_camera: bool,
-    /// What kind of albedo all objects have; none: all kinds, each as often as it trains best.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub albedo: Option<AlbedoKind>,
+    /// Whether all objects whose file says how they look keep that; else half of them.
+    pub own_albedo: bool,
 }
 
 impl Default for Recipe {
@@ -58,7 +56,7 @@ impl Default for Recipe {
             views: 4,
             lightings: 4,
             random_camera: true,
-            albedo: None,
+            own_albedo: false,
         }
     }
 }
@@ -67,33 +65,18 @@ impl Recipe {
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`SynthError::Setting`] names the first that is not.
+    /// [`SynthError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), SynthError> {
-        let checks = [
-            ("the size", self.size, 16..=2048, "16 to 2048 pixels"),
-            (
-                "the number of views",
-                self.views,
-                1..=u32::MAX,
-                "at least 1",
-            ),
-            (
-                "the number of lightings",
-                self.lightings,
-                1..=u32::MAX,
-                "at least 1",
-            ),
-        ];
-        match checks
-            .into_iter()
-            .find(|(_, value, range, _)| !range.contains(value))
-        {
-            None => Ok(()),
-            Some((name, value, _, allowed)) => Err(SynthError::Setting {
-                name,
-                value: u64::from(value),
-                allowed,
-            }),
+        let refused = |name: &str, value: u32, allowed: &str| {
+            Err(SynthError::Refused(format!(
+                "{name} is {value}: give {allowed}"
+            )))
+        };
+        match (self.size, self.views, self.lightings) {
+            (size @ (..16 | 2049..), ..) => refused("the size", size, "16 to 2048 pixels"),
+            (_, 0, _) => refused("the number of views", 0, "at least 1"),
+            (_, _, 0) => refused("the number of lightings", 0, "at least 1"),
+            _ => Ok(()),
         }
     }
 
@@ -174,14 +157,19 @@ impl Recipe {
 
     /// The material of a number on what a view shows: paint, relief on a third, gloss on a third.
     #[must_use]
-    pub fn material(
-        &self,
-        library: &Library,
-        view: &SyntheticView,
-        number: u64,
-    ) -> (Finish, Material) {
+    pub fn material(&self, library: &Library, view: &SyntheticView, number: u64) -> Material {
+        self.finished(library, view, number).1
+    }
+
+    fn finished(&self, library: &Library, view: &SyntheticView, number: u64) -> (Finish, Material) {
         let mut random = Random::new(stream(stream(self.seed, 5), number));
-        let finish = Finish::draw(&mut random, view.scene.buffer(), library, 0.35, self.albedo);
+        let finish = Finish::draw(
+            &mut random,
+            view.scene.buffer(),
+            library,
+            0.35,
+            self.own_albedo,
+        );
         let material = finish.apply(view.scene.buffer(), library);
         (finish, material)
     }
@@ -196,7 +184,7 @@ impl Recipe {
     ) -> SynthSample<'a> {
         let seed = stream(stream(self.seed, 2), number);
         let mut random = Random::new(seed);
-        let (finish, material) = self.material(library, view, number);
+        let (finish, material) = self.finished(library, view, number);
         let buffer = view.scene.buffer();
         let lighting = Lighting {
             has_shadows: self.shadows,
@@ -311,11 +299,11 @@ mod tests {
             let view = small().view(&object, &mesh, number);
             let sample = small().sample(&library, &view, number);
             let bright = sample
-                .image()
+                .image
                 .pixels()
                 .filter(|p| p.0.iter().any(|&v| v > 120));
             assert!(bright.count() > 8, "{number}");
-            let sum: u64 = sample.image().as_raw().iter().map(|&v| u64::from(v)).sum();
+            let sum: u64 = sample.image.as_raw().iter().map(|&v| u64::from(v)).sum();
             means.push(sum);
         }
         means.dedup();

@@ -17,7 +17,7 @@ use relight_core::light::{Order, ShLight};
 /// All that a sample was made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub struct Description {
+pub(crate) struct Description {
     /// The sample's number.
     pub number: u64,
     /// What it was drawn from.
@@ -67,25 +67,26 @@ impl Lighting {
 
 /// A picture with its ground truth.
 pub struct SynthSample<'a> {
-    view: &'a SyntheticView,
-    material: Material,
-    /// With the camera's gain.
-    shaded: Shaded,
-    image: RgbImage,
-    description: Description,
+    /// The view that is shown.
+    pub view: &'a SyntheticView,
+    /// Albedo, normals and gloss at the covered pixels.
+    pub material: Material,
+    /// Shading and highlight at the covered pixels, with the camera's gain: the picture is the camera's response to
+    /// `albedo x shading + highlight`.
+    pub shaded: Shaded,
+    /// The picture: the camera's 8-bit values, 0 outside the object.
+    pub image: RgbImage,
+    pub(crate) description: Description,
 }
 
 /// What the largest value in a file of 16 bits stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Whites {
+pub(crate) struct Whites {
     /// In `shading.png`.
     pub shading: f32,
     /// In `highlight.png`.
     pub highlight: f32,
 }
-
-/// The files of a sample, by name.
-pub(super) struct Files(pub(super) Vec<(&'static str, Vec<u8>)>);
 
 impl<'a> SynthSample<'a> {
     /// Takes the picture: `shaded` is still without the gain of the description's camera; `seed` draws
@@ -109,39 +110,20 @@ impl<'a> SynthSample<'a> {
         }
     }
 
-    /// The view that is shown.
+    /// All light but what bounces, as nine coefficients in the viewer's frame, times the camera's gain.
     #[must_use]
-    pub fn view(&self) -> &SyntheticView {
-        self.view
+    pub fn coefficients(&self) -> &[[f64; 3]; 9] {
+        &self.description.coefficients
     }
 
-    /// The picture: the camera's 8-bit values, 0 outside the object.
+    /// The light, 0..=1, for a value of the picture, 0..=1: what its camera's response takes back.
     #[must_use]
-    pub fn image(&self) -> &RgbImage {
-        &self.image
+    pub fn light_of(&self, value: f32) -> f32 {
+        self.description.camera.response.decode(value)
     }
 
-    /// Albedo, normals and gloss at the covered pixels.
-    #[must_use]
-    pub fn material(&self) -> &Material {
-        &self.material
-    }
-
-    /// Shading and highlight at the covered pixels, with the camera's gain: the picture is the camera's
-    /// response to `albedo x shading + highlight`.
-    #[must_use]
-    pub fn shaded(&self) -> &Shaded {
-        &self.shaded
-    }
-
-    /// All that the sample was made of.
-    #[must_use]
-    pub fn description(&self) -> &Description {
-        &self.description
-    }
-
-    /// The sample as files.
-    pub(super) fn files(&self) -> Result<Files, SynthError> {
+    /// The sample as files, by name.
+    pub(super) fn files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, SynthError> {
         let buffer = self.view.scene.buffer();
         let shading = Sixteen::up_to_largest(&self.shaded.shading);
         let highlight = Sixteen::up_to_largest(&self.shaded.highlight);
@@ -150,7 +132,7 @@ impl<'a> SynthSample<'a> {
             highlight: highlight.white,
         };
         let light = ShLight::new(self.description.coefficients.to_vec())?;
-        Ok(Files(vec![
+        Ok(vec![
             ("image.png", relit_data::shard::encode_rgb(&self.image)?),
             ("mask.png", relit_data::shard::encode_mask(&mask(buffer))?),
             (
@@ -165,7 +147,7 @@ impl<'a> SynthSample<'a> {
             ("highlight.png", encode_sixteen(buffer, &highlight)?),
             ("light.txt", light.to_string().into_bytes()),
             ("sample.json", self.json(whites)),
-        ]))
+        ])
     }
 
     fn json(&self, white: Whites) -> Vec<u8> {
@@ -186,9 +168,9 @@ impl<'a> SynthSample<'a> {
 
 /// The mask of what a buffer covers, 0 and 255.
 pub(super) fn mask(buffer: &GBuffer) -> GrayImage {
-    let mut mask = GrayImage::new(buffer.size(), buffer.size());
-    for &pixel in buffer.pixels() {
-        mask.put_pixel(pixel % buffer.size(), pixel / buffer.size(), Luma([255]));
+    let mut mask = GrayImage::new(buffer.size, buffer.size);
+    for &pixel in &buffer.pixels {
+        mask.put_pixel(pixel % buffer.size, pixel / buffer.size, Luma([255]));
     }
     mask
 }
@@ -207,9 +189,9 @@ pub(super) fn photograph(
         return picture;
     }
     let compressed = camera.compressed(picture);
-    let size = buffer.size();
+    let size = buffer.size;
     let inside = buffer
-        .pixels()
+        .pixels
         .iter()
         .map(|&pixel| compressed.get_pixel(pixel % size, pixel / size).0);
     picture_of(buffer, &inside.collect::<Vec<_>>())
@@ -217,9 +199,9 @@ pub(super) fn photograph(
 
 /// A picture with these colours at the covered pixels and black elsewhere.
 pub(super) fn picture_of(buffer: &GBuffer, values: &[[u8; 3]]) -> RgbImage {
-    let mut picture = RgbImage::new(buffer.size(), buffer.size());
-    for (&pixel, &value) in buffer.pixels().iter().zip(values) {
-        picture.put_pixel(pixel % buffer.size(), pixel / buffer.size(), Rgb(value));
+    let mut picture = RgbImage::new(buffer.size, buffer.size);
+    for (&pixel, &value) in buffer.pixels.iter().zip(values) {
+        picture.put_pixel(pixel % buffer.size, pixel / buffer.size, Rgb(value));
     }
     picture
 }

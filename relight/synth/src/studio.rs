@@ -13,7 +13,7 @@ use relight_core::light::{LightError, Panorama};
 /// A kind of panorama that is made here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Surroundings {
+pub(crate) enum Surroundings {
     /// A dark room with two to four soft boxes.
     Studio,
     /// A room with a window by day, and a lamp.
@@ -26,11 +26,10 @@ pub enum Surroundings {
 
 impl Surroundings {
     /// All kinds.
-    pub const ALL: [Self; 4] = [Self::Studio, Self::Room, Self::Sky, Self::Even];
+    pub(crate) const ALL: [Self; 4] = [Self::Studio, Self::Room, Self::Sky, Self::Even];
 
     /// The name, as in file names.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Studio => "studio",
             Self::Room => "room",
@@ -43,7 +42,7 @@ impl Surroundings {
     ///
     /// # Errors
     /// [`LightError::Empty`] where `extent` has no pixels.
-    pub fn panorama(self, seed: u64, extent: Extent) -> Result<Panorama, LightError> {
+    pub(crate) fn panorama(self, seed: u64, extent: Extent) -> Result<Panorama, LightError> {
         let mut random = Random::new(stream(seed, self as u64));
         let place: Box<dyn Fn(Vec3) -> Vec3> = match self {
             Self::Studio => Box::new(studio(&mut random)),

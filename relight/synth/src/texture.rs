@@ -14,7 +14,7 @@ const LONGEST_SIDE: usize = 1024;
 
 /// A picture in linear light, which repeats itself in all directions.
 #[derive(Debug, Clone)]
-pub struct TextureImage {
+pub(crate) struct TextureImage {
     width: usize,
     height: usize,
     texels: Vec<Vec3>,
@@ -40,7 +40,7 @@ impl TextureImage {
     ///
     /// # Errors
     /// [`SynthError::Image`] where it cannot be read or is no picture.
-    pub fn read(path: &Path) -> Result<Self, SynthError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, SynthError> {
         let image = ColourImage::read(path, None)?.into_light();
         let planes = image.planes();
         let Extent { width, height } = planes.extent();

@@ -89,7 +89,7 @@ impl Pose {
     /// The map from the mesh's own frame into the viewer's.
     pub fn place(&self, mesh: &Mesh, projection: Projection) -> Affine3A {
         let linear = self.turn * Mat3::from_diagonal(self.stretch);
-        let turned: Vec<Vec3> = mesh.positions().iter().map(|&p| linear * p).collect();
+        let turned: Vec<Vec3> = mesh.positions.iter().map(|&p| linear * p).collect();
         let (mut scale, mut offset) = (0.5, Vec3::ZERO);
         // The perspective of the framed object is another one than that of the unframed.
         for _ in 0..8 {
@@ -156,7 +156,7 @@ mod tests {
     fn bounds(pose: &Pose, projection: Projection) -> Bounds {
         let mesh = ShapeKind::Lathe.build(3);
         let placement = pose.place(&mesh, projection);
-        Bounds::of(mesh.positions(), |p| {
+        Bounds::of(&mesh.positions, |p| {
             projection.project(placement.transform_point3(p)).0
         })
     }

@@ -44,7 +44,6 @@ fn composition(side: usize) -> Result<Composition, Box<dyn Error>> {
             ..Recipe::default()
         },
         library: Library::read(&Folders::default())?,
-        plain_share: data.plain_share,
     })
 }
 

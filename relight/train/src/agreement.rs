@@ -16,7 +16,7 @@ pub(super) type Fact = (&'static str, String);
 /// Compares facts, which all processes have in the same order.
 ///
 /// # Errors
-/// [`TrainError::Disagreement`] in every process, [`TrainError::ProcessLost`].
+/// [`TrainError::Refused`] in every process, [`TrainError::ProcessLost`].
 pub(super) fn agree(group: &ProcessGroup, facts: &[Fact]) -> Result<(), TrainError> {
     let (own, count) = (group.rank().index() as usize, facts.len());
     let mut hashes = vec![0.0; count * group.rank().world_size() as usize];
@@ -25,13 +25,14 @@ pub(super) fn agree(group: &ProcessGroup, facts: &[Fact]) -> Result<(), TrainErr
         *hash = (HASH.checksum(text.as_bytes()) >> 11) as f64;
     }
     group.sum(&mut hashes)?;
-    for (process, theirs) in (0..).zip(hashes.chunks_exact(count.max(1))) {
+    for (process, theirs) in (0_u32..).zip(hashes.chunks_exact(count.max(1))) {
         let differs = theirs.iter().zip(&hashes).position(|(a, b)| a != b);
         if let Some(fact) = differs {
-            return Err(TrainError::Disagreement {
-                process,
-                what: facts[fact].0,
-            });
+            let what = facts[fact].0;
+            return Err(TrainError::Refused(format!(
+                "{what} of process {process} are not those of process 0: start all processes with the same program, command \
+                 and files, and a folder for the run that all of them see"
+            )));
         }
     }
     Ok(())

@@ -6,10 +6,10 @@ use tch::Kind;
 
 use super::data_loader::Composition;
 use super::error::TrainError;
-use super::resources::Resources;
 use super::sample::TruthBatch;
 use super::settings::{DataSettings, RunSettings};
 use super::shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
+use super::task::Resources;
 use relight_reader::Rank;
 use relight_synth::{Folders, LeftOut, Library, Recipe, stream};
 
@@ -27,14 +27,11 @@ pub(super) fn composition(data: &DataSettings, seed: u64) -> Result<Composition,
         recipe: Recipe {
             seed: stream(seed, 21),
             size: data.size,
-            light: data.light,
-            shadows: data.shadows,
             views: data.views,
             lightings: data.lightings,
             ..Recipe::default()
         },
         library,
-        plain_share: data.plain_share,
     })
 }
 
@@ -76,7 +73,7 @@ impl ComposedBatches {
     /// Leaves the rest of each batch to other processes. Called before the first batch.
     ///
     /// # Errors
-    /// [`TrainError::Indivisible`].
+    /// [`TrainError::Refused`].
     pub(super) fn set_rank(&mut self, rank: Rank) -> Result<(), TrainError> {
         self.settings.check(rank)?;
         self.rank = rank;

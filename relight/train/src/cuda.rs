@@ -11,15 +11,16 @@ use super::error::TrainError;
 /// The GPU of a number, from 0.
 ///
 /// # Errors
-/// [`TrainError::NoCuda`] where libtorch has no library for CUDA that can be loaded, [`TrainError::NoGpu`] where it finds
-/// fewer GPUs.
+/// [`TrainError::Refused`] where libtorch has no library for CUDA that can be loaded, or finds fewer GPUs.
 pub fn cuda_device(number: usize) -> Result<Device, TrainError> {
     load()?;
     let count = Cuda::device_count();
     if i64::try_from(number).is_ok_and(|number| number < count) {
         Ok(Device::Cuda(number))
     } else {
-        Err(TrainError::NoGpu { number, count })
+        Err(TrainError::Refused(format!(
+            "there is no GPU {number}, counted from 0: libtorch finds {count} here"
+        )))
     }
 }
 
@@ -40,7 +41,13 @@ fn load() -> Result<(), TrainError> {
         #[cfg(not(unix))]
         libloading::Library::new(name)
     };
-    std::mem::forget(library.map_err(TrainError::NoCuda)?);
+    let library = library.map_err(|fault| {
+        TrainError::Refused(format!(
+            "libtorch's library for CUDA cannot be loaded: PyTorch for CUDA is needed with all its packages, its folder torch as \
+             LIBTORCH where relight is built, or torch/lib in LD_LIBRARY_PATH where it runs ({fault})"
+        ))
+    });
+    std::mem::forget(library?);
     Ok(())
 }
 
@@ -52,10 +59,10 @@ mod tests {
     fn a_gpu_that_is_not_there_is_told_in_one_sentence() {
         let error = cuda_device(4711).unwrap_err();
         let text = error.to_string();
-        let told = match error {
-            TrainError::NoCuda(_) => "libtorch's library for CUDA cannot be loaded",
-            _ => "there is no GPU 4711",
-        };
-        assert!(text.starts_with(told), "{text}");
+        let told = [
+            "libtorch's library for CUDA cannot be loaded",
+            "there is no GPU 4711",
+        ];
+        assert!(told.iter().any(|told| text.starts_with(told)), "{text}");
     }
 }

@@ -50,20 +50,8 @@ impl Darkness {
     pub(super) fn cross_entropy(&self, logit: &Tensor) -> Result<Mean, TrainError> {
         // softplus(x) - p x is the cross entropy of the probability p and the logit x.
         let entropy = logit.f_softplus()?.f_sub(&self.paint.f_mul(logit)?)?;
-        self.mean(&entropy)
-    }
-
-    /// The squared error of an answer, a part of 0..=1.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub(super) fn squared_error(&self, paint: &Tensor) -> Result<Mean, TrainError> {
-        self.mean(&paint.f_sub(&self.paint)?.f_square()?)
-    }
-
-    fn mean(&self, of: &Tensor) -> Result<Mean, TrainError> {
         let over = self.weight.f_sum(None)?.f_clamp_min(1.0)?;
-        let value = of.f_mul(&self.weight)?.f_sum(None)?.f_div(&over)?;
+        let value = entropy.f_mul(&self.weight)?.f_sum(None)?.f_div(&over)?;
         Ok(Mean { value, over })
     }
 }
@@ -121,7 +109,5 @@ mod tests {
         };
         assert!(cost(5.0, 0.0) < 0.02 && cost(-5.0, 0.0) > 3.0);
         assert_eq!(cost(5.0, 0.0), cost(5.0, -9.0));
-        let error = truth.squared_error(&truth.paint).unwrap().value;
-        assert_eq!(error.double_value(&[]), 0.0);
     }
 }

@@ -19,8 +19,13 @@ use relight_synth::{Library, Recipe, stream};
 /// Part of the pictures whose values are taken for sRGB, whatever the camera's response: the user of a photograph
 /// does not know it either. Hardly more, as albedo times shading is not such a picture.
 const TAKEN_AS_SRGB: f64 = 0.10;
+/// Part of the pictures that a plain camera takes (sRGB, no noise, no compression); the others are taken as the recipe says.
+const PLAIN: f64 = 0.5;
 /// Views that wait to be taken, for each thread.
 const AHEAD: usize = 2;
+
+/// Why there is no sample.
+pub(super) const NOT_COMPOSED: TrainError = TrainError::Fault("a sample could not be composed");
 
 /// What samples are composed of.
 #[derive(Debug)]
@@ -29,9 +34,6 @@ pub struct Composition {
     pub recipe: Recipe,
     /// What they are made of.
     pub library: Library,
-    /// Part of the pictures that a plain camera takes (sRGB, no noise, no compression), 0..=1; the others are taken as
-    /// the recipe says.
-    pub plain_share: f64,
 }
 
 /// The samples of one view, by the view's number; none where composing them panicked.
@@ -56,7 +58,7 @@ impl DataLoader {
     /// `first_view` on.
     ///
     /// # Errors
-    /// [`TrainError::Synth`] where the recipe is out of range, [`TrainError::Threads`].
+    /// [`TrainError::Synth`] where the recipe is out of range, [`TrainError::Io`].
     pub fn start(
         composition: Arc<Composition>,
         rank: Rank,
@@ -86,7 +88,11 @@ impl DataLoader {
                         }
                     }
                 })
-                .map_err(TrainError::Threads)
+                .map_err(|source| TrainError::Io {
+                    path: "the data-loader workers".into(),
+                    doing: "started",
+                    source,
+                })
         };
         let threads = (0..threads).map(spawn).collect::<Result<_, _>>()?;
         Ok(Self {
@@ -102,7 +108,7 @@ impl DataLoader {
     /// The next sample, with its number.
     ///
     /// # Errors
-    /// [`TrainError::DataLoader`] where composing panicked: a fault of the program.
+    /// [`TrainError::Fault`] where composing panicked: a fault of the program.
     pub fn next_sample(&mut self) -> Result<(u64, TruthArrays), TrainError> {
         loop {
             if let Some(sample) = self.current.pop() {
@@ -115,9 +121,8 @@ impl DataLoader {
                 self.next_view += self.stride;
                 continue;
             }
-            let (view, samples) = self.views.recv().map_err(|_| TrainError::DataLoader)?;
-            self.early
-                .insert(view, samples.ok_or(TrainError::DataLoader)?);
+            let (view, samples) = self.views.recv().map_err(|_| NOT_COMPOSED)?;
+            self.early.insert(view, samples.ok_or(NOT_COMPOSED)?);
         }
     }
 }
@@ -145,7 +150,7 @@ impl Composition {
             .map(|number| {
                 let draw = |which: u64| unit(stream(stream(self.recipe.seed, which), number));
                 let recipe = Recipe {
-                    random_camera: self.recipe.random_camera && draw(11) >= self.plain_share,
+                    random_camera: self.recipe.random_camera && draw(11) >= PLAIN,
                     ..self.recipe.clone()
                 };
                 let linearisation = if draw(12) < TAKEN_AS_SRGB {

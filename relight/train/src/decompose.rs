@@ -134,7 +134,7 @@ impl Default for DecomposeLossCoefficients {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn decompose_losses(
+pub(crate) fn decompose_losses(
     batch: &TruthBatch,
     answer: &AnsweredTensors,
     coefficients: &DecomposeLossCoefficients,
@@ -238,7 +238,7 @@ fn highlight_energy_error(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn head_spreads(
+pub(crate) fn head_spreads(
     batch: &TruthBatch,
     answer: &AnsweredTensors,
 ) -> Result<BTreeMap<&'static str, f64>, TrainError> {

@@ -1,9 +1,6 @@
 //! Stops a run that has gone wrong: losses that are no numbers or explode, heads that collapse.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-
-use relit_data::causes::with_causes;
 
 use super::error::TrainError;
 
@@ -18,23 +15,22 @@ const KEEP: f64 = 0.99;
 
 /// Looks at every step.
 #[derive(Debug, Default)]
-pub struct Guard {
+pub(crate) struct Guard {
     seen: u64,
     loss: f64,
     spreads: BTreeMap<&'static str, f64>,
 }
 
 impl Guard {
-    /// Looks at the losses and spreads of a step; `save` saves its batch and answers where.
+    /// Looks at the losses and spreads of a step.
     ///
     /// # Errors
-    /// [`TrainError::BadLoss`] or [`TrainError::Collapsed`].
-    pub fn check(
+    /// [`TrainError::Ended`].
+    pub(crate) fn check(
         &mut self,
         step: u64,
         losses: &BTreeMap<String, f64>,
         spreads: &BTreeMap<&'static str, f64>,
-        save: impl FnOnce() -> Result<PathBuf, TrainError>,
     ) -> Result<(), TrainError> {
         let total = losses.get("loss").copied().unwrap_or(0.0);
         let exploded = self.seen >= SETTLING && total > EXPLOSION * self.loss;
@@ -42,10 +38,10 @@ impl Guard {
         let of_parts = losses.iter().filter(|(name, _)| *name != "loss");
         let mut named = of_parts.chain(losses.get_key_value("loss"));
         if let Some((name, &value)) = named.find(|(_, value)| !value.is_finite()) {
-            return Err(bad_loss(step, name, value, save));
+            return Err(bad_loss(step, name, value));
         }
         if exploded {
-            return Err(bad_loss(step, "loss", total, save));
+            return Err(bad_loss(step, "loss", total));
         }
         self.seen += 1;
         self.loss = mean(self.loss, total, self.seen);
@@ -59,12 +55,10 @@ impl Guard {
         }
         match collapsed {
             None => Ok(()),
-            Some((head, spread)) => Err(TrainError::Collapsed {
-                step,
-                head,
-                spread,
-                batch: saved(save),
-            }),
+            Some((head, spread)) => Err(TrainError::Ended(format!(
+                "at step {step} the answers for {head} have hardly any variation left ({spread:.2e} of the ground truth's): \
+                 the head has collapsed, and the run ends"
+            ))),
         }
     }
 }
@@ -74,29 +68,14 @@ fn mean(running: f64, value: f64, seen: u64) -> f64 {
     keep * running + (1.0 - keep) * value
 }
 
-fn bad_loss(
-    step: u64,
-    loss: &str,
-    value: f64,
-    save: impl FnOnce() -> Result<PathBuf, TrainError>,
-) -> TrainError {
-    TrainError::BadLoss {
-        step,
-        loss: match loss {
-            "loss" => "sum of all losses".to_owned(),
-            part => part.to_owned(),
-        },
-        value,
-        batch: saved(save),
-    }
-}
-
-/// What became of the batch. That it cannot be saved must not hide why the run ends.
-fn saved(save: impl FnOnce() -> Result<PathBuf, TrainError>) -> String {
-    match save() {
-        Ok(path) => format!("the batch is in {}", path.display()),
-        Err(fault) => format!("the batch could not be saved: {}", with_causes(&fault)),
-    }
+fn bad_loss(step: u64, loss: &str, value: f64) -> TrainError {
+    let loss = match loss {
+        "loss" => "sum of all losses",
+        part => part,
+    };
+    TrainError::Ended(format!(
+        "at step {step} the {loss} is {value}: the run ends before this step is made"
+    ))
 }
 
 #[cfg(test)]
@@ -106,7 +85,7 @@ mod tests {
     fn step(guard: &mut Guard, step: u64, loss: f64, spread: f64) -> Result<(), TrainError> {
         let losses = BTreeMap::from([("loss".to_owned(), loss)]);
         let spreads = BTreeMap::from([("albedo", spread)]);
-        guard.check(step, &losses, &spreads, || Ok(PathBuf::from("batch")))
+        guard.check(step, &losses, &spreads)
     }
 
     #[test]
@@ -120,21 +99,19 @@ mod tests {
     #[test]
     fn a_loss_that_is_no_number_ends_it_at_once() {
         let error = step(&mut Guard::default(), 4, f64::NAN, 1.0).unwrap_err();
-        assert!(matches!(error, TrainError::BadLoss { step: 4, .. }));
+        assert!(error.to_string().contains("at step 4"), "{error}");
     }
 
     #[test]
-    fn the_loss_that_is_no_number_is_named_also_where_its_batch_cannot_be_saved() {
+    fn the_loss_that_is_no_number_is_named() {
         let losses = BTreeMap::from([
             ("loss".to_owned(), f64::NAN),
             ("loss/albedo".to_owned(), 0.2),
             ("loss/normals".to_owned(), f64::NAN),
         ]);
-        let full = || Err(TrainError::DataLoader);
-        let error = Guard::default().check(7, &losses, &BTreeMap::new(), full);
+        let error = Guard::default().check(7, &losses, &BTreeMap::new());
         let text = error.unwrap_err().to_string();
         assert!(text.contains("loss/normals is NaN"), "{text}");
-        assert!(text.contains("the batch could not be saved"), "{text}");
     }
 
     #[test]

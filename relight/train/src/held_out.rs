@@ -8,12 +8,12 @@ use tch::{Device, Kind, Tensor, no_grad};
 
 use super::data_loader::Composition;
 use super::error::TrainError;
-use super::low_rank::{first_singular_values, rank_one};
+use super::low_rank::rank_one;
 use super::paper_phases::equal_rows;
 use super::sample::{DrawnSample, TruthArrays, TruthBatch};
 use super::symmetry::Symmetry;
-use super::turn_reader::{TurnReader, TurnTensors};
-use relight_synth::{AlbedoKind, Recipe, stream};
+use super::turn_reader::{TurnReader, TurnTensors, no_frames};
+use relight_synth::{Recipe, stream};
 
 /// Batches of turns that are kept.
 const TURN_BATCHES: usize = 4;
@@ -44,7 +44,7 @@ impl HeldOutTurns {
             damage.extend(group.damage);
         }
         if batches.is_empty() {
-            return Err(TrainError::NoFrames);
+            return Err(no_frames());
         }
         let damage = (!damage.is_empty()).then(|| format!("held out: {}", damage.join("; ")));
         Ok(Self { batches, damage })
@@ -82,20 +82,18 @@ pub(super) struct HeldOutSamples {
 }
 
 impl HeldOutSamples {
-    /// One sample each of `count` objects, painted as `albedo` says where it says anything. Neither their seed nor their
-    /// light depends on the run's, so that runs can be compared.
-    pub(super) fn new(composition: &Composition, count: u64, albedo: Option<AlbedoKind>) -> Self {
+    /// One sample each of `count` objects. Neither their seed nor their light depends on the run's, so that runs can be
+    /// compared.
+    pub(super) fn new(composition: &Composition, count: u64) -> Self {
         let composition = Composition {
             recipe: Recipe {
                 seed: stream(0x76_61_6c, 23),
                 size: composition.recipe.size,
                 views: 1,
                 lightings: 1,
-                albedo,
                 ..Recipe::default()
             },
             library: composition.library.without_meshes(),
-            plain_share: composition.plain_share,
         };
         Self {
             composition,
@@ -108,15 +106,6 @@ impl HeldOutSamples {
         let compose = |view| self.composition.samples_of(view);
         self.samples
             .get_or_init(|| (0..self.count).flat_map(compose).collect())
-    }
-
-    /// A batch of the first of them, at most as many as are taken at once.
-    pub(super) fn first(&self, kind: Kind, device: Device) -> Result<TruthBatch, TrainError> {
-        let views = 0..self.count.min(SAMPLE_BATCH as u64);
-        let samples: Vec<TruthArrays> = views
-            .flat_map(|view| self.composition.samples_of(view))
-            .collect();
-        batch_of(&samples, kind, device)
     }
 
     /// The mean of each figure over the samples.
@@ -149,21 +138,13 @@ fn batch_of(samples: &[TruthArrays], kind: Kind, device: Device) -> Result<Truth
 }
 
 /// How far pictures of one reflectance, `frames x channels x height x width`, are from being multiples of one: the
-/// part of their energy that the best matrix of rank one leaves, and their second singular value over the first.
-/// Frames are brought to one length first.
-pub(super) fn rank_figures(of: &Tensor, mask: &Tensor) -> Result<(f64, f64), TrainError> {
+/// part of their energy that the best matrix of rank one leaves. Frames are brought to one length first.
+pub(super) fn rank_residual(of: &Tensor, mask: &Tensor) -> Result<f64, TrainError> {
     let rows = equal_rows(of, mask)?;
     let energy = |of: &Tensor| of.f_square()?.f_sum(Kind::Double);
     let rest = energy(&rows.f_sub(&rank_one(&rows)?)?)?;
     let residual = rest.f_div(&energy(&rows)?.f_clamp_min(1e-12)?)?;
-    let values = first_singular_values(&rows)?;
-    let ratio = values
-        .f_narrow(1, 1, 1)?
-        .f_div(&values.f_narrow(1, 0, 1)?)?;
-    Ok((
-        f64::try_from(residual)?,
-        f64::try_from(ratio.f_mean(None)?)?,
-    ))
+    Ok(f64::try_from(residual)?)
 }
 
 /// How well highlights are found: the energy of the error as a part of theirs, and which part of the pixels that were

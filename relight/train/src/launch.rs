@@ -27,7 +27,7 @@ impl Launch {
     /// one process: without `RANK` and `WORLD_SIZE`, or with a `WORLD_SIZE` of 1. Empty variables count as missing.
     ///
     /// # Errors
-    /// [`TrainError::LaunchIncomplete`] or [`TrainError::LaunchValue`].
+    /// [`TrainError::Refused`].
     ///
     /// ```
     /// use relight_train::Launch;
@@ -77,22 +77,22 @@ impl Launch {
     }
 }
 
-fn incomplete(set: &'static str, missing: &'static str) -> TrainError {
-    TrainError::LaunchIncomplete { set, missing }
+fn incomplete(set: &str, missing: &str) -> TrainError {
+    TrainError::Refused(format!(
+        "{set} is set and {missing} is not: to train with several processes, set RANK, WORLD_SIZE, MASTER_ADDR and \
+         MASTER_PORT for each of them, as torchrun does; for one process, unset RANK and WORLD_SIZE"
+    ))
 }
 
 fn number<N: std::str::FromStr>(
-    name: &'static str,
+    name: &str,
     value: &str,
     allowed: &str,
     is_right: impl Fn(&N) -> bool,
 ) -> Result<N, TrainError> {
     let number = value.parse().ok().filter(is_right);
-    number.ok_or_else(|| TrainError::LaunchValue {
-        name,
-        value: value.to_owned(),
-        allowed: allowed.to_owned(),
-    })
+    let fault = format!("the environment variable {name} is {value}: it has to be {allowed}");
+    number.ok_or(TrainError::Refused(fault))
 }
 
 #[cfg(test)]

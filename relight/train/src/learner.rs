@@ -1,11 +1,13 @@
-//! A network that learns: its parameters, its optimiser and the moving average of its weights.
+//! A network that learns: its parameters, its optimiser and the exponential moving average (EMA) of its weights, which
+//! answers better than the parameters themselves.
 
-use tch::Device;
+use std::collections::BTreeMap;
+
+use tch::{Device, Tensor, no_grad};
 
 use super::adam::{Adam, AdamSettings};
-use super::average::WeightAverage;
 use super::error::TrainError;
-use super::model::{ComputePrecision, Model};
+use super::model::{ComputePrecision, Model, copy_into, to_weights};
 use relight_nets::{Graph, Weights};
 
 /// A network in training.
@@ -119,5 +121,59 @@ impl Learner {
         self.model.recall(&own.under("model."))?;
         self.average.recall(&own.under("average."))?;
         self.adam.recall(&own)
+    }
+}
+
+/// An exponential moving average. In the first steps it forgets faster, so that it does not remember the
+/// initial weights.
+#[derive(Debug)]
+struct WeightAverage {
+    decay: f64,
+    values: BTreeMap<String, Tensor>,
+}
+
+impl WeightAverage {
+    /// The average of parameters that keeps the part `decay` (0..1) of itself at each step.
+    fn new(parameters: &BTreeMap<String, Tensor>, decay: f64) -> Result<Self, TrainError> {
+        let copy = |(name, parameter): (&String, &Tensor)| {
+            let mut value = parameter.f_detach()?.f_zeros_like()?;
+            value.f_copy_(&parameter.f_detach()?)?;
+            Ok((name.clone(), value))
+        };
+        Ok(Self {
+            decay,
+            values: parameters
+                .iter()
+                .map(copy)
+                .collect::<Result<_, tch::TchError>>()?,
+        })
+    }
+
+    /// Takes up the parameters after the step of a number, from 1.
+    fn update(
+        &mut self,
+        parameters: &BTreeMap<String, Tensor>,
+        step: u64,
+    ) -> Result<(), TrainError> {
+        let step = step as f64;
+        let decay = self.decay.min((1.0 + step) / (10.0 + step));
+        no_grad(|| {
+            for (name, value) in &mut self.values {
+                if let Some(parameter) = parameters.get(name) {
+                    let _ = value.f_lerp_(parameter, 1.0 - decay)?;
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// The averaged weights.
+    fn weights(&self) -> Result<Weights, TrainError> {
+        to_weights(&self.values)
+    }
+
+    /// Goes on from an average that was saved.
+    fn recall(&mut self, saved: &Weights) -> Result<(), TrainError> {
+        copy_into(&mut self.values, saved)
     }
 }

@@ -3,25 +3,24 @@
 //! | module | concern |
 //! | --- | --- |
 //! | `model` | a [`relight_nets::Graph`] on tensors: what is trained is what the ONNX file holds |
-//! | `adam`, `average`, `learner` | how a network learns; all of it can be saved |
-//! | [`losses`], [`low_rank`], `terms` | what is descended |
+//! | `adam`, `learner` | how a network learns; all of it can be saved |
+//! | `losses`, `low_rank`, `terms` | what is descended |
 //! | `sample`, `data_loader`, `shuffle_buffer`, `composed` | samples composed while training |
 //! | `decompose`, `decompose_task` | the decomposing network: maps, losses, run |
 //! | `held_out` | turns and samples that networks are judged by while they train |
 //! | `task`, `run`, `checkpoint`, `journal`, `guard` | a run: what is trained, its steps, what is saved, what is logged, what ends it |
-//! | `resources`, `cuda` | device, workers, how a run is stopped; GPUs |
+//! | `cuda` | GPUs |
 //! | `launch`, `process_group`, `agreement`, `all_reduced` | several processes: their ranks, sums over them, whether they agree, all-reduced losses |
 //! | `paper_layers`, `paper_phases`, `paper_networks`, `paper_task` | the paper's phases: layers on tensors, losses, networks, runs |
 //! | `turn_samples`, `turn_task` | the network of whole turns: views in rooms, its run |
-//! | `turn_reader`, `labelled` | turns, and frames with labels |
-//! | [`RunSettings`] and others, `settings/` | TOML, also with the keys of earlier releases |
+//! | `turn_reader` | turns |
+//! | [`RunSettings`] and others, `settings/` | TOML |
 
 #![cfg(feature = "libtorch")]
 
 mod adam;
 mod agreement;
 mod all_reduced;
-mod average;
 mod checkpoint;
 mod composed;
 mod cuda;
@@ -33,18 +32,16 @@ mod error;
 mod guard;
 mod held_out;
 mod journal;
-mod labelled;
 mod launch;
 mod learner;
-pub mod losses;
-pub mod low_rank;
+mod losses;
+mod low_rank;
 mod model;
-pub mod paper_layers;
+mod paper_layers;
 mod paper_networks;
-pub mod paper_phases;
+mod paper_phases;
 mod paper_task;
 mod process_group;
-mod resources;
 mod run;
 mod sample;
 mod settings;
@@ -58,14 +55,12 @@ mod turn_samples;
 mod turn_task;
 
 pub use adam::{Adam, AdamSettings};
-pub use average::WeightAverage;
 pub use checkpoint::{CHECKPOINT, Checkpoint};
 pub use cuda::cuda_device;
 pub use data_loader::{Composition, DataLoader};
-pub use decompose::{AnsweredTensors, DecomposeLossCoefficients, decompose_losses, head_spreads};
+pub use decompose::{AnsweredTensors, DecomposeLossCoefficients};
 pub use decompose_task::DecomposeTask;
 pub use error::TrainError;
-pub use guard::Guard;
 pub use journal::{Journal, TABLE};
 pub use launch::Launch;
 pub use learner::{Learner, LearnerSettings};
@@ -74,19 +69,14 @@ pub use paper_networks::PaperInputs;
 pub use paper_phases::PaperPhase;
 pub use paper_task::PaperTask;
 pub use process_group::ProcessGroup;
-pub use resources::Resources;
 pub use run::{Run, RunOutcome, TrainObserver};
-pub use sample::{DrawnSample, Linearisation, TruthArrays, TruthBatch};
+pub use sample::TruthArrays;
 pub use settings::{
-    DataSettings, DecomposeHead, DecomposeSettings, PaperLossCoefficients, PaperSettings,
-    PrecisionChoice, RenamedSetting, RunSettings, SettingsFile, TransferSettings,
-    TurnNetworkSettings, TurnSettings, read_settings,
+    DataSettings, DecomposeSettings, PaperLossCoefficients, PaperSettings, RunSettings,
+    TransferSettings, TurnNetworkSettings, TurnSettings, read_settings,
 };
-pub use shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
-pub use symmetry::Symmetry;
-pub use task::{StepLosses, TrainingTask, Validation};
+pub use task::{Resources, StepLosses, TrainingTask, Validation};
 pub use terms::LossTerms;
-pub use turn_reader::{TurnGroup, TurnReader, TurnTensors};
 pub use turn_task::TurnNetworkTask;
 
 /// The examples of the README, so that they are built.

@@ -14,7 +14,7 @@ const CHORD_FLOOR: f64 = 0.02;
 
 /// A mean, and what it is a mean over: so that the mean over several parts of a batch can be made of theirs.
 #[derive(Debug)]
-pub struct Mean {
+pub(crate) struct Mean {
     /// The mean.
     pub value: Tensor,
     /// How much it is taken over, one number without gradient; above 0 where there is a mean.
@@ -26,7 +26,7 @@ pub struct Mean {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn scale_invariant(
+pub(crate) fn scale_invariant(
     found: &Tensor,
     truth: &Tensor,
     weight: &Tensor,
@@ -50,7 +50,7 @@ pub fn scale_invariant(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn windowed(
+pub(crate) fn windowed(
     found: &Tensor,
     truth: &Tensor,
     weight: &Tensor,
@@ -83,7 +83,11 @@ pub fn windowed(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<[Mean; 2], TrainError> {
+pub(crate) fn gradient(
+    found: &Tensor,
+    truth: &Tensor,
+    weight: &Tensor,
+) -> Result<[Mean; 2], TrainError> {
     let along = |dimension: i64| -> Result<Mean, tch::TchError> {
         let step = |of: &Tensor| {
             let length = of.size()[dimension as usize] - 1;
@@ -111,7 +115,7 @@ pub fn gradient(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<[Mean
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
+pub(crate) fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
     let cosine = found
         .f_mul(truth)?
         .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
@@ -126,7 +130,7 @@ pub fn angular(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, 
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
+pub(crate) fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, TrainError> {
     let length = found
         .f_sub(truth)?
         .f_square()?
@@ -144,7 +148,7 @@ pub fn chord(found: &Tensor, truth: &Tensor, weight: &Tensor) -> Result<Mean, Tr
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn relative_distance(found: &Tensor, truth: &Tensor) -> Result<Mean, TrainError> {
+pub(crate) fn relative_distance(found: &Tensor, truth: &Tensor) -> Result<Mean, TrainError> {
     let length = |of: &Tensor| {
         of.f_square()?
             .f_sum_dim_intlist([1_i64].as_slice(), false, None)?
@@ -162,37 +166,11 @@ pub fn relative_distance(found: &Tensor, truth: &Tensor) -> Result<Mean, TrainEr
     Ok(Mean { value, over })
 }
 
-/// Mean angle between the bands 1 of lights (`batch x 9`), degrees, over those whose truth is known.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub fn light_degrees(found: &Tensor, truth: &Tensor) -> Result<Tensor, TrainError> {
-    let direction = |of: &Tensor| -> Result<(Tensor, Tensor), tch::TchError> {
-        let band = of.f_narrow(1, 1, 3)?;
-        let length = band
-            .f_square()?
-            .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-            .f_add_scalar(TINY * TINY)?
-            .f_sqrt()?;
-        Ok((band.f_div(&length)?, length))
-    };
-    let ((found, _), (truth, length)) = (direction(found)?, direction(truth)?);
-    let angle = found
-        .f_mul(&truth)?
-        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
-        .f_clamp(-1.0, 1.0)?
-        .f_acos()?
-        .f_rad2deg()?;
-    let known = length.f_gt(2.0 * TINY)?.f_to_kind(truth.kind())?;
-    let over = known.f_sum(None)?.f_add_scalar(TINY)?;
-    Ok(angle.f_mul(&known)?.f_sum(None)?.f_div(&over)?)
-}
-
 /// Mean angle between unit normals under the weight, degrees.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn angular_degrees(
+pub(crate) fn angular_degrees(
     found: &Tensor,
     truth: &Tensor,
     weight: &Tensor,
@@ -251,8 +229,6 @@ mod tests {
         let distance = relative_distance(&found, &truth).unwrap();
         assert!((distance.value.double_value(&[]) - 1.0 / 5.0_f64.sqrt()).abs() < 1e-3);
         assert!((distance.over.double_value(&[]) - 1.0).abs() < 1e-5);
-        let degrees = light_degrees(&found, &truth).unwrap().double_value(&[]);
-        assert!((degrees - 45.0).abs() < 0.01, "{degrees}");
     }
 
     #[test]

@@ -9,8 +9,7 @@
 //! v is the first eigenvector of the N x N Gram matrix R R^T: squaring that matrix again and again
 //! leaves nothing else of it, and no decomposition of d columns is needed.
 
-use serde::{Deserialize, Serialize};
-use tch::{Kind, Tensor};
+use tch::Tensor;
 
 use super::error::TrainError;
 
@@ -20,26 +19,12 @@ const SQUARINGS: usize = 8;
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-20;
 
-/// Which form of the loss.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LowRankForm {
-    /// The paper's: the squared distance.
-    Squared,
-    /// The released code's: the distance over the number of pixels in the mask, times 100.
-    Released,
-    /// The second singular value, a loss of earlier work that the paper compares with.
-    Second,
-    /// The second singular value over the first, another one.
-    Ratio,
-}
-
 /// The first left singular vector of each matrix of `groups x N x d`: `groups x N x 1`, without
 /// gradient.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn first_singular_vector(rows: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn first_singular_vector(rows: &Tensor) -> Result<Tensor, TrainError> {
     let rows = rows.f_detach()?;
     let mut power = rows.f_matmul(&rows.f_transpose(1, 2)?)?;
     for squared in 0..=SQUARINGS {
@@ -68,47 +53,22 @@ pub fn first_singular_vector(rows: &Tensor) -> Result<Tensor, TrainError> {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn rank_one(rows: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn rank_one(rows: &Tensor) -> Result<Tensor, TrainError> {
     let vector = first_singular_vector(rows)?;
     let shares = vector.f_transpose(1, 2)?.f_matmul(&rows.f_detach()?)?;
     Ok(vector.f_matmul(&shares)?)
 }
 
-/// The loss of each group of `groups x N x d` rows, averaged over the groups. `mask_px`: pixels under
-/// each group's mask, for [`LowRankForm::Released`].
+/// The loss of each group of `groups x N x d` rows, averaged over the groups.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn low_rank_loss(
-    rows: &Tensor,
-    mask_px: &Tensor,
-    form: LowRankForm,
-) -> Result<Tensor, TrainError> {
-    let square = || {
-        rows.f_sub(&rank_one(rows)?)?
-            .f_square()?
-            .f_sum_dim_intlist([1_i64, 2].as_slice(), false, None)
-            .map_err(TrainError::from)
-    };
-    Ok(match form {
-        LowRankForm::Squared => square()?.f_mean(None)?,
-        LowRankForm::Released => square()?
-            .f_clamp_min(TINY)?
-            .f_sqrt()?
-            .f_div(&mask_px.f_clamp_min(1.0)?)?
-            .f_mul_scalar(100.0)?
-            .f_mean(None)?,
-        LowRankForm::Second => first_singular_values(rows)?
-            .f_narrow(1, 1, 1)?
-            .f_mean(None)?,
-        LowRankForm::Ratio => {
-            let values = first_singular_values(rows)?;
-            let ratio = values
-                .f_narrow(1, 1, 1)?
-                .f_div(&values.f_narrow(1, 0, 1)?)?;
-            ratio.f_mean(None)?
-        }
-    })
+pub(crate) fn low_rank_loss(rows: &Tensor) -> Result<Tensor, TrainError> {
+    let square = rows
+        .f_sub(&rank_one(rows)?)?
+        .f_square()?
+        .f_sum_dim_intlist([1_i64, 2].as_slice(), false, None)?;
+    Ok(square.f_mean(None)?)
 }
 
 /// Chromaticity (r, g) / (r + g + b) of diffuse pictures, `batch x 3 x height x width` to
@@ -117,25 +77,9 @@ pub fn low_rank_loss(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn chromaticity(diffuse: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn chromaticity(diffuse: &Tensor) -> Result<Tensor, TrainError> {
     let sum = diffuse.f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
     Ok(diffuse.f_narrow(1, 0, 2)?.f_div(&sum.f_clamp_min(1e-5)?)?)
-}
-
-/// The first two singular values of each matrix of `groups x N x d`, for comparison with losses that
-/// are made of them: `groups x 2`, with gradient.
-///
-/// # Errors
-/// [`TrainError::Torch`].
-pub fn first_singular_values(rows: &Tensor) -> Result<Tensor, TrainError> {
-    let gram = rows.f_matmul(&rows.f_transpose(1, 2)?)?;
-    // Ascending.
-    let values = gram.f_to_kind(Kind::Double)?.f_linalg_eigvalsh("L")?;
-    let count = values.size()[1];
-    let first = values.f_narrow(1, count - 1, 1)?;
-    let second = values.f_narrow(1, count - 2, 1)?;
-    let both = Tensor::f_cat(&[first, second], 1)?;
-    Ok(both.f_clamp_min(TINY)?.f_sqrt()?.f_to_kind(Kind::Float)?)
 }
 
 #[cfg(test)]
@@ -146,14 +90,11 @@ mod tests {
 
     fn random(shape: &[i64]) -> Tensor {
         tch::manual_seed(3);
-        Tensor::randn(shape, (Kind::Double, tch::Device::Cpu))
+        Tensor::randn(shape, (tch::Kind::Double, tch::Device::Cpu))
     }
 
     fn loss(rows: &Tensor) -> f64 {
-        let ones = Tensor::ones([rows.size()[0]], (Kind::Double, tch::Device::Cpu));
-        low_rank_loss(rows, &ones, LowRankForm::Squared)
-            .unwrap()
-            .double_value(&[])
+        low_rank_loss(rows).unwrap().double_value(&[])
     }
 
     #[test]
@@ -178,9 +119,7 @@ mod tests {
             let mut rows = start.copy();
             for _ in 0..200 {
                 let leaf = rows.detach().set_requires_grad(true);
-                let ones = Tensor::ones([1], (Kind::Double, tch::Device::Cpu));
-                let loss = low_rank_loss(&leaf, &ones, LowRankForm::Squared).unwrap();
-                loss.backward();
+                low_rank_loss(&leaf).unwrap().backward();
                 rows = tch::no_grad(|| &leaf - leaf.grad() * rate);
             }
             (&rows - &goal).square().sum(None).double_value(&[])
@@ -190,20 +129,6 @@ mod tests {
         }
         let far = descend(1.05);
         assert!(far.is_nan() || far > 1.0, "{far}");
-    }
-
-    #[test]
-    fn the_losses_of_singular_values_are_those_of_the_decomposition() {
-        let rows = random(&[3, 6, 50]);
-        let (_, values, _) = rows.svd(true, true);
-        let second = values.narrow(1, 1, 1);
-        let ratio = &second / values.narrow(1, 0, 1);
-        let ones = Tensor::ones([3], (Kind::Double, tch::Device::Cpu));
-        for (form, wanted) in [(LowRankForm::Second, second), (LowRankForm::Ratio, ratio)] {
-            let found = low_rank_loss(&rows, &ones, form).unwrap().double_value(&[]);
-            let wanted = wanted.mean(None).double_value(&[]);
-            assert!((found - wanted).abs() < 1e-5, "{found} {wanted}");
-        }
     }
 
     proptest! {
@@ -251,10 +176,7 @@ mod tests {
     #[test]
     fn its_gradient_is_twice_the_rest() {
         let rows = random(&[1, 4, 30]).set_requires_grad(true);
-        let ones = Tensor::ones([1], (Kind::Double, tch::Device::Cpu));
-        low_rank_loss(&rows, &ones, LowRankForm::Squared)
-            .unwrap()
-            .backward();
+        low_rank_loss(&rows).unwrap().backward();
         let wanted = (rows.detach() - rank_one(&rows).unwrap()) * 2.0;
         let worst = (rows.grad() - wanted).abs().max().double_value(&[]);
         assert!(worst < 1e-4, "{worst}");

@@ -2,41 +2,26 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Tensor, no_grad};
 
 use super::error::TrainError;
 use relight_nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
 
 /// In which precision layers are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ComputePrecision {
     /// 32 bits.
     Single,
     /// bfloat16 inside convolutions, normalisations and layers; parameters and results have 32 bits.
     Mixed,
-    /// 64 bits, parameters and results too: for comparisons, in which rounding must not hide anything.
+    /// 64 bits, parameters and results too, several times slower: for comparisons, in which rounding must not hide anything.
+    /// Checkpoints keep 32 of them.
     Double,
 }
 
 impl ComputePrecision {
-    const ALL: [Self; 3] = [Self::Single, Self::Mixed, Self::Double];
-
-    /// Its name, as in settings.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Single => "single",
-            Self::Mixed => "mixed",
-            Self::Double => "double",
-        }
-    }
-
-    /// The one of a name.
-    #[must_use]
-    pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|one| one.name() == name)
-    }
-
     /// The type of parameters, of what goes in and of what comes out.
     #[must_use]
     pub fn kind(self) -> Kind {
@@ -105,13 +90,6 @@ impl Model {
         &self.parameters
     }
 
-    /// Computes its layers in another precision of the same [`ComputePrecision::kind`] from now on.
-    pub(super) fn set_precision(&mut self, precision: ComputePrecision) {
-        if precision.kind() == self.precision.kind() {
-            self.precision = precision;
-        }
-    }
-
     /// In which precision its layers are computed.
     #[must_use]
     pub fn precision(&self) -> ComputePrecision {
@@ -129,24 +107,12 @@ impl Model {
         Ok(())
     }
 
-    /// Wants gradients only of the parameters whose names begin so: all others stay as they are.
-    ///
-    /// # Errors
-    /// [`TrainError::Torch`].
-    pub(super) fn train_only(&mut self, prefix: &str) -> Result<(), TrainError> {
-        for (name, parameter) in &mut self.parameters {
-            *parameter = parameter.f_set_requires_grad(name.starts_with(prefix))?;
-        }
-        Ok(())
-    }
-
-    /// Adds 0 to the gradient of every parameter that is trained, so that all of those have one.
+    /// Adds 0 to the gradient of every parameter, so that all have one.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
     pub(super) fn add_zero_gradients(&self) -> Result<(), TrainError> {
-        let trained = |parameter: &&Tensor| parameter.requires_grad();
-        for parameter in self.parameters.values().filter(trained) {
+        for parameter in self.parameters.values() {
             parameter.f_sum(None)?.f_mul_scalar(0.0)?.f_backward()?;
         }
         Ok(())

@@ -13,7 +13,7 @@ const TINY: f64 = 1e-6;
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn network_input(srgb: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn network_input(srgb: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
     Ok(srgb.f_mul_scalar(2.0)?.f_add_scalar(-1.0)?.f_mul(mask)?)
 }
 
@@ -21,7 +21,7 @@ pub fn network_input(srgb: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError>
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn to_srgb(linear: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn to_srgb(linear: &Tensor) -> Result<Tensor, TrainError> {
     let light = linear.f_clamp(0.0, 1.0)?;
     let dark = light.f_mul_scalar(12.92)?;
     // The root's slope at 0 is infinite: there the line is taken, and the root must not be asked.
@@ -38,7 +38,7 @@ pub fn to_srgb(linear: &Tensor) -> Result<Tensor, TrainError> {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn normals_of_slopes(slopes: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn normals_of_slopes(slopes: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
     let length = slopes
         .f_square()?
         .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
@@ -55,7 +55,7 @@ pub fn normals_of_slopes(slopes: &Tensor, mask: &Tensor) -> Result<Tensor, Train
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn diffuse_shading(
+pub(crate) fn diffuse_shading(
     normals: &Tensor,
     coefficients: &Tensor,
     form: DiffuseForm,
@@ -80,7 +80,7 @@ pub fn diffuse_shading(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn power_highlight(
+pub(crate) fn power_highlight(
     normals: &Tensor,
     coefficients: &Tensor,
     reflectance: &Tensor,
@@ -170,7 +170,7 @@ fn power_terms(normals: &Tensor) -> Result<Tensor, TrainError> {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn answered_light(answer: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn answered_light(answer: &Tensor) -> Result<Tensor, TrainError> {
     let nine = answer.f_narrow(1, 0, 9)?;
     let length = nine
         .f_square()?
@@ -185,7 +185,7 @@ pub fn answered_light(answer: &Tensor) -> Result<Tensor, TrainError> {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn answered_gloss(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
+pub(crate) fn answered_gloss(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
     let reflectance = answer.f_narrow(1, 0, 3)?.f_softplus()?;
     let smoothness = answer
         .f_select(1, 3)?

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use tch::{Device, Tensor};
 
 use super::error::TrainError;
-use super::held_out::{highlight_figures, rank_figures};
+use super::held_out::{highlight_figures, rank_residual};
 use super::losses::angular_degrees;
 use super::low_rank::chromaticity;
-use super::model::{ComputePrecision, Model};
+use super::model::Model;
 use super::paper_phases::{
     PaperPhase, TruthLoss, diffuse_chromaticity, diffuse_of_truth, highlight_of, light_on_truth,
     normal_on_truth, normals_of, reflectance, reflectance_on_turns, saturated_frames,
@@ -28,8 +28,6 @@ pub struct PaperInputs {
     pub turns: Option<PathBuf>,
     /// A data set of turns that the networks are judged by, and that should not be among `turns`.
     pub held_out: Option<PathBuf>,
-    /// Frames with labels, in the layout of `relight synth`.
-    pub labels: Option<PathBuf>,
     /// Weights to begin with.
     pub weights: Option<Weights>,
     /// Spec-Net's weights.
@@ -64,7 +62,7 @@ impl PhaseNetworks {
     /// Reads the networks that the phase is given.
     ///
     /// # Errors
-    /// [`TrainError::Needed`] where one is missing, those of [`Model::new`].
+    /// [`TrainError::Refused`] where one is missing, those of [`Model::new`].
     pub(super) fn new(
         phase: PaperPhase,
         settings: &PaperSettings,
@@ -73,7 +71,7 @@ impl PhaseNetworks {
     ) -> Result<Self, TrainError> {
         let optional = |graph: Graph, weights: &Option<Weights>| {
             let model = weights.as_ref().map(|weights| {
-                let mut model = Model::new(graph, weights, device, precision(settings))?;
+                let mut model = Model::new(graph, weights, device, settings.run.precision)?;
                 model.set_trainable(false)?;
                 Ok::<_, TrainError>(model)
             });
@@ -187,12 +185,9 @@ impl PhaseNetworks {
             Self::Joint { light, spec } => whole(reflectance(own, light, spec.as_ref(), turns)?),
             Self::Normal | Self::Specular { .. } => return Ok(Vec::new()),
         };
-        let (raw, found) = (rank_figures(&raw, &mask)?, rank_figures(&found, &mask)?);
         Ok(vec![
-            ("pictures_residual", raw.0),
-            ("pictures_sigma_ratio", raw.1),
-            ("residual", found.0),
-            ("sigma_ratio", found.1),
+            ("pictures_residual", rank_residual(&raw, &mask)?),
+            ("residual", rank_residual(&found, &mask)?),
         ])
     }
 
@@ -201,17 +196,15 @@ impl PhaseNetworks {
         &self,
         own: &Model,
         turns: &TurnTensors,
-        settings: &PaperSettings,
     ) -> Result<Option<Tensor>, TrainError> {
-        let form = settings.loss.form;
         match self {
-            Self::Spec => spec_on_turns(own, turns, form),
+            Self::Spec => spec_on_turns(own, turns),
             Self::Normal => Ok(None),
             Self::Light { normal, spec } => {
-                reflectance_on_turns(normal, own, spec.as_ref(), turns, form).map(Some)
+                reflectance_on_turns(normal, own, spec.as_ref(), turns).map(Some)
             }
             Self::Joint { light, spec } => {
-                reflectance_on_turns(own, light, spec.as_ref(), turns, form).map(Some)
+                reflectance_on_turns(own, light, spec.as_ref(), turns).map(Some)
             }
             Self::Specular {
                 spec,
@@ -222,11 +215,8 @@ impl PhaseNetworks {
     }
 }
 
-pub(super) fn needed(phase: PaperPhase, option: &'static str) -> TrainError {
-    TrainError::Needed {
-        phase: phase.name(),
-        option,
-    }
+pub(super) fn needed(phase: PaperPhase, option: &str) -> TrainError {
+    TrainError::Refused(format!("relight train {} needs {option}", phase.name()))
 }
 
 /// The network that a phase trains.
@@ -237,13 +227,4 @@ pub(super) fn learned(phase: PaperPhase) -> Graph {
         PaperPhase::Light => light_net(Head::Pooled),
         PaperPhase::Specular => reflectance_net(Head::Pooled),
     }
-}
-
-/// Single where nothing else was asked for: these networks are small.
-pub(super) fn precision(settings: &PaperSettings) -> ComputePrecision {
-    settings
-        .run
-        .precision
-        .named()
-        .unwrap_or(ComputePrecision::Single)
 }

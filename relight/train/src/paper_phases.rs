@@ -16,7 +16,7 @@ use tch::Tensor;
 use super::decompose::{FULL_HIGHLIGHT, HIGHLIGHT_EMPHASIS, spread};
 use super::error::TrainError;
 use super::losses::{Mean, angular, scale_invariant};
-use super::low_rank::{LowRankForm, chromaticity, low_rank_loss};
+use super::low_rank::{chromaticity, low_rank_loss};
 use super::model::Model;
 use super::paper_layers::{
     answered_gloss, answered_light, diffuse_shading, network_input, normals_of_slopes,
@@ -94,7 +94,11 @@ impl PaperPhase {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn highlight_of(spec: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn highlight_of(
+    spec: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
     let answer = &spec.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
     let highlight = answer.f_add_scalar(1.0)?.f_mul_scalar(0.5)?;
     Ok(highlight.f_clamp(0.0, 1.0)?.f_mul(mask)?)
@@ -104,7 +108,11 @@ pub fn highlight_of(spec: &Model, picture: &Tensor, mask: &Tensor) -> Result<Ten
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn normals_of(normal: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn normals_of(
+    normal: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
     let slopes = &normal.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
     let (p, q) = (slopes.f_narrow(1, 0, 1)?, slopes.f_narrow(1, 1, 1)?);
     normals_of_slopes(&Tensor::f_cat(&[p, q.f_neg()?], 1)?, mask)
@@ -114,7 +122,11 @@ pub fn normals_of(normal: &Model, picture: &Tensor, mask: &Tensor) -> Result<Ten
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn light_of(light: &Model, picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+pub(crate) fn light_of(
+    light: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
     answered_light(&light.forward(&network_input(&to_srgb(picture)?, mask)?)?[0])
 }
 
@@ -142,9 +154,8 @@ pub(super) fn equal_rows(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainErro
         .f_unsqueeze(0)?)
 }
 
-fn low_rank(of: &Tensor, mask: &Tensor, form: LowRankForm) -> Result<Tensor, TrainError> {
-    let pixels = mask.f_narrow(0, 0, 1)?.f_sum(None)?.f_view([1])?;
-    low_rank_loss(&rows(of, mask)?, &pixels, form)
+fn low_rank(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+    low_rank_loss(&rows(of, mask)?)
 }
 
 /// The frames for which the gate of saturation opens Spec-Net, and their masks; none where they are fewer than two.
@@ -172,7 +183,7 @@ pub(super) fn saturated_frames(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn diffuse_chromaticity(
+pub(crate) fn diffuse_chromaticity(
     spec: &Model,
     picture: &Tensor,
     mask: &Tensor,
@@ -186,20 +197,19 @@ pub fn diffuse_chromaticity(
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn spec_on_turns(
+pub(crate) fn spec_on_turns(
     spec: &Model,
     turns: &TurnTensors,
-    form: LowRankForm,
 ) -> Result<Option<Tensor>, TrainError> {
     let Some((picture, mask)) = saturated_frames(turns)? else {
         return Ok(None);
     };
-    low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask, form).map(Some)
+    low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask).map(Some)
 }
 
 /// What an answer on composed samples comes to.
 #[derive(Debug)]
-pub struct TruthLoss {
+pub(crate) struct TruthLoss {
     /// Its loss.
     pub mean: Mean,
     /// What is answered.
@@ -212,7 +222,7 @@ pub struct TruthLoss {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
     let found = highlight_of(spec, &batch.picture, &batch.mask)?;
     let truth = batch.highlight.f_clamp(0.0, 1.0)?;
     let emphasis = truth
@@ -235,7 +245,7 @@ pub fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, Trai
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
     let found = normals_of(normal, &diffuse_of_truth(batch)?, &batch.mask)?;
     Ok(TruthLoss {
         mean: angular(&found, &batch.normals, &batch.mask)?,
@@ -248,7 +258,7 @@ pub fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, 
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+pub(crate) fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
     let coefficients = light_of(light, &diffuse_of_truth(batch)?, &batch.mask)?;
     let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released)?;
     let grey = shading.f_mean_dim([1_i64].as_slice(), true, None)?;
@@ -265,21 +275,20 @@ pub fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, Tr
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn reflectance_on_turns(
+pub(crate) fn reflectance_on_turns(
     normal: &Model,
     light: &Model,
     spec: Option<&Model>,
     turns: &TurnTensors,
-    form: LowRankForm,
 ) -> Result<Tensor, TrainError> {
-    low_rank(&reflectance(normal, light, spec, turns)?, &turns.mask, form)
+    low_rank(&reflectance(normal, light, spec, turns)?, &turns.mask)
 }
 
 /// The reflectance of a turn's frames: their diffuse pictures over the shading of the networks' normals and light.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn reflectance(
+pub(crate) fn reflectance(
     normal: &Model,
     light: &Model,
     spec: Option<&Model>,
@@ -326,7 +335,7 @@ fn gate(turns: &TurnTensors) -> Result<Tensor, TrainError> {
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub fn specular_on_turns(
+pub(crate) fn specular_on_turns(
     reflectance: &Model,
     (spec, normal, light): (&Model, &Model, &Model),
     turns: &TurnTensors,
@@ -451,9 +460,7 @@ mod tests {
         let mask = Tensor::ones([frames, 1, side, side], place);
         let residual = |picture: &Tensor| {
             let reflectance = picture / &shading;
-            crate::held_out::rank_figures(&reflectance, &mask)
-                .unwrap()
-                .0
+            crate::held_out::rank_residual(&reflectance, &mask).unwrap()
         };
         let (linear, file) = (residual(&picture), residual(&to_srgb(&picture).unwrap()));
         assert!(linear < 1e-6 && file > 0.002, "{linear} {file}");

@@ -9,16 +9,13 @@ use super::agreement::fingerprint;
 use super::composed::{ComposedBatches, buffer_settings, composition};
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, HeldOutTurns};
-use super::labelled::LabelledFrames;
-use super::learner::{Learner, LearnerSettings};
+use super::learner::Learner;
 use super::losses::Mean;
-use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed, precision};
+use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed};
 use super::paper_phases::PaperPhase;
-use super::process_group::ProcessGroup;
-use super::resources::Resources;
-use super::sample::TruthBatch;
+use super::process_group::{ProcessGroup, indivisible};
 use super::settings::{PaperSettings, first_difference};
-use super::task::{StepLosses, TrainingTask, Validation};
+use super::task::{Resources, StepLosses, TrainingTask, Validation};
 use super::turn_reader::{TurnGroup, TurnReader};
 use relight_nets::Weights;
 use relight_reader::Rank;
@@ -34,7 +31,6 @@ pub struct PaperTask {
     learner: Learner,
     composed: ComposedBatches,
     turns: Option<TurnReader>,
-    labels: Option<LabelledFrames>,
     rank: Rank,
     held_out_samples: HeldOutSamples,
     held_out_turns: Option<HeldOutTurns>,
@@ -44,7 +40,7 @@ impl PaperTask {
     /// Reads what samples are composed of, opens the turns, and makes the networks.
     ///
     /// # Errors
-    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Needed`] where the phase
+    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Refused`] where the phase
     /// needs what is not given.
     pub fn new(
         phase: PaperPhase,
@@ -57,35 +53,25 @@ impl PaperTask {
             return Err(needed(phase, "--turns"));
         }
         if inputs.turns.is_some() && !phase.learns_from_turns() {
-            return Err(TrainError::NotTaught {
-                phase: phase.name(),
-            });
+            return Err(TrainError::Refused(format!(
+                "relight train {} learns from composed samples, not from turns: leave --turns away",
+                phase.name()
+            )));
         }
         if inputs.held_out.is_some() && !phase.is_judged_by_turns() {
-            return Err(TrainError::NotJudged {
-                phase: phase.name(),
-            });
-        }
-        if inputs.labels.is_some() && phase == PaperPhase::Specular {
-            return Err(TrainError::NotLabelled {
-                phase: phase.name(),
-            });
+            return Err(TrainError::Refused(format!(
+                "relight train {} has no figures on turns: leave --held-out away",
+                phase.name()
+            )));
         }
         let graph = learned(phase);
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = inputs.weights.clone().unwrap_or_else(initial);
-        let learner = LearnerSettings {
-            adam: settings.run.adam(),
-            ema_decay: settings.run.ema_decay,
-            precision: precision(&settings),
-            device: resources.device,
-        };
+        let learner = settings.run.learner(resources.device);
+        let kind = learner.precision.kind();
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
-        let labels = |path: &PathBuf| LabelledFrames::open(path, stream(settings.run.seed, 32));
-        let held_out = |path: &PathBuf| {
-            HeldOutTurns::read(path, precision(&settings).kind(), resources.device)
-        };
+        let held_out = |path: &PathBuf| HeldOutTurns::read(path, kind, resources.device);
         let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
         // On them, nothing is known of the paper's smoothness.
         let samples = match phase {
@@ -93,7 +79,7 @@ impl PaperTask {
             _ => settings.data.validation,
         };
         Ok(Self {
-            held_out_samples: HeldOutSamples::new(&composition, samples, None),
+            held_out_samples: HeldOutSamples::new(&composition, samples),
             held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),
@@ -101,11 +87,10 @@ impl PaperTask {
             composed: ComposedBatches::new(
                 composition,
                 buffer_settings(&settings.data, &settings.run),
-                precision(&settings).kind(),
+                kind,
                 resources.clone(),
             ),
             turns: inputs.turns.as_ref().map(open).transpose()?,
-            labels: inputs.labels.as_ref().map(labels).transpose()?,
             rank: Rank::ONLY,
             settings,
             resources,
@@ -114,7 +99,7 @@ impl PaperTask {
 
     /// The type of what goes into the network.
     fn kind(&self) -> Kind {
-        precision(&self.settings).kind()
+        self.settings.run.precision.kind()
     }
 
     /// The losses on this process's groups of a step.
@@ -124,7 +109,7 @@ impl PaperTask {
             return Ok(());
         };
         let (mut values, mut damage) = (Vec::new(), Vec::new());
-        for group in 0..self.settings.turns.groups / u64::from(self.rank.world_size()) {
+        for _ in 0..self.settings.turns.groups / u64::from(self.rank.world_size()) {
             let TurnGroup {
                 frames,
                 damage: found,
@@ -132,9 +117,7 @@ impl PaperTask {
             damage.extend(found);
             if let Some(turns) = frames {
                 let own = &self.learner.model;
-                values.extend(self.networks.on_turns(own, &turns, &self.settings)?);
-                let name = format!("turns.{group}");
-                losses.batch.insert(name, turns.picture);
+                values.extend(self.networks.on_turns(own, &turns)?);
             }
         }
         losses.add_damage(&damage);
@@ -147,32 +130,6 @@ impl PaperTask {
             losses
                 .terms
                 .add_mean("turns", coefficient, Mean { value, over });
-        }
-        Ok(())
-    }
-
-    /// The loss on this process's frames with labels of a step.
-    fn on_labels(&self, step: u64, losses: &mut StepLosses) -> Result<(), TrainError> {
-        let Some(labels) = &self.labels else {
-            return Ok(());
-        };
-        let coefficient = self.settings.loss.labels;
-        let drawn = labels.batch(step, self.settings.turns.labelled);
-        losses.add_damage(&drawn.damage);
-        let frames = drawn.drawn();
-        let batch = match frames.as_slice() {
-            [] => None,
-            frames => Some(TruthBatch::new(frames, self.kind(), self.resources.device)?),
-        };
-        let loss = batch
-            .as_ref()
-            .map(|batch| self.networks.on_truth(&self.learner.model, batch));
-        match loss.transpose()?.flatten() {
-            Some(loss) => losses.terms.add_mean("labels", coefficient, loss.mean),
-            None => losses.terms.add_nothing("labels", coefficient),
-        }
-        for (name, tensor) in batch.iter().flat_map(TruthBatch::named) {
-            losses.batch.insert(format!("labels.{name}"), tensor);
         }
         Ok(())
     }
@@ -214,10 +171,6 @@ impl TrainingTask for PaperTask {
             .turns
             .as_ref()
             .map_or(String::new(), TurnReader::identity);
-        inputs += &self
-            .labels
-            .as_ref()
-            .map_or(String::new(), LabelledFrames::identity);
         for model in self.networks.given() {
             inputs += &fingerprint(model.parameters())?;
         }
@@ -231,17 +184,10 @@ impl TrainingTask for PaperTask {
         }
         if let Some(reader) = &mut self.turns {
             if !groups.is_multiple_of(u64::from(rank.world_size())) {
-                return Err(TrainError::Indivisible {
-                    name: "turns.groups",
-                    value: groups,
-                    of: rank.world_size(),
-                    needed: format!("a multiple of {}", rank.world_size()),
-                });
+                let needed = format!("a multiple of {}", rank.world_size());
+                return Err(indivisible("turns.groups", groups, rank, &needed));
             }
             reader.set_rank(rank)?;
-        }
-        if let Some(labels) = &mut self.labels {
-            labels.set_rank(rank);
         }
         self.rank = rank;
         Ok(())
@@ -256,10 +202,8 @@ impl TrainingTask for PaperTask {
                 losses.terms.add_mean("supervised", supervised, loss.mean);
                 losses.spreads.insert(loss.head, loss.spread);
             }
-            losses.batch.extend(batch.named());
         }
         self.on_turns(&mut losses)?;
-        self.on_labels(step, &mut losses)?;
         Ok(losses)
     }
 

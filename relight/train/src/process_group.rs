@@ -63,14 +63,14 @@ impl ProcessGroup {
     /// Meets the other processes; all of them are there when it returns.
     ///
     /// # Errors
-    /// [`TrainError::NotJoined`].
+    /// [`TrainError::Refused`].
     pub fn join(launch: &Launch) -> Result<Self, TrainError> {
-        let not_joined = |fault: String| TrainError::NotJoined {
-            process: launch.rank.index(),
-            of: launch.rank.world_size(),
-            address: launch.address.clone(),
-            port: launch.port,
-            fault,
+        let not_joined = |fault: String| {
+            let (process, of) = (launch.rank.index(), launch.rank.world_size());
+            let place = format!("{}:{}", launch.address, launch.port);
+            TrainError::Refused(format!(
+                "process {process} of {of} did not meet the others at {place} (MASTER_ADDR, MASTER_PORT): {fault}"
+            ))
         };
         let host = CString::new(launch.address.as_str());
         let host = host.map_err(|fault| not_joined(fault.to_string()))?;
@@ -170,7 +170,7 @@ impl ProcessGroup {
             // call, and nothing else uses it meanwhile; at most `REASON` bytes are written to `fault`.
             unsafe { relight_group_sum(self.raw.as_ptr(), raw, fault, REASON) }
         })
-        .map_err(|fault| TrainError::ProcessLost { fault })
+        .map_err(TrainError::ProcessLost)
     }
 
     /// Waits until the others are done as well, and closes the connections. A group that is dropped without it keeps
@@ -182,6 +182,12 @@ impl ProcessGroup {
             unsafe { relight_group_leave(self.raw.as_ptr()) }
         }
     }
+}
+
+/// That a setting cannot be divided among the processes.
+pub(super) fn indivisible(name: &str, value: u64, rank: Rank, needed: &str) -> TrainError {
+    let of = rank.world_size();
+    TrainError::Refused(format!("{name} is {value}: {of} processes need {needed}"))
 }
 
 /// Makes a call that answers 0, or writes a reason.

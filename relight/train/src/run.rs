@@ -18,7 +18,6 @@ use super::checkpoint::Checkpoint;
 use super::error::TrainError;
 use super::guard::Guard;
 use super::journal::Journal;
-use super::model::to_weights;
 use super::process_group::ProcessGroup;
 use super::settings::RunSettings;
 use super::task::{StepLosses, TrainingTask, Validation};
@@ -75,24 +74,13 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Begins a run in a folder, or goes on with the one that is there (`resume`).
+    /// Begins a run in a folder, or goes on with the one that is there (`resume`); among the processes of a group, all of
+    /// which open it with the same arguments.
     ///
     /// # Errors
-    /// [`TrainError::Occupied`], [`TrainError::Checkpoint`] where it is another run's, [`TrainError::Io`].
+    /// [`TrainError::Occupied`], [`TrainError::Checkpoint`] where it is another run's, [`TrainError::Io`];
+    /// [`TrainError::Refused`], [`TrainError::ProcessLost`].
     pub fn open(
-        task: &'a mut dyn TrainingTask,
-        settings: &'a RunSettings,
-        folder: &'a Path,
-        resume: bool,
-    ) -> Result<Self, TrainError> {
-        Self::open_among(task, settings, folder, resume, None)
-    }
-
-    /// The same among the processes of a group, all of which open the run, with the same arguments.
-    ///
-    /// # Errors
-    /// Those of [`Self::open`]; [`TrainError::Disagreement`], [`TrainError::Indivisible`], [`TrainError::ProcessLost`].
-    pub fn open_among(
         task: &'a mut dyn TrainingTask,
         settings: &'a RunSettings,
         folder: &'a Path,
@@ -144,8 +132,9 @@ impl<'a> Run<'a> {
     /// weights at the end.
     ///
     /// # Errors
-    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::EndedEarly`] where another process is lost: the
-    /// run is saved.
+    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Ended`] where another process is lost:
+    /// the run is
+    /// saved.
     pub fn finish(
         mut self,
         stop: &AtomicBool,
@@ -153,7 +142,7 @@ impl<'a> Run<'a> {
     ) -> Result<RunOutcome, TrainError> {
         let figures = match self.make_steps(stop, observer) {
             Ok(figures) => figures,
-            Err(lost @ TrainError::ProcessLost { .. }) => {
+            Err(lost @ TrainError::ProcessLost(_)) => {
                 return Err(self.end_early(lost, observer));
             }
             Err(fault) => return Err(fault),
@@ -241,28 +230,14 @@ impl<'a> Run<'a> {
         };
         // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.
         if !reduced.values.is_empty() {
-            self.check(&losses, &reduced)?;
+            self.guard
+                .check(self.step, &reduced.values, &reduced.spreads)?;
             let norm = self.descend(&losses, &reduced, learning_rate)?;
             self.log(&reduced, (learning_rate, norm), observer)?;
         }
         self.step += 1;
         self.cursor = self.task.cursor();
         Ok(reduced.stop)
-    }
-
-    /// Ends the run where something is wrong with the losses of a step.
-    fn check(&mut self, losses: &StepLosses, reduced: &AllReducedLosses) -> Result<(), TrainError> {
-        let (step, folder) = (self.step, self.folder);
-        let process = match &self.group {
-            Some(group) => format!("-process-{}", group.rank().index()),
-            None => String::new(),
-        };
-        self.guard
-            .check(step, &reduced.values, &reduced.spreads, || {
-                let path = folder.join(format!("bad-batch-{step}{process}.safetensors"));
-                to_weights(&losses.batch)?.write(&path, WeightPrecision::Single)?;
-                Ok(path)
-            })
     }
 
     /// Goes down the all-reduced loss; the norm of its gradient.
@@ -323,21 +298,18 @@ impl<'a> Run<'a> {
             Ok(()) => format!("its checkpoint is {path}: start all processes again with --resume"),
             Err(fault) => format!("it could not be saved: {}", with_causes(&fault)),
         };
-        TrainError::EndedEarly {
-            lost: Box::new(lost),
-            step: self.step,
-            saved,
-        }
+        let step = self.step;
+        TrainError::Ended(format!(
+            "{lost}; the run ends after {step} steps, and {saved}"
+        ))
     }
 
     /// Saves the run in process 0, and in others where that has ended and has not.
     fn save_as_successor(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
         if self.journal.is_none() {
             let begun = Instant::now();
-            while Journal::is_open(self.folder) && begun.elapsed() < SUCCESSION {
-                if self.is_saved() {
-                    return Ok(());
-                }
+            while Journal::is_open(self.folder) && !self.is_saved() && begun.elapsed() < SUCCESSION
+            {
                 std::thread::sleep(Duration::from_millis(500));
             }
             if self.is_saved() {
@@ -374,14 +346,13 @@ impl<'a> Run<'a> {
             .map(|(name, value)| (format!("validation/{name}"), *value))
             .collect();
         journal.scalars(self.step, &named)?;
-        if let Some((png, size)) = sheet {
+        if let Some(png) = sheet {
             let path = self.folder.join("validation.png");
             relit_data::durable::write_whole(&path, &png).map_err(|source| TrainError::Io {
                 path,
                 doing: "written",
                 source,
             })?;
-            journal.picture(self.step, "validation", size, png)?;
         }
         observer.validated(self.step, &figures);
         Ok(figures)

@@ -1,7 +1,5 @@
 //! One made picture with its truth, as the arrays that a batch is made of.
 
-use std::collections::BTreeMap;
-
 use glam::Vec3;
 use half::f16;
 use rayon::prelude::*;
@@ -12,7 +10,6 @@ use super::symmetry::Symmetry;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 use relight_nets::{INPUTS, LIGHT_OUTPUTS};
 use relight_photo::decompose::{EncodedPicture, PredictedLight};
-use relight_reader::TruthSample;
 use relight_synth::SynthSample;
 
 /// Planes of a sample: the input, the linear picture, shading, albedo, normals, highlight.
@@ -20,7 +17,7 @@ const PLANES: usize = INPUTS + 3 + 1 + 3 + 3 + 1;
 
 /// How the values of a made picture are taken for light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Linearisation {
+pub(crate) enum Linearisation {
     /// By the response of the camera that made it: the picture is exactly albedo times shading plus highlight.
     Exact,
     /// As sRGB, as a photograph is taken whose camera nobody knows.
@@ -39,7 +36,7 @@ pub struct TruthArrays {
 
 /// A sample in a batch.
 #[derive(Debug, Clone, Copy)]
-pub struct DrawnSample<'a> {
+pub(crate) struct DrawnSample<'a> {
     /// The sample.
     pub arrays: &'a TruthArrays,
     /// How it is seen, normals and all.
@@ -48,7 +45,7 @@ pub struct DrawnSample<'a> {
 
 /// A batch of them on a device, `batch x channels x height x width`.
 #[derive(Debug)]
-pub struct TruthBatch {
+pub(crate) struct TruthBatch {
     /// What the network sees.
     pub input: Tensor,
     /// 1 inside the mask, 1 channel.
@@ -69,11 +66,10 @@ pub struct TruthBatch {
 
 impl TruthArrays {
     /// The arrays of a sample.
-    #[must_use]
-    pub fn new(sample: &SynthSample<'_>, linearisation: Linearisation) -> Self {
+    pub(crate) fn new(sample: &SynthSample<'_>, linearisation: Linearisation) -> Self {
         let (picture, mask) = (
             linear(sample, linearisation),
-            sample.view().scene.buffer().mask(),
+            sample.view.scene.buffer().mask(),
         );
         let encoded = EncodedPicture::new(&picture, &mask);
         let extent = encoded.extent();
@@ -88,54 +84,13 @@ impl TruthArrays {
         let mean = mean_shading(sample);
         let truth = &mut values[(INPUTS + 3) * pixels..];
         fill_truth(sample, white, mean, truth, pixels);
-        let light = &sample.description().coefficients;
+        let light = sample.coefficients();
         let light = PredictedLight::of_light(light, f64::from(mean));
         Self {
             extent,
             values,
             light: light.numbers().map(|number| number as f32),
         }
-    }
-
-    /// The arrays of a picture whose ground truth was found otherwise. Its colours are taken for light as they stand.
-    ///
-    /// # Errors
-    /// The name of a part of the ground truth that is missing.
-    pub fn of_truth(sample: &TruthSample) -> Result<Self, &'static str> {
-        let picture = sample.image.as_ref().ok_or("image")?.planes();
-        let normals = sample.normals.as_ref().ok_or("normals")?;
-        let albedo = sample.albedo.as_ref().ok_or("albedo")?.planes();
-        let shading = grey(sample.shading.as_ref().ok_or("shading")?.planes());
-        let highlight = grey(sample.highlight.as_ref().ok_or("highlight")?.planes());
-        let encoded = EncodedPicture::new(picture, &sample.mask);
-        let white = encoded.white();
-        let covered = |at: usize| sample.mask.plane(0)[at] > 0.0;
-        let pixels = encoded.extent().pixels();
-        let lit = (0..pixels).filter(|&at| covered(at));
-        let total: f32 = lit.clone().map(|at| shading[at]).sum();
-        let mean = (total / lit.count().max(1) as f32).max(1e-6);
-
-        let mut planes: Vec<(Vec<f32>, f32)> = Vec::with_capacity(PLANES - INPUTS);
-        let whole = |planes: &Planes<3>| planes.planes().map(<[f32]>::to_vec);
-        planes.extend(whole(picture).map(|plane| (plane, 1.0 / white)));
-        planes.push((shading, 1.0 / mean));
-        planes.extend(whole(albedo).map(|plane| (plane, 1.0)));
-        planes.extend(whole(normals.planes()).map(|plane| (plane, 1.0)));
-        planes.push((highlight, 1.0 / white));
-
-        let mut values: Vec<f16> = encoded.values().iter().map(|&v| f16::from_f32(v)).collect();
-        for (plane, (truth, scale)) in planes.into_iter().enumerate() {
-            let is_truth = plane >= 3;
-            values.extend(truth.into_iter().enumerate().map(|(at, value)| {
-                let counts = !is_truth || covered(at);
-                f16::from_f32(if counts { value * scale } else { 0.0 })
-            }));
-        }
-        Ok(Self {
-            extent: encoded.extent(),
-            values,
-            light: [0.0; LIGHT_OUTPUTS],
-        })
     }
 
     /// Width and height.
@@ -145,15 +100,9 @@ impl TruthArrays {
     }
 }
 
-fn grey(light: &Planes<3>) -> Vec<f32> {
-    let [red, green, blue] = light.planes();
-    let channels = red.iter().zip(green).zip(blue);
-    channels.map(|((r, g), b)| (r + g + b) / 3.0).collect()
-}
-
 /// The mean of the shading; above 0, also of an object on which no light falls.
 fn mean_shading(sample: &SynthSample<'_>) -> f32 {
-    let shading = &sample.shaded().shading;
+    let shading = &sample.shaded.shading;
     let total: f32 = shading.iter().map(|light| light.element_sum() / 3.0).sum();
     (total / shading.len().max(1) as f32).max(1e-6)
 }
@@ -161,9 +110,9 @@ fn mean_shading(sample: &SynthSample<'_>) -> f32 {
 /// The ground truth at the covered pixels.
 fn fill_truth(sample: &SynthSample<'_>, white: f32, mean: f32, values: &mut [f16], pixels: usize) {
     let grey = |light: &Vec3| light.element_sum() / 3.0;
-    let (shaded, material) = (sample.shaded(), sample.material());
-    let buffer = sample.view().scene.buffer();
-    for (at, &pixel) in buffer.pixels().iter().enumerate() {
+    let (shaded, material) = (&sample.shaded, &sample.material);
+    let buffer = sample.view.scene.buffer();
+    for (at, &pixel) in buffer.pixels.iter().enumerate() {
         let (albedo, normal) = (material.albedo[at], material.normals[at]);
         let truth = [
             grey(&shaded.shading[at]) / mean,
@@ -190,16 +139,15 @@ fn visible_highlight(diffuse: Vec3, highlight: Vec3) -> f32 {
 
 /// The picture's light.
 fn linear(sample: &SynthSample<'_>, linearisation: Linearisation) -> Planes<3> {
-    let response = sample.description().camera.response;
     let level = |level: usize| {
         let value = level as f32 / 255.0;
         match linearisation {
-            Linearisation::Exact => response.decode(value),
+            Linearisation::Exact => sample.light_of(value),
             Linearisation::AsSrgb => Srgb::to_linear(value),
         }
     };
     let levels: [f32; 256] = std::array::from_fn(level);
-    let image = sample.image();
+    let image = &sample.image;
     let extent = Extent::new(image.width() as usize, image.height() as usize);
     Planes::from_fn(extent, |x, y| {
         image
@@ -214,7 +162,7 @@ impl TruthBatch {
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn new(
+    pub(crate) fn new(
         samples: &[DrawnSample<'_>],
         kind: Kind,
         device: Device,
@@ -245,24 +193,6 @@ impl TruthBatch {
             highlight: part(INPUTS + 10, 1)?,
             light: light.f_to_device(device)?.f_to_kind(kind)?,
         })
-    }
-}
-
-impl TruthBatch {
-    /// The tensors by name. They share their numbers.
-    #[must_use]
-    pub fn named(&self) -> BTreeMap<String, Tensor> {
-        [
-            ("input", &self.input),
-            ("picture", &self.picture),
-            ("shading", &self.shading),
-            ("albedo", &self.albedo),
-            ("normals", &self.normals),
-            ("highlight", &self.highlight),
-            ("light", &self.light),
-        ]
-        .map(|(name, tensor)| (name.to_owned(), tensor.shallow_clone()))
-        .into()
     }
 }
 
@@ -312,7 +242,10 @@ mod tests {
         };
         let batch = |mirrored: bool| {
             let arrays = &arrays;
-            let symmetry = Symmetry::mirror(mirrored);
+            let symmetry = Symmetry {
+                mirrored,
+                ..Symmetry::NONE
+            };
             let sample = DrawnSample { arrays, symmetry };
             TruthBatch::new(&[sample], Kind::Float, Device::Cpu).unwrap()
         };

@@ -6,19 +6,16 @@ use super::decompose::AnsweredTensors;
 use super::error::TrainError;
 use super::sample::TruthBatch;
 
-/// A PNG file and its width and height.
-type Sheet = (Vec<u8>, (usize, usize));
-
-/// The first samples of a batch, a row each: the picture; albedo, shading, normals and highlight, the ground truth left of
+/// The first samples of a batch as PNG, a row each: the picture; albedo, shading, normals and highlight, the ground truth left of
 /// each answer. Albedo and shading in the scale that suits the ground truth best.
 ///
 /// # Errors
-/// [`TrainError::Torch`], [`TrainError::Sheet`].
+/// [`TrainError::Torch`], [`TrainError::Encode`].
 pub(super) fn validation_sheet(
     batch: &TruthBatch,
     answer: &AnsweredTensors,
     rows: usize,
-) -> Result<Sheet, TrainError> {
+) -> Result<Vec<u8>, TrainError> {
     let mask = &batch.mask;
     let shown = |of: &Tensor| of.f_clamp(0.0, 1.0)?.f_pow_tensor_scalar(1.0 / 2.2);
     let scaled = |of: &Tensor, to: &Tensor| scaled_to(of, to, mask);
@@ -52,9 +49,10 @@ pub(super) fn validation_sheet(
     let (width, height) = (tiles.len() * width as usize, rows * height as usize);
     let values = Vec::<u8>::try_from(sheet)?;
     let picture = image::RgbImage::from_raw(width as u32, height as u32, values);
-    let picture = picture.ok_or(TrainError::Sheet)?;
-    let png = relit_data::shard::encode_rgb(&picture)?;
-    Ok((png, (width, height)))
+    let picture = picture.ok_or(TrainError::Fault(
+        "a sheet of answers could not be laid out",
+    ))?;
+    Ok(relit_data::shard::encode_rgb(&picture)?)
 }
 
 /// A map times the factor for each sample that brings it nearest to another.

@@ -11,17 +11,18 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::data_loader::{Composition, DataLoader, unit};
+use super::data_loader::{Composition, DataLoader, NOT_COMPOSED, unit};
 use super::error::TrainError;
-use super::resources::Resources;
+use super::process_group::indivisible;
 use super::sample::{DrawnSample, TruthArrays};
 use super::symmetry::Symmetry;
+use super::task::Resources;
 use relight_reader::Rank;
 use relight_synth::stream;
 
 /// How samples are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShuffleBufferSettings {
+pub(crate) struct ShuffleBufferSettings {
     /// Samples that are kept.
     pub capacity: u64,
     /// Samples of a view, at least 1.
@@ -43,7 +44,7 @@ struct SampleDraw {
 
 /// The buffer.
 #[derive(Debug)]
-pub struct ShuffleBuffer {
+pub(crate) struct ShuffleBuffer {
     settings: ShuffleBufferSettings,
     rank: Rank,
     loader: DataLoader,
@@ -57,7 +58,7 @@ impl ShuffleBuffer {
     ///
     /// # Errors
     /// Those of the loader; [`TrainError::Stopped`] where a run of one process is asked to stop meanwhile.
-    pub fn open(
+    pub(crate) fn open(
         settings: ShuffleBufferSettings,
         rank: Rank,
         composition: &Arc<Composition>,
@@ -82,15 +83,12 @@ impl ShuffleBuffer {
     ///
     /// # Errors
     /// Those of the loader.
-    pub fn batch(&mut self, step: u64) -> Result<Vec<DrawnSample<'_>>, TrainError> {
+    pub(crate) fn batch(&mut self, step: u64) -> Result<Vec<DrawnSample<'_>>, TrainError> {
         self.move_to(step, None)?;
         let draws = self.settings.draws(step, self.rank);
         draws
             .map(|draw| {
-                let arrays = self
-                    .samples
-                    .get(&draw.number)
-                    .ok_or(TrainError::DataLoader)?;
+                let arrays = self.samples.get(&draw.number).ok_or(NOT_COMPOSED)?;
                 let symmetry = draw.symmetry;
                 Ok(DrawnSample { arrays, symmetry })
             })
@@ -122,23 +120,18 @@ impl ShuffleBufferSettings {
     /// Whether batches can be divided so.
     ///
     /// # Errors
-    /// [`TrainError::Indivisible`].
-    pub fn check(self, rank: Rank) -> Result<(), TrainError> {
+    /// [`TrainError::Refused`].
+    pub(crate) fn check(self, rank: Rank) -> Result<(), TrainError> {
         let of = rank.world_size();
-        let indivisible = |name, value, needed| TrainError::Indivisible {
-            name,
-            value,
-            of,
-            needed,
-        };
         if !self.batch.is_multiple_of(u64::from(of)) {
             let needed = format!("a multiple of {of}");
-            return Err(indivisible("run.batch", self.batch, needed));
+            return Err(indivisible("run.batch", self.batch, rank, &needed));
         }
         if !self.classes().is_multiple_of(u64::from(of)) {
             let least = self.batch * self.lightings;
             let needed = format!("at least run.batch x data.lightings, {least}");
-            return Err(indivisible("data.shuffle_buffer", self.capacity, needed));
+            let (name, capacity) = ("data.shuffle_buffer", self.capacity);
+            return Err(indivisible(name, capacity, rank, &needed));
         }
         Ok(())
     }

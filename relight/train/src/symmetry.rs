@@ -6,7 +6,7 @@ use relight_core::image::Extent;
 
 /// One of them: the picture's axes are swapped, then each is turned over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Symmetry {
+pub(crate) struct Symmetry {
     /// Whether rows become columns; of square pictures only.
     pub transposed: bool,
     /// Whether left becomes right.
@@ -17,28 +17,18 @@ pub struct Symmetry {
 
 impl Symmetry {
     /// The picture as it is.
-    pub const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         transposed: false,
         mirrored: false,
         upside_down: false,
     };
 
     /// The one that the lowest three bits of a number say.
-    #[must_use]
-    pub fn of_bits(bits: u64) -> Self {
+    pub(crate) fn of_bits(bits: u64) -> Self {
         Self {
             mirrored: bits & 1 == 1,
             upside_down: bits & 2 == 2,
             transposed: bits & 4 == 4,
-        }
-    }
-
-    /// The picture or its mirror image.
-    #[must_use]
-    pub fn mirror(mirrored: bool) -> Self {
-        Self {
-            mirrored,
-            ..Self::NONE
         }
     }
 
@@ -166,6 +156,5 @@ mod tests {
             assert!(!all[..at].contains(one));
         }
         assert_eq!(all[0], Symmetry::NONE);
-        assert_eq!(Symmetry::mirror(true), all[1]);
     }
 }

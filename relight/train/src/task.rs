@@ -1,14 +1,27 @@
-//! What a run trains, and what it hears of it: the losses of a step, the figures of a validation.
+//! What a run trains, on what, and what it hears of it: the losses of a step, the figures of a validation.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-use tch::Tensor;
+use tch::Device;
 
 use super::error::TrainError;
 use super::learner::Learner;
 use super::process_group::ProcessGroup;
 use super::terms::LossTerms;
 use relight_synth::LeftOut;
+
+/// Where a run is computed, and with how many threads.
+#[derive(Debug, Clone)]
+pub struct Resources {
+    /// Where networks are computed.
+    pub device: Device,
+    /// Data-loader workers: threads that compose samples.
+    pub workers: usize,
+    /// Set to end a run early, also while its first samples are being composed.
+    pub stop: Arc<AtomicBool>,
+}
 
 /// What a run trains.
 pub trait TrainingTask {
@@ -32,7 +45,7 @@ pub trait TrainingTask {
     /// Takes this process's part of the work from now on. Called before the first step.
     ///
     /// # Errors
-    /// [`TrainError::Indivisible`] where the settings leave no equal parts.
+    /// [`TrainError::Refused`] where the settings leave no equal parts.
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
 
     /// What of a user's own files it does not use.
@@ -78,8 +91,6 @@ pub struct StepLosses {
     pub terms: LossTerms,
     /// How much each head's answers vary, in parts of the ground truth's variation.
     pub spreads: BTreeMap<&'static str, f64>,
-    /// The batch, to be saved where something is wrong with it. They share their numbers.
-    pub batch: BTreeMap<String, Tensor>,
     /// What was damaged in the data, and is not in the batch.
     pub damage: Option<String>,
 }
@@ -101,8 +112,8 @@ impl StepLosses {
 pub struct Validation {
     /// Figures by name.
     pub figures: BTreeMap<String, f64>,
-    /// A sheet of answers beside the ground truth, a PNG file, with its size.
-    pub sheet: Option<(Vec<u8>, (usize, usize))>,
+    /// A sheet of answers beside the ground truth, a PNG file.
+    pub sheet: Option<Vec<u8>>,
     /// What was damaged in the data, and is not in the figures.
     pub damage: Option<String>,
 }

@@ -36,7 +36,7 @@ impl LossTerms {
     }
 
     /// Adds a loss that is a mean over something else, as over pixels. Several of one name are parts of one loss.
-    pub fn add_mean(&mut self, name: &'static str, coefficient: f64, mean: Mean) {
+    pub(crate) fn add_mean(&mut self, name: &'static str, coefficient: f64, mean: Mean) {
         let mean = Some(mean);
         self.0.push(Term {
             name,
@@ -46,7 +46,7 @@ impl LossTerms {
     }
 
     /// Says that there is nothing in the batch that this loss could be taken of.
-    pub fn add_nothing(&mut self, name: &'static str, coefficient: f64) {
+    pub(crate) fn add_nothing(&mut self, name: &'static str, coefficient: f64) {
         let mean = None;
         self.0.push(Term {
             name,

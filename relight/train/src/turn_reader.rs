@@ -17,7 +17,7 @@ use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 const AHEAD: usize = 3;
 
 /// Reads a data set again and again, in an order that a seed shuffles.
-pub struct TurnReader {
+pub(crate) struct TurnReader {
     turns: Arc<Turns>,
     stream: Stream<Turns>,
     plan: DrawPlan,
@@ -37,7 +37,7 @@ impl std::fmt::Debug for TurnReader {
 
 /// Frames of one turn on a device.
 #[derive(Debug)]
-pub struct TurnTensors {
+pub(crate) struct TurnTensors {
     /// `frames x 3 x height x width`, linear, 0..=1, 0 outside the mask.
     pub picture: Tensor,
     /// `frames x 1 x height x width`, 0 or 1.
@@ -48,7 +48,7 @@ pub struct TurnTensors {
 
 /// What is left of a group of frames.
 #[derive(Debug)]
-pub struct TurnGroup {
+pub(crate) struct TurnGroup {
     /// Its frames; none where fewer than two can be read.
     pub frames: Option<TurnTensors>,
     /// What of it was damaged.
@@ -60,7 +60,7 @@ impl TurnReader {
     ///
     /// # Errors
     /// [`TrainError::Data`].
-    pub fn open(path: &Path, seed: u64) -> Result<Self, TrainError> {
+    pub(crate) fn open(path: &Path, seed: u64) -> Result<Self, TrainError> {
         let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
         let (plan, cursor) = (DrawPlan::of_turns(seed), Cursor::default());
         Ok(Self {
@@ -76,15 +76,14 @@ impl TurnReader {
     ///
     /// # Errors
     /// [`TrainError::Data`].
-    pub fn set_rank(&mut self, rank: Rank) -> Result<(), TrainError> {
+    pub(crate) fn set_rank(&mut self, rank: Rank) -> Result<(), TrainError> {
         self.plan.rank = rank;
         self.go_to(self.cursor)
     }
 
     /// Text that tells data sets apart: of each turn its name, the number of its samples, and the bytes that they are stored
     /// in.
-    #[must_use]
-    pub fn identity(&self) -> String {
+    pub(crate) fn identity(&self) -> String {
         let turns = self
             .turns
             .names()
@@ -96,8 +95,7 @@ impl TurnReader {
     }
 
     /// Where the next batch stands.
-    #[must_use]
-    pub fn cursor(&self) -> Cursor {
+    pub(crate) fn cursor(&self) -> Cursor {
         self.cursor
     }
 
@@ -105,7 +103,7 @@ impl TurnReader {
     ///
     /// # Errors
     /// [`TrainError::Data`].
-    pub fn go_to(&mut self, cursor: Cursor) -> Result<(), TrainError> {
+    pub(crate) fn go_to(&mut self, cursor: Cursor) -> Result<(), TrainError> {
         self.stream = start(&self.turns, self.plan, cursor)?;
         self.cursor = cursor;
         self.readable = cursor.epoch;
@@ -115,15 +113,19 @@ impl TurnReader {
     /// The next group of this process, in 32 or 64 bits.
     ///
     /// # Errors
-    /// [`TrainError::Torch`]; [`TrainError::NoFrames`] where a whole epoch has no group with two frames.
-    pub fn next_group(&mut self, kind: Kind, device: Device) -> Result<TurnGroup, TrainError> {
+    /// [`TrainError::Torch`]; [`TrainError::Refused`] where a whole epoch has no group with two frames.
+    pub(crate) fn next_group(
+        &mut self,
+        kind: Kind,
+        device: Device,
+    ) -> Result<TurnGroup, TrainError> {
         let (drawn, damage) = match self.stream.next() {
             Some(Ok(drawn)) => (drawn, None),
             Some(Err(damaged)) => {
                 let damage = relit_data::causes::with_causes(&damaged);
                 (damaged.rest, Some(damage))
             }
-            None => return Err(TrainError::NoFrames),
+            None => return Err(no_frames()),
         };
         self.cursor = drawn.next;
         let frames = if drawn.batch.frames.len() >= 2 {
@@ -134,10 +136,15 @@ impl TurnReader {
         };
         self.stream.give_back(drawn.batch);
         if self.cursor.epoch > self.readable + 1 {
-            return Err(TrainError::NoFrames);
+            return Err(no_frames());
         }
         Ok(TurnGroup { frames, damage })
     }
+}
+
+/// That a data set has no two frames of one turn that can be read.
+pub(super) fn no_frames() -> TrainError {
+    TrainError::Refused("the turns have no batch of two frames that can be read".to_owned())
 }
 
 fn start(turns: &Arc<Turns>, plan: DrawPlan, from: Cursor) -> Result<Stream<Turns>, TrainError> {

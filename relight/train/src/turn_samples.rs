@@ -1,6 +1,5 @@
 //! What the network of turns learns from: views of objects on the table, each in a random room, as tensors.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -107,8 +106,7 @@ impl TurnViews {
         let drawn: Result<Vec<Planes>, TrainError> = turns
             .par_iter()
             .map(|&(view, seed)| {
-                let view = self.cache.view(&self.library, view)?;
-                let drawn = DrawnTurn::draw(&view, &self.rooms, seed);
+                let drawn = self.cache.turn(&self.library, view, &self.rooms, seed)?;
                 let drawn = if is_coarse { drawn.halved() } else { drawn };
                 Ok(Planes::new(&drawn, phase_of(stream(seed, 1))))
             })
@@ -186,17 +184,5 @@ impl TurnBatch {
             log_albedo: stacked(3, |turn| &turn.log_albedo)?,
             mask: stacked(1, |turn| &turn.mask)?,
         })
-    }
-
-    /// Its tensors by name.
-    pub(super) fn named(&self) -> BTreeMap<String, Tensor> {
-        [
-            ("input", &self.input),
-            ("normals", &self.normals),
-            ("log_albedo", &self.log_albedo),
-            ("mask", &self.mask),
-        ]
-        .map(|(name, tensor)| (name.to_owned(), tensor.shallow_clone()))
-        .into()
     }
 }

@@ -5,16 +5,14 @@ use std::path::Path;
 use tch::{Kind, Tensor, no_grad};
 
 use super::error::TrainError;
-use super::learner::{Learner, LearnerSettings};
+use super::learner::Learner;
 use super::losses::{Mean, angular_degrees, chord};
-use super::model::ComputePrecision;
-use super::process_group::ProcessGroup;
-use super::resources::Resources;
+use super::process_group::{ProcessGroup, indivisible};
 use super::settings::{TurnNetworkSettings, first_difference};
-use super::task::{StepLosses, TrainingTask, Validation};
+use super::task::{Resources, StepLosses, TrainingTask, Validation};
 use super::terms::LossTerms;
 use super::turn_samples::{TurnBatch, TurnViews};
-use relight_nets::{ALBEDO_PARAMETERS, LOG_MEANS, Weights, turn_network};
+use relight_nets::{LOG_MEANS, Weights, turn_network};
 use relight_reader::Rank;
 use relight_synth::{DrawnTurn, LeftOut, stream};
 
@@ -55,22 +53,8 @@ impl TurnNetworkTask {
         let graph = turn_network();
         let initial = || Weights::initial(&graph, settings.run.seed);
         let weights = weights.cloned().unwrap_or_else(initial);
-        // Those of before there was a head for albedo.
-        let weights = weights.completed(&graph, ALBEDO_PARAMETERS, settings.run.seed);
-        let learner = Learner::new(
-            graph,
-            &weights,
-            LearnerSettings {
-                adam: settings.run.adam(),
-                ema_decay: settings.run.ema_decay,
-                precision: settings
-                    .run
-                    .precision
-                    .named()
-                    .unwrap_or(ComputePrecision::Single),
-                device: resources.device,
-            },
-        )?;
+        let learner = settings.run.learner(resources.device);
+        let learner = Learner::new(graph, &weights, learner)?;
         Ok(Self {
             training: TurnViews::for_training(&settings.data, views, settings.run.seed)?,
             validation: TurnViews::for_validation(&settings.data, views)?,
@@ -186,12 +170,12 @@ impl TrainingTask for TurnNetworkTask {
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
         let (batch, rank) = (self.settings.run.batch, group.rank());
         if !batch.is_multiple_of(u64::from(rank.world_size())) {
-            return Err(TrainError::Indivisible {
-                name: "run.batch",
-                value: batch,
-                of: rank.world_size(),
-                needed: "a multiple of their number".to_owned(),
-            });
+            return Err(indivisible(
+                "run.batch",
+                batch,
+                rank,
+                "a multiple of their number",
+            ));
         }
         self.rank = rank;
         Ok(())
@@ -216,7 +200,6 @@ impl TrainingTask for TurnNetworkTask {
         terms.add_mean("albedo", ALBEDO, albedo);
         Ok(StepLosses {
             terms,
-            batch: batch.named(),
             ..StepLosses::default()
         })
     }

@@ -1,8 +1,8 @@
-//! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [NORMALS] [metal]`.
+//! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [metal]`.
 //!
 //! TRUTH is a rendered session (`normal_gt.png`, `albedo_gt.png`, `truth.json`) or a folder that `relight synth --turn`
-//! wrote (`normal.png`, `albedo.png`, `turn.json`). NORMALS are those to start from, as `--normals` takes them; without
-//! it those of the shipped network. `metal` says how the light that is called known is fitted to the truth.
+//! wrote (`normal.png`, `albedo.png`, `turn.json`). `metal` says how the light that is called known is fitted to the
+//! truth.
 #![allow(clippy::print_stdout, reason = "the example is a program of its own")]
 
 use std::error::Error;
@@ -11,95 +11,66 @@ use std::path::Path;
 use std::time::Instant;
 
 use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
-use relight_core::light::NormalsFrame;
 use relight_core::light::{Normals, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::render::Surface;
 use relight_nets::{NetError, Weights};
 use relight_reader::{Encoding, SampleId, Source, Turns};
 use relight_turn::{
-    Conditioning, Elevation, MaterialKind, NormalsSource, ReadTurn, TableFrame, TableRotation,
-    TurnMaps, TurnNetwork, TurnOptions, TurnPrior, fit_turn_light, prior_albedo, prior_normals,
-    read_curves, solve_turn,
+    Elevation, MaterialKind, ReadTurn, SolvedTurn, TableFrame, TableRotation, TurnLight,
+    TurnNetwork, TurnNetworks, TurnOptions, fit_turn_light, read_curves, solve_turn,
 };
+use relit_data::rig::RotationDirection;
 use serde_json::Value;
-
-/// The weights for photographs that the program comes with.
-fn shipped() -> Result<Weights, NetError> {
-    weights("decompose.safetensors")
-}
 
 fn weights(name: &str) -> Result<Weights, NetError> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cli/weights");
     Weights::read(&folder.join(name))
 }
 
-/// Light from which a pixel counts as a highlight, in parts of white.
-const HIGHLIGHTS: [f32; 4] = [0.02, 0.05, 0.1, 0.2];
 /// Confidences above which the error is told.
 const LEVELS: [f32; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.9];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [shard, truth, normals @ ..] = arguments.as_slice() else {
+    let [shard, truth, kind @ ..] = arguments.as_slice() else {
         return Err("give a shard and its truth".into());
     };
-    let (normals, material) = match normals {
-        [normals @ .., kind] if kind == "metal" => (normals, MaterialKind::Metal),
-        normals => (normals, MaterialKind::Diffuse),
+    let material = match kind {
+        [kind] if kind == "metal" => MaterialKind::Metal,
+        _ => MaterialKind::Diffuse,
     };
     let (shard, truth) = (Path::new(shard), Path::new(truth));
-    let start = Instant::now();
     let turn = read_curves(shard, TableRotation::default(), &|_, _| {})?;
-    println!(
-        "read in {:.1} s; {:?}",
-        start.elapsed().as_secs_f64(),
-        Conditioning::of(&turn.curves)
-    );
-    println!("clipped {:.3}", turn.curves.clipped());
     let truth = Truth::read(truth, shard, &turn)?;
     let frame = TableFrame::new(truth.elevation);
-    let source = normals.first().map_or(NormalsSource::Own, |path| {
-        NormalsSource::of(Path::new(path))
-    });
-    let prior = prior_normals(&source, shipped, NormalsFrame::YUp, &turn.first, &turn.mask)?;
-    truth.angles("prior alone", &prior)?;
     let known = fit_turn_light(&turn.curves, &truth.surface, material, &frame)?;
-    let options = |light, prior| TurnOptions {
-        elevation: truth.elevation,
-        light,
-        prior,
-        ..TurnOptions::default()
+    let networks = TurnNetworks {
+        turn: TurnNetwork::new(&weights("turn.safetensors")?)?,
+        photo: weights("decompose.safetensors")?,
     };
-    truth.tell("light known", &turn, &options(Some(known.clone()), None))?;
-    truth.tell(
-        "light known, prior",
-        &turn,
-        &options(Some(known), Some(prior.clone().into())),
-    )?;
-    truth.tell("light unknown", &turn, &options(None, None))?;
-    truth.tell(
-        "light unknown, prior",
-        &turn,
-        &options(None, Some(prior.into())),
-    )?;
-    let network = TurnNetwork::new(&weights("turn.safetensors")?)?;
-    let found = TurnPrior::from(network.predict(&turn.curves, truth.elevation)?);
-    let seen = prior_albedo(&shipped()?, &turn.first, &turn.mask)?;
-    let prior = found.with_albedo_of_photographs(seen, &turn.mask);
-    truth.tell(
-        "light unknown, network of turns",
-        &turn,
-        &options(None, Some(prior)),
-    )
+    for (name, light) in [
+        ("light known", TurnLight::Given(known)),
+        ("light unknown", TurnLight::Unknown),
+    ] {
+        let options = TurnOptions {
+            rotation: Some(RotationDirection::CounterClockwise),
+            elevation: Some(truth.elevation),
+            light,
+            material: None,
+        };
+        let start = Instant::now();
+        let solved = solve_turn(shard, &options, &networks, &|_, _| {})?;
+        truth.tell(name, &solved)?;
+        println!("    {:.1} s", start.elapsed().as_secs_f64());
+    }
+    Ok(())
 }
 
 struct Truth {
     surface: Surface,
     mask: Vec<bool>,
     elevation: Elevation,
-    /// The most that each pixel shines anywhere in the turn, where that is known.
-    highlight: Option<Vec<f32>>,
 }
 
 impl Truth {
@@ -132,21 +103,17 @@ impl Truth {
         Ok(Self {
             mask: mask.collect(),
             surface: Surface::new(normals, albedo, None)?,
-            highlight: highlight(folder)?,
             elevation: Elevation::given(degrees)?,
         })
     }
 
-    /// Solves a turn, and says how far it is from the truth.
-    fn tell(
-        &self,
-        name: &str,
-        turn: &ReadTurn,
-        options: &TurnOptions,
-    ) -> Result<(), Box<dyn Error>> {
-        let start = Instant::now();
-        let found = solve_turn(&turn.curves, options)?;
-        let seconds = start.elapsed().as_secs_f64();
+    /// Says how far a solved turn is from the truth.
+    fn tell(&self, name: &str, solved: &SolvedTurn) -> Result<(), Box<dyn Error>> {
+        let SolvedTurn {
+            turn,
+            solution: found,
+            ..
+        } = solved;
         let normals = found.normals(&turn.curves);
         self.angles(name, &normals)?;
         let (truth, albedo) = (self.surface.albedo().planes(), found.albedo(&turn.curves));
@@ -160,23 +127,13 @@ impl Truth {
         let black = Planes::<3>::zeros(extent);
         let own = Comparison::new(extent, &truth.planes(), &black.planes(), &self.mask)?;
         println!(
-            "    albedo {:.3}, residual {:.3}, expected {:.1} deg, {seconds:.1} s",
+            "    albedo {:.3}, residual {:.3}, expected {:.1} deg, {:?}, {}",
             pair.mse(ScaleFit::Channel) / own.mse(ScaleFit::None),
             found.residual(),
             found.expected_error_deg(),
-        );
-        println!(
-            "    material {:?}, {:?}",
+            found.conditioning().verdict,
             found.material(),
-            found.materials()
         );
-        for start in found.initialisations() {
-            println!("    start {start:?}");
-        }
-        if let Some(highlight) = &self.highlight {
-            let maps = TurnMaps::new(&turn.curves, &found);
-            self.tell_highlights(highlight, &maps.highlight);
-        }
         let confidence = found.confidence(&turn.curves);
         for level in LEVELS {
             let mask: Vec<bool> = (0..self.mask.len())
@@ -202,26 +159,6 @@ impl Truth {
         Ok(())
     }
 
-    /// Which pixels shine by more than a level, found and true.
-    fn tell_highlights(&self, truth: &[f32], found: &Planes<1>) {
-        for level in HIGHLIGHTS {
-            let (mut both, mut of_truth, mut of_found) = (0.0, 0.0, 0.0);
-            let pairs = truth.iter().zip(found.plane(0)).zip(&self.mask);
-            for ((truth, found), _) in pairs.filter(|(_, mask)| **mask) {
-                let (is, seems) = (*truth >= level, *found >= level);
-                both += f64::from(u8::from(is && seems));
-                of_truth += f64::from(u8::from(is));
-                of_found += f64::from(u8::from(seems));
-            }
-            println!(
-                "    highlight >= {level}: {of_truth} of {} pixels, precision {:.2}, recall {:.2}",
-                self.mask.iter().filter(|&&mask| mask).count(),
-                both / f64::max(of_found, 1.0),
-                both / f64::max(of_truth, 1.0)
-            );
-        }
-    }
-
     fn angles(&self, name: &str, normals: &Normals<YUp>) -> Result<(), Box<dyn Error>> {
         let whole = normals.completed(&self.mask);
         let truth = self.surface.normals().planes().planes();
@@ -232,27 +169,6 @@ impl Truth {
         );
         Ok(())
     }
-}
-
-/// The most of the highlights of a simulated turn's frames, the mean of the channels; none where there are none.
-fn highlight(folder: &Path) -> Result<Option<Vec<f32>>, Box<dyn Error>> {
-    let Ok(lines) = fs::read_to_string(folder.join("frames.jsonl")) else {
-        return Ok(None);
-    };
-    let mut most: Vec<f32> = Vec::new();
-    for line in lines.lines() {
-        let frame: Value = serde_json::from_str(line)?;
-        let index = frame["index"].as_u64().ok_or("no index")?;
-        let white = frame["white"]["highlight"].as_f64().ok_or("no white")? as f32;
-        let path = folder.join(format!("highlight/{index:04}.png"));
-        let image = Rgb::<Linear>::read(&path, Transfer::Linear)?.into_planes();
-        let [r, g, b] = image.planes();
-        most.resize(r.len(), 0.0);
-        for (at, most) in most.iter_mut().enumerate() {
-            *most = most.max((r[at] + g[at] + b[at]) / 3.0 * white);
-        }
-    }
-    Ok(Some(most))
 }
 
 /// Where the frames lie in the video, by the first record.

@@ -7,12 +7,12 @@ use relight_core::captured_object::CapturedObjectError;
 use relight_core::files::{FolderFault, MovieError};
 use relight_core::image::{Extent, ImageError};
 use relight_core::light::{LightError, LightFileError, PanoramaError};
+use relight_nets::NetError;
 use relight_photo::decompose::DecomposeError;
 use relight_reader::OpenError;
 use relit_data::session::SessionError;
 
 use crate::observe::probe_place::ProbePlace;
-use crate::observe::verdict::LightVerdict;
 use crate::setting_error::SettingError;
 
 /// Why a turn cannot be solved, or what was found cannot be written.
@@ -77,19 +77,19 @@ pub enum TurnError {
     /// No light fits the curves.
     #[error("no light explains the turn: all of it is dark, or all of it is clipped")]
     NoLight,
-    /// The exposure was wrong.
-    #[error("no light explains the turn: {}", .0.advice().unwrap_or("it is wrongly exposed"))]
-    Unfit(LightVerdict),
-    /// A map of normals has another size than the frames.
-    #[error("the normals have {} x {} pixels, and the frames {} x {}", found.width, found.height, expected.width, expected.height)]
-    PriorSize {
+    /// A surface has another size than the frames.
+    #[error("the surface has {} x {} pixels, and the frames {} x {}", found.width, found.height, expected.width, expected.height)]
+    SurfaceSize {
         /// The size of the map.
         found: Extent,
         /// The size of the frames.
         expected: Extent,
     },
-    /// A network for normals cannot be used.
-    #[error("the normals to start from cannot be made")]
+    /// The network of turns fails.
+    #[error(transparent)]
+    Network(#[from] NetError),
+    /// The network of photographs fails.
+    #[error("the network of photographs cannot tell the albedo")]
     Decompose(#[from] DecomposeError),
     /// An image cannot be read or written.
     #[error(transparent)]
@@ -97,24 +97,6 @@ pub enum TurnError {
     /// The object cannot be made a file.
     #[error("the object cannot be written as a file that can be lit")]
     Asset(#[source] Box<CapturedObjectError>),
-    /// Metal has no diffuse part that a network could learn from.
-    #[error(
-        "the object is taken for metal, which has no albedo and shading apart: there are no labels of it"
-    )]
-    NoDiffusePart,
-    /// Normals and albedo are not observable.
-    #[error("no labels are written: the turn does not determine normals and albedo")]
-    NotObservable,
-    /// No pixel is confident enough.
-    #[error(
-        "no labels are written: no pixel's confidence reaches {least}, the highest is {most:.2}"
-    )]
-    NotConfident {
-        /// The least confidence that was asked for.
-        least: f32,
-        /// The largest there is.
-        most: f32,
-    },
     /// Light cannot be used.
     #[error(transparent)]
     Light(#[from] LightError),
@@ -138,7 +120,7 @@ pub enum TurnError {
         /// The path.
         path: PathBuf,
     },
-    /// The session whose video shows the surroundings cannot be read.
+    /// The session whose video shows the ball cannot be read.
     #[error(transparent)]
     Session(#[from] SessionError),
     /// The video is not that of the turn.

@@ -1,6 +1,7 @@
 //! Turns of a ball whose frames follow from the model itself: what is fitted has to be what they were made of.
 
 use std::sync::LazyLock;
+use std::time::Duration;
 
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
@@ -14,8 +15,9 @@ use crate::model::metal::MIRROR;
 use crate::model::shading::ShadingModel;
 use crate::observe::reading::TableRotation;
 use crate::{
-    CurveBuilder, Elevation, MaterialKind, ReadTurn, TableFrame, TableLight, TurnCurves,
-    TurnOptions, TurnSolution, solve_turn,
+    CurveBuilder, Elevation, HypothesisFigures, MaterialKind, PhaseFigure, PhaseHypothesis,
+    ReadTurn, RotationSource, SolvedTurn, TableFrame, TableLight, TurnCurves, TurnPrediction,
+    TurnSolution, solve_in_light,
 };
 
 pub(crate) const SIDE: usize = 24;
@@ -97,12 +99,9 @@ pub(crate) fn film(surface: &Surface, light: &ShLight, take: Take) -> TurnCurves
     builder.finish().unwrap()
 }
 
-pub(crate) fn known(light: &ShLight) -> TurnOptions {
-    TurnOptions {
-        elevation: elevation(),
-        light: Some(light.clone()),
-        ..TurnOptions::default()
-    }
+/// What is found of curves in a light that is known.
+pub(crate) fn solve(curves: &TurnCurves, light: &ShLight) -> TurnSolution {
+    solve_in_light(curves, light, elevation(), None)
 }
 
 /// The median of the angle between normals, degrees: at the rim a few pixels have two answers.
@@ -138,22 +137,19 @@ pub(crate) fn albedo_off(surface: &Surface, albedo: &Rgb<Linear>, gain: f32) -> 
 /// The ball's turn, and what is found of it in known light.
 pub(crate) static SOLVED: LazyLock<(ReadTurn, TurnSolution)> = LazyLock::new(|| {
     let turn = read(&ball(), &environment());
-    let solution = solve_turn(&turn.curves, &known(&environment())).unwrap();
+    let solution = solve(&turn.curves, &environment());
     (turn, solution)
 });
 
 /// What a reader makes of a take.
 pub(crate) fn read(surface: &Surface, light: &ShLight) -> ReadTurn {
-    let first_angles = vec![0.0, 120.0, 240.0];
     ReadTurn {
         name: "ball".to_owned(),
         curves: film(surface, light, TAKE),
         rotation: TableRotation::default(),
-        first: first_angles
-            .iter()
-            .map(|&angle| frame(surface, light, angle))
-            .collect(),
-        first_angles,
+        first: [0.0, 120.0, 240.0]
+            .map(|angle| frame(surface, light, angle))
+            .into(),
         sources: Vec::new(),
         origin: None,
         mask: mask(surface),
@@ -212,4 +208,43 @@ pub(crate) fn even_environment() -> ShLight {
     let mut even = ShLight::even(Order::TWO, [0.3; 3]);
     even.coefficients_mut()[3] = [0.01; 3];
     even
+}
+
+/// What the network of turns expects in the direction that was taken and in the other one, degrees.
+pub(crate) fn expecting(this: f32, other: f32) -> HypothesisFigures {
+    HypothesisFigures {
+        phase: PhaseHypothesis::First,
+        phases: vec![PhaseFigure {
+            phase: PhaseHypothesis::First,
+            expected_error_deg: this,
+        }],
+        other_direction_deg: other,
+    }
+}
+
+/// A network of turns that knows a surface, each channel of its albedo in a unit of its own, and expects such errors, degrees.
+pub(crate) fn knowing(surface: &Surface, expected_deg: f32) -> TurnPrediction {
+    let albedo = surface.albedo().planes();
+    let extent = surface.extent();
+    TurnPrediction {
+        normals: surface.normals().clone(),
+        expected_errors: Planes::filled(extent, [expected_deg]),
+        albedo: Rgb::new(Planes::from_fn(extent, |x, y| {
+            let [red, green, blue] = albedo.pixel(x, y);
+            [2.0 * red, 3.0 * green, 0.5 * blue]
+        })),
+        hypotheses: expecting(expected_deg, 2.0 * expected_deg),
+    }
+}
+
+/// A turn that was read with its rotation given, and what was found of it.
+pub(crate) fn solved(mut turn: ReadTurn, solution: TurnSolution) -> SolvedTurn {
+    turn.rotation.source = RotationSource::Given;
+    SolvedTurn {
+        turn,
+        solution,
+        network: expecting(10.0, 20.0),
+        ball: None,
+        reading: Duration::ZERO,
+    }
 }

@@ -7,10 +7,13 @@ use std::time::Instant;
 
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
+use relight_core::image::Transfer;
+use relight_core::light::NormalsFrame;
 use relight_core::parallel;
 use relight_nets::{InferenceEngine, NetError, OnnxRuntime, Weights};
 use relight_photo::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, WORKING_SIDE, WorkingSize,
+    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, SpecularGate,
+    WORKING_SIDE, WorkingSize,
 };
 use relight_photo::files::{
     DecompositionFigures, DecompositionFiles, FoundPhotos, PhotoInput, PhotoReading,
@@ -22,7 +25,7 @@ use serde_json::{Value, json};
 use crate::commands::CommandResult;
 use crate::photos::name_unused;
 use crate::shipped;
-use crate::values::{GateName, TransferName, YName};
+use crate::values::{GATES, NORMALS_Y, TRANSFERS, one_of};
 
 /// Each photograph takes its memory, gigabytes where it is large.
 const MOST_SIDE_BY_SIDE: usize = 4;
@@ -60,8 +63,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value_t = SizeName::S256)]
     size: SizeName,
     /// Separate highlights.
-    #[arg(long, value_enum, default_value_t = GateName::Auto)]
-    specular: GateName,
+    #[arg(long, default_value = "auto", value_parser = one_of(GATES))]
+    specular: SpecularGate,
     /// Leave out the mirror image: faster, and a little worse.
     #[arg(long)]
     no_mirror: bool,
@@ -70,14 +73,14 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE.onnx")]
     normals: Option<PathBuf>,
     /// Which way y points in that network's normals [default: as MoGe-2 and Metric3D have it, else up].
-    #[arg(long, value_enum, value_name = "WAY", requires = "normals")]
-    normals_y: Option<YName>,
+    #[arg(long, value_parser = one_of(NORMALS_Y), value_name = "WAY", requires = "normals")]
+    normals_y: Option<NormalsFrame>,
     /// What computes the network.
     #[arg(long, value_enum, default_value_t = EngineName::Tract)]
     engine: EngineName,
     /// How PNG, JPEG and WebP files are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
-    #[arg(long, value_enum)]
-    transfer: Option<TransferName>,
+    #[arg(long, value_parser = one_of(TRANSFERS))]
+    transfer: Option<Transfer>,
     /// Of each shard the first so many samples, which are spread over the turn.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     count: Option<u32>,
@@ -151,7 +154,7 @@ impl Arguments {
                 SizeName::Native => WorkingSize::Native,
             },
             mirror: !self.no_mirror,
-            specular: self.specular.into(),
+            specular: self.specular,
             ..DecomposeOptions::default()
         }
     }
@@ -160,7 +163,7 @@ impl Arguments {
         PhotoReading {
             mask: self.mask.clone(),
             rectangle: self.rect,
-            transfer: self.transfer.map(Into::into),
+            transfer: self.transfer,
         }
     }
 
@@ -176,7 +179,7 @@ impl Arguments {
         let engine = self.engine.engine(console)?;
         let mut decomposer = Decomposer::with_engine(&weights, WORKING_SIDE, engine)?;
         if let Some(path) = &self.normals {
-            decomposer.read_normals(path, self.normals_y.map(Into::into))?;
+            decomposer.read_normals(path, self.normals_y)?;
             let name = decomposer.normals_network().unwrap_or_default();
             let event = json!({ "event": "normals", "file": path, "network": name });
             console.say(&format!("{}: taken for {name}", path.display()), &event);

@@ -6,20 +6,21 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
 use relight_core::files::write_png;
-use relight_core::image::{Depth, Planes};
+use relight_core::image::{Depth, Planes, Transfer};
+use relight_core::light::NormalsFrame;
 use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
     EvalError, HighlightMethod, InsertionRecipe, IntrinsicBaseline, IntrinsicInput,
     IntrinsicMethod, LightMethod, NormalMethod, OrdinalMethod, Predictions, RelightMethod,
-    RelightingRecipe, RelightingSet, ScoreTable, TurnMethod, TurnNetworks, TurnSet,
-    evaluate_highlights, evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals,
-    evaluate_ordinal, evaluate_relighting, evaluate_turns, make_relighting,
+    RelightingRecipe, RelightingSet, ScoreTable, TurnMethod, TurnSet, evaluate_highlights,
+    evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal,
+    evaluate_relighting, evaluate_turns, make_relighting,
 };
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
 use relight_reader::{JudgedImages, TruthLayout, TruthSet};
 use relight_synth::Folders;
-use relight_turn::TurnNetwork;
+use relight_turn::{TurnNetwork, TurnNetworks};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde::Serialize;
@@ -29,7 +30,7 @@ use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::library::read_library;
 use crate::shipped;
-use crate::values::{TransferName, YName};
+use crate::values::{Choices, DIFFUSE_FORMS, NORMALS_Y, TRANSFERS, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -60,8 +61,8 @@ enum Protocol {
         #[command(flatten)]
         set: SetArguments,
         /// The image that baselines decompose.
-        #[arg(long, value_enum, default_value_t = InputName::Diffuse)]
-        input: InputName,
+        #[arg(long, default_value = "diffuse", value_parser = one_of(INPUTS))]
+        input: IntrinsicInput,
     },
     /// Normals: MSE, DSSIM and angles.
     Normals {
@@ -73,8 +74,8 @@ enum Protocol {
         #[command(flatten)]
         set: SetArguments,
         /// How shading follows from coefficients.
-        #[arg(long, value_enum, default_value_t = DiffuseName::Irradiance)]
-        diffuse: DiffuseName,
+        #[arg(long, default_value = "irradiance", value_parser = one_of(DIFFUSE_FORMS))]
+        diffuse: DiffuseForm,
     },
     /// Highlights: MSE and DSSIM of the highlight and of what it leaves.
     Highlight {
@@ -130,11 +131,11 @@ struct CommonArguments {
     predictions: Vec<PathBuf>,
     /// How PNG files of colour among the estimates are encoded; EXR is linear [default: as decomposition.json says, linear
     /// where there is none].
-    #[arg(long, value_enum, value_name = "SPACE")]
-    transfer: Option<TransferName>,
+    #[arg(long, value_name = "SPACE", value_parser = one_of(TRANSFERS))]
+    transfer: Option<Transfer>,
     /// Which way y points in estimated normals.
-    #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
-    normals_y: YName,
+    #[arg(long, value_name = "WAY", default_value = "up", value_parser = one_of(NORMALS_Y))]
+    normals_y: NormalsFrame,
     /// Write the table as JSON, with the scores of each image, to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -224,13 +225,7 @@ struct InsertionArguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum TurnMethodName {
-    /// From shapes inflated out of the outline.
-    Outline,
-    /// From the network of photographs.
-    Photo,
-    /// The network of turns alone.
-    Network,
-    /// From the network of turns.
+    /// In a light that is not known.
     Turn,
     /// In the true light.
     Light,
@@ -239,30 +234,16 @@ enum TurnMethodName {
 impl From<TurnMethodName> for TurnMethod {
     fn from(name: TurnMethodName) -> Self {
         match name {
-            TurnMethodName::Outline => Self::Outline,
-            TurnMethodName::Photo => Self::Photo,
-            TurnMethodName::Network => Self::Network,
-            TurnMethodName::Turn => Self::NetworkThenSolver,
+            TurnMethodName::Turn => Self::UnknownLight,
             TurnMethodName::Light => Self::KnownLight,
         }
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum InputName {
-    /// Without highlights.
-    Diffuse,
-    /// As it was taken.
-    Original,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum DiffuseName {
-    /// The light that arrives at the surface.
-    Irradiance,
-    /// As the paper's released code has it.
-    Released,
-}
+const INPUTS: Choices<IntrinsicInput> = &[
+    ("diffuse", "Without highlights", IntrinsicInput::Diffuse),
+    ("original", "As it was taken", IntrinsicInput::Original),
+];
 
 impl Arguments {
     /// What is wrong with the arguments together.
@@ -306,10 +287,7 @@ impl CommonArguments {
     }
 
     fn predictions(&self) -> impl Iterator<Item = Predictions> {
-        let folder = |path: &PathBuf| {
-            let transfer = self.transfer.map(Into::into);
-            Predictions::new(path.clone(), transfer, self.normals_y.into())
-        };
+        let folder = |path: &PathBuf| Predictions::new(path.clone(), self.transfer, self.normals_y);
         self.predictions.iter().map(folder)
     }
 }
@@ -347,12 +325,8 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 
 type Evaluated = Result<ScoreTable, Box<dyn Error>>;
 
-fn mit(arguments: &SetArguments, input: InputName, console: Console) -> Evaluated {
+fn mit(arguments: &SetArguments, input: IntrinsicInput, console: Console) -> Evaluated {
     let (set, split) = arguments.open()?;
-    let input = match input {
-        InputName::Diffuse => IntrinsicInput::Diffuse,
-        InputName::Original => IntrinsicInput::Original,
-    };
     let baselines = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
     let methods = with_predictions(baselines, &arguments.common, IntrinsicMethod::Predictions);
     let steps = set.names().len() * methods.len();
@@ -371,12 +345,8 @@ fn normals(arguments: &SetArguments, console: Console) -> Evaluated {
     })
 }
 
-fn light(arguments: &SetArguments, diffuse: DiffuseName, console: Console) -> Evaluated {
+fn light(arguments: &SetArguments, form: DiffuseForm, console: Console) -> Evaluated {
     let (set, split) = arguments.open()?;
-    let form = match diffuse {
-        DiffuseName::Irradiance => DiffuseForm::Irradiance,
-        DiffuseName::Released => DiffuseForm::Released,
-    };
     let baselines = [LightMethod::Even, LightMethod::Oracle];
     let methods = with_predictions(baselines, &arguments.common, LightMethod::Predictions);
     let steps = set.names().len() * methods.len();

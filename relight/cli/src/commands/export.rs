@@ -16,14 +16,13 @@ use relight_export::layers::to_layers;
 use relight_export::mesh::{MeshShape, ObjectMesh};
 use relight_export::source::read_object;
 use relight_export::{ExportError, blender};
-use relight_turn::RotationDirection;
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
+use relit_data::rig::RotationDirection;
 use serde::Deserialize;
 use serde_json::json;
 
 use crate::commands::CommandResult;
-use crate::values::DirectionName;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -65,10 +64,6 @@ pub(crate) struct Arguments {
     /// With --frames: the folder of relight turn that has the turn's light, for lights.lp.
     #[arg(long, value_name = "DIR", requires = "frames")]
     lamps: Option<PathBuf>,
-    /// With --lamps, for folders of before light.json said it: the rotation direction of the table, seen from above, as its
-    /// angle grows.
-    #[arg(long, value_enum, requires = "lamps")]
-    direction: Option<DirectionName>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -140,7 +135,7 @@ fn run_frames(arguments: &Arguments, frames: u32, console: Console) -> CommandRe
     };
     let lamp = match &arguments.lamps {
         None => None,
-        Some(folder) => Some(lamp(folder, arguments.direction)?),
+        Some(folder) => Some(lamp(folder)?),
     };
     let output = &arguments.output;
     let written = write_frames(&arguments.input, output, frames, lamp.as_ref())?;
@@ -173,8 +168,7 @@ fn run_frames(arguments: &Arguments, frames: u32, console: Console) -> CommandRe
 #[derive(Deserialize)]
 struct LightFigures {
     elevation: LightElevation,
-    /// None in files from before it was told.
-    rotation: Option<LightRotation>,
+    rotation: LightRotation,
 }
 
 #[derive(Deserialize)]
@@ -215,7 +209,7 @@ fn lamp_doubt(folder: &Path, shard: &Path) -> Result<Option<String>, Box<dyn Err
         return Err(wrong(format!("it is of the turn {}, not of {name}", solved.turn)).into());
     }
     let verdict = solved.conditioning.verdict;
-    let is_fit = ["good", "not_matt"].contains(&verdict.as_str());
+    let is_fit = ["good", "not_lambertian"].contains(&verdict.as_str());
     let doubt = || {
         format!(
             "the light of {} is not to be believed ({verdict})",
@@ -226,7 +220,7 @@ fn lamp_doubt(folder: &Path, shard: &Path) -> Result<Option<String>, Box<dyn Err
 }
 
 /// The lamp of a turn that was solved into a folder.
-fn lamp(folder: &Path, direction: Option<DirectionName>) -> Result<TurnLamp, Box<dyn Error>> {
+fn lamp(folder: &Path) -> Result<TurnLamp, Box<dyn Error>> {
     let light = ShLight::read(&folder.join("light.txt"))?;
     let path = folder.join("light.json");
     let wrong = |reason: String| ExportError::Figures {
@@ -236,23 +230,7 @@ fn lamp(folder: &Path, direction: Option<DirectionName>) -> Result<TurnLamp, Box
     let json = fs::read(&path).map_err(|error| wrong(error.to_string()))?;
     let figures: LightFigures =
         serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
-    let solved = figures.rotation.map(|rotation| rotation.direction);
-    let given = direction.map(RotationDirection::from);
-    let direction = match (solved, given) {
-        (Some(solved), Some(given)) if solved != given => {
-            return Err(wrong(format!(
-                "the turn was solved as {solved}, and its light is mirrored in the other direction: solve it again with \
-                 relight turn --direction {given}"
-            ))
-            .into());
-        }
-        (Some(direction), _) | (None, Some(direction)) => direction,
-        (None, None) => {
-            let reason = "it does not say which way the table turns: give --direction";
-            return Err(wrong(reason.to_owned()).into());
-        }
-    };
-    let turn = match direction {
+    let turn = match figures.rotation.direction {
         RotationDirection::CounterClockwise => TableTurn::CounterClockwise,
         RotationDirection::Clockwise => TableTurn::Clockwise,
     };

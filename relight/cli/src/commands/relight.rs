@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use relight_core::files::{MovieFormat, MovieWriter, OutputKind, write_picture};
+use relight_core::image::{Depth, Transfer};
 use relight_photo::decompose::Rectangle;
 use relight_photo::files::{FoundPhotos, InsertionError, PhotoInput, PhotoReading};
 use relight_photo::insert::{
@@ -21,8 +22,10 @@ use super::decompose::rectangle;
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::light::NewLightArguments;
-use crate::photos::{Bits, Network, NetworkArguments, globbed, name_unused, not_an_input};
-use crate::values::{TransferName, WhiteName};
+use crate::photos::{
+    BITS, Network, NetworkArguments, bits_fault, globbed, name_unused, not_an_input,
+};
+use crate::values::{TRANSFERS, WHITE_BALANCES, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -90,8 +93,8 @@ pub(crate) struct Arguments {
     #[arg(long, conflicts_with = "beside")]
     compare: bool,
     /// How the colour of the light is shown.
-    #[arg(long, value_enum, default_value = "light")]
-    white_balance: WhiteName,
+    #[arg(long, value_parser = one_of(WHITE_BALANCES), default_value = "light")]
+    white_balance: WhiteBalance,
     /// Brightness in stops. With 0 the strongest light is as strong as in the photograph.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_hyphen_values = true)]
     exposure: f32,
@@ -105,13 +108,13 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=16_384))]
     size: Option<u32>,
     /// Bits a channel of a PNG.
-    #[arg(long, value_enum, default_value = "8")]
-    bits: Bits,
+    #[arg(long, value_parser = one_of(BITS), default_value = "8")]
+    bits: Depth,
     #[command(flatten)]
     network: NetworkArguments,
     /// How PNG, JPEG and WebP photographs are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
-    #[arg(long, value_enum)]
-    transfer: Option<TransferName>,
+    #[arg(long, value_parser = one_of(TRANSFERS))]
+    transfer: Option<Transfer>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -154,7 +157,7 @@ impl Arguments {
             }
             None if self.turn.is_some() => ".mp4 or .webm",
             None => ".png, .jpg or .exr",
-            Some(_) => return self.bits.fault(&self.output),
+            Some(_) => return bits_fault(self.bits, &self.output),
         };
         Some(format!("--output {}: give {wanted}", self.output.display()))
     }
@@ -174,7 +177,7 @@ impl Arguments {
         PhotoReading {
             mask: self.mask.clone(),
             rectangle: self.rect,
-            transfer: self.transfer.map(Into::into),
+            transfer: self.transfer,
         }
     }
 
@@ -227,7 +230,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let run = Run {
         arguments,
         light: match arguments.light.read()? {
-            Some(light) => Some(WhiteBalance::from(arguments.white_balance).shown(light)?),
+            Some(light) => Some(arguments.white_balance.shown(light)?),
             None => None,
         },
         network: OnceLock::new(),
@@ -299,7 +302,7 @@ impl Run<'_> {
             _ => {
                 let turn = arguments.turned.to_radians();
                 let picture = shot.sheet(turn, arguments.companions())?;
-                write_picture(&output, &picture, arguments.bits.into())?;
+                write_picture(&output, &picture, arguments.bits)?;
                 1
             }
         };

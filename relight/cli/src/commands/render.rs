@@ -3,20 +3,20 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use rayon::prelude::*;
 use relight_core::captured_object::CapturedObject;
 use relight_core::files::{Map, MapFiles};
 use relight_core::files::{MovieFormat, MovieWriter};
-use relight_core::image::{Linear, Rgb, Srgb};
-use relight_core::light::{Direction, Order, Panorama, Rotation, ShLight};
+use relight_core::image::{Linear, Rgb, Transfer};
+use relight_core::light::{Direction, NormalsFrame, Order, Panorama, Rotation, ShLight};
 use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_for};
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_empty_folder;
-use crate::values::{TransferName, YName};
+use crate::values::{Choices, DIFFUSE_FORMS, NORMALS_Y, TRANSFERS, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -54,11 +54,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "STOPS", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     exposure: Exposure,
     /// The specular layer.
-    #[arg(long, value_enum, default_value_t = SpecularName::Lobe)]
-    specular: SpecularName,
+    #[arg(long, default_value = "lobe", value_parser = one_of(SPECULAR_FORMS))]
+    specular: SpecularForm,
     /// The diffuse layer.
-    #[arg(long, value_enum, default_value_t = DiffuseName::Irradiance)]
-    diffuse: DiffuseName,
+    #[arg(long, default_value = "irradiance", value_parser = one_of(DIFFUSE_FORMS))]
+    diffuse: DiffuseForm,
 }
 
 #[derive(Args)]
@@ -70,8 +70,8 @@ struct ObjectArguments {
     #[arg(long, value_name = "FILE", required_unless_present = "asset")]
     normals: Option<PathBuf>,
     /// Which way y points in the map of normals.
-    #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
-    normals_y: YName,
+    #[arg(long, value_name = "WAY", default_value = "up", value_parser = one_of(NORMALS_Y))]
+    normals_y: NormalsFrame,
     /// A grey image; the object is where it is at least one half [default: where there are normals].
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
@@ -85,8 +85,8 @@ struct ObjectArguments {
     #[arg(long, value_name = "FILE|VALUE", default_value = "50", value_parser = map)]
     smoothness: Map,
     /// How PNG and JPEG files of albedo and reflectance are encoded; EXR is linear.
-    #[arg(long, value_enum, default_value_t = TransferName::Srgb)]
-    transfer: TransferName,
+    #[arg(long, default_value = "srgb", value_parser = one_of(TRANSFERS))]
+    transfer: Transfer,
 }
 
 #[derive(Args)]
@@ -120,21 +120,18 @@ struct LightArguments {
     save_light: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum SpecularName {
-    /// The Blinn-Phong lobe in zonal harmonics: close to the ground truth.
-    Lobe,
-    /// The paper's formula, for the first nine coefficients.
-    Power,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum DiffuseName {
-    /// Shading is irradiance.
-    Irradiance,
-    /// As the paper's released code has it: |L00| and 0.1 more.
-    Released,
-}
+const SPECULAR_FORMS: Choices<SpecularForm> = &[
+    (
+        "lobe",
+        "The Blinn-Phong lobe in zonal harmonics: close to the ground truth",
+        SpecularForm::Lobe,
+    ),
+    (
+        "power",
+        "The paper's formula, for the first nine coefficients",
+        SpecularForm::Power,
+    ),
+];
 
 #[derive(Clone, Copy)]
 enum Exposure {
@@ -186,14 +183,8 @@ impl Arguments {
 
     fn look(&self, light: &ShLight) -> Look {
         Look {
-            diffuse: match self.diffuse {
-                DiffuseName::Irradiance => DiffuseForm::Irradiance,
-                DiffuseName::Released => DiffuseForm::Released,
-            },
-            specular: match self.specular {
-                SpecularName::Lobe => SpecularForm::Lobe,
-                SpecularName::Power => SpecularForm::Power,
-            },
+            diffuse: self.diffuse,
+            specular: self.specular,
             exposure: match self.exposure {
                 Exposure::Auto => exposure_for(light),
                 Exposure::Stops(stops) => stops.exp2() * relight_core::render::EXPOSURE,
@@ -214,12 +205,12 @@ impl ObjectArguments {
     fn files(&self, normals: &Path) -> MapFiles {
         MapFiles {
             normals: normals.to_owned(),
-            frame: self.normals_y.into(),
+            frame: self.normals_y,
             mask: self.mask.clone(),
             albedo: self.albedo.clone(),
             reflectance: self.reflectance.clone(),
             smoothness: self.smoothness.clone(),
-            transfer: self.transfer.into(),
+            transfer: self.transfer,
         }
     }
 }
@@ -246,7 +237,9 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let look = arguments.look(&light);
     let frames = arguments.turn.unwrap_or(1);
     match arguments.target() {
-        Target::Png(path) => encoded(still(arguments, &look, &surface, &light)?).write_png(path)?,
+        Target::Png(path) => still(arguments, &look, &surface, &light)?
+            .encode()
+            .write_png(path)?,
         Target::Exr(path) => still(arguments, &look, &surface, &light)?.write_exr(path)?,
         Target::Folder(folder) => {
             let bar = console.progress(frames.into(), "frames");
@@ -255,7 +248,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
                 let image = look.turned(&surface, &light, part(frame, frames))?;
                 let name = format!("{frame:0PLACES$}.png");
                 bar.inc(1);
-                encoded(image).write_png(&folder.join(name))
+                image.encode().write_png(&folder.join(name))
             })?;
             bar.finish_and_clear();
         }
@@ -264,7 +257,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             let mut movie = MovieWriter::create(path, format, surface.extent(), arguments.fps)?;
             for frame in 0..frames {
                 let image = look.turned(&surface, &light, part(frame, frames))?;
-                movie.push(&encoded(image))?;
+                movie.push(&image.encode())?;
                 bar.inc(1);
             }
             movie.finish()?;
@@ -293,10 +286,6 @@ fn still(
     } else {
         look.image(surface, light)
     }
-}
-
-fn encoded(image: Rgb<Linear>) -> Rgb<Srgb> {
-    image.encode()
 }
 
 /// How far the light has turned at a frame.

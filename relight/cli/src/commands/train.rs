@@ -15,8 +15,8 @@ use clap::{Args, Subcommand};
 use relight_nets::{NetError, Weights};
 use relight_train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
-    ProcessGroup, Resources, Run, RunOutcome, RunSettings, SettingsFile, TrainError, TrainObserver,
-    TrainingTask, TurnNetworkSettings, TurnNetworkTask, cuda_device, read_settings,
+    ProcessGroup, Resources, Run, RunOutcome, RunSettings, TrainError, TrainObserver, TrainingTask,
+    TurnNetworkSettings, TurnNetworkTask, cuda_device, read_settings,
 };
 use relit_console::{Console, Outcome, ProgressBar};
 use serde::Serialize;
@@ -48,8 +48,7 @@ Examples:
       four processes of one machine, each with its part of every batch; also by RANK, WORLD_SIZE, MASTER_ADDR,
       MASTER_PORT and LOCAL_RANK, as scripts of Slurm and operators of Kubernetes set them
 
-In the folder of a run: checkpoint.safetensors, losses.csv, event files for TensorBoard, validation.png, and at
-the end the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
+In the folder of a run: checkpoint.safetensors, losses.csv, validation.png, and at the end the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
 
 /// Signals within this time count as one: `timeout` sends two.
 const TOGETHER: Duration = Duration::from_secs(1);
@@ -99,9 +98,6 @@ struct PaperArguments {
     /// Turns that are not trained on: validations say how near to rank one their reflectance is.
     #[arg(long, value_name = "SHARDS")]
     held_out: Option<PathBuf>,
-    /// Frames with labels, as relight turn --labels and relight synth write them, beside turns and composed samples.
-    #[arg(long, value_name = "FOLDER")]
-    labels: Option<PathBuf>,
     /// Spec-Net's weights, for light, joint and specular.
     #[arg(long, value_name = "FILE")]
     spec: Option<PathBuf>,
@@ -138,9 +134,6 @@ struct RunArguments {
     /// Data-loader workers: threads that compose samples.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     workers: usize,
-    /// The old name of --workers, read in 0.3, not in 0.4.
-    #[arg(long, hide = true, value_name = "N", conflicts_with = "workers", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
-    composers: Option<usize>,
     /// Where the network is computed: cpu, cuda:N, or cuda: of several processes on a machine, a GPU for each.
     #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
     device: DeviceName,
@@ -191,39 +184,26 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 }
 
 fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
-    let settings = arguments.settings.as_deref();
-    let file = settings.map_or_else(|| Ok(DecomposeSettings::default().into()), read_settings)?;
+    let file = arguments.settings.as_deref();
+    let settings = file.map_or_else(|| Ok(DecomposeSettings::default()), read_settings)?;
     if arguments.print_settings {
-        return print_settings(&file, arguments, console);
+        return print_settings(&settings, console);
     }
     let processes = arguments.join(console)?;
-    if processes.is_first() {
-        arguments.tell_of_old_names(&file, console);
-    }
-    let settings = file.settings;
     let run = settings.run.clone();
     let weights = read_weights(arguments.weights.as_deref())?;
-    if settings.only.is_some() && weights.is_none() && !arguments.resume {
-        let message =
-            "`only` trains one head of a network that is there: give its weights by --weights FILE";
-        return Err(message.into());
-    }
     let resources = processes.resources.clone();
     let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
     train(&mut task, &run, (arguments, processes), console)
 }
 
 fn turn(arguments: &TurnArguments, console: Console) -> CommandResult {
-    let settings = arguments.run.settings.as_deref();
-    let file = settings.map_or_else(|| Ok(TurnNetworkSettings::default().into()), read_settings)?;
+    let file = arguments.run.settings.as_deref();
+    let settings = file.map_or_else(|| Ok(TurnNetworkSettings::default()), read_settings)?;
     if arguments.run.print_settings {
-        return print_settings(&file, &arguments.run, console);
+        return print_settings(&settings, console);
     }
     let processes = arguments.run.join(console)?;
-    if processes.is_first() {
-        arguments.run.tell_of_old_names(&file, console);
-    }
-    let settings = file.settings;
     let run = settings.run.clone();
     let weights = read_weights(arguments.run.weights.as_deref())?;
     let own = arguments.run.folder()?.join("views");
@@ -234,20 +214,15 @@ fn turn(arguments: &TurnArguments, console: Console) -> CommandResult {
 }
 
 fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
-    let file = PaperSettings::of_phase(phase, arguments.run.settings.as_deref())?;
+    let settings = PaperSettings::of_phase(phase, arguments.run.settings.as_deref())?;
     if arguments.run.print_settings {
-        return print_settings(&file, &arguments.run, console);
+        return print_settings(&settings, console);
     }
     let processes = arguments.run.join(console)?;
-    if processes.is_first() {
-        arguments.run.tell_of_old_names(&file, console);
-    }
-    let settings = file.settings;
     let run = settings.run.clone();
     let inputs = PaperInputs {
         turns: arguments.turns.clone(),
         held_out: arguments.held_out.clone(),
-        labels: arguments.labels.clone(),
         weights: read_weights(arguments.run.weights.as_deref())?,
         spec: read_weights(arguments.spec.as_deref())?,
         normal: read_weights(arguments.normal.as_deref())?,
@@ -263,33 +238,7 @@ struct Processes {
     group: Option<ProcessGroup>,
 }
 
-impl Processes {
-    fn is_first(&self) -> bool {
-        self.group.as_ref().is_none_or(ProcessGroup::is_first)
-    }
-}
-
 impl RunArguments {
-    /// Warns of names that this release still reads and the next one does not.
-    fn tell_of_old_names<S>(&self, file: &SettingsFile<S>, console: Console) {
-        let path = self.settings.as_deref().unwrap_or(Path::new(""));
-        for setting in &file.renamed {
-            let line = format!("{}: {setting}", path.display());
-            let event = json!({
-                "event": "renamed", "path": path.display().to_string(),
-                "old": format!("{}.{}", setting.table, setting.old), "new": format!("{}.{}", setting.table, setting.new),
-            });
-            console.warn_with(&line, &event);
-        }
-        if self.composers.is_some() {
-            let event = json!({ "event": "renamed", "old": "--composers", "new": "--workers" });
-            console.warn_with(
-                "--composers is now --workers: it is read, rename it before 0.4",
-                &event,
-            );
-        }
-    }
-
     fn folder(&self) -> Result<&Path, &'static str> {
         self.output
             .as_deref()
@@ -309,7 +258,7 @@ impl RunArguments {
         let group = launch.as_ref().map(ProcessGroup::join).transpose()?;
         let resources = Resources {
             device,
-            workers: self.composers.unwrap_or(self.workers),
+            workers: self.workers,
             // While processes wait for each other, signals end them: there is nothing to save.
             stop: stop_at_signals(group.is_some())?,
         };
@@ -335,13 +284,7 @@ fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
     path.map(Weights::read).transpose()
 }
 
-fn print_settings<S: Serialize>(
-    file: &SettingsFile<S>,
-    arguments: &RunArguments,
-    console: Console,
-) -> CommandResult {
-    arguments.tell_of_old_names(file, console);
-    let settings = &file.settings;
+fn print_settings(settings: &impl Serialize, console: Console) -> CommandResult {
     let event = json!({ "event": "settings", "settings": settings });
     console.say(toml::to_string(settings)?.trim_end(), &event);
     Ok(Outcome::Whole)
@@ -358,22 +301,29 @@ fn train(
     let group = processes.group;
     let process = group.as_ref().map_or(0, |group| group.rank().index());
     let folder = arguments.folder()?;
-    let run = Run::open_among(task, settings, folder, arguments.resume, group)?;
-    if process > 0 {
-        let outcome = run.finish(&stop, &mut OtherProcess { console, process })?;
-        return Ok(outcome_of(&outcome));
-    }
+    let run = Run::open(task, settings, folder, arguments.resume, group)?;
     let made = run.steps_made();
+    let bar = (process == 0).then(|| console.progress(settings.steps, "train"));
+    if let Some(bar) = &bar {
+        bar.set_position(made);
+        bar.reset_eta();
+    }
     let mut progress = RunProgress {
         console,
-        bar: console.progress(settings.steps, "train"),
+        process,
+        bar,
     };
-    progress.bar.set_position(made);
-    progress.bar.reset_eta();
     let outcome = run.finish(&stop, &mut progress)?;
-    progress.bar.finish_and_clear();
-    report(&outcome, console);
-    Ok(outcome_of(&outcome))
+    if let Some(bar) = progress.bar {
+        bar.finish_and_clear();
+        report(&outcome, console);
+    }
+    let is_incomplete = outcome.stopped || outcome.damaged;
+    Ok(if is_incomplete {
+        Outcome::Incomplete
+    } else {
+        Outcome::Whole
+    })
 }
 
 /// The flag that Ctrl-C and SIGTERM set. Where no launcher has started the program, another signal a second or more later ends it
@@ -397,14 +347,6 @@ fn stop_at_signals(is_launched: bool) -> io::Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-fn outcome_of(outcome: &RunOutcome) -> Outcome {
-    if outcome.stopped || outcome.damaged {
-        Outcome::Incomplete
-    } else {
-        Outcome::Whole
-    }
-}
-
 fn report(outcome: &RunOutcome, console: Console) {
     let files: Vec<String> = outcome
         .weights
@@ -425,63 +367,53 @@ fn report(outcome: &RunOutcome, console: Console) {
     );
 }
 
-/// Any process but the first says only what it alone knows.
-struct OtherProcess {
-    console: Console,
-    process: u32,
-}
-
-impl TrainObserver for OtherProcess {
-    fn step(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
-
-    fn damaged(&mut self, step: u64, what: &str) {
-        let process = self.process;
-        let event =
-            json!({ "event": "damaged", "step": step, "process": process, "message": what });
-        let line = format!("step {step}, process {process}: left out: {what}");
-        self.console.warn_with(&line, &event);
-    }
-
-    fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
-
-    fn saved(&mut self, _: u64, _: &Path) {}
-}
-
-/// Shows a run on the terminal.
+/// Shows a run on the terminal. Any process but the first has no bar, and says only what it alone knows.
 struct RunProgress {
     console: Console,
-    bar: ProgressBar,
+    process: u32,
+    bar: Option<ProgressBar>,
 }
 
 impl TrainObserver for RunProgress {
     fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>) {
+        let Some(bar) = &self.bar else { return };
         if let Some(loss) = losses.get("loss") {
-            self.bar.set_message(format!("train, loss {loss:.3}"));
+            bar.set_message(format!("train, loss {loss:.3}"));
         }
-        self.bar.set_position(step);
+        bar.set_position(step);
     }
 
     fn damaged(&mut self, step: u64, what: &str) {
-        let event = json!({ "event": "damaged", "step": step, "message": what });
-        let line = format!("step {step}: left out: {what}");
-        self.bar.suspend(|| self.console.warn_with(&line, &event));
+        let process = self.process;
+        match &self.bar {
+            Some(bar) => {
+                let event = json!({ "event": "damaged", "step": step, "message": what });
+                let line = format!("step {step}: left out: {what}");
+                bar.suspend(|| self.console.warn_with(&line, &event));
+            }
+            None => {
+                let event = json!({ "event": "damaged", "step": step, "process": process, "message": what });
+                let line = format!("step {step}, process {process}: left out: {what}");
+                self.console.warn_with(&line, &event);
+            }
+        }
     }
 
     fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>) {
-        if figures.is_empty() {
+        let Some(bar) = self.bar.as_ref().filter(|_| !figures.is_empty()) else {
             return;
-        }
+        };
         let text: Vec<String> = figures
             .iter()
             .map(|(name, value)| format!("{name} {value:.4}"))
             .collect();
         let event = json!({ "event": "validated", "step": step, "figures": figures });
         let line = format!("step {step}: {}", text.join(", "));
-        self.bar.suspend(|| self.console.say(&line, &event));
+        bar.suspend(|| self.console.say(&line, &event));
     }
 
     fn saved(&mut self, step: u64, path: &Path) {
-        if self.console.is_json() {
+        if self.console.is_json() && self.bar.is_some() {
             let path = path.display().to_string();
             let event = json!({ "event": "saved", "step": step, "path": path });
             self.console.say("", &event);

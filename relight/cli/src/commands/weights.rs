@@ -1,7 +1,7 @@
 //! `relight weights`: weights of networks from one format into another.
 
-use std::error::Error;
 use std::path::PathBuf;
+use std::slice;
 
 use clap::{Args, Subcommand, ValueEnum};
 use relight_nets::paper::{self, Head};
@@ -19,9 +19,7 @@ Examples:
   relight weights export net.pth -o net.safetensors --half
       what PyTorch saved, as a safetensors file of half precision
   relight weights export net.pth --net normal-net -o normal-net.onnx
-      the paper's Normal-Net for any ONNX engine, for pictures of 256 x 256 pixels
-  relight weights export a/decomposer.safetensors b/decomposer.safetensors -o mean.safetensors --half
-      the mean of two runs that began with the same weights";
+      the paper's Normal-Net for any ONNX engine, for pictures of 256 x 256 pixels";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -31,17 +29,15 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Check weights against a network, and write them with it as ONNX or alone as safetensors. Of several, the mean is
-    /// written.
+    /// Check weights against a network, and write them with it as ONNX or alone as safetensors.
     Export(Export),
 }
 
 #[derive(Args)]
 struct Export {
-    /// The weights (.safetensors, or a state dict that PyTorch saved: .pth, .pt). Several are those of runs that began with the
-    /// same weights.
-    #[arg(value_name = "IN", required = true)]
-    inputs: Vec<PathBuf>,
+    /// The weights (.safetensors, or a state dict that PyTorch saved: .pth, .pt).
+    #[arg(value_name = "IN")]
+    input: PathBuf,
     /// The file to write: .onnx or .safetensors.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
@@ -112,26 +108,15 @@ impl Export {
             .into_iter()
             .find(|known| ending.eq_ignore_ascii_case(known))
     }
-
-    /// The network, as the first weights have it, and the mean of all weights, each checked against it.
-    fn mean(&self) -> Result<(Graph, Weights), Box<dyn Error>> {
-        let read = self.inputs.iter().map(|input| Weights::read(input));
-        let all = read.collect::<Result<Vec<_>, _>>()?;
-        let graph = self.net.graph(&all[0]);
-        let mut fitted = Vec::with_capacity(all.len());
-        for (input, weights) in self.inputs.iter().zip(all) {
-            let weights = weights.fitted_to(&graph);
-            fitted.push(weights.map_err(|fault| format!("{}: {fault}", input.display()))?);
-        }
-        let mean = Weights::mean(&fitted).ok_or("the weights are of different networks")?;
-        Ok((graph, mean))
-    }
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let Verb::Export(export) = &arguments.verb;
-    not_an_input(&export.output, &export.inputs)?;
-    let (graph, weights) = export.mean()?;
+    not_an_input(&export.output, slice::from_ref(&export.input))?;
+    let weights = Weights::read(&export.input)?;
+    let graph = export.net.graph(&weights);
+    let weights = weights.fitted_to(&graph);
+    let weights = weights.map_err(|fault| format!("{}: {fault}", export.input.display()))?;
     if let Some(folder) = export.output.parent() {
         make_folder(folder)?;
     }

@@ -168,23 +168,6 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
 }
 
 #[test]
-fn of_the_weights_of_several_runs_the_mean_is_exported() {
-    let folder = Folder::new();
-    let of = |seed| Weights::initial(&decomposer(), seed);
-    for seed in [3, 4] {
-        let path = folder.path(&format!("{seed}.safetensors"));
-        of(seed).write(&path, WeightPrecision::Single).unwrap();
-    }
-    let command = "weights export 3.safetensors 4.safetensors -o of/both/mean.safetensors";
-    assert_eq!(
-        code_and_errors(&relight(&folder, command)),
-        (0, String::new())
-    );
-    let mean = Weights::read(&folder.path("of/both/mean.safetensors")).unwrap();
-    assert_eq!(Some(mean), Weights::mean(&[of(3), of(4)]));
-}
-
-#[test]
 fn the_weights_that_come_with_the_program_are_exported() {
     let folder = Folder::new();
     for (weights, net) in [("decompose", "decomposer"), ("turn", "turn-net")] {

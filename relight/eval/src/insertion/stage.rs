@@ -9,10 +9,10 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
-use relight_core::light::{Direction, LightError, LightSampler, Order, Panorama, Rotation};
+use relight_core::light::{LightError, LightSampler, Order, Panorama};
 use relight_synth::{
-    Environment, GBuffer, Library, Lighting, Material, Method, Occluder, Pose, Projection, Recipe,
-    SyntheticScene, SyntheticView, stream,
+    GBuffer, Library, Lighting, Material, Occluder, Pose, Projection, Recipe, SyntheticScene,
+    SyntheticView, stream,
 };
 
 /// Pixels of the rendering along a pixel of the picture.
@@ -114,12 +114,12 @@ impl Stage {
             projection: Projection::Orthographic,
             scene: SyntheticScene::shaded(buffer, Occluder::new(&mesh, placement), 16, own),
         };
-        let (_, mut material) = recipe.material(library, &view, number);
+        let mut material = recipe.material(library, &view, number);
         if stage.black_paint {
-            paint_black(&mut material, view.scene.buffer().object_points(), own);
+            paint_black(&mut material, &view.scene.buffer().object_points, own);
         }
         let occluder = Occluder::new(&mesh, placement);
-        let table = Table::under(mesh.positions(), placement, &occluder, recipe.size);
+        let table = Table::under(&mesh.positions, placement, &occluder, recipe.size);
         let old = Around::draw(library, &mut random)?;
         let new = Around::draw(library, &mut random)?;
         let before = table.lit(library, (&view, &material), &old, stream(own, 1));
@@ -198,16 +198,7 @@ impl<'a> Table<'a> {
     ) -> Lit {
         let width = around.radiance.extent().width;
         let turn = f64::from(TAU) * around.columns as f64 / width as f64;
-        let lighting = Lighting {
-            environment: Some(Environment {
-                panorama: around.panorama,
-                rotation: *Rotation::about(Direction::UP, turn).matrix(),
-                irradiance: Vec3::splat(IRRADIANCE),
-                method: Method::MonteCarlo,
-            }),
-            has_shadows: true,
-            ..Lighting::default()
-        };
+        let lighting = Lighting::of_panorama(around.panorama, turn, IRRADIANCE, true);
         let shaded = view
             .scene
             .light(material, &lighting, &library.panoramas, seed);

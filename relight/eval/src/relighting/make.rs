@@ -18,10 +18,8 @@ use super::set::{FILE, Index, ObjectEntry, Part, SCHEMA, light_file, object_fold
 use crate::{EvalError, EvalProgress};
 use relight_core::files::write_png;
 use relight_core::image::{Depth, Rgb};
-use relight_core::light::{Direction, Order, Rotation};
-use relight_synth::{
-    BlinnPhong, Environment, GBuffer, Library, Lighting, Material, Method, Recipe, Shaded, stream,
-};
+use relight_core::light::Order;
+use relight_synth::{BlinnPhong, GBuffer, Library, Lighting, Material, Recipe, Shaded, stream};
 
 /// Mean irradiance over all normals under each light: white then has half the value that clips.
 const IRRADIANCE: f32 = 0.5;
@@ -74,19 +72,9 @@ impl RelightingRecipe {
             let mut random =
                 Pcg64::seed_from_u64(stream(stream(self.seed, LIGHT_STREAM), number as u64));
             let panorama = number % library.panoramas.len();
-            let turn = Rotation::about(Direction::UP, TAU * unit(&mut random));
-            let environment = Environment {
-                panorama,
-                rotation: *turn.matrix(),
-                irradiance: Vec3::splat(IRRADIANCE),
-                method: Method::MonteCarlo,
-            };
+            let turn = TAU * unit(&mut random);
             let name = library.panoramas.name(panorama).unwrap_or_default();
-            let lighting = Lighting {
-                environment: Some(environment),
-                has_shadows: self.shadows,
-                ..Lighting::default()
-            };
+            let lighting = Lighting::of_panorama(panorama, turn, IRRADIANCE, self.shadows);
             (name.to_owned(), lighting)
         };
         (0..self.lights).map(lighting).collect()
@@ -234,7 +222,7 @@ fn make_object(
         return Ok(entry);
     }
     let view = synth.view(&object, &mesh, number as u64);
-    let (_, material) = synth.material(library, &view, number as u64);
+    let material = synth.material(library, &view, number as u64);
     let material = Material {
         gloss: Some(gloss),
         ..material

@@ -17,8 +17,8 @@ impl GBuffer {
     #[must_use]
     pub fn ambient_visibility(&self, occluder: &Occluder, rays: u32, seed: u64) -> Vec<f32> {
         let open = |k: usize| {
-            let turn = unit_of(mix(stream(seed, u64::from(self.pixels()[k]))));
-            let (normal, start) = (self.normals()[k], self.ray_starts()[k]);
+            let turn = unit_of(mix(stream(seed, u64::from(self.pixels[k]))));
+            let (normal, start) = (self.normals[k], self.ray_starts[k]);
             let free = (0..rays).filter(|&ray| {
                 let direction = cosine_direction(normal, ray, rays, turn);
                 !occluder.blocks(start, direction, REACH)
@@ -31,16 +31,16 @@ impl GBuffer {
 
     /// Mean over the neighbours (5 x 5) that lie in nearly the same plane.
     fn smoothed(&self, values: &[f32]) -> Vec<f32> {
-        let side = self.size() as i64;
+        let side = self.size as i64;
         let mut place = vec![u32::MAX; (side * side) as usize];
-        for (k, &pixel) in (0_u32..).zip(self.pixels()) {
+        for (k, &pixel) in (0_u32..).zip(&self.pixels) {
             place[pixel as usize] = k;
         }
         let near = 6.0 / side as f32;
         let mean = |k: usize| {
-            let pixel = i64::from(self.pixels()[k]);
+            let pixel = i64::from(self.pixels[k]);
             let (column, row) = (pixel % side, pixel / side);
-            let (normal, point) = (self.normals()[k], self.points()[k]);
+            let (normal, point) = (self.normals[k], self.points[k]);
             let (mut sum, mut total) = (0.0, 0.0);
             for y in (row - 2).max(0)..(row + 3).min(side) {
                 for x in (column - 2).max(0)..(column + 3).min(side) {
@@ -48,8 +48,8 @@ impl GBuffer {
                     let Some(&value) = values.get(other) else {
                         continue;
                     };
-                    let alike = normal.dot(self.normals()[other]).max(0.0).powi(8);
-                    let off = normal.dot(self.points()[other] - point) / near;
+                    let alike = normal.dot(self.normals[other]).max(0.0).powi(8);
+                    let off = normal.dot(self.points[other] - point) / near;
                     let weight = alike * (1.0 - off * off).max(0.0);
                     sum += value * weight;
                     total += weight;
@@ -118,7 +118,7 @@ mod tests {
             Vec3::Z * height,
         );
         let open = buffer.ambient_visibility(&Occluder::new(&ball, lifted), 256, 5);
-        for (point, open) in buffer.points().iter().zip(open) {
+        for (point, open) in buffer.points.iter().zip(open) {
             let distance = (point.truncate().length_squared() + height * height).sqrt();
             let blocked = (radius / distance).powi(2) * height / distance;
             assert!(

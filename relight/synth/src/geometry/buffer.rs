@@ -12,26 +12,31 @@ use relight_core::light::{Normals, YUp};
 const LIFT: f32 = 1e-3;
 
 /// What is seen of an object, pixel by pixel: made once, it can be given any albedo and any light.
-/// Only covered pixels are kept, row by row from the upper left; all lists run along them.
+/// Only covered pixels are kept, row by row from the upper left; all lists run along them, in the viewer's frame unless told
+/// otherwise.
 #[derive(Debug, Clone)]
 pub struct GBuffer {
-    size: u32,
-    pixels: Vec<u32>,
-    surface: Surface,
-    gradient_map: Mat3,
-}
-
-/// The surface at the covered pixels, in the viewer's frame unless told otherwise.
-#[derive(Debug, Clone, Default)]
-struct Surface {
-    points: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    towards_eye: Vec<Vec3>,
-    ray_starts: Vec<Vec3>,
-    object_points: Vec<Vec3>,
-    texture: Option<Vec<Vec2>>,
+    /// Width and height of the picture, pixels.
+    pub size: u32,
+    /// The covered pixels, ascending: row times size plus column.
+    pub pixels: Vec<u32>,
+    /// Where the surface is.
+    pub(crate) points: Vec<Vec3>,
+    /// Unit normals; they never face away from the eye.
+    pub normals: Vec<Vec3>,
+    /// Unit vectors to the eye.
+    pub towards_eye: Vec<Vec3>,
+    /// Where rays of light start: a little above the surface, and lifted where facets are flatter than the normals say
+    /// (Hanika, "Hacking the Shadow Terminator", 2021).
+    pub(crate) ray_starts: Vec<Vec3>,
+    /// Where the surface is in the mesh's own frame, within the unit sphere: patterns stick to it.
+    pub object_points: Vec<Vec3>,
+    /// Texture coordinates, where the mesh has them.
+    pub(crate) texture: Option<Vec<Vec2>>,
     /// None of a mesh whose file says nothing of it.
     own: Vec<OwnSurface>,
+    /// Takes the gradient of a height, in the mesh's own frame and unit, into the viewer's frame.
+    pub(crate) gradient_map: Mat3,
 }
 
 impl GBuffer {
@@ -39,36 +44,31 @@ impl GBuffer {
     /// pixels.
     pub fn render(mesh: &Mesh, placement: Affine3A, projection: Projection, size: u32) -> Self {
         let posed = Posed::new(mesh, placement, projection, size);
-        let seen = foremost(size, &posed.projected, mesh.triangles());
+        let seen = foremost(size, &posed.projected, &mesh.triangles);
         let covered = (0_u32..)
             .zip(&seen)
             .filter(|(_, triangle)| **triangle != NOTHING);
         let count = covered.clone().count();
+        let list = || Vec::with_capacity(count);
         let mut buffer = Self {
             size,
             pixels: Vec::with_capacity(count),
-            surface: Surface::with_capacity(count, mesh.texture().is_some()),
+            points: list(),
+            normals: list(),
+            towards_eye: list(),
+            ray_starts: list(),
+            object_points: list(),
+            texture: mesh.texture().map(|_| Vec::with_capacity(count)),
+            own: Vec::new(),
             gradient_map: without_scale(posed.normal_map),
         };
         for (pixel, &triangle) in covered {
             let (column, row) = (pixel % size, pixel / size);
-            if posed.resolve(triangle, column, row, &mut buffer.surface) {
+            if posed.resolve(triangle, column, row, &mut buffer) {
                 buffer.pixels.push(pixel);
             }
         }
         buffer
-    }
-
-    /// Width and height of the picture, pixels.
-    #[must_use]
-    pub fn size(&self) -> u32 {
-        self.size
-    }
-
-    /// The covered pixels, ascending: row times size plus column.
-    #[must_use]
-    pub fn pixels(&self) -> &[u32] {
-        &self.pixels
     }
 
     /// Number of covered pixels.
@@ -83,54 +83,10 @@ impl GBuffer {
         self.pixels.is_empty()
     }
 
-    /// Where the surface is.
-    #[must_use]
-    pub fn points(&self) -> &[Vec3] {
-        &self.surface.points
-    }
-
-    /// Unit normals; they never face away from the eye.
-    #[must_use]
-    pub fn normals(&self) -> &[Vec3] {
-        &self.surface.normals
-    }
-
-    /// Unit vectors to the eye.
-    #[must_use]
-    pub fn towards_eye(&self) -> &[Vec3] {
-        &self.surface.towards_eye
-    }
-
-    /// Where the surface is in the mesh's own frame, within the unit sphere: patterns stick to it.
-    #[must_use]
-    pub fn object_points(&self) -> &[Vec3] {
-        &self.surface.object_points
-    }
-
-    /// Texture coordinates, where the mesh has them.
-    #[must_use]
-    pub fn texture(&self) -> Option<&[Vec2]> {
-        self.surface.texture.as_deref()
-    }
-
     /// How the mesh's own file says that the surface looks, where it says anything.
-    #[must_use]
-    pub fn own_surface(&self) -> Option<&[OwnSurface]> {
-        let own = &self.surface.own;
+    pub(crate) fn own_surface(&self) -> Option<&[OwnSurface]> {
+        let own = &self.own;
         (own.len() == self.len() && !own.is_empty()).then_some(own)
-    }
-
-    /// Where rays of light start: a little above the surface, and lifted where facets are flatter
-    /// than the normals say (Hanika, "Hacking the Shadow Terminator", 2021).
-    #[must_use]
-    pub fn ray_starts(&self) -> &[Vec3] {
-        &self.surface.ray_starts
-    }
-
-    /// Takes the gradient of a height, in the mesh's own frame and unit, into the viewer's frame.
-    #[must_use]
-    pub fn gradient_map(&self) -> Mat3 {
-        self.gradient_map
     }
 
     /// A full picture with these values at the covered pixels and `empty` elsewhere.
@@ -217,20 +173,6 @@ fn transposed_means(picture: &[Vec4], side: usize, radius: usize) -> Vec<Vec4> {
     result
 }
 
-impl Surface {
-    fn with_capacity(count: usize, is_textured: bool) -> Self {
-        Self {
-            points: Vec::with_capacity(count),
-            normals: Vec::with_capacity(count),
-            towards_eye: Vec::with_capacity(count),
-            ray_starts: Vec::with_capacity(count),
-            object_points: Vec::with_capacity(count),
-            texture: is_textured.then(|| Vec::with_capacity(count)),
-            own: Vec::new(),
-        }
-    }
-}
-
 /// A mesh in its place before the camera.
 struct Posed<'a> {
     mesh: &'a Mesh,
@@ -243,7 +185,7 @@ struct Posed<'a> {
 impl<'a> Posed<'a> {
     fn new(mesh: &'a Mesh, placement: Affine3A, projection: Projection, size: u32) -> Self {
         let moved = mesh
-            .positions()
+            .positions
             .iter()
             .map(|&p| placement.transform_point3(p));
         let positions: Vec<Vec3> = moved.collect();
@@ -268,8 +210,8 @@ impl<'a> Posed<'a> {
     }
 
     /// Adds what is seen of a triangle at a pixel; false where, by rounding, the pixel is missed.
-    fn resolve(&self, number: u32, column: u32, row: u32, surface: &mut Surface) -> bool {
-        let corners = self.mesh.triangles()[number as usize];
+    fn resolve(&self, number: u32, column: u32, row: u32, surface: &mut GBuffer) -> bool {
+        let corners = self.mesh.triangles[number as usize];
         let inside = Triangle::of(corners, &self.projected)
             .and_then(|triangle| triangle.weights(column as usize, row as usize));
         let Some(inside) = inside else { return false };
@@ -285,7 +227,7 @@ impl<'a> Posed<'a> {
         } else {
             1.0
         };
-        let normals = self.mesh.normals()[number as usize]
+        let normals = self.mesh.normals[number as usize]
             .map(|normal| (self.normal_map * normal).normalize_or(facet * side) * side);
         let normal = blend(weights, normals).normalize_or(facet * side);
         surface.points.push(point);
@@ -293,7 +235,7 @@ impl<'a> Posed<'a> {
         surface.towards_eye.push(towards_eye);
         let lifted = lift(point, weights, places, normals);
         surface.ray_starts.push(lifted + facet * side * LIFT);
-        let own = corners.map(|vertex| self.mesh.positions()[vertex as usize]);
+        let own = corners.map(|vertex| self.mesh.positions[vertex as usize]);
         surface.object_points.push(blend(weights, own));
         if let (Some(list), Some(coordinates)) = (&mut surface.texture, self.mesh.texture()) {
             list.push(blended(coordinates[number as usize], weights));
@@ -367,7 +309,7 @@ mod tests {
             (area / (std::f32::consts::PI * 0.64) - 1.0).abs() < 0.01,
             "{area}"
         );
-        for (&pixel, normal) in buffer.pixels().iter().zip(buffer.normals()) {
+        for (&pixel, normal) in buffer.pixels.iter().zip(&buffer.normals) {
             let x = ((pixel % size) as f32 + 0.5) / 64.0 - 1.0;
             let y = 1.0 - ((pixel / size) as f32 + 0.5) / 64.0;
             let truth = Vec3::new(x, y, (0.64 - x * x - y * y).max(0.0).sqrt()) / 0.8;
@@ -383,10 +325,10 @@ mod tests {
         let distance = 3.0;
         let buffer = ball(Projection::Perspective { distance }, 64);
         for ((&pixel, point), to_eye) in buffer
-            .pixels()
+            .pixels
             .iter()
-            .zip(buffer.points())
-            .zip(buffer.towards_eye())
+            .zip(&buffer.points)
+            .zip(&buffer.towards_eye)
         {
             let x = ((pixel % 64) as f32 + 0.5) / 32.0 - 1.0;
             let y = 1.0 - ((pixel / 64) as f32 + 0.5) / 32.0;
@@ -401,7 +343,7 @@ mod tests {
     fn the_object_s_own_points_turn_with_it() {
         let buffer = ball(Projection::Orthographic, 32);
         let turn = Pose::upright(0.3, 0.4, 0.8).turn;
-        for (point, own) in buffer.points().iter().zip(buffer.object_points()) {
+        for (point, own) in buffer.points.iter().zip(&buffer.object_points) {
             assert!((turn * *own * 0.8).distance(*point) < 1e-3);
         }
     }
@@ -412,8 +354,8 @@ mod tests {
         let placement = Pose::upright(0.0, 2.5, 0.9).place(&mesh, Projection::Orthographic);
         let buffer = GBuffer::render(&mesh, placement, Projection::Orthographic, 32);
         assert!(!buffer.is_empty());
-        assert!(buffer.normals().iter().all(|normal| normal.z > 0.5));
-        let lifts = buffer.ray_starts().iter().zip(buffer.points());
+        assert!(buffer.normals.iter().all(|normal| normal.z > 0.5));
+        let lifts = buffer.ray_starts.iter().zip(&buffer.points);
         assert!(lifts.clone().all(|(start, point)| start.z > point.z));
     }
 
@@ -423,7 +365,7 @@ mod tests {
         let picture = buffer.spread(&vec![7_u8; buffer.len()], 1);
         assert_eq!(picture.len(), 256);
         assert_eq!((picture[0], picture[8 * 16 + 8]), (1, 7));
-        let normals = buffer.normal_map(buffer.normals());
+        let normals = buffer.normal_map(&buffer.normals);
         let mask = buffer.mask();
         assert_eq!((mask.pixel(0, 0), mask.pixel(8, 8)), ([0.0], [1.0]));
         assert_eq!(normals.planes().pixel(0, 0), [0.0; 3]);
@@ -439,7 +381,7 @@ mod tests {
         }
         let mut point = vec![Vec3::ZERO; buffer.len()];
         let middle = buffer
-            .pixels()
+            .pixels
             .iter()
             .position(|&p| p == 16 * 32 + 16)
             .unwrap();

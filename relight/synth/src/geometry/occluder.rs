@@ -124,10 +124,10 @@ impl Disc {
 
 fn triangles(mesh: &Mesh, placement: Affine3A) -> Vec<Triangle> {
     let place = |vertex: u32| {
-        let position = mesh.positions()[vertex as usize];
+        let position = mesh.positions[vertex as usize];
         placement.transform_point3a(Vec3A::from(position))
     };
-    let corners = mesh.triangles().iter();
+    let corners = mesh.triangles.iter();
     corners
         .map(|corners| {
             let [v0, v1, v2] = corners.map(place);

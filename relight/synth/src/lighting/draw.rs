@@ -177,7 +177,7 @@ fn lighting_direction(random: &mut Random, buffer: &GBuffer) -> Vec3 {
             towards.y = towards.y.abs();
         }
         let towards = towards.normalize();
-        let sampled = buffer.normals().iter().step_by(37);
+        let sampled = buffer.normals.iter().step_by(37);
         let (sum, count) = sampled.fold((0.0, 0.0), |(sum, count), normal| {
             (sum + normal.dot(towards).max(0.0), count + 1.0)
         });

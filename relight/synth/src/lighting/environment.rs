@@ -42,7 +42,7 @@ struct Entry {
 
 /// A panorama around an object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Environment {
+pub(crate) struct Environment {
     /// Its number among the [`Panoramas`].
     pub panorama: usize,
     /// From the panorama's frame into the viewer's, a rotation matrix row by row.
@@ -56,7 +56,7 @@ pub struct Environment {
 /// How a panorama's light is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+pub(crate) enum Method {
     /// By its nine coefficients, times the part of the sky that is seen: light as the paper estimates it. Makes no
     /// highlight.
     OrderTwo,
@@ -125,8 +125,7 @@ impl Environment {
 
     /// The light as coefficients of an order up to [`Order::HIGHLIGHT`], in the viewer's frame; dark where there is no
     /// such panorama.
-    #[must_use]
-    pub fn coefficients(&self, order: Order, panoramas: &Panoramas) -> ShLight {
+    pub(crate) fn coefficients(&self, order: Order, panoramas: &Panoramas) -> ShLight {
         match panoramas.entries.get(self.panorama) {
             Some(entry) => entry
                 .light
@@ -138,8 +137,7 @@ impl Environment {
     }
 
     /// The same light, turned further.
-    #[must_use]
-    pub fn turned(&self, turn: &Rotation) -> Self {
+    pub(crate) fn turned(&self, turn: &Rotation) -> Self {
         Self {
             rotation: *turn.after(&self.turn()).matrix(),
             ..self.clone()
@@ -242,17 +240,17 @@ impl<'a> Sky<'a> {
         for k in 0..buffer.len() {
             let point = Point {
                 normal: material.normals[k],
-                towards_eye: buffer.towards_eye()[k],
+                towards_eye: buffer.towards_eye[k],
                 gloss: material.gloss.as_ref(),
             };
             let arrives = |towards: Vec3| {
                 point.normal.dot(towards) > 0.0
                     && occluder.is_none_or(|occluder| {
-                        buffer.normals()[k].dot(towards) > 0.0
-                            && !occluder.blocks(buffer.ray_starts()[k], towards, f32::INFINITY)
+                        buffer.normals[k].dot(towards) > 0.0
+                            && !occluder.blocks(buffer.ray_starts[k], towards, f32::INFINITY)
                     })
             };
-            let own = stream(seed, u64::from(buffer.pixels()[k]));
+            let own = stream(seed, u64::from(buffer.pixels[k]));
             let drawn = point.drawn(own).map(|towards| self.along(towards));
             let rays = self.rays_of(own).copied().chain(drawn);
             for ray in rays.filter(|ray| arrives(ray.towards)) {

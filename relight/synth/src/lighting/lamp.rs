@@ -17,7 +17,7 @@ const BEFORE: f32 = 1e-3;
 
 /// A lamp.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct SyntheticLamp {
+pub(crate) struct SyntheticLamp {
     /// Where it is.
     pub emitter: Emitter,
     /// Irradiance at the origin of a surface that faces the lamp.
@@ -29,7 +29,7 @@ pub struct SyntheticLamp {
 /// Where a lamp's light comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Emitter {
+pub(crate) enum Emitter {
     /// From far away.
     Distant {
         /// To the lamp, unit length.
@@ -58,7 +58,7 @@ pub(super) struct LampRay {
 
 /// Which of a lamp's rays arrive: bit k of each covered pixel is that of ray k.
 #[derive(Debug, Clone)]
-pub struct LampShadows {
+pub(crate) struct LampShadows {
     open: Vec<u64>,
 }
 
@@ -81,11 +81,10 @@ impl SyntheticLamp {
 
     /// Whose rays arrive at the pixels of a buffer. Rays from below the horizon of the mesh's own
     /// normal never do.
-    #[must_use]
-    pub fn shadows(&self, buffer: &GBuffer, occluder: &Occluder, seed: u64) -> LampShadows {
+    pub(crate) fn shadows(&self, buffer: &GBuffer, occluder: &Occluder, seed: u64) -> LampShadows {
         let open = (0..buffer.len()).map(|k| {
-            let rays = self.rays_from(buffer.points()[k], turn(seed, buffer.pixels()[k]));
-            let (normal, start) = (buffer.normals()[k], buffer.ray_starts()[k]);
+            let rays = self.rays_from(buffer.points[k], turn(seed, buffer.pixels[k]));
+            let (normal, start) = (buffer.normals[k], buffer.ray_starts[k]);
             rays.enumerate().fold(0, |bits, (number, ray)| {
                 let arrives = normal.dot(ray.towards) > 0.0
                     && !occluder.blocks(start, ray.towards, ray.distance);
@@ -98,8 +97,7 @@ impl SyntheticLamp {
     }
 
     /// The lamp, as all light from its middle.
-    #[must_use]
-    pub fn coefficients(&self, order: Order) -> ShLight {
+    pub(crate) fn coefficients(&self, order: Order) -> ShLight {
         let values = basis(order, direction(self.emitter.towards()));
         let colour = self.irradiance.to_array().map(f64::from);
         let mut light = ShLight::dark(order);
@@ -110,23 +108,12 @@ impl SyntheticLamp {
     }
 
     /// The lamp, turned about the origin.
-    #[must_use]
-    pub fn turned(&self, turn: &Rotation) -> Self {
+    pub(crate) fn turned(&self, turn: &Rotation) -> Self {
         let moved = |v: Vec3| vector(turn.apply(direction(v))) * v.length();
-        let emitter = match self.emitter {
-            Emitter::Distant {
-                towards,
-                half_angle,
-            } => Emitter::Distant {
-                towards: moved(towards),
-                half_angle,
-            },
-            Emitter::Disc { centre, radius } => Emitter::Disc {
-                centre: moved(centre),
-                radius,
-            },
-        };
-        Self { emitter, ..*self }
+        Self {
+            emitter: self.emitter.at(moved),
+            ..*self
+        }
     }
 }
 
@@ -148,16 +135,21 @@ impl Emitter {
             let least = 0.16 * level.length();
             (level + vertical * height.abs().max(least)).normalize_or(vertical) * length
         };
+        self.at(raised)
+    }
+
+    /// The same with its place or direction changed.
+    fn at(self, changed: impl Fn(Vec3) -> Vec3) -> Self {
         match self {
             Self::Distant {
                 towards,
                 half_angle,
             } => Self::Distant {
-                towards: raised(towards),
+                towards: changed(towards),
                 half_angle,
             },
             Self::Disc { centre, radius } => Self::Disc {
-                centre: raised(centre),
+                centre: changed(centre),
                 radius,
             },
         }
@@ -189,13 +181,6 @@ impl LampShadows {
     /// Whether a ray arrives at a covered pixel.
     pub(super) fn arrives(&self, pixel: usize, ray: usize) -> bool {
         self.open[pixel] >> ray & 1 == 1
-    }
-
-    /// Part of the rays that arrive at each covered pixel, 0..=1, of a lamp with `rays` rays.
-    #[must_use]
-    pub fn fraction(&self, rays: u32) -> Vec<f32> {
-        let part = |bits: &u64| bits.count_ones() as f32 / rays.max(1) as f32;
-        self.open.iter().map(part).collect()
     }
 }
 

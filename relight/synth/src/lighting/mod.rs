@@ -24,30 +24,47 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 pub use draw::LightKind;
-pub use environment::{Environment, Method, Panoramas};
-pub use lamp::{Emitter, LampShadows, SyntheticLamp};
+pub use environment::Panoramas;
+pub(crate) use environment::{Environment, Method};
+pub(crate) use lamp::{Emitter, SyntheticLamp};
 pub use scene::SyntheticScene;
 pub use shaded::{BlinnPhong, Material, Shaded};
 
-use relight_core::light::{Order, Rotation, ShLight};
+use relight_core::light::{Direction, Order, Rotation, ShLight};
 
 /// All light on an object. Colours are linear red, green and blue.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Lighting {
     /// Lamps, each with its shadows.
-    pub lamps: Vec<SyntheticLamp>,
+    pub(crate) lamps: Vec<SyntheticLamp>,
     /// A panorama around the object.
-    pub environment: Option<Environment>,
+    pub(crate) environment: Option<Environment>,
     /// Irradiance of even light from all around.
-    pub ambient: Vec3,
+    pub(crate) ambient: Vec3,
     /// Light that comes from the object's own lit parts to its hollows, as a factor of what they send back: 1 where all of
     /// it arrives.
-    pub bounce: Vec3,
+    pub(crate) bounce: Vec3,
     /// Whether the object blocks light: without, there are neither cast shadows nor dark hollows.
-    pub has_shadows: bool,
+    pub(crate) has_shadows: bool,
 }
 
 impl Lighting {
+    /// A panorama by rays, at an angle about the vertical (radians); `irradiance` is the mean over all normals.
+    #[must_use]
+    pub fn of_panorama(panorama: usize, turn: f64, irradiance: f32, has_shadows: bool) -> Self {
+        let environment = Environment {
+            panorama,
+            rotation: *Rotation::about(Direction::UP, turn).matrix(),
+            irradiance: Vec3::splat(irradiance),
+            method: Method::MonteCarlo,
+        };
+        Self {
+            environment: Some(environment),
+            has_shadows,
+            ..Self::default()
+        }
+    }
+
     /// All light but what bounces, as coefficients of an order: where nothing is in the way, their
     /// diffuse layer is the shading, smoothed where lamps are.
     #[must_use]
@@ -67,8 +84,7 @@ impl Lighting {
     }
 
     /// All light, turned about the origin.
-    #[must_use]
-    pub fn turned(&self, turn: &Rotation) -> Self {
+    pub(crate) fn turned(&self, turn: &Rotation) -> Self {
         Self {
             lamps: self.lamps.iter().map(|lamp| lamp.turned(turn)).collect(),
             environment: self.environment.as_ref().map(|around| around.turned(turn)),

@@ -50,8 +50,7 @@ pub struct Shaded {
 
 impl Shaded {
     /// No light on `pixels` pixels.
-    #[must_use]
-    pub fn dark(pixels: usize) -> Self {
+    pub(crate) fn dark(pixels: usize) -> Self {
         Self {
             shading: vec![Vec3::ZERO; pixels],
             highlight: vec![Vec3::ZERO; pixels],
@@ -60,7 +59,7 @@ impl Shaded {
 
     /// Adds a lamp. Without shadows, light goes through the object, and only what faces away from the
     /// lamp is dark. `seed` is that of the shadows.
-    pub fn add_lamp(
+    pub(crate) fn add_lamp(
         &mut self,
         buffer: &GBuffer,
         material: &Material,
@@ -70,8 +69,8 @@ impl Shaded {
     ) {
         let share = lamp.irradiance / lamp.rays.max(1) as f32;
         for k in 0..buffer.len() {
-            let (normal, eye) = (material.normals[k], buffer.towards_eye()[k]);
-            let rays = lamp.rays_from(buffer.points()[k], turn(seed, buffer.pixels()[k]));
+            let (normal, eye) = (material.normals[k], buffer.towards_eye[k]);
+            let rays = lamp.rays_from(buffer.points[k], turn(seed, buffer.pixels[k]));
             let (mut diffuse, mut lobes) = (0.0, 0.0);
             for (number, ray) in rays.enumerate() {
                 let cosine = normal.dot(ray.towards);
@@ -93,7 +92,12 @@ impl Shaded {
 
     /// Adds light by its coefficients: its irradiance, times the part of the sky that each pixel sees (`open`).
     /// It makes no highlight.
-    pub fn add_smooth(&mut self, material: &Material, light: &ShLight, open: Option<&[f32]>) {
+    pub(crate) fn add_smooth(
+        &mut self,
+        material: &Material,
+        light: &ShLight,
+        open: Option<&[f32]>,
+    ) {
         let shading = irradiance(&material.normals, light);
         for (k, (sum, shading)) in self.shading.iter_mut().zip(shading).enumerate() {
             *sum += shading * open.map_or(1.0, |open| open[k]);
@@ -101,7 +105,7 @@ impl Shaded {
     }
 
     /// Adds even light from all around.
-    pub fn add_ambient(&mut self, irradiance: Vec3, open: Option<&[f32]>) {
+    pub(crate) fn add_ambient(&mut self, irradiance: Vec3, open: Option<&[f32]>) {
         for (k, sum) in self.shading.iter_mut().enumerate() {
             *sum += irradiance * open.map_or(1.0, |open| open[k]);
         }
@@ -110,20 +114,26 @@ impl Shaded {
     /// Adds light that the object throws into its own hollows, an approximation: of the part that sees
     /// the object instead of the sky, `strength` times the light that the surface around sends back, which is its
     /// albedo times its shading. So black objects throw none, and red ones red light.
-    pub fn add_bounce(&mut self, buffer: &GBuffer, albedo: &[Vec3], strength: Vec3, open: &[f32]) {
+    pub(crate) fn add_bounce(
+        &mut self,
+        buffer: &GBuffer,
+        albedo: &[Vec3],
+        strength: Vec3,
+        open: &[f32],
+    ) {
         let sent: Vec<Vec3> = albedo
             .iter()
             .zip(&self.shading)
             .map(|(a, s)| *a * *s)
             .collect();
-        let around = buffer.blurred(&sent, buffer.size() / 16);
+        let around = buffer.blurred(&sent, buffer.size / 16);
         for ((sum, around), open) in self.shading.iter_mut().zip(around).zip(open) {
             *sum += strength * around * (1.0 - open);
         }
     }
 
     /// All light times a colour.
-    pub fn scale(&mut self, colour: Vec3) {
+    pub(crate) fn scale(&mut self, colour: Vec3) {
         for value in self.shading.iter_mut().chain(&mut self.highlight) {
             *value *= colour;
         }

@@ -53,7 +53,7 @@ fn floor_scene() -> SyntheticScene {
 fn white(scene: &SyntheticScene, gloss: Option<BlinnPhong>) -> Material {
     Material {
         albedo: vec![Vec3::ONE; scene.buffer().len()],
-        normals: scene.buffer().normals().to_vec(),
+        normals: scene.buffer().normals.to_vec(),
         gloss,
     }
 }
@@ -96,7 +96,7 @@ fn a_lamp_lights_a_ball_by_the_cosine_and_never_its_far_side() {
         &Panoramas::default(),
         None,
     );
-    for (point, shading) in scene.buffer().points().iter().zip(&shaded.shading) {
+    for (point, shading) in scene.buffer().points.iter().zip(&shaded.shading) {
         // The sphere's own normal, not the buffer's.
         let cosine = (*point / 0.95).dot(towards).max(0.0);
         assert!((shading.x - cosine).abs() < 0.01, "{shading} for {cosine}");
@@ -115,7 +115,7 @@ fn a_lamp_s_highlight_is_blinn_and_phong_s() {
     let lamp = distant(towards, 1, 0.0);
     let shaded = lit(&scene, &only_lamp(lamp), &Panoramas::default(), Some(gloss));
     let half = (towards + Vec3::Z).normalize();
-    for (point, highlight) in scene.buffer().points().iter().zip(&shaded.highlight) {
+    for (point, highlight) in scene.buffer().points.iter().zip(&shaded.highlight) {
         let normal = *point / 0.95;
         let is_lit = normal.dot(towards) > 0.02;
         let lobe = normal.dot(half).max(0.0).powi(20);
@@ -140,7 +140,7 @@ fn a_ball_casts_its_shadow_where_rays_to_the_lamp_meet_it() {
         None,
     );
     let mut in_shadow = 0;
-    for (point, shading) in scene.buffer().points().iter().zip(&shaded.shading) {
+    for (point, shading) in scene.buffer().points.iter().zip(&shaded.shading) {
         let from = Vec3::Z * HEIGHT - *point;
         let passes_at = (from - towards * from.dot(towards)).length();
         if (passes_at - BALL).abs() < 0.01 {
@@ -183,7 +183,7 @@ fn a_disc_lights_the_floor_below_it_as_the_integral_says() {
     let scene = floor_scene();
     let shaded = lit(&scene, &lighting, &Panoramas::default(), None);
     let expected = height * height / (height * height + radius * radius);
-    for (point, shading) in scene.buffer().points().iter().zip(&shaded.shading) {
+    for (point, shading) in scene.buffer().points.iter().zip(&shaded.shading) {
         if point.truncate().length() < 0.05 {
             assert!(
                 (shading.x / expected - 1.0).abs() < 0.01,
@@ -225,7 +225,7 @@ fn below_a_ball_even_light_is_weakened_by_the_ball_s_form_factor() {
             ..Lighting::default()
         };
         let shaded = lit(&scene, &lighting, &panoramas, None);
-        let pairs = scene.buffer().points().iter().zip(&shaded.shading);
+        let pairs = scene.buffer().points.iter().zip(&shaded.shading);
         let errors: Vec<f32> = pairs
             .map(|(point, shading)| {
                 let distance = (point.truncate().length_squared() + HEIGHT * HEIGHT).sqrt();
@@ -291,7 +291,7 @@ fn rays_to_a_panorama_give_what_the_reference_gives() {
     let mut errors = [0.0; 2];
     let mut sums = [0.0; 2];
     for k in (0..scene.buffer().len()).step_by(7) {
-        let normal = direction(scene.buffer().normals()[k]);
+        let normal = direction(scene.buffer().normals[k]);
         let truths = [
             reference.irradiance(normal, k as u64).mean[0],
             reference.highlight(normal, 30.0, k as u64).mean[0] * 0.7,
@@ -336,7 +336,7 @@ fn smooth_light_is_the_diffuse_layer_of_the_turned_coefficients() {
     let light = speckled().project(Order::TWO).rotated(&turn);
     let truths = scene
         .buffer()
-        .normals()
+        .normals
         .iter()
         .map(|n| irradiance(&light, *n));
     let ratios: Vec<f32> = truths
@@ -408,7 +408,7 @@ fn bounced_light_comes_only_where_the_sky_is_hidden() {
     assert!(largest < 1.2);
     let below: Vec<Vec3> = scene
         .buffer()
-        .points()
+        .points
         .iter()
         .zip(&shaded.shading)
         .filter(|(point, _)| point.truncate().length() < 0.1)

@@ -55,7 +55,7 @@ pub(crate) struct MeshMaterials {
 
 /// A surface's own look at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OwnSurface {
+pub(crate) struct OwnSurface {
     /// Linear red, green and blue, 0..=1: the albedo of paint, the highlights' colour of metal.
     pub colour: Vec3,
     /// 0 a mirror, 1 dull.

@@ -17,7 +17,7 @@ use glam::{Vec2, Vec3};
 
 use super::SynthError;
 use material::MeshMaterials;
-pub use material::OwnSurface;
+pub(crate) use material::OwnSurface;
 pub(super) use raw::RawMesh;
 
 /// Most triangles that a mesh may have.
@@ -29,10 +29,12 @@ pub(super) const CREASE: f32 = 50.0 * std::f32::consts::PI / 180.0;
 /// A surface of triangles, with a normal for each corner.
 #[derive(Debug, Clone)]
 pub struct Mesh {
-    positions: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
+    /// The vertices; the farthest is at distance 1 from the origin.
+    pub positions: Vec<Vec3>,
+    /// By their vertices.
+    pub(super) triangles: Vec<[u32; 3]>,
     /// One for each corner of each triangle, unit length.
-    normals: Vec<[Vec3; 3]>,
+    pub(super) normals: Vec<[Vec3; 3]>,
     /// As in [`RawMesh::texture`].
     texture: Vec<[Vec2; 3]>,
     /// Whether all of them have some.
@@ -40,33 +42,15 @@ pub struct Mesh {
     /// As in [`RawMesh::colours`].
     colours: Vec<[Vec3; 3]>,
     materials: Option<MeshMaterials>,
-    left_out: Vec<String>,
+    /// What the mesh's file names and is not used, as its pictures where they are not there: each in words of its own.
+    pub left_out: Vec<String>,
 }
 
-/// Why numbers are no mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MeshFault {
-    /// No triangle, or none with an area.
-    #[error("it has no triangle with an area")]
-    Empty,
-    /// A position is infinite or not a number.
-    #[error("vertex {0} is not at a finite place")]
-    NotFinite(usize),
-    /// A triangle names a vertex that is not there.
-    #[error("triangle {triangle} names vertex {vertex} of {count}")]
-    NoSuchVertex {
-        /// The triangle.
-        triangle: usize,
-        /// The vertex it names.
-        vertex: u32,
-        /// How many there are.
-        count: usize,
-    },
-    /// More than memory should hold.
-    #[error("it has {0} triangles, more than {MOST_TRIANGLES}")]
-    TooLarge(usize),
-}
+/// Why a file is no mesh that is read.
+pub(super) const NOT_READ: &str =
+    "is not a mesh of a kind that can be read: give .obj, .gltf or .glb";
+/// Why triangles are no surface.
+const EMPTY: &str = "it has no triangle with an area";
 
 impl Mesh {
     /// Reads a mesh: Wavefront (`.obj`) or glTF 2.0 (`.gltf`, `.glb`). All its parts become one
@@ -75,35 +59,28 @@ impl Mesh {
     /// the object's. What of that cannot be used is left out: see [`Self::left_out`].
     ///
     /// # Errors
-    /// [`SynthError::Mesh`] where the file is damaged or holds no surface, [`SynthError::Read`] where it
-    /// cannot be read, [`SynthError::MeshKind`] where it is of another kind.
+    /// [`SynthError::Unusable`] where the file is damaged, holds no surface or is of another kind, [`SynthError::Io`] where it
+    /// cannot be read.
     pub fn read(path: &Path) -> Result<Self, SynthError> {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         let raw = match extension.to_str() {
             Some("obj") => obj::read(path)?,
             Some("gltf" | "glb") => gltf::read(path)?,
-            _ => {
-                return Err(SynthError::MeshKind {
-                    path: path.to_owned(),
-                });
-            }
+            _ => return Err(SynthError::unusable(path, NOT_READ)),
         };
-        Self::new(raw, CREASE).map_err(|fault| SynthError::Mesh {
-            path: path.to_owned(),
-            reason: fault.to_string(),
-        })
+        Self::new(raw, CREASE).map_err(SynthError::mesh(path))
     }
 
     /// A mesh of these triangles, moved and scaled into the unit sphere; normals are blended
     /// between faces that meet at less than `crease` radians. Triangles without an area are left
     /// out, vertices at one place are joined.
-    pub(super) fn new(raw: RawMesh, crease: f32) -> Result<Self, MeshFault> {
+    pub(super) fn new(raw: RawMesh, crease: f32) -> Result<Self, String> {
         check(&raw)?;
         let mut raw = weld(raw);
         into_unit_sphere(&mut raw.positions);
         drop_flat(&mut raw);
         if raw.triangles.is_empty() {
-            return Err(MeshFault::Empty);
+            return Err(EMPTY.to_owned());
         }
         let normals = corner_normals(&raw.positions, &raw.triangles, crease);
         let has_own_surface = raw.has_own_surface();
@@ -118,27 +95,6 @@ impl Mesh {
             materials: has_own_surface.then_some(raw.materials),
             left_out: raw.left_out,
         })
-    }
-
-    /// The vertices; the farthest is at distance 1 from the origin.
-    pub fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    /// The triangles, by their vertices.
-    pub(super) fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
-    }
-
-    /// A normal for each corner of each triangle.
-    pub(super) fn normals(&self) -> &[[Vec3; 3]] {
-        &self.normals
-    }
-
-    /// What the mesh's file names and is not used, as its pictures where they are not there: each in words of its own.
-    #[must_use]
-    pub fn left_out(&self) -> &[String] {
-        &self.left_out
     }
 
     /// Whether the mesh's file says how it looks.
@@ -171,30 +127,32 @@ pub(super) fn blended([a, b, c]: [Vec2; 3], weights: [f32; 3]) -> Vec2 {
     a * weights[0] + b * weights[1] + c * weights[2]
 }
 
-fn check(raw: &RawMesh) -> Result<(), MeshFault> {
-    if raw.triangles.len() > MOST_TRIANGLES {
-        return Err(MeshFault::TooLarge(raw.triangles.len()));
+fn check(raw: &RawMesh) -> Result<(), String> {
+    let (count, triangles) = (raw.positions.len(), raw.triangles.len());
+    if triangles > MOST_TRIANGLES {
+        return Err(too_large(triangles));
     }
-    let count = raw.positions.len();
     for (triangle, corners) in raw.triangles.iter().enumerate() {
         for &vertex in corners {
             match raw.positions.get(vertex as usize) {
                 Some(position) if position.is_finite() => {}
-                Some(_) => return Err(MeshFault::NotFinite(vertex as usize)),
+                Some(_) => return Err(format!("vertex {vertex} is not at a finite place")),
                 None => {
-                    return Err(MeshFault::NoSuchVertex {
-                        triangle,
-                        vertex,
-                        count,
-                    });
+                    return Err(format!(
+                        "triangle {triangle} names vertex {vertex} of {count}"
+                    ));
                 }
             }
         }
     }
     if raw.triangles.is_empty() {
-        return Err(MeshFault::Empty);
+        return Err(EMPTY.to_owned());
     }
     Ok(())
+}
+
+fn too_large(triangles: usize) -> String {
+    format!("it has {triangles} triangles, more than {MOST_TRIANGLES}")
 }
 
 /// Joins vertices at one place, so that faces know their neighbours, and leaves out those that no
@@ -377,8 +335,8 @@ mod tests {
     #[test]
     fn a_mesh_is_moved_into_the_unit_sphere_and_its_vertices_joined() {
         let mesh = Mesh::new(cube(), CREASE).unwrap();
-        assert_eq!(mesh.positions().len(), 8);
-        for position in mesh.positions() {
+        assert_eq!(mesh.positions.len(), 8);
+        for position in mesh.positions {
             assert!((position.length() - 1.0).abs() < 1e-6);
         }
     }
@@ -386,13 +344,13 @@ mod tests {
     #[test]
     fn edges_stay_sharp_below_the_crease_angle_and_are_blended_above_it() {
         let sharp = Mesh::new(cube(), CREASE).unwrap();
-        for normal in sharp.normals().iter().flatten() {
+        for normal in sharp.normals.iter().flatten() {
             assert!((normal.abs().max_element() - 1.0).abs() < 1e-6, "{normal}");
         }
         let smooth = Mesh::new(cube(), 2.0).unwrap();
-        for (normals, corners) in smooth.normals().iter().zip(smooth.triangles()) {
+        for (normals, corners) in smooth.normals.iter().zip(&smooth.triangles) {
             for (normal, &vertex) in normals.iter().zip(corners) {
-                assert!(normal.dot(smooth.positions()[vertex as usize]) > 0.9);
+                assert!(normal.dot(smooth.positions[vertex as usize]) > 0.9);
             }
         }
     }
@@ -401,23 +359,20 @@ mod tests {
     fn numbers_that_are_no_mesh_are_refused_and_named() {
         let mut raw = cube();
         raw.positions[3].y = f32::NAN;
-        assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), MeshFault::NotFinite(3));
+        let fault = "vertex 3 is not at a finite place";
+        assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), fault);
         let mut raw = cube();
         raw.triangles[2][1] = 99;
-        let fault = MeshFault::NoSuchVertex {
-            triangle: 2,
-            vertex: 99,
-            count: 24,
-        };
+        let fault = "triangle 2 names vertex 99 of 24";
         assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), fault);
         let mut raw = cube();
         for position in &mut raw.positions {
             position.x = 0.0;
             position.y = 1.0;
         }
-        assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), MeshFault::Empty);
+        assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), EMPTY);
         let empty = Mesh::new(RawMesh::default(), CREASE);
-        assert_eq!(empty.unwrap_err(), MeshFault::Empty);
+        assert_eq!(empty.unwrap_err(), EMPTY);
     }
 
     #[test]
@@ -428,7 +383,7 @@ mod tests {
                 *position *= scale;
             }
             let mesh = Mesh::new(raw, CREASE).unwrap();
-            assert_eq!(mesh.triangles().len(), 12);
+            assert_eq!(mesh.triangles.len(), 12);
         }
     }
 }

@@ -87,10 +87,20 @@ fn colour(text: &str) -> Option<Vec3> {
 fn picture(text: &str) -> Option<MtlPicture> {
     let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
     let mut rest = text;
-    while let Some((option, behind)) = option(rest) {
-        let values: Vec<&str> = values(option, &mut rest, behind).collect();
+    while let Some((option, most)) = option(rest) {
+        rest = rest[option.len()..].trim_start();
+        let mut values = Vec::new();
+        while let Some((word, behind)) = rest.split_once(char::is_whitespace) {
+            let number = word.parse().map_or(f32::NAN, |number: f32| number);
+            // Numbers that are left out are not taken from the name.
+            if values.len() == most || (takes_numbers(option) && number.is_nan()) {
+                break;
+            }
+            values.push(number);
+            rest = behind.trim_start();
+        }
         let pair = |plain: Vec2| {
-            let number = |at: usize| values.get(at)?.parse().ok().filter(|n: &f32| n.is_finite());
+            let number = |at: usize| values.get(at).copied().filter(|n: &f32| n.is_finite());
             Vec2::new(number(0).unwrap_or(plain.x), number(1).unwrap_or(plain.y))
         };
         match option {
@@ -107,63 +117,33 @@ fn picture(text: &str) -> Option<MtlPicture> {
     })
 }
 
-/// The option with which a text begins, and what stands behind it.
-fn option(text: &str) -> Option<(&str, &str)> {
-    let (word, behind) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-    OPTIONS
-        .iter()
-        .find(|(name, _)| name.eq_ignore_ascii_case(word))
-        .map(|&(name, _)| (name, behind.trim_start()))
+/// The option with which a text begins, and how many values may follow it.
+fn option(text: &str) -> Option<(&'static str, usize)> {
+    let word = text.split(char::is_whitespace).next()?;
+    let mut options = OPTIONS.into_iter();
+    options.find(|(name, _)| name.eq_ignore_ascii_case(word))
 }
 
-/// The values of an option; `rest` becomes what stands behind them. Numbers that are left out are not taken from the name.
-fn values<'a>(
-    option: &str,
-    rest: &mut &'a str,
-    behind: &'a str,
-) -> impl Iterator<Item = &'a str> + use<'a> {
-    let most = OPTIONS.iter().find(|(name, _)| *name == option);
-    let most = most.map_or(Values::Words(0), |(_, most)| *most);
-    let mut found = Vec::new();
-    *rest = behind;
-    while let Some((word, behind)) = rest.split_once(char::is_whitespace) {
-        let is_value = match most {
-            Values::Numbers(most) => found.len() < most && word.parse::<f32>().is_ok(),
-            Values::Words(most) => found.len() < most,
-        };
-        if !is_value {
-            break;
-        }
-        found.push(word);
-        *rest = behind.trim_start();
-    }
-    found.into_iter()
-}
-
-/// What may follow an option.
-#[derive(Clone, Copy)]
-enum Values {
-    /// At most so many numbers.
-    Numbers(usize),
-    /// So many words.
-    Words(usize),
+/// Whether at most so many numbers follow an option; else so many words.
+fn takes_numbers(option: &str) -> bool {
+    ["-bm", "-boost", "-mm", "-o", "-s", "-t", "-texres"].contains(&option)
 }
 
 /// The options of pictures.
-const OPTIONS: [(&str, Values); 13] = [
-    ("-blendu", Values::Words(1)),
-    ("-blendv", Values::Words(1)),
-    ("-bm", Values::Numbers(1)),
-    ("-boost", Values::Numbers(1)),
-    ("-cc", Values::Words(1)),
-    ("-clamp", Values::Words(1)),
-    ("-imfchan", Values::Words(1)),
-    ("-mm", Values::Numbers(2)),
-    ("-o", Values::Numbers(3)),
-    ("-s", Values::Numbers(3)),
-    ("-t", Values::Numbers(3)),
-    ("-texres", Values::Numbers(1)),
-    ("-type", Values::Words(1)),
+const OPTIONS: [(&str, usize); 13] = [
+    ("-blendu", 1),
+    ("-blendv", 1),
+    ("-bm", 1),
+    ("-boost", 1),
+    ("-cc", 1),
+    ("-clamp", 1),
+    ("-imfchan", 1),
+    ("-mm", 2),
+    ("-o", 3),
+    ("-s", 3),
+    ("-t", 3),
+    ("-texres", 1),
+    ("-type", 1),
 ];
 
 #[cfg(test)]

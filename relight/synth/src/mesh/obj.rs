@@ -28,17 +28,17 @@ const MOST_LIBRARIES: usize = 32;
 /// All parts of the file as one surface, with the materials of the `.mtl` files that it names.
 pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
-    let damaged = |reason: String| SynthError::Mesh {
-        path: path.to_owned(),
-        reason,
-    };
-    let file = ObjFile::parsed(&decoded(&bytes)).map_err(damaged)?;
+    parsed(path, &bytes).map_err(SynthError::mesh(path))
+}
+
+fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
+    let file = ObjFile::parsed(&decoded(bytes))?;
     let mut left_out = Vec::new();
     if file.has_free_form {
         left_out.push("its free-form surfaces are not read, only its polygons".to_owned());
     }
-    let materials = Materials::read(path, &file, &mut left_out).map_err(damaged)?;
-    let mut raw = file.triangles(&materials).map_err(damaged)?;
+    let materials = Materials::read(path, &file, &mut left_out)?;
+    let mut raw = file.triangles(&materials)?;
     raw.materials.all = materials.all;
     raw.left_out = left_out;
     Ok(raw)

@@ -28,15 +28,15 @@ use super::texture::TextureImage;
 use palette::{Inks, Palette};
 use pattern::{Canvas, Pattern};
 
-pub use palette::AlbedoKind;
-pub use relief::Relief;
+pub(crate) use palette::AlbedoKind;
+pub(crate) use relief::Relief;
 
 /// Least albedo of anything: soot reflects more.
 const DARKEST: f32 = 0.01;
 
 /// The albedo of a surface: a ground and patterns over it, one over the other.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Paint {
+pub(crate) struct Paint {
     /// What it was drawn as.
     pub kind: AlbedoKind,
     /// Linear red, green and blue of the ground, 0..=1.
@@ -71,8 +71,7 @@ struct Mottle {
 
 impl Paint {
     /// One colour everywhere.
-    #[must_use]
-    pub fn constant(albedo: [f32; 3]) -> Self {
+    pub(crate) fn constant(albedo: [f32; 3]) -> Self {
         Self {
             kind: AlbedoKind::Constant,
             ground: Vec3::from_array(albedo),
@@ -92,16 +91,13 @@ impl Paint {
     }
 
     /// A random paint for an object on which `points` lie; `pictures` tells how many there are to
-    /// choose from, `kind` what it is drawn as, else that is drawn, too.
-    pub(super) fn draw(
-        random: &mut Random,
-        points: &[Vec3],
-        pictures: usize,
-        kind: Option<AlbedoKind>,
-    ) -> Self {
-        let drawn = AlbedoKind::draw(random);
-        let kind = kind.filter(|&kind| kind != AlbedoKind::Own);
-        let kind = kind.unwrap_or(drawn);
+    /// choose from.
+    pub(super) fn draw(random: &mut Random, points: &[Vec3], pictures: usize) -> Self {
+        let kind = AlbedoKind::draw(random);
+        Self::of_kind(random, kind, points, pictures)
+    }
+
+    fn of_kind(random: &mut Random, kind: AlbedoKind, points: &[Vec3], pictures: usize) -> Self {
         if kind == AlbedoKind::Print {
             return Self::printed(random, points);
         }
@@ -164,8 +160,7 @@ impl Paint {
 
     /// The albedo at these points of an object (in its own frame, within the unit sphere), linear,
     /// 0.01..=1. `texture` are their texture coordinates, where there are any.
-    #[must_use]
-    pub fn apply(
+    pub(crate) fn apply(
         &self,
         points: &[Vec3],
         texture: Option<&[Vec2]>,
@@ -225,7 +220,7 @@ mod tests {
         })];
         let mut counts = std::collections::HashMap::new();
         for _ in 0..600 {
-            let paint = Paint::draw(&mut random, &points, pictures.len(), None);
+            let paint = Paint::draw(&mut random, &points, pictures.len());
             let albedo = paint.apply(&points, None, &pictures);
             assert!(
                 albedo
@@ -249,7 +244,7 @@ mod tests {
         let mut random = Random::new(12);
         let (mut inked, mut neutral, mut covered) = (0, 0, 0.0);
         for _ in 0..200 {
-            let paint = Paint::draw(&mut random, &points, 0, Some(AlbedoKind::Print));
+            let paint = Paint::of_kind(&mut random, AlbedoKind::Print, &points, 0);
             let albedo = paint.apply(&points, None, &[]);
             let grey = |a: &Vec3| a.element_sum() / 3.0;
             let lightest = albedo.iter().map(grey).fold(0.0, f32::max);
@@ -282,7 +277,7 @@ mod tests {
         let points = points();
         let mut random = Random::new(3);
         for _ in 0..40 {
-            let paint = Paint::draw(&mut random, &points, 3, None);
+            let paint = Paint::draw(&mut random, &points, 3);
             let text = serde_json::to_string(&paint).unwrap();
             let back: Paint = serde_json::from_str(&text).unwrap();
             assert_eq!(back, paint);

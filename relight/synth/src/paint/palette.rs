@@ -8,7 +8,7 @@ use super::super::random::Random;
 /// What kind of albedo an object has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum AlbedoKind {
+pub(crate) enum AlbedoKind {
     /// One colour.
     Constant,
     /// Two colours that go over into one another.
@@ -21,7 +21,7 @@ pub enum AlbedoKind {
     Print,
     /// Patterns of two to five colours.
     Patterned,
-    /// What the file of the mesh says. Of objects whose file says nothing, and where nothing is asked for, any of the others.
+    /// What the file of the mesh says.
     Own,
 }
 

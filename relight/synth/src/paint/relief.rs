@@ -10,7 +10,7 @@ use super::frame::step;
 
 /// A height field on the surface.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Relief {
+pub(crate) struct Relief {
     octaves: Vec<Octave>,
     /// Where there is relief, if not everywhere.
     patches: Option<Octave>,
@@ -59,11 +59,10 @@ impl Relief {
     }
 
     /// The normals of what a buffer shows, leaned by the relief; they never face away from the eye.
-    #[must_use]
-    pub fn apply(&self, buffer: &GBuffer) -> Vec<Vec3> {
-        let to_viewer = buffer.gradient_map();
-        let seen = buffer.object_points().iter().zip(buffer.normals());
-        let seen = seen.zip(buffer.towards_eye());
+    pub(crate) fn apply(&self, buffer: &GBuffer) -> Vec<Vec3> {
+        let to_viewer = buffer.gradient_map;
+        let seen = buffer.object_points.iter().zip(&buffer.normals);
+        let seen = seen.zip(&buffer.towards_eye);
         seen.map(|((&point, &normal), &towards_eye)| {
             let slope = to_viewer * self.slope(point);
             let along = slope - normal * slope.dot(normal);
@@ -132,7 +131,7 @@ mod tests {
         let leaned = relief.apply(&buffer);
         let mut right = 0;
         for (k, leaned) in leaned.iter().enumerate() {
-            let (point, normal) = (buffer.object_points()[k], buffer.normals()[k]);
+            let (point, normal) = (buffer.object_points[k], buffer.normals[k]);
             // Tangents of the surface that stands out of the plane by the height.
             let is_right = [Vec3::X, Vec3::Y].iter().all(|&axis| {
                 let step = 2e-3;
@@ -151,7 +150,7 @@ mod tests {
         assert!(
             leaned
                 .iter()
-                .zip(buffer.normals())
+                .zip(&buffer.normals)
                 .any(|(a, b)| a.dot(*b) < 0.98)
         );
     }
@@ -165,8 +164,8 @@ mod tests {
         let mut random = Random::new(5);
         for _ in 0..5 {
             let leaned = Relief::draw(&mut random).apply(&buffer);
-            assert_ne!(leaned, buffer.normals());
-            for (normal, towards_eye) in leaned.iter().zip(buffer.towards_eye()) {
+            assert_ne!(leaned, buffer.normals);
+            for (normal, towards_eye) in leaned.iter().zip(&buffer.towards_eye) {
                 assert!((normal.length() - 1.0).abs() < 1e-4);
                 assert!(normal.dot(*towards_eye) > -1e-4);
             }

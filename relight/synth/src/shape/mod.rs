@@ -124,8 +124,8 @@ mod tests {
     fn a_seed_gives_one_object_and_another_seed_another() {
         for kind in ShapeKind::WEIGHTS.map(|(kind, _)| kind) {
             let [a, b, c] = [1, 1, 2].map(|seed| kind.build(seed));
-            assert_eq!(a.positions(), b.positions(), "{kind:?}");
-            assert_ne!(a.positions(), c.positions(), "{kind:?}");
+            assert_eq!(&a.positions, &b.positions, "{kind:?}");
+            assert_ne!(&a.positions, &c.positions, "{kind:?}");
         }
     }
 
@@ -134,10 +134,10 @@ mod tests {
         for kind in ALL {
             for seed in 0..6 {
                 let mesh = kind.build(seed);
-                assert!(mesh.triangles().len() >= 2, "{kind:?} {seed}");
-                let mut lengths = mesh.positions().iter().map(|p| p.length());
+                assert!(mesh.triangles.len() >= 2, "{kind:?} {seed}");
+                let mut lengths = mesh.positions.iter().map(|p| p.length());
                 assert!(lengths.all(|length| length <= 1.0001), "{kind:?} {seed}");
-                let mut normals = mesh.normals().iter().flatten();
+                let mut normals = mesh.normals.iter().flatten();
                 assert!(
                     normals.all(|n| (n.length() - 1.0).abs() < 1e-4),
                     "{kind:?} {seed}"
@@ -158,10 +158,10 @@ mod tests {
             for seed in 0..8 {
                 let mesh = kind.build(seed);
                 let volume: f32 = mesh
-                    .triangles()
+                    .triangles
                     .iter()
                     .map(|corners| {
-                        let [a, b, c] = corners.map(|v| mesh.positions()[v as usize]);
+                        let [a, b, c] = corners.map(|v| mesh.positions[v as usize]);
                         a.dot(b.cross(c)) / 6.0
                     })
                     .sum();
@@ -173,9 +173,9 @@ mod tests {
     #[test]
     fn the_ball_is_round() {
         let ball = ShapeKind::Sphere.build(0);
-        for (corners, normals) in ball.triangles().iter().zip(ball.normals()) {
+        for (corners, normals) in ball.triangles.iter().zip(&ball.normals) {
             for (&vertex, normal) in corners.iter().zip(normals) {
-                let position = ball.positions()[vertex as usize];
+                let position = ball.positions[vertex as usize];
                 assert!((position.length() - 1.0).abs() < 1e-5);
                 assert!(normal.dot(position) > 0.99998);
             }

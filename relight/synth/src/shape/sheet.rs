@@ -134,10 +134,10 @@ mod tests {
         for seed in 0..seeds {
             let mesh = kind.build(seed);
             let normals: Vec<Vec3> = mesh
-                .triangles()
+                .triangles
                 .iter()
                 .map(|corners| {
-                    let [a, b, c] = corners.map(|v| mesh.positions()[v as usize]);
+                    let [a, b, c] = corners.map(|v| mesh.positions[v as usize]);
                     (b - a).cross(c - a).normalize_or_zero()
                 })
                 .collect();

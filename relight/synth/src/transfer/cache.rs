@@ -11,6 +11,8 @@ use relit_data::shard::Digest;
 use serde::{Deserialize, Serialize};
 
 use super::cast::{RadianceTransfer, TransferFinish};
+use super::drawn::DrawnTurn;
+use super::rooms::Rooms;
 use super::views::TransferRecipe;
 use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS};
 use crate::SynthError;
@@ -55,12 +57,27 @@ impl TransferCache {
         })
     }
 
-    /// The view of a number: read where it is there, else cast and kept. The numbers of a view that was read and of one
-    /// that was cast are the same.
+    /// The turn of a seed: the view of a number in a random material and room.
     ///
     /// # Errors
-    /// [`SynthError`] where it cannot be written.
-    pub fn view(&self, library: &Library, number: u64) -> Result<RadianceTransfer, SynthError> {
+    /// [`SynthError`] where the view cannot be written.
+    pub fn turn(
+        &self,
+        library: &Library,
+        number: u64,
+        rooms: &Rooms,
+        seed: u64,
+    ) -> Result<DrawnTurn, SynthError> {
+        Ok(DrawnTurn::draw(&self.view(library, number)?, rooms, seed))
+    }
+
+    /// The view of a number: read where it is there, else cast and kept. The numbers of a view that was read and of one
+    /// that was cast are the same.
+    pub(super) fn view(
+        &self,
+        library: &Library,
+        number: u64,
+    ) -> Result<RadianceTransfer, SynthError> {
         let path = self.path_of(number);
         if let Some(found) = fs::read(&path).ok().and_then(|bytes| decode(&bytes)) {
             return Ok(found);
@@ -85,7 +102,7 @@ fn digest_of(library: &Library) -> Digest {
     let mut bytes = Vec::new();
     for (name, mesh) in &library.meshes {
         bytes.extend(name.as_bytes());
-        for position in mesh.positions() {
+        for position in &mesh.positions {
             position
                 .to_array()
                 .iter()

@@ -13,7 +13,7 @@ const SETS: usize = 16;
 
 /// What each pixel of a view makes of light from all around. All lists run along the covered pixels.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RadianceTransfer {
+pub(crate) struct RadianceTransfer {
     /// Width and height, pixels.
     pub size: u32,
     /// The camera over the plate, radians.
@@ -34,7 +34,7 @@ pub struct RadianceTransfer {
 
 /// Albedo and relief of a view.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TransferFinish {
+pub(crate) struct TransferFinish {
     /// Unit normals in the viewer's frame, with relief.
     pub normals: Vec<Vec3>,
     /// Linear red, green and blue, 0..=1.
@@ -101,17 +101,17 @@ impl RadianceTransfer {
             .map(|_| Directions::draw(&mut random, rays, to_table))
             .collect();
         let cast = |k: usize| {
-            let pixel = buffer.pixels()[k];
-            let (column, row) = (pixel % buffer.size(), pixel / buffer.size());
+            let pixel = buffer.pixels[k];
+            let (column, row) = (pixel % buffer.size, pixel / buffer.size);
             let set = &sets[(column % 4 + 4 * (row % 4)) as usize % SETS];
             PixelRays::cast(buffer, occluder, k, set, to_table)
         };
         let cast: Vec<PixelRays> = (0..buffer.len()).into_par_iter().map(cast).collect();
         Self {
-            size: buffer.size(),
+            size: buffer.size,
             elevation,
-            pixels: buffer.pixels().to_vec(),
-            towards_eye: buffer.towards_eye().to_vec(),
+            pixels: buffer.pixels.clone(),
+            towards_eye: buffer.towards_eye.clone(),
             mirrors: cast.iter().map(|pixel| pixel.mirrors).collect(),
             blocked: cast.iter().map(|pixel| pixel.blocked).collect(),
             bounced: cast.iter().map(|pixel| pixel.bounced).collect(),
@@ -135,8 +135,8 @@ impl PixelRays {
         directions: &Directions,
         to_table: Mat3,
     ) -> Self {
-        let (normal, eye) = (buffer.normals()[k], buffer.towards_eye()[k]);
-        let from = buffer.ray_starts()[k];
+        let (normal, eye) = (buffer.normals[k], buffer.towards_eye[k]);
+        let from = buffer.ray_starts[k];
         let mirrored = normal * (2.0 * normal.dot(eye)) - eye;
         let mut found = Self {
             mirrors: !occluder.blocks(from, mirrored, f32::INFINITY),

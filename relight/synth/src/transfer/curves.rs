@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use relight_core::light::{Order, ShLight};
+use relight_core::light::ShLight;
 
 use super::cast::{RadianceTransfer, TransferFinish, harmonics_at, table_frame};
 use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS, TRANSFER_ORDER, band, cosine_band};
@@ -12,14 +12,14 @@ const HARMONICS: usize = 6;
 /// A colour of less than this is black. Numerical.
 const LEAST_ALBEDO: f32 = 1e-3;
 /// Terms of a curve: its mean, then real and imaginary part of each harmonic.
-pub const CURVE_COEFFICIENTS: usize = 2 * HARMONICS + 1;
+pub(super) const CURVE_COEFFICIENTS: usize = 2 * HARMONICS + 1;
 
 /// Red, green and blue of each term of a pixel's curve `c_0 + Re Σ c_m e^(i m a)`: `c_0`, `Re c_1`, `Im c_1` and so on.
-pub type CurveCoefficients = [[f32; 3]; CURVE_COEFFICIENTS];
+pub(crate) type CurveCoefficients = [[f32; 3]; CURVE_COEFFICIENTS];
 
 /// How a surface sends light back.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TransferMaterial {
+pub(crate) struct TransferMaterial {
     /// Whether it has no diffuse part: its albedo is the colour of what it mirrors.
     pub is_metal: bool,
     /// What it mirrors head-on, of even light: 0.04 of plastic, 0 of a surface without gloss. Of metal 1.
@@ -36,7 +36,7 @@ pub struct TransferMaterial {
 
 /// How strong highlights are as a surface is seen from aside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TransferLobe {
+pub(crate) enum TransferLobe {
     /// Stronger, by Schlick's approximation of Fresnel's reflectance: plastic, varnish.
     Fresnel,
     /// Weaker, by the cosine: a power of the half vector's cosine without a reflectance of its own, as
@@ -57,8 +57,7 @@ impl TransferMaterial {
     /// The gloss of a power of the half vector's cosine, which the transfer shows as a Gaussian around the mirrored
     /// direction: the lobe's solid angle is 8 π / (exponent + 1) times the cosine to the eye, and light moves by twice the
     /// half vector's angle.
-    #[must_use]
-    pub fn with_half_vector(self, reflectance: f32, exponent: f32) -> Self {
+    pub(super) fn with_half_vector(self, reflectance: f32, exponent: f32) -> Self {
         Self {
             reflectance: 8.0 * reflectance / (exponent + 1.0),
             blur: 2.0 / exponent.max(1.0).sqrt(),
@@ -81,8 +80,7 @@ impl RadianceTransfer {
     ///
     /// # Panics
     /// Where the finish has not as many pixels.
-    #[must_use]
-    pub fn curves(
+    pub(super) fn curves(
         &self,
         finish: &TransferFinish,
         material: &TransferMaterial,
@@ -190,9 +188,4 @@ fn add(curve: &mut CurveCoefficients, transfer: &[f32], light: &[[f32; 3]], colo
             }
         }
     }
-}
-
-/// The order that the light of a room has.
-pub(super) const fn room_order() -> Order {
-    TRANSFER_ORDER
 }

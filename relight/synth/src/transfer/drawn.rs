@@ -55,8 +55,7 @@ impl DrawnTurn {
     pub const RECIPE: u32 = 2;
 
     /// The turn of a seed: the view in a random material and room.
-    #[must_use]
-    pub fn draw(view: &RadianceTransfer, rooms: &Rooms, seed: u64) -> Self {
+    pub(super) fn draw(view: &RadianceTransfer, rooms: &Rooms, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let finish = finish(view, &mut random);
         let material = TransferMaterial::draw(&mut random);

@@ -37,8 +37,6 @@ use relight_core::light::Order;
 use relight_core::render::cosine_lobe;
 
 pub use cache::TransferCache;
-pub use cast::{RadianceTransfer, TransferFinish};
-pub use curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferLobe, TransferMaterial};
 pub use drawn::DrawnTurn;
 pub use rooms::Rooms;
 pub use views::TransferRecipe;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{Direction, Panorama, Rotation, ShLight, basis};
 
-use super::curves::room_order;
+use super::TRANSFER_ORDER;
 use crate::random::{Random, stream};
 use crate::vectors::rotation_rows;
 
@@ -48,7 +48,7 @@ impl Rooms {
                     } else {
                         recoloured(&small, &mut random)?
                     };
-                    of_mean_one(&image.project(room_order()))
+                    of_mean_one(&image.project(TRANSFER_ORDER))
                 })
                 .collect::<Vec<ShLight>>()
         };
@@ -84,7 +84,7 @@ impl Rooms {
         }
         if random.chance(WITH_EVEN) {
             let share = f64::from(random.log_uniform(0.1..1.5)) as f32;
-            let even = ShLight::even(room_order(), [1.0; 3]);
+            let even = ShLight::even(TRANSFER_ORDER, [1.0; 3]);
             add(&mut light, &even, [share; 3]);
         }
         if random.chance(TWO_SIDED) {
@@ -100,7 +100,7 @@ impl Rooms {
 
     fn panorama(&self, random: &mut Random) -> ShLight {
         let Some(variants) = self.panoramas.get(random.index(self.panoramas.len())) else {
-            return ShLight::even(room_order(), [1.0; 3]);
+            return ShLight::even(TRANSFER_ORDER, [1.0; 3]);
         };
         let mut light = variants[random.index(variants.len())].clone();
         if random.chance(0.5) {

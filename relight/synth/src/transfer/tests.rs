@@ -4,6 +4,8 @@ use glam::Vec3;
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{Direction, Panorama, Rotation, ShLight, basis};
 
+use super::cast::{RadianceTransfer, TransferFinish};
+use super::curves::{CurveCoefficients, TransferLobe, TransferMaterial};
 use super::*;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::{Folders, Library};
@@ -41,7 +43,7 @@ fn open_ball(elevation: f32) -> RadianceTransfer {
     let mut transfer =
         RadianceTransfer::cast(&buffer, &Occluder::new(&mesh, placement), elevation, 200, 3);
     transfer.finishes = vec![TransferFinish {
-        normals: buffer.normals().to_vec(),
+        normals: buffer.normals.clone(),
         albedo: vec![Vec3::splat(PI); buffer.len()],
     }];
     transfer
@@ -112,7 +114,7 @@ fn standing(size: u32, rays: u32) -> (RadianceTransfer, GBuffer, Occluder) {
     let occluder = Occluder::with_disc(&mesh, placement, &plate);
     let mut transfer = RadianceTransfer::cast(&buffer, &occluder, elevation, rays, 3);
     transfer.finishes = vec![TransferFinish {
-        normals: buffer.normals().to_vec(),
+        normals: buffer.normals.clone(),
         albedo: vec![Vec3::ONE; buffer.len()],
     }];
     (transfer, buffer, occluder)
@@ -125,7 +127,7 @@ fn under_even_light_a_pixel_shows_the_part_of_the_sky_that_it_sees() {
     let curves = transfer.curves(&transfer.finishes[0], &MATT, &even);
     let mut random = crate::random::Random::new(9);
     for k in (0..buffer.len()).step_by(11) {
-        let (normal, from) = (buffer.normals()[k], buffer.ray_starts()[k]);
+        let (normal, from) = (buffer.normals[k], buffer.ray_starts[k]);
         let count = 2000;
         let mut open = 0.0;
         for _ in 0..count {
@@ -173,7 +175,7 @@ fn harmonics_of_frames(
     let pixels = scene.buffer().len();
     let material = Material {
         albedo: vec![Vec3::ONE; pixels],
-        normals: scene.buffer().normals().to_vec(),
+        normals: scene.buffer().normals.to_vec(),
         gloss,
     };
     let [x, y, z] = axis.to_array().map(f64::from);
@@ -246,7 +248,7 @@ fn rendered_frames_of_a_turn_have_the_fourier_coefficients_that_the_transfer_say
     let axis = Vec3::new(0.0, transfer.elevation.cos(), transfer.elevation.sin());
     let (panoramas, light) = soft_room(transfer.elevation);
     let finish = TransferFinish {
-        normals: buffer.normals().to_vec(),
+        normals: buffer.normals.clone(),
         albedo: vec![Vec3::splat(PI); buffer.len()],
     };
     let curves = transfer.curves(&finish, &MATT, &light);
@@ -276,7 +278,7 @@ fn highlights_of_rendered_frames_are_as_strong_as_the_transfer_says() {
     let (panoramas, light) = soft_room(elevation);
     let axis = Vec3::new(0.0, elevation.cos(), elevation.sin());
     let finish = TransferFinish {
-        normals: buffer.normals().to_vec(),
+        normals: buffer.normals.clone(),
         albedo: vec![Vec3::ZERO; buffer.len()],
     };
     let scene = SyntheticScene::open(buffer);

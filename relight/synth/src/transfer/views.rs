@@ -30,8 +30,7 @@ pub struct TransferRecipe {
 
 impl TransferRecipe {
     /// Casts the view of a number.
-    #[must_use]
-    pub fn cast(&self, library: &Library, number: u64) -> RadianceTransfer {
+    pub(super) fn cast(&self, library: &Library, number: u64) -> RadianceTransfer {
         let mut random = Random::new(stream(stream(self.seed, 31), number));
         let recipe = Recipe {
             seed: random.seed(),
@@ -48,7 +47,7 @@ impl TransferRecipe {
             RadianceTransfer::cast(&buffer, &occluder, elevation, self.rays, random.seed());
         transfer.finishes = (0..FINISHES)
             .map(|_| {
-                let finish = Finish::painted(&mut random, &buffer, library, 0.0, None);
+                let finish = Finish::painted(&mut random, &buffer, library, 0.0);
                 let material = finish.apply(&buffer, library);
                 TransferFinish {
                     normals: material.normals,

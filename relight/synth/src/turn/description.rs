@@ -24,32 +24,32 @@ pub struct TurnRecipe {
 #[non_exhaustive]
 pub struct TurnDescription {
     /// `relight.turn/1`.
-    pub schema: String,
+    pub(crate) schema: String,
     /// What it was drawn from: the recipe's seed and the turn's number.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// The turn's number.
-    pub number: u64,
+    pub(crate) number: u64,
     /// The object.
-    pub object: ObjectSource,
+    pub(crate) object: ObjectSource,
     /// How it stands.
-    pub pose: Pose,
+    pub(crate) pose: Pose,
     /// How it is seen.
-    pub projection: Projection,
+    pub(crate) projection: Projection,
     /// The table's axis in the viewer's frame, upwards. At the table's angle `a`, the light has turned by
     /// `-a` about it (right-hand rule).
     pub axis: [f64; 3],
     /// What it is made of.
-    pub finish: Finish,
+    pub(crate) finish: Finish,
     /// The name of the panorama that the lighting has.
-    pub panorama: Option<String>,
+    pub(crate) panorama: Option<String>,
     /// The light at the angle 0.
-    pub lighting: Lighting,
+    pub(crate) lighting: Lighting,
     /// The camera.
-    pub camera: CameraModel,
+    pub(crate) camera: CameraModel,
     /// Frames.
-    pub frames: u32,
+    pub(crate) frames: u32,
     /// Width and height.
-    pub size: u32,
+    pub(crate) size: u32,
 }
 
 /// The ground truth of one frame, a line of `frames.jsonl`.
@@ -61,7 +61,7 @@ pub struct FrameTruth {
     /// The table's angle, degrees.
     pub angle_deg: f64,
     /// What 65535 stands for in the frame's `shading` and `highlight`.
-    pub white: Whites,
+    pub(crate) white: Whites,
     /// All light but what bounces, as nine coefficients in the viewer's frame, with the camera's gain.
     pub coefficients: [[f64; 3]; 9],
 }

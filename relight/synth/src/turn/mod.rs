@@ -7,11 +7,9 @@
 //! | `stand` | how an object stands on the table |
 //! | `simulated` | a turn and its frames, rendered |
 //! | `ground_truth` | the ground truth of a turn, beside its shard |
-//! | `page` | the turn's page |
 
 mod description;
 mod ground_truth;
-mod page;
 mod simulated;
 mod stand;
 #[cfg(test)]
@@ -33,7 +31,6 @@ use super::folder::{SynthTally, holds_samples};
 use super::library::Library;
 use super::sample::mask;
 use ground_truth::GroundTruthFolder;
-use page::TurnPage;
 use simulated::{RenderedFrame, SimulatedTurn};
 pub(crate) use stand::{Stand, standing_object};
 
@@ -58,11 +55,11 @@ pub fn write_turns(
 ) -> Result<SynthTally, SynthError> {
     turns.recipe.check()?;
     if !(1..=shard::MAX_SAMPLES).contains(&turns.frames) {
-        return Err(SynthError::Setting {
-            name: "the number of frames",
-            value: u64::from(turns.frames),
-            allowed: "1 to 1000000",
-        });
+        let fault = format!(
+            "the number of frames is {}: give 1 to 1000000",
+            turns.frames
+        );
+        return Err(SynthError::Refused(fault));
     }
     let folder = OutputFolder::lock(out)?;
     let mut dataset = open_dataset(out, &settings(turns))?;
@@ -98,15 +95,11 @@ fn settings(turns: &TurnRecipe) -> ExtractionSettings {
 
 fn open_dataset(out: &Path, settings: &ExtractionSettings) -> Result<Dataset, SynthError> {
     if holds_samples(out) {
-        return Err(SynthError::OtherSettings {
-            path: out.to_owned(),
-        });
+        return Err(SynthError::other_settings(out));
     }
     match Dataset::read(out) {
         Ok(there) if there.settings == *settings => Ok(there),
-        Ok(_) => Err(SynthError::OtherSettings {
-            path: out.to_owned(),
-        }),
+        Ok(_) => Err(SynthError::other_settings(out)),
         Err(shard::ShardError::NoDataset { .. }) => Ok(Dataset::new(settings.clone())),
         Err(error) => Err(error.into()),
     }
@@ -118,16 +111,14 @@ fn is_whole(turn: &SimulatedTurn<'_>, dataset: &Dataset, out: &Path) -> Result<b
         return Ok(false);
     };
     if entry.input != turn.input() {
-        return Err(SynthError::OtherSettings {
-            path: out.to_owned(),
-        });
+        return Err(SynthError::other_settings(out));
     }
     let truth = ground_truth::ground_truth_of(out, &turn.session);
     // The last file that came to be part of it.
     Ok(truth.join("light.txt").is_file() && dataset.check_integrity(out, &turn.session).is_ok())
 }
 
-/// Writes shard, table, page and ground truth.
+/// Writes shard, table and ground truth.
 fn write_turn(
     turn: &SimulatedTurn<'_>,
     folder: &OutputFolder,
@@ -140,7 +131,7 @@ fn write_turn(
     let mut writer = ShardWriter::create(folder.path(), layout, &turn.session, frames, &mask)?;
     let truth = GroundTruthFolder::create(folder.path(), &turn.session)?;
     truth.write_object(turn)?;
-    let mut page = TurnPage::new(frames);
+    let mut records = Vec::new();
     let mut lines = Vec::new();
     for first in (0..frames).step_by(BATCH as usize) {
         let batch: Result<Vec<RenderedFrame>, SynthError> = (first..frames.min(first + BATCH))
@@ -155,16 +146,14 @@ fn write_turn(
             truth.write_frame(&frame)?;
             lines.extend(serde_json::to_vec(&frame.truth).unwrap_or_default());
             lines.push(b'\n');
-            page.keep(&frame.sample);
+            records.push(frame.sample.record.clone());
             writer.push(frame.sample)?;
         }
     }
     truth.write("frames.jsonl", &lines)?;
-    let html = page.render(turn)?;
     let files = writer.finish()?;
-    let report = folder.write(&format!("{}.html", turn.session), html.as_bytes())?;
     truth.publish()?;
-    let spec_net = page.records.iter().filter(|record| record.spec_net).count();
+    let spec_net = records.iter().filter(|record| record.spec_net).count();
     let entry = SessionEntry {
         id: turn.session.clone(),
         object: turn.object.clone(),
@@ -181,10 +170,10 @@ fn write_turn(
         duplicates: 0,
         spec_net: spec_net as u32,
         lossy: false,
-        quality: Some(SessionQuality::of(&page.records, false, None)),
+        quality: Some(SessionQuality::of(&records, false, None)),
         warnings: Vec::new(),
         table: files.table,
-        report: Some(report),
+        report: None,
     };
     Ok((entry, files.shards))
 }

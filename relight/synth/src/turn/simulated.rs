@@ -65,7 +65,13 @@ impl<'a> SimulatedTurn<'a> {
         let (object, mesh) = standing_object(recipe, library, &mut random);
         let stand = Stand::draw(&mut random, ELEVATIONS);
         let scene = scene(recipe, &stand, &mesh, random.seed());
-        let finish = Finish::draw(&mut random, scene.buffer(), library, GLOSSY, recipe.albedo);
+        let finish = Finish::draw(
+            &mut random,
+            scene.buffer(),
+            library,
+            GLOSSY,
+            recipe.own_albedo,
+        );
         let material = finish.apply(scene.buffer(), library);
         let lighting = Lighting::draw(
             &mut random,

@@ -57,7 +57,7 @@ impl Stand {
     pub(crate) fn plate(&self, mesh: &Mesh) -> Disc {
         let placement = self.placement(mesh);
         let points = mesh
-            .positions()
+            .positions
             .iter()
             .map(|&p| placement.transform_point3(p));
         let lowest = points

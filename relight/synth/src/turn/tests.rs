@@ -120,12 +120,7 @@ fn the_number_of_threads_changes_no_byte() {
         let mut all: Vec<Vec<u8>> = files
             .map(|file| fs::read(truth.join(file)).unwrap())
             .to_vec();
-        for file in [
-            "dataset.json",
-            "synth-3-0000.tar",
-            "synth-3-0000.parquet",
-            "synth-3-0000.html",
-        ] {
+        for file in ["dataset.json", "synth-3-0000.tar", "synth-3-0000.parquet"] {
             all.push(fs::read(folder.path().join(file)).unwrap());
         }
         all
@@ -145,15 +140,15 @@ fn turns_that_are_whole_are_kept_and_others_are_refused() {
         ..turns(4)
     };
     let error = write_turns(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
-    assert!(matches!(error, SynthError::OtherSettings { .. }));
+    assert!(error.to_string().contains("other settings"), "{error}");
     let samples = tempfile::tempdir().unwrap();
     write_samples(&turns(4).recipe, &library, 1, samples.path(), &|| {}).unwrap();
     let error = write_turns(&turns(4), &library, 1, samples.path(), &|| {}).unwrap_err();
-    assert!(matches!(error, SynthError::OtherSettings { .. }));
+    assert!(error.to_string().contains("other settings"), "{error}");
     let mut other = turns(4);
     other.recipe.light = LightKind::Sh;
     let error = write_turns(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
-    assert!(matches!(error, SynthError::OtherSettings { .. }));
+    assert!(error.to_string().contains("other settings"), "{error}");
 }
 
 #[test]

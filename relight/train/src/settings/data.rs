@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::allowed::all_allowed;
+use super::{ensure, within};
 use crate::error::TrainError;
-use relight_synth::LightKind;
 
 // Nobody trains more: these keep a slip of the pen from filling the memory.
 const MOST_SAMPLES: u64 = 1_000_000;
@@ -22,12 +21,6 @@ pub struct DataSettings {
     pub views: u32,
     /// Materials and lightings of each view.
     pub lightings: u32,
-    /// What light there is.
-    pub light: LightKind,
-    /// Whether objects block light.
-    pub shadows: bool,
-    /// Part of the pictures that a plain camera takes.
-    pub plain_share: f64,
     /// Samples of the shuffle buffer, from which batches are drawn.
     pub shuffle_buffer: u64,
     /// How often each is seen, in the mean.
@@ -51,9 +44,6 @@ impl Default for DataSettings {
             size: 128,
             views: 2,
             lightings: 6,
-            light: LightKind::Mixed,
-            shadows: true,
-            plain_share: 0.5,
             shuffle_buffer: 768,
             reuse: 4.0,
             meshes: None,
@@ -70,16 +60,11 @@ impl Default for DataSettings {
 pub struct TurnSettings {
     /// Groups of a step, at least 1, each of 12 frames of one turn.
     pub groups: u64,
-    /// Frames with labels of a step, at least 1, where there are labels.
-    pub labelled: u64,
 }
 
 impl Default for TurnSettings {
     fn default() -> Self {
-        Self {
-            groups: 1,
-            labelled: 8,
-        }
+        Self { groups: 1 }
     }
 }
 
@@ -87,40 +72,18 @@ impl DataSettings {
     /// Whether all numbers are in range; the recipe checks the others.
     ///
     /// # Errors
-    /// [`TrainError::Setting`] names the first that is not.
+    /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        all_allowed([
-            (
-                "data.size",
-                (32..=LARGEST_SIZE).contains(&self.size) && self.size.is_multiple_of(32),
-                self.size.to_string(),
-                "a multiple of 32 up to 1024",
-            ),
-            (
-                "data.shuffle_buffer",
-                (1..=MOST_SAMPLES).contains(&self.shuffle_buffer),
-                self.shuffle_buffer.to_string(),
-                "from 1 to a million",
-            ),
-            (
-                "data.reuse",
-                self.reuse >= 1.0 && self.reuse.is_finite(),
-                self.reuse.to_string(),
-                "at least 1",
-            ),
-            (
-                "data.plain_share",
-                (0.0..=1.0).contains(&self.plain_share),
-                self.plain_share.to_string(),
-                "from 0 to 1",
-            ),
-            (
-                "data.validation",
-                (1..=MOST_SAMPLES).contains(&self.validation),
-                self.validation.to_string(),
-                "from 1 to a million",
-            ),
-        ])
+        let is_right = (32..=LARGEST_SIZE).contains(&self.size) && self.size.is_multiple_of(32);
+        ensure(
+            is_right,
+            "data.size",
+            self.size,
+            "a multiple of 32 up to 1024",
+        )?;
+        within("data.shuffle_buffer", self.shuffle_buffer, 1..=MOST_SAMPLES)?;
+        within("data.reuse", self.reuse, 1.0..=1e6)?;
+        within("data.validation", self.validation, 1..=MOST_SAMPLES)
     }
 }
 
@@ -128,20 +91,8 @@ impl TurnSettings {
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`TrainError::Setting`] names the first that is not.
+    /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        let setting = |name, value| {
-            let allowed = "from 1 to a million";
-            (
-                name,
-                (1..=MOST_SAMPLES).contains(&value),
-                value.to_string(),
-                allowed,
-            )
-        };
-        all_allowed([
-            setting("turns.groups", self.groups),
-            setting("turns.labelled", self.labelled),
-        ])
+        within("turns.groups", self.groups, 1..=MOST_SAMPLES)
     }
 }

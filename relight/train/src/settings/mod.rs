@@ -5,21 +5,17 @@
 //! | `run` | how long and how fast a network learns: `[run]` |
 //! | `data` | composed samples and turns: `[data]`, `[turns]` |
 //! | `transfer` | views and rooms of the network of turns: its `[data]` |
-//! | `loss` | loss coefficients: `[loss]` |
 //! | `file` | reading TOML, and how the settings of two runs differ |
-//! | `renamed` | old names of settings |
-//! | `allowed` | settings out of range |
 
-mod allowed;
 mod data;
 mod file;
-mod loss;
-mod renamed;
 mod run;
 #[cfg(test)]
 mod tests;
 mod transfer;
 
+use std::fmt::Display;
+use std::ops::{Bound, RangeBounds};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -27,46 +23,17 @@ use serde::{Deserialize, Serialize};
 use super::decompose::DecomposeLossCoefficients;
 use super::error::TrainError;
 use super::paper_phases::PaperPhase;
-use file::read_with;
-use loss::{check_coefficient, check_coefficients};
-use relight_nets::{LIGHT_PARAMETERS, PAINT_PARAMETERS};
 
 pub use data::{DataSettings, TurnSettings};
 pub(super) use file::first_difference;
-pub use file::{SettingsFile, read_settings};
-pub use loss::PaperLossCoefficients;
-pub use renamed::RenamedSetting;
-pub use run::{PrecisionChoice, RunSettings};
+pub use file::read_settings;
+pub use run::RunSettings;
 pub use transfer::TransferSettings;
-
-/// A head of the decomposing network that can be trained by itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DecomposeHead {
-    /// That which tells paint from shadow.
-    Paint,
-    /// That which tells the light.
-    Light,
-}
-
-impl DecomposeHead {
-    /// How the names of its parameters begin.
-    #[must_use]
-    pub fn parameters(self) -> &'static str {
-        match self {
-            Self::Paint => PAINT_PARAMETERS,
-            Self::Light => LIGHT_PARAMETERS,
-        }
-    }
-}
 
 /// The settings of `relight train decompose`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DecomposeSettings {
-    /// The one head that is trained, where all else stays as the weights have it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub only: Option<DecomposeHead>,
     /// How long and how fast.
     pub run: RunSettings,
     /// On what.
@@ -89,7 +56,7 @@ impl TurnNetworkSettings {
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`TrainError::Setting`] names the first that is not.
+    /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
         self.data.check()
@@ -110,42 +77,50 @@ pub struct PaperSettings {
     pub loss: PaperLossCoefficients,
 }
 
+/// The loss coefficients of the paper's phases: the table `[loss]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PaperLossCoefficients {
+    /// The low-rank loss on turns.
+    pub low_rank: f64,
+    /// The supervised term: the loss on composed samples beside turns; 0: none is composed.
+    pub supervised: f64,
+}
+
+impl Default for PaperLossCoefficients {
+    fn default() -> Self {
+        Self {
+            low_rank: 1.0,
+            supervised: 1.0,
+        }
+    }
+}
+
 impl PaperSettings {
     /// The settings of a phase: what the TOML file does not name has its default, the learning rate that of the phase.
     ///
     /// # Errors
     /// As [`read_settings`].
-    pub fn of_phase(
-        phase: PaperPhase,
-        file: Option<&Path>,
-    ) -> Result<SettingsFile<Self>, TrainError> {
-        let Some(file) = file else {
-            let mut settings = Self::default();
+    pub fn of_phase(phase: PaperPhase, file: Option<&Path>) -> Result<Self, TrainError> {
+        let mut settings: Self = file.map_or_else(|| Ok(Self::default()), read_settings)?;
+        let table: toml::Table = file.map_or_else(|| Ok(toml::Table::new()), read_settings)?;
+        let run = table.get("run");
+        if run.is_none_or(|run| run.get("learning_rate").is_none()) {
             settings.run.learning_rate = phase.default_learning_rate();
-            return Ok(settings.into());
-        };
-        read_with(file, |text| {
-            let mut settings: Self = toml::from_str(text)?;
-            let table: toml::Table = toml::from_str(text)?;
-            let run = table.get("run");
-            if run.is_none_or(|run| run.get("learning_rate").is_none()) {
-                settings.run.learning_rate = phase.default_learning_rate();
-            }
-            Ok(settings)
-        })
+        }
+        Ok(settings)
     }
 
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`TrainError::Setting`] names the first that is not.
+    /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
         self.data.check()?;
         check_coefficients(&[
             ("loss.low_rank", self.loss.low_rank),
             ("loss.supervised", self.loss.supervised),
-            ("loss.labels", self.loss.labels),
         ])?;
         self.turns.check()
     }
@@ -155,11 +130,13 @@ impl DecomposeSettings {
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`TrainError::Setting`] names the first that is not.
+    /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
         self.run.check()?;
         self.data.check()?;
         let loss = &self.loss;
+        // A part of others: alone it counts nothing.
+        check_coefficient("loss.quotient", loss.quotient)?;
         check_coefficients(&[
             ("loss.whole", loss.whole),
             ("loss.windows", loss.windows),
@@ -169,8 +146,60 @@ impl DecomposeSettings {
             ("loss.highlight_energy", loss.highlight_energy),
             ("loss.paint", loss.paint),
             ("loss.light", loss.light),
-        ])?;
-        // A part of others: alone it counts nothing.
-        check_coefficient("loss.quotient", loss.quotient)
+        ])
     }
+}
+
+/// Whether loss coefficients are in range, and not all of them 0.
+fn check_coefficients(coefficients: &[(&'static str, f64)]) -> Result<(), TrainError> {
+    for &(name, coefficient) in coefficients {
+        check_coefficient(name, coefficient)?;
+    }
+    let is_nothing = coefficients
+        .iter()
+        .all(|&(_, coefficient)| coefficient == 0.0);
+    ensure(!is_nothing, "[loss]", 0, "above 0 for one of all others")
+}
+
+fn check_coefficient(name: &str, value: f64) -> Result<(), TrainError> {
+    ensure(
+        value >= 0.0 && value.is_finite(),
+        name,
+        value,
+        "a number from 0",
+    )
+}
+
+/// Whether the value of a setting is in a range, which has a least value.
+fn within<N: PartialOrd + Display>(
+    name: &str,
+    value: N,
+    range: impl RangeBounds<N>,
+) -> Result<(), TrainError> {
+    let least = match range.start_bound() {
+        Bound::Included(least) | Bound::Excluded(least) => least.to_string(),
+        Bound::Unbounded => String::new(),
+    };
+    let allowed = match range.end_bound() {
+        Bound::Included(most) => format!("from {least} to {most}"),
+        Bound::Excluded(end) => format!("from {least} to below {end}"),
+        Bound::Unbounded => format!("at least {least}"),
+    };
+    ensure(range.contains(&value), name, value, &allowed)
+}
+
+/// Whether a number is above 0, and one.
+fn positive(name: &str, value: f64) -> Result<(), TrainError> {
+    ensure(value > 0.0 && value.is_finite(), name, value, "above 0")
+}
+
+/// Says which setting is not allowed, and what is.
+fn ensure(
+    is_allowed: bool,
+    name: &str,
+    value: impl Display,
+    allowed: &str,
+) -> Result<(), TrainError> {
+    let fault = || TrainError::Refused(format!("{name} is {value}: it has to be {allowed}"));
+    is_allowed.then_some(()).ok_or_else(fault)
 }

@@ -1,10 +1,12 @@
 //! How long and how fast a network learns.
 
 use serde::{Deserialize, Serialize};
+use tch::Device;
 
-use super::allowed::all_allowed;
+use super::{positive, within};
 use crate::adam::AdamSettings;
 use crate::error::TrainError;
+use crate::learner::LearnerSettings;
 use crate::model::ComputePrecision;
 
 // Nobody trains more: these keep a slip of the pen from filling the memory.
@@ -39,41 +41,13 @@ pub struct RunSettings {
     /// Part of the exponential moving average of the weights that is kept at each step.
     pub ema_decay: f64,
     /// In which precision layers are computed.
-    pub precision: PrecisionChoice,
+    pub precision: ComputePrecision,
     /// Steps from one line of losses to the next.
     pub log_every: u64,
     /// Steps from one validation, with its pictures, to the next.
     pub validate_every: u64,
     /// Minutes from one checkpoint to the next.
     pub checkpoint_minutes: f64,
-}
-
-/// In which precision layers are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PrecisionChoice {
-    /// 32 bits.
-    Single,
-    /// bfloat16.
-    Mixed,
-    /// 64 bits, several times slower: to compare runs. Checkpoints keep 32 of them.
-    Double,
-    /// Of `decompose` the faster of single and mixed, by a short measurement when the run begins; a resumed run keeps it.
-    /// The paper's networks are small: single.
-    Fastest,
-}
-
-impl PrecisionChoice {
-    /// The precision that it names; none where it is to be found out.
-    #[must_use]
-    pub fn named(self) -> Option<ComputePrecision> {
-        match self {
-            Self::Single => Some(ComputePrecision::Single),
-            Self::Mixed => Some(ComputePrecision::Mixed),
-            Self::Double => Some(ComputePrecision::Double),
-            Self::Fastest => None,
-        }
-    }
 }
 
 impl Default for RunSettings {
@@ -90,7 +64,7 @@ impl Default for RunSettings {
             beta2: 0.99,
             weight_decay: 1e-3,
             ema_decay: 0.998,
-            precision: PrecisionChoice::Fastest,
+            precision: ComputePrecision::Single,
             log_every: 20,
             validate_every: 250,
             checkpoint_minutes: 5.0,
@@ -102,84 +76,24 @@ impl RunSettings {
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`TrainError::Setting`] names the first that is not.
+    /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        let part = |value: f64| (0.0..1.0).contains(&value);
-        let positive = |value: f64| value > 0.0 && value.is_finite();
-        all_allowed([
-            (
-                "run.steps",
-                (1..=MOST_STEPS).contains(&self.steps),
-                self.steps.to_string(),
-                "from 1 to a thousand million",
-            ),
-            (
-                "run.batch",
-                (1..=LARGEST_BATCH).contains(&self.batch),
-                self.batch.to_string(),
-                "from 1 to 4096",
-            ),
-            (
-                "run.learning_rate",
-                positive(self.learning_rate),
-                self.learning_rate.to_string(),
-                "above 0",
-            ),
-            (
-                "run.min_lr_ratio",
-                (0.0..=1.0).contains(&self.min_lr_ratio),
-                self.min_lr_ratio.to_string(),
-                "from 0 to 1",
-            ),
-            (
-                "run.max_grad_norm",
-                positive(self.max_grad_norm),
-                self.max_grad_norm.to_string(),
-                "above 0",
-            ),
-            (
-                "run.beta1",
-                part(self.beta1),
-                self.beta1.to_string(),
-                "from 0 to below 1",
-            ),
-            (
-                "run.beta2",
-                part(self.beta2),
-                self.beta2.to_string(),
-                "from 0 to below 1",
-            ),
-            (
-                "run.weight_decay",
-                (0.0..1.0).contains(&self.weight_decay),
-                self.weight_decay.to_string(),
-                "from 0 to below 1",
-            ),
-            (
-                "run.ema_decay",
-                part(self.ema_decay),
-                self.ema_decay.to_string(),
-                "from 0 to below 1",
-            ),
-            (
-                "run.log_every",
-                self.log_every > 0,
-                self.log_every.to_string(),
-                "at least 1",
-            ),
-            (
-                "run.validate_every",
-                self.validate_every > 0,
-                self.validate_every.to_string(),
-                "at least 1",
-            ),
-            (
-                "run.checkpoint_minutes",
-                positive(self.checkpoint_minutes) && self.checkpoint_minutes <= MOST_MINUTES,
-                self.checkpoint_minutes.to_string(),
-                "above 0 and at most a million",
-            ),
-        ])
+        within("run.steps", self.steps, 1..=MOST_STEPS)?;
+        within("run.batch", self.batch, 1..=LARGEST_BATCH)?;
+        positive("run.learning_rate", self.learning_rate)?;
+        within("run.min_lr_ratio", self.min_lr_ratio, 0.0..=1.0)?;
+        positive("run.max_grad_norm", self.max_grad_norm)?;
+        within("run.beta1", self.beta1, 0.0..1.0)?;
+        within("run.beta2", self.beta2, 0.0..1.0)?;
+        within("run.weight_decay", self.weight_decay, 0.0..1.0)?;
+        within("run.ema_decay", self.ema_decay, 0.0..1.0)?;
+        within("run.log_every", self.log_every, 1..)?;
+        within("run.validate_every", self.validate_every, 1..)?;
+        within(
+            "run.checkpoint_minutes",
+            self.checkpoint_minutes,
+            1e-3..=MOST_MINUTES,
+        )
     }
 
     /// The learning rate of a step, from 0: it grows evenly at first, and falls along a cosine.
@@ -193,13 +107,17 @@ impl RunSettings {
             * (self.min_lr_ratio + (1.0 - self.min_lr_ratio) * cosine)
     }
 
-    /// The optimiser's settings.
-    #[must_use]
-    pub fn adam(&self) -> AdamSettings {
-        AdamSettings {
-            beta1: self.beta1,
-            beta2: self.beta2,
-            weight_decay: self.weight_decay,
+    /// How a network learns on a device.
+    pub(crate) fn learner(&self, device: Device) -> LearnerSettings {
+        LearnerSettings {
+            adam: AdamSettings {
+                beta1: self.beta1,
+                beta2: self.beta2,
+                weight_decay: self.weight_decay,
+            },
+            ema_decay: self.ema_decay,
+            precision: self.precision,
+            device,
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::allowed::all_allowed;
+use super::{ensure, within};
 use crate::error::TrainError;
 
 const MOST_VIEWS: u64 = 1_000_000;
@@ -62,47 +62,22 @@ impl TransferSettings {
     /// Whether all numbers are in range.
     ///
     /// # Errors
-    /// [`TrainError::Setting`] names the first that is not.
+    /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        let views = |name, value: u64| {
-            let is_allowed = (1..=MOST_VIEWS).contains(&value);
-            (name, is_allowed, value.to_string(), "from 1 to a million")
-        };
-        all_allowed([
-            (
-                "data.size",
-                (32..=512).contains(&self.size) && self.size.is_multiple_of(32),
-                self.size.to_string(),
-                "a multiple of 32 up to 512",
-            ),
-            views("data.views", self.views),
-            views("data.first_views", self.first_views),
-            views("data.validation", self.validation),
-            (
-                "data.new_views",
-                self.new_views <= MOST_VIEWS,
-                self.new_views.to_string(),
-                "up to a million",
-            ),
-            (
-                "data.rays",
-                (16..=4096).contains(&self.rays),
-                self.rays.to_string(),
-                "from 16 to 4096",
-            ),
-            (
-                "data.coarse_part",
-                (0.0..=1.0).contains(&self.coarse_part),
-                self.coarse_part.to_string(),
-                "from 0 to 1",
-            ),
-            (
-                "data.variants",
-                (1..=1000).contains(&self.variants),
-                self.variants.to_string(),
-                "from 1 to 1000",
-            ),
-        ])
+        let is_right = (32..=512).contains(&self.size) && self.size.is_multiple_of(32);
+        ensure(
+            is_right,
+            "data.size",
+            self.size,
+            "a multiple of 32 up to 512",
+        )?;
+        within("data.views", self.views, 1..=MOST_VIEWS)?;
+        within("data.first_views", self.first_views, 1..=MOST_VIEWS)?;
+        within("data.validation", self.validation, 1..=MOST_VIEWS)?;
+        within("data.new_views", self.new_views, 0..=MOST_VIEWS)?;
+        within("data.rays", self.rays, 16..=4096)?;
+        within("data.coarse_part", self.coarse_part, 0.0..=1.0)?;
+        within("data.variants", self.variants, 1..=1000)
     }
 
     /// How many of the views there are at a step.

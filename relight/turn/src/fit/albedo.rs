@@ -1,12 +1,9 @@
-//! The albedo of pixels whose normals are hardly to be trusted: by those around them that are, and by an albedo that is
-//! expected. Knows nothing of light.
+//! The albedo of pixels whose normals are hardly to be trusted: by those around them that are. Knows nothing of light.
 //!
 //! A wrong normal has a wrong shading, and so its pixel a wrong albedo. Albedos of one surface are alike where its
 //! colour is, and the chromaticity of a pixel's mean light shows that without any normal.
 
 use rayon::prelude::*;
-use relight_core::image::{Linear, Rgb};
-use relight_core::statistics::median;
 
 use crate::fit::curve_statistics::CurveStatistics;
 use crate::observe::curves::TurnCurves;
@@ -21,11 +18,6 @@ struct AlbedoParameters {
     taps: isize,
     /// Standard deviation of chromaticities of one surface. By hand.
     same_colour: f64,
-    /// Expected error of a normal at which the expected albedo counts one half, radians. Measured: on 16 synthetic turns
-    /// (docs/results/turns.md).
-    half_expected: f64,
-    /// The least albedo whose logarithm counts. Numerical.
-    darkest: f64,
 }
 
 const PARAMETERS: AlbedoParameters = AlbedoParameters {
@@ -33,8 +25,6 @@ const PARAMETERS: AlbedoParameters = AlbedoParameters {
     reach: 1.0 / 32.0,
     taps: 8,
     same_colour: 0.05,
-    half_expected: 0.04,
-    darkest: 1e-4,
 };
 
 /// The albedo of each pixel, shrunk toward those of the same colour around it as far as its normal is expected to be
@@ -89,33 +79,6 @@ pub(crate) fn shared(curves: &TurnCurves, albedo: &[[f64; 3]], errors: &[f64]) -
             }
             let own = confidence[pixel];
             std::array::from_fn(|c| own * albedo[pixel][c] + (1.0 - own) * sum[c] / weights)
-        })
-        .collect()
-}
-
-/// The albedo of each pixel, in logarithms the nearer to the expected one, the further its normal is expected to be off,
-/// radians. A wrong normal makes albedos wrong by factors, and a few of them by large ones. The expected one is in any
-/// unit: its medians are brought to those of the albedo.
-pub(crate) fn toward_expected(
-    curves: &TurnCurves,
-    albedo: &[[f64; 3]],
-    expected: &Rgb<Linear>,
-    errors: &[f64],
-) -> Vec<[f64; 3]> {
-    let logarithm = |value: f64| value.max(PARAMETERS.darkest).ln();
-    let planes = expected.planes().planes();
-    let expected = |pixel: usize, c: usize| logarithm(f64::from(planes[c][curves.places()[pixel]]));
-    let units: [f64; 3] = std::array::from_fn(|c| {
-        let apart = (0..albedo.len()).map(|pixel| logarithm(albedo[pixel][c]) - expected(pixel, c));
-        median(apart).unwrap_or(0.0)
-    });
-    (0..albedo.len())
-        .map(|pixel| {
-            let own = 1.0 / (1.0 + (errors[pixel] / PARAMETERS.half_expected).powi(4));
-            std::array::from_fn(|c| {
-                let there = expected(pixel, c) + units[c];
-                (own * logarithm(albedo[pixel][c]) + (1.0 - own) * there).exp()
-            })
         })
         .collect()
 }
@@ -177,29 +140,6 @@ mod tests {
             let off = |c: usize| (found[c] / truth(pixel)[c] - 1.0).abs();
             let most = if wrong.contains(&pixel) { 0.05 } else { 1e-9 };
             assert!((0..3).all(|c| off(c) < most), "{pixel}: {found:?}");
-        }
-    }
-
-    #[test]
-    fn a_doubtful_albedo_becomes_the_expected_one_in_its_own_unit_and_a_sure_one_stays() {
-        let curves = halves();
-        let truth = |pixel: usize| [0.4, 0.3, 0.2].map(|value| value + 0.01 * (pixel % 7) as f64);
-        // Each channel in a unit of its own.
-        let expected = curves.map(|pixel| {
-            let [red, green, blue] = truth(pixel).map(|value| value as f32);
-            [2.0 * red, 3.0 * green, 5.0 * blue]
-        });
-        let wrong = |pixel: usize| pixel.is_multiple_of(3);
-        let albedo: Vec<[f64; 3]> = (0..curves.pixels())
-            .map(|pixel| truth(pixel).map(|value| if wrong(pixel) { 6.0 * value } else { value }))
-            .collect();
-        let errors: Vec<f64> = (0..curves.pixels())
-            .map(|pixel| if wrong(pixel) { 1.5 } else { 0.01 })
-            .collect();
-        let found = toward_expected(&curves, &albedo, &Rgb::new(expected), &errors);
-        for (pixel, found) in found.iter().enumerate() {
-            let off = |c: usize| (found[c] / truth(pixel)[c] - 1.0).abs();
-            assert!((0..3).all(|c| off(c) < 0.01), "{pixel}: {found:?}");
         }
     }
 }

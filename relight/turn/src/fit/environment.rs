@@ -18,8 +18,6 @@ use crate::observe::curves::TurnCurves;
 
 /// Parameters of the fit of the light.
 struct EnvironmentParameters {
-    /// Rounds that alternate between albedo and light. By hand.
-    rounds: usize,
     /// Ridge of the light's terms, relative to the normal equations. Numerical: light that the normals hardly show
     /// stays small.
     ridge: f64,
@@ -32,7 +30,6 @@ struct EnvironmentParameters {
 }
 
 const PARAMETERS: EnvironmentParameters = EnvironmentParameters {
-    rounds: 3,
     ridge: 1e-5,
     gloss_ridge: 1e-4,
     lambertian_residual: 1e-3,
@@ -53,7 +50,7 @@ pub fn fit_turn_light(
     frame: &TableFrame,
 ) -> Result<ShLight, TurnError> {
     if surface.extent() != curves.extent() {
-        return Err(TurnError::PriorSize {
+        return Err(TurnError::SurfaceSize {
             found: surface.extent(),
             expected: curves.extent(),
         });
@@ -70,7 +67,7 @@ pub fn fit_turn_light(
         }
     }
     if material == MaterialKind::Metal {
-        let model = fit_reflection(&statistics, &known, &colours, frame, GLOSS_TERMS);
+        let model = fit_reflection(&statistics, &known, &colours, frame);
         let light = model
             .ok_or(TurnError::NoLight)?
             .gloss
@@ -105,77 +102,45 @@ fn with_higher_bands(light: ShLight, gloss: &GlossLight) -> Result<ShLight, Turn
     Ok(ShLight::new(coefficients)?)
 }
 
-/// The shading model of a Lambertian object with these normals that fits the curves best, in alternation with the
-/// albedo, which is brought along.
-pub(crate) fn fit_lambertian(
+/// The shading model that fits the curves of these normals and albedos best, for a diffuse object without gloss: one linear
+/// fit of the light. What gloss shows of a light that is not known can hardly be told from what the diffuse part shows.
+pub(crate) fn fit_model(
     statistics: &[CurveStatistics],
     normals: &[[f64; 3]],
-    albedo: &mut [[f64; 3]],
+    albedo: &[[f64; 3]],
     frame: &TableFrame,
+    material: MaterialKind,
 ) -> Option<ShadingModel> {
+    if material == MaterialKind::Metal {
+        return fit_reflection(statistics, normals, albedo, frame);
+    }
     let pixels = pixels(statistics, normals, frame);
-    let mut found = None;
-    for _ in 0..PARAMETERS.rounds {
-        let (light, gloss) = fit_light(&pixels, albedo, Finish::Lambertian)?;
-        let model = ShadingModel {
-            frame: *frame,
-            light,
-            diffuse_beyond: GlossLight::NONE,
-            gloss,
-            material: MaterialKind::Diffuse,
-        };
-        update_albedo(&model, statistics, normals, albedo);
-        found = Some(model);
-    }
-    found
+    let (light, gloss) = fit_light(&pixels, albedo, Finish::Lambertian)?;
+    Some(ShadingModel {
+        frame: *frame,
+        light,
+        diffuse_beyond: GlossLight::NONE,
+        gloss,
+        material,
+    })
 }
 
-/// The same for metal that shows so many bands of its light.
-pub(crate) fn fit_metal(
-    statistics: &[CurveStatistics],
-    normals: &[[f64; 3]],
-    albedo: &mut [[f64; 3]],
-    frame: &TableFrame,
-    bands: usize,
-) -> Option<ShadingModel> {
-    let mut found = None;
-    for _ in 0..PARAMETERS.rounds {
-        let model = fit_reflection(statistics, normals, albedo, frame, bands * bands)?;
-        update_albedo(&model, statistics, normals, albedo);
-        found = Some(model);
-    }
-    found
-}
-
-/// Gives every pixel the albedo that fits it best.
-fn update_albedo(
-    model: &ShadingModel,
-    statistics: &[CurveStatistics],
-    normals: &[[f64; 3]],
-    albedo: &mut [[f64; 3]],
-) {
-    for ((statistics, &normal), albedo) in statistics.iter().zip(normals).zip(albedo) {
-        *albedo = statistics.albedo(&model.harmonics(normal));
-    }
-}
-
-/// The shading model of metal with these normals and albedos, with so many terms of its light.
+/// The same of metal.
 fn fit_reflection(
     statistics: &[CurveStatistics],
     normals: &[[f64; 3]],
     albedo: &[[f64; 3]],
     frame: &TableFrame,
-    count: usize,
 ) -> Option<ShadingModel> {
     let mut shown = [[0.0; GLOSS_TERMS]; 3];
     for (channel, shown) in shown.iter_mut().enumerate() {
-        let mut equations = NormalEquations::new(count);
+        let mut equations = NormalEquations::new(GLOSS_TERMS);
         for ((statistics, &normal), albedo) in statistics.iter().zip(normals).zip(albedo) {
             let mut terms = mirror_terms(frame.to_table(reflected(normal)));
             for part in terms.iter_mut().flat_map(|term| &mut term.parts) {
                 *part *= albedo[channel];
             }
-            add(&mut equations, (statistics, channel), &terms[..count]);
+            add(&mut equations, (statistics, channel), &terms);
         }
         equations.add_ridge(1, PARAMETERS.ridge);
         for (term, [value, ..]) in shown.iter_mut().zip(equations.solve()?) {

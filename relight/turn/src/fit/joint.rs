@@ -1,18 +1,15 @@
-//! Joint optimisation of light, gloss, normals and albedo by Gauss-Newton steps, in which every pixel follows the
-//! light.
+//! Joint optimisation of gloss, normals and albedo by Gauss-Newton steps, in which every pixel follows the gloss.
 //!
-//! Alternation between light and pixels takes many rounds, for each is held by the other. A step here takes out of what
-//! the light's unknowns do to a curve the part that the pixel's own normal and albedo could do as well: the Schur
-//! complement of the normal equations.
+//! A step takes out of what the unknowns do to a curve the part that the pixel's own normal and albedo could do as well:
+//! the Schur complement of the normal equations.
 
 use rayon::prelude::*;
 use relight_core::statistics::median;
 
 use crate::fit::curve_statistics::CurveStatistics;
-use crate::fit::normal_step::PriorNormal;
 use crate::fit::schur::JointEquations;
 use crate::fit::search::{PixelFit, Search, cost, search_all};
-use crate::fit::unknowns::{Columns, Estimate, Unknowns};
+use crate::fit::unknowns::Unknowns;
 use crate::model::shading::ShadingModel;
 
 /// Parameters of the joint optimisation.
@@ -50,31 +47,23 @@ const PARAMETERS: JointParameters = JointParameters {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct JointOptimisation<'a> {
     pub(crate) statistics: &'a [CurveStatistics],
-    pub(crate) prior: Option<&'a [PriorNormal]>,
-    /// Where normals are searched from; anywhere without.
-    pub(crate) starts: Option<&'a [PixelFit]>,
     pub(crate) unknowns: Unknowns<'a>,
 }
 
 impl JointOptimisation<'_> {
-    /// The final residual and shading model. Each round searches the normals, then refines all unknowns.
-    pub(crate) fn found(
-        &self,
-        start: ShadingModel,
-        rounds: usize,
-        steps: usize,
-    ) -> (f64, ShadingModel) {
+    /// The shading model of the least residual. Each round searches the normals anywhere, then refines all unknowns.
+    pub(crate) fn found(&self, start: ShadingModel, rounds: usize, steps: usize) -> ShadingModel {
         let mut model = start;
         let mut residual = f64::INFINITY;
         for _ in 0..rounds {
-            let fits = search_all(&model, self.statistics, self.prior, self.starts);
+            let fits = search_all(&model, self.statistics, None);
             let (found, fits) = self.refined(model, fits, steps);
-            let reached = cost(&fits, self.prior);
+            let reached = cost(&fits);
             if reached < residual {
                 (model, residual) = (found, reached);
             }
         }
-        (residual, model)
+        model
     }
 
     /// Shading model and pixels after at most so many steps from these.
@@ -84,18 +73,18 @@ impl JointOptimisation<'_> {
         fits: Vec<PixelFit>,
         steps: usize,
     ) -> (ShadingModel, Vec<PixelFit>) {
-        let (mut estimate, mut fits) = (Estimate::of(&model, self.unknowns), fits);
-        let (frame, mut damping) = (model.frame, PARAMETERS.damping);
-        let mut least = cost(&fits, self.prior);
+        let (mut estimate, mut fits) = (self.unknowns.estimate(&model), fits);
+        let mut damping = PARAMETERS.damping;
+        let mut least = cost(&fits);
         for _ in 0..steps {
-            let model = estimate.model(&frame, self.unknowns);
-            let Some(step) = self.step(&estimate, &model, &fits, damping) else {
+            let model = self.unknowns.model(&estimate);
+            let Some(step) = self.step(&model, &fits, damping) else {
                 break;
             };
-            let other = estimate.moved(&step, self.unknowns);
-            let model = other.model(&frame, self.unknowns);
-            let found = search_all(&model, self.statistics, self.prior, Some(&fits));
-            let reached = cost(&found, self.prior);
+            let other = self.unknowns.moved(&estimate, &step);
+            let model = self.unknowns.model(&other);
+            let found = search_all(&model, self.statistics, Some(&fits));
+            let reached = cost(&found);
             if reached < least {
                 let gain = (least - reached) / least;
                 (estimate, fits, least) = (other, found, reached);
@@ -110,42 +99,27 @@ impl JointOptimisation<'_> {
                 }
             }
         }
-        (estimate.model(&frame, self.unknowns), fits)
+        (self.unknowns.model(&estimate), fits)
     }
 
     /// How the unknowns should change.
-    fn step(
-        &self,
-        estimate: &Estimate,
-        model: &ShadingModel,
-        fits: &[PixelFit],
-        damping: f64,
-    ) -> Option<Vec<f64>> {
+    fn step(&self, model: &ShadingModel, fits: &[PixelFit], damping: f64) -> Option<Vec<f64>> {
         let weights = weights(fits);
-        let columns = Columns {
-            estimate,
-            bands: self.unknowns.bands(estimate)?,
-            layout: self.unknowns.layout(),
-            model,
-        };
+        let (unknowns, count) = (&self.unknowns, self.unknowns.count());
         let search = Search::new(model);
         let sums = (0..fits.len().div_ceil(PARAMETERS.chunk))
             .into_par_iter()
             .map(|chunk| {
-                let mut sums = JointEquations::new(columns.layout.count());
+                let mut sums = JointEquations::new(count);
                 let pixels =
                     chunk * PARAMETERS.chunk..((chunk + 1) * PARAMETERS.chunk).min(fits.len());
                 for pixel in pixels.filter(|&pixel| !self.statistics[pixel].is_dark()) {
-                    let prior = self.prior.map(|all| all[pixel]);
-                    let one = (&self.statistics[pixel], prior, fits[pixel].normal);
-                    sums.add_pixel(&search, &columns, one, weights[pixel]);
+                    let one = (&self.statistics[pixel], fits[pixel].normal);
+                    sums.add_pixel(&search, unknowns, one, weights[pixel]);
                 }
                 sums
             })
-            .reduce(
-                || JointEquations::new(columns.layout.count()),
-                JointEquations::plus,
-            );
+            .reduce(|| JointEquations::new(count), JointEquations::plus);
         sums.solve(damping)
     }
 }

@@ -1,7 +1,6 @@
 //! How the cost of a normal changes as it leans.
 
 use crate::fit::curve_statistics::{CurveStatistics, sum_of_products};
-use crate::model::directions::dot;
 use crate::model::harmonics::COEFFICIENTS;
 
 /// Parameters of a step of a normal.
@@ -11,16 +10,6 @@ struct NormalStepParameters {
 }
 
 const PARAMETERS: NormalStepParameters = NormalStepParameters { longest_step: 0.2 };
-
-/// A normal of the viewer's frame, where a network or a shape expects it, and how much that counts:
-/// `weight (1 - cos)` is added to the residual.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PriorNormal {
-    pub(crate) normal: [f64; 3],
-    pub(crate) weight: f64,
-    /// How much surer it is than others: one over the squared error that is expected of it, 1 where that is not known.
-    pub(crate) sureness: f64,
-}
 
 /// The harmonics of a pixel, channel by channel, and how they change as its normal leans.
 #[derive(Debug, Clone, Copy)]
@@ -67,17 +56,6 @@ impl QuadraticCost {
     pub(crate) fn scale(&mut self, factor: f64) {
         self.gradient.iter_mut().for_each(|value| *value *= factor);
         self.hessian.iter_mut().for_each(|value| *value *= factor);
-    }
-
-    /// Adds the prior's part.
-    pub(crate) fn add_prior(&mut self, prior: PriorNormal, normal: [f64; 3], axes: [[f64; 3]; 2]) {
-        let half = 0.5 * prior.weight;
-        for (gradient, axis) in self.gradient.iter_mut().zip(axes) {
-            *gradient -= half * dot(prior.normal, axis);
-        }
-        let hessian = half * dot(prior.normal, normal).max(0.1);
-        self.hessian[0] += hessian;
-        self.hessian[2] += hessian;
     }
 
     /// The step to the least cost, were it a parabola.

@@ -10,7 +10,6 @@ use crate::fit::probe_check::most_residual;
 use crate::model::frame::TableFrame;
 use crate::model::material::MaterialKind;
 use crate::observe::conditioning::Conditioning;
-use crate::observe::film::Filmed;
 use crate::observe::probe::{ProbeBall, ProbeBuilder};
 
 /// Parameters of the light by a ball.
@@ -53,7 +52,7 @@ impl ProbeBuilder {
     /// # Errors
     /// Where the frames tell too little, or the ball is not where it is said to be: [`TurnError::Misplaced`] and
     /// [`TurnError::NoBall`].
-    pub fn finish(self) -> Result<ProbeLight, TurnError> {
+    pub(crate) fn finish(self) -> Result<ProbeLight, TurnError> {
         let frame = TableFrame::new(self.probe.elevation);
         let curves = self.builder.finish()?;
         let looks = if Conditioning::of(&curves).beyond > PARAMETERS.sharp {
@@ -100,21 +99,12 @@ impl ProbeBuilder {
     }
 }
 
-impl Filmed {
-    /// The light by the ball, where there is one.
-    ///
-    /// # Errors
-    /// Where the ball's frames tell too little.
-    pub fn light(&mut self) -> Result<Option<ProbeLight>, TurnError> {
-        self.probe.take().map(ProbeBuilder::finish).transpose()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::directions::reflected;
-    use crate::{Elevation, Probe, ProbePlace};
+    use crate::observe::probe::Probe;
+    use crate::{Elevation, ProbePlace};
     use relight_core::image::{ColourSpace, Extent, Srgb};
     use relight_core::light::Rotation;
     use relight_core::light::{Direction, Normals, Order, YUp, basis};

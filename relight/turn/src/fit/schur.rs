@@ -3,9 +3,9 @@
 use relight_core::light::NormalEquations;
 
 use crate::fit::curve_statistics::CurveStatistics;
-use crate::fit::normal_step::{PriorNormal, QuadraticCost};
+use crate::fit::normal_step::QuadraticCost;
 use crate::fit::search::Search;
-use crate::fit::unknowns::Columns;
+use crate::fit::unknowns::Unknowns;
 use crate::model::directions::tangents;
 use crate::model::harmonics::COEFFICIENTS;
 
@@ -36,15 +36,15 @@ impl JointEquations {
     pub(crate) fn add_pixel(
         &mut self,
         search: &Search<'_>,
-        columns: &Columns<'_>,
-        (statistics, prior, normal): (&CurveStatistics, Option<PriorNormal>, [f64; 3]),
+        unknowns: &Unknowns<'_>,
+        (statistics, normal): (&CurveStatistics, [f64; 3]),
         weight: f64,
     ) {
         let axes = tangents(normal);
         let derivatives = search.derivatives(statistics, normal, axes);
         let mut quadratic = QuadraticCost::default();
         let mut couplings = vec![[0.0; 2]; self.count];
-        let all = columns.of(normal, derivatives.albedo);
+        let all = unknowns.columns(normal, derivatives.albedo);
         for (channel, mut columns) in all.into_iter().enumerate() {
             let (base, jacobian) = (&derivatives.base[channel], &derivatives.jacobian[channel]);
             quadratic.add(statistics, channel, jacobian, &derivatives.seen[channel]);
@@ -77,9 +77,6 @@ impl JointEquations {
             .iter_mut()
             .flatten()
             .for_each(|value| *value *= statistics.unit());
-        if let Some(prior) = prior {
-            quadratic.add_prior(prior, normal, axes);
-        }
         self.eliminate_normal(&quadratic, &couplings, weight / statistics.unit());
     }
 

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts, sum_of_products};
-use crate::fit::normal_step::{NormalDerivatives, PriorNormal, QuadraticCost};
-use crate::model::directions::{LEAST_FACING, dot, half_sphere, tangents, tilted};
+use crate::fit::normal_step::{NormalDerivatives, QuadraticCost};
+use crate::model::directions::{LEAST_FACING, half_sphere, tangents, tilted};
 use crate::model::harmonics::COEFFICIENTS;
 use crate::model::shading::{PixelHarmonics, ShadingModel};
 
@@ -58,6 +58,15 @@ pub(crate) struct PixelFit {
     pub(crate) residual: f64,
 }
 
+impl PixelFit {
+    /// That of a pixel without light.
+    pub(crate) const DARK: Self = Self {
+        normal: [0.0, 0.0, 1.0],
+        albedo: [0.0; 3],
+        residual: 1.0,
+    };
+}
+
 /// Candidate normals under a shading model.
 pub(crate) struct Search<'a> {
     model: &'a ShadingModel,
@@ -87,21 +96,16 @@ impl<'a> Search<'a> {
     }
 
     /// The best normal anywhere.
-    pub(crate) fn anywhere(
-        &self,
-        statistics: &CurveStatistics,
-        prior: Option<PriorNormal>,
-    ) -> PixelFit {
+    pub(crate) fn anywhere(&self, statistics: &CurveStatistics) -> PixelFit {
         let mut best = [(f64::INFINITY, [0.0, 0.0, 1.0]); PARAMETERS.refined];
         for tried in &self.tried {
-            let cost =
-                statistics.residual(&tried.harmonics, &tried.products) + bias(prior, tried.normal);
+            let cost = statistics.residual(&tried.harmonics, &tried.products);
             if cost < best[PARAMETERS.refined - 1].0 {
                 insert(&mut best, (cost, tried.normal));
             }
         }
         let refined =
-            best.map(|(_, start)| self.downhill(statistics, prior, start, PARAMETERS.first_steps));
+            best.map(|(_, start)| self.downhill(statistics, start, PARAMETERS.first_steps));
         let [first, rest @ ..] = refined;
         let (start, _) = rest.into_iter().fold(
             first,
@@ -109,17 +113,12 @@ impl<'a> Search<'a> {
                 if other.1 < best.1 { other } else { best }
             },
         );
-        self.near(statistics, prior, start)
+        self.near(statistics, start)
     }
 
     /// The best normal that is reached from `start` downhill.
-    pub(crate) fn near(
-        &self,
-        statistics: &CurveStatistics,
-        prior: Option<PriorNormal>,
-        start: [f64; 3],
-    ) -> PixelFit {
-        let (normal, _) = self.downhill(statistics, prior, start, PARAMETERS.steps);
+    pub(crate) fn near(&self, statistics: &CurveStatistics, start: [f64; 3]) -> PixelFit {
+        let (normal, _) = self.downhill(statistics, start, PARAMETERS.steps);
         PixelFit {
             normal,
             albedo: statistics.albedo(&self.model.harmonics(normal)),
@@ -132,17 +131,16 @@ impl<'a> Search<'a> {
     fn downhill(
         &self,
         statistics: &CurveStatistics,
-        prior: Option<PriorNormal>,
         start: [f64; 3],
         steps: usize,
     ) -> ([f64; 3], f64) {
-        let cost = |normal| self.residual(statistics, normal) + bias(prior, normal);
+        let cost = |normal| self.residual(statistics, normal);
         let mut normal = start;
         let mut least = cost(normal);
         let mut damping = PARAMETERS.damping;
         for _ in 0..steps {
             let axes = tangents(normal);
-            let quadratic = self.quadratic(statistics, prior, normal, axes);
+            let quadratic = self.quadratic(statistics, normal, axes);
             let step = quadratic.step(damping);
             let other = tilted(normal, axes, step);
             let found = cost(other);
@@ -164,7 +162,6 @@ impl<'a> Search<'a> {
     fn quadratic(
         &self,
         statistics: &CurveStatistics,
-        prior: Option<PriorNormal>,
         normal: [f64; 3],
         axes: [[f64; 3]; 2],
     ) -> QuadraticCost {
@@ -174,9 +171,6 @@ impl<'a> Search<'a> {
             quadratic.add(statistics, channel, jacobian, &derivatives.seen[channel]);
         }
         quadratic.scale(statistics.unit());
-        if let Some(prior) = prior {
-            quadratic.add_prior(prior, normal, axes);
-        }
         quadratic
     }
 
@@ -233,14 +227,13 @@ impl<'a> Search<'a> {
     pub(crate) fn standard_deviation(
         &self,
         statistics: &CurveStatistics,
-        prior: Option<PriorNormal>,
         fit: &PixelFit,
         freedom: f64,
     ) -> f64 {
         let [u, v] = tangents(fit.normal);
         let cost = |a: f64, b: f64| {
             let normal = tilted(fit.normal, [u, v], [a, b]);
-            self.residual(statistics, normal) + bias(prior, normal)
+            self.residual(statistics, normal)
         };
         let h = PARAMETERS.hessian_step;
         let middle = cost(0.0, 0.0);
@@ -274,17 +267,10 @@ fn insert(best: &mut [(f64, [f64; 3]); PARAMETERS.refined], one: (f64, [f64; 3])
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
 }
 
-fn bias(prior: Option<PriorNormal>, normal: [f64; 3]) -> f64 {
-    prior.map_or(0.0, |prior| {
-        prior.weight * (1.0 - dot(prior.normal, normal))
-    })
-}
-
 /// The best normals of all pixels: near those of other fits, or anywhere.
 pub(crate) fn search_all(
     model: &ShadingModel,
     statistics: &[CurveStatistics],
-    prior: Option<&[PriorNormal]>,
     near: Option<&[PixelFit]>,
 ) -> Vec<PixelFit> {
     let search = Search::new(model);
@@ -292,34 +278,19 @@ pub(crate) fn search_all(
         .par_iter()
         .enumerate()
         .map(|(pixel, statistics)| {
-            let prior = prior.map(|all| all[pixel]);
             if statistics.is_dark() {
-                return PixelFit {
-                    normal: prior.map_or([0.0, 0.0, 1.0], |prior| prior.normal),
-                    albedo: [0.0; 3],
-                    residual: 1.0,
-                };
+                return PixelFit::DARK;
             }
             match near {
-                Some(fits) => search.near(statistics, prior, fits[pixel].normal),
-                None => search.anywhere(statistics, prior),
+                Some(fits) => search.near(statistics, fits[pixel].normal),
+                None => search.anywhere(statistics),
             }
         })
         .collect()
 }
 
-/// What is left of the curves, with what normals are off those that are expected, the mean over the pixels.
-pub(crate) fn cost(fits: &[PixelFit], prior: Option<&[PriorNormal]>) -> f64 {
-    let sum: f64 = fits
-        .iter()
-        .enumerate()
-        .map(|(pixel, fit)| {
-            let off = prior.map_or(0.0, |all| {
-                let prior = all[pixel];
-                prior.weight * (1.0 - dot(prior.normal, fit.normal))
-            });
-            fit.residual.min(1.0) + off
-        })
-        .sum();
+/// The residual of the curves, the mean over the pixels.
+pub(crate) fn cost(fits: &[PixelFit]) -> f64 {
+    let sum: f64 = fits.iter().map(|fit| fit.residual.min(1.0)).sum();
     sum / fits.len().max(1) as f64
 }

@@ -4,15 +4,11 @@ use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::statistics::median;
 
-use crate::fit::azimuth::AzimuthFigures;
-use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
-use crate::fit::material_choice::doubted;
 use crate::fit::search::PixelFit;
 use crate::model::frame::{Elevation, TableFrame};
 use crate::model::lighting::TableLight;
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
-use crate::network::predict::HypothesisFigures;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
@@ -29,7 +25,7 @@ const PARAMETERS: ConfidenceParameters = ConfidenceParameters { half_error: 0.2 
 pub struct TurnSolution {
     /// One a pixel under the mask.
     pub(crate) fits: Vec<PixelFit>,
-    /// The albedo of each pixel, which is that of its fit where its normal is to be trusted.
+    /// The albedo of each pixel: in known light that of its fit where its normal is to be trusted.
     pub(crate) albedo: Vec<[f64; 3]>,
     /// The angle that each normal is expected to be off, radians.
     pub(crate) expected_errors: Vec<f64>,
@@ -37,14 +33,6 @@ pub struct TurnSolution {
     pub(crate) elevation: Elevation,
     /// The light, where it was measured.
     pub(crate) measured: Option<ShLight>,
-    pub(crate) initialisations: Vec<InitialisationFigure>,
-    pub(crate) materials: Vec<MaterialFigure>,
-    pub(crate) has_prior: bool,
-    pub(crate) hypotheses: Option<HypothesisFigures>,
-    pub(crate) is_prior_left_out: bool,
-    pub(crate) azimuth: Option<AzimuthFigures>,
-    pub(crate) direction: Option<DirectionFigure>,
-    pub(crate) given_material: Option<MaterialKind>,
     pub(crate) conditioning: Conditioning,
 }
 
@@ -56,17 +44,11 @@ impl TurnSolution {
     }
 
     /// The albedo: in the light's units where that was known, else in such units that the mean shading of the object
-    /// over the turn is 1 in each channel. Where a normal is hardly to be trusted, it is that of the same colour
-    /// around, and that which was expected.
+    /// over the turn is 1 in each channel. In known light it is that of the same colour around where a normal is hardly to be
+    /// trusted; in unknown light, what networks answer.
     #[must_use]
     pub fn albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| self.albedo[pixel].map(|v| v as f32)))
-    }
-
-    /// The albedo that goes with each normal's shading, right or wrong.
-    #[must_use]
-    pub fn fitted_albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
-        Rgb::new(curves.map(|pixel| self.fits[pixel].albedo.map(|v| v as f32)))
     }
 
     /// The shading over the whole turn: the mean irradiance of each pixel, or what white metal would show.
@@ -108,52 +90,10 @@ impl TurnSolution {
         self.model.material
     }
 
-    /// The residual of each material that was tried.
-    #[must_use]
-    pub fn materials(&self) -> &[MaterialFigure] {
-        &self.materials
-    }
-
     /// Whether the light, of the turn and where it was given, is fit for this.
     #[must_use]
     pub const fn conditioning(&self) -> Conditioning {
         self.conditioning
-    }
-
-    /// The other kind, where one was given and the other fits clearly better.
-    #[must_use]
-    pub fn doubted_material(&self) -> Option<MaterialKind> {
-        self.given_material.and_then(|_| doubted(&self.materials))
-    }
-
-    /// How well both rotation directions fit the curves; none where that is not observable.
-    #[must_use]
-    pub const fn direction(&self) -> Option<DirectionFigure> {
-        self.direction
-    }
-
-    /// What the network of turns took the turn for, where its normals were given.
-    #[must_use]
-    pub const fn hypotheses(&self) -> Option<&HypothesisFigures> {
-        self.hypotheses.as_ref()
-    }
-
-    /// Whether the given normals were left out: a shape inflated out of the outline fits the turn better.
-    #[must_use]
-    pub const fn is_prior_left_out(&self) -> bool {
-        self.is_prior_left_out
-    }
-
-    /// From which side the light comes, by all that says so; none where no network of turns was asked.
-    #[must_use]
-    pub const fn azimuth(&self) -> Option<&AzimuthFigures> {
-        self.azimuth.as_ref()
-    }
-
-    /// How each initialisation of an unknown light ended; none where it was known.
-    #[must_use]
-    pub fn initialisations(&self) -> &[InitialisationFigure] {
-        &self.initialisations
     }
 
     /// The median over the pixels of the residual of a curve, over the energy of its variation.

@@ -1,6 +1,7 @@
 //! The camera over the table.
 
 use relight_core::light::Rotation;
+use relit_data::rig::CAMERA_ELEVATIONS_DEG;
 use serde::Serialize;
 
 use crate::setting_error::SettingError;
@@ -11,17 +12,14 @@ struct ElevationParameters {
     usual_deg: f64,
     /// Uncertainty of that one, degrees. By hand.
     usual_uncertainty_deg: f64,
-    /// Uncertainty of one that was given, degrees. By hand.
+    /// Uncertainty of one that was measured, degrees. By hand.
     given_uncertainty_deg: f64,
-    /// Uncertainty of a length that was measured in a picture, in heights of the rim. By hand.
-    rim_uncertainty: f64,
 }
 
 const PARAMETERS: ElevationParameters = ElevationParameters {
     usual_deg: 18.0,
     usual_uncertainty_deg: 8.0,
     given_uncertainty_deg: 1.0,
-    rim_uncertainty: 0.03,
 };
 
 /// Where an elevation comes from.
@@ -32,10 +30,8 @@ pub enum ElevationSource {
     Assumed,
     /// It was given.
     Given,
-    /// From the ellipse of the table's rim.
-    Rim,
-    /// From the rim as the session's video shows it.
-    Video,
+    /// The session says it: it is known of the rig.
+    Rig,
 }
 
 /// How high the camera looks down on the table: 0 from the side, 90 degrees from above.
@@ -62,7 +58,7 @@ impl Elevation {
     /// # Errors
     /// [`SettingError`] beyond 0 to 89 degrees.
     pub fn given(degrees: f64) -> Result<Self, SettingError> {
-        if !(0.0..=89.0).contains(&degrees) {
+        if !CAMERA_ELEVATIONS_DEG.contains(&degrees) {
             return Err(SettingError {
                 what: "the elevation",
                 value: degrees,
@@ -76,36 +72,13 @@ impl Elevation {
         })
     }
 
-    /// From the ellipse that the table's round rim is in the picture, pixels: seen from far away its height
-    /// over its width is the sine of the elevation.
+    /// The elevation of the rig, as a session has it, degrees.
     ///
     /// # Errors
-    /// [`SettingError`] where that is no ellipse of a round rim.
-    pub fn of_rim(width: f64, height: f64) -> Result<Self, SettingError> {
-        let sine = height / width;
-        if !(width > 0.0 && (0.0..1.0).contains(&sine)) {
-            return Err(SettingError {
-                what: "the rim's height over its width",
-                value: sine,
-                allowed: "0 to 1",
-            });
-        }
-        let elevation = sine.asin();
-        let quadratic = 1.0 / elevation.cos();
+    /// [`SettingError`] beyond 0 to 89 degrees.
+    pub fn of_rig(degrees: f64) -> Result<Self, SettingError> {
         Ok(Self {
-            degrees: elevation.to_degrees(),
-            uncertainty_deg: (PARAMETERS.rim_uncertainty * sine * quadratic)
-                .to_degrees()
-                .max(0.5),
-            source: ElevationSource::Rim,
-        })
-    }
-
-    /// From a rim that was found in the video, with its uncertainty, degrees.
-    pub(crate) fn seen(degrees: f64, uncertainty_deg: f64) -> Result<Self, SettingError> {
-        Ok(Self {
-            uncertainty_deg,
-            source: ElevationSource::Video,
+            source: ElevationSource::Rig,
             ..Self::given(degrees)?
         })
     }
@@ -194,13 +167,14 @@ mod tests {
     }
 
     #[test]
-    fn a_rim_half_as_high_as_wide_is_seen_from_thirty_degrees() {
-        let elevation = Elevation::of_rim(400.0, 200.0).unwrap();
-        assert!((elevation.degrees() - 30.0).abs() < 1e-9);
-        assert_eq!(elevation.source(), ElevationSource::Rim);
-        assert!(Elevation::of_rim(200.0, 400.0).is_err());
-        assert!(Elevation::of_rim(0.0, 0.0).is_err());
-        assert!(Elevation::given(f64::NAN).is_err());
-        assert!(Elevation::given(90.0).is_err());
+    fn an_elevation_beyond_what_a_camera_can_have_is_refused() {
+        assert_eq!(
+            Elevation::of_rig(20.0).unwrap().source(),
+            ElevationSource::Rig
+        );
+        for degrees in [f64::NAN, 90.0, -1.0] {
+            assert!(Elevation::given(degrees).is_err());
+            assert!(Elevation::of_rig(degrees).is_err());
+        }
     }
 }

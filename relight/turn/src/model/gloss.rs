@@ -67,26 +67,12 @@ impl GlossLight {
         ShLight::new(coefficients)
     }
 
-    /// The bands from `first` on.
-    pub(crate) fn beyond(mut self, first: usize) -> Self {
-        for terms in &mut self.terms {
-            terms[..first * first].fill(0.0);
-        }
-        self
-    }
-
     /// The first so many bands.
     pub(crate) fn within(mut self, bands: usize) -> Self {
         let count = (bands * bands).min(GLOSS_TERMS);
         for terms in &mut self.terms {
             terms[count..].fill(0.0);
         }
-        self
-    }
-
-    /// The same with one term changed by so much.
-    pub(crate) fn moved(mut self, channel: usize, term: usize, by: f64) -> Self {
-        self.terms[channel][term] += by;
         self
     }
 

@@ -3,7 +3,6 @@
 use std::f64::consts::PI;
 
 use relight_core::light::{LightError, Order, ShLight};
-use relight_core::render::cosine_lobe;
 
 use crate::model::frame::TableFrame;
 use crate::model::harmonics::{COEFFICIENTS, HarmonicTerm, LAMBERTIAN_COEFFICIENTS};
@@ -36,28 +35,6 @@ pub(crate) const OF_COEFFICIENTS: [(usize, f64); TERMS] = {
         (4, -A2 * Y22),
     ]
 };
-
-/// Which term of the gloss shows the same part of the environment light as each term of [`TableLight`], and how many
-/// times as large the latter is: the factor of its cosine lobe and polynomial.
-pub(crate) const LAMBERTIAN_IN_GLOSS: [(usize, f64); TERMS] = {
-    const AT: [usize; TERMS] = [0, 1, 4, 2, 3, 5, 6, 7, 8];
-    let mut all = [(0, 0.0); TERMS];
-    let mut term = 0;
-    while term < TERMS {
-        all[term] = (AT[term], OF_COEFFICIENTS[term].1.abs());
-        term += 1;
-    }
-    all
-};
-
-/// How much of all its light a light that was found may lack from some side. Measured on the 16 synthetic turns of seed
-/// 3001: lights that lack up to 0.4 of it go with normals no worse than others do, for their terms also stand for shade and
-/// gloss that the model does not have.
-const MOST_NEGATIVE: f64 = 0.5;
-
-/// How far its light may come from one side: the length of its first moment over all of it. That of a single lamp has 1, and a
-/// tenth is left to noise.
-const MOST_ONE_SIDED: f64 = 1.1;
 
 /// The irradiance of the environment light on a normal, while the table turns: with the normal (x, y, z) in the
 /// table's frame and q = x + i y,
@@ -107,40 +84,6 @@ impl TableLight {
         Ok(self.coefficients()?.rotated(&frame.rotation().inverse()))
     }
 
-    /// From where more light comes, by the first harmonic of a level normal's curve: the azimuth in the table's frame
-    /// at angle 0, from x towards y, degrees.
-    #[must_use]
-    pub fn bright_azimuth_deg(&self) -> f64 {
-        let sum = |at: usize| self.terms.iter().map(|terms| terms[at]).sum::<f64>();
-        (-sum(4)).atan2(sum(3)).to_degrees()
-    }
-
-    /// How much the first harmonic of a level normal's curve is of the mean over all normals: 0 where no side is brighter.
-    #[must_use]
-    pub fn bright_part(&self) -> f64 {
-        let sum = |at: usize| self.terms.iter().map(|terms| terms[at]).sum::<f64>();
-        sum(3).hypot(sum(4)) / sum(0).max(f64::MIN_POSITIVE)
-    }
-
-    /// Whether light that is nowhere negative could have these terms, but for a part that stands for what the model does
-    /// not have: of such light L the moments `[∫L, ∫Lωᵀ; ∫Lω, ∫Lωωᵀ]` are positive semidefinite, and no more is asked
-    /// of them, for a polynomial of order 2 that is nowhere negative on the sphere is a sum of squares there (the S-lemma).
-    #[must_use]
-    pub fn is_possible(&self) -> bool {
-        self.coefficients().is_ok_and(|light| {
-            (0..3).all(|channel| {
-                let mut moments = moments(&light, channel);
-                let [all, x, y, z] = moments[0];
-                if x.hypot(y).hypot(z) > MOST_ONE_SIDED * all {
-                    return false;
-                }
-                let slack = MOST_NEGATIVE * moments[0][0];
-                (0..4).for_each(|k| moments[k][k] += slack);
-                is_positive_semidefinite(moments)
-            })
-        })
-    }
-
     /// The terms of each channel.
     #[must_use]
     pub const fn terms(&self) -> &[[f64; TERMS]; 3] {
@@ -179,48 +122,6 @@ impl TableLight {
     }
 }
 
-/// The moments of a channel's light over all directions up to order 2, in the order 1, x, y, z.
-fn moments(light: &ShLight, channel: usize) -> [[f64; 4]; 4] {
-    // A coefficient is the light's moment with its polynomial, which is such a factor, without the lobe's, times 1, y, z, x,
-    // 2xy, yz, 3z² - 1, xz and x² - y².
-    let mut of = [0.0; TERMS];
-    for (at, factor) in OF_COEFFICIENTS {
-        of[at] = light.coefficients()[at][channel] * cosine_lobe(at.isqrt()) / factor.abs();
-    }
-    let [all, y, z, x, across, yz, above, xz, apart] = of;
-    let xy = across / 2.0;
-    let zz = (all + above) / 3.0;
-    let (xx, yy) = ((all - zz + apart) / 2.0, (all - zz - apart) / 2.0);
-    [
-        [all, x, y, z],
-        [x, xx, xy, xz],
-        [y, xy, yy, yz],
-        [z, xz, yz, zz],
-    ]
-}
-
-/// Whether a symmetric matrix is positive semidefinite, by its Cholesky decomposition.
-fn is_positive_semidefinite(mut matrix: [[f64; 4]; 4]) -> bool {
-    for k in 0..4 {
-        let row = matrix[k];
-        let pivot = row[k];
-        if pivot < 0.0 {
-            return false;
-        }
-        for below in &mut matrix[k + 1..] {
-            if pivot > f64::MIN_POSITIVE {
-                let factor = below[k] / pivot;
-                let pairs = below.iter_mut().zip(row).skip(k + 1);
-                pairs.for_each(|(value, above)| *value -= factor * above);
-            } else if below[k] != 0.0 {
-                // A column of a semidefinite matrix is 0 where its diagonal is.
-                return false;
-            }
-        }
-    }
-    true
-}
-
 /// What each term of the light contributes to the harmonics of a normal in the table's frame.
 pub(crate) fn lambertian_terms([x, y, z]: [f64; 3]) -> [HarmonicTerm; TERMS] {
     let (x2, y2) = (x * x - y * y, 2.0 * x * y);
@@ -255,55 +156,6 @@ mod tests {
     }
 
     #[test]
-    fn light_from_one_side_is_possible_and_what_is_brighter_there_than_all_light_is_not() {
-        let frame = TableFrame::new(Elevation::given(23.0).unwrap());
-        let towards = Direction::new(0.3, 0.5, 0.4).unwrap();
-        let point = relight_core::light::basis(Order::TWO, towards);
-        let stretched = |factor: f64| {
-            let values = point.iter().enumerate();
-            let values = values.map(|(at, value)| [value * if at == 0 { 1.0 } else { factor }; 3]);
-            TableLight::from_viewer(&ShLight::new(values.collect()).unwrap(), &frame)
-        };
-        assert!(stretched(1.0).is_possible());
-        assert!(!stretched(1.3).is_possible());
-        assert!(!stretched(30.0).is_possible());
-        assert!(TableLight::from_viewer(&light(), &frame).is_possible());
-    }
-
-    #[test]
-    fn light_that_would_be_negative_on_two_sides_is_not_possible_though_none_is_brighter() {
-        let towards = Direction::new(0.3, 0.5, 0.4).unwrap();
-        let point = relight_core::light::basis(Order::TWO, towards);
-        let of_second_band = |factor: f64| {
-            let values = point.iter().enumerate();
-            let values = values.map(|(at, value)| match at {
-                0 => [*value; 3],
-                1..4 => [0.0; 3],
-                _ => [factor * value; 3],
-            });
-            let light = ShLight::new(values.collect()).unwrap();
-            TableLight::from_viewer(&light, &TableFrame::new(Elevation::assumed()))
-        };
-        // All light from a ring lacks nothing; -0.5 is its second band.
-        assert!(of_second_band(-0.5).is_possible());
-        assert!(!of_second_band(-2.0).is_possible());
-    }
-
-    #[test]
-    fn moments_are_those_of_the_light() {
-        let towards = Direction::new(0.3, 0.5, 0.4).unwrap();
-        let [x, y, z] = towards.components();
-        let point = relight_core::light::basis(Order::TWO, towards);
-        let light = ShLight::new(point.iter().map(|&value| [value; 3]).collect()).unwrap();
-        let expected = [1.0, x, y, z];
-        for (row, a) in moments(&light, 1).iter().zip(expected) {
-            for (found, b) in row.iter().zip(expected) {
-                assert!((found - a * b).abs() < 1e-9, "{found} {}", a * b);
-            }
-        }
-    }
-
-    #[test]
     fn the_curve_of_a_normal_is_its_shading_under_the_turning_light() {
         let frame = TableFrame::new(Elevation::given(23.0).unwrap());
         let table = TableLight::from_viewer(&light(), &frame);
@@ -331,18 +183,6 @@ mod tests {
                 );
             }
         }
-    }
-
-    #[test]
-    fn the_bright_side_is_where_the_light_comes_from() {
-        let mut light = ShLight::even(Order::TWO, [1.0; 3]);
-        // Y_1,1 is x, Y_1,-1 is y.
-        light.coefficients_mut()[3] = [0.3; 3];
-        light.coefficients_mut()[1] = [0.3; 3];
-        let frame = TableFrame::new(Elevation::given(0.0).unwrap());
-        let viewer = light.rotated(&frame.rotation().inverse());
-        let table = TableLight::from_viewer(&viewer, &frame);
-        assert!((table.bright_azimuth_deg() - 45.0).abs() < 1e-6);
     }
 
     #[test]

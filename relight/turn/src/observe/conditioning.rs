@@ -10,7 +10,7 @@ use crate::model::directions::half_sphere;
 use crate::model::harmonics::{COEFFICIENTS, LAMBERTIAN_COEFFICIENTS};
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
-use crate::observe::verdict::LightVerdict;
+use crate::observe::verdict::TurnVerdict;
 
 /// Parameters of the judgement of a turn.
 struct ConditioningParameters {
@@ -24,6 +24,11 @@ struct ConditioningParameters {
     least_light: f64,
     /// Normals on which the modulation of a given light is measured. By hand.
     normals: usize,
+    /// Least coverage of a turn in unknown light, degrees. By hand: the network has seen gaps of up to 18 degrees, and up to
+    /// three of them.
+    least_coverage_deg: f64,
+    /// Largest median of the errors that the network of turns expects, degrees. By hand.
+    most_expected_deg: f64,
 }
 
 const PARAMETERS: ConditioningParameters = ConditioningParameters {
@@ -31,6 +36,8 @@ const PARAMETERS: ConditioningParameters = ConditioningParameters {
     least_observable: 0.1,
     least_light: 1e-5,
     normals: 100,
+    least_coverage_deg: 330.0,
+    most_expected_deg: 20.0,
 };
 
 /// How well the light of the turn determines normals.
@@ -43,8 +50,10 @@ pub struct Conditioning {
     /// The effective value of the harmonics over the mean in a light that was given: the median over the normals that
     /// face the viewer.
     pub given_modulation: Option<f64>,
+    /// How many degrees of the turn the frames cover.
+    pub coverage_deg: f64,
     /// What follows.
-    pub verdict: LightVerdict,
+    pub verdict: TurnVerdict,
 }
 
 impl Conditioning {
@@ -67,31 +76,37 @@ impl Conditioning {
             .filter(|observable| matches!(observable, PixelLight::Clipped));
         let verdict = if (observable as f64) < PARAMETERS.least_observable * pixels.len() as f64 {
             if 2 * clipped.count() >= pixels.len() - observable {
-                LightVerdict::Overexposed
+                TurnVerdict::Overexposed
             } else {
-                LightVerdict::Underexposed
+                TurnVerdict::Underexposed
             }
         } else if modulation < LEAST_MODULATION {
-            LightVerdict::TooEven
+            TurnVerdict::TooEven
         } else if beyond > PARAMETERS.most_beyond {
-            LightVerdict::NotLambertian
+            TurnVerdict::NotLambertian
         } else {
-            LightVerdict::Good
+            TurnVerdict::Good
         };
         Self {
             modulation,
             beyond,
             given_modulation: None,
+            coverage_deg: curves.coverage_deg(),
             verdict,
         }
     }
 
-    /// The same where a light was found that cannot be, unless the turn is unfit for another reason.
-    pub(crate) fn in_found(self, is_possible: bool) -> Self {
-        let verdict = if self.verdict.is_fit() && !is_possible {
-            LightVerdict::ImpossibleLight
-        } else {
+    /// The same in a light that is not known, where the network of turns expects such an error of its normals, degrees, the
+    /// median.
+    pub(crate) fn by_network(self, expected_error_deg: f64) -> Self {
+        let verdict = if self.verdict.is_exposure() {
             self.verdict
+        } else if self.coverage_deg < PARAMETERS.least_coverage_deg {
+            TurnVerdict::PartOfTurn
+        } else if expected_error_deg > PARAMETERS.most_expected_deg {
+            TurnVerdict::Uncertain
+        } else {
+            TurnVerdict::Good
         };
         Self { verdict, ..self }
     }
@@ -131,7 +146,7 @@ impl Conditioning {
         Self {
             given_modulation: Some(modulation),
             verdict: if is_even {
-                LightVerdict::TooEven
+                TurnVerdict::TooEven
             } else {
                 self.verdict
             },

@@ -1,6 +1,9 @@
 //! Light over the table's angle, one curve a pixel and channel.
 
+use std::f64::consts::TAU;
+
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
+use relight_core::statistics::median;
 use relit_data::image_stats::SATURATED_VALUE;
 
 use crate::error::TurnError;
@@ -25,6 +28,8 @@ struct CurveParameters {
     /// Least share of the pixels of a block, 0 to 1, that have to be unclipped. By hand: the mean of fewer would be too
     /// dark.
     least_of_block: f32,
+    /// Least gap between parts with frames that is not covered, in usual gaps. By hand.
+    hole: f64,
 }
 
 const PARAMETERS: CurveParameters = CurveParameters {
@@ -34,6 +39,7 @@ const PARAMETERS: CurveParameters = CurveParameters {
     same_exposure: 0.01,
     least_parts: 8,
     least_of_block: 0.9,
+    hole: 3.0,
 };
 
 /// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Of each frame it keeps the light of a few pixels,
@@ -191,7 +197,7 @@ impl CurveBuilder {
             harmonics: seen.iter().map(|&at| self.parts[at].harmonics()).collect(),
             angles: seen
                 .iter()
-                .map(|&at| (at as f64 + 0.5) / PARAMETERS.parts as f64 * std::f64::consts::TAU)
+                .map(|&at| (at as f64 + 0.5) / PARAMETERS.parts as f64 * TAU)
                 .collect(),
             values,
             weights,
@@ -329,6 +335,36 @@ impl TurnCurves {
         map
     }
 
+    /// The values that a map has at the pixels under the mask.
+    pub(crate) fn pixels_of<'a, const C: usize>(
+        &'a self,
+        map: &'a Planes<C>,
+    ) -> impl Iterator<Item = [f64; C]> + 'a {
+        let width = self.extent.width;
+        let places = self.places.iter();
+        places.map(move |&at| map.pixel(at % width, at / width).map(f64::from))
+    }
+
+    /// How many degrees of the turn the frames cover: all but gaps that are much larger than what is usual between them.
+    #[must_use]
+    pub fn coverage_deg(&self) -> f64 {
+        let mut angles: Vec<f64> = self.angles.iter().map(|angle| angle.to_degrees()).collect();
+        angles.sort_by(f64::total_cmp);
+        let after = angles.iter().skip(1).copied();
+        let first = angles.first().map(|first| first + 360.0);
+        let gaps: Vec<f64> = (angles.iter().zip(after.chain(first)))
+            .map(|(angle, next)| next - angle)
+            .collect();
+        let usual = median(gaps.iter().copied()).unwrap_or(0.0);
+        let is_hole = |gap: &&f64| **gap > PARAMETERS.hole * usual;
+        360.0
+            - gaps
+                .iter()
+                .filter(is_hole)
+                .map(|gap| gap - usual)
+                .sum::<f64>()
+    }
+
     /// The curves as they are if the table turns the other way as its angle grows.
     pub(crate) fn with_other_direction(&self) -> Self {
         let mut other = self.clone();
@@ -338,7 +374,7 @@ impl TurnCurves {
             }
         }
         for angle in &mut other.angles {
-            *angle = -*angle;
+            *angle = (-*angle).rem_euclid(TAU);
         }
         other
     }

@@ -1,8 +1,6 @@
-//! What the video of a turn shows beside the object: the surroundings, the table's rim, and a ball that measures its
-//! light.
+//! What the video of a turn shows beside the object: a ball that measures its light.
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
@@ -11,12 +9,9 @@ use relit_data::geometry::Rect;
 use relit_data::session::Recording;
 
 use crate::error::TurnError;
-use crate::model::frame::Elevation;
 use crate::observe::probe::{Probe, ProbeBuilder};
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::reading::{ReadTurn, TurnOrigin};
-use crate::observe::rim::RimBuilder;
-use crate::observe::strip::{PanoramaStrip, StripBuilder};
 
 /// Parameters of the comparison of a video with its shard.
 struct FilmParameters {
@@ -28,89 +23,55 @@ struct FilmParameters {
     /// Relative difference of the light of blocks from which frames show something else. Measured: those of their own
     /// video differ by 0.01 to 0.02, by JPEG and scaling.
     most_different: f64,
-    /// One frame of so many counts for the mean in which the table's rim is looked for. By hand.
-    every: u64,
 }
 
 const PARAMETERS: FilmParameters = FilmParameters {
     most_covered: 0.05,
     block: 16,
     most_different: 0.12,
-    every: 4,
 };
 
-/// What was seen beside the object.
-#[derive(Debug)]
-pub struct Filmed {
-    pub(crate) strip: Option<PanoramaStrip>,
-    elevation: Option<Elevation>,
-    pub(crate) probe: Option<ProbeBuilder>,
-}
-
-/// Reads the video of a turn: a session's folder, or the video file. `progress` is told how many of the turn's frames
-/// are done, and how many there are.
+/// Reads the ball in the video of a turn. `progress` is told how many of the turn's frames are done, and how many there are.
 ///
 /// # Errors
 /// Where the video cannot be read, is not that of the turn, or the ball is not in it or under the object's mask.
-pub fn film(
-    path: &Path,
+pub(crate) fn film(
+    recording: &Recording,
     turn: &ReadTurn,
-    probe: Option<Probe>,
+    probe: Probe,
     progress: &dyn Fn(u64, u64),
-) -> Result<Filmed, TurnError> {
-    let recording = Recording::open(path)?;
-    check_session(&recording, path, turn.origin.as_ref())?;
-    if let Some(probe) = &probe {
-        check_mask(probe.place, turn)?;
-    }
+) -> Result<ProbeBuilder, TurnError> {
+    check_session(recording, turn.origin.as_ref())?;
+    check_mask(probe.place, turn)?;
     let mut movie = MovieReader::open(&recording.video, FrameTiming::Each)?;
     let angles: HashMap<u64, f64> = turn.sources.iter().copied().collect();
     let mut likeness = Likeness::new(turn);
-    let mut strip = StripBuilder::new(movie.extent())?;
-    let mut rim = RimBuilder::new(movie.extent());
-    let mut probe = probe.map(ProbeBuilder::new).transpose()?;
+    let mut ball = ProbeBuilder::new(probe)?;
     let (mut number, mut done) = (0, 0);
     while let Some(frame) = movie.frame()? {
         if let Some(&angle) = angles.get(&number) {
             likeness.compare(number, &frame);
-            strip.push(angle, &frame)?;
-            if done % PARAMETERS.every == 0 {
-                rim.push(&frame);
-            }
-            if let Some(probe) = &mut probe {
-                probe.push(angle, &frame)?;
-            }
+            ball.push(angle, &frame)?;
             done += 1;
             progress(done, angles.len() as u64);
         }
         number += 1;
     }
+    let path = recording.video.clone();
     if done == 0 {
         return Err(TurnError::OtherVideo {
-            path: recording.video,
+            path,
             frames: number,
         });
     }
     if !likeness.is_same() {
-        return Err(TurnError::OtherPictures {
-            path: recording.video,
-        });
+        return Err(TurnError::OtherPictures { path });
     }
-    let strip = strip.finish();
-    let focal = strip.as_ref().map(PanoramaStrip::focal);
-    Ok(Filmed {
-        elevation: focal.and_then(|focal| rim.finish(turn, focal)),
-        strip,
-        probe,
-    })
+    Ok(ball)
 }
 
 /// Whether a session is the one of which the shard's records speak.
-fn check_session(
-    recording: &Recording,
-    path: &Path,
-    origin: Option<&TurnOrigin>,
-) -> Result<(), TurnError> {
+fn check_session(recording: &Recording, origin: Option<&TurnOrigin>) -> Result<(), TurnError> {
     let (Some(_), Some(origin)) = (&recording.manifest, origin) else {
         return Ok(());
     };
@@ -123,7 +84,7 @@ fn check_session(
         return Ok(());
     }
     Err(TurnError::OtherSession {
-        path: path.to_owned(),
+        path: recording.video.clone(),
         found: recording.id.clone(),
         session: origin.session.clone(),
     })
@@ -234,20 +195,6 @@ pub(crate) fn light_at(
     (column < width && row < height).then(|| picture.pixel(column, row).map(Srgb::to_linear))
 }
 
-impl Filmed {
-    /// The surroundings of the table; none where its sides do not show the same surroundings one after the other.
-    #[must_use]
-    pub const fn strip(&self) -> Option<&PanoramaStrip> {
-        self.strip.as_ref()
-    }
-
-    /// The camera over the table, by the table's rim; none where the video does not show it clearly.
-    #[must_use]
-    pub const fn elevation(&self) -> Option<Elevation> {
-        self.elevation
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use relit_data::session::Manifest;
@@ -255,7 +202,6 @@ mod tests {
     use super::*;
     use crate::CurveBuilder;
     use crate::observe::reading::TableRotation;
-    use crate::observe::session::session_of;
     use relight_core::image::Linear;
 
     const EXTENT: Extent = Extent {
@@ -300,7 +246,6 @@ mod tests {
             curves: builder.finish().unwrap(),
             rotation: TableRotation::default(),
             first,
-            first_angles: (0..12).map(|number| 30.0 * f64::from(number)).collect(),
             sources: (0..12)
                 .map(|number| (number, 30.0 * number as f64))
                 .collect(),
@@ -336,7 +281,7 @@ mod tests {
         std::fs::write(&path, "").unwrap();
         let mut recording = Recording::open(&path).unwrap();
         let turn = shard(0);
-        let check = |recording: &Recording| check_session(recording, &path, turn.origin.as_ref());
+        let check = |recording: &Recording| check_session(recording, turn.origin.as_ref());
         // Of a bare video nothing is known.
         assert!(check(&recording).is_ok());
         let manifest = br#"{
@@ -356,22 +301,6 @@ mod tests {
         );
         recording.id = "20261120T093015Z-mug".to_owned();
         assert!(check(&recording).is_ok());
-    }
-
-    #[test]
-    fn the_session_that_a_shard_names_is_found_beside_it() {
-        let folder = tempfile::tempdir().unwrap();
-        let shard_file = folder.path().join("dataset/20261120T093015Z-mug.tar");
-        std::fs::create_dir_all(folder.path().join("dataset")).unwrap();
-        std::fs::write(&shard_file, "").unwrap();
-        let turn = shard(0);
-        assert_eq!(session_of(&shard_file, &turn), None);
-        let session = folder.path().join("sessions/20261120T093015Z-mug");
-        std::fs::create_dir_all(&session).unwrap();
-        // A folder without a video leads nowhere.
-        assert_eq!(session_of(&shard_file, &turn), None);
-        std::fs::write(session.join("video.mkv"), "").unwrap();
-        assert_eq!(session_of(&shard_file, &turn), Some(session));
     }
 
     #[test]

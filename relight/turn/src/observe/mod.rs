@@ -1,5 +1,4 @@
-//! What the frames show: curves over the table's angle, the background of the video, and a ball that measures the
-//! light.
+//! What the frames show: curves over the table's angle, and a ball that measures the light.
 
 pub(crate) mod conditioning;
 pub(crate) mod curves;
@@ -9,8 +8,5 @@ pub(crate) mod mirror_panorama;
 pub(crate) mod probe;
 pub(crate) mod probe_place;
 pub(crate) mod reading;
-pub(crate) mod rim;
-pub(crate) mod session;
-pub(crate) mod strip;
 pub(crate) mod surroundings;
 pub(crate) mod verdict;

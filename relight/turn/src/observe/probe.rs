@@ -38,18 +38,18 @@ pub enum ProbeBall {
 
 /// A ball that measures the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Probe {
+pub(crate) struct Probe {
     /// Where it is.
-    pub place: ProbePlace,
+    pub(crate) place: ProbePlace,
     /// What it is made of; what it looks like where that is not known.
-    pub ball: Option<ProbeBall>,
+    pub(crate) ball: Option<ProbeBall>,
     /// The camera over the table.
-    pub elevation: Elevation,
+    pub(crate) elevation: Elevation,
 }
 
 /// Gathers what a ball shows over a turn.
 #[derive(Debug)]
-pub struct ProbeBuilder {
+pub(crate) struct ProbeBuilder {
     pub(crate) probe: Probe,
     pub(crate) normals: Normals<YUp>,
     pub(crate) builder: CurveBuilder,
@@ -63,7 +63,7 @@ impl ProbeBuilder {
     ///
     /// # Errors
     /// None for a ball.
-    pub fn new(probe: Probe) -> Result<Self, TurnError> {
+    pub(crate) fn new(probe: Probe) -> Result<Self, TurnError> {
         let extent = Extent::new(PARAMETERS.side, PARAMETERS.side);
         let mask = Planes::from_fn(extent, |x, y| {
             let from_middle = |at: usize| 2.0 * (at as f32 + 0.5) / PARAMETERS.side as f32 - 1.0;
@@ -83,7 +83,7 @@ impl ProbeBuilder {
     ///
     /// # Errors
     /// [`TurnError::Setting`] where the ball is not in it.
-    pub fn push(&mut self, angle_deg: f64, frame: &Rgb<Srgb>) -> Result<(), TurnError> {
+    pub(crate) fn push(&mut self, angle_deg: f64, frame: &Rgb<Srgb>) -> Result<(), TurnError> {
         let planes = frame.planes();
         let place = self.probe.place;
         if !place.is_within(planes.extent()) {

@@ -1,6 +1,5 @@
 //! A turn's frames, once through, into curves.
 
-use std::fmt;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::Arc;
@@ -12,7 +11,8 @@ use relight_reader::{
 };
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use serde::{Deserialize, Serialize};
+use relit_data::rig::RotationDirection;
+use serde::Serialize;
 
 use crate::error::TurnError;
 use crate::observe::curves::{CurveBuilder, TurnCurves};
@@ -25,37 +25,6 @@ struct ReadingParameters {
 
 const PARAMETERS: ReadingParameters = ReadingParameters { batch: 12 };
 
-/// Which way the table turns as its angle grows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RotationDirection {
-    /// Counter-clockwise, seen from above: the background moves to the right.
-    #[default]
-    CounterClockwise,
-    /// Clockwise: the background moves to the left.
-    Clockwise,
-}
-
-impl fmt::Display for RotationDirection {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::CounterClockwise => "counter-clockwise",
-            Self::Clockwise => "clockwise",
-        })
-    }
-}
-
-impl RotationDirection {
-    /// The other one.
-    #[must_use]
-    pub const fn other(self) -> Self {
-        match self {
-            Self::CounterClockwise => Self::Clockwise,
-            Self::Clockwise => Self::CounterClockwise,
-        }
-    }
-}
-
 /// What says which way the table turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -65,8 +34,8 @@ pub enum RotationSource {
     Assumed,
     /// The caller.
     Given,
-    /// The background of the session's video.
-    Background,
+    /// The session: it is known of the rig.
+    Rig,
     /// The network of turns, which is clearly surer of its normals this way.
     Network,
 }
@@ -78,17 +47,6 @@ pub struct TableRotation {
     pub direction: RotationDirection,
     /// What says so.
     pub source: RotationSource,
-}
-
-impl TableRotation {
-    /// One that is known.
-    #[must_use]
-    pub const fn given(direction: RotationDirection) -> Self {
-        Self {
-            direction,
-            source: RotationSource::Given,
-        }
-    }
 }
 
 /// What the records of a shard say of the video that it was made from.
@@ -111,8 +69,6 @@ pub struct ReadTurn {
     pub rotation: TableRotation,
     /// Its first twelve frames, which cover the whole turn.
     pub first: Vec<Rgb<Linear>>,
-    /// Their angles of the table, degrees.
-    pub first_angles: Vec<f64>,
     /// Where the frames stand in the turn's video, from 0, and the table's angle of each, degrees.
     pub sources: Vec<(u64, f64)>,
     /// The video itself; none where the frames have no records.
@@ -123,6 +79,21 @@ pub struct ReadTurn {
     pub has_angles: bool,
     /// What is wrong with frames that are left out.
     pub damage: Vec<String>,
+}
+
+impl ReadTurn {
+    /// The same of a table that turns the other way, as `source` says.
+    pub(crate) fn turned_other_way(mut self, source: RotationSource) -> Self {
+        self.curves = self.curves.with_other_direction();
+        for (_, angle) in &mut self.sources {
+            *angle = -*angle;
+        }
+        self.rotation = TableRotation {
+            direction: self.rotation.direction.other(),
+            source,
+        };
+        self
+    }
 }
 
 /// Reads the turn of a shard, or of what else [`Turns::open`] takes, once through. `progress` is told how many
@@ -161,7 +132,6 @@ pub fn read_curves(
         rotation,
         builder: None,
         first: Vec::new(),
-        first_angles: Vec::new(),
         sources: Vec::new(),
         origin: None,
         mask: None,
@@ -201,7 +171,6 @@ struct Reader {
     rotation: TableRotation,
     builder: Option<CurveBuilder>,
     first: Vec<Rgb<Linear>>,
-    first_angles: Vec<f64>,
     sources: Vec<(u64, f64)>,
     origin: Option<TurnOrigin>,
     mask: Option<Planes<1>>,
@@ -234,7 +203,6 @@ impl Reader {
             self.builder(extent, mask)?.push(angle, extent, planes)?;
             if self.first.len() < PARAMETERS.batch as usize {
                 let planes = planes.map(<[f32]>::to_vec);
-                self.first_angles.push(angle);
                 self.first
                     .push(Rgb::new(Planes::from_planes(extent, planes)?));
             }
@@ -286,7 +254,6 @@ impl Reader {
             curves: builder.finish()?,
             rotation: self.rotation,
             first: self.first,
-            first_angles: self.first_angles,
             sources: self.sources,
             origin: self.origin,
             mask: self.mask.ok_or(TurnError::Empty)?,

@@ -5,27 +5,34 @@ use serde::Serialize;
 /// Whether normals and albedo are to be expected from the turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum LightVerdict {
-    /// The light has a bright side.
+pub enum TurnVerdict {
+    /// They are.
     Good,
-    /// The light is nearly the same from everywhere.
+    /// A light that is known is nearly the same from everywhere.
     TooEven,
-    /// Most of what varies is shadows or highlights.
-    #[serde(rename = "not_matt")]
+    /// Most of what varies in a light that is known is shadows or highlights.
     NotLambertian,
     /// Nearly all of the object is clipped over half of the turn or more.
     Overexposed,
     /// Nearly all of the object is black.
     Underexposed,
-    /// The light that was found would have to be negative somewhere.
-    ImpossibleLight,
+    /// The frames cover only part of a turn, in a light that is not known.
+    PartOfTurn,
+    /// The network of turns expects large errors.
+    Uncertain,
 }
 
-impl LightVerdict {
+impl TurnVerdict {
     /// Whether normals and albedo are observable at all.
     #[must_use]
     pub const fn is_fit(self) -> bool {
         matches!(self, Self::Good | Self::NotLambertian)
+    }
+
+    /// Whether the camera's exposure makes the turn worthless.
+    #[must_use]
+    pub const fn is_exposure(self) -> bool {
+        matches!(self, Self::Overexposed | Self::Underexposed)
     }
 
     /// What to do about it, in one sentence; none where all is well.
@@ -48,9 +55,12 @@ impl LightVerdict {
                 "the object is underexposed: nearly all of it is black; \
                  lengthen the exposure or add light, and capture the turn again",
             ),
-            Self::ImpossibleLight => Some(
-                "no light explains the turn: the one that fits it best would be negative from some side; \
-                 do not trust light and albedo, and the normals as far as their confidence says, or give the light (--light, --probe)",
+            Self::PartOfTurn => Some(
+                "the frames cover only part of a turn: do not trust normals where the confidence is low, or capture a whole turn",
+            ),
+            Self::Uncertain => Some(
+                "the network of turns is not sure of the normals: do not trust them where the confidence is low, \
+                 or measure the light (--light, --probe)",
             ),
         }
     }

@@ -8,15 +8,12 @@ use relight_core::files::{MovieError, MovieWriter};
 
 use crate::error::TurnError;
 use crate::report::files::{ASSET, TurnFiles};
-use crate::report::labels::TurnLabels;
 
 /// Where the results of a turn are to be written.
 #[derive(Debug, Clone, Copy)]
 pub struct Destinations<'a> {
     /// The folder for the results.
     pub output: &'a Path,
-    /// The folder for labels.
-    pub labels: Option<&'a Path>,
     /// The object as a file.
     pub asset: Option<&'a Path>,
     /// Whether there is to be a video.
@@ -38,12 +35,9 @@ pub enum AssetDestination<'a> {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DestinationError {
-    /// The folder of the results or that of the labels cannot be written.
+    /// The folder of the results cannot be written.
     #[error(transparent)]
     Folder(#[from] TurnError),
-    /// The labels and the results would be lost in each other.
-    #[error("{}: give a folder of its own, neither in that of the results nor around it", .0.display())]
-    Labels(PathBuf),
     /// The object cannot be written there.
     #[error("{}: {what}", path.display())]
     AssetPlace {
@@ -61,20 +55,13 @@ pub enum DestinationError {
 }
 
 impl<'a> Destinations<'a> {
-    /// Refuses places that cannot be written, or of which one would be lost in another; where the object goes.
+    /// Refuses places that cannot be written; where the object goes.
     ///
     /// # Errors
     /// With the first of them.
     pub fn check(&self) -> Result<AssetDestination<'a>, DestinationError> {
         let output = resolved(self.output);
         TurnFiles::check(self.output)?;
-        if let Some(labels) = self.labels {
-            let inner = resolved(labels);
-            if inner.starts_with(&output) || output.starts_with(&inner) {
-                return Err(DestinationError::Labels(labels.to_owned()));
-            }
-            TurnLabels::check(labels)?;
-        }
         let asset = self.check_asset(&output)?;
         if self.has_movie {
             MovieWriter::check()?;
@@ -100,10 +87,6 @@ impl<'a> Destinations<'a> {
             return refuse("give a name that ends in .relit");
         }
         let inner = resolved(path);
-        let labels = self.labels.map(resolved);
-        if labels.is_some_and(|labels| inner.starts_with(labels)) {
-            return refuse("give a place that is not in the folder of the labels");
-        }
         if inner == output.join(ASSET) {
             return Ok(AssetDestination::Inside);
         }

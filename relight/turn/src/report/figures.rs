@@ -4,17 +4,14 @@ use relight_core::light::Order;
 use serde::Serialize;
 
 use crate::error::TurnError;
-use crate::fit::azimuth::AzimuthFigures;
-use crate::fit::figures::{DirectionFigure, InitialisationFigure, MaterialFigure};
 use crate::fit::solution::TurnSolution;
 use crate::model::frame::Elevation;
-use crate::model::lighting::{TERMS, TableLight};
+use crate::model::lighting::TERMS;
 use crate::model::material::MaterialKind;
 use crate::network::predict::HypothesisFigures;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::exposure::ExposureStep;
-use crate::observe::reading::{ReadTurn, RotationDirection, TableRotation};
-use crate::observe::strip::{PanoramaStrip, StripFigures};
+use crate::observe::reading::{ReadTurn, TableRotation};
 use crate::report::maps::AngleFigure;
 
 /// The figures of a turn, as `turn.json` holds them.
@@ -34,22 +31,12 @@ pub struct TurnFigures {
     pub(crate) rotation: TableRotation,
     pub(crate) conditioning: Conditioning,
     pub(crate) advice: Option<&'static str>,
-    pub(crate) normals: Option<String>,
-    /// Whether these normals were left out: a shape inflated out of the outline fits the turn better.
-    pub(crate) normals_left_out: bool,
-    pub(crate) light: FigureLight,
-    /// What the object is taken for, and the residual of each kind that was tried.
-    #[serde(rename = "body")]
+    /// Where the light is from: a file, or the ball; none where it was found.
+    pub(crate) light_source: Option<String>,
+    /// What the object is taken for.
     pub(crate) material: MaterialKind,
-    #[serde(rename = "bodies")]
-    pub(crate) materials: Vec<MaterialFigure>,
-    /// How well both rotation directions fit the turn; none where that is not observable.
-    #[serde(rename = "sense")]
-    pub(crate) direction: Option<DirectionFigure>,
-    /// What the network of turns took the turn for; none where it was not asked.
-    pub(crate) network: Option<HypothesisFigures>,
-    /// From which side the light comes, by all that says so; none where no network of turns was asked.
-    pub(crate) azimuth: Option<AzimuthFigures>,
+    /// What the network of turns took the turn for.
+    pub(crate) network: HypothesisFigures,
     /// The residual of a curve, over the energy of its variation, the median.
     pub(crate) residual: f64,
     /// The angle that normals are expected to be off, degrees, the median.
@@ -57,42 +44,9 @@ pub struct TurnFigures {
     /// Specular reflectance and smoothness of the whole object, as `relight render` takes them; none for a Lambertian
     /// one.
     pub(crate) gloss: Option<FigureGloss>,
-    /// Which ambiguity nothing broke.
-    pub(crate) ambiguity: Option<&'static str>,
     pub(crate) exposure_steps: Vec<ExposureStep>,
-    /// What the panorama strip says; none where the video was not read, or its sides do not show the same environment.
-    #[serde(rename = "room")]
-    pub(crate) panorama: Option<FigurePanorama>,
     pub(crate) white: FigureWhites,
     pub(crate) over_angle: Vec<AngleFigure>,
-}
-
-/// The surroundings by the background of the video, beside the light that was fitted.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub(crate) struct FigurePanorama {
-    #[serde(flatten)]
-    strip: StripFigures,
-    /// The light's bright side, as that of the strip.
-    light_azimuth_deg: f64,
-    /// How far the two are apart, degrees.
-    apart_deg: f64,
-}
-
-impl FigurePanorama {
-    /// Of a strip that was made with a rotation; it tells the direction of the shard's own angle.
-    pub(crate) fn new(strip: &PanoramaStrip, light: &TableLight, rotation: TableRotation) -> Self {
-        let mut strip = *strip.figures();
-        let light_azimuth_deg = light.bright_azimuth_deg();
-        let apart = (strip.bright_azimuth_deg - light_azimuth_deg).rem_euclid(360.0);
-        if rotation.direction == RotationDirection::Clockwise {
-            strip.direction = strip.direction.other();
-        }
-        Self {
-            strip,
-            light_azimuth_deg,
-            apart_deg: apart.min(360.0 - apart),
-        }
-    }
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -103,19 +57,11 @@ pub(crate) struct FigureGloss {
     pub(crate) residual: f64,
 }
 
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct FigureLight {
-    pub(crate) source: Option<String>,
-    #[serde(rename = "starts")]
-    pub(crate) initialisations: Vec<InitialisationFigure>,
-}
-
 /// The light that the largest value of a file stands for.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct FigureWhites {
     pub(crate) albedo: f32,
     pub(crate) shading: f32,
-    pub(crate) highlight: f32,
 }
 
 /// The light, as `light.json` holds it.
@@ -138,6 +84,12 @@ impl TurnFigures {
     #[must_use]
     pub const fn frames(&self) -> u32 {
         self.frames
+    }
+
+    /// How many degrees of the turn they cover.
+    #[must_use]
+    pub const fn coverage_deg(&self) -> f64 {
+        self.conditioning.coverage_deg
     }
 }
 

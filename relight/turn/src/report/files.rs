@@ -8,16 +8,12 @@ use relight_core::image::{Depth, Extent};
 use relight_photo::files::{bright, write_light};
 
 use crate::error::TurnError;
-use crate::fit::solution::TurnSolution;
-use crate::observe::reading::ReadTurn;
-use crate::observe::strip::PanoramaStrip;
 use crate::report::encoding::{grey, write_json};
-use crate::report::figures::{
-    FigureGloss, FigureLight, FigurePanorama, FigureWhites, LightFile, TurnFigures,
-};
+use crate::report::figures::{FigureGloss, FigureWhites, LightFile, TurnFigures};
 use crate::report::maps::TurnMaps;
 use crate::report::movie::write_movie;
 use crate::report::sheet::contact_sheet;
+use crate::solving::SolvedTurn;
 
 /// The file of figures.
 const FIGURES: &str = "turn.json";
@@ -26,11 +22,10 @@ const FIGURES: &str = "turn.json";
 pub(crate) const ASSET: &str = "object.relit";
 
 /// What is written beside it.
-const FILES: [&str; 13] = [
+const FILES: [&str; 11] = [
     "normal.png",
     "albedo.png",
     "shading.png",
-    "highlight.png",
     "shadow.png",
     "confidence.png",
     "mask.png",
@@ -38,7 +33,6 @@ const FILES: [&str; 13] = [
     "light.json",
     "contact.png",
     "relit.mp4",
-    "room.png",
     ASSET,
 ];
 
@@ -53,18 +47,10 @@ const SCHEMA: &str = "relight.solved_turn/1";
 /// A solved turn with all that is written of it.
 #[derive(Debug, Clone, Copy)]
 pub struct TurnFiles<'a> {
-    /// What was read.
-    pub turn: &'a ReadTurn,
-    /// What was found.
-    pub solution: &'a TurnSolution,
-    /// Its residuals.
-    pub maps: &'a TurnMaps,
+    /// What was read and found.
+    pub solved: &'a SolvedTurn,
     /// Where the light is from: a file's name, or none where it was found.
     pub light_source: Option<&'a str>,
-    /// Where the normals that initialise are from.
-    pub normals_source: Option<&'a str>,
-    /// The panorama strip, where the video was read.
-    pub strip: Option<&'a PanoramaStrip>,
     /// The object, where it is to be among the files, as `object.relit`.
     pub asset: Option<&'a CapturedObject>,
     /// Whether to write the video.
@@ -91,8 +77,9 @@ impl TurnFiles<'_> {
     }
 
     fn write_files(&self, folder: &Path) -> Result<TurnFigures, TurnError> {
-        let Self { solution, maps, .. } = *self;
-        let curves = &self.turn.curves;
+        let SolvedTurn { turn, solution, .. } = self.solved;
+        let curves = &turn.curves;
+        let maps = TurnMaps::new(curves, solution);
         let path = |name: &str| folder.join(name);
         let surface = solution.surface(curves)?;
         let albedo = solution.albedo(curves);
@@ -103,7 +90,6 @@ impl TurnFiles<'_> {
         let white = FigureWhites {
             albedo: write_light(&path("albedo.png"), &albedo)?,
             shading: write_light(&path("shading.png"), &shading)?,
-            highlight: write_light(&path("highlight.png"), &grey(&maps.highlight))?,
         };
         let confidence = grey(&solution.confidence(curves));
         write_png(
@@ -112,35 +98,32 @@ impl TurnFiles<'_> {
             Depth::Eight,
         )?;
         write_png(&path("confidence.png"), confidence.planes(), Depth::Eight)?;
-        write_png(
-            &path("mask.png"),
-            grey(&self.turn.mask).planes(),
-            Depth::Eight,
-        )?;
+        write_png(&path("mask.png"), grey(&turn.mask).planes(), Depth::Eight)?;
         let light = solution.light().to_viewer(solution.frame())?;
         light.write(&path("light.txt"))?;
-        write_json(&path("light.json"), &LightFile::new(self.turn, solution)?)?;
-        let sheet = contact_sheet(self.turn, solution, maps, (&surface, &light))?;
+        write_json(&path("light.json"), &LightFile::new(turn, solution)?)?;
+        let sheet = contact_sheet(turn, solution, &maps, (&surface, &light))?;
         write_png(&path("contact.png"), &sheet, Depth::Eight)?;
-        if let Some(strip) = self.strip {
-            strip.write_png(&path("room.png"))?;
-        }
         if let Some(asset) = self.asset {
             asset.write(&path(ASSET))?;
         }
         if self.has_movie {
-            let white = bright(albedo.planes(), &self.turn.mask);
+            let white = bright(albedo.planes(), &turn.mask);
             write_movie(&path("relit.mp4"), &surface, white)?;
         }
-        let figures = self.figures(white)?;
+        let figures = self.figures(white, maps)?;
         write_json(&path(FIGURES), &figures)?;
         Ok(figures)
     }
 
-    fn figures(&self, white: FigureWhites) -> Result<TurnFigures, TurnError> {
-        let Self { turn, solution, .. } = *self;
+    fn figures(&self, white: FigureWhites, maps: TurnMaps) -> Result<TurnFigures, TurnError> {
+        let SolvedTurn {
+            turn,
+            solution,
+            network,
+            ..
+        } = self.solved;
         let Extent { width, height } = turn.curves.extent();
-        let is_open = self.light_source.is_none() && !solution.has_prior;
         let gloss = solution.gloss(&turn.curves)?.map(|gloss| FigureGloss {
             reflectance: gloss.reflectance,
             smoothness: gloss.smoothness,
@@ -160,30 +143,15 @@ impl TurnFiles<'_> {
             rotation: turn.rotation,
             conditioning: solution.conditioning(),
             advice: solution.conditioning().verdict.advice(),
-            normals: self.normals_source.map(str::to_owned),
-            normals_left_out: solution.is_prior_left_out(),
-            light: FigureLight {
-                source: self.light_source.map(str::to_owned),
-                initialisations: solution.initialisations().to_vec(),
-            },
+            light_source: self.light_source.map(str::to_owned),
             material: solution.material(),
-            materials: solution.materials().to_vec(),
-            direction: solution.direction(),
-            network: solution.hypotheses().cloned(),
-            azimuth: solution.azimuth().cloned(),
+            network: network.clone(),
             residual: solution.residual(),
             expected_error_deg: solution.expected_error_deg(),
             gloss,
-            ambiguity: is_open.then_some(
-                "light and shape are both unknown: the outline says that the object bulges, \
-                 but how steep it is as a whole is open",
-            ),
             exposure_steps: turn.curves.exposure_steps().to_vec(),
-            panorama: self
-                .strip
-                .map(|strip| FigurePanorama::new(strip, solution.light(), turn.rotation)),
             white,
-            over_angle: self.maps.over_angle.clone(),
+            over_angle: maps.over_angle,
         })
     }
 }

@@ -4,16 +4,13 @@ use rayon::prelude::*;
 use relight_core::image::Planes;
 use serde::Serialize;
 
-use crate::fit::residuals::{lit, reference, residuals};
+use crate::fit::residuals::residuals;
 use crate::fit::solution::TurnSolution;
 use crate::observe::curves::TurnCurves;
 
 /// What exceeds the model and what falls short of it.
 #[derive(Debug, Clone)]
 pub struct TurnMaps {
-    /// The most that a pixel exceeds its diffuse part by anywhere in the turn, in units of light, the mean of the
-    /// channels; where it is clipped, as if it were just so bright. 0 outside the mask.
-    pub highlight: Planes<1>,
     /// The part of the model's light over the whole turn that a pixel does not have, 0 to 1.
     pub shadow: Planes<1>,
     /// Both over the table's angle.
@@ -40,22 +37,6 @@ impl TurnMaps {
             .into_par_iter()
             .map(|pixel| residuals(curves, pixel, &solution.fits[pixel], model))
             .collect();
-        let most = |pixel: usize| {
-            let fit = &solution.fits[pixel];
-            let unit = reference(curves, pixel, fit, model);
-            let parts = residuals[pixel].iter().zip(curves.harmonics());
-            let excess = parts.map(|(residuals, basis)| {
-                let [diffuse, gloss] = lit(model, fit.normal, basis);
-                match residuals {
-                    Some(residuals) => residuals * unit + gloss.iter().sum::<f64>() / 3.0,
-                    None => {
-                        let diffuse: f64 = (0..3).map(|c| fit.albedo[c] * diffuse[c]).sum();
-                        curves.clipped_value() - diffuse / 3.0
-                    }
-                }
-            });
-            [excess.fold(0.0_f64, f64::max) as f32]
-        };
         let missing = |pixel: usize| {
             let residuals = &residuals[pixel];
             let sum: f64 = residuals
@@ -66,7 +47,6 @@ impl TurnMaps {
             [(sum / residuals.len().max(1) as f64).min(1.0) as f32]
         };
         Self {
-            highlight: curves.map(most),
             shadow: curves.map(missing),
             over_angle: over_angle(curves, &residuals),
         }

@@ -4,7 +4,6 @@ pub(crate) mod destinations;
 pub(crate) mod encoding;
 pub(crate) mod figures;
 pub(crate) mod files;
-pub(crate) mod labels;
 pub(crate) mod maps;
 pub(crate) mod movie;
 pub(crate) mod object;

@@ -38,28 +38,12 @@ const PARAMETERS: ObjectParameters = ObjectParameters {
 };
 
 impl TurnSolution {
-    /// The light in the viewer's frame when the table stands at an angle, radians.
-    ///
-    /// # Errors
-    /// Where a term is not finite.
-    pub fn light_at(&self, angle: f64) -> Result<ShLight, TurnError> {
-        Ok(self.turned(self.light().to_viewer(self.frame())?, angle))
-    }
-
     fn turned(&self, light: ShLight, angle: f64) -> ShLight {
         let [x, y, z] = self.frame().axis();
         let axis = Direction::new(x, y, z);
         axis.map_or(light.clone(), |axis| {
             light.rotated(&Rotation::about(axis, -angle))
         })
-    }
-
-    /// The light of which gloss shows a part: with the bands that are known beside it.
-    fn gloss_light(&self) -> Result<ShLight, TurnError> {
-        match &self.measured {
-            Some(light) => Ok(light.clone()),
-            None => Ok(self.light().to_viewer(self.frame())?),
-        }
     }
 
     /// The object as the render layers take it, with the gloss of [`TurnSolution::gloss`]. Metal is black with a gloss
@@ -87,7 +71,8 @@ impl TurnSolution {
     }
 
     /// Specular reflectance and smoothness of the whole object: those whose highlight in the light is nearest to the
-    /// gloss that was found. Of metal, the reflectance is that of an albedo of 1. None for an object without gloss.
+    /// gloss that was found. Of metal, the reflectance is that of an albedo of 1. None for an object without gloss, as a
+    /// diffuse one in unknown light.
     ///
     /// # Errors
     /// Where a term of the light is not finite.
@@ -95,20 +80,17 @@ impl TurnSolution {
         if self.model.gloss.is_none() {
             return Ok(None);
         }
-        if self.material() == MaterialKind::Metal && self.measured.is_none() {
-            // What it shows is all that is known of the light: it may be blurred or not.
+        let Some(measured) = &self.measured else {
+            // What metal shows is all that is known of the light: it may be blurred or not.
             return Ok(Some(FittedGloss {
                 reflectance: (PARAMETERS.metal_smoothness + 2.0) / 8.0,
                 smoothness: PARAMETERS.metal_smoothness,
                 residual: 1.0,
             }));
-        }
+        };
         let normals = self.normals(curves);
         let shown = ShadingModel {
-            gloss: self
-                .model
-                .gloss
-                .within(self.gloss_light()?.order().get() + 1),
+            gloss: self.model.gloss.within(measured.order().get() + 1),
             ..self.model
         };
         let mut best: Option<FittedGloss> = None;
@@ -122,7 +104,7 @@ impl TurnSolution {
                 };
                 [(gloss.iter().sum::<f64>() / 3.0).max(0.0) as f32]
             });
-            let light = self.turned(self.gloss_light()?, angle);
+            let light = self.turned(measured.clone(), angle);
             let found = fit_gloss(&light, &normals, &highlight)?;
             if found.is_some_and(|found| best.is_none_or(|best| found.residual < best.residual)) {
                 best = found;

@@ -25,7 +25,7 @@ const PARAMETERS: SheetParameters = SheetParameters {
     columns: 4,
 };
 
-/// One sheet: a frame, normals, albedo and shading; highlight, shadow, confidence, and a ball in the light.
+/// One sheet: a frame, normals, albedo and shading; shadow, confidence, and a ball in the light.
 pub(crate) fn contact_sheet(
     turn: &ReadTurn,
     solution: &TurnSolution,
@@ -60,7 +60,6 @@ pub(crate) fn contact_sheet(
         plain(&surface.normals().to_colours()),
         lit(solution.albedo(curves).planes()),
         lit(shading.planes()),
-        lit(grey(&maps.highlight).planes()),
         plain(grey(&maps.shadow).planes()),
         plain(grey(&solution.confidence(curves)).planes()),
         ball_tile,

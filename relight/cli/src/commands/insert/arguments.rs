@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{ArgAction, Args};
 use relight_core::captured_object::CapturedObject;
 use relight_core::files::OutputKind;
+use relight_core::image::{Depth, Transfer};
 use relight_photo::files::{InsertionOutput, PhotoReading};
 use relight_photo::insert::{
     LightDescription, LightSource, ObjectDescription, SceneDescription, WhiteBalance,
@@ -14,8 +15,8 @@ use relight_photo::insert::{
 use relit_data::text;
 
 use crate::commands::relight::{degrees, gloss_numbers, tint};
-use crate::photos::{Bits, NetworkArguments};
-use crate::values::{TransferName, WhiteName};
+use crate::photos::{BITS, NetworkArguments, bits_fault};
+use crate::values::{TRANSFERS, WHITE_BALANCES, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -74,8 +75,8 @@ pub(crate) struct Arguments {
     #[arg(long, conflicts_with = "scene")]
     no_match: bool,
     /// How the colour of the light is shown [default: light].
-    #[arg(long, value_enum, conflicts_with = "scene")]
-    white_balance: Option<WhiteName>,
+    #[arg(long, value_parser = one_of(WHITE_BALANCES), conflicts_with = "scene")]
+    white_balance: Option<WhiteBalance>,
     /// Brightness of a panorama and its light in stops, from that which is found.
     #[arg(long, value_name = "STOPS", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
     exposure: Option<f64>,
@@ -92,8 +93,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
     fps: u32,
     /// Bits a channel of a PNG.
-    #[arg(long, value_enum, default_value = "8")]
-    bits: Bits,
+    #[arg(long, value_parser = one_of(BITS), default_value = "8")]
+    bits: Depth,
     #[command(flatten)]
     pub(super) network: NetworkArguments,
 }
@@ -103,8 +104,8 @@ pub(crate) struct Arguments {
 struct ObjectArguments {
     /// How the photograph is encoded, where it is a PNG, JPEG or WebP; EXR and HDR are linear [default: what the file says, or
     /// sRGB].
-    #[arg(long, value_enum, action = ArgAction::Append, conflicts_with = "scene")]
-    transfer: Vec<TransferName>,
+    #[arg(long, value_parser = one_of(TRANSFERS), action = ArgAction::Append, conflicts_with = "scene")]
+    transfer: Vec<Transfer>,
     /// A mask, white on the object, or a folder of masks, <photo's name>.png.
     #[arg(long, value_name = "FILE|DIR", action = ArgAction::Append, conflicts_with = "scene")]
     mask: Vec<PathBuf>,
@@ -190,7 +191,7 @@ impl Arguments {
                 self.output.display()
             ));
         }
-        if let Some(fault) = self.bits.fault(&self.output) {
+        if let Some(fault) = bits_fault(self.bits, &self.output) {
             return Some(fault);
         }
         let is_movie = matches!(OutputKind::of(&self.output), Some(OutputKind::Movie(_)));
@@ -206,7 +207,7 @@ impl Arguments {
     pub(super) fn written(&self) -> InsertionOutput<'_> {
         InsertionOutput {
             path: &self.output,
-            depth: self.bits.into(),
+            depth: self.bits,
             turn: self.turn.unwrap_or(360.0),
             seconds: self.seconds,
             frames_per_second: self.fps,
@@ -245,7 +246,7 @@ impl Arguments {
                 turn: self.turned.unwrap_or(0.0),
             },
             matches: !self.no_match,
-            white_balance: self.white_balance.map_or(WhiteBalance::Light, Into::into),
+            white_balance: self.white_balance.unwrap_or(WhiteBalance::Light),
             exposure: self.exposure.unwrap_or(0.0) as f32,
             objects,
         };
@@ -267,7 +268,7 @@ impl ObjectArguments {
                     let name = photo.file_stem().unwrap_or_default();
                     PhotoReading::mask_path(&mask, &name.to_string_lossy())
                 }),
-            transfer: of(&self.transfer, number).map(Into::into),
+            transfer: of(&self.transfer, number),
             at: of(&self.at, number).unwrap_or([across, 0.9]),
             height: of(&self.height, number).unwrap_or(0.4),
             rotation: of(&self.rotate, number).unwrap_or(0.0),

@@ -1,46 +1,28 @@
 //! Warnings with the options that mend them.
 
-use relight_turn::{RotationDirection, TurnWarning};
+use relight_turn::{SolvedTurn, TurnWarning};
 use relit_console::Console;
+use relit_data::rig::RotationDirection;
 
-pub(super) fn warn(text: &str, console: Console) {
-    console.warn(text);
-}
-
-/// Says warnings of a turn that was taken to rotate this way, each with what to give instead.
-pub(super) fn warn_of(
-    warnings: impl IntoIterator<Item = TurnWarning>,
-    direction: RotationDirection,
-    console: Console,
-) {
-    for warning in warnings {
-        match advice(&warning, direction) {
-            Some(advice) => warn(&format!("{warning}{advice}"), console),
-            None => warn(&warning.to_string(), console),
-        }
+/// Says what a user should know of a turn, each with what to give instead.
+pub(super) fn warn_of(solved: &SolvedTurn, console: Console) {
+    let direction = solved.turn.rotation.direction;
+    for warning in solved.warnings() {
+        let advice = advice(&warning, direction).unwrap_or_default();
+        console.warn(&format!("{warning}{advice}"));
     }
 }
 
 fn advice(warning: &TurnWarning, direction: RotationDirection) -> Option<String> {
     let other = direction.other();
     Some(match warning {
-        TurnWarning::BackgroundMovesOtherWay => format!(", give --direction {other}"),
-        TurnWarning::OtherDirection { .. } | TurnWarning::SurerInOtherDirection { .. } => {
-            format!(": try --direction {other}")
-        }
-        TurnWarning::AssumedElevation { .. } => ": give --elevation or --rim".to_owned(),
+        TurnWarning::SurerInOtherDirection { .. } => format!(": try --rotation {other}"),
+        TurnWarning::AssumedElevation { .. } => ": give --elevation".to_owned(),
         TurnWarning::AssumedRotation { .. } => {
-            ": look at it from above as it turns, and give --direction".to_owned()
+            ": look at it from above as it turns, and give --rotation".to_owned()
         }
-        TurnWarning::TakenRotation { direction, .. } => {
-            format!(
-                "; give --direction {direction} if that is right, else {}",
-                direction.other()
-            )
-        }
-        TurnWarning::OtherMaterial { material, .. } => format!(": try --material {material}"),
-        TurnWarning::MetalInUnknownLight => {
-            ": give --material metal if that is right, else diffuse".to_owned()
+        TurnWarning::TakenRotation { .. } => {
+            format!("; give --rotation {direction} if that is right, else {other}")
         }
         _ => return None,
     })

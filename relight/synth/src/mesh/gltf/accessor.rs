@@ -38,9 +38,8 @@ impl File<'_> {
 
     /// Vectors of places or directions.
     pub(super) fn vectors(&self, number: usize) -> Result<Vec<[f32; 3]>, String> {
-        let accessor = self.accessor(number)?;
-        let is_right = accessor.component_type == F32 || self.is_quantised();
-        if accessor.kind != "VEC3" || !is_right {
+        let accessor = self.of_kind(number, "VEC3")?;
+        if accessor.component_type != F32 && !self.is_quantised() {
             return Err(of_another_kind(number));
         }
         self.numbers(number, accessor.normalized)
@@ -48,59 +47,51 @@ impl File<'_> {
 
     /// Texture coordinates: numbers, or parts of the largest whole number.
     pub(super) fn pairs(&self, number: usize) -> Result<Vec<[f32; 2]>, String> {
-        let accessor = self.accessor(number)?;
-        if accessor.kind != "VEC2" {
-            return Err(of_another_kind(number));
-        }
-        self.numbers(number, accessor.normalized || !self.is_quantised())
+        let is_normal = self.of_kind(number, "VEC2")?.normalized;
+        self.numbers(number, is_normal || !self.is_quantised())
     }
 
     /// Colours, without their opacity.
     pub(super) fn colours(&self, number: usize) -> Result<Vec<[f32; 3]>, String> {
-        match self.accessor(number)?.kind.as_str() {
-            "VEC3" => self.numbers(number, true),
-            "VEC4" => {
-                let all: Vec<[f32; 4]> = self.numbers(number, true)?;
-                Ok(all.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
-            }
-            _ => Err(of_another_kind(number)),
+        if self.of_kind(number, "VEC3").is_ok() {
+            return self.numbers(number, true);
         }
+        let all = self.weights(number)?.into_iter();
+        Ok(all.map(|[r, g, b, _]| [r, g, b]).collect())
     }
 
     /// Weights of joints.
     pub(super) fn weights(&self, number: usize) -> Result<Vec<[f32; 4]>, String> {
-        match self.accessor(number)?.kind.as_str() {
-            "VEC4" => self.numbers(number, true),
-            _ => Err(of_another_kind(number)),
-        }
+        self.of_kind(number, "VEC4")?;
+        self.numbers(number, true)
     }
 
     pub(super) fn matrices(&self, number: usize) -> Result<Vec<[f32; 16]>, String> {
-        match self.accessor(number)? {
-            Accessor {
-                kind,
-                component_type: F32,
-                ..
-            } if kind == "MAT4" => self.numbers(number, false),
-            _ => Err(of_another_kind(number)),
+        if self.of_kind(number, "MAT4")?.component_type != F32 {
+            return Err(of_another_kind(number));
         }
+        self.numbers(number, false)
     }
 
     /// Numbers of vertices.
     pub(super) fn indices(&self, number: usize) -> Result<Vec<u32>, String> {
-        if self.accessor(number)?.kind != "SCALAR" {
-            return Err(of_another_kind(number));
-        }
+        self.of_kind(number, "SCALAR")?;
         let all: Vec<[u32; 1]> = self.items(number, index)?;
-        Ok(all.into_iter().map(|[one]| one).collect())
+        Ok(all.into_flattened())
     }
 
     /// Numbers of joints.
     pub(super) fn joints(&self, number: usize) -> Result<Vec<[u32; 4]>, String> {
-        match self.accessor(number)?.kind.as_str() {
-            "VEC4" => self.items(number, index),
-            _ => Err(of_another_kind(number)),
-        }
+        self.of_kind(number, "VEC4")?;
+        self.items(number, index)
+    }
+
+    fn of_kind(&self, number: usize, kind: &str) -> Result<&Accessor, String> {
+        let accessor = self.accessor(number)?;
+        let is_it = accessor.kind == kind;
+        is_it
+            .then_some(accessor)
+            .ok_or_else(|| of_another_kind(number))
     }
 
     /// Whole numbers that are parts of their largest have `is_normal`.

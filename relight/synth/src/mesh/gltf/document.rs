@@ -164,26 +164,15 @@ pub(super) struct Material {
     pub(super) extensions: MaterialExtensions,
 }
 
-#[derive(Debug, Deserialize)]
+/// What is missing is 1.
+#[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct MetallicRoughness {
-    pub(super) base_color_factor: [f32; 4],
+    pub(super) base_color_factor: Option<[f32; 4]>,
     pub(super) base_color_texture: Option<TextureInfo>,
-    pub(super) metallic_factor: f32,
-    pub(super) roughness_factor: f32,
+    pub(super) metallic_factor: Option<f32>,
+    pub(super) roughness_factor: Option<f32>,
     pub(super) metallic_roughness_texture: Option<TextureInfo>,
-}
-
-impl Default for MetallicRoughness {
-    fn default() -> Self {
-        Self {
-            base_color_factor: [1.0; 4],
-            base_color_texture: None,
-            metallic_factor: 1.0,
-            roughness_factor: 1.0,
-            metallic_roughness_texture: None,
-        }
-    }
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -195,22 +184,13 @@ pub(super) struct MaterialExtensions {
     pub(super) glossy: Option<SpecularGlossiness>,
 }
 
-#[derive(Debug, Deserialize)]
+/// What is missing is 1.
+#[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct SpecularGlossiness {
-    pub(super) diffuse_factor: [f32; 4],
+    pub(super) diffuse_factor: Option<[f32; 4]>,
     pub(super) diffuse_texture: Option<TextureInfo>,
-    pub(super) glossiness_factor: f32,
-}
-
-impl Default for SpecularGlossiness {
-    fn default() -> Self {
-        Self {
-            diffuse_factor: [1.0; 4],
-            diffuse_texture: None,
-            glossiness_factor: 1.0,
-        }
-    }
+    pub(super) glossiness_factor: Option<f32>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -230,24 +210,13 @@ pub(super) struct TextureInfoExtensions {
     pub(super) transform: Option<TextureTransform>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct TextureTransform {
     pub(super) offset: [f32; 2],
     pub(super) rotation: f32,
-    pub(super) scale: [f32; 2],
+    pub(super) scale: Option<[f32; 2]>,
     tex_coord: Option<usize>,
-}
-
-impl Default for TextureTransform {
-    fn default() -> Self {
-        Self {
-            offset: [0.0; 2],
-            rotation: 0.0,
-            scale: [1.0; 2],
-            tex_coord: None,
-        }
-    }
 }
 
 impl TextureInfo {

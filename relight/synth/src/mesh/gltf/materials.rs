@@ -51,15 +51,15 @@ impl Pictures<'_> {
         let picture = colours.and_then(|info| self.picture(info, PictureKind::Colours));
         if let Some(glossy) = &of.extensions.glossy {
             return MeshMaterial {
-                colour: Vec3::from_slice(&glossy.diffuse_factor),
+                colour: colour(glossy.diffuse_factor),
                 picture,
-                roughness: 1.0 - glossy.glossiness_factor,
+                roughness: 1.0 - glossy.glossiness_factor.unwrap_or(1.0),
                 ..MeshMaterial::default()
             };
         }
         let surface = &of.pbr_metallic_roughness;
         let plain = MeshMaterial {
-            colour: Vec3::from_slice(&surface.base_color_factor),
+            colour: colour(surface.base_color_factor),
             picture,
             ..MeshMaterial::default()
         };
@@ -68,8 +68,8 @@ impl Pictures<'_> {
             return plain;
         }
         MeshMaterial {
-            roughness: surface.roughness_factor,
-            metallic: surface.metallic_factor,
+            roughness: surface.roughness_factor.unwrap_or(1.0),
+            metallic: surface.metallic_factor.unwrap_or(1.0),
             factors: of.factors().and_then(|info| self.factors(of, info)),
             ..plain
         }
@@ -143,10 +143,16 @@ impl Pictures<'_> {
     }
 }
 
+/// A colour without its opacity.
+fn colour(factor: Option<[f32; 4]>) -> Vec3 {
+    factor.map_or(Vec3::ONE, |factor| Vec3::from_slice(&factor))
+}
+
 /// From texture coordinates, whose v runs upwards here, to places of a picture.
 fn placed(info: &TextureInfo) -> Option<Affine2> {
     let transform = info.extensions.transform.as_ref()?;
-    let [scale, offset] = [transform.scale, transform.offset].map(Vec2::from);
+    let scale = transform.scale.map_or(Vec2::ONE, Vec2::from);
+    let offset = Vec2::from(transform.offset);
     // With v downwards, the angle runs the other way; the spec's example has it reversed, programs do not.
     let placed = Affine2::from_scale_angle_translation(scale, -transform.rotation, offset);
     let upwards = Affine2::from_scale_angle_translation(Vec2::new(1.0, -1.0), 0.0, Vec2::Y);

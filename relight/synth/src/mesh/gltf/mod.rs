@@ -20,7 +20,7 @@ use self::document::{Mesh, Node, Primitive};
 use self::file::{File, not_read};
 use self::nodes::Placements;
 use super::raw::{RawMesh, RawTriangle};
-use super::{MOST_TRIANGLES, MeshFault};
+use super::{MOST_TRIANGLES, too_large};
 use crate::SynthError;
 
 /// Kinds of primitives.
@@ -33,10 +33,7 @@ const DRACO: &str = "KHR_draco_mesh_compression";
 /// All triangles of the default scene as one surface.
 pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
     let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
-    parsed(path, &bytes).map_err(|reason| SynthError::Mesh {
-        path: path.to_owned(),
-        reason,
-    })
+    parsed(path, &bytes).map_err(SynthError::mesh(path))
 }
 
 fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
@@ -192,7 +189,7 @@ impl Reader<'_> {
     fn push(&mut self, part: &Primitive, first: u32, triangles: &[[u32; 3]]) -> Result<(), String> {
         let count = self.raw.triangles.len() + triangles.len();
         if count > MOST_TRIANGLES {
-            return Err(MeshFault::TooLarge(count).to_string());
+            return Err(too_large(count));
         }
         let material = part
             .material

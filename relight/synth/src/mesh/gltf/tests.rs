@@ -67,23 +67,26 @@ fn read_in(folder: &Path, document: &Value, binary: &[u8]) -> Result<Mesh, Synth
 /// Why a file is refused.
 fn refusal(document: &Value, binary: &[u8]) -> String {
     match read(document, binary) {
-        Err(SynthError::Mesh { path, reason }) => {
+        Err(SynthError::Unusable { path, fault }) => {
             assert!(path.ends_with("a.gltf"));
-            reason
+            let reason = fault
+                .strip_prefix("is a mesh that cannot be used: ")
+                .unwrap();
+            reason.split("; mend it").next().unwrap().to_owned()
         }
         other => panic!("{other:?}"),
     }
 }
 
 /// The look at a corner of a triangle.
-fn look(mesh: &Mesh, triangle: usize, corner: usize) -> crate::OwnSurface {
+fn look(mesh: &Mesh, triangle: usize, corner: usize) -> crate::mesh::OwnSurface {
     let weights = std::array::from_fn(|at| f32::from(u8::from(at == corner)));
     mesh.own_surface(triangle, weights).unwrap()
 }
 
 /// How much wider a mesh is than high.
 fn aspect(mesh: &Mesh) -> f32 {
-    let largest = |axis: usize| mesh.positions().iter().map(|p| p[axis]).fold(0.0, f32::max);
+    let largest = |axis: usize| mesh.positions.iter().map(|p| p[axis]).fold(0.0, f32::max);
     largest(0) / largest(1)
 }
 
@@ -124,7 +127,7 @@ fn a_buffer_may_lie_in_a_file_in_the_text_or_in_the_binary_part() {
         .remove("uri");
     shapes.push(read_glb(&glb(&document, &bytes)).unwrap());
     for shape in shapes {
-        assert_eq!((shape.triangles().len(), shape.positions().len()), (2, 4));
+        assert_eq!((shape.triangles.len(), shape.positions.len()), (2, 4));
         assert!((aspect(&shape) - 2.0).abs() < 1e-6);
     }
 }
@@ -137,7 +140,7 @@ fn a_file_beside_is_found_by_its_encoded_name_and_text_may_have_a_byte_order_mar
     std::fs::write(folder.path().join("my shape.bin"), &bytes).unwrap();
     let path = folder.path().join("a.gltf");
     std::fs::write(&path, format!("\u{feff}{document}")).unwrap();
-    assert_eq!(Mesh::read(&path).unwrap().triangles().len(), 2);
+    assert_eq!(Mesh::read(&path).unwrap().triangles.len(), 2);
     std::fs::remove_file(folder.path().join("my shape.bin")).unwrap();
     let error = Mesh::read(&path).unwrap_err().to_string();
     assert!(error.contains("my%20shape.bin"), "{error}");
@@ -238,7 +241,7 @@ fn materials_are_read_with_their_pictures_and_roughness() {
     assert_eq!(look(&mesh, 0, 2).colour, Vec3::new(0.5, 0.0, 0.0));
     let plain = look(&mesh, 0, 0);
     assert_eq!((plain.roughness, plain.metallic), (0.4, 0.0));
-    assert!(mesh.left_out().is_empty());
+    assert!(mesh.left_out.is_empty());
 }
 
 #[test]
@@ -282,8 +285,8 @@ fn a_picture_that_cannot_be_used_is_left_out_and_named() {
             object => object[key] = value,
         }
         let mesh = read(&document, &bytes).unwrap();
-        assert_eq!(mesh.triangles().len(), 2);
-        let found = mesh.left_out();
+        assert_eq!(mesh.triangles.len(), 2);
+        let found = &mesh.left_out;
         assert!(
             !found.is_empty() && found[0].contains(told),
             "{place}: {found:?}"
@@ -307,7 +310,7 @@ fn a_texture_in_webp_is_read_with_and_without_another_source() {
     ] {
         document["textures"][0] = texture;
         let mesh = read(&document, &bytes).unwrap();
-        assert!(mesh.left_out().is_empty());
+        assert!(mesh.left_out.is_empty());
         assert_eq!(look(&mesh, 0, 0).colour, Vec3::new(0.5, 1.0, 0.0));
     }
 }
@@ -326,7 +329,7 @@ fn pictures_lie_on_the_texture_coordinates_that_their_material_names() {
     let surface = &mut document["materials"][0]["pbrMetallicRoughness"];
     surface["metallicRoughnessTexture"] = json!({"index": 0});
     let mesh = read(&document, &bytes).unwrap();
-    assert_eq!(mesh.left_out().len(), 1);
+    assert_eq!(mesh.left_out.len(), 1);
     assert_eq!(look(&mesh, 0, 0).roughness, 0.4);
 }
 
@@ -471,7 +474,7 @@ fn sparse_accessors_change_items_of_others_and_of_zeros() {
         let mesh = read(&document, &bytes).unwrap();
         assert!((aspect(&mesh) - 8.0).abs() < 1e-5);
         // Of zeros, the corner that is not changed lies on another one.
-        assert_eq!(mesh.triangles().len(), if has_base { 2 } else { 1 });
+        assert_eq!(mesh.triangles.len(), if has_base { 2 } else { 1 });
         document["accessors"][0]["count"] = json!(2);
         refusal(&document, &bytes);
     }
@@ -514,7 +517,7 @@ fn a_file_without_scenes_has_all_its_nodes() {
     object.remove("scenes");
     let mesh = read(&document, &bytes).unwrap();
     assert!((aspect(&mesh) - 3.0).abs() < 1e-6);
-    assert_eq!(mesh.triangles().len(), 2);
+    assert_eq!(mesh.triangles.len(), 2);
 }
 
 #[test]
@@ -528,7 +531,7 @@ fn a_mirrored_part_keeps_its_outside() {
         document["nodes"][0]["scale"] = json!(scale);
         let mesh = read(&document, &bytes).unwrap();
         assert!(
-            mesh.normals()
+            mesh.normals
                 .iter()
                 .flatten()
                 .all(|normal| normal.z * z > 0.99)
@@ -598,7 +601,7 @@ fn strips_and_fans_are_read_as_triangles() {
     let surface = document["meshes"][0]["primitives"][0].clone();
     document["meshes"][0]["primitives"] =
         json!([surface, {"attributes": {"POSITION": 0}, "mode": 1}]);
-    assert_eq!(read(&document, &bytes).unwrap().triangles().len(), 2);
+    assert_eq!(read(&document, &bytes).unwrap().triangles.len(), 2);
 }
 
 #[test]

@@ -3,7 +3,8 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use crate::{Mesh, OwnSurface, SynthError};
+use crate::mesh::OwnSurface;
+use crate::{Mesh, SynthError};
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 /// Two materials, each with a colour of its own.
@@ -31,9 +32,12 @@ fn read(text: &str) -> Result<Mesh, SynthError> {
 /// Why a file is refused.
 fn refusal(text: &str) -> String {
     match read(text) {
-        Err(SynthError::Mesh { path, reason }) => {
+        Err(SynthError::Unusable { path, fault }) => {
             assert!(path.ends_with("a.obj"));
-            reason
+            let reason = fault
+                .strip_prefix("is a mesh that cannot be used: ")
+                .unwrap();
+            reason.split("; mend it").next().unwrap().to_owned()
         }
         other => panic!("{text:?}: {other:?}"),
     }
@@ -53,8 +57,8 @@ fn is_red_and_blue(mesh: &Mesh) -> bool {
 /// The area of a mesh in the plane z = 0, where the sides of its box are `width` and `height`.
 fn area(mesh: &Mesh, (width, height): (f32, f32)) -> f32 {
     let scale = 0.5 * width.hypot(height);
-    let twice = mesh.triangles().iter().map(|corners| {
-        let [a, b, c] = corners.map(|vertex| mesh.positions()[vertex as usize]);
+    let twice = mesh.triangles.iter().map(|corners| {
+        let [a, b, c] = corners.map(|vertex| mesh.positions[vertex as usize]);
         let twice = (b - a).cross(c - a).z;
         assert!(twice > 0.0, "a triangle faces the other way");
         twice
@@ -73,16 +77,16 @@ fn png() -> Vec<u8> {
 fn polygons_become_triangles_and_keep_their_texture_coordinates() {
     let textured = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nmtllib missing.mtl\nf 1/1 2/2 3/3 4/4\n";
     let mesh = read(&format!("{SQUARE}{textured}")).unwrap();
-    assert_eq!(mesh.triangles().len(), 2);
-    for (corners, coordinates) in mesh.triangles().iter().zip(mesh.texture().unwrap()) {
+    assert_eq!(mesh.triangles.len(), 2);
+    for (corners, coordinates) in mesh.triangles.iter().zip(mesh.texture().unwrap()) {
         for (&vertex, uv) in corners.iter().zip(coordinates) {
-            let position = mesh.positions()[vertex as usize];
+            let position = mesh.positions[vertex as usize];
             assert_eq!(position.x > 0.0, uv.x > 0.5);
             assert_eq!(position.y > 0.0, uv.y > 0.5);
         }
     }
     // Nothing is lost where no face has a material.
-    assert!(mesh.left_out().is_empty());
+    assert!(mesh.left_out.is_empty());
 }
 
 #[test]
@@ -100,9 +104,9 @@ fn concave_faces_keep_their_notch_and_their_texture_coordinates() {
         }
         let mesh = read(&text).unwrap();
         assert!((area(&mesh, (3.0, 3.0)) - 5.0).abs() < 1e-4, "{first}");
-        for (corners, coordinates) in mesh.triangles().iter().zip(mesh.texture().unwrap()) {
+        for (corners, coordinates) in mesh.triangles.iter().zip(mesh.texture().unwrap()) {
             for (&vertex, uv) in corners.iter().zip(coordinates) {
-                let position = mesh.positions()[vertex as usize];
+                let position = mesh.positions[vertex as usize];
                 let scale = 0.5 * 3_f32.hypot(3.0);
                 assert!((position.x * scale + 1.5 - uv.x).abs() < 1e-5);
             }
@@ -114,7 +118,7 @@ fn concave_faces_keep_their_notch_and_their_texture_coordinates() {
 fn parts_become_one_surface_without_texture_coordinates_where_there_are_none() {
     let mesh = read(&format!("{SQUARE}o a\nf 1 2 3\no b\nf 1 3 4\n")).unwrap();
     assert!(mesh.texture().is_none());
-    assert_eq!((mesh.triangles().len(), mesh.positions().len()), (2, 4));
+    assert_eq!((mesh.triangles.len(), mesh.positions.len()), (2, 4));
 }
 
 #[test]
@@ -152,14 +156,14 @@ fn files_are_read_as_programs_write_them() {
     ] {
         let mesh = read(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"));
         assert!((area(&mesh, (1.0, 1.0)) - 1.0).abs() < 1e-5, "{text:?}");
-        assert!(mesh.left_out().is_empty() && !mesh.has_own_surface());
+        assert!(mesh.left_out.is_empty() && !mesh.has_own_surface());
     }
     let latin1 = [
         b"# Caf\xe9\no T\xfcr\n",
         format!("{SQUARE}f 1 2 3 4").as_bytes(),
     ]
     .concat();
-    assert_eq!(read_beside(&latin1, &[]).unwrap().triangles().len(), 2);
+    assert_eq!(read_beside(&latin1, &[]).unwrap().triangles.len(), 2);
 }
 
 #[test]
@@ -213,7 +217,7 @@ fn materials_are_found_by_the_names_that_programs_write() {
     ] {
         let mesh = read_beside(&named(statement), &[(file, bom.as_bytes())]).unwrap();
         assert!(
-            is_red_and_blue(&mesh) && mesh.left_out().is_empty(),
+            is_red_and_blue(&mesh) && mesh.left_out.is_empty(),
             "{statement}"
         );
     }
@@ -243,7 +247,7 @@ fn several_files_of_materials_are_one_list_in_which_the_first_counts() {
     for statements in ["mtllib r.mtl b.mtl", "mtllib r.mtl\nmtllib b.mtl"] {
         let text = format!("{statements}\n{SQUARE}{COLOURED}");
         let mesh = read_beside(text.as_bytes(), &files).unwrap();
-        assert!(is_red_and_blue(&mesh) && mesh.left_out().is_empty());
+        assert!(is_red_and_blue(&mesh) && mesh.left_out.is_empty());
     }
 }
 
@@ -265,16 +269,16 @@ fn materials_that_are_not_there_are_named_where_faces_have_some() {
     let text = format!("mtllib none.mtl\n{SQUARE}{COLOURED}");
     let mesh = read(&text).unwrap();
     assert!(!mesh.has_own_surface());
-    assert!(mesh.left_out().len() == 1 && mesh.left_out()[0].contains("none.mtl"));
+    assert!(mesh.left_out.len() == 1 && mesh.left_out[0].contains("none.mtl"));
     let red = ("a.mtl", b"newmtl red\nKd 1 0 0\n".as_slice());
     let text = format!("mtllib a.mtl\n{SQUARE}{COLOURED}");
     let mesh = read_beside(text.as_bytes(), &[red]).unwrap();
-    assert!(mesh.left_out().len() == 1 && mesh.left_out()[0].contains("blue"));
+    assert!(mesh.left_out.len() == 1 && mesh.left_out[0].contains("blue"));
     // A name alone promises nothing, and some names say that there is no material.
     assert!(
         read(&format!("{SQUARE}{COLOURED}"))
             .unwrap()
-            .left_out()
+            .left_out
             .is_empty()
     );
     let text = format!(
@@ -284,7 +288,7 @@ fn materials_that_are_not_there_are_named_where_faces_have_some() {
     assert!(
         read_beside(text.as_bytes(), &[red])
             .unwrap()
-            .left_out()
+            .left_out
             .is_empty()
     );
 }
@@ -292,7 +296,7 @@ fn materials_that_are_not_there_are_named_where_faces_have_some() {
 #[test]
 fn free_form_surfaces_are_left_out_and_named() {
     let text = format!("{SQUARE}f 1 2 3\ncstype bspline\nsurf 0 1 0 1 1 2 3 4\nend\n");
-    assert_eq!(read(&text).unwrap().left_out().len(), 1);
+    assert_eq!(read(&text).unwrap().left_out.len(), 1);
 }
 
 #[test]
@@ -347,7 +351,7 @@ fn a_picture_that_cannot_be_used_is_left_out_and_named_once() {
         ];
         let mesh = read_beside(text.as_bytes(), &files).unwrap();
         assert_eq!(look(&mesh, 0, 0).colour, Vec3::new(0.5, 0.0, 0.0));
-        let left_out = mesh.left_out();
+        let left_out = &mesh.left_out;
         let stem = Path::new(name).file_stem().unwrap().to_string_lossy();
         let named = stem.rsplit('\\').next().unwrap();
         assert!(
@@ -358,7 +362,7 @@ fn a_picture_that_cannot_be_used_is_left_out_and_named_once() {
     // Of a material that no triangle has, it is not missed.
     let spare = format!("{MATERIALS}newmtl c\nmap_Kd none.png\n");
     let mesh = read_beside(text.as_bytes(), &[("a.mtl", spare.as_bytes())]).unwrap();
-    assert!(is_red_and_blue(&mesh) && mesh.left_out().is_empty());
+    assert!(is_red_and_blue(&mesh) && mesh.left_out.is_empty());
 }
 
 #[test]

@@ -1,20 +1,20 @@
-use crate::test_turns::{SOLVED, TAKE, ball, environment, even_environment, film, known};
-use crate::{Conditioning, LightVerdict, solve_turn};
+use crate::test_turns::{SOLVED, TAKE, Take, ball, environment, even_environment, film, solve};
+use crate::{Conditioning, TurnVerdict};
 
 #[test]
 fn an_even_light_is_not_trusted_though_it_was_given() {
     // Of the turn that it lit, and of one that another light did.
     for (light, is_at_odds) in [(even_environment(), false), (environment(), true)] {
         let curves = film(&ball(), &light, TAKE);
-        let found = solve_turn(&curves, &known(&even_environment())).unwrap();
+        let found = solve(&curves, &even_environment());
         let conditioning = found.conditioning();
-        assert_eq!(conditioning.verdict, LightVerdict::TooEven);
+        assert_eq!(conditioning.verdict, TurnVerdict::TooEven);
         assert_eq!(conditioning.is_given_at_odds(), is_at_odds);
         let expected = found.expected_error_deg();
         assert!(expected > 45.0, "{expected}");
     }
     let found = SOLVED.1.conditioning();
-    assert_eq!(found.verdict, LightVerdict::Good);
+    assert_eq!(found.verdict, TurnVerdict::Good);
     assert!(!found.is_given_at_odds());
     let ratio = found.given_modulation.unwrap() / found.modulation;
     assert!((0.5..2.0).contains(&ratio), "{found:?}");
@@ -24,23 +24,27 @@ fn an_even_light_is_not_trusted_though_it_was_given() {
 fn even_light_is_called_too_even() {
     let surface = ball();
     let good = Conditioning::of(&film(&surface, &environment(), TAKE));
-    assert_eq!(good.verdict, LightVerdict::Good);
+    assert_eq!(good.verdict, TurnVerdict::Good);
     assert!(good.verdict.advice().is_none());
     let bad = Conditioning::of(&film(&surface, &even_environment(), TAKE));
-    assert_eq!(bad.verdict, LightVerdict::TooEven);
+    assert_eq!(bad.verdict, TurnVerdict::TooEven);
     let advice = bad.verdict.advice().unwrap();
     assert!(advice.contains("turn on one lamp"), "{advice}");
 }
 
 #[test]
-fn a_light_that_cannot_be_makes_a_good_turn_unfit_and_keeps_the_reason_of_a_bad_one() {
-    let surface = ball();
-    let good = Conditioning::of(&film(&surface, &environment(), TAKE));
-    assert_eq!(good.in_found(true).verdict, LightVerdict::Good);
-    let refused = good.in_found(false).verdict;
-    assert_eq!(refused, LightVerdict::ImpossibleLight);
-    assert!(!refused.is_fit());
-    assert!(refused.advice().unwrap().contains("--light"));
-    let even = Conditioning::of(&film(&surface, &even_environment(), TAKE));
-    assert_eq!(even.in_found(false).verdict, LightVerdict::TooEven);
+fn the_network_s_errors_and_the_coverage_decide_where_the_light_is_not_known() {
+    let of = |light, part| Conditioning::of(&film(&ball(), light, Take { part, ..TAKE }));
+    let good = of(&environment(), 1.0);
+    assert_eq!(good.coverage_deg, 360.0);
+    assert_eq!(good.by_network(10.0).verdict, TurnVerdict::Good);
+    assert_eq!(good.by_network(45.0).verdict, TurnVerdict::Uncertain);
+    // An even light is the network's affair.
+    let even = of(&even_environment(), 1.0);
+    assert_eq!(even.by_network(10.0).verdict, TurnVerdict::Good);
+    let part = of(&environment(), 245.0 / 360.0);
+    assert!((part.coverage_deg - 245.0).abs() <= 5.0, "{part:?}");
+    let verdict = part.by_network(10.0).verdict;
+    assert_eq!(verdict, TurnVerdict::PartOfTurn);
+    assert!(!verdict.is_fit() && verdict.advice().is_some());
 }

@@ -1,5 +1,5 @@
-use crate::test_turns::{SOLVED, albedo_off, ball, environment, frame, known, mask, off};
-use crate::{CurveBuilder, solve_turn};
+use crate::CurveBuilder;
+use crate::test_turns::{SOLVED, albedo_off, ball, environment, frame, mask, off, solve};
 
 #[test]
 fn steps_of_the_exposure_are_found_and_taken_out() {
@@ -21,7 +21,7 @@ fn steps_of_the_exposure_are_found_and_taken_out() {
     assert_eq!((down.angle_deg, up.angle_deg), (102.0, 240.0));
     assert!((down.factor - 0.8).abs() < 0.01, "{down:?}");
     assert!((up.factor - 1.25).abs() < 0.015, "{up:?}");
-    let found = solve_turn(&curves, &known(&light)).unwrap();
+    let found = solve(&curves, &light);
     let off = off(&surface, &found.normals(&curves));
     assert!(off < 0.5, "{off}");
     assert!(albedo_off(&surface, &found.albedo(&curves), 1.0) < 0.02);

@@ -1,8 +1,8 @@
-use crate::test_turns::{SIDE, ball, environment, frame, known, mask, off};
-use crate::{CurveBuilder, TurnMaps, solve_turn};
+use crate::test_turns::{SIDE, ball, environment, frame, mask, off, solve};
+use crate::{CurveBuilder, TurnMaps};
 
 #[test]
-fn shadows_and_highlights_of_some_frames_are_left_out_and_shown() {
+fn shadows_and_highlights_of_some_frames_are_left_out_and_shadows_shown() {
     let (surface, light) = (ball(), environment());
     let extent = surface.extent();
     let mut builder = CurveBuilder::new(extent, mask(&surface).plane(0)).unwrap();
@@ -24,14 +24,13 @@ fn shadows_and_highlights_of_some_frames_are_left_out_and_shown() {
         builder.push(angle, extent, image.planes()).unwrap();
     }
     let curves = builder.finish().unwrap();
-    let found = solve_turn(&curves, &known(&light)).unwrap();
+    let found = solve(&curves, &light);
     let off = off(&surface, &found.normals(&curves));
     assert!(off < 2.0, "{off}");
     let maps = TurnMaps::new(&curves, &found);
     let middle = maps.shadow.pixel(SIDE / 2, SIDE / 2)[0];
     // Two of 90 frames, half of their light.
     assert!((0.005..0.02).contains(&middle), "{middle}");
-    assert!(maps.highlight.pixel(SIDE / 2, SIDE / 2)[0] > 0.01);
     let darkest = maps
         .over_angle
         .iter()

@@ -1,19 +1,14 @@
 use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::Planes;
 
-use crate::test_turns::{SIDE, SOLVED, known, metal_ball, read};
-use crate::{ReadTurn, TurnFiles, TurnMaps, TurnSolution, solve_turn};
+use crate::test_turns::{SIDE, SOLVED, ball, environment, metal_ball, read, solve, solved};
+use crate::{ReadTurn, SolvedTurn, TurnFiles};
 
 /// The frames of the video that is written of a turn, as planes of sRGB.
-fn film_of(turn: &ReadTurn, solution: &TurnSolution, out: &std::path::Path) -> Vec<Planes<3>> {
-    let maps = TurnMaps::new(&turn.curves, solution);
+fn film_of(solved: &SolvedTurn, out: &std::path::Path) -> Vec<Planes<3>> {
     let files = TurnFiles {
-        turn,
-        solution,
-        maps: &maps,
+        solved,
         light_source: None,
-        normals_source: None,
-        strip: None,
         asset: None,
         has_movie: true,
     };
@@ -49,10 +44,10 @@ fn the_film_shows_the_object_while_a_lamp_goes_around_it() {
         curves,
         ..read(&surface, &light)
     };
-    let of_metal = solve_turn(&metal.curves, &known(&light)).unwrap();
-    let (turn, solution) = &*SOLVED;
-    for (name, turn, solution) in [("diffuse", turn, solution), ("metal", &metal, &of_metal)] {
-        let frames = film_of(turn, solution, &folder.path().join(name));
+    let of_metal = solve(&metal.curves, &light);
+    let diffuse = solved(read(&ball(), &environment()), SOLVED.1.clone());
+    for (name, solved) in [("diffuse", diffuse), ("metal", solved(metal, of_metal))] {
+        let frames = film_of(&solved, &folder.path().join(name));
         assert_eq!(frames.len(), 90);
         let [left, right] = [2..SIDE / 3, 2 * SIDE / 3..SIDE - 2];
         let derivatives =

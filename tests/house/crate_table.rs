@@ -3,8 +3,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::finding::Finding;
-
 /// What the table and the manifests both say of a crate.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct CrateFacts {
@@ -34,11 +32,11 @@ pub(crate) fn rows(document: &str) -> Vec<CrateFacts> {
 }
 
 /// Where the table and the manifests differ.
-pub(crate) fn findings(document: &str, table: &[CrateFacts], found: &[CrateFacts]) -> Vec<Finding> {
+pub(crate) fn findings(document: &str, table: &[CrateFacts], found: &[CrateFacts]) -> Vec<String> {
     let known: BTreeMap<&str, &CrateFacts> =
         table.iter().map(|row| (row.name.as_str(), row)).collect();
     let mut findings = Vec::new();
-    let mut report = |what: String| findings.push(Finding::new(what));
+    let mut report = |what: String| findings.push(what);
     for facts in found {
         let name = &facts.name;
         let Some(row) = known.get(name.as_str()) else {
@@ -151,8 +149,7 @@ mod tests {
     }
 
     fn findings_of(found: &[CrateFacts]) -> Vec<String> {
-        let findings = findings("table.md", &rows(TABLE), found);
-        findings.into_iter().map(|finding| finding.what).collect()
+        findings("table.md", &rows(TABLE), found)
     }
 
     #[test]

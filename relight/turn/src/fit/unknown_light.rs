@@ -1,0 +1,173 @@
+//! Normals, albedo and light of a whole turn in a light that is not known: the network of turns answers normals and albedo,
+//! and one linear fit finds the light that goes with them.
+
+use std::f64::consts::FRAC_PI_2;
+
+use relight_core::image::{Linear, Rgb};
+
+use crate::error::TurnError;
+use crate::fit::confidence::ERROR_PARAMETERS;
+use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts, all_statistics};
+use crate::fit::environment::fit_model;
+use crate::fit::photo_albedo::mean_albedo;
+use crate::fit::search::PixelFit;
+use crate::fit::solution::TurnSolution;
+use crate::model::directions::unit;
+use crate::model::frame::{Elevation, TableFrame};
+use crate::model::material::MaterialKind;
+use crate::model::shading::ShadingModel;
+use crate::network::predict::TurnPrediction;
+use crate::observe::conditioning::Conditioning;
+use crate::observe::curves::TurnCurves;
+
+/// What the network of turns says of a turn, with the light that goes with it. The albedo is the mean of what it answers and
+/// of what the network of photographs has `seen`.
+///
+/// # Errors
+/// [`TurnError::NoLight`] where no light fits the curves.
+pub(crate) fn solve_by_network(
+    curves: &TurnCurves,
+    found: &TurnPrediction,
+    seen: &Rgb<Linear>,
+    elevation: Elevation,
+    material: MaterialKind,
+) -> Result<TurnSolution, TurnError> {
+    let normals: Vec<[f64; 3]> = curves.pixels_of(found.normals.planes()).map(unit).collect();
+    let mut albedo = mean_albedo(curves, &found.albedo, seen);
+    let statistics = all_statistics(curves);
+    let frame = TableFrame::new(elevation);
+    let model = fit_model(&statistics, &normals, &albedo, &frame, material);
+    let (model, factors) = normalised(model.ok_or(TurnError::NoLight)?, &normals);
+    for albedo in &mut albedo {
+        *albedo = [0, 1, 2].map(|c| albedo[c] * factors[c]);
+    }
+    let fits = normals.iter().zip(&statistics);
+    let fits: Vec<PixelFit> = fits
+        .map(|(&normal, statistics)| fit_of(&model, normal, statistics))
+        .collect();
+    let conditioning = Conditioning::of(curves);
+    let unobservable = if conditioning.verdict.is_exposure() {
+        ERROR_PARAMETERS.unobservable
+    } else {
+        0.0
+    };
+    let expected_errors: Vec<f64> = curves
+        .pixels_of(&found.expected_errors)
+        .map(|[degrees]| degrees.to_radians().hypot(unobservable).min(FRAC_PI_2))
+        .collect();
+    let mut solution = TurnSolution {
+        fits,
+        albedo,
+        expected_errors,
+        model,
+        elevation,
+        measured: None,
+        conditioning,
+    };
+    solution.conditioning = conditioning.by_network(solution.expected_error_deg());
+    Ok(solution)
+}
+
+/// The shading model in whose light the mean shading of each channel is 1, and by what its light was divided.
+fn normalised(mut model: ShadingModel, normals: &[[f64; 3]]) -> (ShadingModel, [f64; 3]) {
+    let mut sums = [0.0; 3];
+    for &normal in normals {
+        let harmonics = model.harmonics(normal);
+        for (sum, harmonics) in sums.iter_mut().zip(harmonics.base) {
+            *sum += harmonics[0];
+        }
+    }
+    let factors = sums.map(|sum| {
+        let mean = sum / normals.len() as f64;
+        if mean > 1e-12 { mean } else { 1.0 }
+    });
+    let parts = factors.map(|factor| 1.0 / factor);
+    model.light = model.light.times(parts);
+    if model.material == MaterialKind::Metal {
+        model.gloss = model.gloss.times(parts);
+    }
+    (model, factors)
+}
+
+/// A pixel of this normal, with the albedo that fits its curve best.
+fn fit_of(model: &ShadingModel, normal: [f64; 3], statistics: &CurveStatistics) -> PixelFit {
+    if statistics.is_dark() {
+        return PixelFit {
+            normal,
+            ..PixelFit::DARK
+        };
+    }
+    let harmonics = model.harmonics(normal);
+    PixelFit {
+        normal,
+        albedo: statistics.albedo(&harmonics),
+        residual: statistics.residual(&harmonics, &HarmonicProducts::of(&harmonics)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_turns::{TAKE, ball, elevation, environment, film, knowing, metal_ball, off};
+    use crate::{CurveBuilder, TurnVerdict};
+    use relight_core::image::Extent;
+
+    #[test]
+    fn the_light_that_goes_with_a_network_s_answer_is_found_up_to_its_colour() {
+        let (surface, light) = (ball(), environment());
+        let curves = film(&surface, &light, TAKE);
+        let answer = knowing(&surface, 10.0);
+        let material = MaterialKind::Diffuse;
+        let found =
+            solve_by_network(&curves, &answer, surface.albedo(), elevation(), material).unwrap();
+        assert!(off(&surface, &found.normals(&curves)) < 0.1);
+        assert!((found.expected_error_deg() - 10.0).abs() < 1e-3);
+        assert_eq!(found.conditioning().verdict, TurnVerdict::Good);
+        let coefficients = found.light().to_viewer(found.frame()).unwrap();
+        for c in 0..3 {
+            let scale = light.coefficients()[0][c] / coefficients.coefficients()[0][c];
+            for (a, b) in coefficients.coefficients().iter().zip(light.coefficients()) {
+                assert!(
+                    (a[c] * scale - b[c]).abs() < 0.02,
+                    "{} {}",
+                    a[c] * scale,
+                    b[c]
+                );
+            }
+        }
+        let shading = found.shading(&curves);
+        let mean = shading.planes().plane(1).iter().sum::<f32>() / curves.pixels() as f32;
+        assert!((mean - 1.0).abs() < 1e-3, "{mean}");
+    }
+
+    #[test]
+    fn metal_that_was_given_as_such_is_explained() {
+        let (surface, _, curves) = metal_ball();
+        let answer = knowing(&surface, 10.0);
+        let residual = |material| {
+            let seen = surface.albedo();
+            let found = solve_by_network(&curves, &answer, seen, elevation(), material).unwrap();
+            assert_eq!(found.material(), material);
+            found.residual()
+        };
+        let (metal, diffuse) = (
+            residual(MaterialKind::Metal),
+            residual(MaterialKind::Diffuse),
+        );
+        assert!(metal < 0.02 && metal < diffuse, "{metal} {diffuse}");
+    }
+
+    #[test]
+    fn of_a_dark_turn_no_light_is_found() {
+        let extent = Extent::new(24, 24);
+        let mut builder = CurveBuilder::new(extent, &[1.0; 576]).unwrap();
+        for k in 0..36 {
+            let angle = f64::from(k) * 10.0;
+            builder.push(angle, extent, [&[0.0; 576]; 3]).unwrap();
+        }
+        let curves = builder.finish().unwrap();
+        let (answer, material) = (knowing(&ball(), 10.0), MaterialKind::Diffuse);
+        let found = solve_by_network(&curves, &answer, ball().albedo(), elevation(), material);
+        assert!(matches!(found, Err(TurnError::NoLight)));
+    }
+}

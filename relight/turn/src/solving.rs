@@ -1,0 +1,191 @@
+//! A turn from its shard to normals, albedo and light.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use relight_core::light::ShLight;
+use relight_nets::Weights;
+use relit_data::rig::{RigFacts, RotationDirection};
+use relit_data::session::Recording;
+use relit_data::shard::Dataset;
+
+use crate::error::TurnError;
+use crate::fit::known_light::solve_in_light;
+use crate::fit::photo_albedo::photo_albedo;
+use crate::fit::probe_light::ProbeLight;
+use crate::fit::solution::TurnSolution;
+use crate::fit::unknown_light::solve_by_network;
+use crate::model::frame::Elevation;
+use crate::model::material::MaterialKind;
+use crate::network::predict::{HypothesisFigures, TurnNetwork, TurnPrediction};
+use crate::observe::film::film;
+use crate::observe::probe::{Probe, ProbeBall};
+use crate::observe::probe_place::ProbePlace;
+use crate::observe::reading::{ReadTurn, RotationSource, TableRotation, read_curves};
+
+/// What is known of a turn beforehand.
+#[derive(Debug, Clone, Default)]
+pub struct TurnOptions<'a> {
+    /// Which way the table turns as its angle grows. Where it is not given, it is that of the rig in `dataset.json` or
+    /// `session.json`, else the one in which the network of turns is clearly surer, else the usual one.
+    pub rotation: Option<RotationDirection>,
+    /// The camera over the table; that of the rig, or what is usual, where it is not given.
+    pub elevation: Option<Elevation>,
+    /// The light.
+    pub light: TurnLight<'a>,
+    /// The material. In known light, that which fits the curves where it is not given; else diffuse.
+    pub material: Option<MaterialKind>,
+}
+
+/// What is known of the light of a turn.
+#[derive(Debug, Clone, Default)]
+pub enum TurnLight<'a> {
+    /// Nothing.
+    #[default]
+    Unknown,
+    /// It was measured: in the viewer's frame at the table's angle 0.
+    Given(ShLight),
+    /// A ball on the table measures it.
+    Ball {
+        /// The session of the turn, or its video.
+        session: &'a Path,
+        /// Where the ball is in the video.
+        place: ProbePlace,
+        /// What it is made of; what it looks like where that is not known.
+        ball: Option<ProbeBall>,
+    },
+}
+
+/// The networks that turns are solved with.
+#[derive(Debug)]
+pub struct TurnNetworks {
+    /// That which sees the whole turn.
+    pub turn: TurnNetwork,
+    /// The weights of that which sees single frames.
+    pub photo: Weights,
+}
+
+/// A turn, and what was found of it.
+#[derive(Debug)]
+pub struct SolvedTurn {
+    /// What was read.
+    pub turn: ReadTurn,
+    /// Normals, albedo and light.
+    pub solution: TurnSolution,
+    /// What the network of turns took the turn for.
+    pub network: HypothesisFigures,
+    /// The light by the ball, where there is one.
+    pub ball: Option<ProbeLight>,
+    /// How long the shard took to read.
+    pub reading: Duration,
+}
+
+/// Solves the turn of a shard, or of what else [`read_curves`] takes. `progress` is told how many frames of the
+/// shard, and then of the video, are done, and how many there are.
+///
+/// # Errors
+/// Where the shard or the video cannot be read, a network fails, or no light fits the turn.
+pub fn solve_turn(
+    shard: &Path,
+    options: &TurnOptions<'_>,
+    networks: &TurnNetworks,
+    progress: &dyn Fn(u64, u64),
+) -> Result<SolvedTurn, TurnError> {
+    let recording = match &options.light {
+        TurnLight::Ball { session, .. } => Some(Recording::open(session)?),
+        TurnLight::Unknown | TurnLight::Given(_) => None,
+    };
+    let rig = rig_of(shard, recording.as_ref());
+    let elevation = match (options.elevation, rig.camera_elevation_deg) {
+        (Some(given), _) => given,
+        (None, Some(degrees)) => Elevation::of_rig(degrees)?,
+        (None, None) => Elevation::assumed(),
+    };
+    let start = Instant::now();
+    let turn = read_curves(shard, rotation(options, rig), progress)?;
+    let reading = start.elapsed();
+    let (turn, prediction) = predict(turn, elevation, &networks.turn)?;
+    let ball = match (&options.light, &recording) {
+        (&TurnLight::Ball { place, ball, .. }, Some(recording)) => {
+            let probe = Probe {
+                place,
+                ball,
+                elevation,
+            };
+            Some(film(recording, &turn, probe, progress)?.finish()?)
+        }
+        _ => None,
+    };
+    let given = match &options.light {
+        TurnLight::Given(light) => Some(light),
+        TurnLight::Ball { .. } | TurnLight::Unknown => ball.as_ref().map(|ball| &ball.light),
+    };
+    let solution = match given {
+        Some(light) => solve_in_light(&turn.curves, light, elevation, options.material),
+        None => {
+            let seen = photo_albedo(&networks.photo, &turn.first, &turn.mask)?;
+            let material = options.material.unwrap_or(MaterialKind::Diffuse);
+            solve_by_network(&turn.curves, &prediction, &seen, elevation, material)?
+        }
+    };
+    Ok(SolvedTurn {
+        turn,
+        solution,
+        network: prediction.hypotheses,
+        ball,
+        reading,
+    })
+}
+
+/// What is known of the rig: by the data set of the shard, else by the session.
+fn rig_of(shard: &Path, recording: Option<&Recording>) -> RigFacts {
+    let of_dataset = || {
+        let folder = if shard.is_dir() {
+            shard
+        } else {
+            shard.parent()?
+        };
+        let dataset = Dataset::read(folder).ok()?;
+        let is_it =
+            |file: &str| shard.is_dir() || shard.file_name().is_some_and(|name| name == file);
+        let entry = dataset.shards.iter().find(|entry| is_it(&entry.file))?;
+        let session = dataset
+            .sessions
+            .iter()
+            .find(|session| session.id == entry.session);
+        session?.rig
+    };
+    let of_session = || recording?.manifest.as_ref()?.rig;
+    of_dataset().or_else(of_session).unwrap_or_default()
+}
+
+fn rotation(options: &TurnOptions<'_>, rig: RigFacts) -> TableRotation {
+    let known = |direction, source| TableRotation { direction, source };
+    match (options.rotation, rig.rotation) {
+        (Some(given), _) => known(given, RotationSource::Given),
+        (None, Some(direction)) => known(direction, RotationSource::Rig),
+        (None, None) => TableRotation::default(),
+    }
+}
+
+/// What the network of turns says of a turn, in the other rotation direction where nobody knows it and the network is clearly
+/// surer of that one.
+fn predict(
+    mut turn: ReadTurn,
+    elevation: Elevation,
+    network: &TurnNetwork,
+) -> Result<(ReadTurn, TurnPrediction), TurnError> {
+    let prediction = network.predict(&turn.curves, elevation)?;
+    if turn.rotation.source != RotationSource::Assumed {
+        return Ok((turn, prediction));
+    }
+    if prediction.hypotheses.is_direction_doubted() {
+        let turn = turn.turned_other_way(RotationSource::Network);
+        let prediction = network.predict(&turn.curves, elevation)?;
+        return Ok((turn, prediction));
+    }
+    if prediction.hypotheses.is_direction_sure() {
+        turn.rotation.source = RotationSource::Network;
+    }
+    Ok((turn, prediction))
+}
