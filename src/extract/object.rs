@@ -1,11 +1,9 @@
 //! The mask of the object, read from a file.
 
-use std::io::Cursor;
 use std::path::Path;
 
+use image::GrayImage;
 use image::imageops::{FilterType, resize};
-use image::metadata::Orientation;
-use image::{DynamicImage, GrayImage, ImageDecoder, ImageReader, Limits};
 
 use relit_data::geometry::Rect;
 use relit_data::mask::{MaskPicture, ObjectPixels};
@@ -52,7 +50,7 @@ impl ObjectMask {
             path: path.clone(),
             source,
         })?;
-        let picture = decode(&bytes).map_err(|source| ExtractError::Mask {
+        let picture = relit_still::decode(&bytes).map_err(|source| ExtractError::Mask {
             path: path.clone(),
             source,
         })?;
@@ -107,19 +105,6 @@ impl ObjectMask {
             )
         })
     }
-}
-
-/// The picture in a mask's file, as it is displayed.
-fn decode(bytes: &[u8]) -> image::ImageResult<DynamicImage> {
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
-    let mut decoder = reader.into_decoder()?;
-    // A file whose orientation cannot be read is shown as it is stored.
-    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let mut limits = Limits::default();
-    limits.reserve(decoder.total_bytes())?;
-    let mut image = DynamicImage::from_decoder(decoder)?;
-    image.apply_orientation(orientation);
-    Ok(image)
 }
 
 /// The frame on which a mask was made, by the record beside it (`mask.json` of `mask.png`). A record that is
