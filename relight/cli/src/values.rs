@@ -1,12 +1,11 @@
 //! Values of options that several verbs take.
 
 use clap::ValueEnum;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_photo::decompose::SpecularGate;
 use relight_photo::insert::WhiteBalance;
-use relit_data::rig::RotationDirection;
 
 /// How integers in files of colour are encoded.
 #[derive(Clone, Copy, ValueEnum)]
@@ -86,11 +85,16 @@ impl From<GateName> for SpecularGate {
     }
 }
 
-/// Which way a table turns as its angle grows, seen from above; the help lists both.
-pub(crate) fn rotation() -> impl TypedValueParser<Value = RotationDirection> {
-    let all = RotationDirection::ALL;
-    PossibleValuesParser::new(all.map(RotationDirection::name)).map(move |name| {
-        let is_it = |direction: &RotationDirection| direction.name() == name;
-        all.into_iter().find(is_it).unwrap_or_default()
+/// A value that has a name, which the help lists and explains.
+pub(crate) fn named<T: Clone + Send + Sync + 'static, const N: usize>(
+    values: [(&'static str, &'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    let names = values
+        .each_ref()
+        .map(|(name, help, _)| PossibleValue::new(*name).help(*help));
+    PossibleValuesParser::new(names).try_map(move |given| {
+        let mut all = values.iter();
+        let found = all.find(|(name, ..)| *name == given);
+        found.map(|(_, _, value)| value.clone()).ok_or("unknown")
     })
 }

@@ -6,13 +6,8 @@ use crate::model::harmonics::COEFFICIENTS;
 use crate::model::shading::{PixelHarmonics, ShadingModel};
 use crate::observe::curves::TurnCurves;
 
-/// Parameters of the residuals.
-struct ResidualParameters {
-    /// Least share of what is seen that the model is taken to fit, 0 to 1. By hand.
-    least_model: f64,
-}
-
-const PARAMETERS: ResidualParameters = ResidualParameters { least_model: 0.1 };
+/// Least share of what is seen that the model is taken to fit, 0 to 1. By hand.
+const LEAST_MODEL: f64 = 0.1;
 
 /// The light by which what is left of a pixel is measured: the model's mean over the turn, or a tenth of what is
 /// seen where that is more.
@@ -25,7 +20,7 @@ pub(crate) fn reference(
     let harmonics = model.harmonics(fit.normal);
     let predicted: f64 = (0..3).map(|c| fit.albedo[c] * harmonics.base[c][0]).sum();
     let seen: f64 = CurveStatistics::mean(curves, pixel).iter().sum();
-    (predicted.max(PARAMETERS.least_model * seen) / 3.0).max(1e-6)
+    (predicted.max(LEAST_MODEL * seen) / 3.0).max(1e-6)
 }
 
 /// How much more light than the fit's each part of the turn has, the mean of the channels, over the

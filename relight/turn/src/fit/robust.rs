@@ -8,18 +8,10 @@ use crate::fit::search::PixelFit;
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 
-/// Parameters of the robust weights.
-struct RobustParameters {
-    /// Residual whose weight is one quarter, in standard deviations. By hand.
-    width: f64,
-    /// Least standard deviation, in parts of the pixel's mean light. By hand.
-    least_deviation: f64,
-}
-
-const PARAMETERS: RobustParameters = RobustParameters {
-    width: 2.0,
-    least_deviation: 0.01,
-};
+/// Residual whose weight is one quarter, in standard deviations. By hand.
+const WIDTH: f64 = 2.0;
+/// Least standard deviation, in parts of the pixel's mean light. By hand.
+const LEAST_DEVIATION: f64 = 0.01;
 
 /// The robust weight of each part of the turn for a pixel, 0 to 1: near 0 where the fit is far from what
 /// is seen, measured by the median of how far it is elsewhere.
@@ -34,9 +26,9 @@ pub(crate) fn robust_weights(
     let Some(median) = upper_median(sizes) else {
         return vec![1.0; residuals.len()];
     };
-    let deviation = 1.4826 * median + PARAMETERS.least_deviation;
+    let deviation = 1.4826 * median + LEAST_DEVIATION;
     let robust_weights = |residuals: &Option<f64>| {
-        let size = residuals.unwrap_or(0.0) / (PARAMETERS.width * deviation);
+        let size = residuals.unwrap_or(0.0) / (WIDTH * deviation);
         (1.0 / (1.0 + size * size).powi(2)) as f32
     };
     residuals.iter().map(robust_weights).collect()
