@@ -9,9 +9,8 @@ use relight_core::metrics::angular_error;
 use relight_core::render::{DiffuseForm, DiffuseLayer, Surface};
 
 use crate::fit::residuals::lit;
-use crate::model::gloss::GlossLight;
+use crate::model::gloss::{GlossLight, MIRROR};
 use crate::model::harmonics::basis_at;
-use crate::model::metal::MIRROR;
 use crate::model::shading::ShadingModel;
 use crate::{
     CurveBuilder, Elevation, FactSource, MaterialKind, NetworkFigures, ReadTurn, SolvedTurn,

@@ -8,11 +8,10 @@ use crate::error::TurnError;
 use crate::fit::curve_statistics::CurveStatistics;
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
-use crate::model::gloss::{GLOSS_TERMS, GlossLight, gloss_terms};
+use crate::model::gloss::{GLOSS_TERMS, GlossLight, MIRROR, gloss_terms, mirror_terms};
 use crate::model::harmonics::HarmonicTerm;
 use crate::model::lighting::{TERMS, TableLight, lambertian_terms};
 use crate::model::material::MaterialKind;
-use crate::model::metal::{MIRROR, mirror_terms};
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 

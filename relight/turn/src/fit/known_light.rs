@@ -9,7 +9,7 @@ use crate::fit::confidence::{
 };
 use crate::fit::curve_statistics::{CurveStatistics, all_statistics};
 use crate::fit::joint::JointOptimisation;
-use crate::fit::robust::robust_weights;
+use crate::fit::residuals::robust_weights;
 use crate::fit::search::{PixelFit, search_all};
 use crate::fit::solution::TurnSolution;
 use crate::fit::unknowns::Unknowns;

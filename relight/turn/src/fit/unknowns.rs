@@ -3,11 +3,10 @@
 
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
-use crate::model::gloss::{GlossLight, gloss_terms};
+use crate::model::gloss::{GlossLight, gloss_terms, mirror_terms};
 use crate::model::harmonics::COEFFICIENTS;
 use crate::model::known_light::KnownLight;
 use crate::model::material::MaterialKind;
-use crate::model::metal::mirror_terms;
 use crate::model::shading::ShadingModel;
 
 /// Largest attenuation of a band by gloss, over that of a smooth dielectric. By hand: light by a dark grey ball is

@@ -25,7 +25,7 @@ const NORMALS: usize = 100;
 /// Least coverage of a turn in unknown light, degrees. By hand: the network has seen gaps of up to 18 degrees, and up to
 /// three of them.
 const LEAST_COVERAGE_DEG: f64 = 330.0;
-/// Largest median of the errors that are expected in unknown light, degrees. Measured: of 14 synthetic turns those below are off
+/// Largest median of the errors that are expected in unknown light, degrees. Measured: of 15 synthetic turns those below are off
 /// by 7 to 14 degrees, and those above by 14 to 22 (docs/results/turns.md).
 const MOST_EXPECTED_DEG: f64 = 15.0;
 
