@@ -6,7 +6,6 @@ use relight_core::light::NormalsFrame;
 use relight_core::render::DiffuseForm;
 use relight_photo::decompose::SpecularGate;
 use relight_photo::insert::WhiteBalance;
-use relit_data::rig::RotationDirection;
 
 /// Values of an option: the name on the command line, what the help says of it, and what it stands for.
 pub(crate) type Choices<T> = &'static [(&'static str, &'static str, T)];
@@ -75,14 +74,5 @@ pub(crate) fn one_of<T: Copy + Send + Sync>(
         found
             .map(|&(.., value)| value)
             .ok_or("it is none of the possible values")
-    })
-}
-
-/// Which way a table turns as its angle grows, seen from above; the help lists both.
-pub(crate) fn rotation() -> impl TypedValueParser<Value = RotationDirection> {
-    let all = RotationDirection::ALL;
-    PossibleValuesParser::new(all.map(RotationDirection::name)).map(move |name| {
-        let is_it = |direction: &RotationDirection| direction.name() == name;
-        all.into_iter().find(is_it).unwrap_or_default()
     })
 }

@@ -15,8 +15,7 @@ use relight_core::files::{write_exr, write_png};
 use relight_core::image::{ColourSpace, Depth, Extent, Planes, Srgb, Transfer};
 use relight_core::light::{Normals, NormalsFrame, YUp};
 use relight_eval::{
-    EvalError, IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, NormalMethod, Predictions,
-    ScoreTable, evaluate_intrinsic, evaluate_normals,
+    EvalError, IntrinsicInput, Predictions, ScoreTable, evaluate_intrinsic, evaluate_normals,
 };
 use relight_reader::{TruthLayout, TruthSet};
 use relit_data::causes::with_causes;
@@ -70,9 +69,14 @@ fn evaluated(
     found: &Path,
     transfer: Option<Transfer>,
 ) -> Result<ScoreTable, EvalError> {
-    let predictions = Predictions::new(found.to_owned(), transfer, NormalsFrame::YUp);
-    let method = IntrinsicMethod::Predictions(predictions);
-    evaluate_intrinsic(set, "all", IntrinsicInput::Diffuse, &[method], &|| {})
+    let found = [Predictions::new(
+        found.to_owned(),
+        transfer,
+        NormalsFrame::YUp,
+    )];
+    let mut table = evaluate_intrinsic(set, "all", IntrinsicInput::Diffuse, &found, &|_| {})?;
+    table.lines.retain(|line| line.method == "net");
+    Ok(table)
 }
 
 fn worst(table: &ScoreTable) -> f64 {
@@ -155,8 +159,7 @@ fn pictures_of_arap_are_found_with_the_albedo_of_their_scene() {
     let yard = set.load(2).unwrap();
     let pixel = yard.albedo.unwrap().planes().pixel(1, 1);
     assert!((pixel[0] - albedo().pixel(1, 1)[0]).abs() < 0.01, "sRGB");
-    let all = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
-    let table = evaluate_intrinsic(&set, "all", IntrinsicInput::Diffuse, &all, &|| {}).unwrap();
+    let table = evaluate_intrinsic(&set, "all", IntrinsicInput::Diffuse, &[], &|_| {}).unwrap();
     assert!(
         table
             .notes
@@ -235,10 +238,11 @@ fn single_images_of_stanford_orb_are_measured_at_their_benchmark_s_size() {
     let parts: Vec<&str> = table.lines.iter().map(|line| line.part.as_str()).collect();
     assert_eq!(parts, ["albedo", "albedo"]);
     assert!(worst(&table) < 1e-3, "{table:?}");
-    let predictions = Predictions::new(found, None, NormalsFrame::YUp);
-    let method = [NormalMethod::Predictions(predictions)];
-    let table = evaluate_normals(&set, "all", &method, &|| {}).unwrap();
-    let angle = table.lines[0]
+    let found = [Predictions::new(found, None, NormalsFrame::YUp)];
+    let table = evaluate_normals(&set, "all", &found, &|_| {}).unwrap();
+    let line = table.lines.iter().find(|line| line.method == "net");
+    let angle = line
+        .unwrap()
         .measures
         .iter()
         .find(|one| one.name == "mean angle");

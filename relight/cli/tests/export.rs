@@ -79,7 +79,8 @@ fn the_lamps_of_another_turn_are_refused() {
         said.contains("--lamps takes a folder of relight turn"),
         "{said}"
     );
-    let figures = r#"{ "turn": "mug", "conditioning": { "verdict": "good" } }"#;
+    let figures = r#"{ "turn": "mug", "conditioning": { "verdict": "good" },
+        "elevation": { "degrees": 20.0 }, "rotation": { "direction": "clockwise" } }"#;
     fs::write(solved.join("turn.json"), figures).unwrap();
     let (code, said) = desk.export("cup.tar -o frames --frames 4 --lamps mug");
     assert_eq!(code, 1, "{said}");

@@ -1,13 +1,14 @@
 //! Why an evaluation cannot be made.
 
-use std::path::PathBuf;
+use std::error::Error;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use relight_core::image::{Extent, ImageError};
-use relight_core::light::LightError;
-use relight_core::metrics::MetricError;
-use relight_core::parallel::JobPanic;
-use relight_photo::insert::InsertError;
 use relight_reader::{DamagedSample, OpenError};
+
+/// Why something failed.
+type Cause = Box<dyn Error + Send + Sync>;
 
 /// Why an evaluation cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -19,107 +20,31 @@ pub enum EvalError {
     /// A sample of the ground truth cannot be read.
     #[error("the ground truth is damaged")]
     Damage(#[from] DamagedSample),
-    /// Measuring a sample panicked.
-    #[error("{sample}")]
-    Panic {
-        /// The sample.
-        sample: String,
-        /// The panic.
-        #[source]
-        panic: JobPanic,
-    },
-    /// The ground truth does not have a part that the protocol needs.
-    #[error("the ground truth has no {part} of {sample}: this protocol cannot be run on it")]
-    Lacks {
-        /// The sample.
-        sample: String,
-        /// The part.
-        part: &'static str,
-    },
-    /// There is no prediction.
-    #[error(
-        "there is no prediction {part}.exr or {part}.png in {}: all images of the ground truth are compared, or none",
-        folder.display()
-    )]
-    Unpredicted {
-        /// The folder in which it should be.
-        folder: PathBuf,
-        /// Which part.
-        part: &'static str,
-    },
+    /// Ground truth and predictions do not have what the protocol needs: what is wrong.
+    #[error("{0}")]
+    Unfit(String),
     /// A prediction cannot be read.
     #[error("a prediction cannot be read")]
     Prediction(#[from] ImageError),
-    /// A prediction does not have the size of the ground truth.
-    #[error("{} has {}x{} pixels, its ground truth {}x{}", path.display(), found.width, found.height, expected.width, expected.height)]
-    Size {
-        /// The prediction.
-        path: PathBuf,
-        /// Its size.
-        found: Extent,
-        /// The ground truth's.
-        expected: Extent,
-    },
-    /// A folder holds no turns.
-    #[error("{} holds no turns of relight synth --turn", path.display())]
-    Turns {
-        /// The folder.
-        path: PathBuf,
-        /// Why not.
-        source: Box<relit_data::shard::ShardError>,
-    },
-    /// A turn cannot be solved.
-    #[error("a turn cannot be solved")]
-    Turn(#[source] Box<relight_turn::TurnError>),
-    /// A network cannot be run.
-    #[error(transparent)]
-    Network(#[from] relight_nets::NetError),
-    /// A file cannot be read.
-    #[error("{} cannot be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's reason.
-        source: std::io::Error,
-    },
-    /// A file or folder cannot be written.
-    #[error("{} cannot be written", path.display())]
-    Write {
+    /// A file or folder cannot be used.
+    #[error("{} {fault}", path.display())]
+    File {
         /// The file or folder.
         path: PathBuf,
-        /// The operating system's reason.
-        source: std::io::Error,
-    },
-    /// The description of a set does not parse.
-    #[error("{} does not describe a set", path.display())]
-    Description {
-        /// The file.
-        path: PathBuf,
         /// What is wrong with it.
-        source: serde_json::Error,
+        fault: &'static str,
+        /// Why.
+        source: Cause,
     },
-    /// A folder says that its files are encoded otherwise than the caller does.
-    #[error(
-        "{} says that its files are {written}, and --transfer that they are {said}: leave --transfer out",
-        path.display()
-    )]
-    Encoding {
-        /// The description.
-        path: PathBuf,
-        /// What it says.
-        written: &'static str,
-        /// What the caller says.
-        said: &'static str,
-    },
-    /// The description is of another version.
-    #[error("{} says {found:?}, this version reads {expected:?}", path.display())]
-    Schema {
-        /// The file.
-        path: PathBuf,
-        /// What it says.
-        found: String,
-        /// What it should say.
-        expected: &'static str,
+    /// A sample cannot be decomposed, relit or measured.
+    #[error("{sample} {fault}")]
+    Sample {
+        /// The sample.
+        sample: String,
+        /// What cannot be done with it.
+        fault: &'static str,
+        /// Why.
+        source: Cause,
     },
     /// A folder holds a set of another recipe.
     #[error(
@@ -133,45 +58,61 @@ pub enum EvalError {
     /// Objects cannot be made.
     #[error(transparent)]
     Synth(#[from] relight_synth::SynthError),
-    /// Light is not in the form of coefficients.
-    #[error("{} does not hold light", path.display())]
-    Light {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: LightError,
-    },
-    /// No light can be fitted.
-    #[error("no light can be fitted to {sample}")]
-    Unlit {
-        /// The sample.
-        sample: String,
-        /// Why.
-        source: LightError,
-    },
-    /// An object cannot be decomposed, relit or inserted.
-    #[error("{sample} cannot be decomposed or shown in other light")]
-    Insertion {
-        /// The sample.
-        sample: String,
-        /// Why.
-        source: Box<InsertError>,
-    },
-    /// A measure cannot be taken.
-    #[error("{sample} cannot be measured")]
-    Metric {
-        /// The sample.
-        sample: String,
-        /// Why.
-        source: MetricError,
-    },
+    /// A turn cannot be solved.
+    #[error("a turn cannot be solved")]
+    Turn(#[source] Box<relight_turn::TurnError>),
 }
 
 impl EvalError {
-    /// Puts the path to an operating system's reason.
-    pub(super) fn write(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
+    /// Puts the path, and what is wrong with it, to a reason.
+    pub(super) fn file<C: Into<Cause>>(path: &Path, fault: &'static str) -> impl FnOnce(C) -> Self {
         let path = path.to_owned();
-        |source| Self::Write { path, source }
+        move |source| Self::File {
+            path,
+            fault,
+            source: source.into(),
+        }
+    }
+
+    /// Puts the path to an operating system's reason.
+    pub(super) fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        Self::file(path, "cannot be read")
+    }
+
+    /// Puts the path to an operating system's reason.
+    pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        Self::file(path, "cannot be written")
+    }
+
+    /// Puts the sample, and what cannot be done with it, to a reason.
+    pub(super) fn sample<C: Into<Cause>>(
+        sample: &str,
+        fault: &'static str,
+    ) -> impl FnOnce(C) -> Self {
+        let sample = sample.to_owned();
+        move |source| Self::Sample {
+            sample,
+            fault,
+            source: source.into(),
+        }
+    }
+
+    /// A description of another version than this one reads.
+    pub(super) fn schema(path: &Path, found: &str, expected: &str) -> Self {
+        let path = path.display();
+        Self::Unfit(format!(
+            "{path} says {found:?}, this version reads {expected:?}"
+        ))
+    }
+
+    /// An estimate of another size than its ground truth.
+    pub(super) fn size(path: &Path, found: Extent, expected: Extent) -> Self {
+        let [found, expected] =
+            [found, expected].map(|size| format!("{}x{}", size.width, size.height));
+        let path = path.display();
+        Self::Unfit(format!(
+            "{path} has {found} pixels, its ground truth {expected}"
+        ))
     }
 }
 

@@ -6,61 +6,43 @@ use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
 use relight_reader::{TruthSample, TruthSet};
 
-/// Where highlights come from.
-#[derive(Debug, Clone)]
-pub enum HighlightMethod {
-    /// There are none.
-    Nothing,
-    /// They were predicted: part `highlight`, in the image's units.
-    Predictions(Predictions),
-}
-
-impl HighlightMethod {
-    fn name(&self) -> String {
-        match self {
-            Self::Nothing => "no highlight".to_owned(),
-            Self::Predictions(predictions) => predictions.name(),
-        }
-    }
-
-    fn highlight(&self, sample: &TruthSample) -> Result<Rgb<Linear>, EvalError> {
-        let extent = sample.extent();
-        match self {
-            Self::Nothing => Ok(Rgb::new(Planes::zeros(extent))),
-            Self::Predictions(predictions) => predictions.colour(&sample.name, "highlight", extent),
-        }
-    }
-}
-
-/// MSE and DSSIM of the highlight, and of the image without it, for each method. Images are brought
-/// to a maximum of 1 and encoded as sRGB, in which highlights are seen.
+/// MSE and DSSIM of the highlight, and of the image without it, for no highlight and for each prediction (part `highlight`, in
+/// the image's units). Images are brought to a maximum of 1 and encoded as sRGB, in which highlights are seen.
 ///
 /// # Errors
 /// Where the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_highlights(
     set: &TruthSet,
     split: &str,
-    methods: &[HighlightMethod],
+    predictions: &[Predictions],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "highlights".to_owned(),
-        notes: vec![
-            "highlight: against the true one; diffuse: the image less the highlight, not below 0, \
-             against the image less the true one"
-                .to_owned(),
-            format!("SSIM by {}", Ssim::Gaussian.name()),
-        ],
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
-    for method in methods {
+    let notes = vec![
+        "highlight: against the true one; diffuse: the image less the highlight, not below 0, \
+         against the image less the true one"
+            .to_owned(),
+        format!("SSIM by {}", Ssim::Gaussian.name()),
+    ];
+    let mut table = ScoreTable::new("highlights", notes);
+    let steps = (1 + predictions.len()) * set.names().len();
+    let progress = || progress(steps);
+    add_method(
+        &mut table,
+        (set, split),
+        "no highlight",
+        &progress,
+        |sample| score(sample, &Rgb::new(Planes::zeros(sample.extent()))),
+    )?;
+    for found in predictions {
         add_method(
             &mut table,
             (set, split),
-            &method.name(),
-            progress,
-            |sample| score(sample, &method.highlight(sample)?),
+            &found.name(),
+            &progress,
+            |sample| {
+                let highlight = found.colour(&sample.name, "highlight", sample.extent())?;
+                score(sample, &highlight)
+            },
         )?;
     }
     Ok(table)

@@ -7,7 +7,6 @@
 //! | [`evaluate_light`] | normals and shading | light as coefficients | MSE, SMSE, SSIM of the shading that it makes |
 //! | [`evaluate_highlights`] | image, highlight | highlight | MSE, DSSIM of the highlight and of what it leaves |
 //! | [`evaluate_ordinal`] | what people judged of points | albedo | WHDR |
-//! | [`evaluate_insertion`] | an object rendered in another picture | nothing: it runs `insert` | MSE, DSSIM |
 //! | [`evaluate_turns`] | turns with normals, albedo, light | nothing: it runs `turn` | angles, albedo, what is expected beside what is |
 //! | [`evaluate_relighting`] | an object's maps, images under many lights | maps, or images | MSE, DSSIM |
 //!
@@ -17,13 +16,11 @@
 
 mod error;
 mod highlights;
-mod insertion;
 mod intrinsic;
 mod light;
 mod normals;
 mod ordinal;
 mod predictions;
-mod reliability;
 mod relighting;
 mod retinex;
 mod run;
@@ -31,21 +28,18 @@ mod scores;
 mod turns;
 
 pub use error::EvalError;
-pub use highlights::{HighlightMethod, evaluate_highlights};
-pub use insertion::{InsertionMethod, InsertionRecipe, SheetWriter, evaluate_insertion};
-pub use intrinsic::{IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, evaluate_intrinsic};
-pub use light::{LightMethod, evaluate_light};
-pub use normals::{NormalMethod, evaluate_normals};
-pub use ordinal::{OrdinalMethod, evaluate_ordinal};
+pub use highlights::evaluate_highlights;
+pub use intrinsic::{IntrinsicInput, evaluate_intrinsic};
+pub use light::evaluate_light;
+pub use normals::evaluate_normals;
+pub use ordinal::evaluate_ordinal;
 pub use predictions::Predictions;
-pub use reliability::ReliabilityBin;
 pub use relighting::{
     RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
 };
-pub use retinex::{IntrinsicImages, Retinex};
 pub use run::EvalProgress;
 pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
-pub use turns::{TurnLine, TurnMethod, TurnScore, TurnSet, TurnTable, evaluate_turns};
+pub use turns::{TurnMethod, TurnTable, evaluate_turns};
 
 /// The examples of the README, so that they are built.
 #[cfg(doctest)]

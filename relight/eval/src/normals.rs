@@ -7,62 +7,40 @@ use relight_core::light::{Normals, YUp};
 use relight_core::metrics::{AngularError, Comparison, ScaleFit, Ssim, angular_error, dssim};
 use relight_reader::{TruthSample, TruthSet};
 
-/// Where normals come from.
-#[derive(Debug, Clone)]
-pub enum NormalMethod {
-    /// All of them point to the viewer.
-    Viewer,
-    /// They were predicted: part `normal`.
-    Predictions(Predictions),
-}
-
-impl NormalMethod {
-    fn name(&self) -> String {
-        match self {
-            Self::Viewer => "all towards the viewer".to_owned(),
-            Self::Predictions(predictions) => predictions.name(),
-        }
-    }
-
-    fn normals(&self, sample: &TruthSample) -> Result<Normals<YUp>, EvalError> {
-        let extent = sample.extent();
-        match self {
-            Self::Viewer => Ok(Normals::new(Planes::filled(extent, [0.0, 0.0, 1.0]))),
-            Self::Predictions(predictions) => predictions.normals(&sample.name, extent),
-        }
-    }
-}
-
-/// MSE and DSSIM of normal maps, and the angles between normals, for each method.
+/// MSE and DSSIM of normal maps, and the angles between normals, for normals that all point to the viewer and for each
+/// prediction (part `normal`).
 ///
 /// # Errors
 /// Where the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_normals(
     set: &TruthSet,
     split: &str,
-    methods: &[NormalMethod],
+    predictions: &[Predictions],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "normals".to_owned(),
-        notes: vec![
-            format!(
-                "MSE and DSSIM: of the colours (n + 1) / 2, SSIM by {}",
-                Ssim::Gaussian.name()
-            ),
-            "angles: degrees; within: the fraction of pixels with an angle of at most so much"
-                .to_owned(),
-        ],
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
-    for method in methods {
+    let notes = vec![
+        format!(
+            "MSE and DSSIM: of the colours (n + 1) / 2, SSIM by {}",
+            Ssim::Gaussian.name()
+        ),
+        "angles: degrees; within: the fraction of pixels with an angle of at most so much"
+            .to_owned(),
+    ];
+    let mut table = ScoreTable::new("normals", notes);
+    let steps = (1 + predictions.len()) * set.names().len();
+    let progress = || progress(steps);
+    let viewer = "all towards the viewer";
+    add_method(&mut table, (set, split), viewer, &progress, |sample| {
+        let to_viewer = Planes::filled(sample.extent(), [0.0, 0.0, 1.0]);
+        score(sample, &Normals::new(to_viewer))
+    })?;
+    for found in predictions {
         add_method(
             &mut table,
             (set, split),
-            &method.name(),
-            progress,
-            |sample| score(sample, &method.normals(sample)?),
+            &found.name(),
+            &progress,
+            |sample| score(sample, &found.normals(&sample.name, sample.extent())?),
         )?;
     }
     Ok(table)

@@ -9,7 +9,7 @@ use super::EvalError;
 use relight_core::files::read_planes;
 use relight_core::image::{Extent, Linear, Planes, Rgb, Samples, Transfer};
 use relight_core::light::NormalsFrame;
-use relight_core::light::{Normals, ShLight, YDown, YUp};
+use relight_core::light::{LightError, Normals, ShLight, YDown, YUp};
 use relight_core::render::{Gloss, Surface};
 use relit_data::text;
 
@@ -29,6 +29,9 @@ pub struct Predictions {
 const DESCRIPTION: &str = "decomposition.json";
 /// What that says it is.
 const SCHEMA: &str = "relight.decomposition/1";
+
+/// What is wrong with a description that does not parse.
+pub(crate) const NO_SET: &str = "does not describe a set";
 
 /// The part of it that says how its PNGs hold colours. The first files of the schema did not say it, and held sRGB.
 #[derive(Deserialize)]
@@ -72,11 +75,12 @@ impl Predictions {
     fn transfer(&self, name: &str) -> Result<Transfer, EvalError> {
         let written = self.written_transfer(name)?;
         match (self.transfer, written) {
-            (Some(said), Some(written)) if said != written => Err(EvalError::Encoding {
-                path: self.file(name, DESCRIPTION),
-                written: transfer_name(written),
-                said: transfer_name(said),
-            }),
+            (Some(said), Some(written)) if said != written => Err(EvalError::Unfit(format!(
+                "{} says that its files are {}, and --transfer that they are {}: leave --transfer out",
+                self.file(name, DESCRIPTION).display(),
+                transfer_name(written),
+                transfer_name(said),
+            ))),
             (said, written) => Ok(said.or(written).unwrap_or(Transfer::Linear)),
         }
     }
@@ -87,28 +91,20 @@ impl Predictions {
         let bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
             Err(source) if source.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(source) => return Err(EvalError::Read { path, source }),
+            Err(source) => return Err(EvalError::read(&path)(source)),
         };
         let parsed: Result<Encoding, _> = serde_json::from_slice(text::unmarked(&bytes));
-        let encoding = match parsed {
-            Ok(encoding) => encoding,
-            Err(source) => return Err(EvalError::Description { path, source }),
-        };
+        let encoding = parsed.map_err(EvalError::file(&path, NO_SET))?;
         if encoding.schema != SCHEMA {
-            return Err(EvalError::Schema {
-                path,
-                found: encoding.schema,
-                expected: SCHEMA,
-            });
+            return Err(EvalError::schema(&path, &encoding.schema, SCHEMA));
         }
         match encoding.transfer.as_deref() {
             None | Some("srgb") => Ok(Some(Transfer::Srgb)),
             Some("linear") => Ok(Some(Transfer::Linear)),
-            Some(other) => Err(EvalError::Schema {
-                path,
-                found: format!("transfer {other}"),
-                expected: "transfer srgb or linear",
-            }),
+            Some(other) => {
+                let found = format!("transfer {other}");
+                Err(EvalError::schema(&path, &found, "transfer srgb or linear"))
+            }
         }
     }
 
@@ -168,7 +164,6 @@ impl Predictions {
     }
 
     fn find(&self, name: &str, part: &'static str) -> Result<PathBuf, EvalError> {
-        let folder = self.root.join(name);
         let found = match part {
             // As `relight decompose` calls it.
             "highlight" => self
@@ -176,7 +171,12 @@ impl Predictions {
                 .or_else(|| self.existing(name, "specular")),
             _ => self.existing(name, part),
         };
-        found.ok_or(EvalError::Unpredicted { folder, part })
+        found.ok_or_else(|| {
+            EvalError::Unfit(format!(
+                "there is no prediction {part}.exr or {part}.png in {}: all images of the ground truth are compared, or none",
+                self.root.join(name).display()
+            ))
+        })
     }
 
     fn existing(&self, name: &str, part: &str) -> Option<PathBuf> {
@@ -211,21 +211,12 @@ fn check_size(path: PathBuf, found: Extent, expected: Extent) -> Result<(), Eval
     if found == expected {
         return Ok(());
     }
-    Err(EvalError::Size {
-        path,
-        found,
-        expected,
-    })
+    Err(EvalError::size(&path, found, expected))
 }
 
 /// A light in a file of coefficients.
 pub(crate) fn read_light(path: &Path) -> Result<ShLight, EvalError> {
-    let text = text::read(path).map_err(|source| EvalError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    text.parse().map_err(|source| EvalError::Light {
-        path: path.to_owned(),
-        source,
-    })
+    let text = text::read(path).map_err(EvalError::read(path))?;
+    let light: Result<ShLight, LightError> = text.parse();
+    light.map_err(EvalError::file(path, "does not hold light"))
 }

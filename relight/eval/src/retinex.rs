@@ -1,43 +1,16 @@
-//! Colour Retinex: a decomposition that assumes that albedo changes in colour and shading does not.
+//! Colour Retinex after Grosse et al. (2009), on the chromaticity of linear images: albedo changes in colour, and shading does
+//! not.
+//!
+//! Of two neighbouring pixels the change in log brightness (the mean of the channels) is the albedo's where their
+//! chromaticities, `rgb / (r + g + b)`, differ by more than [`CHROMATICITY`] in the sum of absolute differences, else the
+//! shading's. The log albedo is the field whose differences fit these best, by least squares.
 
-use super::EvalError;
-use super::run::{grey, of_grey};
+use super::run::grey;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 
-/// An image as albedo times shading.
-#[derive(Debug, Clone, PartialEq)]
-pub struct IntrinsicImages {
-    /// The albedo.
-    pub albedo: Rgb<Linear>,
-    /// The shading, without colour.
-    pub shading: Rgb<Linear>,
-}
-
-/// Colour Retinex after Grosse et al. (2009), on the chromaticity of linear images.
-///
-/// Of two neighbouring pixels the change in log brightness (the mean of the channels) is the
-/// albedo's where their chromaticities, `rgb / (r + g + b)`, differ by more than `chromaticity` in
-/// the sum of absolute differences or their log brightness by more than `brightness`, else the
-/// shading's. The log albedo is the field whose differences fit these best, by least squares.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Retinex {
-    /// Smallest change in chromaticity that is the albedo's.
-    pub chromaticity: f32,
-    /// Smallest change in log brightness that is; infinite where only colour decides.
-    pub brightness: f32,
-}
-
-impl Default for Retinex {
-    /// Colour alone decides, from 0.02 on: the best of 0.01, 0.02 and 0.04 on the ten objects of
-    /// MIT Intrinsic Images that SIRFS trains on.
-    fn default() -> Self {
-        Self {
-            chromaticity: 0.02,
-            brightness: f32::INFINITY,
-        }
-    }
-}
-
+/// Smallest change in chromaticity that is the albedo's: the best of 0.01, 0.02 and 0.04 on the ten objects of MIT Intrinsic
+/// Images that SIRFS trains on.
+const CHROMATICITY: f32 = 0.02;
 /// Values of less than this are taken as this before a logarithm.
 const DARKEST: f32 = 1e-4;
 /// Pulls the log albedo of parts without a known difference towards 0.
@@ -47,65 +20,56 @@ const RESIDUAL: f64 = 1e-6;
 /// ... or after so many steps.
 const MOST_STEPS: usize = 3000;
 
-impl Retinex {
-    /// Decomposes the pixels where `mask` is true; the others become 0.
-    pub(super) fn decompose(
-        self,
-        image: &Rgb<Linear>,
-        mask: &[bool],
-    ) -> Result<IntrinsicImages, EvalError> {
-        let extent = image.planes().extent();
-        let brightness = grey(image);
-        let log_albedo = self.edges(image, &brightness, mask).solve();
-        let mut shading = vec![0.0; extent.pixels()];
-        for ((at, log_albedo), brightness) in
-            indices(mask).zip(log_albedo).zip(under(&brightness, mask))
-        {
-            shading[at] = brightness / (log_albedo.exp() as f32).max(f32::MIN_POSITIVE);
-        }
-        Ok(IntrinsicImages {
-            albedo: divided(image, &shading),
-            shading: of_grey(extent, shading)?,
-        })
+/// The shading of the pixels where `mask` is true; 0 elsewhere.
+pub(super) fn shading(image: &Rgb<Linear>, mask: &[bool]) -> Vec<f32> {
+    let brightness = grey(image);
+    let log_albedo = edges(image, &brightness, mask).solve();
+    let mut shading = vec![0.0; mask.len()];
+    for (at, log_albedo) in indices(mask).zip(log_albedo) {
+        shading[at] = brightness[at] / (log_albedo.exp() as f32).max(f32::MIN_POSITIVE);
     }
+    shading
+}
 
-    /// The differences of log albedo between neighbours under the mask.
-    fn edges(self, image: &Rgb<Linear>, brightness: &[f32], mask: &[bool]) -> Field {
-        let Extent { width, height } = image.planes().extent();
-        let mut number = vec![None; mask.len()];
-        for (count, at) in indices(mask).enumerate() {
-            number[at] = Some(count);
-        }
-        let mut field = Field::new(indices(mask).count());
-        for y in 0..height {
-            for x in 0..width {
-                let at = y * width + x;
-                let right = (x + 1 < width).then_some(at + 1);
-                let below = (y + 1 < height).then_some(at + width);
-                for other in right.into_iter().chain(below) {
-                    if let (Some(a), Some(b)) = (number[at], number[other]) {
-                        let step = self.albedo_step(image, brightness, (at, other));
-                        field.edges.push((a, b, step));
-                    }
+/// The differences of log albedo between neighbours under the mask.
+fn edges(image: &Rgb<Linear>, brightness: &[f32], mask: &[bool]) -> Field {
+    let Extent { width, height } = image.planes().extent();
+    let mut number = vec![None; mask.len()];
+    for (count, at) in indices(mask).enumerate() {
+        number[at] = Some(count);
+    }
+    let mut field = Field::new(indices(mask).count());
+    for y in 0..height {
+        for x in 0..width {
+            let at = y * width + x;
+            let right = (x + 1 < width).then_some(at + 1);
+            let below = (y + 1 < height).then_some(at + width);
+            for other in right.into_iter().chain(below) {
+                if let (Some(a), Some(b)) = (number[at], number[other]) {
+                    let step = albedo_step(image, brightness, (at, other));
+                    field.edges.push((a, b, step));
                 }
             }
         }
-        field
     }
+    field
+}
 
-    /// The change of log albedo from one pixel to its neighbour.
-    fn albedo_step(self, image: &Rgb<Linear>, brightness: &[f32], (a, b): (usize, usize)) -> f64 {
-        let log = |at: usize| brightness[at].max(DARKEST).ln();
-        let change = log(b) - log(a);
-        let planes = image.planes().planes();
-        let chromaticity = |at: usize| {
-            let sum = (3.0 * brightness[at]).max(DARKEST);
-            planes.map(|plane| plane[at] / sum)
-        };
-        let colours = chromaticity(a).into_iter().zip(chromaticity(b));
-        let turn: f32 = colours.map(|(a, b)| (a - b).abs()).sum();
-        let is_albedo = turn > self.chromaticity || change.abs() > self.brightness;
-        if is_albedo { f64::from(change) } else { 0.0 }
+/// The change of log albedo from one pixel to its neighbour.
+fn albedo_step(image: &Rgb<Linear>, brightness: &[f32], (a, b): (usize, usize)) -> f64 {
+    let log = |at: usize| brightness[at].max(DARKEST).ln();
+    let change = log(b) - log(a);
+    let planes = image.planes().planes();
+    let chromaticity = |at: usize| {
+        let sum = (3.0 * brightness[at]).max(DARKEST);
+        planes.map(|plane| plane[at] / sum)
+    };
+    let colours = chromaticity(a).into_iter().zip(chromaticity(b));
+    let turn: f32 = colours.map(|(a, b)| (a - b).abs()).sum();
+    if turn > CHROMATICITY {
+        f64::from(change)
+    } else {
+        0.0
     }
 }
 
@@ -186,13 +150,6 @@ fn indices(mask: &[bool]) -> impl Iterator<Item = usize> {
         .filter_map(|(at, &inside)| inside.then_some(at))
 }
 
-fn under<'a>(plane: &'a [f32], mask: &'a [bool]) -> impl Iterator<Item = f32> {
-    plane
-        .iter()
-        .zip(mask)
-        .filter_map(|(&value, &inside)| inside.then_some(value))
-}
-
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -230,16 +187,15 @@ mod tests {
             paint(y).map(|c| c * shade(x))
         }));
         let mask = vec![true; extent.pixels()];
-        let found = Retinex::default().decompose(&image, &mask).unwrap();
-        let shading = found.shading.planes();
-        let albedo = found.albedo.planes();
-        let gain = shading.pixel(0, 0)[0] / shade(0);
+        let shading = shading(&image, &mask);
+        let albedo = divided(&image, &shading);
+        let gain = shading[0] / shade(0);
         for y in 0..16 {
             for x in 0..24 {
                 let expected = gain * shade(x);
-                let value = shading.pixel(x, y)[0];
+                let value = shading[24 * y + x];
                 assert!((value / expected - 1.0).abs() < 0.01, "{x} {y}: {value}");
-                let red = albedo.pixel(x, y)[0] * gain / paint(y)[0];
+                let red = albedo.planes().pixel(x, y)[0] * gain / paint(y)[0];
                 assert!((red - 1.0).abs() < 0.01, "{x} {y}: {red}");
             }
         }
@@ -252,11 +208,11 @@ mod tests {
             [0.1 + 0.1 * x as f32, 0.5, 0.1 * y as f32]
         }));
         let mask: Vec<bool> = (0..81).map(|at| at % 9 != 4).collect();
-        let found = Retinex::default().decompose(&image, &mask).unwrap();
+        let shading = shading(&image, &mask);
+        let albedo = divided(&image, &shading);
         for (at, &inside) in mask.iter().enumerate() {
             let (x, y) = (at % 9, at / 9);
-            let (a, s) = (found.albedo.planes(), found.shading.planes());
-            let product = a.pixel(x, y)[0] * s.pixel(x, y)[0];
+            let product = albedo.planes().pixel(x, y)[0] * shading[at];
             let expected = if inside {
                 image.planes().pixel(x, y)[0]
             } else {
@@ -269,8 +225,6 @@ mod tests {
     #[test]
     fn a_black_image_stays_black() {
         let image = Rgb::new(Planes::zeros(Extent::new(5, 5)));
-        let found = Retinex::default().decompose(&image, &[true; 25]).unwrap();
-        let planes = [found.albedo.planes(), found.shading.planes()];
-        assert!(planes.iter().all(|p| p.plane(0).iter().all(|&v| v == 0.0)));
+        assert_eq!(shading(&image, &[true; 25]), [0.0; 25]);
     }
 }

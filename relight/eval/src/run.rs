@@ -8,8 +8,13 @@ use relight_core::metrics::MetricError;
 use relight_core::parallel;
 use relight_reader::{TruthSample, TruthSet};
 
-/// Told after each image, from many threads.
-pub type EvalProgress<'a> = &'a (dyn Fn() + Sync);
+/// Told after each image, from many threads, how many there are in all.
+pub type EvalProgress<'a> = &'a (dyn Fn(usize) + Sync);
+
+/// What is wrong with a sample of which a measure cannot be taken.
+pub(super) const NOT_MEASURED: &str = "cannot be measured";
+/// The same where no light can be fitted.
+pub(super) const UNLIT: &str = "cannot be lit: no light can be fitted to it";
 
 /// A measure of one image that becomes part of a line.
 pub(super) struct Scored {
@@ -28,7 +33,7 @@ pub(super) fn add_method(
     table: &mut ScoreTable,
     (set, split): (&TruthSet, &str),
     method: &str,
-    progress: EvalProgress<'_>,
+    progress: &(dyn Fn() + Sync),
     score: impl Fn(&TruthSample) -> Result<Vec<Scored>, EvalError> + Sync,
 ) -> Result<(), EvalError> {
     let names: Vec<&str> = set.names().collect();
@@ -43,7 +48,7 @@ pub(super) fn add_method(
 /// What `work` finds of `count` samples, side by side, with their names. A panic is an error that names the sample.
 pub(super) fn each<R: Send>(
     count: usize,
-    progress: EvalProgress<'_>,
+    progress: &(dyn Fn() + Sync),
     name: impl Fn(usize) -> String + Sync,
     work: impl Fn(usize) -> Result<R, EvalError> + Sync,
 ) -> Result<Vec<(String, R)>, EvalError> {
@@ -56,7 +61,7 @@ pub(super) fn each<R: Send>(
                     progress();
                     Ok((sample, found?))
                 }
-                Err(panic) => Err(EvalError::Panic { sample, panic }),
+                Err(panic) => Err(EvalError::sample(&sample, NOT_MEASURED)(panic)),
             }
         })
         .collect()
@@ -128,9 +133,11 @@ pub(super) fn need<'a, T>(
     part: &'static str,
     found: &'a Option<T>,
 ) -> Result<&'a T, EvalError> {
-    found.as_ref().ok_or_else(|| EvalError::Lacks {
-        sample: sample.name.clone(),
-        part,
+    found.as_ref().ok_or_else(|| {
+        let name = &sample.name;
+        EvalError::Unfit(format!(
+            "the ground truth has no {part} of {name}: this protocol cannot be run on it"
+        ))
     })
 }
 
@@ -139,10 +146,7 @@ pub(super) fn measured<T>(
     sample: &TruthSample,
     result: Result<T, MetricError>,
 ) -> Result<T, EvalError> {
-    result.map_err(|source| EvalError::Metric {
-        sample: sample.name.clone(),
-        source,
-    })
+    result.map_err(EvalError::sample(&sample.name, NOT_MEASURED))
 }
 
 /// Where the mask is 1.

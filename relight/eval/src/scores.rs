@@ -98,6 +98,16 @@ pub struct ScoreTable {
 }
 
 impl ScoreTable {
+    /// One without lines.
+    pub(super) fn new(protocol: &str, notes: Vec<String>) -> Self {
+        Self {
+            protocol: protocol.to_owned(),
+            notes,
+            lines: Vec::new(),
+            images: Vec::new(),
+        }
+    }
+
     /// The columns of measures, in the order in which lines name them.
     fn measures(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();

@@ -3,27 +3,26 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use relight_core::files::write_png;
-use relight_core::image::{ColourSpace, Depth, Linear, Planes, Rgb, Srgb, Transfer};
-use relight_core::light::{Normals, Rotation, ShLight, YUp};
+use relight_core::image::{Linear, Rgb, Transfer};
+use relight_core::light::{Direction, Normals, Rotation, ShLight, YUp};
 use relight_core::statistics::median;
 use relight_synth::TurnDescription;
 use relight_turn::{
-    Elevation, MaterialKind, SolvedTurn, TableFrame, TableRotation, TurnError, TurnLight,
-    TurnNetworks, TurnOptions, TurnVerdict, read_curves, solve_turn,
+    Elevation, MaterialKind, SolvedTurn, TableFrame, TurnError, TurnLight, TurnNetworks,
+    TurnOptions, TurnVerdict, solve_turn,
 };
 use relit_data::rig::RotationDirection;
 use relit_data::shard::Dataset;
 use serde::Serialize;
 
-use super::predictions::read_light;
-use super::reliability::{ReliabilityBin, reliability, summed, write_diagrams};
+use super::predictions::{NO_SET, read_light};
 use super::{EvalError, EvalProgress};
 
 /// Errors up to which it is counted how many pixels keep what is expected of them, degrees.
 const LIMITS_DEG: [f64; 3] = [10.0, 20.0, 30.0];
 /// Azimuths that are tried for the turn about the table's axis, degrees to each side.
 const AZIMUTHS_DEG: i32 = 90;
+
 /// How a turn is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TurnMethod {
@@ -38,8 +37,7 @@ impl TurnMethod {
     pub const ALL: [Self; 2] = [Self::UnknownLight, Self::KnownLight];
 
     /// Its name in the table.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::UnknownLight => "light unknown",
             Self::KnownLight => "light known",
@@ -49,54 +47,44 @@ impl TurnMethod {
 
 /// The errors of a turn by a method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TurnScore {
-    /// The turn.
-    pub turn: String,
+struct TurnScore {
+    turn: String,
     /// Mean and median angle between found and true normals, degrees.
-    pub mean_deg: f64,
-    /// The median of these angles, degrees.
-    pub median_deg: f64,
+    mean_deg: f64,
+    median_deg: f64,
     /// By how much the answer is turned about the table's axis, degrees: without that its mean error is least.
-    pub azimuth_deg: f64,
+    azimuth_deg: f64,
     /// That least mean error, degrees.
-    pub unturned_deg: f64,
+    unturned_deg: f64,
     /// Squared error of the albedo over its energy, after one scale a channel.
-    pub albedo: f64,
+    albedo: f64,
     /// For the pixels that are expected to be off by at most 10, 20 and 30 degrees: how many there are, and how many
     /// of them are.
-    pub kept: [[usize; 2]; 3],
-    /// The pixels by what is expected of them, in steps of 5 degrees.
-    pub reliability: Vec<ReliabilityBin>,
-    /// The median of what is expected of them, degrees.
-    pub expected_deg: f64,
+    kept: [[usize; 2]; 3],
+    /// Mean and median of what is expected of the pixels, degrees.
+    expected_mean_deg: f64,
+    expected_deg: f64,
     /// What is to be thought of the turn.
-    pub verdict: TurnVerdict,
-    /// What the object is taken for.
-    pub material: MaterialKind,
+    verdict: TurnVerdict,
 }
 
 /// A method on all turns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TurnLine {
-    /// The method.
-    pub method: String,
-    /// Each turn.
-    pub turns: Vec<TurnScore>,
+struct TurnLine {
+    method: &'static str,
+    turns: Vec<TurnScore>,
 }
 
 /// All methods on all turns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct TurnTable {
     /// What the turns are called.
-    pub split: String,
-    /// The methods.
-    pub lines: Vec<TurnLine>,
+    split: String,
+    lines: Vec<TurnLine>,
 }
 
 /// Turns in the layout of `relight synth --turn`, with their ground truth.
-#[derive(Debug)]
-pub struct TurnSet {
+struct TurnSet {
     folder: PathBuf,
     turns: Vec<(String, PathBuf)>,
 }
@@ -111,15 +99,9 @@ struct TrueTurn {
 }
 
 impl TurnSet {
-    /// Opens a data set of `relight synth --turn`.
-    ///
-    /// # Errors
-    /// [`EvalError::Turns`] where it is none.
-    pub fn open(folder: &Path) -> Result<Self, EvalError> {
-        let dataset = Dataset::read(folder).map_err(|source| EvalError::Turns {
-            path: folder.to_owned(),
-            source: Box::new(source),
-        })?;
+    fn open(folder: &Path) -> Result<Self, EvalError> {
+        let fault = "holds no turns of relight synth --turn";
+        let dataset = Dataset::read(folder).map_err(EvalError::file(folder, fault))?;
         let shard = |id: &str| {
             dataset
                 .shards_of(id)
@@ -136,24 +118,13 @@ impl TurnSet {
         })
     }
 
-    /// How many there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.turns.len()
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.turns.is_empty()
-    }
-
     fn read(&self, number: usize) -> Result<TrueTurn, EvalError> {
         let (id, shard) = &self.turns[number];
         let truth = self.folder.join("truth").join(id);
-        let description: TurnDescription = parse(&truth.join("turn.json"), |bytes| {
-            serde_json::from_slice(bytes)
-        })?;
+        let path = truth.join("turn.json");
+        let json = std::fs::read(&path).map_err(EvalError::read(&path))?;
+        let description: TurnDescription =
+            serde_json::from_slice(&json).map_err(EvalError::file(&path, NO_SET))?;
         let [_, up, out] = description.axis;
         Ok(TrueTurn {
             shard: shard.clone(),
@@ -163,79 +134,36 @@ impl TurnSet {
             light: read_light(&truth.join("light.txt"))?,
         })
     }
-
-    /// Writes each turn as others read it: `<turn>.data/` with twelve frames that cover the turn, `L (001).png` and so on,
-    /// and `mask.png`, as methods of universal photometric stereo expect it.
-    ///
-    /// # Errors
-    /// Where a turn cannot be read or a file cannot be written.
-    pub fn write_frames(&self, out: &Path) -> Result<(), EvalError> {
-        for (id, shard) in &self.turns {
-            let turn = read_curves(shard, TableRotation::default(), &|_, _| {})?;
-            let folder = out.join(format!("{id}.data"));
-            std::fs::create_dir_all(&folder).map_err(|source| EvalError::Write {
-                path: folder.clone(),
-                source,
-            })?;
-            for (frame, picture) in (1..).zip(&turn.first) {
-                let path = folder.join(format!("L ({frame:03}).png"));
-                write_png(&path, &as_seen(picture), Depth::Eight)?;
-            }
-            let grey = turn.mask.plane(0).to_vec();
-            let grey = Planes::from_planes(turn.mask.extent(), [grey.clone(), grey.clone(), grey])?;
-            write_png(&folder.join("mask.png"), &grey, Depth::Eight)?;
-        }
-        Ok(())
-    }
 }
 
-/// A frame as a camera shows it.
-fn as_seen(frame: &Rgb<Linear>) -> Planes<3> {
-    frame
-        .planes()
-        .clone()
-        .map(|value| Srgb::from_linear(value.clamp(0.0, 1.0)))
-}
-
-fn parse<T>(
-    path: &Path,
-    parse: impl FnOnce(&[u8]) -> Result<T, serde_json::Error>,
-) -> Result<T, EvalError> {
-    let bytes = std::fs::read(path).map_err(|source| EvalError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    parse(&bytes).map_err(|source| EvalError::Description {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-/// Solves every turn by every method. `progress` is told each turn and method.
+/// Solves every turn of a data set of `relight synth --turn` by every method; `split` is what the table calls them. `progress`
+/// is told each turn and method.
 ///
 /// # Errors
 /// Where a turn or its ground truth cannot be read, or cannot be solved.
 pub fn evaluate_turns(
-    set: &TurnSet,
+    folder: &Path,
     split: &str,
     methods: &[TurnMethod],
     networks: &TurnNetworks,
     progress: EvalProgress<'_>,
 ) -> Result<TurnTable, EvalError> {
+    let set = TurnSet::open(folder)?;
     let mut lines: Vec<TurnLine> = methods
         .iter()
         .map(|method| TurnLine {
-            method: method.name().to_owned(),
+            method: method.name(),
             turns: Vec::new(),
         })
         .collect();
-    for number in 0..set.len() {
+    let steps = methods.len() * set.turns.len();
+    for number in 0..set.turns.len() {
         let truth = set.read(number)?;
         for (line, &method) in lines.iter_mut().zip(methods) {
             let answer = truth.solve(method, networks)?;
             line.turns
                 .push(score(&set.turns[number].0, &truth, &answer));
-            progress();
+            progress(steps);
         }
     }
     Ok(TurnTable {
@@ -253,7 +181,7 @@ impl TrueTurn {
                 TurnMethod::UnknownLight => TurnLight::Unknown,
                 TurnMethod::KnownLight => TurnLight::Given(self.light.clone()),
             },
-            material: None,
+            material: MaterialKind::Diffuse,
         };
         solve_turn(&self.shard, &options, networks, &|_, _| {})
     }
@@ -298,10 +226,9 @@ fn score(name: &str, truth: &TrueTurn, answer: &SolvedTurn) -> TurnScore {
         unturned_deg,
         albedo: albedo_error(&truth.albedo, &solution.albedo(curves), &inside),
         kept,
-        reliability: reliability(pairs()),
+        expected_mean_deg: mean(&expected),
         expected_deg: solution.expected_error_deg(),
-        verdict: solution.conditioning().verdict,
-        material: solution.material(),
+        verdict: solution.verdict(),
     }
 }
 
@@ -318,8 +245,7 @@ fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// The turn about the table's axis by which the answer is off, degrees, and the mean error without it.
 fn best_azimuth(right: &[[f64; 3]], found: &[[f64; 3]], elevation: Elevation) -> (f64, f64) {
     let [x, y, z] = TableFrame::new(elevation).axis();
-    let axis =
-        relight_core::light::Direction::new(x, y, z).unwrap_or(relight_core::light::Direction::UP);
+    let axis = Direction::new(x, y, z).unwrap_or(Direction::UP);
     let every = (right.len() / 2000).max(1);
     let tried = (-AZIMUTHS_DEG..=AZIMUTHS_DEG).map(|degrees| {
         let degrees = f64::from(degrees);
@@ -383,22 +309,6 @@ impl TurnLine {
     }
 }
 
-impl TurnTable {
-    /// Draws a reliability diagram for each method, side by side: expected errors to the right, errors upwards, up to 45
-    /// degrees with a line every 10.
-    ///
-    /// # Errors
-    /// Where the file cannot be written.
-    pub fn write_reliability(&self, path: &Path) -> Result<(), EvalError> {
-        let of_line = |line: &TurnLine| {
-            let turns = line.turns.iter();
-            summed(turns.map(|turn| turn.reliability.as_slice()))
-        };
-        let diagrams: Vec<_> = self.lines.iter().map(of_line).collect();
-        write_diagrams(path, &diagrams)
-    }
-}
-
 impl fmt::Display for TurnTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let turns = self.lines.first().map_or(0, |line| line.turns.len());
@@ -407,22 +317,32 @@ impl fmt::Display for TurnTable {
             f,
             "  angles between found and true normals, degrees: mean over the turns and its standard error, of their means and \
              medians; by how much answers are turned about the table's axis (mean of the amounts), and the mean error without \
-             it; albedo: squared error over energy; of the pixels expected within 10, 20, 30 degrees how many are"
+             it; what is expected; albedo: squared error over energy; of the pixels expected within 10, 20, 30 degrees how many are"
         )?;
         writeln!(
             f,
-            "{:24}  {:>12}  {:>12}  {:>7}  {:>8}  {:>6}  {:>5} {:>5} {:>5}",
-            "method", "mean", "median", "azimuth", "unturned", "albedo", "10", "20", "30"
+            "{:24}  {:>12}  {:>12}  {:>7}  {:>8}  {:>8}  {:>6}  {:>5} {:>5} {:>5}",
+            "method",
+            "mean",
+            "median",
+            "azimuth",
+            "unturned",
+            "expected",
+            "albedo",
+            "10",
+            "20",
+            "30"
         )?;
         for line in &self.lines {
             let (mean, error) = line.mean_of(|turn| turn.mean_deg);
             let (median, median_error) = line.mean_of(|turn| turn.median_deg);
             let (azimuth, _) = line.mean_of(|turn| turn.azimuth_deg.abs());
             let (unturned, _) = line.mean_of(|turn| turn.unturned_deg);
+            let (expected, _) = line.mean_of(|turn| turn.expected_mean_deg);
             let (albedo, _) = line.mean_of(|turn| turn.albedo);
             write!(
                 f,
-                "{:24}  {:>12}  {:>12}  {azimuth:>7.1}  {unturned:>8.1}  {albedo:>6.3} ",
+                "{:24}  {:>12}  {:>12}  {azimuth:>7.1}  {unturned:>8.1}  {expected:>8.1}  {albedo:>6.3} ",
                 line.method,
                 format!("{mean:.1} ± {error:.1}"),
                 format!("{median:.1} ± {median_error:.1}"),
@@ -446,7 +366,7 @@ mod tests {
     fn an_answer_turned_about_the_axis_is_found_out() {
         let elevation = Elevation::given(20.0).unwrap();
         let [x, y, z] = TableFrame::new(elevation).axis();
-        let axis = relight_core::light::Direction::new(x, y, z).unwrap();
+        let axis = Direction::new(x, y, z).unwrap();
         let turn = Rotation::about(axis, 17.0_f64.to_radians());
         let right: Vec<[f64; 3]> = (0..200)
             .map(|k| {

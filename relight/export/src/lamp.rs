@@ -1,6 +1,7 @@
 //! Where the light comes from, frame by frame, where one lamp dominates. Knows nothing of files.
 
 use relight_core::light::{Direction, Rotation, ShLight};
+use relit_data::rig::RotationDirection;
 
 use crate::error::ExportError;
 
@@ -9,21 +10,12 @@ const OF_A_LAMP: f64 = 1.732_050_807_568_877_2;
 /// The part of that from which on a lamp dominates: a lamp and even light of a ninth of its irradiance, all round.
 pub const LEAST_LAMP: f64 = 0.8;
 
-/// Which way the table turns, seen from above, as its angle grows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TableTurn {
-    /// The background moves to the right.
-    CounterClockwise,
-    /// The background moves to the left.
-    Clockwise,
-}
-
 /// The lamp of a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurnLamp {
     start: Direction,
     axis: Direction,
-    turn: TableTurn,
+    turn: RotationDirection,
     /// Band 1 over band 0 of the light, as a part of that of a single lamp.
     pub dominance: f64,
 }
@@ -34,7 +26,11 @@ impl TurnLamp {
     ///
     /// # Errors
     /// [`ExportError::NoLamp`] where there is none.
-    pub fn new(light: &ShLight, elevation: f64, turn: TableTurn) -> Result<Self, ExportError> {
+    pub fn new(
+        light: &ShLight,
+        elevation: f64,
+        turn: RotationDirection,
+    ) -> Result<Self, ExportError> {
         let coefficients = light.coefficients();
         let sum = |at: usize| -> f64 { coefficients.get(at).map_or(0.0, |rgb| rgb.iter().sum()) };
         // Band 1 is, in order, y, z and x.
@@ -66,8 +62,8 @@ impl TurnLamp {
     #[must_use]
     pub fn at(&self, angle: f64) -> Direction {
         let around = match self.turn {
-            TableTurn::CounterClockwise => -angle,
-            TableTurn::Clockwise => angle,
+            RotationDirection::CounterClockwise => -angle,
+            RotationDirection::Clockwise => angle,
         };
         Rotation::about(self.axis, around).apply(self.start)
     }
@@ -90,7 +86,7 @@ mod tests {
 
     #[test]
     fn a_lamp_to_the_right_is_behind_after_a_quarter_of_a_turn_counter_clockwise() {
-        let turn = TableTurn::CounterClockwise;
+        let turn = RotationDirection::CounterClockwise;
         let lamp = TurnLamp::new(&light(1.7, 0.0, 0.0), 0.0, turn).unwrap();
         assert!((lamp.dominance - 0.98).abs() < 0.01);
         // The background moves to the right in front of the camera, so what is to the right goes behind the camera.
@@ -99,14 +95,15 @@ mod tests {
             x.abs() < 1e-9 && y.abs() < 1e-9 && (z - 1.0).abs() < 1e-9,
             "{x} {y} {z}"
         );
-        let other = TurnLamp::new(&light(1.7, 0.0, 0.0), 0.0, TableTurn::Clockwise).unwrap();
+        let other =
+            TurnLamp::new(&light(1.7, 0.0, 0.0), 0.0, RotationDirection::Clockwise).unwrap();
         assert!((other.at(FRAC_PI_2).components()[2] + 1.0).abs() < 1e-9);
     }
 
     #[test]
     fn an_even_room_has_no_lamp() {
         for room in [light(0.5, 0.5, 0.0), ShLight::dark(Order::TWO)] {
-            let error = TurnLamp::new(&room, 0.3, TableTurn::Clockwise).unwrap_err();
+            let error = TurnLamp::new(&room, 0.3, RotationDirection::Clockwise).unwrap_err();
             assert!(matches!(error, ExportError::NoLamp { .. }), "{error}");
         }
     }

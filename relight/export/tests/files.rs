@@ -15,11 +15,12 @@ use relight_core::light::Normals;
 use relight_core::render::{Gloss, Surface};
 use relight_export::frames::write_frames;
 use relight_export::glb::to_glb;
-use relight_export::lamp::{TableTurn, TurnLamp};
+use relight_export::lamp::TurnLamp;
 use relight_export::layers::to_layers;
 use relight_export::mesh::{MeshShape, ObjectMesh};
 use relight_export::source::read_object;
 use relight_export::{ExportError, blender};
+use relit_data::rig::RotationDirection;
 
 /// A ball of an albedo, glossy if asked for.
 fn ball(side: usize, is_glossy: bool) -> CapturedObject {
@@ -196,7 +197,7 @@ fn a_turn_becomes_frames_a_mask_and_a_list_of_lamps() {
     let mut light = relight_core::light::ShLight::dark(relight_core::light::Order::TWO);
     light.coefficients_mut()[0] = [1.0; 3];
     light.coefficients_mut()[3] = [1.7; 3];
-    let lamp = TurnLamp::new(&light, 0.3, TableTurn::CounterClockwise).unwrap();
+    let lamp = TurnLamp::new(&light, 0.3, RotationDirection::CounterClockwise).unwrap();
     let error = write_frames(folder.path(), &out, 12, Some(&lamp)).unwrap_err();
     assert!(matches!(error, ExportError::NoAngle { .. }), "{error}");
     // The earlier export is as it was; what is no export stays.

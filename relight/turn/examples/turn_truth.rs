@@ -1,8 +1,7 @@
 //! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [metal]`.
 //!
 //! TRUTH is a rendered session (`normal_gt.png`, `albedo_gt.png`, `truth.json`) or a folder that `relight synth --turn`
-//! wrote (`normal.png`, `albedo.png`, `turn.json`). `metal` says how the light that is called known is fitted to the
-//! truth.
+//! wrote (`normal.png`, `albedo.png`, `turn.json`). `metal` says what the object is of.
 #![allow(clippy::print_stdout, reason = "the example is a program of its own")]
 
 use std::error::Error;
@@ -57,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             rotation: Some(RotationDirection::CounterClockwise),
             elevation: Some(truth.elevation),
             light,
-            material: None,
+            material,
         };
         let start = Instant::now();
         let solved = solve_turn(shard, &options, &networks, &|_, _| {})?;
@@ -131,7 +130,7 @@ impl Truth {
             pair.mse(ScaleFit::Channel) / own.mse(ScaleFit::None),
             found.residual(),
             found.expected_error_deg(),
-            found.conditioning().verdict,
+            found.verdict(),
             found.material(),
         );
         let confidence = found.confidence(&turn.curves);

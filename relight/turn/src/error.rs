@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use relight_core::captured_object::CapturedObjectError;
 use relight_core::files::{FolderFault, MovieError};
-use relight_core::image::{Extent, ImageError};
+use relight_core::image::ImageError;
 use relight_core::light::{LightError, LightFileError, PanoramaError};
 use relight_nets::NetError;
 use relight_photo::decompose::DecomposeError;
@@ -40,51 +40,15 @@ pub enum TurnError {
         /// How many it has.
         found: usize,
     },
-    /// Frames are missing, and none of them has an angle.
-    #[error(
-        "the frames have no angles, and only {found} of at least {indices} of the turn are there: without angles, a turn has to be whole"
-    )]
-    NoAngles {
-        /// How many frames there are.
-        found: u32,
-        /// The last frame's number, from 1.
-        indices: u64,
-    },
-    /// A frame has another size than the first.
-    #[error("a frame has {} x {} pixels where {} x {} are needed", found.width, found.height, expected.width, expected.height)]
-    FrameSize {
-        /// The frame's size.
-        found: Extent,
-        /// The size of the first.
-        expected: Extent,
-    },
-    /// There is nothing under the mask.
-    #[error("no frame has a pixel under the mask")]
-    Empty,
-    /// There are too few angles.
-    #[error(
-        "{angles} different angles were found: five terms a pixel need at least {needed}, spread over the turn"
-    )]
-    TooFewAngles {
-        /// How many there are.
-        angles: usize,
-        /// How many are needed.
-        needed: usize,
-    },
+    /// The frames do not make a turn: why.
+    #[error("{0}")]
+    Frames(String),
     /// A setting cannot be.
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// No light fits the curves.
     #[error("no light explains the turn: all of it is dark, or all of it is clipped")]
     NoLight,
-    /// A surface has another size than the frames.
-    #[error("the surface has {} x {} pixels, and the frames {} x {}", found.width, found.height, expected.width, expected.height)]
-    SurfaceSize {
-        /// The size of the map.
-        found: Extent,
-        /// The size of the frames.
-        expected: Extent,
-    },
     /// The network of turns fails.
     #[error(transparent)]
     Network(#[from] NetError),
@@ -97,55 +61,22 @@ pub enum TurnError {
     /// The object cannot be made a file.
     #[error("the object cannot be written as a file that can be lit")]
     Asset(#[source] Box<CapturedObjectError>),
-    /// Light cannot be used.
+    /// The light of a file cannot be read, or its file not be written.
     #[error(transparent)]
-    Light(#[from] LightError),
+    LightFile(#[from] LightFileError),
     /// A panorama cannot be read.
     #[error(transparent)]
     Panorama(#[from] PanoramaError),
-    /// Light cannot be read or written.
-    #[error(transparent)]
-    LightFile(#[from] LightFileError),
-    /// The folder for results holds something else.
-    #[error("{} holds {name}, which is no result of a turn: give a folder that is new, empty, or holds an earlier result", path.display())]
-    Foreign {
-        /// The folder.
-        path: PathBuf,
-        /// What it holds.
-        name: String,
-    },
-    /// A path for results cannot be a folder.
-    #[error("{} cannot be the folder for the results: give the name of a folder, not of a file", path.display())]
-    NoFolder {
-        /// The path.
-        path: PathBuf,
-    },
     /// The session whose video shows the ball cannot be read.
     #[error(transparent)]
     Session(#[from] SessionError),
     /// The video is not that of the turn.
-    #[error("none of the turn's frames is among the {frames} of {}: give the session from which the shard was made", path.display())]
+    #[error("{} is not the turn's video: {why}; give the session from which the shard was made", path.display())]
     OtherVideo {
         /// The video.
         path: PathBuf,
-        /// How many frames it has.
-        frames: u64,
-    },
-    /// The shard says that it was made from another session.
-    #[error("the shard was made from the session {session}, and {} is the session {found}: give the session from which the shard was made", path.display())]
-    OtherSession {
-        /// The session that was given.
-        path: PathBuf,
-        /// Its id.
-        found: String,
-        /// The id in the shard's records.
-        session: String,
-    },
-    /// The video shows something else than the shard.
-    #[error("the frames of {} do not show what those of the shard do: give the session from which the shard was made", path.display())]
-    OtherPictures {
-        /// The video.
-        path: PathBuf,
+        /// What tells them apart.
+        why: String,
     },
     /// The ball is under the object's mask.
     #[error(
@@ -160,7 +91,7 @@ pub enum TurnError {
     /// There is no ball.
     #[error(
         "the circle at {given} shows no ball: the light by it explains {explained:.0} % of what varies in it; measure the ball's middle and radius in the video again, \
-         see that nothing covers it, and say what the ball is made of"
+         check that nothing covers it, and say what the ball is made of"
     )]
     NoBall {
         /// Where it is said to be.
@@ -182,29 +113,16 @@ pub enum TurnError {
     /// A video cannot be read or written.
     #[error(transparent)]
     Movie(#[from] MovieError),
-    /// A file or folder cannot be read.
-    #[error("{} cannot be read", path.display())]
-    Read {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system answers.
-        source: io::Error,
-    },
-    /// A file or folder cannot be written.
-    #[error("{} cannot be written", path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system answers.
-        source: io::Error,
-    },
+    /// The folder for the results holds something else, or cannot be used: why.
+    #[error("{0}")]
+    Folder(String),
 }
 
 impl TurnError {
     /// Puts the path to an operating system's reason.
     pub(crate) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
-        |source| Self::Write { path, source }
+        |source| FolderFault::Write(path, source).into()
     }
 }
 
@@ -214,13 +132,30 @@ impl From<CapturedObjectError> for TurnError {
     }
 }
 
+/// A light of which a coefficient is not finite is none.
+impl From<LightError> for TurnError {
+    fn from(_: LightError) -> Self {
+        Self::NoLight
+    }
+}
+
 impl From<FolderFault> for TurnError {
     fn from(fault: FolderFault) -> Self {
-        match fault {
-            FolderFault::Foreign(path, name) => Self::Foreign { path, name },
-            FolderFault::NoFolder(path) => Self::NoFolder { path },
-            FolderFault::Read(path, source) => Self::Read { path, source },
-            FolderFault::Write(path, source) => Self::Write { path, source },
-        }
+        Self::Folder(match fault {
+            FolderFault::Foreign(path, name) => format!(
+                "{} holds {name}, which is no result of a turn: give a folder that is new, empty, or holds an earlier result",
+                path.display()
+            ),
+            FolderFault::NoFolder(path) => format!(
+                "{} cannot be the folder for the results: give the name of a folder, not of a file",
+                path.display()
+            ),
+            FolderFault::Read(path, source) => {
+                format!("{} cannot be read: {source}", path.display())
+            }
+            FolderFault::Write(path, source) => {
+                format!("{} cannot be written: {source}", path.display())
+            }
+        })
     }
 }

@@ -3,21 +3,20 @@
 //! Camera and object ride on one table, so for the object the environment light rotates about the table's axis by an
 //! angle that is known. [`read_curves`] brings a turn to one curve over that angle a pixel and channel. In a light that is not
 //! known the network of turns answers normals and albedo, and one linear fit finds the light. In a light that was measured
-//! photometric stereo finds normals and albedo without training. [`solve_turn`] does either, from a shard. [`TurnMaps`] has
-//! what the curves have beyond the model, and [`TurnFiles`] writes all of it.
+//! photometric stereo finds normals and albedo without training. [`solve_turn`] does either, from a shard, and [`TurnFiles`]
+//! writes what was found.
 //!
 //! | module | concern |
 //! | --- | --- |
-//! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `metal`, `shading` (one of them) |
+//! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `shading` (one of them) |
 //! | `observe` | what the frames show: `reading`, `curves`, `exposure`, `conditioning`; `film` and `probe` for a ball in the video |
-//! | `network` | `input`, `answer`, `predict`: normals and albedo by the network of turns |
-//! | `fit` | `known_light`: `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the gloss), `robust`, `albedo`, `confidence`; `unknown_light`: `environment`, `photo_albedo` |
-//! | `report` | `files`, `figures`, `maps`, `object`: what is written; `warnings` and `destinations`: what a user should know after and before |
+//! | `network` | `input`, `predict`: normals and albedo by the network of turns |
+//! | `fit` | `known_light`: `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the gloss), `residuals`, `albedo`, `confidence`; `unknown_light`: `environment`, `photo_albedo` |
+//! | `report` | `files`, `sheet`, `movie`, `object`: what is written; `warnings`: what a user should know |
 //!
-//! `solving` puts them together.
-//! A folder knows those above it in this table. Each module has its parameters in one struct, with unit and source:
-//! *derived*, *measured*, *by convention*, *numerical* (a guard on which results hardly depend), or *by hand*, of which
-//! no sweep is recorded.
+//! `solving` puts them together. A folder knows those above it in this table. Each module has its parameters as constants, with
+//! unit and source: *derived*, *measured*, *by convention*, *numerical* (a guard on which results hardly depend), or *by hand*,
+//! of which no sweep is recorded.
 
 mod error;
 mod fit;
@@ -37,23 +36,17 @@ pub use fit::given_light::read_given_light;
 pub use fit::known_light::solve_in_light;
 pub use fit::probe_light::ProbeLight;
 pub use fit::solution::TurnSolution;
-pub use model::frame::{Elevation, ElevationSource, TableFrame};
+pub use model::frame::{Elevation, FactSource, TableFrame};
 pub use model::lighting::TableLight;
 pub use model::material::MaterialKind;
-pub use network::answer::NetworkNormal;
 pub use network::input::{NetworkTurn, PhaseHypothesis, network_input};
-pub use network::predict::{HypothesisFigures, PhaseFigure, TurnNetwork, TurnPrediction};
-pub use observe::conditioning::Conditioning;
+pub use network::predict::{NetworkFigures, TurnNetwork, TurnPrediction};
 pub use observe::curves::{CurveBuilder, TurnCurves};
 pub use observe::exposure::ExposureStep;
 pub use observe::probe::ProbeBall;
 pub use observe::probe_place::ProbePlace;
-pub use observe::reading::{ReadTurn, RotationSource, TableRotation, TurnOrigin, read_curves};
+pub use observe::reading::{ReadTurn, TableRotation, TurnOrigin, read_curves};
 pub use observe::verdict::TurnVerdict;
-pub use report::destinations::{AssetDestination, DestinationError, Destinations};
-pub use report::figures::TurnFigures;
 pub use report::files::TurnFiles;
-pub use report::maps::TurnMaps;
-pub use report::warnings::TurnWarning;
 pub use setting_error::SettingError;
 pub use solving::{SolvedTurn, TurnLight, TurnNetworks, TurnOptions, solve_turn};

@@ -15,13 +15,13 @@ use crate::fit::photo_albedo::photo_albedo;
 use crate::fit::probe_light::ProbeLight;
 use crate::fit::solution::TurnSolution;
 use crate::fit::unknown_light::solve_by_network;
-use crate::model::frame::Elevation;
+use crate::model::frame::{Elevation, FactSource};
 use crate::model::material::MaterialKind;
-use crate::network::predict::{HypothesisFigures, TurnNetwork, TurnPrediction};
+use crate::network::predict::{NetworkFigures, TurnNetwork, TurnPrediction};
 use crate::observe::film::film;
 use crate::observe::probe::{Probe, ProbeBall};
 use crate::observe::probe_place::ProbePlace;
-use crate::observe::reading::{ReadTurn, RotationSource, TableRotation, read_curves};
+use crate::observe::reading::{ReadTurn, TableRotation, read_curves};
 
 /// What is known of a turn beforehand.
 #[derive(Debug, Clone, Default)]
@@ -33,8 +33,8 @@ pub struct TurnOptions<'a> {
     pub elevation: Option<Elevation>,
     /// The light.
     pub light: TurnLight<'a>,
-    /// The material. In known light, that which fits the curves where it is not given; else diffuse.
-    pub material: Option<MaterialKind>,
+    /// The material.
+    pub material: MaterialKind,
 }
 
 /// What is known of the light of a turn.
@@ -72,8 +72,8 @@ pub struct SolvedTurn {
     pub turn: ReadTurn,
     /// Normals, albedo and light.
     pub solution: TurnSolution,
-    /// What the network of turns took the turn for.
-    pub network: HypothesisFigures,
+    /// What the network of turns expects of its normals.
+    pub network: NetworkFigures,
     /// The light by the ball, where there is one.
     pub ball: Option<ProbeLight>,
     /// How long the shard took to read.
@@ -124,14 +124,19 @@ pub fn solve_turn(
         Some(light) => solve_in_light(&turn.curves, light, elevation, options.material),
         None => {
             let seen = photo_albedo(&networks.photo, &turn.first, &turn.mask)?;
-            let material = options.material.unwrap_or(MaterialKind::Diffuse);
-            solve_by_network(&turn.curves, &prediction, &seen, elevation, material)?
+            solve_by_network(
+                &turn.curves,
+                &prediction,
+                &seen,
+                elevation,
+                options.material,
+            )?
         }
     };
     Ok(SolvedTurn {
         turn,
         solution,
-        network: prediction.hypotheses,
+        network: prediction.figures,
         ball,
         reading,
     })
@@ -139,31 +144,35 @@ pub fn solve_turn(
 
 /// What is known of the rig: by the data set of the shard, else by the session.
 fn rig_of(shard: &Path, recording: Option<&Recording>) -> RigFacts {
-    let of_dataset = || {
-        let folder = if shard.is_dir() {
-            shard
-        } else {
-            shard.parent()?
-        };
-        let dataset = Dataset::read(folder).ok()?;
-        let is_it =
-            |file: &str| shard.is_dir() || shard.file_name().is_some_and(|name| name == file);
-        let entry = dataset.shards.iter().find(|entry| is_it(&entry.file))?;
-        let session = dataset
-            .sessions
-            .iter()
-            .find(|session| session.id == entry.session);
-        session?.rig
-    };
     let of_session = || recording?.manifest.as_ref()?.rig;
-    of_dataset().or_else(of_session).unwrap_or_default()
+    rig_of_dataset(shard)
+        .or_else(of_session)
+        .unwrap_or_default()
+}
+
+fn rig_of_dataset(shard: &Path) -> Option<RigFacts> {
+    let is_dataset = shard.is_dir();
+    let folder = if is_dataset { shard } else { shard.parent()? };
+    let dataset = Dataset::read(folder).ok()?;
+    let is_of = |id: &str| {
+        let mut shards = dataset.shards_of(id);
+        shards.any(|entry| {
+            shard
+                .file_name()
+                .is_some_and(|name| name == entry.file.as_str())
+        })
+    };
+    let mut sessions = dataset.sessions.iter();
+    sessions
+        .find(|session| is_dataset || is_of(&session.id))?
+        .rig
 }
 
 fn rotation(options: &TurnOptions<'_>, rig: RigFacts) -> TableRotation {
     let known = |direction, source| TableRotation { direction, source };
     match (options.rotation, rig.rotation) {
-        (Some(given), _) => known(given, RotationSource::Given),
-        (None, Some(direction)) => known(direction, RotationSource::Rig),
+        (Some(given), _) => known(given, FactSource::Given),
+        (None, Some(direction)) => known(direction, FactSource::Rig),
         (None, None) => TableRotation::default(),
     }
 }
@@ -176,16 +185,16 @@ fn predict(
     network: &TurnNetwork,
 ) -> Result<(ReadTurn, TurnPrediction), TurnError> {
     let prediction = network.predict(&turn.curves, elevation)?;
-    if turn.rotation.source != RotationSource::Assumed {
+    if turn.rotation.source != FactSource::Assumed {
         return Ok((turn, prediction));
     }
-    if prediction.hypotheses.is_direction_doubted() {
-        let turn = turn.turned_other_way(RotationSource::Network);
+    if prediction.figures.is_direction_doubted() {
+        let turn = turn.turned_other_way(FactSource::Network);
         let prediction = network.predict(&turn.curves, elevation)?;
         return Ok((turn, prediction));
     }
-    if prediction.hypotheses.is_direction_sure() {
-        turn.rotation.source = RotationSource::Network;
+    if prediction.figures.is_direction_sure() {
+        turn.rotation.source = FactSource::Network;
     }
     Ok((turn, prediction))
 }

@@ -9,15 +9,13 @@ use relight_core::metrics::angular_error;
 use relight_core::render::{DiffuseForm, DiffuseLayer, Surface};
 
 use crate::fit::residuals::lit;
-use crate::model::gloss::GlossLight;
+use crate::model::gloss::{GlossLight, MIRROR};
 use crate::model::harmonics::basis_at;
-use crate::model::metal::MIRROR;
 use crate::model::shading::ShadingModel;
-use crate::observe::reading::TableRotation;
 use crate::{
-    CurveBuilder, Elevation, HypothesisFigures, MaterialKind, PhaseFigure, PhaseHypothesis,
-    ReadTurn, RotationSource, SolvedTurn, TableFrame, TableLight, TurnCurves, TurnPrediction,
-    TurnSolution, solve_in_light,
+    CurveBuilder, Elevation, FactSource, MaterialKind, NetworkFigures, ReadTurn, SolvedTurn,
+    TableFrame, TableLight, TableRotation, TurnCurves, TurnPrediction, TurnSolution,
+    solve_in_light,
 };
 
 pub(crate) const SIDE: usize = 24;
@@ -101,7 +99,7 @@ pub(crate) fn film(surface: &Surface, light: &ShLight, take: Take) -> TurnCurves
 
 /// What is found of curves in a light that is known.
 pub(crate) fn solve(curves: &TurnCurves, light: &ShLight) -> TurnSolution {
-    solve_in_light(curves, light, elevation(), None)
+    solve_in_light(curves, light, elevation(), MaterialKind::Diffuse)
 }
 
 /// The median of the angle between normals, degrees: at the rim a few pixels have two answers.
@@ -211,13 +209,9 @@ pub(crate) fn even_environment() -> ShLight {
 }
 
 /// What the network of turns expects in the direction that was taken and in the other one, degrees.
-pub(crate) fn expecting(this: f32, other: f32) -> HypothesisFigures {
-    HypothesisFigures {
-        phase: PhaseHypothesis::First,
-        phases: vec![PhaseFigure {
-            phase: PhaseHypothesis::First,
-            expected_error_deg: this,
-        }],
+pub(crate) fn expecting(this: f32, other: f32) -> NetworkFigures {
+    NetworkFigures {
+        expected_error_deg: this,
         other_direction_deg: other,
     }
 }
@@ -233,13 +227,13 @@ pub(crate) fn knowing(surface: &Surface, expected_deg: f32) -> TurnPrediction {
             let [red, green, blue] = albedo.pixel(x, y);
             [2.0 * red, 3.0 * green, 0.5 * blue]
         })),
-        hypotheses: expecting(expected_deg, 2.0 * expected_deg),
+        figures: expecting(expected_deg, 2.0 * expected_deg),
     }
 }
 
 /// A turn that was read with its rotation given, and what was found of it.
 pub(crate) fn solved(mut turn: ReadTurn, solution: TurnSolution) -> SolvedTurn {
-    turn.rotation.source = RotationSource::Given;
+    turn.rotation.source = FactSource::Given;
     SolvedTurn {
         turn,
         solution,

@@ -4,17 +4,14 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Subcommand, ValueEnum};
-use relight_core::files::write_png;
-use relight_core::image::{Depth, Planes, Transfer};
+use clap::{Args, Subcommand};
+use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
-    EvalError, HighlightMethod, InsertionRecipe, IntrinsicBaseline, IntrinsicInput,
-    IntrinsicMethod, LightMethod, NormalMethod, OrdinalMethod, Predictions, RelightMethod,
-    RelightingRecipe, RelightingSet, ScoreTable, TurnMethod, TurnSet, evaluate_highlights,
-    evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal,
-    evaluate_relighting, evaluate_turns, make_relighting,
+    EvalProgress, IntrinsicInput, Predictions, RelightMethod, RelightingRecipe, RelightingSet,
+    ScoreTable, TurnMethod, evaluate_highlights, evaluate_intrinsic, evaluate_light,
+    evaluate_normals, evaluate_ordinal, evaluate_relighting, evaluate_turns, make_relighting,
 };
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
@@ -27,7 +24,6 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::commands::CommandResult;
-use crate::folder::make_folder;
 use crate::library::read_library;
 use crate::shipped;
 use crate::values::{Choices, DIFFUSE_FORMS, NORMALS_Y, TRANSFERS, one_of};
@@ -42,8 +38,6 @@ Examples:
       estimates out/net/<name>/normal.png on 500 images, spread over the set
   relight eval relighting --data relighting --make
       100 objects under 30 lights each, made by the renderer of `relight synth`
-  relight eval insertion --panoramas hdri -o insertion.json
-      24 objects in other pictures, with and without shadow, edge colours and relighting
   relight synth --turn --light monte-carlo --count 24 --frames 60 --size 128 --seed 2611 -o turns
   relight eval turn --data turns
       24 synthetic turns in rooms that no network was trained in";
@@ -84,8 +78,6 @@ enum Protocol {
     },
     /// Relighting: MSE and DSSIM of an object under many lights, from its image under one.
     Relighting(RelightingArguments),
-    /// Insertion: MSE and DSSIM of objects in other pictures, with and without each part of `relight insert`.
-    Insertion(InsertionArguments),
     /// Whole turns in unknown rooms: normals, albedo, and whether what is said to be sure is right.
     Turn(TurnArguments),
     /// Albedo as people judge it: WHDR on the folder of Intrinsic Images in the Wild.
@@ -101,18 +93,11 @@ struct TurnArguments {
     #[arg(long, value_name = "TEXT")]
     split: Option<String>,
     /// How turns are solved; may be given several times [default: all ways].
-    #[arg(long, value_enum, value_name = "HOW")]
-    method: Vec<TurnMethodName>,
+    #[arg(long, value_name = "HOW", value_parser = one_of(METHODS))]
+    method: Vec<TurnMethod>,
     /// Weights of the network of turns [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     turn_network: Option<PathBuf>,
-    /// Write twelve frames and the mask of each turn into this folder, as methods of universal photometric stereo read
-    /// them.
-    #[arg(long, value_name = "DIR")]
-    frames: Option<PathBuf>,
-    /// Draw errors beside what is expected of them, a diagram for each method, to this file (.png).
-    #[arg(long, value_name = "FILE")]
-    reliability: Option<PathBuf>,
     /// Write the table as JSON, with the scores of each turn, to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -192,53 +177,14 @@ struct RelightingArguments {
     panoramas: Option<PathBuf>,
 }
 
-#[derive(Args)]
-struct InsertionArguments {
-    /// How many objects to make, each with one new picture.
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    objects: u64,
-    /// Width and height of the pictures.
-    #[arg(long, value_name = "PIXELS", default_value_t = 192, value_parser = clap::value_parser!(u32).range(32..=1024))]
-    size: u32,
-    /// What objects, materials and lights are drawn from.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
-    /// Paint a part of each object black, which may be taken for shadow.
-    #[arg(long)]
-    black_paint: bool,
-    /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
-    #[arg(long, value_name = "DIR")]
-    meshes: Option<PathBuf>,
-    /// Panoramas (.hdr, .exr) in place of the synthetic ones.
-    #[arg(long, value_name = "DIR")]
-    panoramas: Option<PathBuf>,
-    /// The network's weights [default: those that come with the program].
-    #[arg(long, value_name = "FILE")]
-    weights: Option<PathBuf>,
-    /// Write a sheet for each object: photograph, new picture, ground truth, and each method's result.
-    #[arg(long, value_name = "DIR")]
-    sheets: Option<PathBuf>,
-    /// Write the table as JSON, with the scores of each image, to this file.
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum TurnMethodName {
-    /// In a light that is not known.
-    Turn,
-    /// In the true light.
-    Light,
-}
-
-impl From<TurnMethodName> for TurnMethod {
-    fn from(name: TurnMethodName) -> Self {
-        match name {
-            TurnMethodName::Turn => Self::UnknownLight,
-            TurnMethodName::Light => Self::KnownLight,
-        }
-    }
-}
+const METHODS: Choices<TurnMethod> = &[
+    (
+        "turn",
+        "In a light that is not known",
+        TurnMethod::UnknownLight,
+    ),
+    ("light", "In the true light", TurnMethod::KnownLight),
+];
 
 const INPUTS: Choices<IntrinsicInput> = &[
     ("diffuse", "Without highlights", IntrinsicInput::Diffuse),
@@ -255,17 +201,13 @@ impl Arguments {
             | Protocol::Highlight { set } => {
                 (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
             }
-            Protocol::Relighting(_)
-            | Protocol::Insertion(_)
-            | Protocol::Turn(_)
-            | Protocol::Whdr(_) => None,
+            Protocol::Relighting(_) | Protocol::Turn(_) | Protocol::Whdr(_) => None,
         }
     }
 
     /// The file for the table.
     fn output(&self) -> Option<&Path> {
         let common = match &self.protocol {
-            Protocol::Insertion(arguments) => return arguments.output.as_deref(),
             Protocol::Turn(arguments) => return arguments.output.as_deref(),
             Protocol::Mit { set, .. }
             | Protocol::Normals { set }
@@ -286,9 +228,9 @@ impl CommonArguments {
         self.split.clone().unwrap_or_else(named)
     }
 
-    fn predictions(&self) -> impl Iterator<Item = Predictions> {
+    fn predictions(&self) -> Vec<Predictions> {
         let folder = |path: &PathBuf| Predictions::new(path.clone(), self.transfer, self.normals_y);
-        self.predictions.iter().map(folder)
+        self.predictions.iter().map(folder).collect()
     }
 }
 
@@ -316,7 +258,6 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         Protocol::Highlight { set } => highlight(set, console).map(whole),
         Protocol::Relighting(arguments) => relighting(arguments, console),
         Protocol::Whdr(common) => ordinal(common, console).map(whole),
-        Protocol::Insertion(arguments) => insertion(arguments, console),
         Protocol::Turn(arguments) => return turns(arguments, console),
     }?;
     report(&table, arguments.output(), console)?;
@@ -326,42 +267,38 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 type Evaluated = Result<ScoreTable, Box<dyn Error>>;
 
 fn mit(arguments: &SetArguments, input: IntrinsicInput, console: Console) -> Evaluated {
-    let (set, split) = arguments.open()?;
-    let baselines = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
-    let methods = with_predictions(baselines, &arguments.common, IntrinsicMethod::Predictions);
-    let steps = set.names().len() * methods.len();
-    with_progress(steps, "evaluating", console, |progress| {
-        evaluate_intrinsic(&set, &split, input, &methods, progress)
+    let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
+    with_progress("evaluating", console, |progress| {
+        evaluate_intrinsic(&set, &split, input, &found, progress)
     })
 }
 
 fn normals(arguments: &SetArguments, console: Console) -> Evaluated {
-    let (set, split) = arguments.open()?;
-    let baselines = [NormalMethod::Viewer];
-    let methods = with_predictions(baselines, &arguments.common, NormalMethod::Predictions);
-    let steps = set.names().len() * methods.len();
-    with_progress(steps, "evaluating", console, |progress| {
-        evaluate_normals(&set, &split, &methods, progress)
+    let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
+    with_progress("evaluating", console, |progress| {
+        evaluate_normals(&set, &split, &found, progress)
     })
 }
 
 fn light(arguments: &SetArguments, form: DiffuseForm, console: Console) -> Evaluated {
-    let (set, split) = arguments.open()?;
-    let baselines = [LightMethod::Even, LightMethod::Oracle];
-    let methods = with_predictions(baselines, &arguments.common, LightMethod::Predictions);
-    let steps = set.names().len() * methods.len();
-    with_progress(steps, "evaluating", console, |progress| {
-        evaluate_light(&set, &split, form, &methods, progress)
+    let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
+    with_progress("evaluating", console, |progress| {
+        evaluate_light(&set, &split, form, &found, progress)
     })
 }
 
 fn highlight(arguments: &SetArguments, console: Console) -> Evaluated {
-    let (set, split) = arguments.open()?;
-    let baselines = [HighlightMethod::Nothing];
-    let methods = with_predictions(baselines, &arguments.common, HighlightMethod::Predictions);
-    let steps = set.names().len() * methods.len();
-    with_progress(steps, "evaluating", console, |progress| {
-        evaluate_highlights(&set, &split, &methods, progress)
+    let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
+    with_progress("evaluating", console, |progress| {
+        evaluate_highlights(&set, &split, &found, progress)
+    })
+}
+
+fn ordinal(common: &CommonArguments, console: Console) -> Evaluated {
+    let images = JudgedImages::open(&common.data)?;
+    let (split, found) = (common.split("all of"), common.predictions());
+    with_progress("evaluating", console, |progress| {
+        evaluate_ordinal(&images, &split, &found, progress)
     })
 }
 
@@ -376,19 +313,20 @@ fn relighting(
     };
     let common = &arguments.common;
     let set = RelightingSet::open(&common.data)?;
-    let network = network(arguments.weights.as_deref())?;
-    let baselines = [
+    let network = match &arguments.weights {
+        None => shipped::decomposer()?,
+        Some(path) => Decomposer::new(&Weights::read(path)?)?,
+    };
+    let mut methods = vec![
         RelightMethod::Naive,
         RelightMethod::Photograph(&network),
         RelightMethod::Maps(&network),
         RelightMethod::Oracle(SpecularForm::Power),
         RelightMethod::Oracle(SpecularForm::Lobe),
     ];
-    let methods = with_predictions(baselines, common, |folder| {
-        RelightMethod::Predictions(folder, SpecularForm::Lobe)
-    });
-    let steps = set.objects() * methods.len();
-    let table = with_progress(steps, "evaluating", console, |progress| {
+    let found = common.predictions().into_iter();
+    methods.extend(found.map(|folder| RelightMethod::Predictions(folder, SpecularForm::Lobe)));
+    let table = with_progress("evaluating", console, |progress| {
         evaluate_relighting(&set, &common.split("all of"), &methods, progress)
     })?;
     Ok((table, outcome))
@@ -408,55 +346,13 @@ fn make(arguments: &RelightingArguments, console: Console) -> CommandResult {
         panoramas: arguments.panoramas.clone(),
     };
     let (library, outcome) = read_library(&folders, console)?;
-    with_progress(recipe.objects, "making objects", console, |progress| {
+    with_progress("making objects", console, |progress| {
         make_relighting(&recipe, &library, &arguments.common.data, progress)
     })?;
     Ok(outcome)
 }
 
-fn insertion(
-    arguments: &InsertionArguments,
-    console: Console,
-) -> Result<(ScoreTable, Outcome), Box<dyn Error>> {
-    let recipe = InsertionRecipe {
-        objects: arguments.objects,
-        size: arguments.size,
-        seed: arguments.seed,
-        black_paint: arguments.black_paint,
-    };
-    let folders = Folders {
-        meshes: arguments.meshes.clone(),
-        textures: None,
-        panoramas: arguments.panoramas.clone(),
-    };
-    let (library, outcome) = read_library(&folders, console)?;
-    let network = network(arguments.weights.as_deref())?;
-    if let Some(folder) = &arguments.sheets {
-        make_folder(folder)?;
-    }
-    let mut show = |name: &str, tiles: &[Planes<3>]| match &arguments.sheets {
-        None => Ok(()),
-        Some(folder) => {
-            let sheet = Planes::sheet(tiles, tiles.len().div_ceil(2))?;
-            Ok::<(), EvalError>(write_png(
-                &folder.join(format!("{name}.png")),
-                &sheet,
-                Depth::Eight,
-            )?)
-        }
-    };
-    let objects = arguments.objects as usize;
-    let table = with_progress(objects, "inserting", console, |progress| {
-        evaluate_insertion(&recipe, &library, &network, &mut show, progress)
-    })?;
-    Ok((table, outcome))
-}
-
 fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
-    let set = TurnSet::open(&arguments.data)?;
-    if let Some(folder) = &arguments.frames {
-        set.write_frames(folder)?;
-    }
     let weights = match &arguments.turn_network {
         Some(path) => Weights::read(path)?,
         None => shipped::turn_weights()?,
@@ -471,61 +367,29 @@ fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
         .unwrap_or(arguments.data.as_os_str());
     let own = name.to_string_lossy().into_owned();
     let split = arguments.split.clone().unwrap_or(own);
-    let methods: Vec<TurnMethod> = if arguments.method.is_empty() {
-        TurnMethod::ALL.to_vec()
-    } else {
-        arguments.method.iter().map(|&name| name.into()).collect()
+    let methods = match arguments.method.as_slice() {
+        [] => &TurnMethod::ALL,
+        methods => methods,
     };
-    let table = with_progress(set.len() * methods.len(), "solving", console, |progress| {
-        evaluate_turns(&set, &split, &methods, &networks, progress)
+    let table = with_progress("solving", console, |progress| {
+        evaluate_turns(&arguments.data, &split, methods, &networks, progress)
     })?;
-    if let Some(path) = &arguments.reliability {
-        table.write_reliability(path)?;
-    }
     write_json(&table, arguments.output.as_deref())?;
     let event = json!({ "event": "table", "table": table });
     console.say(table.to_string().trim_end(), &event);
     Ok(Outcome::Whole)
 }
 
-fn network(weights: Option<&Path>) -> Result<Decomposer, Box<dyn Error>> {
-    Ok(match weights {
-        None => shipped::decomposer()?,
-        Some(path) => Decomposer::new(&Weights::read(path)?)?,
-    })
-}
-
-fn ordinal(common: &CommonArguments, console: Console) -> Evaluated {
-    let images = JudgedImages::open(&common.data)?;
-    let baselines = [
-        OrdinalMethod::ConstantAlbedo,
-        OrdinalMethod::ConstantShading,
-    ];
-    let methods = with_predictions(baselines, common, OrdinalMethod::Predictions);
-    let steps = images.len() * methods.len();
-    with_progress(steps, "evaluating", console, |progress| {
-        evaluate_ordinal(&images, &common.split("all of"), &methods, progress)
-    })
-}
-
-/// The baselines, and the folders of predictions as methods.
-fn with_predictions<M, const N: usize>(
-    baselines: [M; N],
-    common: &CommonArguments,
-    method: impl Fn(Predictions) -> M,
-) -> Vec<M> {
-    let predicted = common.predictions().map(method);
-    baselines.into_iter().chain(predicted).collect()
-}
-
 fn with_progress<T, E: Error + 'static>(
-    steps: usize,
     label: &'static str,
     console: Console,
-    work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, E>,
+    work: impl FnOnce(EvalProgress<'_>) -> Result<T, E>,
 ) -> Result<T, Box<dyn Error>> {
-    let bar = console.progress(steps as u64, label);
-    let result = work(&|| bar.inc(1));
+    let bar = console.progress(0, label);
+    let result = work(&|steps| {
+        bar.set_length(steps as u64);
+        bar.inc(1);
+    });
     bar.finish_and_clear();
     Ok(result?)
 }

@@ -11,7 +11,7 @@ use relight_core::image::{Extent, encode_exr};
 use relight_core::light::{Panorama, ShLight};
 use relight_export::frames::write_frames;
 use relight_export::glb::to_glb;
-use relight_export::lamp::{TableTurn, TurnLamp};
+use relight_export::lamp::TurnLamp;
 use relight_export::layers::to_layers;
 use relight_export::mesh::{MeshShape, ObjectMesh};
 use relight_export::source::read_object;
@@ -129,13 +129,12 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 }
 
 fn run_frames(arguments: &Arguments, frames: u32, console: Console) -> CommandResult {
-    let doubt = match &arguments.lamps {
-        None => None,
-        Some(folder) => lamp_doubt(folder, &arguments.input)?,
-    };
-    let lamp = match &arguments.lamps {
-        None => None,
-        Some(folder) => Some(lamp(folder)?),
+    let (lamp, doubt) = match &arguments.lamps {
+        None => (None, None),
+        Some(folder) => {
+            let (lamp, doubt) = lamp(folder, &arguments.input)?;
+            (Some(lamp), doubt)
+        }
     };
     let output = &arguments.output;
     let written = write_frames(&arguments.input, output, frames, lamp.as_ref())?;
@@ -164,37 +163,32 @@ fn run_frames(arguments: &Arguments, frames: u32, console: Console) -> CommandRe
     Ok(outcome)
 }
 
-/// What is read of `light.json`.
-#[derive(Deserialize)]
-struct LightFigures {
-    elevation: LightElevation,
-    rotation: LightRotation,
-}
-
-#[derive(Deserialize)]
-struct LightRotation {
-    direction: RotationDirection,
-}
-
-#[derive(Deserialize)]
-struct LightElevation {
-    degrees: f64,
-}
-
 /// What is read of `turn.json`.
 #[derive(Deserialize)]
-struct SolvedTurn {
+struct TurnFigures {
     turn: String,
-    conditioning: SolvedConditioning,
+    conditioning: Conditioning,
+    elevation: Elevation,
+    rotation: Rotation,
 }
 
 #[derive(Deserialize)]
-struct SolvedConditioning {
+struct Conditioning {
     verdict: String,
 }
 
-/// Checks that the folder is of this turn, and says what is wrong with its light, if anything is.
-fn lamp_doubt(folder: &Path, shard: &Path) -> Result<Option<String>, Box<dyn Error>> {
+#[derive(Deserialize)]
+struct Elevation {
+    degrees: f64,
+}
+
+#[derive(Deserialize)]
+struct Rotation {
+    direction: RotationDirection,
+}
+
+/// The lamp of the turn `shard` that was solved into a folder, and what is wrong with its light, if anything is.
+fn lamp(folder: &Path, shard: &Path) -> Result<(TurnLamp, Option<String>), Box<dyn Error>> {
     let path = folder.join("turn.json");
     let wrong = |reason: String| ExportError::Figures {
         path: path.clone(),
@@ -202,7 +196,7 @@ fn lamp_doubt(folder: &Path, shard: &Path) -> Result<Option<String>, Box<dyn Err
     };
     let json = fs::read(&path)
         .map_err(|error| wrong(format!("{error}; --lamps takes a folder of relight turn")))?;
-    let solved: SolvedTurn =
+    let solved: TurnFigures =
         serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
     let name = shard.file_stem().unwrap_or_default().to_string_lossy();
     if solved.turn != name {
@@ -216,29 +210,10 @@ fn lamp_doubt(folder: &Path, shard: &Path) -> Result<Option<String>, Box<dyn Err
             folder.display()
         )
     };
-    Ok((!is_fit).then(doubt))
-}
-
-/// The lamp of a turn that was solved into a folder.
-fn lamp(folder: &Path) -> Result<TurnLamp, Box<dyn Error>> {
     let light = ShLight::read(&folder.join("light.txt"))?;
-    let path = folder.join("light.json");
-    let wrong = |reason: String| ExportError::Figures {
-        path: path.clone(),
-        reason,
-    };
-    let json = fs::read(&path).map_err(|error| wrong(error.to_string()))?;
-    let figures: LightFigures =
-        serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
-    let turn = match figures.rotation.direction {
-        RotationDirection::CounterClockwise => TableTurn::CounterClockwise,
-        RotationDirection::Clockwise => TableTurn::Clockwise,
-    };
-    Ok(TurnLamp::new(
-        &light,
-        figures.elevation.degrees.to_radians(),
-        turn,
-    )?)
+    let elevation = solved.elevation.degrees.to_radians();
+    let lamp = TurnLamp::new(&light, elevation, solved.rotation.direction)?;
+    Ok((lamp, (!is_fit).then(doubt)))
 }
 
 fn glb(arguments: &Arguments, object: &CapturedObject) -> Result<Vec<u8>, Box<dyn Error>> {

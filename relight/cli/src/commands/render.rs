@@ -63,7 +63,7 @@ pub(crate) struct Arguments {
 
 #[derive(Args)]
 struct ObjectArguments {
-    /// A captured object, which relight turn --asset has written, in place of maps.
+    /// A captured object, which relight turn has written (object.relit), in place of maps.
     #[arg(value_name = "OBJECT.relit", conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
     asset: Option<PathBuf>,
     /// Normals: PNG of 8 or 16 bits, colours (n + 1) / 2, black outside; or EXR of vectors. x right, z to the viewer.

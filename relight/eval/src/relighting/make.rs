@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::method::shown;
 use super::set::{FILE, Index, ObjectEntry, Part, SCHEMA, light_file, object_folder};
+use crate::predictions::NO_SET;
 use crate::{EvalError, EvalProgress};
 use relight_core::files::write_png;
 use relight_core::image::{Depth, Rgb};
@@ -177,7 +178,7 @@ pub fn make_relighting(
         .into_par_iter()
         .map(|number| {
             let entry = make_object(recipe, library, &lightings, out, number)?;
-            progress();
+            progress(recipe.objects);
             Ok(entry)
         })
         .collect::<Result<_, EvalError>>()?;
@@ -191,10 +192,7 @@ pub fn make_relighting(
 }
 
 fn write_json(path: &Path, content: &impl Serialize) -> Result<(), EvalError> {
-    let bytes = serde_json::to_vec_pretty(content).map_err(|source| EvalError::Description {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = serde_json::to_vec_pretty(content).map_err(EvalError::file(path, NO_SET))?;
     write_whole(path, &bytes).map_err(EvalError::write(path))
 }
 

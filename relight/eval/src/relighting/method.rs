@@ -11,6 +11,9 @@ use relight_core::render::{DiffuseForm, Gloss, Layers, SpecularForm, Surface};
 use relight_photo::decompose::{DecomposeOptions, Decomposer, Decomposition, SpecularGate};
 use relight_photo::insert::{MaterialChange, Subject};
 
+/// What cannot be done with an object.
+const NOT_RELIT: &str = "cannot be decomposed or shown in other light";
+
 /// Where relit images come from.
 #[derive(Debug, Clone)]
 pub enum RelightMethod<'d> {
@@ -81,10 +84,8 @@ impl RelightMethod<'_> {
                 let mask = &photo.mask;
                 let subject =
                     Subject::new(&photo.picture, mask, Some(mask), decomposer, &photo.options);
-                let subject = Box::new(subject.map_err(|source| EvalError::Insertion {
-                    sample: object.name.clone(),
-                    source: Box::new(source),
-                })?);
+                let subject =
+                    Box::new(subject.map_err(EvalError::sample(&object.name, NOT_RELIT))?);
                 Ok(Relight::Subject {
                     set,
                     object,
@@ -99,10 +100,7 @@ impl RelightMethod<'_> {
                     options,
                 } = Photographed::of(set, object, part)?;
                 let found = decomposer.decompose(&picture, &mask, &options);
-                let found = found.map_err(|source| EvalError::Insertion {
-                    sample: object.name.clone(),
-                    source: Box::new(source.into()),
-                })?;
+                let found = found.map_err(EvalError::sample(&object.name, NOT_RELIT))?;
                 let white = mean_irradiance(&set.lights()[object.input]);
                 rendered(surface_of(found, white)?, SpecularForm::Lobe)
             }
@@ -217,10 +215,7 @@ impl Relight<'_> {
                 let exposure = mean_irradiance(subject.light()) / mean_irradiance(new);
                 let new = new.clone().tinted([f64::from(exposure); 3]);
                 let colours = subject.relit(&new, &MaterialChange::default());
-                let colours = colours.map_err(|source| EvalError::Insertion {
-                    sample: object.name.clone(),
-                    source: Box::new(source),
-                })?;
+                let colours = colours.map_err(EvalError::sample(&object.name, NOT_RELIT))?;
                 let image = shown(subject.in_place(&photo.picture, &colours));
                 Ok(cut_out(&image, &object.mask))
             }

@@ -10,7 +10,7 @@ pub use make::{RelightingRecipe, make_relighting};
 pub use method::RelightMethod;
 pub use set::RelightingSet;
 
-use super::run::{Scored, add_lines, each};
+use super::run::{NOT_MEASURED, Scored, add_lines, each};
 use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
 use relight_core::image::Planes;
 use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
@@ -26,20 +26,18 @@ pub fn evaluate_relighting(
     methods: &[RelightMethod<'_>],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "relighting".to_owned(),
-        notes: vec![
-            set.about(),
-            "one image in; out the images under all other lights; images: how many were compared"
-                .to_owned(),
-            format!("SSIM by {}", Ssim::Gaussian.name()),
-        ],
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
+    let notes = vec![
+        set.about(),
+        "one image in; out the images under all other lights; images: how many were compared"
+            .to_owned(),
+        format!("SSIM by {}", Ssim::Gaussian.name()),
+    ];
+    let mut table = ScoreTable::new("relighting", notes);
+    let steps = methods.len() * set.objects();
+    let progress = || progress(steps);
     let targets = set.lights().len().saturating_sub(1);
     for method in methods {
-        let scored = each(set.objects(), progress, object_folder, |number| {
+        let scored = each(set.objects(), &progress, object_folder, |number| {
             score(set, &set.object(number)?, method)
         })?;
         add_lines(&mut table, &method.name(), split, targets, scored);
@@ -91,13 +89,10 @@ fn compare(
     found: &Planes<3>,
     mask: &[bool],
 ) -> Result<(f64, f64), EvalError> {
-    let failed = |source| EvalError::Metric {
-        sample: object.name.clone(),
-        source,
-    };
     let (truth_planes, found_planes) = (truth.planes(), found.planes());
     let pair = Comparison::new(truth.extent(), &truth_planes, &found_planes, mask);
-    let pair = pair.map_err(failed)?;
-    let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed)?;
+    let failed = || EvalError::sample(&object.name, NOT_MEASURED);
+    let pair = pair.map_err(failed())?;
+    let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed())?;
     Ok((pair.mse(ScaleFit::None), dssim(ssim)))
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::EvalError;
-use crate::predictions::read_light;
+use crate::predictions::{NO_SET, read_light};
 use relight_core::files::read_planes;
 use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, ShLight, YUp};
@@ -95,24 +95,14 @@ impl RelightingSet {
     /// Opens the set in the folder `root`.
     ///
     /// # Errors
-    /// [`EvalError::Read`], [`EvalError::Description`], [`EvalError::Light`].
+    /// Where a file of it cannot be read, or is of another version.
     pub fn open(root: &Path) -> Result<Self, EvalError> {
         let path = root.join(FILE);
-        let bytes = fs::read(&path).map_err(|source| EvalError::Read {
-            path: path.clone(),
-            source,
-        })?;
+        let bytes = fs::read(&path).map_err(EvalError::read(&path))?;
         let index: Index =
-            serde_json::from_slice(&bytes).map_err(|source| EvalError::Description {
-                path: path.clone(),
-                source,
-            })?;
+            serde_json::from_slice(&bytes).map_err(EvalError::file(&path, NO_SET))?;
         if index.schema != SCHEMA {
-            return Err(EvalError::Schema {
-                path,
-                found: index.schema,
-                expected: SCHEMA,
-            });
+            return Err(EvalError::schema(&path, &index.schema, SCHEMA));
         }
         let lights = (0..index.lights.len())
             .map(|number| read_light(&light_file(root, number)))
@@ -183,11 +173,7 @@ pub(super) fn read_image(path: PathBuf, expected: Extent) -> Result<Planes<3>, E
     if planes.extent() == expected {
         return Ok(planes);
     }
-    Err(EvalError::Size {
-        path,
-        found: planes.extent(),
-        expected,
-    })
+    Err(EvalError::size(&path, planes.extent(), expected))
 }
 
 pub(super) fn object_folder(number: usize) -> String {

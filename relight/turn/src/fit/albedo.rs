@@ -8,24 +8,14 @@ use rayon::prelude::*;
 use crate::fit::curve_statistics::CurveStatistics;
 use crate::observe::curves::TurnCurves;
 
-/// Parameters of the smoothed albedo.
-struct AlbedoParameters {
-    /// Expected error of a normal at which its pixel's own albedo counts one half, radians. By hand.
-    half_error: f64,
-    /// Standard deviation of the surroundings, in widths of the frame. By hand.
-    reach: f64,
-    /// Pixels that are looked at, from the middle to two standard deviations. By hand.
-    taps: isize,
-    /// Standard deviation of chromaticities of one surface. By hand.
-    same_colour: f64,
-}
-
-const PARAMETERS: AlbedoParameters = AlbedoParameters {
-    half_error: 0.14,
-    reach: 1.0 / 32.0,
-    taps: 8,
-    same_colour: 0.05,
-};
+/// Expected error of a normal at which its pixel's own albedo counts one half, radians. By hand.
+const HALF_ERROR: f64 = 0.14;
+/// Standard deviation of the surroundings, in widths of the frame. By hand.
+const REACH: f64 = 1.0 / 32.0;
+/// Pixels that are looked at, from the middle to two standard deviations. By hand.
+const TAPS: isize = 8;
+/// Standard deviation of chromaticities of one surface. By hand.
+const SAME_COLOUR: f64 = 0.05;
 
 /// The albedo of each pixel, shrunk toward those of the same colour around it as far as its normal is expected to be
 /// off, radians.
@@ -40,12 +30,12 @@ pub(crate) fn shared(curves: &TurnCurves, albedo: &[[f64; 3]], errors: &[f64]) -
         .collect();
     let confidence: Vec<f64> = errors
         .iter()
-        .map(|error| 1.0 / (1.0 + (error / PARAMETERS.half_error).powi(2)))
+        .map(|error| 1.0 / (1.0 + (error / HALF_ERROR).powi(2)))
         .collect();
-    let deviation = PARAMETERS.reach * extent.width as f64;
-    let step = (2.0 * deviation / PARAMETERS.taps as f64).max(1.0);
-    let around: Vec<(isize, isize, f64)> = (-PARAMETERS.taps..=PARAMETERS.taps)
-        .flat_map(|down| (-PARAMETERS.taps..=PARAMETERS.taps).map(move |right| (down, right)))
+    let deviation = REACH * extent.width as f64;
+    let step = (2.0 * deviation / TAPS as f64).max(1.0);
+    let around: Vec<(isize, isize, f64)> = (-TAPS..=TAPS)
+        .flat_map(|down| (-TAPS..=TAPS).map(move |right| (down, right)))
         .map(|(down, right)| {
             let [down, right] = [down, right].map(|taps| (taps as f64 * step).round());
             let square = (down * down + right * right) / (deviation * deviation);
@@ -69,8 +59,7 @@ pub(crate) fn shared(curves: &TurnCurves, albedo: &[[f64; 3]], errors: &[f64]) -
                 let apart: f64 = (0..3)
                     .map(|c| (colours[pixel][c] - colours[other][c]).powi(2))
                     .sum();
-                let alike =
-                    (-0.5 * apart / (PARAMETERS.same_colour * PARAMETERS.same_colour)).exp();
+                let alike = (-0.5 * apart / (SAME_COLOUR * SAME_COLOUR)).exp();
                 let weight = near * alike * confidence[other] * confidence[other];
                 for (sum, albedo) in sum.iter_mut().zip(albedo[other]) {
                     *sum += weight * albedo;

@@ -14,35 +14,22 @@ use crate::model::frame::Elevation;
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 
-/// Parameters of the expected errors.
-pub(crate) struct ErrorParameters {
-    /// Least smoothing of a map of normals, standard deviation in pixels. By hand.
-    least_blur: f64,
-    /// Standard deviation of a pixel's surroundings, in widths of the frame. By hand.
-    surroundings: f64,
-    /// Degrees of freedom of the residual of a curve. Measured: fitted to the angles that the standard deviation stands
-    /// for.
-    pub(crate) freedom: f64,
-    /// Median residual from which differences to the surroundings are doubted in full, over the energy of the
-    /// variation. By hand.
-    relative_residual: f64,
-    /// Error that all normals have in common, radians, by shade in hollows and bounced light. By hand: 5 degrees.
-    common: f64,
-    /// Error of normals where the turn does not determine them, radians. By hand.
-    pub(crate) unobservable: f64,
-    /// Error of a normal nearly all of whose light is clipped, radians. By hand.
-    clipped: f64,
-}
-
-pub(crate) const ERROR_PARAMETERS: ErrorParameters = ErrorParameters {
-    least_blur: 0.6,
-    surroundings: 1.0 / 40.0,
-    freedom: 3.0,
-    relative_residual: 0.005,
-    common: 0.08,
-    unobservable: 1.0,
-    clipped: 0.8,
-};
+/// Least smoothing of a map of normals, standard deviation in pixels. By hand.
+const LEAST_BLUR: f64 = 0.6;
+/// Standard deviation of a pixel's surroundings, in widths of the frame. By hand.
+const SURROUNDINGS: f64 = 1.0 / 40.0;
+/// Degrees of freedom of the residual of a curve. Measured: fitted to the angles that the standard deviation stands
+/// for.
+pub(crate) const FREEDOM: f64 = 3.0;
+/// Median residual from which differences to the surroundings are doubted in full, over the energy of the
+/// variation. By hand.
+const RELATIVE_RESIDUAL: f64 = 0.005;
+/// Error that all normals have in common, radians, by shade in hollows and bounced light. By hand: 5 degrees.
+const COMMON: f64 = 0.08;
+/// Error of normals where the turn does not determine them, radians. By hand.
+pub(crate) const UNOBSERVABLE: f64 = 1.0;
+/// Error of a normal nearly all of whose light is clipped, radians. By hand.
+const CLIPPED: f64 = 0.8;
 
 /// The pixels of a turn as they are fitted.
 #[derive(Debug, Clone, Copy)]
@@ -74,13 +61,8 @@ impl OwnError {
 
 /// What all normals of a turn are expected to be off, radians.
 pub(crate) fn common_error(elevation: Elevation, is_fit: bool) -> f64 {
-    let unobservable = if is_fit {
-        0.0
-    } else {
-        ERROR_PARAMETERS.unobservable
-    };
-    ERROR_PARAMETERS
-        .common
+    let unobservable = if is_fit { 0.0 } else { UNOBSERVABLE };
+    COMMON
         .hypot(elevation.uncertainty_deg().to_radians())
         .hypot(unobservable)
 }
@@ -94,12 +76,10 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
         fits,
     } = pixels;
     let search = Search::new(model);
-    let deviation = ERROR_PARAMETERS.surroundings * curves.extent().width as f64;
-    let surroundings = smoothed_normals(
-        curves,
-        deviation.max(ERROR_PARAMETERS.least_blur),
-        |pixel| fits[pixel].normal,
-    );
+    let deviation = SURROUNDINGS * curves.extent().width as f64;
+    let surroundings = smoothed_normals(curves, deviation.max(LEAST_BLUR), |pixel| {
+        fits[pixel].normal
+    });
     (0..fits.len())
         .into_par_iter()
         .map(|pixel| {
@@ -111,8 +91,8 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
                 };
             }
             let fit = &fits[pixel];
-            let deviation = search.standard_deviation(statistics, fit, ERROR_PARAMETERS.freedom);
-            let clipped = ERROR_PARAMETERS.clipped * curves.clipped_at(pixel);
+            let deviation = search.standard_deviation(statistics, fit, FREEDOM);
+            let clipped = CLIPPED * curves.clipped_at(pixel);
             let inconsistency = dot(surroundings[pixel], fit.normal);
             OwnError {
                 deviation: deviation.hypot(clipped),
@@ -130,7 +110,7 @@ pub(crate) fn shared_albedo(
     errors: &[OwnError],
 ) -> Vec<[f64; 3]> {
     let residual = median(fits.iter().map(|fit| fit.residual)).unwrap_or(0.0);
-    let doubt = (residual / ERROR_PARAMETERS.relative_residual).min(1.0);
+    let doubt = (residual / RELATIVE_RESIDUAL).min(1.0);
     let error = |own: &OwnError| own.deviation.hypot(doubt * own.inconsistency);
     let errors: Vec<f64> = errors.iter().map(error).collect();
     let albedo: Vec<[f64; 3]> = fits.iter().map(|fit| fit.albedo).collect();

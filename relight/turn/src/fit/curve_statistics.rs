@@ -9,20 +9,12 @@ use crate::observe::curves::TurnCurves;
 /// Products of two harmonics.
 pub(crate) const PAIRS: usize = COEFFICIENTS * (COEFFICIENTS + 1) / 2;
 
-/// Parameters of the least-squares fit of a curve.
-struct StatisticsParameters {
-    /// Weight of the mean of a curve beside its variation, 0 to 1. By hand: shade in hollows and bounced light change
-    /// the mean more than the harmonics.
-    mean_weight: f64,
-    /// Share of a curve's energy that counts as variation in any case, 0 to 1. Numerical: it keeps residuals of even
-    /// curves finite.
-    variation_floor: f64,
-}
-
-const PARAMETERS: StatisticsParameters = StatisticsParameters {
-    mean_weight: 0.1,
-    variation_floor: 0.01,
-};
+/// Weight of the mean of a curve beside its variation, 0 to 1. By hand: shade in hollows and bounced light change
+/// the mean more than the harmonics.
+const MEAN_WEIGHT: f64 = 0.1;
+/// Share of a curve's energy that counts as variation in any case, 0 to 1. Numerical: it keeps residuals of even
+/// curves finite.
+const VARIATION_FLOOR: f64 = 0.01;
 
 /// The normal equations of a pixel: with weights w, harmonics b and values v, the sums of w b v, of w b b and of
 /// w v v for each channel, where the mean of the curve counts by `mean_weight`.
@@ -167,10 +159,10 @@ impl CurveStatistics {
                 continue;
             }
             // What the mean contributes, by the Schur complement of the constant.
-            let part = 1.0 - PARAMETERS.mean_weight;
+            let part = 1.0 - MEAN_WEIGHT;
             let mean = right[0] / count;
             let centred = self.energy[channel] - mean * right[0];
-            variation += centred.max(0.0) + PARAMETERS.variation_floor * self.energy[channel];
+            variation += centred.max(0.0) + VARIATION_FLOOR * self.energy[channel];
             self.energy[channel] -= part * mean * right[0];
             for j in 0..COEFFICIENTS {
                 let first = products[pair(0, j)];

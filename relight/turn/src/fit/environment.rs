@@ -8,33 +8,22 @@ use crate::error::TurnError;
 use crate::fit::curve_statistics::CurveStatistics;
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
-use crate::model::gloss::{GLOSS_TERMS, GlossLight, gloss_terms};
+use crate::model::gloss::{GLOSS_TERMS, GlossLight, MIRROR, gloss_terms, mirror_terms};
 use crate::model::harmonics::HarmonicTerm;
 use crate::model::lighting::{TERMS, TableLight, lambertian_terms};
 use crate::model::material::MaterialKind;
-use crate::model::metal::{MIRROR, mirror_terms};
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 
-/// Parameters of the fit of the light.
-struct EnvironmentParameters {
-    /// Ridge of the light's terms, relative to the normal equations. Numerical: light that the normals hardly show
-    /// stays small.
-    ridge: f64,
-    /// The same of the terms of gloss, in parts of the diffuse light. Numerical.
-    gloss_ridge: f64,
-    /// Residual up to which a known surface has no gloss, over the curves' energy. By hand.
-    lambertian_residual: f64,
-    /// Least part of band 2 that gloss shows if its higher bands are to tell of the light. By hand.
-    least_gloss: f64,
-}
-
-const PARAMETERS: EnvironmentParameters = EnvironmentParameters {
-    ridge: 1e-5,
-    gloss_ridge: 1e-4,
-    lambertian_residual: 1e-3,
-    least_gloss: 0.01,
-};
+/// Ridge of the light's terms, relative to the normal equations. Numerical: light that the normals hardly show
+/// stays small.
+const RIDGE: f64 = 1e-5;
+/// The same of the terms of gloss, in parts of the diffuse light. Numerical.
+const GLOSS_RIDGE: f64 = 1e-4;
+/// Residual up to which a known surface has no gloss, over the curves' energy. By hand.
+const LAMBERTIAN_RESIDUAL: f64 = 1e-3;
+/// Least part of band 2 that gloss shows if its higher bands are to tell of the light. By hand.
+const LEAST_GLOSS: f64 = 0.01;
 
 /// The light that fits the curves of a known surface best: of a ball whose albedo is known, say, or of an object with
 /// its truth. Pixels without a normal do not count. It is in the viewer's frame at the table's angle 0. Bands beyond
@@ -50,10 +39,11 @@ pub fn fit_turn_light(
     frame: &TableFrame,
 ) -> Result<ShLight, TurnError> {
     if surface.extent() != curves.extent() {
-        return Err(TurnError::SurfaceSize {
-            found: surface.extent(),
-            expected: curves.extent(),
-        });
+        let [found, expected] = [surface.extent(), curves.extent()]
+            .map(|size| format!("{} x {}", size.width, size.height));
+        return Err(TurnError::Frames(format!(
+            "the surface has {found} pixels, and the frames {expected}"
+        )));
     }
     let (normals, albedo) = (surface.normals().planes(), surface.albedo().planes());
     let width = curves.extent().width;
@@ -78,7 +68,7 @@ pub fn fit_turn_light(
     let pixels = pixels(&statistics, &known, frame);
     let (diffuse, none) =
         fit_light(&pixels, &colours, Finish::Lambertian).ok_or(TurnError::NoLight)?;
-    let light = if residual(&pixels, &colours, (&diffuse, &none)) < PARAMETERS.lambertian_residual {
+    let light = if residual(&pixels, &colours, (&diffuse, &none)) < LAMBERTIAN_RESIDUAL {
         diffuse.coefficients()?
     } else {
         let (light, gloss) =
@@ -93,7 +83,7 @@ fn with_higher_bands(light: ShLight, gloss: &GlossLight) -> Result<ShLight, Turn
     let shown = gloss.light()?;
     let second = GlossLight::bands(&light).split_off(2);
     let factor = gloss.attenuation_of(&second[0]);
-    if factor <= PARAMETERS.least_gloss {
+    if factor <= LEAST_GLOSS {
         return Ok(light);
     }
     let mut coefficients = light.coefficients().to_vec();
@@ -142,7 +132,7 @@ fn fit_reflection(
             }
             add(&mut equations, (statistics, channel), &terms);
         }
-        equations.add_ridge(1, PARAMETERS.ridge);
+        equations.add_ridge(1, RIDGE);
         for (term, [value, ..]) in shown.iter_mut().zip(equations.solve()?) {
             *term = value;
         }
@@ -239,8 +229,8 @@ fn fit_light(
                 diffuse.chain(pixel.gloss[..free].iter().copied()).collect();
             add(&mut equations, (pixel.statistics, channel), &terms);
         }
-        equations.add_ridge(1, PARAMETERS.ridge);
-        equations.add_ridge(TERMS, PARAMETERS.gloss_ridge);
+        equations.add_ridge(1, RIDGE);
+        equations.add_ridge(TERMS, GLOSS_RIDGE);
         let found = equations.solve()?;
         let all = light[channel].iter_mut().chain(&mut gloss[channel]);
         for (term, [value, ..]) in all.zip(found) {

@@ -12,36 +12,22 @@ use crate::fit::search::{PixelFit, Search, cost, search_all};
 use crate::fit::unknowns::Unknowns;
 use crate::model::shading::ShadingModel;
 
-/// Parameters of the joint optimisation.
-struct JointParameters {
-    /// Damping of the first step, relative to the diagonal (Levenberg-Marquardt). Numerical.
-    damping: f64,
-    /// Factor of the damping after a step that lowers the cost. Numerical.
-    damping_fall: f64,
-    /// Factor of the damping after one that does not. Numerical.
-    damping_rise: f64,
-    /// Damping at which the steps end. Numerical.
-    most_damping: f64,
-    /// Relative gain of a step below which the steps end. Numerical.
-    settled: f64,
-    /// Pixels that one task adds up. Fixed, so that sums do not depend on the number of threads.
-    chunk: usize,
-    /// Residual at which a pixel counts one quarter, in medians. By hand.
-    outlier: f64,
-    /// Least residual that is taken for the median, over the energy of the variation. Numerical.
-    least_median: f64,
-}
-
-const PARAMETERS: JointParameters = JointParameters {
-    damping: 1e-3,
-    damping_fall: 0.2,
-    damping_rise: 10.0,
-    most_damping: 1e3,
-    settled: 2e-3,
-    chunk: 128,
-    outlier: 4.0,
-    least_median: 1e-3,
-};
+/// Damping of the first step, relative to the diagonal (Levenberg-Marquardt). Numerical.
+const DAMPING: f64 = 1e-3;
+/// Factor of the damping after a step that lowers the cost. Numerical.
+const DAMPING_FALL: f64 = 0.2;
+/// Factor of the damping after one that does not. Numerical.
+const DAMPING_RISE: f64 = 10.0;
+/// Damping at which the steps end. Numerical.
+const MOST_DAMPING: f64 = 1e3;
+/// Relative gain of a step below which the steps end. Numerical.
+const SETTLED: f64 = 2e-3;
+/// Pixels that one task adds up. Fixed, so that sums do not depend on the number of threads.
+const CHUNK: usize = 128;
+/// Residual at which a pixel counts one quarter, in medians. By hand.
+const OUTLIER: f64 = 4.0;
+/// Least residual that is taken for the median, over the energy of the variation. Numerical.
+const LEAST_MEDIAN: f64 = 1e-3;
 
 /// Pixels whose shading model is fitted.
 #[derive(Debug, Clone, Copy)]
@@ -74,7 +60,7 @@ impl JointOptimisation<'_> {
         steps: usize,
     ) -> (ShadingModel, Vec<PixelFit>) {
         let (mut estimate, mut fits) = (self.unknowns.estimate(&model), fits);
-        let mut damping = PARAMETERS.damping;
+        let mut damping = DAMPING;
         let mut least = cost(&fits);
         for _ in 0..steps {
             let model = self.unknowns.model(&estimate);
@@ -88,13 +74,13 @@ impl JointOptimisation<'_> {
             if reached < least {
                 let gain = (least - reached) / least;
                 (estimate, fits, least) = (other, found, reached);
-                damping *= PARAMETERS.damping_fall;
-                if gain < PARAMETERS.settled {
+                damping *= DAMPING_FALL;
+                if gain < SETTLED {
                     break;
                 }
             } else {
-                damping *= PARAMETERS.damping_rise;
-                if damping > PARAMETERS.most_damping {
+                damping *= DAMPING_RISE;
+                if damping > MOST_DAMPING {
                     break;
                 }
             }
@@ -107,12 +93,11 @@ impl JointOptimisation<'_> {
         let weights = weights(fits);
         let (unknowns, count) = (&self.unknowns, self.unknowns.count());
         let search = Search::new(model);
-        let sums = (0..fits.len().div_ceil(PARAMETERS.chunk))
+        let sums = (0..fits.len().div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
                 let mut sums = JointEquations::new(count);
-                let pixels =
-                    chunk * PARAMETERS.chunk..((chunk + 1) * PARAMETERS.chunk).min(fits.len());
+                let pixels = chunk * CHUNK..((chunk + 1) * CHUNK).min(fits.len());
                 for pixel in pixels.filter(|&pixel| !self.statistics[pixel].is_dark()) {
                     let one = (&self.statistics[pixel], fits[pixel].normal);
                     sums.add_pixel(&search, unknowns, one, weights[pixel]);
@@ -129,9 +114,9 @@ impl JointOptimisation<'_> {
 fn weights(fits: &[PixelFit]) -> Vec<f64> {
     let median = median(fits.iter().map(|fit| fit.residual))
         .unwrap_or(0.0)
-        .max(PARAMETERS.least_median);
+        .max(LEAST_MEDIAN);
     let weight = |fit: &PixelFit| {
-        let size = fit.residual / (PARAMETERS.outlier * median);
+        let size = fit.residual / (OUTLIER * median);
         1.0 / (1.0 + size).powi(2)
     };
     fits.iter().map(weight).collect()

@@ -12,7 +12,6 @@ pub(crate) mod photo_albedo;
 pub(crate) mod probe_check;
 pub(crate) mod probe_light;
 pub(crate) mod residuals;
-pub(crate) mod robust;
 pub(crate) mod schur;
 pub(crate) mod search;
 pub(crate) mod smoothing;

@@ -3,13 +3,8 @@
 use crate::fit::curve_statistics::{CurveStatistics, sum_of_products};
 use crate::model::harmonics::COEFFICIENTS;
 
-/// Parameters of a step of a normal.
-struct NormalStepParameters {
-    /// Longest step of a normal, radians. By hand.
-    longest_step: f64,
-}
-
-const PARAMETERS: NormalStepParameters = NormalStepParameters { longest_step: 0.2 };
+/// Longest step of a normal, radians. By hand.
+const LONGEST_STEP: f64 = 0.2;
 
 /// The harmonics of a pixel, channel by channel, and how they change as its normal leans.
 #[derive(Debug, Clone, Copy)]
@@ -70,8 +65,8 @@ impl QuadraticCost {
             (uv * a - uu * b) / determinant,
         ];
         let length = step[0].hypot(step[1]);
-        if length > PARAMETERS.longest_step {
-            step.map(|value| value * PARAMETERS.longest_step / length)
+        if length > LONGEST_STEP {
+            step.map(|value| value * LONGEST_STEP / length)
         } else {
             step
         }

@@ -8,18 +8,10 @@ use relight_photo::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 use crate::error::TurnError;
 use crate::observe::curves::TurnCurves;
 
-/// Parameters of the albedo.
-struct AlbedoParameters {
-    /// Frames that are decomposed, spread over the turn. Measured: with twelve the error is no less.
-    frames: usize,
-    /// The least albedo that counts: darker ones are noise. Numerical.
-    darkest: f32,
-}
-
-const PARAMETERS: AlbedoParameters = AlbedoParameters {
-    frames: 4,
-    darkest: 1e-4,
-};
+/// Frames that are decomposed, spread over the turn. Measured: with twelve the error is no less.
+const FRAMES: usize = 4;
+/// The least albedo that counts: darker ones are noise. Numerical.
+const DARKEST: f32 = 1e-4;
 
 /// The albedo of the decomposing network: the geometric mean over a few frames of the turn, each of which the network
 /// sees in another light. Its unit is not known.
@@ -32,7 +24,7 @@ pub(crate) fn photo_albedo(
     mask: &Planes<1>,
 ) -> Result<Rgb<Linear>, TurnError> {
     let decomposer = Decomposer::new(weights)?;
-    let every = frames.len().div_ceil(PARAMETERS.frames).max(1);
+    let every = frames.len().div_ceil(FRAMES).max(1);
     let chosen = frames.iter().step_by(every);
     let part = 1.0 / chosen.len() as f32;
     let mut logarithms = Planes::<3>::zeros(mask.extent());
@@ -45,7 +37,7 @@ pub(crate) fn photo_albedo(
         for (sum, plane) in pairs {
             sum.iter_mut()
                 .zip(plane)
-                .for_each(|(sum, value)| *sum += part * value.max(PARAMETERS.darkest).ln());
+                .for_each(|(sum, value)| *sum += part * value.max(DARKEST).ln());
         }
     }
     Ok(Rgb::new(logarithms.map(f32::exp)))
@@ -59,7 +51,7 @@ pub(crate) fn mean_albedo(
     other: &Rgb<Linear>,
 ) -> Vec<[f64; 3]> {
     let logarithms = |albedo: &Rgb<Linear>| -> Vec<[f64; 3]> {
-        let darkest = f64::from(PARAMETERS.darkest);
+        let darkest = f64::from(DARKEST);
         let values = curves.pixels_of(albedo.planes());
         values
             .map(|albedo| albedo.map(|value| value.max(darkest).ln()))

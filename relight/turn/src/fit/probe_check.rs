@@ -8,47 +8,30 @@ use crate::model::frame::{Elevation, TableFrame};
 use crate::observe::curves::TurnCurves;
 use crate::observe::mirror_panorama::MirrorPanorama;
 use crate::observe::probe::ProbeBall;
-use crate::observe::surroundings::{SURROUNDINGS_PARAMETERS, Surroundings, middle_of};
+use crate::observe::surroundings::{ACROSS, Surroundings, middle_of};
 
-/// Parameters of the check of a ball's place.
-struct ProbeCheckParameters {
-    /// Share of a circle's radius that counts, 0 to 1. By hand: the rim also shows what is behind it.
-    radius_share: f64,
-    /// Middles that are tried first, in either direction, in given radii. By hand.
-    shifts: [f64; 5],
-    /// Radii that are tried first, in given radii. By hand: steps of a fourth root of 2.
-    scales: [f64; 5],
-    /// Steps around the best, in parts of half their distances. Derived: either way and none.
-    steps: [f64; 3],
-    /// How often the best is improved, each time by half the steps. By hand.
-    refined: i32,
-    /// Largest residual of a grey ball by its own light, over that by an even light. By hand.
-    most_of_grey: f64,
-    /// The same of a chrome ball, of whose small windows the panorama keeps less. By hand.
-    most_of_chrome: f64,
-    /// Largest part of the given circle's residual with which another one is the ball. By hand.
-    clearly: f64,
-    /// By how much its residual has to be less. By hand.
-    less: f64,
-    /// Least distance to the given circle, in radii. By hand: nearer ones measure nearly the same light.
-    apart: f64,
-    /// Least share of a circle, 0 to 1, that has to be in the picture. By hand.
-    least_inside: f64,
-}
-
-const PARAMETERS: ProbeCheckParameters = ProbeCheckParameters {
-    radius_share: 0.92,
-    shifts: [-0.5, -0.25, 0.0, 0.25, 0.5],
-    scales: [0.7, 0.84, 1.0, 1.19, 1.42],
-    steps: [-1.0, 0.0, 1.0],
-    refined: 3,
-    most_of_grey: 0.3,
-    most_of_chrome: 0.6,
-    clearly: 0.6,
-    less: 0.02,
-    apart: 0.08,
-    least_inside: 0.9,
-};
+/// Share of a circle's radius that counts, 0 to 1. By hand: the rim also shows what is behind it.
+const RADIUS_SHARE: f64 = 0.92;
+/// Middles that are tried first, in either direction, in given radii. By hand.
+const SHIFTS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
+/// Radii that are tried first, in given radii. By hand: steps of a fourth root of 2.
+const SCALES: [f64; 5] = [0.7, 0.84, 1.0, 1.19, 1.42];
+/// Steps around the best, in parts of half their distances. Derived: either way and none.
+const STEPS: [f64; 3] = [-1.0, 0.0, 1.0];
+/// How often the best is improved, each time by half the steps. By hand.
+const REFINED: i32 = 3;
+/// Largest residual of a grey ball by its own light, over that by an even light. By hand.
+const MOST_OF_GREY: f64 = 0.3;
+/// The same of a chrome ball, of whose small windows the panorama keeps less. By hand.
+const MOST_OF_CHROME: f64 = 0.6;
+/// Largest part of the given circle's residual with which another one is the ball. By hand.
+const CLEARLY: f64 = 0.6;
+/// By how much its residual has to be less. By hand.
+const LESS: f64 = 0.02;
+/// Least distance to the given circle, in radii. By hand: nearer ones measure nearly the same light.
+const APART: f64 = 0.08;
+/// Least share of a circle, 0 to 1, that has to be in the picture. By hand.
+const LEAST_INSIDE: f64 = 0.9;
 
 /// A circle, in radii from the middle that was given: to the right and up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,11 +80,7 @@ impl Surroundings {
         let [x, y] = best.middle;
         let apart = x.hypot(y).max((best.radius - 1.0).abs());
         let most = most_residual(ball);
-        if least < PARAMETERS.clearly * residual
-            && least < residual - PARAMETERS.less
-            && apart > PARAMETERS.apart
-            && least < most
-        {
+        if least < CLEARLY * residual && least < residual - LESS && apart > APART && least < most {
             let [x, y] = place.in_picture(best.middle);
             return Err(TurnError::Misplaced {
                 given: place,
@@ -122,8 +101,8 @@ impl Surroundings {
 /// The largest residual of a ball by its own light.
 pub(crate) const fn most_residual(ball: ProbeBall) -> f64 {
     match ball {
-        ProbeBall::Grey => PARAMETERS.most_of_grey,
-        ProbeBall::Chrome => PARAMETERS.most_of_chrome,
+        ProbeBall::Grey => MOST_OF_GREY,
+        ProbeBall::Chrome => MOST_OF_CHROME,
     }
 }
 
@@ -131,26 +110,26 @@ impl Shown {
     /// The circle of the smallest residual, and that residual.
     fn best(&self, given: Circle, residual: f64) -> (Circle, f64) {
         let mut best = (given, residual);
-        let tries = PARAMETERS.shifts.iter().flat_map(|&x| {
-            PARAMETERS.shifts.iter().flat_map(move |&y| {
-                PARAMETERS.scales.iter().map(move |&radius| Circle {
+        let tries = SHIFTS.iter().flat_map(|&x| {
+            SHIFTS.iter().flat_map(move |&y| {
+                SCALES.iter().map(move |&radius| Circle {
                     middle: [x, y],
                     radius,
                 })
             })
         });
         self.try_all(tries, &mut best);
-        for round in 1..=PARAMETERS.refined {
+        for round in 1..=REFINED {
             let part = 0.5_f64.powi(round);
             let around = best.0;
-            let tries = PARAMETERS.steps.iter().flat_map(|x| {
-                PARAMETERS.steps.iter().flat_map(move |y| {
-                    PARAMETERS.steps.iter().map(move |scale| Circle {
+            let tries = STEPS.iter().flat_map(|x| {
+                STEPS.iter().flat_map(move |y| {
+                    STEPS.iter().map(move |scale| Circle {
                         middle: [
                             around.middle[0] + 0.25 * part * x,
                             around.middle[1] + 0.25 * part * y,
                         ],
-                        radius: around.radius * PARAMETERS.scales[3].powf(part * scale),
+                        radius: around.radius * SCALES[3].powf(part * scale),
                     })
                 })
             });
@@ -172,17 +151,15 @@ impl Shown {
     /// The residual of the light fitted to a ball in a circle, over that of an even light; none where the circle is not
     /// in the picture, or nothing varies in it.
     fn residual(&self, circle: Circle) -> Option<f64> {
-        let wanted = std::f64::consts::PI
-            * (PARAMETERS.radius_share * circle.radius * SURROUNDINGS_PARAMETERS.across as f64
-                / 2.0)
-                .powi(2);
+        let wanted =
+            std::f64::consts::PI * (RADIUS_SHARE * circle.radius * ACROSS as f64 / 2.0).powi(2);
         let (pixels, normals): (Vec<usize>, Vec<[f64; 3]>) = self
             .at
             .iter()
             .enumerate()
             .filter_map(|(pixel, &at)| Some((pixel, circle.normal(at)?)))
             .unzip();
-        if (pixels.len() as f64) < PARAMETERS.least_inside * wanted {
+        if (pixels.len() as f64) < LEAST_INSIDE * wanted {
             return None;
         }
         match self.ball {
@@ -236,7 +213,6 @@ impl Circle {
     fn normal(self, at: [f64; 2]) -> Option<[f64; 3]> {
         let [x, y] = [0, 1].map(|i| (at[i] - self.middle[i]) / self.radius);
         let square = x * x + y * y;
-        (square < PARAMETERS.radius_share * PARAMETERS.radius_share)
-            .then(|| [x, y, (1.0 - square).sqrt()])
+        (square < RADIUS_SHARE * RADIUS_SHARE).then(|| [x, y, (1.0 - square).sqrt()])
     }
 }

@@ -12,13 +12,8 @@ use crate::model::material::MaterialKind;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::probe::{ProbeBall, ProbeBuilder};
 
-/// Parameters of the light by a ball.
-struct ProbeLightParameters {
-    /// Share of the variation beyond the second harmonic from which a ball looks like chrome, 0 to 1. By hand.
-    sharp: f64,
-}
-
-const PARAMETERS: ProbeLightParameters = ProbeLightParameters { sharp: 0.06 };
+/// Share of the variation beyond the second harmonic from which a ball looks like chrome, 0 to 1. By hand.
+const SHARP: f64 = 0.06;
 
 /// The light that a ball measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +50,7 @@ impl ProbeBuilder {
     pub(crate) fn finish(self) -> Result<ProbeLight, TurnError> {
         let frame = TableFrame::new(self.probe.elevation);
         let curves = self.builder.finish()?;
-        let looks = if Conditioning::of(&curves).beyond > PARAMETERS.sharp {
+        let looks = if Conditioning::of(&curves).beyond > SHARP {
             ProbeBall::Chrome
         } else {
             ProbeBall::Grey

@@ -1,4 +1,7 @@
-//! The residual of a pixel's curve.
+//! The residual of a pixel's curve, and which parts of the turn its fit may believe by it: not those in which it is in
+//! another's shadow or shows a highlight.
+
+use relight_core::statistics::upper_median;
 
 use crate::fit::curve_statistics::CurveStatistics;
 use crate::fit::search::PixelFit;
@@ -6,26 +9,21 @@ use crate::model::harmonics::COEFFICIENTS;
 use crate::model::shading::{PixelHarmonics, ShadingModel};
 use crate::observe::curves::TurnCurves;
 
-/// Parameters of the residuals.
-struct ResidualParameters {
-    /// Least share of what is seen that the model is taken to fit, 0 to 1. By hand.
-    least_model: f64,
-}
+/// Least share of what is seen that the model is taken to fit, 0 to 1. By hand.
+const LEAST_MODEL: f64 = 0.1;
 
-const PARAMETERS: ResidualParameters = ResidualParameters { least_model: 0.1 };
+/// Residual whose weight is one quarter, in standard deviations. By hand.
+const WIDTH: f64 = 2.0;
+/// Least standard deviation, in parts of the pixel's mean light. By hand.
+const LEAST_DEVIATION: f64 = 0.01;
 
 /// The light by which what is left of a pixel is measured: the model's mean over the turn, or a tenth of what is
 /// seen where that is more.
-pub(crate) fn reference(
-    curves: &TurnCurves,
-    pixel: usize,
-    fit: &PixelFit,
-    model: &ShadingModel,
-) -> f64 {
+fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, model: &ShadingModel) -> f64 {
     let harmonics = model.harmonics(fit.normal);
     let predicted: f64 = (0..3).map(|c| fit.albedo[c] * harmonics.base[c][0]).sum();
     let seen: f64 = CurveStatistics::mean(curves, pixel).iter().sum();
-    (predicted.max(PARAMETERS.least_model * seen) / 3.0).max(1e-6)
+    (predicted.max(LEAST_MODEL * seen) / 3.0).max(1e-6)
 }
 
 /// How much more light than the fit's each part of the turn has, the mean of the channels, over the
@@ -51,6 +49,27 @@ pub(crate) fn residuals(
             (count > 0.0).then(|| sum / count / reference)
         })
         .collect()
+}
+
+/// The robust weight of each part of the turn for a pixel, 0 to 1: near 0 where the fit is far from what
+/// is seen, measured by the median of how far it is elsewhere.
+pub(crate) fn robust_weights(
+    curves: &TurnCurves,
+    pixel: usize,
+    fit: &PixelFit,
+    model: &ShadingModel,
+) -> Vec<f32> {
+    let residuals = residuals(curves, pixel, fit, model);
+    let sizes = residuals.iter().flatten().map(|residuals| residuals.abs());
+    let Some(median) = upper_median(sizes) else {
+        return vec![1.0; residuals.len()];
+    };
+    let deviation = 1.4826 * median + LEAST_DEVIATION;
+    let robust_weights = |residuals: &Option<f64>| {
+        let size = residuals.unwrap_or(0.0) / (WIDTH * deviation);
+        (1.0 / (1.0 + size * size).powi(2)) as f32
+    };
+    residuals.iter().map(robust_weights).collect()
 }
 
 /// What a channel shows where the harmonics' basis has these values.

@@ -8,45 +8,28 @@ use crate::model::directions::{LEAST_FACING, half_sphere, tangents, tilted};
 use crate::model::harmonics::COEFFICIENTS;
 use crate::model::shading::{PixelHarmonics, ShadingModel};
 
-/// Parameters of the search for a normal.
-struct SearchParameters {
-    /// Candidates over the visible half sphere. By hand: about 7 degrees apart.
-    candidates: usize,
-    /// How many of the best candidates are refined. By hand.
-    refined: usize,
-    /// Gauss-Newton steps of each of them before the best is taken. By hand.
-    first_steps: usize,
-    /// Largest number of Gauss-Newton steps. By hand.
-    steps: usize,
-    /// Length of a step at which the refinement ends, radians. Numerical.
-    last_step: f64,
-    /// Step of the finite differences of the gradient, radians. Numerical.
-    gradient_step: f64,
-    /// Step of the finite differences of the Hessian, radians. By hand.
-    hessian_step: f64,
-    /// Damping of the first step, relative to the trace of the Hessian (Levenberg-Marquardt). Numerical.
-    damping: f64,
-    /// Factor of the damping after a step that lowers the cost. Numerical.
-    damping_fall: f64,
-    /// Factor of the damping after one that does not. Numerical.
-    damping_rise: f64,
-    /// Least eigenvalue of the Hessian: at a border of what is allowed it need not be positive. Numerical.
-    least_curvature: f64,
-}
-
-const PARAMETERS: SearchParameters = SearchParameters {
-    candidates: 400,
-    refined: 3,
-    first_steps: 4,
-    steps: 16,
-    last_step: 1e-4,
-    gradient_step: 1e-4,
-    hessian_step: 0.06,
-    damping: 1e-3,
-    damping_fall: 0.2,
-    damping_rise: 8.0,
-    least_curvature: 1e-3,
-};
+/// Candidates over the visible half sphere. By hand: about 7 degrees apart.
+const CANDIDATES: usize = 400;
+/// How many of the best candidates are refined. By hand.
+const REFINED: usize = 3;
+/// Gauss-Newton steps of each of them before the best is taken. By hand.
+const FIRST_STEPS: usize = 4;
+/// Largest number of Gauss-Newton steps. By hand.
+const STEPS: usize = 16;
+/// Length of a step at which the refinement ends, radians. Numerical.
+const LAST_STEP: f64 = 1e-4;
+/// Step of the finite differences of the gradient, radians. Numerical.
+const GRADIENT_STEP: f64 = 1e-4;
+/// Step of the finite differences of the Hessian, radians. By hand.
+const HESSIAN_STEP: f64 = 0.06;
+/// Damping of the first step, relative to the trace of the Hessian (Levenberg-Marquardt). Numerical.
+const DAMPING: f64 = 1e-3;
+/// Factor of the damping after a step that lowers the cost. Numerical.
+const DAMPING_FALL: f64 = 0.2;
+/// Factor of the damping after one that does not. Numerical.
+const DAMPING_RISE: f64 = 8.0;
+/// Least eigenvalue of the Hessian: at a border of what is allowed it need not be positive. Numerical.
+const LEAST_CURVATURE: f64 = 1e-3;
 
 /// A pixel's answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,7 +64,7 @@ struct Tried {
 
 impl<'a> Search<'a> {
     pub(crate) fn new(model: &'a ShadingModel) -> Self {
-        let tried = half_sphere(PARAMETERS.candidates).map(|normal| {
+        let tried = half_sphere(CANDIDATES).map(|normal| {
             let harmonics = model.harmonics(normal);
             Tried {
                 normal,
@@ -97,15 +80,14 @@ impl<'a> Search<'a> {
 
     /// The best normal anywhere.
     pub(crate) fn anywhere(&self, statistics: &CurveStatistics) -> PixelFit {
-        let mut best = [(f64::INFINITY, [0.0, 0.0, 1.0]); PARAMETERS.refined];
+        let mut best = [(f64::INFINITY, [0.0, 0.0, 1.0]); REFINED];
         for tried in &self.tried {
             let cost = statistics.residual(&tried.harmonics, &tried.products);
-            if cost < best[PARAMETERS.refined - 1].0 {
+            if cost < best[REFINED - 1].0 {
                 insert(&mut best, (cost, tried.normal));
             }
         }
-        let refined =
-            best.map(|(_, start)| self.downhill(statistics, start, PARAMETERS.first_steps));
+        let refined = best.map(|(_, start)| self.downhill(statistics, start, FIRST_STEPS));
         let [first, rest @ ..] = refined;
         let (start, _) = rest.into_iter().fold(
             first,
@@ -118,7 +100,7 @@ impl<'a> Search<'a> {
 
     /// The best normal that is reached from `start` downhill.
     pub(crate) fn near(&self, statistics: &CurveStatistics, start: [f64; 3]) -> PixelFit {
-        let (normal, _) = self.downhill(statistics, start, PARAMETERS.steps);
+        let (normal, _) = self.downhill(statistics, start, STEPS);
         PixelFit {
             normal,
             albedo: statistics.albedo(&self.model.harmonics(normal)),
@@ -137,7 +119,7 @@ impl<'a> Search<'a> {
         let cost = |normal| self.residual(statistics, normal);
         let mut normal = start;
         let mut least = cost(normal);
-        let mut damping = PARAMETERS.damping;
+        let mut damping = DAMPING;
         for _ in 0..steps {
             let axes = tangents(normal);
             let quadratic = self.quadratic(statistics, normal, axes);
@@ -147,11 +129,11 @@ impl<'a> Search<'a> {
             let length = step[0].hypot(step[1]);
             if other[2] >= LEAST_FACING && found < least {
                 (normal, least) = (other, found);
-                damping *= PARAMETERS.damping_fall;
+                damping *= DAMPING_FALL;
             } else {
-                damping *= PARAMETERS.damping_rise;
+                damping *= DAMPING_RISE;
             }
-            if length < PARAMETERS.last_step {
+            if length < LAST_STEP {
                 break;
             }
         }
@@ -183,11 +165,8 @@ impl<'a> Search<'a> {
     ) -> NormalDerivatives {
         let here = self.model.harmonics(normal);
         let albedo = statistics.albedo(&here);
-        let there = [
-            [PARAMETERS.gradient_step, 0.0],
-            [0.0, PARAMETERS.gradient_step],
-        ]
-        .map(|step| self.model.harmonics(tilted(normal, [u, v], step)));
+        let there = [[GRADIENT_STEP, 0.0], [0.0, GRADIENT_STEP]]
+            .map(|step| self.model.harmonics(tilted(normal, [u, v], step)));
         let base = here.base;
         let seen: [_; 3] = std::array::from_fn(|c| sum(&base[c], albedo[c], &here.gloss[c]));
         let jacobian = std::array::from_fn(|c| {
@@ -196,7 +175,7 @@ impl<'a> Search<'a> {
             there.map(|there| {
                 let moved = sum(&there.base[c], albedo[c], &there.gloss[c]);
                 let mut column: [f64; COEFFICIENTS] =
-                    std::array::from_fn(|i| (moved[i] - seen[c][i]) / PARAMETERS.gradient_step);
+                    std::array::from_fn(|i| (moved[i] - seen[c][i]) / GRADIENT_STEP);
                 // The albedo follows the normal.
                 if own > 1e-12 && albedo[c] > 0.0 {
                     let share = sum_of_products(&column, &along) / own;
@@ -235,7 +214,7 @@ impl<'a> Search<'a> {
             let normal = tilted(fit.normal, [u, v], [a, b]);
             self.residual(statistics, normal)
         };
-        let h = PARAMETERS.hessian_step;
+        let h = HESSIAN_STEP;
         let middle = cost(0.0, 0.0);
         let uu = (cost(h, 0.0) + cost(-h, 0.0) - 2.0 * middle) / (h * h);
         let vv = (cost(0.0, h) + cost(0.0, -h) - 2.0 * middle) / (h * h);
@@ -247,7 +226,7 @@ impl<'a> Search<'a> {
         );
         let inverse: f64 = [half + rest, half - rest]
             .into_iter()
-            .map(|eigenvalue| 1.0 / eigenvalue.max(PARAMETERS.least_curvature))
+            .map(|eigenvalue| 1.0 / eigenvalue.max(LEAST_CURVATURE))
             .sum();
         (2.0 * fit.residual / freedom * inverse).sqrt()
     }
@@ -262,8 +241,8 @@ fn sum(
 }
 
 /// Puts one of less cost in its place, and the last one out.
-fn insert(best: &mut [(f64, [f64; 3]); PARAMETERS.refined], one: (f64, [f64; 3])) {
-    best[PARAMETERS.refined - 1] = one;
+fn insert(best: &mut [(f64, [f64; 3]); REFINED], one: (f64, [f64; 3])) {
+    best[REFINED - 1] = one;
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
 }
 

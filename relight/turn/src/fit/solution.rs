@@ -4,6 +4,7 @@ use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::statistics::median;
 
+use crate::fit::residuals::residuals;
 use crate::fit::search::PixelFit;
 use crate::model::frame::{Elevation, TableFrame};
 use crate::model::lighting::TableLight;
@@ -11,14 +12,10 @@ use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
+use crate::observe::verdict::TurnVerdict;
 
-/// Parameters of the confidence.
-struct ConfidenceParameters {
-    /// Expected error at which the confidence is one half, radians. By convention of the files.
-    half_error: f64,
-}
-
-const PARAMETERS: ConfidenceParameters = ConfidenceParameters { half_error: 0.2 };
+/// Expected error at which the confidence is one half, radians. By convention of the files.
+const HALF_ERROR: f64 = 0.2;
 
 /// Normals, albedo and light.
 #[derive(Debug, Clone)]
@@ -72,6 +69,18 @@ impl TurnSolution {
         curves.map(|pixel| [self.expected_errors[pixel].to_degrees() as f32])
     }
 
+    /// The part of the model's light over the whole turn that a pixel does not have, 0 to 1.
+    pub(crate) fn shadow(&self, curves: &TurnCurves) -> Planes<1> {
+        curves.map(|pixel| {
+            let residuals = residuals(curves, pixel, &self.fits[pixel], &self.model);
+            let missing = residuals
+                .iter()
+                .flatten()
+                .map(|residual| (-residual).max(0.0));
+            [(missing.sum::<f64>() / residuals.len().max(1) as f64).min(1.0) as f32]
+        })
+    }
+
     /// The light.
     #[must_use]
     pub const fn light(&self) -> &TableLight {
@@ -90,10 +99,10 @@ impl TurnSolution {
         self.model.material
     }
 
-    /// Whether the light, of the turn and where it was given, is fit for this.
+    /// What is to be thought of the normals and the albedo.
     #[must_use]
-    pub const fn conditioning(&self) -> Conditioning {
-        self.conditioning
+    pub const fn verdict(&self) -> TurnVerdict {
+        self.conditioning.verdict
     }
 
     /// The median over the pixels of the residual of a curve, over the energy of its variation.
@@ -112,5 +121,5 @@ impl TurnSolution {
 }
 
 pub(crate) fn confidence(expected_error: f64) -> f64 {
-    1.0 / (1.0 + (expected_error / PARAMETERS.half_error).powi(2))
+    1.0 / (1.0 + (expected_error / HALF_ERROR).powi(2))
 }

@@ -3,32 +3,21 @@
 
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
-use crate::model::gloss::{GlossLight, gloss_terms};
+use crate::model::gloss::{GlossLight, gloss_terms, mirror_terms};
 use crate::model::harmonics::COEFFICIENTS;
 use crate::model::known_light::KnownLight;
 use crate::model::material::MaterialKind;
-use crate::model::metal::mirror_terms;
 use crate::model::shading::ShadingModel;
 
-/// Parameters of the bands' attenuations.
-struct AttenuationParameters {
-    /// Largest attenuation of a band by gloss, over that of a smooth dielectric. By hand: light by a dark grey ball is
-    /// in small units.
-    most_gloss: f64,
-    /// Largest attenuation of a band by metal, over that of band 0. By hand: physically 1.
-    most_metal: f64,
-    /// Least attenuation of band 0 by which the others of metal are divided. Numerical.
-    least_first: f64,
-    /// What metal shows of band l at first: this to the power of l. By hand.
-    first_of_metal: f64,
-}
-
-const PARAMETERS: AttenuationParameters = AttenuationParameters {
-    most_gloss: 20.0,
-    most_metal: 1.2,
-    least_first: 0.05,
-    first_of_metal: 0.9,
-};
+/// Largest attenuation of a band by gloss, over that of a smooth dielectric. By hand: light by a dark grey ball is
+/// in small units.
+const MOST_GLOSS: f64 = 20.0;
+/// Largest attenuation of a band by metal, over that of band 0. By hand: physically 1.
+const MOST_METAL: f64 = 1.2;
+/// Least attenuation of band 0 by which the others of metal are divided. Numerical.
+const LEAST_FIRST: f64 = 0.05;
+/// What metal shows of band l at first: this to the power of l. By hand.
+const FIRST_OF_METAL: f64 = 0.9;
 
 /// The unknowns of an object of a material in a known light: the attenuation of each band.
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +32,7 @@ impl Unknowns<'_> {
     pub(crate) fn initial(&self) -> ShadingModel {
         let mirror = self.known.mirror();
         let attenuations: Vec<f64> = (0..mirror.len())
-            .map(|l| PARAMETERS.first_of_metal.powi(l as i32))
+            .map(|l| FIRST_OF_METAL.powi(l as i32))
             .collect();
         let gloss = match self.material {
             MaterialKind::Diffuse => GlossLight::NONE,
@@ -68,13 +57,13 @@ impl Unknowns<'_> {
         let mut moved: Vec<f64> = attenuations
             .iter()
             .zip(step)
-            .map(|(attenuation, by)| (attenuation + by).clamp(0.0, PARAMETERS.most_gloss))
+            .map(|(attenuation, by)| (attenuation + by).clamp(0.0, MOST_GLOSS))
             .collect();
         if let (MaterialKind::Metal, Some(&first)) = (self.material, moved.first()) {
             // Of an even light metal shows its albedo's part, whatever its lobe is.
-            let first = first.max(PARAMETERS.least_first);
+            let first = first.max(LEAST_FIRST);
             for attenuation in &mut moved {
-                *attenuation = (*attenuation / first).min(PARAMETERS.most_metal);
+                *attenuation = (*attenuation / first).min(MOST_METAL);
             }
         }
         moved

@@ -6,32 +6,26 @@ use serde::Serialize;
 
 use crate::setting_error::SettingError;
 
-/// Parameters of the elevation.
-struct ElevationParameters {
-    /// Elevation where none is known, degrees. By convention of the rig.
-    usual_deg: f64,
-    /// Uncertainty of that one, degrees. By hand.
-    usual_uncertainty_deg: f64,
-    /// Uncertainty of one that was measured, degrees. By hand.
-    given_uncertainty_deg: f64,
-}
+/// Elevation where none is known, degrees. By convention of the rig.
+const USUAL_DEG: f64 = 18.0;
+/// Uncertainty of that one, degrees. By hand.
+const USUAL_UNCERTAINTY_DEG: f64 = 8.0;
+/// Uncertainty of one that was measured, degrees. By hand.
+const GIVEN_UNCERTAINTY_DEG: f64 = 1.0;
 
-const PARAMETERS: ElevationParameters = ElevationParameters {
-    usual_deg: 18.0,
-    usual_uncertainty_deg: 8.0,
-    given_uncertainty_deg: 1.0,
-};
-
-/// Where an elevation comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// Where an elevation or a rotation direction comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum ElevationSource {
+pub enum FactSource {
     /// Nobody said: what is usual on this rig.
+    #[default]
     Assumed,
-    /// It was given.
+    /// The caller.
     Given,
-    /// The session says it: it is known of the rig.
+    /// The session: it is known of the rig.
     Rig,
+    /// The network of turns, which is clearly surer of its normals this way.
+    Network,
 }
 
 /// How high the camera looks down on the table: 0 from the side, 90 degrees from above.
@@ -39,7 +33,7 @@ pub enum ElevationSource {
 pub struct Elevation {
     degrees: f64,
     uncertainty_deg: f64,
-    source: ElevationSource,
+    source: FactSource,
 }
 
 impl Elevation {
@@ -47,9 +41,9 @@ impl Elevation {
     #[must_use]
     pub const fn assumed() -> Self {
         Self {
-            degrees: PARAMETERS.usual_deg,
-            uncertainty_deg: PARAMETERS.usual_uncertainty_deg,
-            source: ElevationSource::Assumed,
+            degrees: USUAL_DEG,
+            uncertainty_deg: USUAL_UNCERTAINTY_DEG,
+            source: FactSource::Assumed,
         }
     }
 
@@ -67,8 +61,8 @@ impl Elevation {
         }
         Ok(Self {
             degrees,
-            uncertainty_deg: PARAMETERS.given_uncertainty_deg,
-            source: ElevationSource::Given,
+            uncertainty_deg: GIVEN_UNCERTAINTY_DEG,
+            source: FactSource::Given,
         })
     }
 
@@ -78,7 +72,7 @@ impl Elevation {
     /// [`SettingError`] beyond 0 to 89 degrees.
     pub fn of_rig(degrees: f64) -> Result<Self, SettingError> {
         Ok(Self {
-            source: ElevationSource::Rig,
+            source: FactSource::Rig,
             ..Self::given(degrees)?
         })
     }
@@ -97,7 +91,7 @@ impl Elevation {
 
     /// Where it comes from.
     #[must_use]
-    pub const fn source(&self) -> ElevationSource {
+    pub const fn source(&self) -> FactSource {
         self.source
     }
 }
@@ -168,10 +162,7 @@ mod tests {
 
     #[test]
     fn an_elevation_beyond_what_a_camera_can_have_is_refused() {
-        assert_eq!(
-            Elevation::of_rig(20.0).unwrap().source(),
-            ElevationSource::Rig
-        );
+        assert_eq!(Elevation::of_rig(20.0).unwrap().source(), FactSource::Rig);
         for degrees in [f64::NAN, 90.0, -1.0] {
             assert!(Elevation::given(degrees).is_err());
             assert!(Elevation::of_rig(degrees).is_err());

@@ -160,7 +160,16 @@ pub(crate) fn gloss_terms(facing: f64, reflected: [f64; 3]) -> [HarmonicTerm; GL
     terms_of(reflectance(facing), reflected)
 }
 
-pub(crate) fn terms_of(part: f64, [x, y, z]: [f64; 3]) -> [HarmonicTerm; GLOSS_TERMS] {
+/// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a
+/// Lambertian white surface in even light, π times it, and the terms are √(4π) times the harmonics.
+pub(crate) const MIRROR: f64 = 0.886_226_925_452_758;
+
+/// The same where all light is reflected, as by metal.
+pub(crate) fn mirror_terms(reflected: [f64; 3]) -> [HarmonicTerm; GLOSS_TERMS] {
+    terms_of(1.0, reflected)
+}
+
+fn terms_of(part: f64, [x, y, z]: [f64; 3]) -> [HarmonicTerm; GLOSS_TERMS] {
     let legendre = derivatives(z);
     let mut terms = [HarmonicTerm {
         coefficient: 0,

@@ -6,9 +6,8 @@ use relight_core::light::ShLight;
 use relight_core::render::cosine_lobe;
 
 use crate::model::frame::TableFrame;
-use crate::model::gloss::GlossLight;
+use crate::model::gloss::{GlossLight, MIRROR};
 use crate::model::lighting::{LAMBERTIAN_BANDS, TableLight};
-use crate::model::metal::MIRROR;
 
 /// A light that was measured.
 #[derive(Debug, Clone, PartialEq)]

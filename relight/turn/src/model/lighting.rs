@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use relight_core::light::{LightError, Order, ShLight};
 
 use crate::model::frame::TableFrame;
+use crate::model::gloss::{GlossLight, MIRROR};
 use crate::model::harmonics::{COEFFICIENTS, HarmonicTerm, LAMBERTIAN_COEFFICIENTS};
 
 /// Terms of a channel's light.
@@ -15,7 +16,7 @@ pub(crate) const LAMBERTIAN_BANDS: usize = 3;
 
 /// What each term of [`TableLight`] is of a coefficient of the spherical harmonics: its index and factor.
 /// The factors are those of the cosine lobe, pi, 2 pi / 3 and pi / 4, times those of the polynomials.
-pub(crate) const OF_COEFFICIENTS: [(usize, f64); TERMS] = {
+const OF_COEFFICIENTS: [(usize, f64); TERMS] = {
     const Y0: f64 = 0.282_094_791_773_878_14;
     const Y1: f64 = 0.488_602_511_902_919_9;
     const Y20: f64 = 0.315_391_565_252_520_05;
@@ -62,6 +63,19 @@ impl TableLight {
         let terms = [0, 1, 2]
             .map(|channel| OF_COEFFICIENTS.map(|(at, factor)| factor * coefficients[at][channel]));
         Self { terms }
+    }
+
+    /// The light of which a mirror shows this.
+    ///
+    /// # Errors
+    /// Where a term is not finite.
+    pub(crate) fn of_mirror(shown: &GlossLight) -> Result<Self, LightError> {
+        let light = shown.light()?;
+        let coefficients = light.coefficients();
+        let factor = |channel: usize| {
+            OF_COEFFICIENTS.map(|(at, factor)| factor * coefficients[at][channel] / MIRROR)
+        };
+        Ok(Self::new([0, 1, 2].map(factor)))
     }
 
     /// The same as coefficients in the table's frame.

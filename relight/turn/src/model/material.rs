@@ -5,10 +5,11 @@ use std::fmt;
 use serde::Serialize;
 
 /// What gives an object its colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MaterialKind {
     /// It scatters light evenly, and may have gloss that shows the light as it is: plastic, wood, stone, leather.
+    #[default]
     Diffuse,
     /// It has no diffuse part, and its reflection is coloured: bronze, steel, gold.
     Metal,

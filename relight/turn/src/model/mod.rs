@@ -7,5 +7,4 @@ pub(crate) mod harmonics;
 pub(crate) mod known_light;
 pub(crate) mod lighting;
 pub(crate) mod material;
-pub(crate) mod metal;
 pub(crate) mod shading;

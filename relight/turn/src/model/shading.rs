@@ -2,11 +2,10 @@
 
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
-use crate::model::gloss::GlossLight;
+use crate::model::gloss::{GlossLight, mirror_terms};
 use crate::model::harmonics::{COEFFICIENTS, LAMBERTIAN_COEFFICIENTS};
 use crate::model::lighting::TableLight;
 use crate::model::material::MaterialKind;
-use crate::model::metal::mirror_terms;
 
 /// The shading model: environment light and material, as a pixel shows them.
 #[derive(Debug, Clone, Copy)]

@@ -7,27 +7,17 @@ use crate::model::harmonics::COEFFICIENTS;
 use crate::network::input::NetworkTurn;
 use crate::observe::curves::TurnCurves;
 
-/// Parameters of the grid.
-struct CropParameters {
-    /// Width and height of the grid. By convention: what the network was trained on.
-    side: usize,
-    /// Part of the grid's side that the object takes. By convention: as of the objects that it was trained on.
-    fill: f32,
-    /// What a pixel at the mask's edge counts beside one inside. By hand: it shows some of the background.
-    edge: f32,
-    /// Ridge on the harmonics, as a part of the mean of the diagonal. Numerical.
-    ridge: f64,
-}
-
-const PARAMETERS: CropParameters = CropParameters {
-    side: 128,
-    fill: 0.9,
-    edge: 0.02,
-    ridge: 1e-6,
-};
+/// Width and height of the grid. By convention: what the network was trained on.
+const SIDE: usize = 128;
+/// Part of the grid's side that the object takes. By convention: as of the objects that it was trained on.
+const FILL: f32 = 0.9;
+/// What a pixel at the mask's edge counts beside one inside. By hand: it shows some of the background.
+const EDGE: f32 = 0.02;
+/// Ridge on the harmonics, as a part of the mean of the diagonal. Numerical.
+const RIDGE: f64 = 1e-6;
 
 /// Width and height of the grid.
-pub(crate) const GRID: usize = PARAMETERS.side;
+pub(crate) const GRID: usize = SIDE;
 
 /// The curves of a turn on the grid.
 pub(crate) struct Crop {
@@ -171,7 +161,7 @@ fn place_of(curves: &TurnCurves) -> ([f32; 2], f32) {
         }
     }
     let extents = [0, 1].map(|axis| (high[axis] - low[axis]) as f32);
-    let side = extents[0].max(extents[1]) / PARAMETERS.fill;
+    let side = extents[0].max(extents[1]) / FILL;
     let middles = [0, 1].map(|axis| (high[axis] + low[axis]) as f32 / 2.0);
     (
         middles.map(|middle| middle - side / 2.0),
@@ -237,7 +227,7 @@ impl<'a> CoveredPixels<'a> {
                 let is_inside = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)]
                     .into_iter()
                     .all(|(x, y)| self.number(x, y).is_some());
-                members.push((number, if is_inside { 1.0 } else { PARAMETERS.edge }));
+                members.push((number, if is_inside { 1.0 } else { EDGE }));
             }
         }
         (2 * members.len() >= all && !members.is_empty()).then_some(members)
@@ -268,7 +258,7 @@ impl<'a> CoveredPixels<'a> {
             }
             equations.add(harmonics, mean);
         }
-        equations.add_ridge(1, PARAMETERS.ridge);
+        equations.add_ridge(1, RIDGE);
         let solved = equations.solve()?;
         let mut coefficients = [[0.0; 3]; COEFFICIENTS];
         for (to, from) in coefficients.iter_mut().zip(solved) {

@@ -18,27 +18,16 @@ const STRONG: usize = 2;
 /// Terms of a curve.
 const TERMS: usize = 2 * HARMONICS + 1;
 
-/// Parameters of the input.
-struct InputParameters {
-    /// Least mean of a curve, in means over the object. By hand: below, harmonics are noise.
-    least_mean: f32,
-    /// Largest harmonic, in means of the curve. Derived: of non-negative light it is at most 2.
-    largest_ratio: f32,
-    /// Largest harmonic, in effective values over the object. By hand.
-    largest_value: f32,
-    /// Pixels darker than this, in means over the object, count less for the phase of the light. By hand.
-    dark: f32,
-    /// Largest logarithm of a mean beside that of all. By hand.
-    largest_log: f32,
-}
-
-const PARAMETERS: InputParameters = InputParameters {
-    least_mean: 0.002,
-    largest_ratio: 1.5,
-    largest_value: 4.0,
-    dark: 0.1,
-    largest_log: 3.0,
-};
+/// Least mean of a curve, in means over the object. By hand: below, harmonics are noise.
+const LEAST_MEAN: f32 = 0.002;
+/// Largest harmonic, in means of the curve. Derived: of non-negative light it is at most 2.
+const LARGEST_RATIO: f32 = 1.5;
+/// Largest harmonic, in effective values over the object. By hand.
+const LARGEST_VALUE: f32 = 4.0;
+/// Pixels darker than this, in means over the object, count less for the phase of the light. By hand.
+const DARK: f32 = 0.1;
+/// Largest logarithm of a mean beside that of all. By hand.
+const LARGEST_LOG: f32 = 3.0;
 
 /// Which way the room is taken to be turned. The phase of the first harmonic says it, where that is strong; in a room
 /// that is bright on two opposite sides that of the second says it, up to half a turn.
@@ -144,11 +133,7 @@ pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32>
                 .sum::<f32>();
             let effective = (square / turn.pixels.len().max(1) as f32).sqrt() + 1e-4;
             whole.push(effective.ln() / 1.5 + 1.0);
-            let value = |k: usize| {
-                of(k)
-                    .scaled(1.0 / effective)
-                    .up_to(PARAMETERS.largest_value)
-            };
+            let value = |k: usize| of(k).scaled(1.0 / effective).up_to(LARGEST_VALUE);
             planes.push(|k| value(k).re);
             planes.push(|k| value(k).im);
         }
@@ -187,7 +172,7 @@ fn logarithms(means: &[[f32; 3]]) -> Vec<[f32; 3]> {
         let sum: f32 = means.iter().map(|mean| mean[c].ln()).sum();
         sum / means.len().max(1) as f32
     });
-    let most = PARAMETERS.largest_log;
+    let most = LARGEST_LOG;
     let one = |mean: &[f32; 3]| [0, 1, 2].map(|c| (mean[c].ln() - middle[c]).clamp(-most, most));
     means.iter().map(one).collect()
 }
@@ -199,7 +184,7 @@ fn over_mean(means: &[[f32; 3]]) -> ([f32; 3], Vec<[f32; 3]>) {
         let sum: f32 = means.iter().map(|mean| mean[c].max(0.0)).sum();
         (sum / count).max(1e-9)
     });
-    let one = |mean: &[f32; 3]| [0, 1, 2].map(|c| (mean[c] / of_all[c]).max(PARAMETERS.least_mean));
+    let one = |mean: &[f32; 3]| [0, 1, 2].map(|c| (mean[c] / of_all[c]).max(LEAST_MEAN));
     (of_all, means.iter().map(one).collect())
 }
 
@@ -239,7 +224,7 @@ impl Ratios {
                     im: curve[2 * m + 2][c],
                 };
                 let over = means[k][c] * of_all[c];
-                value.scaled(1.0 / over).up_to(PARAMETERS.largest_ratio)
+                value.scaled(1.0 / over).up_to(LARGEST_RATIO)
             })
         };
         let harmonics = (0..HARMONICS)
@@ -255,7 +240,7 @@ impl Ratios {
             .zip(&self.means)
             .map(|(harmonic, mean)| {
                 [0, 1, 2]
-                    .map(|c| harmonic[c].scaled(mean[c] / (mean[c] + PARAMETERS.dark)))
+                    .map(|c| harmonic[c].scaled(mean[c] / (mean[c] + DARK)))
                     .into_iter()
                     .fold(Complex::default(), Complex::plus)
             });

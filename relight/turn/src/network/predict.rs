@@ -7,7 +7,6 @@ use relight_nets::{Inference, NetError, Weights, turn_network};
 use serde::Serialize;
 
 use crate::model::frame::Elevation;
-use crate::network::answer::NetworkNormal;
 use crate::network::crop::{Crop, GRID, mean_light};
 use crate::network::input::{PhaseHypothesis, log_means, network_input};
 use crate::observe::curves::TurnCurves;
@@ -27,52 +26,61 @@ pub struct TurnPrediction {
     pub expected_errors: Planes<1>,
     /// Albedo, each channel in a unit of its own.
     pub albedo: Rgb<Linear>,
-    /// What it was taken for, and what else was looked at.
-    pub hypotheses: HypothesisFigures,
+    /// The means of these errors.
+    pub figures: NetworkFigures,
 }
 
-/// What the network takes a turn for, by the mean error that it expects, degrees.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HypothesisFigures {
-    /// Which way the room was taken to be turned: the phase with the least expected error.
-    pub phase: PhaseHypothesis,
-    /// Every phase that was looked at.
-    pub phases: Vec<PhaseFigure>,
-    /// The least expected error if the table turned the other way.
-    pub other_direction_deg: f32,
-}
-
-/// A phase and the mean error that is expected with it.
+/// The mean errors that the network expects of a turn, degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PhaseFigure {
-    /// The phase.
-    pub phase: PhaseHypothesis,
-    /// Degrees.
+pub struct NetworkFigures {
+    /// Of its answer.
     pub expected_error_deg: f32,
+    /// The least if the table turned the other way.
+    pub other_direction_deg: f32,
 }
 
 /// Largest part of one direction's expected error with which the other direction is taken to be right. Measured: on 40
 /// synthetic turns the wrong direction has 0.99 to 2.8 times the expected error of the right one (docs/results/turns.md).
 const CLEARLY: f32 = 0.9;
 
-impl HypothesisFigures {
-    /// The mean error that is expected of the answer, degrees.
-    #[must_use]
-    pub fn expected_error_deg(&self) -> f32 {
-        let taken = self.phases.iter().find(|figure| figure.phase == self.phase);
-        taken.map_or(f32::INFINITY, |figure| figure.expected_error_deg)
-    }
-
+impl NetworkFigures {
     /// Whether the table clearly looks as if it turned this way.
-    #[must_use]
-    pub fn is_direction_sure(&self) -> bool {
-        self.expected_error_deg() < CLEARLY * self.other_direction_deg
+    pub(crate) fn is_direction_sure(self) -> bool {
+        self.expected_error_deg < CLEARLY * self.other_direction_deg
     }
 
     /// Whether the table looks as if it turned the other way.
-    #[must_use]
-    pub fn is_direction_doubted(&self) -> bool {
-        self.other_direction_deg < CLEARLY * self.expected_error_deg()
+    pub(crate) fn is_direction_doubted(self) -> bool {
+        self.other_direction_deg < CLEARLY * self.expected_error_deg
+    }
+}
+
+/// Range of the logarithm of the expected chord: 1 degree to all that there is.
+const LOG_CHORD: (f32, f32) = (-4.0, 0.7);
+
+/// A normal and its expected error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct NetworkNormal {
+    /// Unit length, in the viewer's frame; it faces the viewer.
+    normal: [f32; 3],
+    /// By how much it is expected to be off, degrees.
+    expected_error_deg: f32,
+}
+
+impl NetworkNormal {
+    /// The normal of a pixel's four numbers.
+    fn of_answer([x, y, z, log_chord]: [f32; 4]) -> Self {
+        let length = (x * x + y * y + z * z).sqrt();
+        let normal = if length > 1e-9 && length.is_finite() {
+            [x / length, y / length, z / length]
+        } else {
+            [0.0, 0.0, 1.0]
+        };
+        let chord = log_chord.clamp(LOG_CHORD.0, LOG_CHORD.1).exp();
+        Self {
+            normal,
+            expected_error_deg: 2.0 * (chord / 2.0).min(1.0).asin().to_degrees(),
+        }
     }
 }
 
@@ -109,48 +117,38 @@ impl TurnNetwork {
     ) -> Result<TurnPrediction, NetError> {
         let crop = Crop::new(curves);
         let elevation = elevation.degrees().to_radians() as f32;
-        let looks = self.looks(&crop, elevation)?;
-        let others = self.looks(&Crop::new(&curves.with_other_direction()), elevation)?;
-        let phases = looks
-            .iter()
-            .map(|&(phase, expected_error_deg, _)| PhaseFigure {
-                phase,
-                expected_error_deg,
-            })
-            .collect();
-        let other_direction_deg = others
-            .iter()
-            .map(|(_, error, _)| *error)
-            .fold(f32::INFINITY, f32::min);
-        let best = looks.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        let (phase, cells) = match best {
-            Some((phase, _, seen)) => {
-                let in_mirror = self.cells(&crop.mirrored(), elevation, phase.in_mirror())?;
-                (phase, mean_of_looks(&seen, &in_mirror))
-            }
-            None => (PhaseHypothesis::First, vec![None; GRID * GRID]),
-        };
-        let hypotheses = HypothesisFigures {
-            phase,
-            phases,
+        let (phase, expected_error_deg, seen) = self.surest(&crop, elevation)?;
+        let other = Crop::new(&curves.with_other_direction());
+        let (_, other_direction_deg, _) = self.surest(&other, elevation)?;
+        let in_mirror = self.cells(&crop.mirrored(), elevation, phase.in_mirror())?;
+        let cells = mean_of_looks(&seen, &in_mirror);
+        let figures = NetworkFigures {
+            expected_error_deg,
             other_direction_deg,
         };
-        Ok(spread(curves, &crop, &cells, hypotheses))
+        Ok(spread(curves, &crop, &cells, figures))
     }
 
-    /// What the network says with every phase, and the mean error that it expects.
-    fn looks(
+    /// The phase with which the network expects the least mean error, that error, and what it says.
+    fn surest(
         &self,
         crop: &Crop,
         elevation: f32,
-    ) -> Result<Vec<(PhaseHypothesis, f32, Cells)>, NetError> {
-        PhaseHypothesis::ALL
+    ) -> Result<(PhaseHypothesis, f32, Cells), NetError> {
+        let looks: Result<Vec<_>, NetError> = PhaseHypothesis::ALL
             .into_par_iter()
             .map(|phase| {
                 let cells = self.cells(crop, elevation, phase)?;
                 Ok((phase, mean_error(&cells), cells))
             })
-            .collect()
+            .collect();
+        let nothing = (
+            PhaseHypothesis::First,
+            f32::INFINITY,
+            vec![None; GRID * GRID],
+        );
+        let looks = looks?.into_iter();
+        Ok(looks.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(nothing))
     }
 
     fn cells(
@@ -213,7 +211,7 @@ fn spread(
     curves: &TurnCurves,
     crop: &Crop,
     cells: &Cells,
-    hypotheses: HypothesisFigures,
+    figures: NetworkFigures,
 ) -> TurnPrediction {
     let normals: Vec<Option<[f32; 4]>> = cells
         .iter()
@@ -248,6 +246,20 @@ fn spread(
         normals: Normals::new(curves.map(|pixel| answers[pixel].normal)),
         expected_errors: curves.map(|pixel| [answers[pixel].expected_error_deg]),
         albedo: Rgb::new(curves.map(|pixel| albedo[pixel])),
-        hypotheses,
+        figures,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_becomes_a_unit_normal_with_its_chord_as_an_angle() {
+        let found = NetworkNormal::of_answer([0.0, 3.0, 4.0, 0.2_f32.ln()]);
+        assert_eq!(found.normal, [0.0, 0.6, 0.8]);
+        assert!((found.expected_error_deg - 11.48).abs() < 0.01);
+        let nothing = NetworkNormal::of_answer([0.0, f32::NAN, 0.0, 0.0]);
+        assert_eq!(nothing.normal, [0.0, 0.0, 1.0]);
     }
 }

@@ -12,54 +12,42 @@ use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 use crate::observe::verdict::TurnVerdict;
 
-/// Parameters of the judgement of a turn.
-struct ConditioningParameters {
-    /// Largest share of the variation beyond the second harmonic, 0 to 1. By hand: above it the modulation is not that
-    /// of a Lambertian surface.
-    most_beyond: f64,
-    /// Least share of the pixels whose curves can be used, 0 to 1; with fewer the exposure was wrong. By hand.
-    least_observable: f64,
-    /// Least mean light of a pixel that can be used, linear, of the three channels together. By hand: what is less is
-    /// black.
-    least_light: f64,
-    /// Normals on which the modulation of a given light is measured. By hand.
-    normals: usize,
-    /// Least coverage of a turn in unknown light, degrees. By hand: the network has seen gaps of up to 18 degrees, and up to
-    /// three of them.
-    least_coverage_deg: f64,
-    /// Largest median of the errors that the network of turns expects, degrees. By hand.
-    most_expected_deg: f64,
-}
-
-const PARAMETERS: ConditioningParameters = ConditioningParameters {
-    most_beyond: 0.3,
-    least_observable: 0.1,
-    least_light: 1e-5,
-    normals: 100,
-    least_coverage_deg: 330.0,
-    most_expected_deg: 20.0,
-};
+/// Largest share of the variation beyond the second harmonic, 0 to 1. By hand: above it the modulation is not that
+/// of a Lambertian surface.
+const MOST_BEYOND: f64 = 0.3;
+/// Least share of the pixels whose curves can be used, 0 to 1; with fewer the exposure was wrong. By hand.
+const LEAST_OBSERVABLE: f64 = 0.1;
+/// Least mean light of a pixel that can be used, linear, of the three channels together. By hand: what is less is
+/// black.
+const LEAST_LIGHT: f64 = 1e-5;
+/// Normals on which the modulation of a given light is measured. By hand.
+const NORMALS: usize = 100;
+/// Least coverage of a turn in unknown light, degrees. By hand: the network has seen gaps of up to 18 degrees, and up to
+/// three of them.
+const LEAST_COVERAGE_DEG: f64 = 330.0;
+/// Largest median of the errors that are expected in unknown light, degrees. Measured: of 15 synthetic turns those below are off
+/// by 7 to 14 degrees, and those above by 14 to 22 (docs/results/turns.md).
+const MOST_EXPECTED_DEG: f64 = 15.0;
 
 /// How well the light of the turn determines normals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Conditioning {
+pub(crate) struct Conditioning {
     /// The median over the pixels of the effective value of the first and second harmonic, over the mean.
-    pub modulation: f64,
+    pub(crate) modulation: f64,
     /// The median over the pixels of the part of a curve's variation that lies beyond the second harmonic.
-    pub beyond: f64,
+    pub(crate) beyond: f64,
     /// The effective value of the harmonics over the mean in a light that was given: the median over the normals that
     /// face the viewer.
-    pub given_modulation: Option<f64>,
+    pub(crate) given_modulation: Option<f64>,
     /// How many degrees of the turn the frames cover.
-    pub coverage_deg: f64,
+    pub(crate) coverage_deg: f64,
     /// What follows.
-    pub verdict: TurnVerdict,
+    pub(crate) verdict: TurnVerdict,
 }
 
 impl Conditioning {
     /// That of a turn.
-    #[must_use]
-    pub fn of(curves: &TurnCurves) -> Self {
+    pub(crate) fn of(curves: &TurnCurves) -> Self {
         let pixels: Vec<PixelLight> = (0..curves.pixels())
             .into_par_iter()
             .map(|pixel| of_pixel(curves, pixel))
@@ -74,7 +62,7 @@ impl Conditioning {
         let clipped = pixels
             .iter()
             .filter(|observable| matches!(observable, PixelLight::Clipped));
-        let verdict = if (observable as f64) < PARAMETERS.least_observable * pixels.len() as f64 {
+        let verdict = if (observable as f64) < LEAST_OBSERVABLE * pixels.len() as f64 {
             if 2 * clipped.count() >= pixels.len() - observable {
                 TurnVerdict::Overexposed
             } else {
@@ -82,7 +70,7 @@ impl Conditioning {
             }
         } else if modulation < LEAST_MODULATION {
             TurnVerdict::TooEven
-        } else if beyond > PARAMETERS.most_beyond {
+        } else if beyond > MOST_BEYOND {
             TurnVerdict::NotLambertian
         } else {
             TurnVerdict::Good
@@ -101,9 +89,9 @@ impl Conditioning {
     pub(crate) fn by_network(self, expected_error_deg: f64) -> Self {
         let verdict = if self.verdict.is_exposure() {
             self.verdict
-        } else if self.coverage_deg < PARAMETERS.least_coverage_deg {
+        } else if self.coverage_deg < LEAST_COVERAGE_DEG {
             TurnVerdict::PartOfTurn
-        } else if expected_error_deg > PARAMETERS.most_expected_deg {
+        } else if expected_error_deg > MOST_EXPECTED_DEG {
             TurnVerdict::Uncertain
         } else {
             TurnVerdict::Good
@@ -111,19 +99,10 @@ impl Conditioning {
         Self { verdict, ..self }
     }
 
-    /// Whether a light was given that is too even while the turn is not.
-    #[must_use]
-    pub fn is_given_at_odds(&self) -> bool {
-        let is_even = self
-            .given_modulation
-            .is_some_and(|given| given < LEAST_MODULATION);
-        is_even && self.modulation >= LEAST_MODULATION
-    }
-
     /// The same where the light was given, as an object shows it in this environment that blurs nothing: one that is
     /// too even determines no more than an even turn.
     pub(crate) fn in_given(self, model: &ShadingModel) -> Self {
-        let modulations = half_sphere(PARAMETERS.normals).map(|normal| {
+        let modulations = half_sphere(NORMALS).map(|normal| {
             let harmonics = model.harmonics(normal).base;
             let sum = |coefficient: usize| {
                 harmonics
@@ -192,7 +171,7 @@ fn of_pixel(curves: &TurnCurves, pixel: usize) -> PixelLight {
     }
     let harmonics: f64 = solution[1..].iter().map(|value| value * value).sum();
     let constant = solution[0];
-    if constant <= PARAMETERS.least_light {
+    if constant <= LEAST_LIGHT {
         return PixelLight::Black;
     }
     PixelLight::Curve {

@@ -10,37 +10,27 @@ use crate::error::TurnError;
 use crate::model::harmonics::{COEFFICIENTS, HARMONICS};
 use crate::observe::exposure::{ExposureStep, ExposureWatch};
 
-/// Parameters of the curves.
-struct CurveParameters {
-    /// Parts into which the turn is divided. Derived: a part of 5 degrees is narrow beside the harmonics, and its own
-    /// mean of them is kept, so that dividing loses nothing.
-    parts: usize,
-    /// Encoded value, 0 to 1, from which a channel counts as clipped. Derived: the saturation level of the data, less
-    /// rounding.
-    clipped_value: f32,
-    /// Least share of the frames of a part, 0 to 1, in which a channel is not clipped. By hand: the mean of fewer would
-    /// be that of the darker ones.
-    least_unclipped: f32,
-    /// Relative difference up to which exposures of the frames of a part count as equal. By hand.
-    same_exposure: f64,
-    /// Least number of parts with frames. Derived: five Fourier coefficients of a Lambertian curve, and three to spare.
-    least_parts: usize,
-    /// Least share of the pixels of a block, 0 to 1, that have to be unclipped. By hand: the mean of fewer would be too
-    /// dark.
-    least_of_block: f32,
-    /// Least gap between parts with frames that is not covered, in usual gaps. By hand.
-    hole: f64,
-}
+/// Parts into which the turn is divided. Derived: a part of 5 degrees is narrow beside the harmonics, and its own
+/// mean of them is kept, so that dividing loses nothing.
+const PARTS: usize = 72;
+/// Encoded value, 0 to 1, from which a channel counts as clipped. Derived: the saturation level of the data, less
+/// rounding.
+const CLIPPED_VALUE: f32 = SATURATED_VALUE;
+/// Least share of the frames of a part, 0 to 1, in which a channel is not clipped. By hand: the mean of fewer would
+/// be that of the darker ones.
+const LEAST_UNCLIPPED: f32 = 0.95;
+/// Relative difference up to which exposures of the frames of a part count as equal. By hand.
+const SAME_EXPOSURE: f64 = 0.01;
+/// Least number of parts with frames. Derived: five Fourier coefficients of a Lambertian curve, and three to spare.
+const LEAST_PARTS: usize = 8;
+/// Least share of the pixels of a block, 0 to 1, that have to be unclipped. By hand: the mean of fewer would be too
+/// dark.
+const LEAST_OF_BLOCK: f32 = 0.9;
+/// Least gap between parts with frames that is not covered, in usual gaps. By hand.
+const HOLE: f64 = 3.0;
 
-const PARAMETERS: CurveParameters = CurveParameters {
-    parts: 72,
-    clipped_value: SATURATED_VALUE,
-    least_unclipped: 0.95,
-    same_exposure: 0.01,
-    least_parts: 8,
-    least_of_block: 0.9,
-    hole: 3.0,
-};
+/// What is wrong with frames of which nothing is left.
+pub(crate) const NOTHING: &str = "no frame has a pixel under the mask";
 
 /// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Of each frame it keeps the light of a few pixels,
 /// about a kilobyte; beyond that its memory does not grow with the number of frames.
@@ -88,20 +78,20 @@ impl CurveBuilder {
     /// For the pixels under a mask: where it is at least one half.
     ///
     /// # Errors
-    /// [`TurnError::Empty`] where there are none.
+    /// Where there are none.
     pub fn new(extent: Extent, mask: &[f32]) -> Result<Self, TurnError> {
         let places: Vec<usize> = (0..extent.pixels().min(mask.len()))
             .filter(|&at| mask[at] >= 0.5)
             .collect();
         if places.is_empty() {
-            return Err(TurnError::Empty);
+            return Err(TurnError::Frames(NOTHING.to_owned()));
         }
-        let cells = places.len() * PARAMETERS.parts;
+        let cells = places.len() * PARTS;
         Ok(Self {
             extent,
             places,
-            clipped: Srgb::to_linear(PARAMETERS.clipped_value),
-            parts: vec![Part::default(); PARAMETERS.parts],
+            clipped: Srgb::to_linear(CLIPPED_VALUE),
+            parts: vec![Part::default(); PARTS],
             sums: vec![[0.0; 3]; cells],
             counts: vec![[0; 3]; cells],
             watch: ExposureWatch::default(),
@@ -113,7 +103,7 @@ impl CurveBuilder {
     /// that are no number are left out.
     ///
     /// # Errors
-    /// [`TurnError::FrameSize`] where it has another size.
+    /// Where it has another size.
     pub fn push(
         &mut self,
         angle_deg: f64,
@@ -121,22 +111,22 @@ impl CurveBuilder {
         planes: [&[f32]; 3],
     ) -> Result<(), TurnError> {
         if extent != self.extent || planes.iter().any(|plane| plane.len() != extent.pixels()) {
-            return Err(TurnError::FrameSize {
-                found: extent,
-                expected: self.extent,
-            });
+            let [found, expected] =
+                [extent, self.extent].map(|size| format!("{} x {}", size.width, size.height));
+            return Err(TurnError::Frames(format!(
+                "a frame has {found} pixels where {expected} are needed"
+            )));
         }
         if !angle_deg.is_finite() {
             return Ok(());
         }
-        let part = (angle_deg.rem_euclid(360.0) / 360.0 * PARAMETERS.parts as f64) as usize
-            % PARAMETERS.parts;
+        let part = (angle_deg.rem_euclid(360.0) / 360.0 * PARTS as f64) as usize % PARTS;
         self.watch
             .push(angle_deg, &self.places, planes, self.clipped);
         self.parts[part].add(angle_deg.to_radians(), self.frames);
         self.frames += 1;
         for (pixel, &at) in self.places.iter().enumerate() {
-            let cell = pixel * PARAMETERS.parts + part;
+            let cell = pixel * PARTS + part;
             for (channel, plane) in planes.iter().enumerate() {
                 if plane[at] < self.clipped {
                     self.sums[cell][channel] += plane[at];
@@ -151,16 +141,14 @@ impl CurveBuilder {
     /// The curves of all frames.
     ///
     /// # Errors
-    /// [`TurnError::TooFewAngles`] where the frames do not tell two harmonics.
+    /// Where the frames do not tell two harmonics.
     pub fn finish(self) -> Result<TurnCurves, TurnError> {
-        let seen: Vec<usize> = (0..PARAMETERS.parts)
-            .filter(|&at| self.parts[at].frames > 0)
-            .collect();
-        if seen.len() < PARAMETERS.least_parts {
-            return Err(TurnError::TooFewAngles {
-                angles: seen.len(),
-                needed: PARAMETERS.least_parts,
-            });
+        let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
+        if seen.len() < LEAST_PARTS {
+            return Err(TurnError::Frames(format!(
+                "{} different angles were found: five terms a pixel need at least {LEAST_PARTS}, spread over the turn",
+                seen.len()
+            )));
         }
         let (steps, exposures) = self.watch.finish();
         let exposures: Vec<Option<f64>> = self
@@ -172,20 +160,20 @@ impl CurveBuilder {
             self.places
                 .iter()
                 .enumerate()
-                .flat_map(|(pixel, _)| seen.iter().map(move |part| pixel * PARAMETERS.parts + part))
+                .flat_map(|(pixel, _)| seen.iter().map(move |part| pixel * PARTS + part))
         };
         let mean = |cell: usize| {
-            let exposure = exposures[cell % PARAMETERS.parts].unwrap_or(1.0) as f32;
+            let exposure = exposures[cell % PARTS].unwrap_or(1.0) as f32;
             [0, 1, 2]
                 .map(|c| self.sums[cell][c] / f32::from(self.counts[cell][c].max(1)) / exposure)
         };
         let values = cells().map(mean).collect();
         let weights = cells()
             .map(|cell| {
-                let frames = self.parts[cell % PARAMETERS.parts].frames as f32;
+                let frames = self.parts[cell % PARTS].frames as f32;
                 self.counts[cell].map(|count| {
-                    let is_seen = f32::from(count) >= PARAMETERS.least_unclipped * frames
-                        && exposures[cell % PARAMETERS.parts].is_some();
+                    let is_seen = f32::from(count) >= LEAST_UNCLIPPED * frames
+                        && exposures[cell % PARTS].is_some();
                     f32::from(u8::from(is_seen))
                 })
             })
@@ -197,7 +185,7 @@ impl CurveBuilder {
             harmonics: seen.iter().map(|&at| self.parts[at].harmonics()).collect(),
             angles: seen
                 .iter()
-                .map(|&at| (at as f64 + 0.5) / PARAMETERS.parts as f64 * TAU)
+                .map(|&at| (at as f64 + 0.5) / PARTS as f64 * TAU)
                 .collect(),
             values,
             weights,
@@ -224,7 +212,7 @@ impl Part {
             all().fold(f64::INFINITY, f64::min),
             all().fold(0.0, f64::max),
         );
-        (most <= least * (1.0 + PARAMETERS.same_exposure)).then_some(most)
+        (most <= least * (1.0 + SAME_EXPOSURE)).then_some(most)
     }
 
     fn harmonics(&self) -> [f64; COEFFICIENTS] {
@@ -281,7 +269,7 @@ impl TurnCurves {
 
     /// The light from which a channel counts as clipped.
     pub(crate) fn clipped_value(&self) -> f64 {
-        f64::from(Srgb::to_linear(PARAMETERS.clipped_value))
+        f64::from(Srgb::to_linear(CLIPPED_VALUE))
     }
 
     /// The part of a pixel's light, 0 to 1, that is left out because it is clipped.
@@ -356,7 +344,7 @@ impl TurnCurves {
             .map(|(angle, next)| next - angle)
             .collect();
         let usual = median(gaps.iter().copied()).unwrap_or(0.0);
-        let is_hole = |gap: &&f64| **gap > PARAMETERS.hole * usual;
+        let is_hole = |gap: &&f64| **gap > HOLE * usual;
         360.0
             - gaps
                 .iter()
@@ -428,7 +416,7 @@ impl TurnCurves {
             }
         }
         // A block of which a pixel clips is too dark by the mean of the others: it does not count.
-        let least = PARAMETERS.least_of_block * pixels.len() as f32;
+        let least = LEAST_OF_BLOCK * pixels.len() as f32;
         let mean = [0, 1, 2].map(|c| sum[c] / weights[c].max(f32::MIN_POSITIVE));
         let weight = weights.map(|weight| if weight >= least { 1.0 } else { 0.0 });
         (mean, weight)

@@ -6,40 +6,25 @@
 use relight_core::statistics::median;
 use serde::Serialize;
 
-/// Parameters of the search for steps of the exposure.
-struct ExposureParameters {
-    /// Pixels that are looked at, spread over the object. By hand.
-    sampled_pixels: usize,
-    /// Linear light, of the three channels together, below which a pixel does not count. By hand.
-    least_light: f32,
-    /// Frames before and after that predict how the light itself changes. By hand.
-    neighbours: usize,
-    /// Least step beyond the prediction, natural logarithm of a factor. By hand.
-    least_step: f64,
-    /// The same in medians of what frames of the turn differ from their predictions. By hand.
-    outlier_factor: f64,
-    /// Gaps between frames narrower than this predict nothing, in median gaps. By hand.
-    least_span: f64,
-    /// Gaps wider than this tell no step from the light itself, in median gaps. By hand.
-    wide_span: f64,
-    /// Gaps narrower than this do so whatever the median, degrees. By hand.
-    wide_gap_deg: f64,
-    /// What the steps of a whole turn may add up to, natural logarithm of a factor, for each step. Derived: they lead
-    /// back to where they began; the tolerance is by hand.
-    closure: f64,
-}
-
-const PARAMETERS: ExposureParameters = ExposureParameters {
-    sampled_pixels: 256,
-    least_light: 3e-3,
-    neighbours: 3,
-    least_step: 0.03,
-    outlier_factor: 8.0,
-    least_span: 0.2,
-    wide_span: 1.5,
-    wide_gap_deg: 12.0,
-    closure: 0.02,
-};
+/// Pixels that are looked at, spread over the object. By hand.
+const SAMPLED_PIXELS: usize = 256;
+/// Linear light, of the three channels together, below which a pixel does not count. By hand.
+const LEAST_LIGHT: f32 = 3e-3;
+/// Frames before and after that predict how the light itself changes. By hand.
+const NEIGHBOURS: usize = 3;
+/// Least step beyond the prediction, natural logarithm of a factor. By hand.
+const LEAST_STEP: f64 = 0.03;
+/// The same in medians of what frames of the turn differ from their predictions. By hand.
+const OUTLIER_FACTOR: f64 = 8.0;
+/// Gaps between frames narrower than this predict nothing, in median gaps. By hand.
+const LEAST_SPAN: f64 = 0.2;
+/// Gaps wider than this tell no step from the light itself, in median gaps. By hand.
+const WIDE_SPAN: f64 = 1.5;
+/// Gaps narrower than this do so whatever the median, degrees. By hand.
+const WIDE_GAP_DEG: f64 = 12.0;
+/// What the steps of a whole turn may add up to, natural logarithm of a factor, for each step. Derived: they lead
+/// back to where they began; the tolerance is by hand.
+const CLOSURE: f64 = 0.02;
 
 /// A change of the exposure between two frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -71,12 +56,11 @@ impl ExposureWatch {
         planes: [&[f32]; 3],
         clipped: f32,
     ) {
-        let every = places.len().div_ceil(PARAMETERS.sampled_pixels).max(1);
+        let every = places.len().div_ceil(SAMPLED_PIXELS).max(1);
         let light = |&at: &usize| {
             let channels = planes.map(|plane| plane[at]);
             let sum: f32 = channels.iter().sum();
-            let is_usable =
-                channels.iter().all(|&value| value < clipped) && sum > PARAMETERS.least_light;
+            let is_usable = channels.iter().all(|&value| value < clipped) && sum > LEAST_LIGHT;
             is_usable.then_some(sum)
         };
         self.frames.push(Seen {
@@ -95,7 +79,7 @@ impl ExposureWatch {
             angle(a).total_cmp(&angle(b))
         });
         let count = order.len();
-        if count <= 2 * PARAMETERS.neighbours + 1 {
+        if count <= 2 * NEIGHBOURS + 1 {
             return (Vec::new(), even);
         }
         let frame = |at: usize| &self.frames[order[at % count]];
@@ -123,23 +107,18 @@ impl ExposureWatch {
         // The change that leads to each frame, but for how the light itself changes there.
         let jumps: Vec<f64> = (0..count)
             .map(|at| {
-                let around = (1..=PARAMETERS.neighbours).flat_map(|k| [at + k, at + count - k]);
+                let around = (1..=NEIGHBOURS).flat_map(|k| [at + k, at + count - k]);
                 let slopes = around
                     .map(|other| other % count)
-                    .filter(|&other| spans[other] > PARAMETERS.least_span)
+                    .filter(|&other| spans[other] > LEAST_SPAN)
                     .map(|other| changes[other] / spans[other]);
                 changes[at] - spans[at] * median(slopes).unwrap_or(0.0)
             })
             .collect();
         let usual = median(jumps.iter().map(|jump| jump.abs())).unwrap_or(0.0);
         // What is expected over a gap is off by how the light bends there: by the square of its span.
-        let least = |at: usize| {
-            PARAMETERS
-                .least_step
-                .max(PARAMETERS.outlier_factor * usual * spans[at].powi(2).max(1.0))
-        };
-        let is_observable =
-            |at: usize| spans[at] < PARAMETERS.wide_span || gaps[at] < PARAMETERS.wide_gap_deg;
+        let least = |at: usize| LEAST_STEP.max(OUTLIER_FACTOR * usual * spans[at].powi(2).max(1.0));
+        let is_observable = |at: usize| spans[at] < WIDE_SPAN || gaps[at] < WIDE_GAP_DEG;
         let steps: Vec<(usize, f64)> = jumps
             .iter()
             .copied()
@@ -147,7 +126,7 @@ impl ExposureWatch {
             .filter(|&(at, jump)| is_observable(at) && jump.abs() > least(at))
             .collect();
         let sum: f64 = steps.iter().map(|(_, jump)| jump).sum();
-        if steps.is_empty() || sum.abs() > PARAMETERS.closure * steps.len() as f64 {
+        if steps.is_empty() || sum.abs() > CLOSURE * steps.len() as f64 {
             return (Vec::new(), even);
         }
         let mut exposures = even;

@@ -13,23 +13,14 @@ use crate::observe::probe::{Probe, ProbeBuilder};
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::reading::{ReadTurn, TurnOrigin};
 
-/// Parameters of the comparison of a video with its shard.
-struct FilmParameters {
-    /// Largest share of a ball that the mask may cover, 0 to 1. By hand: edges are not exact.
-    most_covered: f64,
-    /// Side of the blocks in which frames are compared, pixels of the shard. By hand: shifts of a few pixels hardly
-    /// change them.
-    block: usize,
-    /// Relative difference of the light of blocks from which frames show something else. Measured: those of their own
-    /// video differ by 0.01 to 0.02, by JPEG and scaling.
-    most_different: f64,
-}
-
-const PARAMETERS: FilmParameters = FilmParameters {
-    most_covered: 0.05,
-    block: 16,
-    most_different: 0.12,
-};
+/// Largest share of a ball that the mask may cover, 0 to 1. By hand: edges are not exact.
+const MOST_COVERED: f64 = 0.05;
+/// Side of the blocks in which frames are compared, pixels of the shard. By hand: shifts of a few pixels hardly
+/// change them.
+const BLOCK: usize = 16;
+/// Relative difference of the light of blocks from which frames show something else. Measured: those of their own
+/// video differ by 0.01 to 0.02, by JPEG and scaling.
+const MOST_DIFFERENT: f64 = 0.12;
 
 /// Reads the ball in the video of a turn. `progress` is told how many of the turn's frames are done, and how many there are.
 ///
@@ -57,15 +48,18 @@ pub(crate) fn film(
         }
         number += 1;
     }
-    let path = recording.video.clone();
+    let other = |why: String| TurnError::OtherVideo {
+        path: recording.video.clone(),
+        why,
+    };
     if done == 0 {
-        return Err(TurnError::OtherVideo {
-            path,
-            frames: number,
-        });
+        return Err(other(format!(
+            "none of the turn's frames is among its {number}"
+        )));
     }
     if !likeness.is_same() {
-        return Err(TurnError::OtherPictures { path });
+        let why = "its frames do not show what those of the shard do";
+        return Err(other(why.to_owned()));
     }
     Ok(ball)
 }
@@ -83,10 +77,12 @@ fn check_session(recording: &Recording, origin: Option<&TurnOrigin>) -> Result<(
     if recording.id == origin.session || is_video {
         return Ok(());
     }
-    Err(TurnError::OtherSession {
+    Err(TurnError::OtherVideo {
         path: recording.video.clone(),
-        found: recording.id.clone(),
-        session: origin.session.clone(),
+        why: format!(
+            "the shard was made from the session {}, and this is of {}",
+            origin.session, recording.id
+        ),
     })
 }
 
@@ -112,7 +108,7 @@ fn check_mask(given: ProbePlace, turn: &ReadTurn) -> Result<(), TurnError> {
         .map(|_| f64::from(crop.w) * f64::from(crop.h) / (width * height) as f64)
         .sum();
     let part = covered / (std::f64::consts::PI * given.radius * given.radius);
-    if part <= PARAMETERS.most_covered {
+    if part <= MOST_COVERED {
         return Ok(());
     }
     Err(TurnError::BallInMask {
@@ -146,15 +142,15 @@ impl<'a> Likeness<'a> {
         };
         let shard = self.turn.first[at].planes();
         let Extent { width, height } = shard.extent();
-        let across = width.div_ceil(PARAMETERS.block);
-        let mut sums = vec![[[0.0; 3]; 2]; across * height.div_ceil(PARAMETERS.block)];
+        let across = width.div_ceil(BLOCK);
+        let mut sums = vec![[[0.0; 3]; 2]; across * height.div_ceil(BLOCK)];
         let mask = self.turn.mask.plane(0);
         for at in (0..mask.len()).filter(|&at| mask[at] >= 0.5) {
             let (x, y) = (at % width, at / width);
             let Some(seen) = light_at(frame.planes(), origin.crop, (x, y), shard.extent()) else {
                 continue;
             };
-            let block = &mut sums[y / PARAMETERS.block * across + x / PARAMETERS.block];
+            let block = &mut sums[y / BLOCK * across + x / BLOCK];
             for c in 0..3 {
                 block[0][c] += shard.plane(c)[at];
                 block[1][c] += seen[c];
@@ -174,7 +170,7 @@ impl<'a> Likeness<'a> {
 
     /// Whether at least half of the frames are alike; where none can be compared, nothing speaks against it.
     fn is_same(&self) -> bool {
-        median(self.differences.iter().copied()).unwrap_or(0.0) < PARAMETERS.most_different
+        median(self.differences.iter().copied()).unwrap_or(0.0) < MOST_DIFFERENT
     }
 }
 

@@ -8,19 +8,11 @@ use crate::error::TurnError;
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
 
-/// Parameters of the panorama.
-struct PanoramaParameters {
-    /// Rows of the panorama, from the table's axis upwards to downwards. By hand: about 6 degrees, finer than order 6
-    /// shows.
-    rows: usize,
-    /// Columns of the panorama. Derived: twice the rows, so that cells are square at the equator.
-    columns: usize,
-}
-
-const PARAMETERS: PanoramaParameters = PanoramaParameters {
-    rows: 32,
-    columns: 64,
-};
+/// Rows of the panorama, from the table's axis upwards to downwards. By hand: about 6 degrees, finer than order 6
+/// shows.
+const ROWS: usize = 32;
+/// Columns of the panorama. Derived: twice the rows, so that cells are square at the equator.
+const COLUMNS: usize = 64;
 
 /// The panorama that a chrome ball shows of the environment light while it turns, in the table's frame at its angle 0.
 #[derive(Debug)]
@@ -34,8 +26,8 @@ impl MirrorPanorama {
     pub(crate) fn new(frame: TableFrame) -> Self {
         Self {
             frame,
-            sums: vec![[0.0; 3]; PARAMETERS.rows * PARAMETERS.columns],
-            counts: vec![0.0; PARAMETERS.rows * PARAMETERS.columns],
+            sums: vec![[0.0; 3]; ROWS * COLUMNS],
+            counts: vec![0.0; ROWS * COLUMNS],
         }
     }
 
@@ -63,11 +55,9 @@ impl MirrorPanorama {
     pub(crate) fn cell(&self, angle: f64, normal: [f64; 3]) -> usize {
         let [x, y, z] = self.frame.to_table(reflected(normal));
         let azimuth = y.atan2(x) + angle;
-        let column = (azimuth.rem_euclid(TAU) / TAU * PARAMETERS.columns as f64) as usize
-            % PARAMETERS.columns;
-        let row = ((z.clamp(-1.0, 1.0).acos() / PI * PARAMETERS.rows as f64) as usize)
-            .min(PARAMETERS.rows - 1);
-        row * PARAMETERS.columns + column
+        let column = (azimuth.rem_euclid(TAU) / TAU * COLUMNS as f64) as usize % COLUMNS;
+        let row = ((z.clamp(-1.0, 1.0).acos() / PI * ROWS as f64) as usize).min(ROWS - 1);
+        row * COLUMNS + column
     }
 
     /// What it shows, as coefficients; directions that it never shows are as bright as their row, or as all.
@@ -75,17 +65,16 @@ impl MirrorPanorama {
         let all = self.all().ok_or(TurnError::NoLight)?;
         let order = Order::GLOSS;
         let mut light = ShLight::even(order, [0.0; 3]);
-        for row in 0..PARAMETERS.rows {
-            let cells = row * PARAMETERS.columns..(row + 1) * PARAMETERS.columns;
+        for row in 0..ROWS {
+            let cells = row * COLUMNS..(row + 1) * COLUMNS;
             let of_row = mean(&self.sums[cells.clone()], &self.counts[cells]).unwrap_or(all);
-            let polar = PI * (row as f64 + 0.5) / PARAMETERS.rows as f64;
-            let edges =
-                [row, row + 1].map(|edge| (PI * edge as f64 / PARAMETERS.rows as f64).cos());
-            let area = (edges[0] - edges[1]) * TAU / PARAMETERS.columns as f64;
-            for column in 0..PARAMETERS.columns {
-                let cell = row * PARAMETERS.columns + column;
+            let polar = PI * (row as f64 + 0.5) / ROWS as f64;
+            let edges = [row, row + 1].map(|edge| (PI * edge as f64 / ROWS as f64).cos());
+            let area = (edges[0] - edges[1]) * TAU / COLUMNS as f64;
+            for column in 0..COLUMNS {
+                let cell = row * COLUMNS + column;
                 let shown = mean(&self.sums[cell..=cell], &self.counts[cell..=cell]);
-                let azimuth = TAU * (column as f64 + 0.5) / PARAMETERS.columns as f64;
+                let azimuth = TAU * (column as f64 + 0.5) / COLUMNS as f64;
                 let (sin, cos) = azimuth.sin_cos();
                 let to = Direction::new(polar.sin() * cos, polar.sin() * sin, polar.cos());
                 let Some(to) = to else { continue };

@@ -13,19 +13,11 @@ use crate::observe::probe_place::ProbePlace;
 use crate::observe::surroundings::Surroundings;
 use crate::setting_error::SettingError;
 
-/// Parameters of the picture of a ball.
-struct ProbeParameters {
-    /// Side of the square to which the ball is brought, pixels. By hand.
-    side: usize,
-    /// Share of the ball's radius that is looked at, 0 to 1. By hand: the rim also shows the background and reflects
-    /// it.
-    radius_share: f32,
-}
-
-const PARAMETERS: ProbeParameters = ProbeParameters {
-    side: 48,
-    radius_share: 0.92,
-};
+/// Side of the square to which the ball is brought, pixels. By hand.
+const SIDE: usize = 48;
+/// Share of the ball's radius that is looked at, 0 to 1. By hand: the rim also shows the background and reflects
+/// it.
+const RADIUS_SHARE: f32 = 0.92;
 
 /// What a ball is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,15 +56,15 @@ impl ProbeBuilder {
     /// # Errors
     /// None for a ball.
     pub(crate) fn new(probe: Probe) -> Result<Self, TurnError> {
-        let extent = Extent::new(PARAMETERS.side, PARAMETERS.side);
+        let extent = Extent::new(SIDE, SIDE);
         let mask = Planes::from_fn(extent, |x, y| {
-            let from_middle = |at: usize| 2.0 * (at as f32 + 0.5) / PARAMETERS.side as f32 - 1.0;
-            let inside = from_middle(x).hypot(from_middle(y)) < PARAMETERS.radius_share;
+            let from_middle = |at: usize| 2.0 * (at as f32 + 0.5) / SIDE as f32 - 1.0;
+            let inside = from_middle(x).hypot(from_middle(y)) < RADIUS_SHARE;
             [f32::from(u8::from(inside))]
         });
         Ok(Self {
             probe,
-            normals: Normals::sphere(PARAMETERS.side).masked(&mask)?,
+            normals: Normals::sphere(SIDE).masked(&mask)?,
             builder: CurveBuilder::new(extent, mask.plane(0))?,
             panorama: MirrorPanorama::new(TableFrame::new(probe.elevation)),
             surroundings: None,
@@ -98,7 +90,7 @@ impl ProbeBuilder {
             none => none.insert(Surroundings::new(place, planes.extent())?),
         };
         surroundings.push(angle_deg, planes)?;
-        let ball = Planes::from_fn(Extent::new(PARAMETERS.side, PARAMETERS.side), |x, y| {
+        let ball = Planes::from_fn(Extent::new(SIDE, SIDE), |x, y| {
             light_at(place, planes, x, y)
         });
         self.add_to_panorama(angle_deg, &ball);
@@ -121,8 +113,8 @@ impl ProbeBuilder {
 
 /// The light at a pixel of the square that the ball fills.
 fn light_at(place: ProbePlace, planes: &Planes<3>, x: usize, y: usize) -> [f32; 3] {
-    let from = |at: usize| (2 * at + 1) as f64 / PARAMETERS.side as f64 - 1.0;
-    let pixel = 2.0 * place.radius / PARAMETERS.side as f64;
+    let from = |at: usize| (2 * at + 1) as f64 / SIDE as f64 - 1.0;
+    let pixel = 2.0 * place.radius / SIDE as f64;
     place.mean_light(planes, place.in_picture([from(x), -from(y)]), pixel)
 }
 

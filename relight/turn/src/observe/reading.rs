@@ -15,30 +15,11 @@ use relit_data::rig::RotationDirection;
 use serde::Serialize;
 
 use crate::error::TurnError;
-use crate::observe::curves::{CurveBuilder, TurnCurves};
+use crate::model::frame::FactSource;
+use crate::observe::curves::{CurveBuilder, NOTHING, TurnCurves};
 
-/// Parameters of the reading.
-struct ReadingParameters {
-    /// Frames that are drawn at a time. By convention of the shards: twelve neighbours cover the whole turn.
-    batch: u32,
-}
-
-const PARAMETERS: ReadingParameters = ReadingParameters { batch: 12 };
-
-/// What says which way the table turns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RotationSource {
-    /// Nobody: it is what is usual on this rig.
-    #[default]
-    Assumed,
-    /// The caller.
-    Given,
-    /// The session: it is known of the rig.
-    Rig,
-    /// The network of turns, which is clearly surer of its normals this way.
-    Network,
-}
+/// Frames that are drawn at a time. By convention of the shards: twelve neighbours cover the whole turn.
+const BATCH: u32 = 12;
 
 /// Which way the table turns, and what says so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -46,7 +27,7 @@ pub struct TableRotation {
     /// Seen from above, as the table's angle grows.
     pub direction: RotationDirection,
     /// What says so.
-    pub source: RotationSource,
+    pub source: FactSource,
 }
 
 /// What the records of a shard say of the video that it was made from.
@@ -83,7 +64,7 @@ pub struct ReadTurn {
 
 impl ReadTurn {
     /// The same of a table that turns the other way, as `source` says.
-    pub(crate) fn turned_other_way(mut self, source: RotationSource) -> Self {
+    pub(crate) fn turned_other_way(mut self, source: FactSource) -> Self {
         self.curves = self.curves.with_other_direction();
         for (_, angle) in &mut self.sources {
             *angle = -*angle;
@@ -117,7 +98,7 @@ pub fn read_curves(
     let frames = turns.turns().iter().sum::<u32>();
     let streaming = Streaming {
         plan: DrawPlan {
-            batch: PARAMETERS.batch,
+            batch: BATCH,
             draw: Draw::Neighbours,
             seed: None,
             rank: Rank::ONLY,
@@ -149,7 +130,7 @@ pub fn read_curves(
             damaged.rest
         });
         reader.take(&shrunk.batch)?;
-        done += u64::from(PARAMETERS.batch);
+        done += u64::from(BATCH);
         progress(done.min(frames.into()), frames.into());
         stream.give_back(shrunk.batch);
     }
@@ -201,7 +182,7 @@ impl Reader {
                 });
             }
             self.builder(extent, mask)?.push(angle, extent, planes)?;
-            if self.first.len() < PARAMETERS.batch as usize {
+            if self.first.len() < BATCH as usize {
                 let planes = planes.map(<[f32]>::to_vec);
                 self.first
                     .push(Rgb::new(Planes::from_planes(extent, planes)?));
@@ -216,7 +197,7 @@ impl Reader {
             self.mask = Some(Planes::from_planes(extent, [mask.to_vec()])?);
             self.builder = Some(CurveBuilder::new(extent, mask)?);
         }
-        self.builder.as_mut().ok_or(TurnError::Empty)
+        self.builder.as_mut().ok_or_else(nothing)
     }
 
     /// The angle of a frame in degrees; `None` if others have one and it has none, or the other way around.
@@ -243,12 +224,13 @@ impl Reader {
         let has_angles = self.has_angles.unwrap_or(true);
         let indices = self.last_index as u64 + 1;
         if !has_angles && indices > self.frames.into() {
-            return Err(TurnError::NoAngles {
-                found: self.frames,
-                indices,
-            });
+            return Err(TurnError::Frames(format!(
+                "the frames have no angles, and only {} of at least {indices} of the turn are there: without angles, a turn \
+                 has to be whole",
+                self.frames
+            )));
         }
-        let builder = self.builder.ok_or(TurnError::Empty)?;
+        let builder = self.builder.ok_or_else(nothing)?;
         Ok(ReadTurn {
             name,
             curves: builder.finish()?,
@@ -256,11 +238,15 @@ impl Reader {
             first: self.first,
             sources: self.sources,
             origin: self.origin,
-            mask: self.mask.ok_or(TurnError::Empty)?,
+            mask: self.mask.ok_or_else(nothing)?,
             has_angles,
             damage: self.damage,
         })
     }
+}
+
+fn nothing() -> TurnError {
+    TurnError::Frames(NOTHING.to_owned())
 }
 
 /// Which frame of its turn it is: by its record, or by its key, which ends in the index.

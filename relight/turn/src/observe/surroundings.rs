@@ -6,18 +6,10 @@ use crate::error::TurnError;
 use crate::observe::curves::CurveBuilder;
 use crate::observe::probe_place::ProbePlace;
 
-/// Parameters of what is gathered around a ball.
-pub(crate) struct SurroundingsParameters {
-    /// How far from the ball's middle is looked at, in radii. By hand.
-    pub(crate) reach: f64,
-    /// Pixels along the diameter of the given circle. By hand.
-    pub(crate) across: usize,
-}
-
-pub(crate) const SURROUNDINGS_PARAMETERS: SurroundingsParameters = SurroundingsParameters {
-    reach: 1.75,
-    across: 24,
-};
+/// How far from the ball's middle is looked at, in radii. By hand.
+pub(crate) const REACH: f64 = 1.75;
+/// Pixels along the diameter of the given circle. By hand.
+pub(crate) const ACROSS: usize = 24;
 
 /// What the picture shows at and around a ball, over a turn.
 #[derive(Debug)]
@@ -31,8 +23,7 @@ pub(crate) struct Surroundings {
 impl Surroundings {
     /// For a ball at a place in pictures of this size.
     pub(crate) fn new(place: ProbePlace, picture: Extent) -> Result<Self, TurnError> {
-        let side =
-            (SURROUNDINGS_PARAMETERS.reach * SURROUNDINGS_PARAMETERS.across as f64).ceil() as usize;
+        let side = (REACH * ACROSS as f64).ceil() as usize;
         let mask: Vec<f32> = (0..side * side)
             .map(|at| {
                 let [x, y] = place.in_picture(middle_of(side, at));
@@ -51,7 +42,7 @@ impl Surroundings {
 
     /// Takes up a frame at an angle of the table, degrees.
     pub(crate) fn push(&mut self, angle_deg: f64, picture: &Planes<3>) -> Result<(), TurnError> {
-        let pixel = 2.0 * self.place.radius / SURROUNDINGS_PARAMETERS.across as f64;
+        let pixel = 2.0 * self.place.radius / ACROSS as f64;
         let extent = Extent::new(self.side, self.side);
         let shown = Planes::from_fn(extent, |x, y| {
             let at = self
@@ -65,7 +56,6 @@ impl Surroundings {
 
 /// The middle of a pixel of the square, in radii from the ball's middle: to the right and up.
 pub(crate) fn middle_of(side: usize, at: usize) -> [f64; 2] {
-    let from =
-        |at: usize| (2.0 * at as f64 + 1.0 - side as f64) / SURROUNDINGS_PARAMETERS.across as f64;
+    let from = |at: usize| (2.0 * at as f64 + 1.0 - side as f64) / ACROSS as f64;
     [from(at % side), -from(at / side)]
 }

@@ -18,7 +18,7 @@ pub enum TurnVerdict {
     Underexposed,
     /// The frames cover only part of a turn, in a light that is not known.
     PartOfTurn,
-    /// The network of turns expects large errors.
+    /// Normals in a light that is not known are expected to be far off.
     Uncertain,
 }
 
@@ -26,7 +26,7 @@ impl TurnVerdict {
     /// Whether normals and albedo are observable at all.
     #[must_use]
     pub const fn is_fit(self) -> bool {
-        matches!(self, Self::Good | Self::NotLambertian)
+        matches!(self, Self::Good | Self::NotLambertian | Self::Uncertain)
     }
 
     /// Whether the camera's exposure makes the turn worthless.

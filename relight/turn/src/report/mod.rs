@@ -1,10 +1,6 @@
 //! What is written of a solved turn.
 
-pub(crate) mod destinations;
-pub(crate) mod encoding;
-pub(crate) mod figures;
 pub(crate) mod files;
-pub(crate) mod maps;
 pub(crate) mod movie;
 pub(crate) mod object;
 pub(crate) mod sheet;

@@ -21,21 +21,12 @@ use crate::observe::reading::ReadTurn;
 /// Angles of the table at which the gloss is looked at: all that lies between shows nothing new.
 const ANGLES: [f64; 4] = [0.0, FRAC_PI_2, 2.0 * FRAC_PI_2, 3.0 * FRAC_PI_2];
 
-/// Parameters of the object as a file.
-struct ObjectParameters {
-    /// Smoothness (exponent of the lobe) of metal in unknown light, which no turn determines. By convention.
-    metal_smoothness: f32,
-    /// Standard deviation of the coverage at the edge of the mask, pixels. By hand.
-    edge: f64,
-    /// Coverage below which a pixel is not part of the object, 0 to 1. By hand.
-    least_alpha: f32,
-}
-
-const PARAMETERS: ObjectParameters = ObjectParameters {
-    metal_smoothness: 60.0,
-    edge: 0.6,
-    least_alpha: 0.02,
-};
+/// Smoothness (exponent of the lobe) of metal in unknown light, which no turn determines. By convention.
+const METAL_SMOOTHNESS: f32 = 60.0;
+/// Standard deviation of the coverage at the edge of the mask, pixels. By hand.
+const EDGE: f64 = 0.6;
+/// Coverage below which a pixel is not part of the object, 0 to 1. By hand.
+const LEAST_ALPHA: f32 = 0.02;
 
 impl TurnSolution {
     fn turned(&self, light: ShLight, angle: f64) -> ShLight {
@@ -51,7 +42,7 @@ impl TurnSolution {
     ///
     /// # Errors
     /// None for maps of one size.
-    pub fn surface(&self, curves: &TurnCurves) -> Result<Surface, TurnError> {
+    pub(crate) fn surface(&self, curves: &TurnCurves) -> Result<Surface, TurnError> {
         let extent = curves.extent();
         let (normals, albedo) = (self.normals(curves), self.albedo(curves));
         let gloss = self.gloss(curves)?;
@@ -76,15 +67,15 @@ impl TurnSolution {
     ///
     /// # Errors
     /// Where a term of the light is not finite.
-    pub fn gloss(&self, curves: &TurnCurves) -> Result<Option<FittedGloss>, TurnError> {
+    pub(crate) fn gloss(&self, curves: &TurnCurves) -> Result<Option<FittedGloss>, TurnError> {
         if self.model.gloss.is_none() {
             return Ok(None);
         }
         let Some(measured) = &self.measured else {
             // What metal shows is all that is known of the light: it may be blurred or not.
             return Ok(Some(FittedGloss {
-                reflectance: (PARAMETERS.metal_smoothness + 2.0) / 8.0,
-                smoothness: PARAMETERS.metal_smoothness,
+                reflectance: (METAL_SMOOTHNESS + 2.0) / 8.0,
+                smoothness: METAL_SMOOTHNESS,
                 residual: 1.0,
             }));
         };
@@ -118,11 +109,11 @@ impl TurnSolution {
     ///
     /// # Errors
     /// Where the maps are too large for a file.
-    pub fn asset(&self, turn: &ReadTurn) -> Result<CapturedObject, TurnError> {
+    pub(crate) fn captured_object(&self, turn: &ReadTurn) -> Result<CapturedObject, TurnError> {
         let curves = &turn.curves;
         let extent = curves.extent();
         let mask = curves.mask();
-        let alpha = blurred_mask(&turn.mask, PARAMETERS.edge);
+        let alpha = blurred_mask(&turn.mask, EDGE);
         let inner: Vec<bool> = (0..mask.len())
             .map(|at| {
                 mask[at]
@@ -152,13 +143,7 @@ impl TurnSolution {
 /// The part of each pixel under the mask, were its edge as soft as a lens makes it; what is hardly anything is nothing.
 fn blurred_mask(mask: &Planes<1>, deviation: f64) -> Planes<1> {
     let everywhere = vec![true; mask.extent().pixels()];
-    blurred(mask, &everywhere, deviation).map(|alpha| {
-        if alpha < PARAMETERS.least_alpha {
-            0.0
-        } else {
-            alpha
-        }
-    })
+    blurred(mask, &everywhere, deviation).map(|alpha| if alpha < LEAST_ALPHA { 0.0 } else { alpha })
 }
 
 #[cfg(test)]

@@ -9,27 +9,17 @@ use crate::error::TurnError;
 use crate::fit::solution::TurnSolution;
 use crate::observe::curves::TurnCurves;
 use crate::observe::reading::ReadTurn;
-use crate::report::encoding::grey;
-use crate::report::maps::TurnMaps;
 
-/// Parameters of the contact sheet.
-struct SheetParameters {
-    /// Height of its pictures, pixels. By convention.
-    tile: usize,
-    /// Pictures in a row. By convention.
-    columns: usize,
-}
-
-const PARAMETERS: SheetParameters = SheetParameters {
-    tile: 256,
-    columns: 4,
-};
+/// Height of its pictures, pixels. By convention.
+const TILE: usize = 256;
+/// Pictures in a row. By convention.
+const COLUMNS: usize = 4;
 
 /// One sheet: a frame, normals, albedo and shading; shadow, confidence, and a ball in the light.
 pub(crate) fn contact_sheet(
     turn: &ReadTurn,
     solution: &TurnSolution,
-    maps: &TurnMaps,
+    shadow: &Planes<1>,
     (surface, light): (&Surface, &ShLight),
 ) -> Result<Planes<3>, TurnError> {
     let curves = &turn.curves;
@@ -60,18 +50,24 @@ pub(crate) fn contact_sheet(
         plain(&surface.normals().to_colours()),
         lit(solution.albedo(curves).planes()),
         lit(shading.planes()),
-        plain(grey(&maps.shadow).planes()),
+        plain(grey(shadow).planes()),
         plain(grey(&solution.confidence(curves)).planes()),
         ball_tile,
     ];
-    Ok(Planes::sheet(&tiles, PARAMETERS.columns)?)
+    Ok(Planes::sheet(&tiles, COLUMNS)?)
+}
+
+/// A colour image of one plane.
+pub(crate) fn grey(plane: &Planes<1>) -> Rgb<Linear> {
+    let [values] = plane.planes();
+    let width = plane.extent().width;
+    Rgb::new(Planes::from_fn(plane.extent(), |x, y| {
+        [values[y * width + x]; 3]
+    }))
 }
 
 /// The size of the sheet's pictures: the frame's shape, `tile` high.
 fn tile(curves: &TurnCurves) -> Extent {
     let Extent { width, height } = curves.extent();
-    Extent::new(
-        (PARAMETERS.tile * width / height.max(1)).clamp(1, 8 * PARAMETERS.tile),
-        PARAMETERS.tile,
-    )
+    Extent::new((TILE * width / height.max(1)).clamp(1, 8 * TILE), TILE)
 }

@@ -28,7 +28,7 @@ Examples:
   relight insert cup.jpg --mask cup-mask.png --into room.jpg --lamp 60,30 -o out.exr
       in the light of a lamp
   relight insert object.relit --into room.hdr -o out.png
-      an object that relight turn --asset has written
+      an object that relight turn has written (object.relit)
   relight insert --scene scene.toml -o out.png
       all of it from a file (docs/relight-insert.md)";
 

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use relight_nets::Weights;
 use relight_turn::{
     Elevation, MaterialKind, ProbeBall, ProbePlace, TurnLight, TurnNetwork, TurnNetworks,
@@ -12,12 +12,12 @@ use relight_turn::{
 use relit_data::rig::RotationDirection;
 
 use crate::shipped;
-use crate::values::rotation;
+use crate::values::{Choices, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight turn 20261120T093015Z-mug.tar -o mug
-      a turn in unknown light: mug/normal.png, albedo.png, light.json, contact.png, relit.mp4 ...
+      a turn in unknown light: mug/normal.png, albedo.png, light.txt, object.relit, relit.mp4 ...
   relight turn mug.tar --elevation 18 --rotation counter-clockwise -o mug
       the turn of a bare clip: its data set does not say how the rig is built
   relight turn mug.tar --light light.txt -o mug
@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
     /// Which way the table turns as its angle grows, seen from above: the background moves to the right, or to
     /// the left [default: as the data set or the session says; else the one in which the network of turns is clearly surer; else
     /// counter-clockwise].
-    #[arg(long, value_name = "WAY", value_parser = rotation())]
+    #[arg(long, value_name = "WAY", value_parser = one_of(ROTATIONS))]
     rotation: Option<RotationDirection>,
     /// The light where it is known, in the viewer's frame at the table's angle 0: coefficients of spherical harmonics
     /// (nine lines of red, green and blue, or more, up to order 6), or a panorama (.hdr, .exr).
@@ -52,54 +52,17 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
     probe: Option<ProbePlace>,
     /// What the ball is made of: without it, what it looks like.
-    #[arg(long, value_enum, value_name = "KIND", requires = "probe")]
-    probe_ball: Option<BallName>,
+    #[arg(long, value_name = "KIND", value_parser = one_of(BALLS), requires = "probe")]
+    probe_ball: Option<ProbeBall>,
     /// Weights of the network of turns, as relight train turn writes them [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     turn_network: Option<PathBuf>,
-    /// The object's material [default: in known light, the one that fits the turn; else diffuse].
-    #[arg(long, value_enum, value_name = "KIND")]
-    material: Option<MaterialName>,
-    /// Write the object as one file that can be lit, object.relit.
-    #[arg(long, value_name = "FILE")]
-    pub(super) asset: Option<PathBuf>,
+    /// The object's material.
+    #[arg(long, value_name = "KIND", value_parser = one_of(MATERIALS), default_value = "diffuse")]
+    material: MaterialKind,
     /// Do not write the video, which needs the program ffmpeg.
     #[arg(long)]
     pub(super) no_video: bool,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum BallName {
-    /// It is diffuse.
-    Grey,
-    /// It mirrors.
-    Chrome,
-}
-
-impl From<BallName> for ProbeBall {
-    fn from(name: BallName) -> Self {
-        match name {
-            BallName::Grey => Self::Grey,
-            BallName::Chrome => Self::Chrome,
-        }
-    }
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum MaterialName {
-    /// It scatters light, with gloss or without.
-    Diffuse,
-    /// It only reflects, in its own colour.
-    Metal,
-}
-
-impl From<MaterialName> for MaterialKind {
-    fn from(name: MaterialName) -> Self {
-        match name {
-            MaterialName::Diffuse => Self::Diffuse,
-            MaterialName::Metal => Self::Metal,
-        }
-    }
 }
 
 impl Arguments {
@@ -110,7 +73,7 @@ impl Arguments {
             (None, Some(session), Some(place)) => TurnLight::Ball {
                 session,
                 place,
-                ball: self.probe_ball.map(ProbeBall::from),
+                ball: self.probe_ball,
             },
             _ => TurnLight::Unknown,
         };
@@ -118,7 +81,7 @@ impl Arguments {
             rotation: self.rotation,
             elevation: self.elevation,
             light,
-            material: self.material.map(MaterialKind::from),
+            material: self.material,
         })
     }
 
@@ -133,6 +96,37 @@ impl Arguments {
         })
     }
 }
+
+const ROTATIONS: Choices<RotationDirection> = &[
+    (
+        "counter-clockwise",
+        "The background moves to the right",
+        RotationDirection::CounterClockwise,
+    ),
+    (
+        "clockwise",
+        "The background moves to the left",
+        RotationDirection::Clockwise,
+    ),
+];
+
+const BALLS: Choices<ProbeBall> = &[
+    ("grey", "It is diffuse", ProbeBall::Grey),
+    ("chrome", "It mirrors", ProbeBall::Chrome),
+];
+
+const MATERIALS: Choices<MaterialKind> = &[
+    (
+        "diffuse",
+        "It scatters light, with gloss or without",
+        MaterialKind::Diffuse,
+    ),
+    (
+        "metal",
+        "It only reflects, in its own colour",
+        MaterialKind::Metal,
+    ),
+];
 
 fn elevation(text: &str) -> Result<Elevation, String> {
     let degrees = text.parse().map_err(|_| "give degrees".to_owned())?;

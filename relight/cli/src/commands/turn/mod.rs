@@ -1,69 +1,44 @@
-//! `relight turn`: a whole turn into normals, albedo, light and their residuals.
+//! `relight turn`: a whole turn into normals, albedo and light.
 
 mod arguments;
-mod warnings;
 
 use std::error::Error;
 use std::time::Instant;
 
-use relight_turn::{
-    AssetDestination, DestinationError, Destinations, ProbeLight, SolvedTurn, TurnError,
-    TurnFigures, TurnFiles, solve_turn,
-};
+use relight_turn::{SolvedTurn, TurnFiles, solve_turn};
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
 pub(crate) use self::arguments::{Arguments, EXAMPLES};
-use self::warnings::warn_of;
 use crate::commands::CommandResult;
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let start = Instant::now();
-    let asset = check_destinations(arguments)?;
+    TurnFiles::check(&arguments.output, !arguments.no_video)?;
     let solved = solve(arguments, console)?;
-    let object = match asset {
-        AssetDestination::None => None,
-        AssetDestination::Inside | AssetDestination::Beside(_) => {
-            Some(solved.solution.asset(&solved.turn)?)
-        }
-    };
     let figures = TurnFiles {
         solved: &solved,
-        light_source: light_source(arguments, solved.ball.as_ref()).as_deref(),
-        asset: object
-            .as_ref()
-            .filter(|_| asset == AssetDestination::Inside),
+        light_source: light_source(arguments, &solved).as_deref(),
         has_movie: !arguments.no_video,
     }
     .write(&arguments.output)?;
-    if let (AssetDestination::Beside(path), Some(object)) = (asset, &object) {
-        object.write(path).map_err(TurnError::from)?;
+    let (seconds, reading_seconds) = (start.elapsed().as_secs_f64(), solved.reading.as_secs_f64());
+    let text = text(arguments, &solved, [reading_seconds, seconds]);
+    let event = json!({
+        "event": "turned",
+        "output": arguments.output,
+        "seconds": seconds,
+        "reading_seconds": reading_seconds,
+        "figures": figures,
+    });
+    console.say(&text, &event);
+    for warning in solved.warnings() {
+        console.warn(&warning);
     }
-    say(
-        arguments,
-        &figures,
-        &solved,
-        start.elapsed().as_secs_f64(),
-        console,
-    );
-    warn_of(&solved, console);
     Ok(if solved.is_whole() {
         Outcome::Whole
     } else {
         Outcome::Incomplete
-    })
-}
-
-/// Refuses places that cannot be written, before the work.
-fn check_destinations(arguments: &Arguments) -> Result<AssetDestination<'_>, Box<dyn Error>> {
-    let destinations = Destinations {
-        output: &arguments.output,
-        asset: arguments.asset.as_deref(),
-        has_movie: !arguments.no_video,
-    };
-    destinations.check().map_err(|error| match error {
-        DestinationError::AssetPlace { .. } => format!("--asset {error}").into(),
-        error => error.into(),
     })
 }
 
@@ -83,27 +58,21 @@ fn solve(arguments: &Arguments, console: Console) -> Result<SolvedTurn, Box<dyn 
 }
 
 /// Where the light is from; none where it is to be found.
-fn light_source(arguments: &Arguments, ball: Option<&ProbeLight>) -> Option<String> {
+fn light_source(arguments: &Arguments, solved: &SolvedTurn) -> Option<String> {
     let given = arguments.light.as_ref();
     let given = given.map(|path| path.display().to_string());
-    given.or_else(|| ball.map(|measured| format!("probe, {}", measured.ball)))
+    let measured = solved.ball.as_ref();
+    given.or_else(|| measured.map(|measured| format!("probe, {}", measured.ball)))
 }
 
-/// Says how it came out.
-fn say(
-    arguments: &Arguments,
-    figures: &TurnFigures,
-    solved: &SolvedTurn,
-    seconds: f64,
-    console: Console,
-) {
-    let reading_seconds = solved.reading.as_secs_f64();
-    let text = format!(
-        "{}: {} frames over {:.0} degrees in {reading_seconds:.1} s, all in {seconds:.1} s; normals expected within {:.0} degrees \
-         (median), light {}, material {}",
+/// How it came out.
+fn text(arguments: &Arguments, solved: &SolvedTurn, [reading, all]: [f64; 2]) -> String {
+    format!(
+        "{}: {} frames over {:.0} degrees in {reading:.1} s, all in {all:.1} s; normals expected within {:.0} degrees (median), \
+         light {}, material {}",
         arguments.output.display(),
-        figures.frames(),
-        figures.coverage_deg(),
+        solved.turn.curves.frames(),
+        solved.turn.curves.coverage_deg(),
         solved.solution.expected_error_deg(),
         match (&arguments.light, &solved.ball) {
             (Some(_), _) => "given",
@@ -111,13 +80,5 @@ fn say(
             (None, None) => "found",
         },
         solved.solution.material(),
-    );
-    let event = json!({
-        "event": "turned",
-        "output": arguments.output,
-        "seconds": seconds,
-        "reading_seconds": reading_seconds,
-        "figures": figures,
-    });
-    console.say(&text, &event);
+    )
 }

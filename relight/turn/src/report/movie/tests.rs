@@ -1,15 +1,14 @@
 use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::Planes;
 
-use crate::test_turns::{SIDE, SOLVED, ball, environment, metal_ball, read, solve, solved};
-use crate::{ReadTurn, SolvedTurn, TurnFiles};
+use crate::test_turns::{SIDE, SOLVED, ball, elevation, environment, metal_ball, read, solved};
+use crate::{MaterialKind, ReadTurn, SolvedTurn, TurnFiles, solve_in_light};
 
 /// The frames of the video that is written of a turn, as planes of sRGB.
 fn film_of(solved: &SolvedTurn, out: &std::path::Path) -> Vec<Planes<3>> {
     let files = TurnFiles {
         solved,
         light_source: None,
-        asset: None,
         has_movie: true,
     };
     files.write(out).unwrap();
@@ -44,7 +43,7 @@ fn the_film_shows_the_object_while_a_lamp_goes_around_it() {
         curves,
         ..read(&surface, &light)
     };
-    let of_metal = solve(&metal.curves, &light);
+    let of_metal = solve_in_light(&metal.curves, &light, elevation(), MaterialKind::Metal);
     let diffuse = solved(read(&ball(), &environment()), SOLVED.1.clone());
     for (name, solved) in [("diffuse", diffuse), ("metal", solved(metal, of_metal))] {
         let frames = film_of(&solved, &folder.path().join(name));

@@ -3,7 +3,7 @@ use crate::test_turns::{SIDE, SOLVED};
 #[test]
 fn a_turn_becomes_an_object_whose_edge_has_its_own_colour() {
     let (turn, solution) = &*SOLVED;
-    let asset = solution.asset(turn).unwrap();
+    let asset = solution.captured_object(turn).unwrap();
     assert_eq!(asset.name(), "ball");
     assert!(asset.alpha().pixel(SIDE / 2, SIDE / 2)[0] > 0.99);
     let mut partly = 0;
