@@ -85,4 +85,3 @@ pub use segment::{Mask, MaskStatistics, check_hints, clean_cut, segment, segment
 pub use settings::{Effort, MAX_PIXELS, MIN_SIDE, SegmentSettings};
 pub use strokes::{Brush, Stroke, Strokes};
 pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, TurnFrames, TurnStatistics};
-

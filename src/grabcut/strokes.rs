@@ -126,12 +126,13 @@ fn lines(stroke: &Stroke) -> impl Iterator<Item = [[f64; 2]; 2]> {
 
 /// The columns and rows that a brush may touch on a line.
 fn around([from, to]: [[f64; 2]; 2], radius: f64, size: (u32, u32)) -> [Range<usize>; 2] {
-    let side = |axis: usize, side| {
+    let covered = |axis: usize, side: u32| {
         let low = from[axis].min(to[axis]) - radius;
         let high = from[axis].max(to[axis]) + radius;
-        covered(low, high, side)
+        let inside = |at: f64| at.clamp(0.0, f64::from(side)) as usize;
+        inside(low.floor())..inside(high.ceil())
     };
-    [side(0, size.0), side(1, size.1)]
+    [covered(0, size.0), covered(1, size.1)]
 }
 
 /// The pixels that painting a stroke looks at.
@@ -170,13 +171,6 @@ fn paint(marks: &mut [Mark], size: (u32, u32), stroke: &Stroke) {
             }
         }
     }
-}
-
-/// The pixels between two coordinates, inside the frame.
-fn covered(low: f64, high: f64, side: u32) -> Range<usize> {
-    let side = f64::from(side);
-    let (low, high) = (low.floor().clamp(0.0, side), high.ceil().clamp(0.0, side));
-    low as usize..high as usize
 }
 
 #[cfg(test)]

@@ -15,26 +15,12 @@ const SEEN: f32 = 0.5;
 /// A larger part of a picture that is clipped is told.
 const MUCH_CLIPPED: f32 = 0.25;
 
-/// The setting that was made last: while only objects and the light's angle change it stays.
+/// The setting that was made last, with all that it depends on: a background, the scene without objects and without the
+/// light's angle, and its longest side. While only those change it stays.
 #[derive(Default)]
-pub(super) struct KeptSetting {
-    made: Option<(SettingKey, SceneSetting)>,
-}
-
-/// All that a setting depends on.
-#[derive(PartialEq)]
-struct SettingKey {
-    /// The scene without objects and without the light's angle.
-    scene: SceneDescription,
-    longest: Option<u32>,
-}
+pub(super) struct KeptSetting(Option<((SceneDescription, Option<u32>), SceneSetting)>);
 
 impl KeptSetting {
-    /// Another background was chosen.
-    pub(super) fn forget(&mut self) {
-        self.made = None;
-    }
-
     /// The setting of a scene, `longest` pixels at most; the background is made ready for it.
     ///
     /// # Errors
@@ -49,12 +35,9 @@ impl KeptSetting {
         let mut bare = scene.clone();
         bare.objects.clear();
         bare.light.turn = 0.0;
-        let key = SettingKey {
-            scene: bare,
-            longest,
-        };
+        let key = (bare, longest);
         let tilt = SceneSetting::ground_tilt(scene, background.for_scene());
-        let kept = self.made.take().filter(|(was, _)| *was == key);
+        let kept = self.0.take().filter(|(was, _)| *was == key);
         let mut setting = match kept {
             Some((_, setting)) => setting,
             None => {
@@ -66,7 +49,7 @@ impl KeptSetting {
             }
         };
         setting.tilt = tilt;
-        Ok(&self.made.insert((key, setting)).1)
+        Ok(&self.0.insert((key, setting)).1)
     }
 }
 

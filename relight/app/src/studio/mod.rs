@@ -198,7 +198,7 @@ impl Studio {
 
     fn choose(&mut self, background: StudioBackground) -> Result<Answer, Refusal> {
         let extent = background.extent(PANORAMA_PICTURE);
-        self.setting.forget();
+        self.setting = KeptSetting::default();
         self.background = Some(background);
         let says = json!({ "width": extent.width, "height": extent.height });
         Ok((says, Vec::new()))
