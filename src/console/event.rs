@@ -70,7 +70,6 @@ pub enum Event {
         record: String,
         #[serde(default)]
         preview: String,
-        alpha: Option<String>,
         #[serde(default)]
         source: Value,
         #[serde(default)]

@@ -50,6 +50,17 @@ impl Rect {
         i64::from(self.y) + i64::from(self.h)
     }
 
+    /// Whether a pixel is inside, by its number in row order of an image of this width.
+    #[must_use]
+    pub fn contains(self, pixel: usize, width: u32) -> bool {
+        let (x, y) = (
+            pixel as i64 % i64::from(width),
+            pixel as i64 / i64::from(width),
+        );
+        (i64::from(self.x)..self.right()).contains(&x)
+            && (i64::from(self.y)..self.bottom()).contains(&y)
+    }
+
     /// The part that lies inside an image of `width` x `height`, if there is any.
     #[must_use]
     pub fn clipped_to(self, width: u32, height: u32) -> Option<Self> {

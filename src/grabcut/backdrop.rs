@@ -7,6 +7,7 @@
 //! evidence is weak. Ends that show the table are left to the search for the table.
 
 use super::bitmap::Bitmap;
+use super::grab_cut::squared_distance;
 use super::turntable::Turntable;
 
 /// Share of the width from which each end of a row is averaged.
@@ -58,7 +59,7 @@ impl Backdrop {
         });
         Self {
             evidence: evidence.collect(),
-            alike: alike.map(|at, alike| alike || table.shadow.bits()[at]),
+            alike: alike.or(&table.shadow),
         }
     }
 }
@@ -66,11 +67,11 @@ impl Backdrop {
 /// Room and table, and the thin rim between them.
 fn with_rim(room: &Bitmap, table: &Bitmap, width: usize) -> Bitmap {
     let radius = ((width as f64 * RIM).round() as usize).max(1);
-    let both = room.map(|at, room| room || table.bits()[at]);
-    let closed = both.dilated(radius).inverted().dilated(radius).inverted();
-    let near_room = room.dilated(2 * radius + 1);
-    let near_table = table.dilated(2 * radius + 1);
-    both.map(|at, both| both || closed.bits()[at] && near_room.bits()[at] && near_table.bits()[at])
+    let both = room.or(table);
+    let near_both = room
+        .dilated(2 * radius + 1)
+        .and(&table.dilated(2 * radius + 1));
+    both.or(&both.closed(radius).and(&near_both))
 }
 
 /// The average features at the ends of each row; none where they show the table.
@@ -94,7 +95,7 @@ impl Ends {
         let right: Vec<_> = (0..height).map(|y| end(y, width - depth)).collect();
         let pairs = left.iter().zip(&right);
         let mut apart: Vec<f32> = pairs
-            .filter_map(|(left, right)| Some(squared(left.as_ref()?, right.as_ref()?)))
+            .filter_map(|(left, right)| Some(squared_distance(left.as_ref()?, right.as_ref()?)))
             .collect();
         apart.sort_by(f32::total_cmp);
         let typical = apart.get(apart.len() / 2).copied().unwrap_or(0.0);
@@ -111,7 +112,7 @@ impl Ends {
         let rows = y.saturating_sub(self.reach)..(y + self.reach + 1).min(self.left.len());
         rows.flat_map(|row| [&self.left[row], &self.right[row]])
             .flatten()
-            .map(|end| squared(feature, end))
+            .map(|end| squared_distance(feature, end))
             .fold(f32::INFINITY, f32::min)
     }
 }
@@ -122,10 +123,6 @@ fn mean(features: &[[f32; 5]]) -> [f32; 5] {
         sum.iter_mut().zip(feature).for_each(|(s, v)| *s += v);
     }
     sum.map(|s| s / features.len().max(1) as f32)
-}
-
-fn squared(a: &[f32; 5], b: &[f32; 5]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
 #[cfg(test)]

@@ -2,7 +2,11 @@
 
 use std::ops::Range;
 
+use image::GrayImage;
 use relit_data::geometry::Rect;
+
+/// Pixels of a mask at or above this level belong to the object.
+const OBJECT_FROM: u8 = 128;
 
 /// One bit for each pixel of an image. At least one pixel, sides below 2^31.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,6 +55,16 @@ impl Bitmap {
         }
     }
 
+    /// The object of a mask: what is at least half white.
+    pub(super) fn of_mask(mask: &GrayImage) -> Self {
+        let levels = mask.as_raw().iter();
+        Self::new(mask.dimensions(), levels.map(|&level| level >= OBJECT_FROM))
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
     pub(super) fn bits(&self) -> &[bool] {
         &self.bits
     }
@@ -90,8 +104,8 @@ impl Bitmap {
         };
         for (from, to) in self
             .bits
-            .chunks(self.width)
-            .zip(across.bits.chunks_mut(self.width))
+            .chunks(self.width.max(1))
+            .zip(across.bits.chunks_mut(self.width.max(1)))
         {
             for run in set_runs(from) {
                 to[run.start.saturating_sub(radius)..(run.end + radius).min(self.width)].fill(true);
@@ -109,6 +123,63 @@ impl Bitmap {
             bits: dilated,
             ..*self
         }
+    }
+
+    /// The set pixels of which another one is set as well.
+    pub(super) fn and(&self, other: &Self) -> Self {
+        self.map(|at, bit| bit && other.bits[at])
+    }
+
+    /// The pixels that are set in either.
+    pub(super) fn or(&self, other: &Self) -> Self {
+        self.map(|at, bit| bit || other.bits[at])
+    }
+
+    /// The set pixels that are not set in the other one.
+    pub(super) fn minus(&self, other: &Self) -> Self {
+        self.map(|at, bit| bit && !other.bits[at])
+    }
+
+    /// The share of the set pixels of which another one is set as well, 0..=1.
+    pub(super) fn share_in(&self, other: &Self) -> f64 {
+        self.and(other).count() as f64 / self.count().max(1) as f64
+    }
+
+    /// Opening: the parts that are wider than twice `radius`.
+    pub(super) fn opened(&self, radius: usize) -> Self {
+        self.inverted().dilated(radius).inverted().dilated(radius)
+    }
+
+    /// Closing: with the gaps that are at most twice `radius` wide.
+    pub(super) fn closed(&self, radius: usize) -> Self {
+        self.dilated(radius).inverted().dilated(radius).inverted()
+    }
+
+    /// Of the components those that `keep` wants by their figures; its second argument gives their pixels.
+    pub(super) fn parts_where(
+        &self,
+        connectivity: Connectivity,
+        keep: impl Fn(&Component, &dyn Fn() -> Self) -> bool,
+    ) -> Self {
+        let components = self.components(connectivity);
+        let kept: Vec<bool> = (components.list.iter().enumerate())
+            .map(|(index, part)| keep(part, &|| self.map(|at, _| components.at(at) == Some(index))))
+            .collect();
+        self.map(|at, _| components.at(at).is_some_and(|index| kept[index]))
+    }
+
+    /// What is not set and does not reach the border.
+    pub(super) fn holes(&self) -> Self {
+        let hole = |part: &Component, _: &dyn Fn() -> Self| self.is_inside(part);
+        self.inverted().parts_where(Connectivity::Four, hole)
+    }
+
+    /// Whether a component does not reach the border.
+    pub(super) fn is_inside(&self, Component { bounds, .. }: &Component) -> bool {
+        bounds.x > 0
+            && bounds.y > 0
+            && bounds.right() < self.width as i64
+            && bounds.bottom() < self.height as i64
     }
 
     /// The connected components of the set pixels.

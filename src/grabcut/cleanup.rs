@@ -1,13 +1,7 @@
-//! From GrabCut's result to a mask: small components dropped, holes filled, the edge softened.
+//! From GrabCut's result to a mask: small components dropped, holes filled.
 
-use image::GrayImage;
-
+use super::Mark;
 use super::bitmap::{Bitmap, Component, Connectivity};
-use super::blur::blur;
-use super::{Feather, Mark, Seeds};
-
-/// Width of the rise from 10 % to 90 % of a Gaussian edge, in standard deviations.
-const RISE: f64 = 2.563;
 
 /// A component with at least this share of the largest one's area is kept.
 const KEPT_FROM: f64 = 0.3;
@@ -32,13 +26,13 @@ pub(super) struct Cleaned {
 
 /// Keeps the largest component and those of a similar size, or with `keep_all` every one, and fills
 /// holes of at most `fill_to` times the object's area, except those in which the seeds mark background.
-pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool, fill_to: f64) -> Cleaned {
+pub(super) fn clean(raw: &Bitmap, marks: &[Mark], keep_all: bool, fill_to: f64) -> Cleaned {
     let components = raw.components(Connectivity::Eight);
     let largest = components.largest();
     let least = largest.map_or(0.0, |at| components.list[at].area as f64 * KEPT_FROM);
     let is_kept = |component: usize| keep_all || components.list[component].area as f64 >= least;
     let kept = raw.map(|at, _| components.at(at).is_some_and(is_kept));
-    let (mask, holes, closed_by_marks) = fill_holes(&kept, seeds, fill_to);
+    let (mask, holes, closed_by_marks) = fill_holes(&kept, marks, fill_to);
     let all = || components.list.iter().enumerate();
     Cleaned {
         components: components.list.len(),
@@ -47,7 +41,7 @@ pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool, fill_to
             .filter(|&(index, _)| !is_kept(index))
             .map(|(_, component)| *component)
             .collect(),
-        dropped_marks_px: marked(seeds, Mark::Object)
+        dropped_marks_px: marked(marks, Mark::Object)
             .filter(|&at| !mask.bits().get(at).copied().unwrap_or(true))
             .count() as u64,
         mask,
@@ -60,26 +54,18 @@ pub(super) fn clean(raw: &Bitmap, seeds: Option<&Seeds>, keep_all: bool, fill_to
 /// 8-connected).
 fn fill_holes(
     object: &Bitmap,
-    seeds: Option<&Seeds>,
+    marks: &[Mark],
     fill_to: f64,
 ) -> (Bitmap, Vec<Component>, Option<Component>) {
     let ground = object.inverted();
     let components = ground.components(Connectivity::Four);
-    let frame = object.map(|_, _| true).bounds();
     let most = object.count() as f64 * fill_to;
     let mut is_hole: Vec<bool> = components
         .list
         .iter()
-        .map(|component| {
-            let bounds = component.bounds;
-            component.area as f64 <= most
-                && bounds.x > 0
-                && bounds.y > 0
-                && bounds.right() < frame.right()
-                && bounds.bottom() < frame.bottom()
-        })
+        .map(|part| part.area as f64 <= most && object.is_inside(part))
         .collect();
-    for index in marked(seeds, Mark::Background).filter_map(|at| components.at(at)) {
+    for index in marked(marks, Mark::Background).filter_map(|at| components.at(at)) {
         is_hole[index] = false;
     }
     let in_hole = |at: usize| components.at(at).is_some_and(|index| is_hole[index]);
@@ -87,12 +73,12 @@ fn fill_holes(
     let holes = components.list.iter().zip(&is_hole);
     let holes = holes.filter(|&(_, &hole)| hole);
     let holes: Vec<Component> = holes.map(|(hole, _)| *hole).collect();
-    let width = frame.w as usize;
+    let width = object.width();
     let beside = |at: usize| {
         let above = at.checked_sub(width);
         [at.checked_sub(1), Some(at + 1), above, Some(at + width)]
     };
-    let closed = marked(seeds, Mark::Object).flat_map(beside).flatten();
+    let closed = marked(marks, Mark::Object).flat_map(beside).flatten();
     let closed = closed.filter_map(|at| components.at(at).filter(|&index| is_hole[index]));
     let largest = closed
         .map(|index| components.list[index])
@@ -101,37 +87,15 @@ fn fill_holes(
 }
 
 /// The pixels that the seeds mark as `wanted`.
-fn marked(seeds: Option<&Seeds>, wanted: Mark) -> impl Iterator<Item = usize> {
-    let marks = seeds.map_or(&[][..], Seeds::marks).iter().enumerate();
+fn marked(marks: &[Mark], wanted: Mark) -> impl Iterator<Item = usize> {
+    let marks = marks.iter().enumerate();
     marks
         .filter(move |&(_, &mark)| mark == wanted)
         .map(|(at, _)| at)
 }
 
-/// The mask as an image: 0 and 255, with a Gaussian edge between them if `feather` is not 0. Set pixels
-/// are at least 128 and the others less, so that a threshold gives the mask back.
-pub(super) fn soften(mask: &Bitmap, size: (u32, u32), feather: Feather) -> GrayImage {
-    let hard: Vec<u8> = mask
-        .bits()
-        .iter()
-        .map(|&bit| if bit { 255 } else { 0 })
-        .collect();
-    let levels = if feather.px() == 0 {
-        hard
-    } else {
-        let soft = blur(&hard, size, f64::from(feather.px()) / RISE);
-        let sided = soft.iter().zip(mask.bits());
-        sided
-            .map(|(&level, &bit)| if bit { level.max(128) } else { level.min(127) })
-            .collect()
-    };
-    GrayImage::from_raw(size.0, size.1, levels).unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
-    use image::{DynamicImage, Luma};
-
     use super::*;
 
     const RING: [&str; 6] = [
@@ -143,17 +107,18 @@ mod tests {
         ".......",
     ];
 
-    fn seeds(size: (u32, u32), marks: &[(u32, u32, u8)]) -> Seeds {
-        let mut image = GrayImage::from_pixel(size.0, size.1, Luma([128]));
-        for &(x, y, level) in marks {
-            image.put_pixel(x, y, Luma([level]));
+    /// Marks in the ring's picture.
+    fn seeds(marked: &[(usize, usize, Mark)]) -> Vec<Mark> {
+        let mut marks = vec![Mark::Unknown; 7 * 6];
+        for &(x, y, mark) in marked {
+            marks[7 * y + x] = mark;
         }
-        Seeds::from_image(&DynamicImage::from(image)).unwrap()
+        marks
     }
 
     #[test]
     fn the_largest_component_is_kept_and_its_hole_is_filled() {
-        let cleaned = clean(&Bitmap::drawn(&RING), None, false, 1.0);
+        let cleaned = clean(&Bitmap::drawn(&RING), &[], false, 1.0);
         let wanted = [
             "#......", ".####..", ".####..", ".####..", ".......", ".......",
         ];
@@ -165,7 +130,7 @@ mod tests {
 
     #[test]
     fn every_component_is_kept_on_request() {
-        let cleaned = clean(&Bitmap::drawn(&RING), None, true, 1.0);
+        let cleaned = clean(&Bitmap::drawn(&RING), &[], true, 1.0);
         assert_eq!((cleaned.components, cleaned.kept), (2, 2));
         assert!(cleaned.dropped.is_empty());
         assert_eq!(cleaned.mask.count(), 15);
@@ -173,55 +138,31 @@ mod tests {
 
     #[test]
     fn a_hole_marked_as_background_stays_open() {
-        let marks = seeds((7, 6), &[(1, 1, 255), (2, 2, 0)]);
-        let cleaned = clean(&Bitmap::drawn(&RING), Some(&marks), false, 1.0);
+        let marks = seeds(&[(1, 1, Mark::Object), (2, 2, Mark::Background)]);
+        let cleaned = clean(&Bitmap::drawn(&RING), &marks, false, 1.0);
         assert!(cleaned.holes.is_empty());
         assert_eq!(cleaned.mask.count(), 11);
     }
 
     #[test]
     fn a_hole_that_a_mark_closed_is_named_and_others_are_not() {
-        let open = clean(&Bitmap::drawn(&RING), None, false, 1.0);
+        let open = clean(&Bitmap::drawn(&RING), &[], false, 1.0);
         assert_eq!(open.closed_by_marks, None);
-        let marks = seeds((7, 6), &[(3, 1, 255)]);
-        let closed = clean(&Bitmap::drawn(&RING), Some(&marks), false, 1.0);
+        let marks = seeds(&[(3, 1, Mark::Object)]);
+        let closed = clean(&Bitmap::drawn(&RING), &marks, false, 1.0);
         assert_eq!(closed.closed_by_marks.map(|hole| hole.area), Some(2));
     }
 
     #[test]
     fn a_dropped_mark_is_counted() {
-        let marks = seeds((7, 6), &[(6, 4, 255), (1, 1, 255)]);
-        let cleaned = clean(&Bitmap::drawn(&RING), Some(&marks), false, 1.0);
+        let marks = seeds(&[(6, 4, Mark::Object), (1, 1, Mark::Object)]);
+        let cleaned = clean(&Bitmap::drawn(&RING), &marks, false, 1.0);
         assert_eq!(cleaned.dropped_marks_px, 1);
     }
 
     #[test]
     fn a_bay_that_is_open_to_the_border_is_not_a_hole() {
         let bay = Bitmap::drawn(&["###", "#.#", "#.#"]);
-        assert_eq!(clean(&bay, None, false, 1.0).mask, bay);
-    }
-
-    #[test]
-    fn a_soft_edge_is_as_wide_as_asked_and_gives_the_mask_back() {
-        let size = (200, 3);
-        let mask = Bitmap::new(size, (0..600).map(|at| at % 200 < 100));
-        let soft = soften(&mask, size, Feather::new(20).unwrap());
-        let row = &soft.as_raw()[..200];
-        let rising = row.iter().filter(|&&v| (26..=229).contains(&v)).count();
-        assert!((18..=22).contains(&rising), "{rising}");
-        assert!(
-            row.iter()
-                .enumerate()
-                .all(|(x, &v)| (v >= 128) == (x < 100))
-        );
-        assert_eq!((row[0], row[199]), (255, 0));
-    }
-
-    #[test]
-    fn a_mask_finer_than_its_feather_survives_the_threshold() {
-        let mask = Bitmap::drawn(&[".......", "...#...", "......."]);
-        let soft = soften(&mask, (7, 3), Feather::new(100).unwrap());
-        let back: Vec<bool> = soft.as_raw().iter().map(|&v| v >= 128).collect();
-        assert_eq!(back, mask.bits());
+        assert_eq!(clean(&bay, &[], false, 1.0).mask, bay);
     }
 }

@@ -6,23 +6,12 @@ use super::settings::{MAX_PIXELS, MIN_SIDE};
 
 /// Why no mask could be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum MaskError {
-    /// A side of the frame is shorter than [`MIN_SIDE`].
+    /// A side of the frame is shorter than [`MIN_SIDE`], or it has more than [`MAX_PIXELS`].
     #[error(
-        "the frame is {width} x {height} pixels, too small to segment: at least {MIN_SIDE} a side are needed"
+        "a frame of {width} x {height} pixels cannot be segmented: it needs at least {MIN_SIDE} a side and at most {MAX_PIXELS} in all"
     )]
-    FrameTooSmall {
-        /// The frame's width, pixels.
-        width: u32,
-        /// The frame's height, pixels.
-        height: u32,
-    },
-    /// The frame has more than [`MAX_PIXELS`].
-    #[error(
-        "the frame is {width} x {height} pixels, more than the {MAX_PIXELS} that can be segmented: scale the video down"
-    )]
-    FrameTooLarge {
+    FrameSize {
         /// The frame's width, pixels.
         width: u32,
         /// The frame's height, pixels.
@@ -42,14 +31,9 @@ pub enum MaskError {
     },
     /// No pixel could be background.
     #[error(
-        "the hints leave no background in the frame of {width} x {height} pixels: draw the rectangle smaller than the frame, or mark background black in the seeds"
+        "the hints leave no background in the frame: draw the rectangle smaller than the frame, or mark background black in the seeds"
     )]
-    NoBackground {
-        /// The frame's width, pixels.
-        width: u32,
-        /// The frame's height, pixels.
-        height: u32,
-    },
+    NoBackground,
     /// The seeds mark the whole rectangle as background.
     #[error(
         "the seeds leave no pixel of the rectangle {rect} that could be the object: mark some of the object white"
@@ -66,15 +50,12 @@ pub enum MaskError {
         /// Number of frames.
         found: usize,
     },
-    /// There are neither a rectangle nor seeds.
-    #[error("there is no hint where the object is: give a rectangle, seeds, or both")]
-    NoHints,
-    /// There is no rectangle, and the seeds mark no object.
+    /// There is no rectangle, and no seeds that mark the object.
     #[error(
-        "the seeds mark no pixel as the object and there is no rectangle: paint white on the object, or give --rect too"
+        "no hint says where the object is: give a rectangle, or seeds with some of the object painted white"
     )]
-    NothingMarked,
-    /// Seeds and frame differ in size.
+    NoHints,
+    /// Seeds, or a mask that is checked, and frame differ in size.
     #[error(
         "the seeds are {} x {} pixels and the frame is {} x {}: paint them on an image of the frame's size", .seeds.0, .seeds.1, .frame.0, .frame.1
     )]
@@ -84,9 +65,15 @@ pub enum MaskError {
         /// Width and height of the frame, pixels.
         frame: (u32, u32),
     },
-    /// Strokes that cannot be painted.
-    #[error(transparent)]
-    Strokes(#[from] StrokesFault),
+    /// An image that cannot be used as seeds: what is wrong with it.
+    #[error("{0}")]
+    Seeds(String),
+    /// The stroke of this number, from 0, cannot be painted.
+    #[error("stroke {0} has no point, or a coordinate or radius that is out of range")]
+    Stroke(usize),
+    /// Painting would take too long.
+    #[error("the strokes cover too many pixels: paint with fewer or smaller ones")]
+    StrokesTooLarge,
     /// GrabCut classified every pixel as background.
     #[error(
         "no object was found: it does not differ enough from its background for this hint; draw the rectangle closer, or mark the object white in seeds"
@@ -97,47 +84,12 @@ pub enum MaskError {
         "the whole frame was classified as the object: mark background black in the seeds, or give a rectangle"
     )]
     Everything,
-    /// An image could not be encoded as PNG.
-    #[error("{what} could not be encoded as PNG")]
+    /// An image could not be encoded.
+    #[error("{what} could not be encoded")]
     Encode {
         /// The image, as in "the mask".
         what: &'static str,
         /// The encoder's error.
         source: image::ImageError,
     },
-}
-
-/// Why an image cannot be used as seeds.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SeedsFault {
-    /// Not a PNG. A lossy format would blur the marks.
-    #[error("it is not a PNG file; save the seeds as PNG")]
-    NotPng,
-    /// A PNG that cannot be decoded.
-    #[error("it cannot be decoded as PNG ({0}); save it again")]
-    Damaged(image::ImageError),
-    /// No pixel marks anything.
-    #[error(
-        "no pixel of it is white (object) or black (background): paint with a hard brush, nearly white is unknown"
-    )]
-    WithoutMark,
-    /// A recorded seeds image has an invalid grey level.
-    #[error("it has the grey level {0}, but only 0, 128 and 255 are valid")]
-    Level(u8),
-}
-
-/// Why strokes cannot be painted.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum StrokesFault {
-    /// No point.
-    #[error("stroke {0} has no point")]
-    Empty(usize),
-    /// A number that is no length, or too large.
-    #[error("stroke {0} has a coordinate or radius that is out of range")]
-    OutOfRange(usize),
-    /// Painting would take too long.
-    #[error("the strokes cover too many pixels: paint with fewer or smaller ones")]
-    TooLarge,
 }

@@ -5,9 +5,12 @@
 //! they differ. Only a set of active pixels is decided; the others keep their labels.
 
 use super::MaskError;
+use super::bitmap::Bitmap;
 use super::max_flow::{DIRECTIONS, NONE, PixelGraph};
 use super::mixture::Mixture;
 
+/// Rounds of models and cuts, at most.
+pub const ITERATIONS: u32 = 5;
 /// Gaussians of each side.
 const COMPONENTS: usize = 5;
 /// Cost of separating two equal neighbours, in units of the log-likelihood.
@@ -47,6 +50,31 @@ impl Label {
             Self::ProbablyBackground
         }
     }
+}
+
+/// The pixels that are object.
+pub(super) fn object_of(labels: &[Label], (width, height): (usize, usize)) -> Bitmap {
+    let object = labels.iter().map(|label| label.is_object());
+    Bitmap::new((width as u32, height as u32), object)
+}
+
+/// Makes another object of what is object; what is sure stays.
+pub(super) fn change(
+    labels: &mut [Label],
+    size: (usize, usize),
+    how: impl FnOnce(&Bitmap) -> Bitmap,
+) {
+    let changed = how(&object_of(labels, size));
+    for (label, &object) in labels.iter_mut().zip(changed.bits()) {
+        if !label.is_sure() {
+            *label = Label::probably(object);
+        }
+    }
+}
+
+/// The squared distance of two features.
+pub(super) fn squared_distance<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
 /// Pixels with features, as far as the cut needs them.
@@ -143,13 +171,12 @@ pub(super) fn rank<const D: usize, F: Field<D>>(
     }
 }
 
-/// Lets models and cuts take turns until nothing changes, at most `iterations` times. `smoothness` is what separating
+/// Lets models and cuts take turns until nothing changes, at most [`ITERATIONS`] times. `smoothness` is what separating
 /// two equal neighbours costs, usually [`SMOOTHNESS`].
 pub(super) fn iterate<const D: usize, F: Field<D>>(
     field: &F,
     labels: &mut [Label],
     first: Option<Models<D>>,
-    iterations: u32,
     smoothness: f32,
 ) -> Result<Models<D>, MaskError> {
     let active = open_pixels(labels);
@@ -163,7 +190,7 @@ pub(super) fn iterate<const D: usize, F: Field<D>>(
         }
         None => Models::learn(field, labels, |_| true),
     };
-    for round in 0..iterations {
+    for round in 0..ITERATIONS {
         if round > 0 {
             models.refine(field, labels);
         }
@@ -177,7 +204,7 @@ pub(super) fn iterate<const D: usize, F: Field<D>>(
 }
 
 /// The pixels that are not sure, in order.
-pub(super) fn open_pixels(labels: &[Label]) -> Vec<u32> {
+fn open_pixels(labels: &[Label]) -> Vec<u32> {
     let open = labels.iter().enumerate();
     open.filter(|(_, label)| !label.is_sure())
         .map(|(at, _)| at as u32)
@@ -236,7 +263,7 @@ impl<'a> OpenCut<'a> {
         for (node, &at) in active.iter().enumerate() {
             node_of[at as usize] = node as u32;
         }
-        let mut graph = PixelGraph::with_capacity(active.len());
+        let mut graph = PixelGraph::default();
         let mut border = vec![0; active.len()];
         for (&at, border) in active.iter().zip(&mut border) {
             let at = at as usize;

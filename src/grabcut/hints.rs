@@ -1,13 +1,13 @@
-//! Hints from a person where the object is: a rectangle, seeds, or both.
+//! Hints from a person where the object is: a rectangle, painted seeds, and strokes over both.
 
+use std::borrow::Cow;
 use std::io::Cursor;
 
 use image::{DynamicImage, GrayImage, ImageFormat, ImageReader, RgbaImage};
 
 use relit_data::geometry::Rect;
 
-use super::error::SeedsFault;
-use super::{MaskError, encode};
+use super::{MaskError, Strokes, grey_png};
 
 /// A pixel marks the object if all its channels are at least this.
 const OBJECT_FROM: u8 = 250;
@@ -50,15 +50,6 @@ impl Mark {
             Self::Object => 255,
         }
     }
-
-    fn from_level(level: u8) -> Result<Self, SeedsFault> {
-        match level {
-            0 => Ok(Self::Background),
-            128 => Ok(Self::Unknown),
-            255 => Ok(Self::Object),
-            other => Err(SeedsFault::Level(other)),
-        }
-    }
 }
 
 /// A mark for each pixel of a frame, at least one of them not [`Mark::Unknown`].
@@ -75,8 +66,8 @@ impl Seeds {
     /// background, everything else and what is more than half transparent is unknown.
     ///
     /// # Errors
-    /// [`SeedsFault::WithoutMark`].
-    pub fn from_image(image: &DynamicImage) -> Result<Self, SeedsFault> {
+    /// [`MaskError::Seeds`] without any mark.
+    pub fn from_image(image: &DynamicImage) -> Result<Self, MaskError> {
         let painted = image.to_rgba8();
         let marks = painted.pixels().map(|pixel| Mark::of(pixel.0)).collect();
         let coloured_px = count_coloured(&painted);
@@ -86,8 +77,8 @@ impl Seeds {
     /// [`Self::from_image`] on the bytes of a PNG file of any colour type and depth.
     ///
     /// # Errors
-    /// Any [`SeedsFault`] but [`SeedsFault::Level`].
-    pub fn from_png(bytes: &[u8]) -> Result<Self, SeedsFault> {
+    /// [`MaskError::Seeds`].
+    pub fn from_png(bytes: &[u8]) -> Result<Self, MaskError> {
         Self::from_image(&decode_png(bytes)?)
     }
 
@@ -95,12 +86,6 @@ impl Seeds {
     #[must_use]
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
-    }
-
-    /// True if at least one pixel marks the object.
-    #[must_use]
-    pub fn mark_the_object(&self) -> bool {
-        self.marks.contains(&Mark::Object)
     }
 
     /// The marks, row by row, `width * height` of them.
@@ -122,27 +107,28 @@ impl Seeds {
     pub fn to_marks_png(&self) -> Result<Vec<u8>, MaskError> {
         let levels = self.marks.iter().map(|mark| mark.level()).collect();
         let image = GrayImage::from_raw(self.width, self.height, levels).unwrap_or_default();
-        encode::grey_png(&image, "the seeds")
+        grey_png(&image, "the seeds")
     }
 
-    /// Reads what [`Self::to_marks_png`] wrote, exactly: another grey level is an error.
+    /// Reads what [`Self::to_marks_png`] wrote.
     ///
     /// # Errors
-    /// Any [`SeedsFault`].
-    pub fn from_marks_png(bytes: &[u8], coloured_px: u64) -> Result<Self, SeedsFault> {
-        let levels = decode_png(bytes)?.to_luma8();
-        let marks = levels.pixels().map(|pixel| Mark::from_level(pixel.0[0]));
-        let marks = marks.collect::<Result<_, _>>()?;
-        Self::new(levels.dimensions(), marks, coloured_px)
+    /// [`MaskError::Seeds`].
+    pub fn from_marks_png(bytes: &[u8], coloured_px: u64) -> Result<Self, MaskError> {
+        Ok(Self {
+            coloured_px,
+            ..Self::from_png(bytes)?
+        })
     }
 
     pub(super) fn new(
         size: (u32, u32),
         marks: Vec<Mark>,
         coloured_px: u64,
-    ) -> Result<Self, SeedsFault> {
+    ) -> Result<Self, MaskError> {
         if marks.iter().all(|&mark| mark == Mark::Unknown) {
-            return Err(SeedsFault::WithoutMark);
+            let why = "no pixel of it is white (object) or black (background): paint with a hard brush, nearly white is unknown";
+            return Err(MaskError::Seeds(why.to_owned()));
         }
         Ok(Self {
             width: size.0,
@@ -153,14 +139,21 @@ impl Seeds {
     }
 }
 
-fn decode_png(bytes: &[u8]) -> Result<DynamicImage, SeedsFault> {
-    let reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|error| SeedsFault::Damaged(error.into()))?;
-    if reader.format() != Some(ImageFormat::Png) {
-        return Err(SeedsFault::NotPng);
-    }
-    reader.decode().map_err(SeedsFault::Damaged)
+/// A lossy format would blur the marks.
+fn decode_png(bytes: &[u8]) -> Result<DynamicImage, MaskError> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let png = reader
+        .ok()
+        .filter(|reader| reader.format() == Some(ImageFormat::Png));
+    let Some(png) = png else {
+        let why = "it is not a PNG file; save the seeds as PNG";
+        return Err(MaskError::Seeds(why.to_owned()));
+    };
+    png.decode().map_err(|error| {
+        MaskError::Seeds(format!(
+            "it cannot be decoded as PNG ({error}); save it again"
+        ))
+    })
 }
 
 fn count_coloured(painted: &RgbaImage) -> u64 {
@@ -172,50 +165,49 @@ fn count_coloured(painted: &RgbaImage) -> u64 {
     painted.pixels().filter(coloured).count() as u64
 }
 
-/// Hints from a person where the object is.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Hints {
-    /// The whole object is inside the rectangle.
-    Rect(Rect),
-    /// Parts of the object are marked, and preferably parts of the background too.
-    Seeds(Seeds),
-    /// A rectangle, and marks that overrule it; background marks alone are enough.
-    Both {
-        /// The rectangle.
-        rect: Rect,
-        /// The marks.
-        seeds: Seeds,
-    },
+/// What a person gave to find the object by: any of these, or nothing where a turn is enough.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Hints {
+    /// The whole object is inside it.
+    pub rect: Option<Rect>,
+    /// Parts of the object are marked, and preferably parts of the background too. They overrule the rectangle, beside
+    /// which marks of the background alone are enough.
+    pub seeds: Option<Seeds>,
+    /// What was painted over the seeds.
+    pub strokes: Strokes,
 }
 
 impl Hints {
-    /// The hints from a rectangle, seeds, or both.
+    /// True if nothing is given.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rect.is_none() && self.seeds.is_none() && self.strokes.is_empty()
+    }
+
+    /// The same with the strokes painted on the seeds of a frame of `size`.
     ///
     /// # Errors
-    /// [`MaskError::NoHints`] without either, [`MaskError::NothingMarked`] for seeds without rectangle that
-    /// mark no object.
-    pub fn from_parts(rect: Option<Rect>, seeds: Option<Seeds>) -> Result<Self, MaskError> {
-        match (rect, seeds) {
-            (None, None) => Err(MaskError::NoHints),
-            (Some(rect), None) => Ok(Self::Rect(rect)),
-            (None, Some(seeds)) if !seeds.mark_the_object() => Err(MaskError::NothingMarked),
-            (None, Some(seeds)) => Ok(Self::Seeds(seeds)),
-            (Some(rect), Some(seeds)) => Ok(Self::Both { rect, seeds }),
+    /// As [`Strokes::paint`].
+    pub fn painted(&self, size: (u32, u32)) -> Result<Cow<'_, Self>, MaskError> {
+        if self.strokes.is_empty() {
+            return Ok(Cow::Borrowed(self));
         }
+        Ok(Cow::Owned(Self {
+            rect: self.rect,
+            seeds: self.strokes.paint(size, self.seeds.as_ref())?,
+            strokes: Strokes::default(),
+        }))
     }
 
-    /// The rectangle, as given.
+    /// The marks of the seeds, none without seeds.
     #[must_use]
-    pub fn rect(&self) -> Option<Rect> {
-        match self {
-            Self::Rect(rect) | Self::Both { rect, .. } => Some(*rect),
-            Self::Seeds(_) => None,
-        }
+    pub fn marks(&self) -> &[Mark] {
+        self.seeds.as_ref().map_or(&[], Seeds::marks)
     }
 
-    /// The hints without what the seeds mark as object; none where nothing is left.
-    pub(super) fn without_object_marks(&self) -> Option<Self> {
-        let background = self.seeds().and_then(|seeds| {
+    /// The hints without what the seeds mark as object.
+    pub(super) fn without_object_marks(&self) -> Self {
+        let background = self.seeds.as_ref().and_then(|seeds| {
             let keep = |&mark: &Mark| match mark {
                 Mark::Object => Mark::Unknown,
                 other => other,
@@ -223,19 +215,18 @@ impl Hints {
             let marks = seeds.marks.iter().map(keep).collect();
             Seeds::new(seeds.size(), marks, seeds.coloured_px).ok()
         });
-        match (self.rect(), background) {
-            (Some(rect), Some(seeds)) => Some(Self::Both { rect, seeds }),
-            (Some(rect), None) => Some(Self::Rect(rect)),
-            (None, seeds) => seeds.map(Self::Seeds),
+        Self {
+            seeds: background,
+            ..self.clone()
         }
     }
+}
 
-    /// The seeds.
-    #[must_use]
-    pub fn seeds(&self) -> Option<&Seeds> {
-        match self {
-            Self::Seeds(seeds) | Self::Both { seeds, .. } => Some(seeds),
-            Self::Rect(_) => None,
+impl From<Rect> for Hints {
+    fn from(rect: Rect) -> Self {
+        Self {
+            rect: Some(rect),
+            ..Self::default()
         }
     }
 }
@@ -298,25 +289,23 @@ mod tests {
     }
 
     #[test]
-    fn seeds_without_object_are_accepted_only_with_a_rectangle() {
+    fn seeds_without_any_mark_are_refused() {
         let grey = ImageBuffer::from_pixel(4, 4, Rgb([128u8, 128, 128]));
-        let unmarked = Seeds::from_png(&png(grey));
-        assert!(matches!(unmarked, Err(SeedsFault::WithoutMark)));
-        let black = ImageBuffer::from_pixel(4, 4, Rgb([0u8, 0, 0]));
-        let seeds = Seeds::from_png(&png(black)).unwrap();
-        let alone = Hints::from_parts(None, Some(seeds.clone()));
-        assert!(matches!(alone, Err(MaskError::NothingMarked)));
-        assert!(Hints::from_parts(Some(Rect::new(0, 0, 2, 2)), Some(seeds)).is_ok());
+        assert!(refused(Seeds::from_png(&png(grey))).starts_with("no pixel of it is white"));
     }
 
     #[test]
     fn what_is_not_a_png_is_refused() {
-        assert!(matches!(Seeds::from_png(b""), Err(SeedsFault::NotPng)));
+        assert!(refused(Seeds::from_png(b"")).contains("not a PNG"));
         let jpeg = [0xff, 0xd8, 0xff, 0xe0, 0, 0];
-        assert!(matches!(Seeds::from_png(&jpeg), Err(SeedsFault::NotPng)));
+        assert!(refused(Seeds::from_png(&jpeg)).contains("not a PNG"));
         let white = ImageBuffer::from_pixel(9, 9, Luma([255u8]));
         let cut = &png(white)[..40];
-        assert!(matches!(Seeds::from_png(cut), Err(SeedsFault::Damaged(_))));
+        assert!(refused(Seeds::from_png(cut)).contains("cannot be decoded"));
+    }
+
+    fn refused(seeds: Result<Seeds, MaskError>) -> String {
+        seeds.unwrap_err().to_string()
     }
 
     #[test]
@@ -326,8 +315,5 @@ mod tests {
         let seeds = Seeds::from_image(&image.into()).unwrap();
         let bytes = seeds.to_marks_png().unwrap();
         assert_eq!(Seeds::from_marks_png(&bytes, 0).unwrap(), seeds);
-        let other = png(ImageBuffer::from_pixel(2, 2, Luma([77u8])));
-        let result = Seeds::from_marks_png(&other, 0);
-        assert!(matches!(result, Err(SeedsFault::Level(77))));
     }
 }

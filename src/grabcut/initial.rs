@@ -21,18 +21,18 @@ pub(super) struct InitialLabels {
 impl InitialLabels {
     /// The labels that the hints give to a frame of `size`.
     pub(super) fn new(hints: &Hints, size: (u32, u32)) -> Result<Self, MaskError> {
-        let rect = hints.rect().map(|rect| clip(rect, size)).transpose()?;
-        let seeds = hints.seeds();
+        let rect = hints.rect.map(|rect| clip(rect, size)).transpose()?;
+        let seeds = hints.seeds.as_ref();
         if let Some(seeds) = seeds.filter(|seeds| seeds.size() != size) {
             return Err(MaskError::SeedsSize {
                 seeds: seeds.size(),
                 frame: size,
             });
         }
-        let marks = seeds.map_or(&[][..], |seeds| seeds.marks());
+        let marks = hints.marks();
         let unmarked = |at: usize| match rect {
             None => Label::ProbablyBackground,
-            Some(rect) if contains(rect, at, size.0) => Label::ProbablyObject,
+            Some(rect) if rect.contains(at, size.0) => Label::ProbablyObject,
             Some(_) => Label::Background,
         };
         let label = |at: usize| match marks.get(at) {
@@ -51,19 +51,11 @@ impl InitialLabels {
             first,
             rect,
         };
-        initial.check(hints, size)?;
-        Ok(initial)
-    }
-
-    fn check(&self, hints: &Hints, (width, height): (u32, u32)) -> Result<(), MaskError> {
-        let object = self.labels.iter().filter(|label| label.is_object());
-        let object = object.count();
-        if object == self.labels.len() {
-            return Err(MaskError::NoBackground { width, height });
-        }
-        match hints.rect() {
-            Some(rect) if object == 0 => Err(MaskError::NoObject { rect }),
-            _ => Ok(()),
+        let object = initial.labels.iter().filter(|label| label.is_object());
+        match (object.count(), hints.rect) {
+            (object, _) if object == pixels => Err(MaskError::NoBackground),
+            (0, Some(rect)) => Err(MaskError::NoObject { rect }),
+            _ => Ok(initial),
         }
     }
 }
@@ -75,10 +67,4 @@ fn clip(rect: Rect, (width, height): (u32, u32)) -> Result<Rect, MaskError> {
         height,
     };
     rect.clipped_to(width, height).ok_or(outside)
-}
-
-fn contains(rect: Rect, at: usize, width: u32) -> bool {
-    let (x, y) = ((at % width as usize) as i64, (at / width as usize) as i64);
-    (i64::from(rect.x)..rect.right()).contains(&x)
-        && (i64::from(rect.y)..rect.bottom()).contains(&y)
 }

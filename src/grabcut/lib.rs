@@ -1,9 +1,9 @@
 //! Which pixels of an image are the object: hints from a person or what a turn shows, GrabCut, clean-up.
 //!
 //! Camera and object ride on the same turntable, so one mask fits all frames of a turn. [`segment`]
-//! makes it from one image and hints, [`segment_turn`] from what the frames of a whole turn show
+//! makes it from one image and hints, [`segment_with`] also from what the frames of a whole turn show
 //! ([`TurnFrames`]), with or without hints. [`preview`] shows it for a person to check; [`MaskCheck`] holds a mask
-//! against a turn, and [`score`] measures it against the ground truth.
+//! against a turn.
 //!
 //! Everything is computed from images and bytes in memory: the crate knows no files, videos or threads, links
 //! no native library, and also runs in a browser.
@@ -22,13 +22,13 @@
 //! });
 //!
 //! // The object lies inside the rectangle; what is outside is background.
-//! let hints = Hints::Rect(Rect::new(24, 8, 50, 48));
+//! let hints = Hints::from(Rect::new(24, 8, 50, 48));
 //! let mask = segment(&image, &hints, &SegmentSettings::default())?;
 //!
-//! assert_eq!(mask.image().get_pixel(48, 32).0, [255]);
-//! assert_eq!(mask.image().get_pixel(10, 10).0, [0]);
-//! assert_eq!(mask.statistics().bounding_box, Rect::new(30, 14, 37, 37));
-//! assert!(mask.warnings().is_empty());
+//! assert_eq!(mask.image.get_pixel(48, 32).0, [255]);
+//! assert_eq!(mask.image.get_pixel(10, 10).0, [0]);
+//! assert_eq!(mask.statistics.bounding_box, Rect::new(30, 14, 37, 37));
+//! assert!(mask.warnings.is_empty());
 //! # Ok::<(), relit_grabcut::MaskError>(())
 //! ```
 //!
@@ -47,22 +47,16 @@
 //! Of the result the largest 8-connected component is kept, and those that have three tenths of its area.
 //! Small holes are filled, except those in which seeds mark background.
 
-mod alpha;
 mod backdrop;
 mod bitmap;
-mod blur;
 mod check;
 mod cleanup;
-mod closed;
 mod cut_energy;
-mod drawing;
-mod encode;
 mod error;
 mod grab_cut;
 mod hints;
 mod initial;
 mod lab;
-mod mask;
 mod max_flow;
 mod mixture;
 mod outline;
@@ -71,33 +65,23 @@ mod preview;
 mod pyramid;
 mod registration;
 mod rim;
-mod score;
 mod segment;
 mod settings;
 mod shape_faults;
-mod starts;
 mod strokes;
 mod turn;
 mod turntable;
 mod warning;
 mod witness;
 
-pub use alpha::alpha;
 pub use check::{DoubtfulRegion, MaskCheck, Registration, ShapeCheck};
-pub use drawing::Drawing;
-pub use encode::{grey_png, rgb_png};
-pub use error::{MaskError, SeedsFault, StrokesFault};
+pub use error::MaskError;
+pub use grab_cut::ITERATIONS;
 pub use hints::{Hints, Mark, Seeds};
-pub use mask::{Mask, MaskStatistics};
 pub use outline::outline;
-pub use preview::preview;
+pub use preview::{grey_png, preview, rgb_png};
 pub use pyramid::half_image;
-pub use score::{BOUNDARY_TOLERANCE_PX, MaskScore, ScoreFault, score};
-pub use segment::{check_hints, clean_cut, segment, segment_turn, segment_with, start_cuts};
-pub use settings::{
-    Effort, Feather, Iterations, MAX_PIXELS, MIN_SIDE, SegmentSettings, SettingsFault,
-};
-pub use starts::{StartCuts, StartRule};
+pub use segment::{Mask, MaskStatistics, check_hints, clean_cut, segment, segment_with};
+pub use settings::{Effort, MAX_PIXELS, MIN_SIDE, SegmentSettings};
 pub use strokes::{Brush, Stroke, Strokes};
 pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, TurnFrames, TurnStatistics};
-pub use warning::{Side, Warning};

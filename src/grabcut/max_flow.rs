@@ -48,7 +48,7 @@ struct Node {
 }
 
 /// A graph whose nodes have up to eight neighbours and two terminals.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct PixelGraph {
     nodes: Vec<Node>,
     active: VecDeque<u32>,
@@ -57,15 +57,6 @@ pub(super) struct PixelGraph {
 }
 
 impl PixelGraph {
-    pub(super) fn with_capacity(nodes: usize) -> Self {
-        Self {
-            nodes: Vec::with_capacity(nodes),
-            active: VecDeque::new(),
-            orphans: VecDeque::new(),
-            time: 0,
-        }
-    }
-
     /// Adds a node. `terminal` is what it costs to put it on the sink's side, minus what it costs to
     /// put it on the source's. `capacity[d]` is the cost of separating it from `neighbours[d]`, which
     /// has to state the same capacity in the opposite direction; 0 where there is none ([`NONE`]).
@@ -377,7 +368,7 @@ mod tests {
         }
 
         fn graph(&self) -> PixelGraph {
-            let mut graph = PixelGraph::with_capacity(self.terminals.len());
+            let mut graph = PixelGraph::default();
             for (at, &terminal) in self.terminals.iter().enumerate() {
                 let next = |d| self.neighbour(at, d).map_or(NONE, |next| next as u32);
                 let capacity = |d| self.capacity(at, d);

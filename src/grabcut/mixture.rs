@@ -4,6 +4,8 @@
 //! components come from splitting the samples along their principal axes (Orchard and Bouman, 1991),
 //! which needs no random numbers.
 
+use super::grab_cut::squared_distance;
+
 /// Rounds of moving the split components' centres to their samples.
 const LLOYD_ROUNDS: usize = 4;
 /// Rounds of the power method, enough for a direction to split along.
@@ -281,10 +283,7 @@ fn along<const D: usize>(sample: &[f32; D], mean: &[f64; D], axis: &[f64; D]) ->
 }
 
 fn nearest<const D: usize>(centres: &[[f32; D]], sample: &[f32; D]) -> usize {
-    let distance = |centre: &[f32; D]| -> f32 {
-        let differences = centre.iter().zip(sample);
-        differences.map(|(a, b)| (a - b) * (a - b)).sum()
-    };
+    let distance = |centre: &[f32; D]| squared_distance(centre, sample);
     let distances = centres.iter().map(distance).enumerate();
     let best = distances.min_by(|a, b| a.1.total_cmp(&b.1));
     best.map_or(0, |(at, _)| at)

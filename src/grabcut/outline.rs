@@ -4,25 +4,35 @@ use std::collections::BTreeMap;
 
 use image::GrayImage;
 
-/// Pixels at or above this level belong to the mask.
-const INSIDE_FROM: u8 = 128;
+use super::bitmap::Bitmap;
+
+/// Ways along the pixels' sides, each to the right of the one before: right, down, left, up. The mask is to their right.
+const HEADINGS: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+/// The row and column, from a pixel's, of the corner where the way along each of its sides begins.
+const BEGINS: [(i64, i64); 4] = [(0, 0), (0, 1), (1, 1), (1, 0)];
+
+/// A corner of pixels: row and column.
+type Corner = (i64, i64);
+/// The ways along the mask's edge, by the corner from which they lead on. At most two lead on from one corner.
+type Sides = BTreeMap<Corner, Vec<usize>>;
 
 /// The edges between the mask's pixels (from 128 on) and the others, as closed polygons along the pixels'
 /// sides: corners `[x, y]`, 0 to width and height, without those at which the direction stays the same. Filled
 /// by the even-odd rule they cover the mask exactly. Pixels that touch at a corner are connected.
 #[must_use]
 pub fn outline(mask: &GrayImage) -> Vec<Vec<[u32; 2]>> {
-    let mut steps = steps(mask);
+    let mut sides = sides(mask);
     let mut polygons = Vec::new();
-    while let Some((&start, _)) = steps.first_key_value() {
+    while let Some((&start, _)) = sides.first_key_value() {
         let mut corners = Vec::new();
         let mut at = start;
         let mut heading = None;
-        while let Some(next) = take(&mut steps, at, heading) {
+        while let Some(next) = take(&mut sides, at, heading) {
             if heading != Some(next) {
-                corners.push([at.1, at.0]);
+                corners.push([at.1 as u32, at.0 as u32]);
             }
-            at = moved(at, next);
+            let (dx, dy) = HEADINGS[next];
+            at = (at.0 + dy, at.1 + dx);
             heading = Some(next);
         }
         polygons.push(corners);
@@ -30,74 +40,38 @@ pub fn outline(mask: &GrayImage) -> Vec<Vec<[u32; 2]>> {
     polygons
 }
 
-/// A direction along the pixels' sides; the mask is to its right.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Heading {
-    Right,
-    Down,
-    Left,
-    Up,
-}
-
-/// A corner of pixels: row and column.
-type Corner = (u32, u32);
-
-/// The sides of the mask's pixels at its edge, by the corner from which they lead on. At most two lead on
-/// from one corner.
-fn steps(mask: &GrayImage) -> BTreeMap<Corner, Vec<Heading>> {
-    let (width, height) = mask.dimensions();
+fn sides(mask: &GrayImage) -> Sides {
+    let (width, height) = (i64::from(mask.width()), i64::from(mask.height()));
+    let object = Bitmap::of_mask(mask);
     let inside = |x: i64, y: i64| {
-        let within = (0..i64::from(width)).contains(&x) && (0..i64::from(height)).contains(&y);
-        within && mask.get_pixel(x as u32, y as u32).0[0] >= INSIDE_FROM
+        let within = (0..width).contains(&x) && (0..height).contains(&y);
+        within && object.bits()[(y * width + x) as usize]
     };
-    let mut steps: BTreeMap<Corner, Vec<Heading>> = BTreeMap::new();
-    for (x, y, pixel) in mask.enumerate_pixels() {
-        if pixel.0[0] < INSIDE_FROM {
-            continue;
-        }
-        let (column, row) = (i64::from(x), i64::from(y));
-        let sides = [
-            (!inside(column, row - 1), (y, x), Heading::Right),
-            (!inside(column + 1, row), (y, x + 1), Heading::Down),
-            (!inside(column, row + 1), (y + 1, x + 1), Heading::Left),
-            (!inside(column - 1, row), (y + 1, x), Heading::Up),
-        ];
-        for (_, corner, heading) in sides.into_iter().filter(|side| side.0) {
-            steps.entry(corner).or_default().push(heading);
+    let mut sides = Sides::new();
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (y, x)));
+    for (y, x) in pixels.filter(|&(y, x)| inside(x, y)) {
+        for (heading, (row, column)) in BEGINS.into_iter().enumerate() {
+            let (dx, dy) = HEADINGS[(heading + 3) % 4];
+            if !inside(x + dx, y + dy) {
+                let ways = sides.entry((y + row, x + column)).or_default();
+                ways.push(heading);
+            }
         }
     }
-    steps
+    sides
 }
 
-/// Takes the side that leads on from a corner: of two, the one to the left, which goes over to the pixel
+/// Takes the way that leads on from a corner: of two, the one to the left, which goes over to the pixel
 /// that touches at the corner.
-fn take(
-    steps: &mut BTreeMap<Corner, Vec<Heading>>,
-    at: Corner,
-    heading: Option<Heading>,
-) -> Option<Heading> {
-    let leading = steps.get_mut(&at)?;
-    let left = heading.map(|heading| match heading {
-        Heading::Right => Heading::Up,
-        Heading::Down => Heading::Right,
-        Heading::Left => Heading::Down,
-        Heading::Up => Heading::Left,
-    });
+fn take(sides: &mut Sides, at: Corner, heading: Option<usize>) -> Option<usize> {
+    let leading = sides.get_mut(&at)?;
+    let left = heading.map(|heading| (heading + 3) % 4);
     let place = leading.iter().position(|&next| Some(next) == left);
     let taken = leading.swap_remove(place.unwrap_or(0));
     if leading.is_empty() {
-        steps.remove(&at);
+        sides.remove(&at);
     }
     Some(taken)
-}
-
-fn moved((row, column): Corner, heading: Heading) -> Corner {
-    match heading {
-        Heading::Right => (row, column + 1),
-        Heading::Down => (row + 1, column),
-        Heading::Left => (row, column - 1),
-        Heading::Up => (row - 1, column),
-    }
 }
 
 #[cfg(test)]

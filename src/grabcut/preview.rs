@@ -1,11 +1,11 @@
-//! The image by which a person checks a mask.
+//! Pictures of a mask: the image by which a person checks it, and PNG in memory.
 
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{GrayImage, RgbImage};
 
+use super::MaskError;
 use super::bitmap::Bitmap;
 
-/// Pixels at or above this level belong to the mask.
-const INSIDE_FROM: u8 = 128;
 const BRIGHT: [u8; 3] = [0, 255, 80];
 const DARK: [u8; 3] = [10, 10, 10];
 /// Brightness of the dimmed background, percent.
@@ -22,10 +22,7 @@ pub fn preview(frame: &RgbImage, mask: &GrayImage) -> RgbImage {
     if mask.dimensions() != size {
         return frame.clone();
     }
-    let object = Bitmap::new(
-        size,
-        mask.as_raw().iter().map(|&level| level >= INSIDE_FROM),
-    );
+    let object = Bitmap::of_mask(mask);
     let width = (size.0.min(size.1) / SIDE_PER_PX).max(2) as usize;
     let line = object.dilated(width);
     let outer_rim = line.dilated(1);
@@ -46,6 +43,34 @@ pub fn preview(frame: &RgbImage, mask: &GrayImage) -> RgbImage {
 
 fn dimmed(level: u8) -> u8 {
     (u16::from(level) * DIMMED / 100) as u8
+}
+
+/// A grey image as PNG, without filters: best for flat areas. `what` names the image in the error.
+///
+/// # Errors
+/// [`MaskError::Encode`].
+pub fn grey_png(image: &GrayImage, what: &'static str) -> Result<Vec<u8>, MaskError> {
+    let mut bytes = Vec::new();
+    let encoder =
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::NoFilter);
+    match image.write_with_encoder(encoder) {
+        Ok(()) => Ok(bytes),
+        Err(source) => Err(MaskError::Encode { what, source }),
+    }
+}
+
+/// A colour image as PNG, with fast compression. `what` names the image in the error.
+///
+/// # Errors
+/// [`MaskError::Encode`].
+pub fn rgb_png(image: &RgbImage, what: &'static str) -> Result<Vec<u8>, MaskError> {
+    let mut bytes = Vec::new();
+    let encoder =
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
+    match image.write_with_encoder(encoder) {
+        Ok(()) => Ok(bytes),
+        Err(source) => Err(MaskError::Encode { what, source }),
+    }
 }
 
 #[cfg(test)]

@@ -3,15 +3,19 @@
 //!
 //! Time and memory therefore grow with the length of the object's edge, not with the image's area.
 
+use std::borrow::Cow;
+
 use image::{ImageBuffer, Pixel, RgbImage};
 
 use super::bitmap::Bitmap;
-use super::grab_cut::{self, Field, Label, Models, OpenCut, SMOOTHNESS};
+use super::grab_cut::{self, Field, Label, Models, OpenCut, SMOOTHNESS, squared_distance};
 use super::lab::LabTable;
-use super::{Effort, Iterations, MaskError};
+use super::{Effort, MaskError};
 
 /// Variance of the colour of equal surfaces.
 const COLOUR_VARIANCE: f64 = 0.1;
+/// An image is halved until it has at most so many pixels.
+const COARSEST_PX: usize = 200_000;
 /// Half the width of the band, pixels of the finer image: the coarse edge is uncertain by 2.
 const BAND: usize = 3;
 /// Where a cut finds one side alone at this smoothness too, there is none.
@@ -29,87 +33,102 @@ pub(super) enum FirstModels {
     All,
 }
 
-/// Cuts the object out of `image`. `labels` holds what is known, row by row, and the result.
-pub(super) fn segment(
-    image: &RgbImage,
-    labels: &mut Vec<Label>,
-    first: FirstModels,
-    iterations: Iterations,
-    effort: Effort,
-) -> Result<(), MaskError> {
-    let table = LabTable::new();
-    let mut levels: Vec<(RgbImage, Vec<Label>)> = Vec::new();
-    loop {
-        let (image, known) = levels.last().map_or((image, &*labels), |(i, l)| (i, l));
-        if pixels(image) <= effort.coarsest_px() {
-            break;
-        }
-        let half = (half_image(image), half_labels(known, size(image)));
-        levels.push(half);
-    }
-    let mut models = None;
-    let mut coarser: Option<(Vec<Label>, (usize, usize))> = None;
-    for (image, mut known) in levels.into_iter().rev() {
-        let begin =
-            |field: &LabField, labels: &mut [Label]| begin_smooth(field, labels, first, iterations);
-        solve(
-            &image,
-            &mut known,
-            coarser.as_ref(),
-            &mut models,
-            effort,
-            &table,
-            begin,
-        )?;
-        coarser = Some((known, size(&image)));
-    }
-    let begin =
-        |field: &LabField, labels: &mut [Label]| begin_smooth(field, labels, first, iterations);
-    solve(
-        image,
-        labels,
-        coarser.as_ref(),
-        &mut models,
-        effort,
-        &table,
-        begin,
-    )
+/// An image at one of its sizes, with what is known at it.
+pub(super) struct Level<'a> {
+    pub(super) image: Cow<'a, RgbImage>,
+    pub(super) labels: Vec<Label>,
 }
 
-fn solve(
-    image: &RgbImage,
-    labels: &mut [Label],
-    coarser: Option<&(Vec<Label>, (usize, usize))>,
-    models: &mut Option<Models<3>>,
-    effort: Effort,
-    table: &LabTable,
-    begin: impl FnOnce(&LabField, &mut [Label]) -> Result<Models<3>, MaskError>,
-) -> Result<(), MaskError> {
-    match (coarser, models.as_mut()) {
-        (Some((coarse, coarse_size)), Some(_)) if pixels(image) > effort.finest_px() => {
-            grow(labels, size(image), coarse, *coarse_size);
-        }
-        (Some((coarse, coarse_size)), Some(models)) => {
-            let field = RgbField { image, table };
-            refine(&field, labels, coarse, *coarse_size, models);
-        }
-        _ => *models = Some(begin(&LabField::new(image, table), labels)?),
+impl Level<'_> {
+    pub(super) fn size(&self) -> (usize, usize) {
+        (self.image.width() as usize, self.image.height() as usize)
     }
-    Ok(())
+}
+
+/// The image, its half, its quarter, down to at most `coarsest` pixels.
+pub(super) fn levels(image: &RgbImage, known: Vec<Label>, coarsest: usize) -> Vec<Level<'_>> {
+    let mut level = Level {
+        image: Cow::Borrowed(image),
+        labels: known,
+    };
+    let mut levels = Vec::new();
+    while level.labels.len() > coarsest {
+        let half = Level {
+            image: Cow::Owned(half_image(&level.image)),
+            labels: half_labels(&level.labels, level.size()),
+        };
+        levels.push(level);
+        level = half;
+    }
+    levels.push(level);
+    levels
+}
+
+/// Cuts the object out of `image`, of which this is known.
+pub(super) fn segment(
+    image: &RgbImage,
+    known: Vec<Label>,
+    first: FirstModels,
+    effort: Effort,
+) -> Result<Bitmap, MaskError> {
+    let table = LabTable::new();
+    let mut finer = levels(image, known, COARSEST_PX);
+    let Some(mut coarsest) = finer.pop() else {
+        return Err(MaskError::Empty);
+    };
+    let size = coarsest.size();
+    let field = RgbField::converted(&coarsest.image, &table);
+    let mut models = begin_smooth(&field, &mut coarsest.labels, first)?;
+    let field = |_, image| RgbField::new(image, &table);
+    Ok(ascend(
+        &finer,
+        coarsest.labels,
+        size,
+        &mut models,
+        effort,
+        field,
+    ))
+}
+
+/// Takes a result of this size up to the finest of the levels, whose order is from fine to coarse. `field` is told how
+/// many steps there were before.
+pub(super) fn ascend<'a, const D: usize, F: Field<D>>(
+    finer: &'a [Level<'_>],
+    mut labels: Vec<Label>,
+    mut size: (usize, usize),
+    models: &mut Models<D>,
+    effort: Effort,
+    field: impl Fn(usize, &'a RgbImage) -> F,
+) -> Bitmap {
+    for (steps, level) in finer.iter().rev().enumerate() {
+        let mut fine = level.labels.clone();
+        if effort.covers(fine.len()) {
+            refine(
+                &field(steps, &level.image),
+                &mut fine,
+                &labels,
+                size,
+                models,
+            );
+        } else {
+            grow(&mut fine, level.size(), &labels, size);
+        }
+        (labels, size) = (fine, level.size());
+    }
+    grab_cut::object_of(&labels, size)
 }
 
 /// Cuts at the coarsest size. A cut that finds one side alone, because an outline costs more than what the colours gain,
 /// is made again with half the smoothness.
 fn begin_smooth(
-    field: &LabField,
+    field: &RgbField<'_>,
     labels: &mut [Label],
     first: FirstModels,
-    iterations: Iterations,
 ) -> Result<Models<3>, MaskError> {
     let known = labels.to_vec();
     let mut smoothness = SMOOTHNESS;
     loop {
-        let cut = start(field, labels, first, iterations, smoothness);
+        let cut = start(field, labels, first, smoothness);
         match cut {
             Err(MaskError::Empty | MaskError::Everything) if smoothness > LEAST_SMOOTHNESS => {
                 labels.copy_from_slice(&known);
@@ -125,7 +144,6 @@ pub(super) fn start<const D: usize>(
     field: &impl Field<D>,
     labels: &mut [Label],
     first: FirstModels,
-    iterations: Iterations,
     smoothness: f32,
 ) -> Result<Models<D>, MaskError> {
     let models = match first {
@@ -136,7 +154,7 @@ pub(super) fn start<const D: usize>(
         FirstModels::Sure => Some(Models::learn(field, labels, Label::is_sure)),
         FirstModels::All => None,
     };
-    grab_cut::iterate(field, labels, models, iterations.get(), smoothness)
+    grab_cut::iterate(field, labels, models, smoothness)
 }
 
 /// Decides a band along the coarse result's edge; elsewhere the coarse result stays.
@@ -156,12 +174,7 @@ pub(super) fn refine<const D: usize>(
 }
 
 /// Each pixel that is not sure takes the coarse result.
-pub(super) fn grow(
-    labels: &mut [Label],
-    size: (usize, usize),
-    coarse: &[Label],
-    coarse_size: (usize, usize),
-) {
+fn grow(labels: &mut [Label], size: (usize, usize), coarse: &[Label], coarse_size: (usize, usize)) {
     for (at, label) in labels.iter_mut().enumerate() {
         if !label.is_sure() {
             let (x, y) = (at % size.0 / 2, at / size.0 / 2);
@@ -172,7 +185,7 @@ pub(super) fn grow(
 }
 
 /// The pixels that are not sure within `radius` of the edge between the labels, in order.
-pub(super) fn band(labels: &[Label], size: (usize, usize), radius: usize) -> Vec<u32> {
+fn band(labels: &[Label], size: (usize, usize), radius: usize) -> Vec<u32> {
     let differs = |at: usize, direction| {
         grab_cut::neighbour(at, direction, size)
             .is_some_and(|next| labels[next].is_object() != labels[at].is_object())
@@ -183,14 +196,6 @@ pub(super) fn band(labels: &[Label], size: (usize, usize), radius: usize) -> Vec
     near.filter(|(_, (near, label))| **near && !label.is_sure())
         .map(|(at, _)| at as u32)
         .collect()
-}
-
-fn size(image: &RgbImage) -> (usize, usize) {
-    (image.width() as usize, image.height() as usize)
-}
-
-fn pixels(image: &RgbImage) -> usize {
-    size(image).0 * size(image).1
 }
 
 /// Half the image: each pixel is the average of 2 x 2; the last column and row of an odd side are doubled.
@@ -225,7 +230,7 @@ pub fn half_image<P: Pixel<Subpixel = u8>>(
 
 /// A coarse pixel is what the marks in it say; background from outside a rectangle counts only if it
 /// fills the pixel.
-pub(super) fn half_labels(labels: &[Label], (width, height): (usize, usize)) -> Vec<Label> {
+fn half_labels(labels: &[Label], (width, height): (usize, usize)) -> Vec<Label> {
     let (half_width, half_height) = (width.div_ceil(2), height.div_ceil(2));
     let of = |at: usize| {
         let (x, y) = (at % half_width * 2, at / half_width * 2);
@@ -246,61 +251,45 @@ pub(super) fn half_labels(labels: &[Label], (width, height): (usize, usize)) -> 
     (0..half_width * half_height).map(of).collect()
 }
 
-/// A small image, its colours converted once.
-pub(super) struct LabField {
-    size: (usize, usize),
+/// An image in the colours of L*a*b*.
+pub(super) struct RgbField<'a> {
+    image: &'a RgbImage,
+    table: &'a LabTable,
+    /// The colours where all of them are needed; empty where few are.
     lab: Vec<[f32; 3]>,
 }
 
-impl LabField {
-    pub(super) fn new(image: &RgbImage, table: &LabTable) -> Self {
-        Self {
-            size: size(image),
-            lab: image.pixels().map(|pixel| table.lab(pixel.0)).collect(),
-        }
-    }
-}
-
-impl Field<3> for LabField {
-    const VARIANCE_FLOOR: f64 = COLOUR_VARIANCE;
-
-    fn size(&self) -> (usize, usize) {
-        self.size
+impl<'a> RgbField<'a> {
+    /// A large image, of which few pixels are needed.
+    pub(super) fn new(image: &'a RgbImage, table: &'a LabTable) -> Self {
+        let lab = Vec::new();
+        Self { image, table, lab }
     }
 
-    fn feature(&self, at: usize) -> [f32; 3] {
-        self.lab[at]
+    /// A small image, its colours converted once.
+    fn converted(image: &'a RgbImage, table: &'a LabTable) -> Self {
+        let lab = image.pixels().map(|pixel| table.lab(pixel.0)).collect();
+        Self { image, table, lab }
     }
-
-    fn contrast(&self, a: usize, b: usize) -> f32 {
-        squared_distance(&self.lab[a], &self.lab[b])
-    }
-}
-
-/// A large image, of which few pixels are needed.
-pub(super) struct RgbField<'a> {
-    pub(super) image: &'a RgbImage,
-    pub(super) table: &'a LabTable,
 }
 
 impl Field<3> for RgbField<'_> {
     const VARIANCE_FLOOR: f64 = COLOUR_VARIANCE;
 
     fn size(&self) -> (usize, usize) {
-        size(self.image)
+        (self.image.width() as usize, self.image.height() as usize)
     }
 
     fn feature(&self, at: usize) -> [f32; 3] {
-        let bytes = self.image.as_raw();
-        self.table
-            .lab([bytes[3 * at], bytes[3 * at + 1], bytes[3 * at + 2]])
+        let bytes = || {
+            let bytes = self.image.as_raw();
+            [bytes[3 * at], bytes[3 * at + 1], bytes[3 * at + 2]]
+        };
+        let known = self.lab.get(at).copied();
+        known.unwrap_or_else(|| self.table.lab(bytes()))
     }
 
     fn contrast(&self, a: usize, b: usize) -> f32 {
         squared_distance(&self.feature(a), &self.feature(b))
     }
-}
-
-fn squared_distance(a: &[f32; 3], b: &[f32; 3]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }

@@ -22,26 +22,43 @@ pub(super) fn shift(
     let average = gradients(average, size);
     let frame = gradients(frame, size);
     let pixels = inner_pixels(object, size);
+    let best = best_shift(size.0, |step| fit(&average, &frame, &pixels, step));
+    match best {
+        Some(best) if best.fit >= best.unmoved * (1.0 + BETTER_BY) => best.shift.into(),
+        _ => (0.0, 0.0),
+    }
+}
+
+/// Where something fits best.
+struct BestShift {
+    /// Right and down, pixels.
+    shift: [f32; 2],
+    fit: f32,
+    /// How well it fits without a shift.
+    unmoved: f32,
+}
+
+/// The shift at which it fits best, to a fraction of a pixel, where `fit` is told the step in row order; none where
+/// that is at the limit of what is looked for, or nothing fits.
+fn best_shift(width: usize, fit: impl Fn(isize) -> f32) -> Option<BestShift> {
     let side = (2 * REACH + 1) as usize;
-    let fits: Vec<f32> = (0..side * side)
-        .map(|at| {
-            let (dx, dy) = ((at % side) as isize - REACH, (at / side) as isize - REACH);
-            fit(&average, &frame, &pixels, dy * size.0 as isize + dx)
-        })
-        .collect();
-    let best = fits.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
-    let Some((best, &most)) = best else {
-        return (0.0, 0.0);
+    let fit = |at: usize| {
+        let (dx, dy) = ((at % side) as isize - REACH, (at / side) as isize - REACH);
+        fit(dy * width as isize + dx)
     };
+    let fits: Vec<f32> = (0..side * side).map(fit).collect();
+    let (best, &most) = fits.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     let (x, y) = (best % side, best / side);
-    let unmoved = fits[side * side / 2];
-    let at_limit = x == 0 || y == 0 || x + 1 == side || y + 1 == side;
-    if at_limit || most <= 0.0 || most < unmoved * (1.0 + BETTER_BY) {
-        return (0.0, 0.0);
+    if most <= 0.0 || x == 0 || y == 0 || x + 1 == side || y + 1 == side {
+        return None;
     }
     let dx = vertex(fits[best - 1], most, fits[best + 1]);
     let dy = vertex(fits[best - side], most, fits[best + side]);
-    (x as f32 - REACH as f32 + dx, y as f32 - REACH as f32 + dy)
+    Some(BestShift {
+        shift: [x as f32 - REACH as f32 + dx, y as f32 - REACH as f32 + dy],
+        fit: most,
+        unmoved: fits[side * side / 2],
+    })
 }
 
 /// The labels moved by a shift (right, down): each pixel takes what was there before, between pixels the
@@ -151,36 +168,18 @@ impl Reference {
     /// The shift (right, down) at which the gradients' directions agree best with a frame's brightness,
     /// and their mean cosine there; none if that is at the limit of what is looked for, or nothing agrees.
     pub(super) fn find(&self, light: &[f32]) -> Option<([f32; 2], f32)> {
-        let (width, height) = self.size;
-        let at = |x: usize, y: usize| light[y * width + x];
-        let mut directions = vec![[0.0_f32; 2]; light.len()];
-        for y in 1..height.saturating_sub(1) {
-            for x in 1..width.saturating_sub(1) {
-                let gradient = [at(x + 1, y) - at(x - 1, y), at(x, y + 1) - at(x, y - 1)];
-                directions[y * width + x] = direction(gradient);
-            }
-        }
-        let side = (2 * REACH + 1) as usize;
-        let fits: Vec<f32> = (0..side * side)
-            .map(|at| {
-                let (dx, dy) = ((at % side) as isize - REACH, (at / side) as isize - REACH);
-                let step = dy * width as isize + dx;
-                let fit = |(at, [ax, ay]): &(usize, [f32; 2])| {
-                    let [bx, by] = directions[at.saturating_add_signed(step)];
-                    ax * bx + ay * by
-                };
-                self.pixels.iter().map(fit).sum()
-            })
+        let directions: Vec<[f32; 2]> = gradients(light, self.size)
+            .into_iter()
+            .map(direction)
             .collect();
-        let (best, &most) = fits.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-        let (x, y) = (best % side, best / side);
-        if most <= 0.0 || x == 0 || y == 0 || x + 1 == side || y + 1 == side {
-            return None;
-        }
-        let dx = vertex(fits[best - 1], most, fits[best + 1]);
-        let dy = vertex(fits[best - side], most, fits[best + side]);
-        let shift = [x as f32 - REACH as f32 + dx, y as f32 - REACH as f32 + dy];
-        Some((shift, most / self.pixels.len() as f32))
+        let best = best_shift(self.size.0, |step| {
+            let fit = |(at, [ax, ay]): &(usize, [f32; 2])| {
+                let [bx, by] = directions[at.saturating_add_signed(step)];
+                ax * bx + ay * by
+            };
+            self.pixels.iter().map(fit).sum()
+        })?;
+        Some((best.shift, best.fit / self.pixels.len() as f32))
     }
 }
 

@@ -17,25 +17,13 @@ const BETWEEN: f64 = 0.4;
 pub(super) fn without_rim(object: &Bitmap, table: &Turntable, size: (usize, usize)) -> Bitmap {
     let radius = ((size.0 as f64 * WIDTH).round() as usize).max(1);
     let reach = ((size.0 as f64 * REACH).round() as usize).max(2);
-    let wide = object.inverted().dilated(radius).inverted().dilated(radius);
-    let thin = object.map(|at, bit| bit && !wide.bits()[at]);
-    let between = |at: usize| is_between(at, object, table, size, reach);
-    let components = thin.components(Connectivity::Eight);
-    let mut of_rim = vec![0_usize; components.list.len()];
-    for (at, _) in thin.bits().iter().enumerate().filter(|(_, bit)| **bit) {
-        if let Some(component) = components.at(at).filter(|_| between(at)) {
-            of_rim[component] += 1;
-        }
-    }
-    let is_rim: Vec<bool> = components
-        .list
-        .iter()
-        .zip(of_rim)
-        .map(|(component, count)| {
-            is_line(component, radius) && count as f64 >= BETWEEN * component.area as f64
-        })
-        .collect();
-    object.map(|at, bit| bit && !components.at(at).is_some_and(|component| is_rim[component]))
+    let thin = object.minus(&object.opened(radius));
+    let between = thin.map(|at, bit| bit && is_between(at, object, table, size, reach));
+    let rim = thin.parts_where(Connectivity::Eight, |line, pixels| {
+        let count = || between.and(&pixels()).count() as f64;
+        is_line(line, radius) && count() >= BETWEEN * line.area as f64
+    });
+    object.minus(&rim)
 }
 
 fn is_line(component: &Component, radius: usize) -> bool {

@@ -2,77 +2,98 @@
 
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
+use serde::{Deserialize, Serialize};
 
-use super::bitmap::Bitmap;
-use super::closed::enclosed;
+use super::bitmap::{Bitmap, Component, Connectivity};
+use super::cut_energy::CutEnergy;
+use super::grab_cut::Label;
 use super::initial::InitialLabels;
-use super::mask::{Mask, MaskStatistics};
 use super::pyramid::FirstModels;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
-use super::starts::{StartCuts, StartRule};
 use super::turn::{self, TurnStatistics};
-use super::warning::OPENING;
-use super::{Effort, Hints, MaskError, SegmentSettings, Warning, cleanup, pyramid, warning};
+use super::warning::{NOTHING_MOVES, OPENING, filled, hole_filled, turn_dropped, warnings};
+use super::{Effort, Hints, Mark, MaskError, SegmentSettings, cleanup, pyramid};
 
 /// On one frame a hole of this share of the object may be a highlight, and is filled.
 const FILLED_OF_FRAME: f64 = 0.01;
-/// The turn's outline has at least this share of the strength of the hints' one.
-const LEAST_OF_HINTS: f32 = 0.85;
 /// Over a turn highlights move: only specks are filled.
 const FILLED_OF_TURN: f64 = 0.001;
+/// The turn's outline has at least this share of the strength of the hints' one.
+const LEAST_OF_HINTS: f32 = 0.85;
+/// A cut reaches a side of the rectangle if it comes within this share of the way to the other.
+const REACHES: f64 = 0.04;
+/// By how much a cut has to be better than that of GrabCut's own start where that reaches all sides of the rectangle, in
+/// units of the log-likelihood of a pixel.
+const MARGIN: f64 = 0.2;
+/// A narrower change by marks is one of the edge, pixels to each side.
+const NARROW: usize = 1;
+
+/// An object's mask on one frame.
+#[derive(Debug, Clone)]
+pub struct Mask {
+    /// The mask, in the size of the frame: 255 object, 0 background.
+    pub image: GrayImage,
+    /// Area, bounding box and components.
+    pub statistics: MaskStatistics,
+    /// What its user should check, one sentence each.
+    pub warnings: Vec<String>,
+    /// Whether one of them names a hole that was filled.
+    names_hole: bool,
+}
+
+/// Numbers about a mask.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MaskStatistics {
+    /// Pixels of the object, at least 1.
+    pub area_px: u64,
+    /// The smallest rectangle around them.
+    pub bounding_box: Rect,
+    /// Connected components before the clean-up, at least 1.
+    pub components: usize,
+    /// Connected components that were kept.
+    pub components_kept: usize,
+    /// Pixels of the holes that were filled.
+    pub holes_filled_px: u64,
+}
 
 /// Finds the object in `frame`. The same input gives the same mask.
 ///
 /// # Errors
-/// [`MaskError::FrameTooSmall`], [`MaskError::FrameTooLarge`]; hints that do not fit the frame
-/// ([`MaskError::RectOutside`], [`MaskError::NoBackground`], [`MaskError::NoObject`], [`MaskError::SeedsSize`]);
-/// a result without object or without background ([`MaskError::Empty`], [`MaskError::Everything`]).
+/// [`MaskError::FrameSize`]; hints that do not fit the frame ([`MaskError::RectOutside`], [`MaskError::NoBackground`],
+/// [`MaskError::NoObject`], [`MaskError::NoHints`], [`MaskError::SeedsSize`]); strokes that cannot be painted
+/// ([`MaskError::StrokesTooLarge`]); a result without object or without background ([`MaskError::Empty`],
+/// [`MaskError::Everything`]).
 pub fn segment(
     frame: &RgbImage,
     hints: &Hints,
     settings: &SegmentSettings,
 ) -> Result<Mask, MaskError> {
-    segment_with(frame, None, Some(hints), settings, Effort::Fine)
+    segment_with(frame, None, hints, settings, Effort::Fine)
 }
 
-/// Finds the object in `frame` by what a turn shows, with or without hints. `turn` was made from frames of
-/// the same recording. The same input gives the same mask.
+/// Finds the object in `frame` by what a turn shows, where there is one, with or without hints. `turn` was made from
+/// frames of the same recording. The same input gives the same mask.
 ///
 /// With a rectangle there is a guard against a turn that misleads: if its mask has an outline along which less
 /// moves differently than along that of the hints alone, the hints alone decide, and a warning says so; so it is
 /// with any hints if there are too few frames.
 ///
 /// # Errors
-/// [`MaskError::FewFrames`] without hints; otherwise as [`segment`].
-pub fn segment_turn(
-    frame: &RgbImage,
-    turn: &TurnStatistics,
-    hints: Option<&Hints>,
-    settings: &SegmentSettings,
-) -> Result<Mask, MaskError> {
-    segment_with(frame, Some(turn), hints, settings, Effort::Fine)
-}
-
-/// [`segment_turn`], or [`segment`] without a turn, with more or less effort.
-///
-/// # Errors
-/// As these; [`MaskError::NoHints`] with neither turn nor hints.
+/// As [`segment`]; [`MaskError::FewFrames`] by a turn without hints.
 pub fn segment_with(
     frame: &RgbImage,
     turn: Option<&TurnStatistics>,
-    hints: Option<&Hints>,
+    hints: &Hints,
     settings: &SegmentSettings,
     effort: Effort,
 ) -> Result<Mask, MaskError> {
-    let mask = cut_unclosed(frame, turn, hints, settings, effort)?;
-    let told = |warning: &Warning| matches!(warning, Warning::HoleFilled { .. });
-    let closed = match hints {
-        Some(hints) if effort != Effort::Draft && !mask.warnings.iter().any(told) => {
-            closed_opening(frame, turn, hints, settings, &mask)
-        }
-        _ => None,
-    };
-    Ok(mask.with_warning(closed))
+    let hints = &*hints.painted(frame.dimensions())?;
+    let mut mask = cut_unclosed(frame, turn, hints, settings, effort)?;
+    if effort != Effort::Draft && !mask.names_hole {
+        let closed = closed_opening(frame, turn, hints, settings, &mask);
+        mask.warnings.extend(closed.as_ref().map(hole_filled));
+    }
+    Ok(mask)
 }
 
 /// What a mask lacks that the marks closed. It is found by a cut without the marks of the object; none where there is
@@ -83,60 +104,76 @@ fn closed_opening(
     hints: &Hints,
     settings: &SegmentSettings,
     mask: &Mask,
-) -> Option<Warning> {
-    if !hints.seeds()?.mark_the_object() {
+) -> Option<Component> {
+    if !hints.marks().contains(&Mark::Object) {
         return None;
     }
     let fewer = hints.without_object_marks();
     // Marks of the background alone show no object.
-    let fewer = fewer.filter(|fewer| turn.is_some() || fewer.rect().is_some());
-    if fewer.is_none() && turn.is_none() {
+    if turn.is_none() && fewer.rect.is_none() {
         return None;
     }
-    let before = cut_unclosed(frame, turn, fewer.as_ref(), settings, Effort::Fine).ok()?;
-    let hole = enclosed(&before.bitmap(), &mask.bitmap())?;
-    let (px, bounds) = (hole.area, hole.bounds);
-    let large = px as f64 >= OPENING * mask.statistics().area_px as f64;
-    large.then_some(Warning::HoleFilled { px, bounds })
+    let before = cut_unclosed(frame, turn, &fewer, settings, Effort::Fine).ok()?;
+    let hole = newly_enclosed(
+        &Bitmap::of_mask(&before.image),
+        &Bitmap::of_mask(&mask.image),
+    )?;
+    (hole.area as f64 >= OPENING * mask.statistics.area_px as f64).then_some(hole)
 }
 
-/// [`segment_with`] without a look at openings that the marks closed.
+/// The largest part that is object only after a change, and lies inside it.
+fn newly_enclosed(before: &Bitmap, after: &Bitmap) -> Option<Component> {
+    let added = after.minus(before).opened(NARROW);
+    let near_ground = after.inverted().dilated(1);
+    let inside = added.parts_where(Connectivity::Eight, |_, part| {
+        part().and(&near_ground).count() == 0
+    });
+    let parts = inside.components(Connectivity::Eight).list;
+    parts.into_iter().max_by_key(|part| part.area)
+}
+
+/// [`segment_with`] painted hints, without a look at openings that the marks closed.
 fn cut_unclosed(
     frame: &RgbImage,
     turn: Option<&TurnStatistics>,
-    hints: Option<&Hints>,
+    hints: &Hints,
     settings: &SegmentSettings,
     effort: Effort,
 ) -> Result<Mask, MaskError> {
     let Some(turn) = turn else {
-        let hints = hints.ok_or(MaskError::NoHints)?;
         return by_hints(frame, hints, settings, effort);
     };
     let size = frame.dimensions();
     check_size(size)?;
-    let by_turn = match turn::segment(frame, turn, hints, settings.iterations, effort) {
+    let dropped = |mut mask: Mask, why: &str| {
+        mask.warnings.push(turn_dropped(why));
+        Ok(mask)
+    };
+    let by_turn = match turn::segment(frame, turn, hints, effort) {
         Ok(by_turn) => by_turn,
+        Err(error) if hints.is_empty() => return Err(error),
         Err(error) => {
-            let Some(hints) = hints else {
-                return Err(error);
-            };
-            let why = error.to_string();
             let mask = by_hints(frame, hints, settings, effort)?;
-            return Ok(mask.with_warning(Some(Warning::TurnDropped { why })));
+            return dropped(mask, &error.to_string());
         }
     };
-    let rect = hints
-        .and_then(Hints::rect)
-        .and_then(|rect| rect.clipped_to(size.0, size.1));
-    if let (Some(hints), Some(_)) = (hints, rect)
+    let rect = used_rect(hints, size);
+    if rect.is_some()
         && let Ok(other) = by_hints(frame, hints, settings, effort)
         && let Some(why) = misled(turn, &by_turn, &other)
     {
-        return Ok(other.with_warning(Some(Warning::TurnDropped { why })));
+        return dropped(other, &why);
     }
-    let still = (!turn.moves()).then_some(Warning::NothingMoves);
-    let mask = finish(&by_turn, size, hints, rect, settings, FILLED_OF_TURN)?;
-    Ok(mask.with_warning(still))
+    let mut mask = finish(&by_turn, size, hints, rect, settings, FILLED_OF_TURN);
+    if !turn.moves() {
+        mask.warnings.push(NOTHING_MOVES.to_owned());
+    }
+    Ok(mask)
+}
+
+/// The part of the rectangle that is inside the frame.
+fn used_rect(hints: &Hints, (width, height): (u32, u32)) -> Option<Rect> {
+    hints.rect.and_then(|rect| rect.clipped_to(width, height))
 }
 
 /// Whether a frame of `size` can be cut by these hints, before another engine does it.
@@ -145,7 +182,7 @@ fn cut_unclosed(
 /// As [`segment`], but for those of its result.
 pub fn check_hints(hints: &Hints, size: (u32, u32)) -> Result<(), MaskError> {
     check_size(size)?;
-    InitialLabels::new(hints, size).map(drop)
+    initial(hints, size).map(drop)
 }
 
 /// The mask of what another engine cut out of a frame by these hints (object from 128 on), with the same clean-up
@@ -159,103 +196,84 @@ pub fn clean_cut(
     settings: &SegmentSettings,
 ) -> Result<Mask, MaskError> {
     let size = cut.dimensions();
-    let raw = Bitmap::new(size, cut.as_raw().iter().map(|&level| level >= 128));
+    let raw = Bitmap::of_mask(cut);
     match raw.count() {
         0 => return Err(MaskError::Empty),
         all if all == cut.as_raw().len() as u64 => return Err(MaskError::Everything),
         _ => {}
     }
-    let rect = hints.rect();
-    let rect = rect.and_then(|rect| rect.clipped_to(size.0, size.1));
-    finish(&raw, size, Some(hints), rect, settings, FILLED_OF_FRAME)
+    let rect = used_rect(hints, size);
+    Ok(finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME))
 }
 
+/// The labels of a frame by hints alone, which have to say where the object may be.
+fn initial(hints: &Hints, size: (u32, u32)) -> Result<InitialLabels, MaskError> {
+    let initial = InitialLabels::new(hints, size)?;
+    // Marks of the background alone cut nothing out of a frame; a turn may do without those of the object.
+    match initial.labels.iter().any(|label| label.is_object()) {
+        true => Ok(initial),
+        false => Err(MaskError::NoHints),
+    }
+}
+
+/// The cut by hints alone. With a rectangle there are two starts: GrabCut's way, with all of it as object, and with the
+/// share of it as background that looks most like what is around it.
+///
+/// The share is right for a rectangle with much background in it, and cuts a part off an object that fills its
+/// rectangle and is in places like what is around it. So the cut of the lower energy counts. Where that of GrabCut's
+/// own start reaches all four sides of its rectangle, as the object of a tight one does, the other has to be better by
+/// a margin.
 fn by_hints(
     frame: &RgbImage,
     hints: &Hints,
     settings: &SegmentSettings,
     effort: Effort,
 ) -> Result<Mask, MaskError> {
-    check_size(frame.dimensions())?;
-    let initial = InitialLabels::new(hints, frame.dimensions())?;
-    if initial.rect.is_none() {
-        let first = initial.first;
-        return cut_from(frame, hints, &initial, first, settings, effort);
-    }
-    let rule = StartRule::default();
-    cuts_by_hints(frame, hints, &initial, settings, effort, rule.shares)?.into_mask(rule)
-}
-
-/// A rectangle's cuts from several starts, each named by the share of the rectangle that is background at first, 0 to
-/// 1; what [`segment`] chooses from. Seeds alone have one start, that of share 0.
-///
-/// # Errors
-/// As [`segment`].
-pub fn start_cuts(
-    frame: &RgbImage,
-    hints: &Hints,
-    settings: &SegmentSettings,
-    shares: &[f64],
-) -> Result<StartCuts, MaskError> {
-    check_size(frame.dimensions())?;
-    let initial = InitialLabels::new(hints, frame.dimensions())?;
-    cuts_by_hints(frame, hints, &initial, settings, Effort::Fine, shares)
-}
-
-fn cuts_by_hints(
-    frame: &RgbImage,
-    hints: &Hints,
-    initial: &InitialLabels,
-    settings: &SegmentSettings,
-    effort: Effort,
-    shares: &[f64],
-) -> Result<StartCuts, MaskError> {
-    let whole = Rect::new(0, 0, frame.width(), frame.height());
-    let rect = initial.rect.unwrap_or(whole);
-    let shares = if initial.rect.is_some() {
-        shares
-    } else {
-        &[0.0]
-    };
-    StartCuts::make(frame, rect, shares, |share| {
-        let first = match initial.rect {
-            None => initial.first,
-            Some(_) if share > 0.0 => FirstModels::Ranked(share),
-            Some(_) => FirstModels::All,
-        };
-        cut_from(frame, hints, initial, first, settings, effort)
-    })
-}
-
-fn cut_from(
-    frame: &RgbImage,
-    hints: &Hints,
-    initial: &InitialLabels,
-    first: FirstModels,
-    settings: &SegmentSettings,
-    effort: Effort,
-) -> Result<Mask, MaskError> {
-    let mut labels = initial.labels.clone();
-    // Marks of the background alone cut nothing out of a frame; a turn may do without those of the object.
-    if !labels.iter().any(|label| label.is_object()) {
-        return Err(MaskError::NothingMarked);
-    }
-    pyramid::segment(frame, &mut labels, first, settings.iterations, effort)?;
     let size = frame.dimensions();
-    let raw = Bitmap::new(size, labels.iter().map(|label| label.is_object()));
-    finish(
-        &raw,
-        size,
-        Some(hints),
-        initial.rect,
-        settings,
-        FILLED_OF_FRAME,
-    )
+    check_size(size)?;
+    let InitialLabels {
+        labels,
+        first,
+        rect,
+    } = initial(hints, size)?;
+    let cut = |labels: Vec<Label>, first: FirstModels| {
+        let raw = pyramid::segment(frame, labels, first, effort)?;
+        Ok(finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME))
+    };
+    let Some(rect) = rect else {
+        return cut(labels, first);
+    };
+    let plain = cut(labels.clone(), FirstModels::All);
+    let ranked = cut(labels, first);
+    let (plain, ranked) = match (plain, ranked) {
+        (Ok(plain), Ok(ranked)) => (plain, ranked),
+        (plain, ranked) => return plain.or(ranked),
+    };
+    let energy = CutEnergy::new(frame, rect);
+    let energy = |mask: &Mask| energy.of(&Bitmap::of_mask(&mask.image));
+    let margin = match fills(plain.statistics.bounding_box, rect) {
+        true => MARGIN,
+        false => 0.0,
+    };
+    match energy(&plain) - energy(&ranked) <= margin {
+        true => Ok(plain),
+        false => Ok(ranked),
+    }
+}
+
+/// Whether a cut reaches all four sides of its rectangle.
+fn fills(found: Rect, rect: Rect) -> bool {
+    let (across, down) = (f64::from(rect.w) * REACHES, f64::from(rect.h) * REACHES);
+    f64::from(found.x) - f64::from(rect.x) <= across
+        && f64::from(found.y) - f64::from(rect.y) <= down
+        && (rect.right() - found.right()) as f64 <= across
+        && (rect.bottom() - found.bottom()) as f64 <= down
 }
 
 /// Why the turn's mask is worse than that of the hints alone; none if it is not.
 fn misled(turn: &TurnStatistics, by_turn: &Bitmap, by_hints: &Mask) -> Option<String> {
-    let (of_turn, of_hints) = (turn.outline(by_turn), turn.outline(&by_hints.bitmap()));
+    let by_hints = Bitmap::of_mask(&by_hints.image);
+    let (of_turn, of_hints) = (turn.outline(by_turn), turn.outline(&by_hints));
     (of_turn < LEAST_OF_HINTS * of_hints).then(|| {
         format!(
             "its outline follows what moves less well ({of_turn:.2}) than that of the hints alone ({of_hints:.2})"
@@ -266,32 +284,69 @@ fn misled(turn: &TurnStatistics, by_turn: &Bitmap, by_hints: &Mask) -> Option<St
 fn finish(
     raw: &Bitmap,
     size: (u32, u32),
-    hints: Option<&Hints>,
+    hints: &Hints,
     rect: Option<Rect>,
     settings: &SegmentSettings,
     fill_to: f64,
-) -> Result<Mask, MaskError> {
-    let seeds = hints.and_then(Hints::seeds);
-    let cleaned = cleanup::clean(raw, seeds, settings.keep_all, fill_to);
-    Ok(Mask {
-        image: cleanup::soften(&cleaned.mask, size, settings.feather),
+) -> Mask {
+    let cleaned = cleanup::clean(raw, hints.marks(), settings.keep_all, fill_to);
+    let levels = cleaned.mask.bits().iter().map(|&bit| u8::from(bit) * 255);
+    let area_px = cleaned.mask.count();
+    Mask {
+        image: GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default(),
         statistics: MaskStatistics {
-            area_px: cleaned.mask.count(),
+            area_px,
             bounding_box: cleaned.mask.bounds(),
             components: cleaned.components,
             components_kept: cleaned.kept,
             holes_filled_px: cleaned.holes.iter().map(|hole| hole.area).sum(),
         },
-        warnings: warning::warnings(hints, rect, &cleaned, size),
-    })
+        names_hole: filled(&cleaned, area_px as f64).is_some(),
+        warnings: warnings(hints, rect, &cleaned, size),
+    }
 }
 
 fn check_size((width, height): (u32, u32)) -> Result<(), MaskError> {
-    if width.min(height) < MIN_SIDE {
-        return Err(MaskError::FrameTooSmall { width, height });
+    let pixels = u64::from(width) * u64::from(height);
+    match width.min(height) >= MIN_SIDE && pixels <= MAX_PIXELS {
+        true => Ok(()),
+        false => Err(MaskError::FrameSize { width, height }),
     }
-    if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(MaskError::FrameTooLarge { width, height });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_reaches_a_rectangle_or_not() {
+        let rect = Rect::new(10, 10, 100, 50);
+        assert!(fills(Rect::new(12, 11, 96, 48), rect));
+        assert!(!fills(Rect::new(18, 11, 90, 48), rect));
+        assert!(!fills(Rect::new(12, 11, 96, 40), rect));
     }
-    Ok(())
+
+    #[test]
+    fn an_opening_that_was_painted_over_is_inside_and_an_added_arm_is_not() {
+        let before = Bitmap::drawn(&[
+            ".............",
+            ".#######.....",
+            ".#...###.....",
+            ".#...###.....",
+            ".#...###.....",
+            ".#######.....",
+            ".............",
+        ]);
+        let after = before.map(|at, bit| {
+            let (x, y) = (at % 13, at / 13);
+            bit || (2..5).contains(&x) && (2..5).contains(&y)
+        });
+        let hole = newly_enclosed(&before, &after);
+        assert_eq!(hole.map(|hole| hole.area), Some(9));
+        let arm = before.map(|at, bit| {
+            let (x, y) = (at % 13, at / 13);
+            bit || (8..12).contains(&x) && (2..5).contains(&y)
+        });
+        assert_eq!(newly_enclosed(&before, &arm), None);
+    }
 }

@@ -119,8 +119,6 @@ mod tests {
             outline: 0.9,
             outline_of_turn: 0.9,
             contradicted: false,
-            iou: 0.8,
-            edge_px: [1.0, 2.0],
             leaks: of(leaks),
             missing: of(missing),
             holes: of(holes),

@@ -5,7 +5,6 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::StrokesFault;
 use super::hints::Mark;
 use super::settings::MAX_PIXELS;
 use super::{MaskError, Seeds};
@@ -42,28 +41,26 @@ pub struct Stroke {
 
 /// Strokes in the order in which they were painted; later ones cover earlier ones.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<Stroke>", into = "Vec<Stroke>")]
+#[serde(try_from = "Vec<Stroke>")]
 pub struct Strokes(Vec<Stroke>);
 
 impl Strokes {
     /// Checks the strokes.
     ///
     /// # Errors
-    /// [`StrokesFault::Empty`] or [`StrokesFault::OutOfRange`], with the place of the stroke from 0.
-    pub fn new(strokes: Vec<Stroke>) -> Result<Self, StrokesFault> {
-        for (at, stroke) in strokes.iter().enumerate() {
-            if stroke.points.is_empty() {
-                return Err(StrokesFault::Empty(at));
-            }
-            let far = |value: &f32| value.is_nan() || value.abs() > FARTHEST;
-            if stroke.points.iter().flatten().any(far)
-                || far(&stroke.radius)
-                || stroke.radius <= 0.0
-            {
-                return Err(StrokesFault::OutOfRange(at));
-            }
+    /// [`MaskError::Stroke`] with the place of a stroke that cannot be painted.
+    pub fn new(strokes: Vec<Stroke>) -> Result<Self, MaskError> {
+        let is_near = |value: &f32| value.abs() <= FARTHEST;
+        let is_valid = |stroke: &Stroke| {
+            !stroke.points.is_empty()
+                && stroke.points.iter().flatten().all(is_near)
+                && is_near(&stroke.radius)
+                && stroke.radius > 0.0
+        };
+        match strokes.iter().position(|stroke| !is_valid(stroke)) {
+            Some(at) => Err(MaskError::Stroke(at)),
+            None => Ok(Self(strokes)),
         }
-        Ok(Self(strokes))
     }
 
     /// True without any stroke.
@@ -81,8 +78,8 @@ impl Strokes {
     /// The marks in a frame of `size` after painting over `base`; none if nothing is marked then.
     ///
     /// # Errors
-    /// [`MaskError::Strokes`]; [`MaskError::SeedsSize`] if `base` has another size;
-    /// [`MaskError::FrameTooLarge`].
+    /// [`MaskError::StrokesTooLarge`]; [`MaskError::SeedsSize`] if `base` has another size;
+    /// [`MaskError::FrameSize`].
     pub fn paint(
         &self,
         size: (u32, u32),
@@ -91,7 +88,7 @@ impl Strokes {
         let (width, height) = size;
         let pixels = u64::from(width) * u64::from(height);
         if pixels > MAX_PIXELS {
-            return Err(MaskError::FrameTooLarge { width, height });
+            return Err(MaskError::FrameSize { width, height });
         }
         if let Some(base) = base.filter(|base| base.size() != size) {
             return Err(MaskError::SeedsSize {
@@ -101,7 +98,7 @@ impl Strokes {
         }
         let work: u64 = self.0.iter().map(|stroke| work(stroke, size)).sum();
         if work > MOST_WORK {
-            return Err(StrokesFault::TooLarge.into());
+            return Err(MaskError::StrokesTooLarge);
         }
         let unmarked = || vec![Mark::Unknown; pixels as usize];
         let mut marks = base.map_or_else(unmarked, |base| base.marks().to_vec());
@@ -113,16 +110,10 @@ impl Strokes {
 }
 
 impl TryFrom<Vec<Stroke>> for Strokes {
-    type Error = StrokesFault;
+    type Error = MaskError;
 
-    fn try_from(strokes: Vec<Stroke>) -> Result<Self, StrokesFault> {
+    fn try_from(strokes: Vec<Stroke>) -> Result<Self, MaskError> {
         Self::new(strokes)
-    }
-}
-
-impl From<Strokes> for Vec<Stroke> {
-    fn from(strokes: Strokes) -> Self {
-        strokes.0
     }
 }
 
@@ -135,12 +126,13 @@ fn lines(stroke: &Stroke) -> impl Iterator<Item = [[f64; 2]; 2]> {
 
 /// The columns and rows that a brush may touch on a line.
 fn around([from, to]: [[f64; 2]; 2], radius: f64, size: (u32, u32)) -> [Range<usize>; 2] {
-    let side = |axis: usize, side| {
+    let covered = |axis: usize, side: u32| {
         let low = from[axis].min(to[axis]) - radius;
         let high = from[axis].max(to[axis]) + radius;
-        covered(low, high, side)
+        let inside = |at: f64| at.clamp(0.0, f64::from(side)) as usize;
+        inside(low.floor())..inside(high.ceil())
     };
-    [side(0, size.0), side(1, size.1)]
+    [covered(0, size.0), covered(1, size.1)]
 }
 
 /// The pixels that painting a stroke looks at.
@@ -179,13 +171,6 @@ fn paint(marks: &mut [Mark], size: (u32, u32), stroke: &Stroke) {
             }
         }
     }
-}
-
-/// The pixels between two coordinates, inside the frame.
-fn covered(low: f64, high: f64, side: u32) -> Range<usize> {
-    let side = f64::from(side);
-    let (low, high) = (low.floor().clamp(0.0, side), high.ceil().clamp(0.0, side));
-    low as usize..high as usize
 }
 
 #[cfg(test)]
@@ -252,11 +237,8 @@ mod tests {
         assert!(wrong(1.0, &[[f32::INFINITY, 1.0]]) && wrong(1.0, &[[1.0, 2e5]]));
         let many = vec![stroke(Brush::Object, 9e4, &[[1.0, 1.0]; 300]); 40];
         let result = Strokes::new(many).unwrap().paint((4000, 4000), None);
-        assert!(matches!(
-            result,
-            Err(MaskError::Strokes(StrokesFault::TooLarge))
-        ));
+        assert!(matches!(result, Err(MaskError::StrokesTooLarge)));
         let huge = Strokes::default().paint((u32::MAX, 9), None);
-        assert!(matches!(huge, Err(MaskError::FrameTooLarge { .. })));
+        assert!(matches!(huge, Err(MaskError::FrameSize { .. })));
     }
 }

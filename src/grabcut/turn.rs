@@ -11,14 +11,16 @@ use image::RgbImage;
 use super::MaskError;
 use super::backdrop::Backdrop;
 use super::bitmap::Bitmap;
-use super::grab_cut::{self, DIRECTIONS_AHEAD, Field, Label, Models, SMOOTHNESS, neighbour};
+use super::grab_cut::{
+    self, DIRECTIONS_AHEAD, Field, Label, Models, SMOOTHNESS, change, neighbour, squared_distance,
+};
 use super::initial::InitialLabels;
 use super::lab::LabTable;
-use super::pyramid::{FirstModels, RgbField, grow, half_image, half_labels, refine, start};
+use super::pyramid::{FirstModels, Level, RgbField, ascend, half_image, levels, refine, start};
 use super::rim::without_rim;
 use super::turntable::{Turntable, find_turntable};
 use super::witness::{Curves, Witness};
-use super::{Effort, Hints, Iterations, registration};
+use super::{Effort, Hints, registration};
 
 /// Fewest frames from which anything can be learned.
 pub const MIN_TURN_FRAMES: usize = 4;
@@ -78,18 +80,6 @@ impl TurnFrames {
         }
         self.frames.push(small.unwrap_or_else(|| frame.clone()));
     }
-
-    /// Number of frames.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.frames.len()
-    }
-
-    /// True without any frame.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.frames.is_empty()
-    }
 }
 
 fn pixels(image: &RgbImage) -> usize {
@@ -100,8 +90,9 @@ fn pixels(image: &RgbImage) -> usize {
 #[derive(Debug)]
 pub struct TurnStatistics {
     frames: usize,
-    full: (u32, u32),
-    fine: TurnField,
+    /// The frames' width and height.
+    pub(super) full: (u32, u32),
+    pub(super) fine: TurnField,
     /// At half the size; none where the fine one is small enough for the first cut.
     coarse: Option<TurnField>,
 }
@@ -117,17 +108,11 @@ impl TurnStatistics {
             TurnField::new(&half, &colours)
         });
         Self {
-            frames: turn.len(),
+            frames: turn.frames.len(),
             full: turn.full,
             fine,
             coarse,
         }
-    }
-
-    /// Number of frames that were looked at.
-    #[must_use]
-    pub fn frames(&self) -> usize {
-        self.frames
     }
 
     /// That there are enough frames.
@@ -138,75 +123,36 @@ impl TurnStatistics {
         }
     }
 
-    /// The frames' width and height.
-    pub(super) fn frame_size(&self) -> (u32, u32) {
-        self.full
-    }
-
-    /// Columns and rows of the statistics.
-    pub(super) fn size(&self) -> (usize, usize) {
-        self.fine.size
-    }
-
     /// The frames are so many times larger: a power of two.
     pub(super) fn factor(&self) -> usize {
         let ratio = (self.full.0 as usize).div_ceil(self.fine.size.0.max(1));
         ratio.next_power_of_two()
     }
 
-    /// The average brightness L of each pixel.
-    pub(super) fn light(&self) -> Vec<f32> {
-        let features = self.fine.features.iter();
-        features.map(|feature| feature[0] / COLOUR_WEIGHT).collect()
-    }
-
     /// A bitmap of the frames' size in that of the statistics.
     pub(super) fn reduced(&self, object: &Bitmap) -> Bitmap {
-        let (columns, rows) = self.fine.size;
-        let bits = (0..columns * rows).map(|at| self.is_set(object, at));
-        Bitmap::new((columns as u32, rows as u32), bits)
-    }
-
-    fn is_set(&self, object: &Bitmap, at: usize) -> bool {
-        let (columns, factor) = (self.fine.size.0, self.factor());
-        let (x, y) = (at % columns * factor, at / columns * factor);
-        let pixel = y * self.full.0 as usize + x;
-        object.bits().get(pixel).copied().unwrap_or(false)
+        let ((columns, rows), factor) = (self.fine.size, self.factor());
+        let is_set = |at: usize| {
+            let (x, y) = (at % columns * factor, at / columns * factor);
+            object.bits().get(y * self.full.0 as usize + x) == Some(&true)
+        };
+        Bitmap::new(
+            (columns as u32, rows as u32),
+            (0..columns * rows).map(is_set),
+        )
     }
 
     /// How well an outline follows what moves differently: the mean over its edges of the strength of
     /// the contrast there, 0..=1.
     pub(super) fn outline(&self, object: &Bitmap) -> f32 {
         let object = self.reduced(object);
-        self.boundary(&object, &object.inverted()).unwrap_or(0.0)
-    }
-
-    /// The same along the boundary between two parts, which have the size of the statistics; `None` where they do not
-    /// touch.
-    pub(super) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> Option<f32> {
-        self.fine.boundary(one, other)
-    }
-
-    /// What the field says of the parts of an image.
-    pub(super) fn field(&self) -> &TurnField {
-        &self.fine
-    }
-
-    /// The share of a part, which has the size of the statistics, that is plain table, 0..=1.
-    pub(super) fn share_of_table(&self, part: &Bitmap) -> f64 {
-        let table = self.fine.table.surface.bits();
-        let on_table = part.map(|at, bit| bit && table[at]).count();
-        on_table as f64 / part.count().max(1) as f64
+        self.fine.outline(&object)
     }
 
     /// Whether anything moves: the median change of the brightness away from the table.
     pub(super) fn moves(&self) -> bool {
-        let mut changes: Vec<f32> = self
-            .fine
-            .features
-            .iter()
-            .map(|feature| feature[3])
-            .collect();
+        let features = self.fine.features.iter();
+        let mut changes: Vec<f32> = features.map(|feature| feature[3]).collect();
         let upper = changes.len() * 3 / 4;
         if changes.is_empty() {
             return false;
@@ -232,10 +178,9 @@ pub(super) struct TurnField {
 
 impl TurnField {
     fn new(frames: &[RgbImage], colours: &LabTable) -> Self {
-        let Some(first) = frames.first().filter(|frame| pixels(frame) > 0) else {
-            return Self::empty();
-        };
-        let size = (first.width() as usize, first.height() as usize);
+        let first = frames.first().filter(|frame| pixels(frame) > 0);
+        let size = first.map_or((0, 0), RgbImage::dimensions);
+        let size = (size.0 as usize, size.1 as usize);
         let count = size.0 * size.1;
         let mut sum = vec![[0.0_f32; 3]; count];
         let mut square = vec![[0.0_f32; 2]; count];
@@ -250,7 +195,7 @@ impl TurnField {
                 square[at][1] += a * a + b * b;
                 for (to, &direction) in DIRECTIONS_AHEAD.iter().enumerate() {
                     if let Some(next) = neighbour(at, direction, size) {
-                        difference[at][to] += squared(&lab[at], &lab[next]);
+                        difference[at][to] += squared_distance(&lab[at], &lab[next]);
                     }
                 }
             }
@@ -274,7 +219,7 @@ impl TurnField {
                 let Some(next) = neighbour(at, DIRECTIONS_AHEAD[to], size) else {
                     return 0.0;
                 };
-                let constant = squared(&mean[at], &mean[next]);
+                let constant = squared_distance(&mean[at], &mean[next]);
                 let all = difference[at][to] / many - (1.0 - CONSTANT_WEIGHT) * constant;
                 all.clamp(0.0, MOST_CONTRAST)
             })
@@ -296,20 +241,16 @@ impl TurnField {
 }
 
 impl TurnField {
-    fn empty() -> Self {
-        Self {
-            size: (0, 0),
-            features: Vec::new(),
-            contrasts: Vec::new(),
-            backdrop: Bitmap::new((0, 0), std::iter::empty()),
-            table: Turntable {
-                surface: Bitmap::new((0, 0), std::iter::empty()),
-                shadow: Bitmap::new((0, 0), std::iter::empty()),
-                plain: Bitmap::new((0, 0), std::iter::empty()),
-            },
-            evidence: Vec::new(),
-            witness: Curves::new(0, 0).finish(),
-        }
+    /// The average brightness L of each pixel.
+    pub(super) fn light(&self) -> Vec<f32> {
+        let features = self.features.iter();
+        features.map(|feature| feature[0] / COLOUR_WEIGHT).collect()
+    }
+
+    /// How strong the contrast is along an outline.
+    pub(super) fn outline(&self, object: &Bitmap) -> f32 {
+        let boundary = self.boundary(object, &object.inverted());
+        boundary.unwrap_or(0.0)
     }
 
     /// How strong the contrast is along the boundary between two parts, which have its size; `None` where they do not
@@ -372,10 +313,6 @@ fn largest(contrasts: &[[f32; 4]], size: (usize, usize)) -> Vec<f32> {
         }
     }
     largest
-}
-
-fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
 impl Field<5> for TurnField {
@@ -448,8 +385,7 @@ impl FrameInTurn<'_> {
 pub(super) fn segment(
     frame: &RgbImage,
     turn: &TurnStatistics,
-    hints: Option<&Hints>,
-    iterations: Iterations,
+    hints: &Hints,
     effort: Effort,
 ) -> Result<Bitmap, MaskError> {
     turn.check()?;
@@ -458,144 +394,38 @@ pub(super) fn segment(
     }
     let table = LabTable::new();
     let (known, share) = known(hints, frame.dimensions())?;
-    let levels = levels(frame, known);
+    let levels = levels(frame, known, COARSE_PIXELS);
     let fine = &turn.fine;
     let at_fine = levels.iter().position(|level| level.size() == fine.size);
     let at_fine = at_fine.ok_or(MaskError::FewFrames { found: 0 })?;
-    let (mut labels, mut models) = cut_turn(turn, &levels[at_fine..], share, iterations)?;
-    let mut size = fine.size;
-    take_rim_away(fine, &mut labels);
-    complete(fine, &mut labels);
-    labels = register(frame, &levels[at_fine], fine, &labels, &table);
-    for (steps, level) in levels[..at_fine].iter().rev().enumerate() {
-        let field = FrameInTurn {
-            turn: fine,
-            frame: RgbField {
-                image: level.image.as_ref().unwrap_or(frame),
-                table: &table,
-            },
-            factor: 2 << steps,
-        };
-        let mut finer = level.labels.clone();
-        if finer.len() > effort.finest_px() {
-            grow(&mut finer, level.size(), &labels, size);
-        } else {
-            refine(&field, &mut finer, &labels, size, &mut models);
-        }
-        (labels, size) = (finer, level.size());
-    }
-    let object = labels.iter().map(|label| label.is_object());
-    Ok(Bitmap::new(frame.dimensions(), object))
-}
-
-/// Makes what hangs on the object as the table's rim background.
-fn take_rim_away(turn: &TurnField, labels: &mut [Label]) {
-    let (width, height) = turn.size;
-    let object = labels.iter().map(|label| label.is_object());
-    let object = Bitmap::new((width as u32, height as u32), object);
-    let left = without_rim(&object, &turn.table, turn.size);
-    for (label, &object) in labels.iter_mut().zip(left.bits()) {
-        if !label.is_sure() {
-            *label = Label::probably(object);
-        }
-    }
-}
-
-/// Makes object what the object encloses and what shows nothing else.
-fn complete(turn: &TurnField, labels: &mut [Label]) {
-    let (width, height) = turn.size;
-    let object = labels.iter().map(|label| label.is_object());
-    let object = Bitmap::new((width as u32, height as u32), object);
-    let completed = turn.completed(&object);
-    for (label, &object) in labels.iter_mut().zip(completed.bits()) {
-        if !label.is_sure() {
-            *label = Label::probably(object);
-        }
-    }
-}
-
-/// Moves the result from where the object is on average to where it is in the frame.
-fn register(
-    frame: &RgbImage,
-    level: &Level,
-    turn: &TurnField,
-    labels: &[Label],
-    colours: &LabTable,
-) -> Vec<Label> {
-    let (width, height) = turn.size;
-    let object = labels.iter().map(|label| label.is_object());
-    let object = Bitmap::new((width as u32, height as u32), object);
-    let average: Vec<f32> = turn
-        .features
-        .iter()
-        .map(|feature| feature[0] / COLOUR_WEIGHT)
-        .collect();
-    let image = level.image.as_ref().unwrap_or(frame);
-    let light: Vec<f32> = image
-        .pixels()
-        .map(|pixel| colours.lab(pixel.0)[0])
-        .collect();
-    let by = registration::shift(&average, &light, &object, turn.size);
-    let moved = registration::moved(&object, by, turn.size);
-    let pairs = level.labels.iter().zip(moved.bits());
-    pairs
-        .map(|(&known, &object)| {
-            if known.is_sure() {
-                known
-            } else {
-                Label::probably(object)
-            }
-        })
-        .collect()
-}
-
-/// A size of the frame, with what is known at it.
-struct Level {
-    /// `None` for the frame itself.
-    image: Option<RgbImage>,
-    full: (u32, u32),
-    labels: Vec<Label>,
-}
-
-impl Level {
-    fn size(&self) -> (usize, usize) {
-        let (width, height) = self.image.as_ref().map_or(self.full, RgbImage::dimensions);
-        (width as usize, height as usize)
-    }
-}
-
-/// The frame, its half, its quarter, down to the coarsest size.
-fn levels(frame: &RgbImage, known: Vec<Label>) -> Vec<Level> {
-    let mut level = Level {
-        image: None,
-        full: frame.dimensions(),
-        labels: known,
+    let (mut labels, mut models) = cut_turn(turn, &levels[at_fine..], share)?;
+    change(&mut labels, fine.size, |object| {
+        without_rim(object, &fine.table, fine.size)
+    });
+    change(&mut labels, fine.size, |object| fine.completed(object));
+    // From where the object is on average to where it is in the frame.
+    change(&mut labels, fine.size, |object| {
+        let pixels = levels[at_fine].image.pixels();
+        let light: Vec<f32> = pixels.map(|pixel| table.lab(pixel.0)[0]).collect();
+        let by = registration::shift(&fine.light(), &light, object, fine.size);
+        registration::moved(object, by, fine.size)
+    });
+    let field = |steps, image| FrameInTurn {
+        turn: fine,
+        frame: RgbField::new(image, &table),
+        factor: 2_usize << steps,
     };
-    let mut levels = Vec::new();
-    while level.size().0 * level.size().1 > COARSE_PIXELS {
-        let half = Level {
-            image: Some(half_image(level.image.as_ref().unwrap_or(frame))),
-            full: level.full,
-            labels: half_labels(&level.labels, level.size()),
-        };
-        levels.push(level);
-        level = half;
-    }
-    levels.push(level);
-    levels
+    let finer = &levels[..at_fine];
+    Ok(ascend(finer, labels, fine.size, &mut models, effort, field))
 }
 
 /// What is known of each pixel: hints, and that the object does not touch the frame's border. With it
 /// the share of the rest that is taken for background at first.
-fn known(hints: Option<&Hints>, size: (u32, u32)) -> Result<(Vec<Label>, f64), MaskError> {
+fn known(hints: &Hints, size: (u32, u32)) -> Result<(Vec<Label>, f64), MaskError> {
     let border = ring(size, BORDER);
     let open = |at: usize| match border(at) {
         true => Label::Background,
         false => Label::ProbablyObject,
-    };
-    let Some(hints) = hints else {
-        let pixels = size.0 as usize * size.1 as usize;
-        return Ok(((0..pixels).map(open).collect(), SHARE));
     };
     let initial = InitialLabels::new(hints, size)?;
     let labels = initial.labels.into_iter().enumerate();
@@ -623,16 +453,15 @@ fn ring(size: (u32, u32), share: f64) -> impl Fn(usize) -> bool {
 /// The cut at the turn's own size; `levels` begins with that size.
 fn cut_turn(
     turn: &TurnStatistics,
-    levels: &[Level],
+    levels: &[Level<'_>],
     share: f64,
-    iterations: Iterations,
 ) -> Result<(Vec<Label>, Models<5>), MaskError> {
     let begin = |field: &TurnField, labels: &mut Vec<Label>| {
         if !field.start_from_backdrop(labels) {
             let size = (field.size.0 as u32, field.size.1 as u32);
             grab_cut::rank(field, labels, share, ring(size, RING));
         }
-        start(field, labels, FirstModels::All, iterations, SMOOTHNESS)
+        start(field, labels, FirstModels::All, SMOOTHNESS)
     };
     let mut labels = levels[0].labels.clone();
     let (Some(coarser), Some(coarse)) = (levels.get(1), &turn.coarse) else {
@@ -641,12 +470,7 @@ fn cut_turn(
     };
     let mut coarse_labels = coarser.labels.clone();
     let mut models = begin(coarse, &mut coarse_labels)?;
-    refine(
-        &turn.fine,
-        &mut labels,
-        &coarse_labels,
-        coarse.size,
-        &mut models,
-    );
+    let size = coarse.size;
+    refine(&turn.fine, &mut labels, &coarse_labels, size, &mut models);
     Ok((labels, models))
 }

@@ -108,10 +108,9 @@ fn shadow(
     };
     let mut grown = surface.clone();
     for _ in 0..(size.1 as f64 * SHADOW_REACH) as usize {
-        let next = grown.dilated(1);
-        grown = grown.map(|at, set| set || next.bits()[at] && may_be(at));
+        grown = grown.or(&grown.dilated(1).map(|at, near| near && may_be(at)));
     }
-    grown.map(|at, set| set && !surface.bits()[at])
+    grown.minus(surface)
 }
 
 /// The average colour of the surface; `None` if it is empty.

@@ -7,6 +7,7 @@
 //! the one that is asked about, and so is evidence of its own.
 
 use super::bitmap::Bitmap;
+use super::grab_cut::squared_distance;
 
 /// Harmonics of the table's angle that a diffuse surface follows.
 const ORDER: usize = 2;
@@ -118,10 +119,7 @@ impl Witness {
     /// empty, or the frames are few.
     pub(super) fn nearer(&self, part: &Bitmap, one: &Bitmap, another: &Bitmap) -> Option<bool> {
         let (part, one, another) = (self.course(part)?, self.course(one)?, self.course(another)?);
-        let apart = |other: &[f32; WAVES]| -> f32 {
-            part.iter().zip(other).map(|(a, b)| (a - b) * (a - b)).sum()
-        };
-        Some(apart(&one) < apart(&another))
+        Some(squared_distance(&part, &one) < squared_distance(&part, &another))
     }
 
     /// The median residual of a part.

@@ -16,8 +16,8 @@ use super::{MaskFiles, MaskRecord, MaskRequest, MaskingError};
 /// over unless the request has its own, is a recipe, or is forced.
 ///
 /// # Errors
-/// [`MaskingError::StrokesOfAnother`] where they were painted on another recording; [`MaskingError::Recipe`] where
-/// they cannot be read.
+/// [`MaskingError::Refused`] where they were painted on another recording; [`MaskingError::Unusable`] where they cannot
+/// be read.
 pub(super) fn with_strokes<'a>(
     request: &'a MaskRequest,
     files: &MaskFiles,
@@ -27,9 +27,9 @@ pub(super) fn with_strokes<'a>(
         return Ok((Cow::Borrowed(request), None));
     };
     let strokes = count_of(record.hints.strokes.count() as u64, "stroke");
-    let has_own = request.recipe.is_some() || !request.drawing.strokes.is_empty();
+    let has_own = request.recipe.is_some() || !request.hints.strokes.is_empty();
     if has_own || request.force {
-        let is_lost = record.hints.strokes != request.drawing.strokes;
+        let is_lost = record.hints.strokes != request.hints.strokes;
         let notice = Notice::Warning(format!(
             "left out {strokes} of the mask that was there: its recipe is kept as {}",
             files.previous.display()
@@ -37,25 +37,23 @@ pub(super) fn with_strokes<'a>(
         return Ok((Cow::Borrowed(request), is_lost.then_some(notice)));
     }
     if !is_of(&record, video) {
-        return Err(MaskingError::StrokesOfAnother(files.record.clone()));
+        return Err(MaskingError::Refused(format!(
+            "{} holds strokes that were painted on another recording: give another name with -o, or --force to make the mask without them",
+            files.record.display()
+        )));
     }
     let notice = Notice::Warning(format!(
         "applied again {strokes} of the mask that was there: --force leaves out what was painted"
     ));
     let mut request = request.clone();
-    if request.drawing.is_empty() && request.turn == TurnRequest::None {
+    if request.hints.is_empty() && request.turn == TurnRequest::None {
         // Nothing but the editor was asked for: it goes on where it stopped.
         request.turn = TurnRequest::of(&record);
         request.frame = record.source.frame;
-        request.drawing = record
-            .hints
-            .drawing()
-            .map_err(|fault| MaskingError::Recipe {
-                path: files.record.clone(),
-                why: fault.to_string(),
-            })?;
+        let unusable = |fault| MaskingError::unusable("recipe", &files.record, &fault);
+        request.hints = record.hints.hints().map_err(unusable)?;
     } else {
-        request.drawing.strokes = record.hints.strokes;
+        request.hints.strokes = record.hints.strokes;
     }
     Ok((Cow::Owned(request), Some(notice)))
 }

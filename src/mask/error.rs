@@ -8,26 +8,19 @@ use relit_data::session;
 
 /// Why the mask of a recording could not be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum MaskingError {
     /// The frame cannot be segmented with these hints.
     #[error(transparent)]
     Mask(#[from] relit_grabcut::MaskError),
-    /// An image that cannot be used as seeds.
-    #[error("the seeds {path} cannot be used: {fault}")]
-    Seeds {
-        /// The image.
+    /// A file that is given cannot be used.
+    #[error("the {what} {path} cannot be used: {why}")]
+    Unusable {
+        /// What it is given as: "seeds", "recipe", "mask", "photograph".
+        what: &'static str,
+        /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        fault: relit_grabcut::SeedsFault,
-    },
-    /// A photograph's colours cannot be converted.
-    #[error("{path} {fault}: convert it to sRGB")]
-    Colour {
-        /// The photograph.
-        path: PathBuf,
-        /// What it says of its colours.
-        fault: relit_still::ColourError,
+        why: String,
     },
     /// A name for the mask that does not end in `.png`.
     #[error("{0} cannot be the mask's name: give one that ends in .png")]
@@ -47,69 +40,9 @@ pub enum MaskingError {
         /// What is wrong with it.
         why: String,
     },
-    /// A record that cannot be used as a recipe.
-    #[error("{path} cannot be used as a recipe: {why}")]
-    Recipe {
-        /// The record.
-        path: PathBuf,
-        /// What is wrong with it.
-        why: String,
-    },
-    /// A mask would lose its strokes, which were painted on another recording.
-    #[error(
-        "{0} holds strokes that were painted on another recording: give another name with -o, or --force to make the mask without them"
-    )]
-    StrokesOfAnother(PathBuf),
-    /// The frame is not the one on which the recipe was recorded.
-    #[error(
-        "frame {frame} of {video} is not the frame on which {recipe} was recorded: give other hints, or --force to use the recorded ones"
-    )]
-    OtherFrame {
-        /// The frame's number.
-        frame: u64,
-        /// The video.
-        video: PathBuf,
-        /// The record.
-        recipe: PathBuf,
-    },
-    /// The recipe was followed on the same frame and gave another mask.
-    #[error(
-        "the mask made with {recipe} differs from the recorded one, although the frame is the same (made by {made_by}, now {now}): nothing was written; give --force to accept the new mask"
-    )]
-    NotReproduced {
-        /// The record.
-        recipe: PathBuf,
-        /// The software that made the recorded mask.
-        made_by: String,
-        /// This software.
-        now: String,
-    },
-    /// A mask that cannot be checked.
-    #[error("the mask {path} cannot be checked: {why}")]
-    Check {
-        /// The mask.
-        path: PathBuf,
-        /// What is wrong with it.
-        why: String,
-    },
-    /// A folder or file that cannot be measured with.
-    #[error("{path} cannot be measured: {why}")]
-    Bench {
-        /// The folder or file.
-        path: PathBuf,
-        /// What is wrong with it.
-        why: String,
-    },
-    /// A mask of OpenCV's GrabCut was wanted of a program that was built without it.
-    #[error(
-        "OpenCV is not built into this relit-mask: build it with `cargo build --release -p relit-mask --features opencv`, or leave out --engine opencv"
-    )]
-    WithoutOpenCv,
-    /// A mask of OpenCV's GrabCut was wanted by a turn.
-    #[error(
-        "OpenCV's GrabCut sees one frame and no turn: give --rect or --seeds without --auto, or leave out --engine opencv"
-    )]
-    OpenCvKnowsNoTurn,
+    /// The request does not fit the recording, the mask that is there, or this program: why, and what to do.
+    #[error("{0}")]
+    Refused(String),
     /// OpenCV's GrabCut reported an error.
     #[error("OpenCV's GrabCut failed")]
     OpenCv(#[source] Box<dyn std::error::Error + Send + Sync>),
@@ -140,16 +73,8 @@ pub enum MaskingError {
         /// The system's error.
         source: io::Error,
     },
-    /// The mask of one recording cannot be checked.
-    #[error("{recording}: {source}")]
-    Checked {
-        /// The recording's id.
-        recording: String,
-        /// What went wrong.
-        source: Box<Self>,
-    },
     /// Any of the others, with the recording's id.
-    #[error("no mask for {recording}: {source}")]
+    #[error("{recording}: {source}")]
     Recording {
         /// The recording's id.
         recording: String,
@@ -168,6 +93,24 @@ impl MaskingError {
             path,
             doing,
             source,
+        }
+    }
+
+    pub(super) fn unusable(
+        what: &'static str,
+        path: impl Into<PathBuf>,
+        why: &impl ToString,
+    ) -> Self {
+        let (path, why) = (path.into(), why.to_string());
+        Self::Unusable { what, path, why }
+    }
+
+    /// Names the recording that it is about.
+    pub(super) fn of(recording: &session::Recording) -> impl Fn(Self) -> Self + use<> {
+        let recording = recording.id.clone();
+        move |source| Self::Recording {
+            recording: recording.clone(),
+            source: Box::new(source),
         }
     }
 }

@@ -17,8 +17,6 @@ pub struct MaskFiles {
     pub record: PathBuf,
     /// The preview.
     pub preview: PathBuf,
-    /// The share of the object in each pixel; written only if the settings ask for it.
-    pub alpha: PathBuf,
     /// The record of the mask before it, kept where a person painted for that one.
     pub previous: PathBuf,
 }
@@ -34,21 +32,16 @@ impl MaskFiles {
             .is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
         match mask.file_stem() {
             Some(stem) if is_png => {
-                let mut preview = stem.to_owned();
-                preview.push("-preview.png");
-                let mut previous = stem.to_owned();
-                previous.push("-previous.json");
-                let mut alpha = stem.to_owned();
-                alpha.push("-alpha.png");
-                if stem == "mask" {
-                    alpha = "alpha.png".into();
-                }
+                let named = |ending: &str| {
+                    let mut name = stem.to_owned();
+                    name.push(ending);
+                    mask.with_file_name(name)
+                };
                 Ok(Self {
                     mask: mask.to_owned(),
                     record: mask.with_extension("json"),
-                    preview: mask.with_file_name(preview),
-                    alpha: mask.with_file_name(alpha),
-                    previous: mask.with_file_name(previous),
+                    preview: named("-preview.png"),
+                    previous: named("-previous.json"),
                 })
             }
             _ => Err(MaskingError::OutputName(mask.to_owned())),
@@ -56,21 +49,13 @@ impl MaskFiles {
     }
 }
 
-/// Checks that existing files may be replaced; `with_alpha`: also the soft mask.
-pub(super) fn check_replaceable(
-    files: &MaskFiles,
-    force: bool,
-    with_alpha: bool,
-) -> Result<(), MaskingError> {
+/// Checks that existing files may be replaced.
+pub(super) fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), MaskingError> {
     let record = read_record(&files.record)?;
     // It may be written, too, and another program's file of that name is never overwritten.
     read_record(&files.previous)?;
     if force {
         return Ok(());
-    }
-    let made_alpha = record.as_ref().is_some_and(|record| record.settings.alpha);
-    if with_alpha && !made_alpha && files.alpha.exists() {
-        return Err(MaskingError::Handmade(files.alpha.clone()));
     }
     let Some(mask) = read_if_exists(&files.mask)? else {
         return Ok(());
@@ -101,21 +86,6 @@ pub(super) fn read_record(path: &Path) -> Result<Option<MaskRecord>, MaskingErro
     Ok(Some(record))
 }
 
-/// Whether the mask that is there was written with its soft form, which belongs to no other mask.
-pub(super) fn has_alpha(files: &MaskFiles) -> Result<bool, MaskingError> {
-    Ok(read_record(&files.record)?.is_some_and(|record| record.settings.alpha))
-}
-
-/// Removes a file if it is there.
-pub(super) fn remove(path: &Path) -> Result<(), MaskingError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(MaskingError::io(path, "removed")(error))
-        }
-        _ => Ok(()),
-    }
-}
-
 pub(super) fn read_if_exists(path: &Path) -> Result<Option<Vec<u8>>, MaskingError> {
     match fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
@@ -137,10 +107,7 @@ mod tests {
         let files = MaskFiles::of(Path::new("a/mug.v2.PNG")).unwrap();
         assert_eq!(files.record, Path::new("a/mug.v2.json"));
         assert_eq!(files.preview, Path::new("a/mug.v2-preview.png"));
-        assert_eq!(files.alpha, Path::new("a/mug.v2-alpha.png"));
         assert_eq!(files.previous, Path::new("a/mug.v2-previous.json"));
-        let files = MaskFiles::of(Path::new("a/mask.png")).unwrap();
-        assert_eq!(files.alpha, Path::new("a/alpha.png"));
     }
 
     #[test]
@@ -156,10 +123,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let files = MaskFiles::of(&folder.path().join("session.png")).unwrap();
         fs::write(&files.record, r#"{"schema": "relit.session/1"}"#).unwrap();
-        let result = check_replaceable(&files, true, false);
+        let result = check_replaceable(&files, true);
         assert!(matches!(result, Err(MaskingError::ForeignFile { .. })));
         fs::rename(&files.record, &files.previous).unwrap();
-        let result = check_replaceable(&files, true, false);
+        let result = check_replaceable(&files, true);
         assert!(matches!(
             result,
             Err(MaskingError::ForeignFile { path, .. }) if path == files.previous
@@ -185,26 +152,12 @@ mod tests {
     fn a_mask_without_record_is_replaced_only_with_force() {
         let folder = tempfile::tempdir().unwrap();
         let files = MaskFiles::of(&folder.path().join("mask.png")).unwrap();
-        assert!(check_replaceable(&files, false, false).is_ok());
+        assert!(check_replaceable(&files, false).is_ok());
         fs::write(&files.mask, "painted").unwrap();
         assert!(matches!(
-            check_replaceable(&files, false, false),
+            check_replaceable(&files, false),
             Err(MaskingError::Handmade(_))
         ));
-        assert!(check_replaceable(&files, true, false).is_ok());
-    }
-
-    #[test]
-    fn a_soft_mask_that_no_record_tells_of_is_replaced_only_with_force() {
-        let folder = tempfile::tempdir().unwrap();
-        let files = MaskFiles::of(&folder.path().join("mask.png")).unwrap();
-        assert!(check_replaceable(&files, false, true).is_ok());
-        fs::write(&files.alpha, "painted").unwrap();
-        assert!(check_replaceable(&files, false, false).is_ok());
-        assert!(matches!(
-            check_replaceable(&files, false, true),
-            Err(MaskingError::Handmade(path)) if path == files.alpha
-        ));
-        assert!(check_replaceable(&files, true, true).is_ok());
+        assert!(check_replaceable(&files, true).is_ok());
     }
 }

@@ -1,7 +1,6 @@
 //! The mask of a recording or a photograph: which of its pixels are the object.
 //!
-//! `NAME.png` is the mask, `NAME.json` its record, `NAME-preview.png` the image for checking it, and on
-//! request `NAME-alpha.png` (`alpha.png` beside `mask.png`) its soft form. An
+//! `NAME.png` is the mask, `NAME.json` its record, `NAME-preview.png` the image for checking it. An
 //! existing mask is replaced only if its record has its hash, because then it can be made again. Strokes that were
 //! painted for it are applied again, and `NAME-previous.json` keeps its record.
 //!
@@ -12,7 +11,7 @@
 //! It knows nothing of data sets and the rig.
 //!
 //! With the feature `opencv`, which is off by default, OpenCV's GrabCut can cut a mask as well: a reference
-//! ([`MaskEngine::OpenCv`]), with which [`bench_image`] compares.
+//! ([`MaskEngine::OpenCv`]).
 //!
 //! # Mask the object of a recording
 //!
@@ -28,41 +27,35 @@
 //! let files = MaskFiles::of(&folder.path().join("mask.png"))?;
 //!
 //! // On the first frame, by a rectangle that contains the object.
-//! let hints = Hints::Rect(Rect::new(170, 20, 325, 390));
+//! let hints = Hints::from(Rect::new(170, 20, 325, 390));
 //! let request = MaskRequest::new(0, hints, SegmentSettings::default());
 //! let mask = make_mask(recording, Some(files), &request)?;
 //!
 //! assert!(mask.files.mask.is_file() && mask.files.preview.is_file());
-//! println!("{} pixels, {:?}", mask.record.result.area_px, mask.record.warnings);
+//! println!("{} pixels, {:?}", mask.record.result.statistics.area_px, mask.record.warnings);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod bench;
 mod checking;
 mod earlier;
 mod editor;
 mod engine;
 mod error;
 mod files;
-mod folds;
 mod making;
 #[cfg(feature = "opencv")]
 mod opencv_grab_cut;
 mod record;
 mod request;
 mod sampling;
-mod seeds;
 
-pub use bench::{BenchImage, BenchOptions, BenchRow, BoxKind, Prompt, bench_image, bench_images};
 pub use checking::{CheckOutput, DriftCheck, FrameDrift, MaskReport, MaskVerdict, check_mask};
 pub use editor::edit;
-pub use engine::{MaskEngine, opencv_grab_cut};
+pub use engine::{MaskEngine, OPENCV_KNOWS_NO_TURN};
 pub use error::MaskingError;
 pub use files::MaskFiles;
-pub use folds::{FoldFigures, FoldReport, cross_validate, start_rules};
 pub use making::{MaskOutput, make_mask};
 pub use record::{
     MASK_SCHEMA, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult, SourceFrame,
 };
-pub use request::MaskRequest;
-pub use seeds::read_seeds;
+pub use request::{MaskRequest, read_seeds};

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use image::RgbImage;
 use relit_data::session::{MASK_FILE, Notice, Recording};
-use relit_grabcut::{Effort, Mask, Warning, alpha, grey_png, preview, rgb_png, segment_with};
+use relit_grabcut::{Effort, Mask, grey_png, preview, rgb_png, segment_with};
 use relit_video::Video;
 
 use super::earlier::{keep_recipe, with_strokes};
 use super::engine::cut_by_opencv;
-use super::files::{check_replaceable, has_alpha, make_folder, remove, write};
+use super::files::{check_replaceable, make_folder, write};
 use super::request::Recipe;
 use super::sampling::{SampledTurn, read_frame, read_turn, same_image};
 use super::{
@@ -19,7 +19,6 @@ use super::{
 
 /// A mask that was written.
 #[derive(Debug, Clone)]
-#[non_exhaustive]
 pub struct MaskOutput {
     /// The recording's id.
     pub recording: String,
@@ -44,18 +43,14 @@ pub fn make_mask(
     request: &MaskRequest,
 ) -> Result<MaskOutput, MaskingError> {
     let recording = Recording::open(input)?;
-    match mask_recording(&recording, output, request) {
-        Ok((files, record, notice)) => Ok(MaskOutput {
-            recording: recording.id,
-            files,
-            record,
-            notices: recording.notices.into_iter().chain(notice).collect(),
-        }),
-        Err(source) => Err(MaskingError::Recording {
-            recording: recording.id,
-            source: Box::new(source),
-        }),
-    }
+    let made = mask_recording(&recording, output, request);
+    let (files, record, notice) = made.map_err(MaskingError::of(&recording))?;
+    Ok(MaskOutput {
+        recording: recording.id,
+        files,
+        record,
+        notices: recording.notices.into_iter().chain(notice).collect(),
+    })
 }
 
 fn mask_recording(
@@ -65,7 +60,7 @@ fn mask_recording(
 ) -> Result<(MaskFiles, MaskRecord, Option<Notice>), MaskingError> {
     let files = files_of(recording, output)?;
     let _made = make_folder(&files)?;
-    check_replaceable(&files, request.force, request.settings.alpha)?;
+    check_replaceable(&files, request.force)?;
     let video = Video::open(&recording.video)?;
     let (request, notice) = with_strokes(request, &files, &video)?;
     let record = segment_and_write(&video, &files, &request)?;
@@ -82,11 +77,12 @@ fn segment_and_write(
         && !request.force
         && !same_image(&recipe.record.source, &source)
     {
-        return Err(MaskingError::OtherFrame {
-            frame: request.frame,
-            video: video.path().to_owned(),
-            recipe: recipe.path.clone(),
-        });
+        return Err(MaskingError::Refused(format!(
+            "frame {} of {} is not the frame on which {} was recorded: give other hints, or --force to use the recorded ones",
+            request.frame,
+            video.path().display(),
+            recipe.path.display()
+        )));
     }
     let turn = read_turn(video, frame.dimensions(), &request.turn)?;
     let mask = cut(&frame, turn.as_ref(), request, Effort::Fine)?;
@@ -100,8 +96,7 @@ pub(super) fn cut(
     request: &MaskRequest,
     effort: Effort,
 ) -> Result<Mask, MaskingError> {
-    let hints = request.drawing.hints(frame.dimensions(), turn.is_some())?;
-    let (hints, settings) = (hints.as_ref(), &request.settings);
+    let (hints, settings) = (&request.hints, &request.settings);
     match request.engine {
         MaskEngine::Relit => {
             let statistics = turn.map(|turn| &turn.statistics);
@@ -121,28 +116,16 @@ pub(super) fn write_files(
     files: &MaskFiles,
     request: &MaskRequest,
 ) -> Result<MaskRecord, MaskingError> {
-    let png = grey_png(mask.image(), "the mask")?;
+    let png = grey_png(&mask.image, "the mask")?;
     let turn_frames = turn.map_or(&[][..], |turn| &turn.frames);
     let record = record_of(source, request, turn_frames, mask, &png)?;
-    let preview_png = rgb_png(&preview(frame, mask.image()), "the preview")?;
+    let preview_png = rgb_png(&preview(frame, &mask.image), "the preview")?;
     let json = record.to_json();
     let json = json.map_err(|error| MaskingError::io(&files.record, "written")(error.into()))?;
-    let soft = match request.settings.alpha {
-        true => Some(grey_png(&alpha(frame, mask.image()), "the soft mask")?),
-        false => None,
-    };
-    // A soft mask of an earlier mask would be taken for this one's.
-    let is_stale = soft.is_none() && has_alpha(files)?;
     keep_recipe(files, &record)?;
     write(&files.preview, &preview_png)?;
-    if let Some(soft) = soft {
-        write(&files.alpha, &soft)?;
-    }
     write(&files.record, &json)?;
     write(&files.mask, &png)?;
-    if is_stale {
-        remove(&files.alpha)?;
-    }
     Ok(record)
 }
 
@@ -165,8 +148,8 @@ fn record_of(
     mask: &Mask,
     png: &[u8],
 ) -> Result<MaskRecord, MaskingError> {
-    let result = RecordedResult::new(mask.statistics(), png);
-    let mut warnings: Vec<String> = mask.warnings().iter().map(Warning::to_string).collect();
+    let result = RecordedResult::new(mask.statistics, png);
+    let mut warnings = mask.warnings.clone();
     let conversion = source.colour_conversion.as_ref();
     warnings.extend(conversion.map(|by| format!("the colours were converted: {by}")));
     let software = MaskSoftware::of(request.engine);
@@ -174,19 +157,19 @@ fn record_of(
         && record.result.mask_blake3 != result.mask_blake3
     {
         if !request.force {
-            return Err(MaskingError::NotReproduced {
-                recipe: path.clone(),
-                made_by: record.software.to_string(),
-                now: software.to_string(),
-            });
+            return Err(MaskingError::Refused(format!(
+                "the mask made with {} differs from the recorded one, although the frame is the same (made by {}, now {software}): nothing was written; give --force to accept the new mask",
+                path.display(),
+                record.software
+            )));
         }
-        warnings.push(Warning::NotReproduced.to_string());
+        warnings.push("this mask differs from the one that the recipe recorded".to_owned());
     }
     Ok(MaskRecord {
         schema: MASK_SCHEMA.to_owned(),
         software,
         source,
-        hints: RecordedHints::new(&request.drawing, turn_frames)?,
+        hints: RecordedHints::new(&request.hints, turn_frames)?,
         engine: request.engine,
         settings: request.settings,
         result,

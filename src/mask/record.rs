@@ -3,9 +3,7 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use relit_data::geometry::Rect;
-use relit_grabcut::{
-    Drawing, MaskError, MaskStatistics, Seeds, SeedsFault, SegmentSettings, Strokes,
-};
+use relit_grabcut::{Hints, MaskError, MaskStatistics, Seeds, SegmentSettings, Strokes};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -18,7 +16,6 @@ pub const MASK_SCHEMA: &str = "relit.mask/1";
 /// The content of `mask.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct MaskRecord {
     /// [`MASK_SCHEMA`].
     pub schema: String,
@@ -28,8 +25,7 @@ pub struct MaskRecord {
     pub source: SourceFrame,
     /// The hints.
     pub hints: RecordedHints,
-    /// What cut the object out; in older records relit's GrabCut.
-    #[serde(default)]
+    /// What cut the object out.
     pub engine: MaskEngine,
     /// The settings.
     pub settings: SegmentSettings,
@@ -42,11 +38,10 @@ pub struct MaskRecord {
 /// The versions on which a mask's bytes depend.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct MaskSoftware {
     /// Version of relit.
     pub version: String,
-    /// Version of OpenCV, if that cut the mask; older records have it wherever it was linked.
+    /// Version of OpenCV, if that cut the mask.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opencv: Option<String>,
 }
@@ -54,7 +49,6 @@ pub struct MaskSoftware {
 /// The frame on which a mask was made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct SourceFrame {
     /// File name of the video, without folders.
     pub video: String,
@@ -76,10 +70,9 @@ pub struct SourceFrame {
     pub frame_blake3: String,
 }
 
-/// A [`Drawing`] as it is recorded, and the turn.
+/// [`Hints`] as they are recorded, and the turn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct RecordedHints {
     /// The rectangle as given; null without one.
     pub rect: Option<Rect>,
@@ -96,63 +89,41 @@ pub struct RecordedHints {
     pub turn_frames: Vec<u64>,
 }
 
-/// [`MaskStatistics`] and hash of a mask as they are recorded.
+/// What came out, and the hash of the mask's file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct RecordedResult {
     /// BLAKE3 of the mask's file, in hexadecimal.
     pub mask_blake3: String,
-    /// Pixels of the object.
-    pub area_px: u64,
-    /// The smallest rectangle around them.
-    pub bounding_box: Rect,
-    /// Connected components before the clean-up.
-    pub components: u64,
-    /// Connected components that were kept.
-    pub components_kept: u64,
-    /// Pixels of the holes that were filled.
-    pub holes_filled_px: u64,
+    /// Area, bounding box and components.
+    #[serde(flatten)]
+    pub statistics: MaskStatistics,
 }
 
 /// Why a file is not a mask's record, or cannot be used to make the mask again.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RecordFault {
-    /// Not JSON, or without the fields of a record.
-    #[error("{0}")]
-    Json(#[from] serde_json::Error),
-    /// Another schema.
-    #[error("its schema is {found}, not {MASK_SCHEMA:?}")]
-    Schema {
-        /// The field `schema`, as JSON.
-        found: Value,
-    },
-    /// Neither rectangle nor seeds.
-    #[error("it records no hints")]
-    NoHints,
-    /// Seeds that are not base64.
-    #[error("its seeds are not base64 ({0})")]
-    Base64(#[from] base64::DecodeError),
-    /// Seeds that are not a valid image.
-    #[error("its seeds are not valid: {0}")]
-    Seeds(#[from] SeedsFault),
+#[error("{0}")]
+pub struct RecordFault(String);
+
+impl RecordFault {
+    fn new(why: impl ToString) -> Self {
+        Self(why.to_string())
+    }
 }
 
 impl MaskRecord {
     /// Reads the content of a `mask.json`.
     ///
     /// # Errors
-    /// [`RecordFault::Json`] or [`RecordFault::Schema`].
+    /// Where it is not JSON, has another schema, or is not a record.
     pub fn from_json(bytes: &[u8]) -> Result<Self, RecordFault> {
-        let value: Value = serde_json::from_slice(relit_data::text::unmarked(bytes))?;
+        let value = serde_json::from_slice(relit_data::text::unmarked(bytes));
+        let value: Value = value.map_err(RecordFault::new)?;
         let schema = value.get("schema").unwrap_or(&Value::Null);
         if schema != MASK_SCHEMA {
-            return Err(RecordFault::Schema {
-                found: schema.clone(),
-            });
+            let why = format!("its schema is {schema}, not {MASK_SCHEMA:?}");
+            return Err(RecordFault(why));
         }
-        Ok(serde_json::from_value(value)?)
+        serde_json::from_value(value).map_err(RecordFault::new)
     }
 
     /// The content of a `mask.json`.
@@ -195,12 +166,12 @@ impl RecordedHints {
     ///
     /// # Errors
     /// [`MaskError::Encode`].
-    pub fn new(drawing: &Drawing, turn_frames: &[u64]) -> Result<Self, MaskError> {
-        let seeds = drawing.seeds.as_ref();
+    pub fn new(hints: &Hints, turn_frames: &[u64]) -> Result<Self, MaskError> {
+        let seeds = hints.seeds.as_ref();
         let png = seeds.map(Seeds::to_marks_png).transpose()?;
         Ok(Self {
-            rect: drawing.rect,
-            strokes: drawing.strokes.clone(),
+            rect: hints.rect,
+            strokes: hints.strokes.clone(),
             seeds: png.map(|png| STANDARD.encode(png)),
             seeds_coloured_px: seeds.map_or(0, Seeds::coloured_px),
             turn_frames: turn_frames.to_vec(),
@@ -210,24 +181,27 @@ impl RecordedHints {
     /// The hints that were recorded; empty where the video alone was enough.
     ///
     /// # Errors
-    /// [`RecordFault::NoHints`], [`RecordFault::Base64`] or [`RecordFault::Seeds`].
-    pub fn drawing(&self) -> Result<Drawing, RecordFault> {
+    /// Where there are none, or the seeds are damaged.
+    pub fn hints(&self) -> Result<Hints, RecordFault> {
+        let wrong =
+            |why: &dyn std::fmt::Display| RecordFault(format!("its seeds are not valid: {why}"));
         let seeds = match &self.seeds {
             None => None,
             Some(text) => {
-                let png = STANDARD.decode(text)?;
-                Some(Seeds::from_marks_png(&png, self.seeds_coloured_px)?)
+                let png = STANDARD.decode(text).map_err(|error| wrong(&error))?;
+                let seeds = Seeds::from_marks_png(&png, self.seeds_coloured_px);
+                Some(seeds.map_err(|error| wrong(&error))?)
             }
         };
-        let drawing = Drawing {
+        let hints = Hints {
             rect: self.rect,
             seeds,
             strokes: self.strokes.clone(),
         };
-        if drawing.is_empty() && self.turn_frames.is_empty() {
-            return Err(RecordFault::NoHints);
+        if hints.is_empty() && self.turn_frames.is_empty() {
+            return Err(RecordFault::new("it records no hints"));
         }
-        Ok(drawing)
+        Ok(hints)
     }
 }
 
@@ -237,11 +211,7 @@ impl RecordedResult {
     pub fn new(statistics: MaskStatistics, png: &[u8]) -> Self {
         Self {
             mask_blake3: blake3::hash(png).to_hex().to_string(),
-            area_px: statistics.area_px,
-            bounding_box: statistics.bounding_box,
-            components: statistics.components as u64,
-            components_kept: statistics.components_kept as u64,
-            holes_filled_px: statistics.holes_filled_px,
+            statistics,
         }
     }
 }
@@ -249,7 +219,7 @@ impl RecordedResult {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use relit_grabcut::{Brush, Hints, Stroke};
+    use relit_grabcut::{Brush, Stroke};
 
     fn record() -> MaskRecord {
         let statistics = MaskStatistics {
@@ -272,7 +242,7 @@ mod tests {
                 colour_conversion: None,
                 frame_blake3: "00".to_owned(),
             },
-            hints: RecordedHints::new(&Hints::Rect(Rect::new(-1, 2, 30, 40)).into(), &[]).unwrap(),
+            hints: RecordedHints::new(&Rect::new(-1, 2, 30, 40).into(), &[]).unwrap(),
             engine: MaskEngine::OpenCv,
             settings: SegmentSettings::default(),
             result: RecordedResult::new(statistics, b"png"),
@@ -287,29 +257,20 @@ mod tests {
     }
 
     #[test]
-    fn a_record_that_names_no_engine_is_of_relits_own() {
-        let text = String::from_utf8(record().to_json().unwrap()).unwrap();
-        let older = text.replace("  \"engine\": \"opencv\",\n", "");
-        assert_ne!(older, text);
-        let read = MaskRecord::from_json(older.as_bytes()).unwrap();
-        assert_eq!(read.engine, MaskEngine::Relit);
-    }
-
-    #[test]
     fn strokes_are_read_back_as_they_were_painted() {
         let stroke = Stroke {
             brush: Brush::Eraser,
             radius: 7.3,
             points: vec![[0.1, 1.0 / 3.0], [-12.5, 99.999]],
         };
-        let drawing = Drawing {
+        let painted = Hints {
             strokes: Strokes::new(vec![stroke]).unwrap(),
-            ..Drawing::default()
+            ..Hints::default()
         };
-        let hints = RecordedHints::new(&drawing, &[]).unwrap();
+        let hints = RecordedHints::new(&painted, &[]).unwrap();
         let bytes = MaskRecord { hints, ..record() }.to_json().unwrap();
         let read = MaskRecord::from_json(&bytes).unwrap();
-        assert_eq!(read.hints.drawing().unwrap(), drawing);
+        assert_eq!(read.hints.hints().unwrap(), painted);
         let text = String::from_utf8(bytes).unwrap();
         let wrong = text.replace("\"eraser\"", "\"magic\"");
         assert!(MaskRecord::from_json(wrong.as_bytes()).is_err());
@@ -327,11 +288,11 @@ mod tests {
     }
 
     #[test]
-    fn a_recipe_with_impossible_settings_is_refused() {
+    fn a_recipe_with_unknown_settings_is_refused() {
         let text = String::from_utf8(record().to_json().unwrap()).unwrap();
-        let text = text.replace("\"iterations\": 5", "\"iterations\": 0");
+        let text = text.replace("\"keep_all\":", "\"feather\": 3, \"keep_all\":");
         let error = MaskRecord::from_json(text.as_bytes()).unwrap_err();
-        assert!(error.to_string().contains("0 iterations"), "{error}");
+        assert!(error.to_string().contains("feather"), "{error}");
     }
 
     #[test]
@@ -343,11 +304,9 @@ mod tests {
             strokes: Strokes::default(),
             turn_frames: Vec::new(),
         };
-        let no_hints = of(None, None).drawing();
-        assert!(matches!(no_hints, Err(RecordFault::NoHints)));
-        let no_base64 = of(None, Some("%")).drawing();
-        assert!(matches!(no_base64, Err(RecordFault::Base64(_))));
-        let no_png = of(None, Some("aaaa")).drawing();
-        assert!(matches!(no_png, Err(RecordFault::Seeds(_))));
+        let refused = |seeds| of(None, seeds).hints().unwrap_err().to_string();
+        assert_eq!(refused(None), "it records no hints");
+        assert!(refused(Some("%")).starts_with("its seeds are not valid"));
+        assert!(refused(Some("aaaa")).contains("not a PNG"));
     }
 }

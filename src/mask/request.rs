@@ -3,20 +3,24 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use relit_grabcut::{Drawing, SegmentSettings};
+use relit_grabcut::{Hints, Seeds, SegmentSettings};
 
-use super::{MaskEngine, MaskRecord, MaskingError, RecordFault};
+use super::{MaskEngine, MaskRecord, MaskingError};
 
 /// How to make a mask.
 #[derive(Debug, Clone)]
 pub struct MaskRequest {
-    pub(super) frame: u64,
-    pub(super) drawing: Drawing,
+    /// The number of the frame on which it is made, 0-based.
+    pub frame: u64,
+    /// Where the object is; may be empty where the turn is looked at.
+    pub hints: Hints,
     pub(super) turn: TurnRequest,
     pub(super) engine: MaskEngine,
-    pub(super) settings: SegmentSettings,
+    /// The settings.
+    pub settings: SegmentSettings,
     pub(super) recipe: Option<Recipe>,
-    pub(super) force: bool,
+    /// Replaces a mask that differs from its record, and accepts another result of a recipe.
+    pub force: bool,
 }
 
 /// Which frames of the turn are looked at.
@@ -48,12 +52,12 @@ pub(super) struct Recipe {
 }
 
 impl MaskRequest {
-    /// A mask on frame number `frame`, 0-based, with these hints.
+    /// A mask on frame number `frame` by these hints.
     #[must_use]
-    pub fn new(frame: u64, drawing: impl Into<Drawing>, settings: SegmentSettings) -> Self {
+    pub fn new(frame: u64, hints: impl Into<Hints>, settings: SegmentSettings) -> Self {
         Self {
             frame,
-            drawing: drawing.into(),
+            hints: hints.into(),
             turn: TurnRequest::None,
             engine: MaskEngine::default(),
             settings,
@@ -62,42 +66,35 @@ impl MaskRequest {
         }
     }
 
-    /// A mask by what the whole video tells, on frame number `frame`; the hints may be empty.
+    /// The same by what the whole video shows, too.
     #[must_use]
-    pub fn auto(frame: u64, drawing: impl Into<Drawing>, settings: SegmentSettings) -> Self {
+    pub fn by_turn(self) -> Self {
         Self {
-            frame,
-            drawing: drawing.into(),
             turn: TurnRequest::Sampled,
-            engine: MaskEngine::default(),
-            settings,
-            recipe: None,
-            force: false,
+            ..self
         }
     }
 
     /// The mask that the record `path` describes, to the same bytes.
     ///
     /// # Errors
-    /// [`MaskingError::Io`] or [`MaskingError::Recipe`]; those of [`Self::with_engine`].
+    /// [`MaskingError::Io`] or [`MaskingError::Unusable`]; those of [`Self::with_engine`].
     pub fn from_recipe(path: &Path) -> Result<Self, MaskingError> {
-        let wrong = |fault: RecordFault| MaskingError::Recipe {
-            path: path.to_owned(),
-            why: fault.to_string(),
-        };
         let bytes = fs::read(path).map_err(MaskingError::io(path, "read"))?;
-        let record = MaskRecord::from_json(&bytes).map_err(wrong)?;
-        let drawing = record.hints.drawing().map_err(wrong)?;
-        let path = path.to_owned();
+        let read = MaskRecord::from_json(&bytes).and_then(|record| {
+            let hints = record.hints.hints()?;
+            Ok((record, hints))
+        });
+        let (record, hints) =
+            read.map_err(|fault| MaskingError::unusable("recipe", path, &fault))?;
         let engine = record.engine;
         let request = Self {
-            frame: record.source.frame,
-            drawing,
             turn: TurnRequest::of(&record),
-            engine: MaskEngine::default(),
-            settings: record.settings,
-            recipe: Some(Recipe { path, record }),
-            force: false,
+            recipe: Some(Recipe {
+                path: path.to_owned(),
+                record: record.clone(),
+            }),
+            ..Self::new(record.source.frame, hints, record.settings)
         };
         request.with_engine(engine)
     }
@@ -105,16 +102,18 @@ impl MaskRequest {
     /// Lets this engine cut the object out. [`edit`](super::edit) cuts by relit's nevertheless.
     ///
     /// # Errors
-    /// [`MaskingError::WithoutOpenCv`], [`MaskingError::OpenCvKnowsNoTurn`].
+    /// [`MaskingError::Refused`] where it is not built in, or knows no turn.
     pub fn with_engine(self, engine: MaskEngine) -> Result<Self, MaskingError> {
         engine.check(self.turn != TurnRequest::None)?;
         Ok(Self { engine, ..self })
     }
+}
 
-    /// With `force`, replaces a mask that differs from its record, and accepts another result of a
-    /// recipe.
-    #[must_use]
-    pub fn with_force(self, force: bool) -> Self {
-        Self { force, ..self }
-    }
+/// Reads seeds from a PNG file of any colour type and depth.
+///
+/// # Errors
+/// [`MaskingError::Io`] or [`MaskingError::Unusable`].
+pub fn read_seeds(path: &Path) -> Result<Seeds, MaskingError> {
+    let bytes = fs::read(path).map_err(MaskingError::io(path, "read"))?;
+    Seeds::from_png(&bytes).map_err(|fault| MaskingError::unusable("seeds", path, &fault))
 }

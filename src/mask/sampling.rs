@@ -17,26 +17,33 @@ pub(super) struct SampledTurn {
     pub(super) statistics: TurnStatistics,
 }
 
-/// Reads the frames that are asked for; none where one frame is enough. Frames that cannot be decoded
-/// are left out.
+/// Reads the frames of a turn that are asked for; none where one frame is enough.
 pub(super) fn read_turn(
     video: &Video,
-    (width, height): (u32, u32),
+    size: (u32, u32),
     request: &TurnRequest,
 ) -> Result<Option<SampledTurn>, MaskingError> {
-    let numbers = match request {
-        TurnRequest::None => return Ok(None),
-        TurnRequest::Sampled => video.spread(TURN_FRAMES),
-        TurnRequest::Frames(frames) => frames.clone(),
-    };
+    match request {
+        TurnRequest::None => Ok(None),
+        TurnRequest::Sampled => sampled(video, size, &video.spread(TURN_FRAMES)).map(Some),
+        TurnRequest::Frames(frames) => sampled(video, size, frames).map(Some),
+    }
+}
+
+/// Reads these frames. Those that cannot be decoded are left out.
+pub(super) fn sampled(
+    video: &Video,
+    (width, height): (u32, u32),
+    numbers: &[u64],
+) -> Result<SampledTurn, MaskingError> {
     let mut frames = Vec::new();
     let mut turn = TurnFrames::new(width, height);
-    for (number, picture) in video.pictures(&numbers, (width, height))? {
+    for (number, picture) in video.pictures(numbers, (width, height))? {
         frames.push(number);
         turn.push(&picture);
     }
     let statistics = TurnStatistics::new(&turn);
-    Ok(Some(SampledTurn { frames, statistics }))
+    Ok(SampledTurn { frames, statistics })
 }
 
 /// Reads a frame, and says of which recording it is.
@@ -68,9 +75,9 @@ fn to_srgb(video: &Video, frame: &mut RgbImage) -> Result<(), MaskingError> {
     }
     let path = video.path();
     let bytes = fs::read(path).map_err(MaskingError::io(path, "read"))?;
-    let colour = Colour::of_file(&bytes).map_err(|fault| MaskingError::Colour {
-        path: path.to_owned(),
-        fault,
+    let colour = Colour::of_file(&bytes).map_err(|fault| {
+        let why = format!("it {fault}; convert it to sRGB");
+        MaskingError::unusable("photograph", path, &why)
     })?;
     colour.to_srgb8(frame);
     Ok(())

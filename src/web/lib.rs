@@ -3,7 +3,8 @@
 //!
 //! A server keeps an [`AccessPolicy`], puts [`guard`] around its routes and [`run`]s them on a listener.
 //! [`index`] lets a browser in that comes with the [`Token`] in its URL; the [`Announcement`] holds that
-//! URL. The crate knows nothing of what is served: neither the rig nor masks.
+//! URL. The crate knows nothing of what is served: neither the rig nor masks; [`SKETCH`] are the scripts and the style
+//! by which pages let a person draw.
 
 mod access;
 mod address;
@@ -20,7 +21,7 @@ pub use address::Announcement;
 pub use extract::{BodyLimit, JsonBody, QueryParams};
 pub use failure::{Failure, Problem};
 pub use forward::forward;
-pub use listen::{ConnectionLimits, GRACE, Shutdown, run};
+pub use listen::{ConnectionLimits, GRACE, Shutdown, run, serve_page};
 pub use listen_address::{ListenAddress, ListenAddressFault};
-pub use page::{Entry, Index, PageAsset, SCRIPT, STYLE, asset, index};
+pub use page::{Entry, Index, PageAsset, SCRIPT, SKETCH, STYLE, asset, index};
 pub use token::{InvalidToken, Token, TokenFileError};

@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::net::IpAddr;
+use std::io;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -18,10 +19,14 @@ use tokio_io_timeout::TimeoutWriter;
 /// Asks a server to end, from any thread. Copies ask the same server.
 pub use tokio_util::sync::CancellationToken as Shutdown;
 
-use crate::access::Local;
+use crate::access::{AccessPolicy, Local};
+use crate::address::Announcement;
+use crate::token::Token;
 
 /// Time that running requests get when the server ends.
 pub const GRACE: Duration = Duration::from_secs(1);
+/// Threads of a page's server that carry requests; work has its own.
+const PAGE_THREADS: usize = 2;
 /// Header lines of a request.
 const MOST_HEADERS: usize = 64;
 /// Bytes of a request's head, and of an answer that wait to be sent beyond the piece at hand.
@@ -70,6 +75,49 @@ pub async fn run(
     let all = u32::try_from(limits.connections).unwrap_or(u32::MAX);
     // Who is not ready by then is cut off.
     let _ = timeout(GRACE, connections.acquire_many(all)).await;
+}
+
+/// Serves a page from threads of its own until `shutdown` is cancelled, with the usual limits. The address's port may be 0 for any
+/// free one. Where there is no token, and others than this machine can reach the address, it is random. `names` are those
+/// by which the machine is known, `open_paths` need no token, `announce` is called once, when a browser can connect.
+///
+/// # Errors
+/// Where the address cannot be listened on, or the system has no randomness or no threads.
+pub fn serve_page(
+    address: SocketAddr,
+    token: Option<Token>,
+    names: Vec<String>,
+    open_paths: &[&'static str],
+    router: impl FnOnce(Arc<AccessPolicy>) -> Router,
+    announce: impl FnOnce(&Announcement),
+    shutdown: &Shutdown,
+) -> io::Result<()> {
+    let listener = std::net::TcpListener::bind(address)?;
+    listener.set_nonblocking(true)?;
+    let address = listener.local_addr()?;
+    let token = match token {
+        None if !address.ip().is_loopback() => Some(Token::random()?),
+        given => given,
+    };
+    let announcement = Announcement::new(address, &names, token.as_ref());
+    let policy = AccessPolicy::new(address.port(), token, names, open_paths.to_vec());
+    let router = router(Arc::new(policy));
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(PAGE_THREADS)
+        .thread_name("relit-http")
+        .enable_io()
+        .enable_time()
+        .build()?;
+    let served = runtime.block_on(async {
+        let listener = TcpListener::from_std(listener)?;
+        announce(&announcement);
+        let limits = ConnectionLimits::default();
+        let connections = Arc::new(Semaphore::new(limits.connections));
+        run(listener, router, limits, &connections, shutdown).await;
+        Ok(())
+    });
+    runtime.shutdown_timeout(GRACE);
+    served
 }
 
 /// Connections by address: one client cannot take all of them.

@@ -33,6 +33,19 @@ pub const fn asset(path: &'static str, kind: &'static str, text: &'static str) -
     PageAsset { path, kind, text }
 }
 
+/// What pages share on which a person sketches where an object is: `sketcher.js` over a canvas, and its style. The app's
+/// build takes the same files.
+pub const SKETCH: [PageAsset; 4] = [
+    asset("/sketch.css", STYLE, include_str!("page/sketch.css")),
+    asset("/sketcher.js", SCRIPT, include_str!("page/sketcher.js")),
+    asset(
+        "/sketch-view.js",
+        SCRIPT,
+        include_str!("page/sketch-view.js"),
+    ),
+    asset("/history.js", SCRIPT, include_str!("page/history.js")),
+];
+
 impl PageAsset {
     /// The file as an answer.
     #[must_use]

@@ -1,7 +1,7 @@
-"""Composites of objects on backgrounds, with ground truth, in the form that `relit-mask bench` reads.
+"""Composites of objects on backgrounds, with ground truth, in the form that masks.py reads.
 
     python composites.py OBJECTS BACKGROUNDS FOLDER
-    relit-mask bench FOLDER --boxes tight,loose,cut --folds 5
+    python masks.py relit-mask FOLDER --boxes tight,loose,cut
 
 OBJECTS holds `NAME.png` and `NAME.mask.png` (white is object), BACKGROUNDS pictures and panoramas (.hdr). Each object
 is put on so many random crops as `--each` says, at 25 to 55 % of their area's side, as bright as the crop times 2 to a

@@ -13,8 +13,8 @@ use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage};
 use proptest::prelude::*;
 use relit_data::geometry::Rect;
 use relit_grabcut::{
-    Feather, Hints, Iterations, MaskError, Seeds, SegmentSettings, TurnFrames, TurnStatistics,
-    Warning, alpha, segment, segment_turn,
+    Effort, Hints, Mask, MaskError, Seeds, SegmentSettings, TurnFrames, TurnStatistics, segment,
+    segment_with,
 };
 
 use scene::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
@@ -32,21 +32,38 @@ fn disc() -> RgbImage {
 }
 
 fn around() -> Hints {
-    Hints::Rect(AROUND.parse().unwrap())
+    Hints::from(AROUND.parse::<Rect>().unwrap())
 }
 
-fn seeds(marks: impl Fn(u32, u32) -> u8) -> Seeds {
-    Seeds::from_image(&DynamicImage::from(seeds_image(marks))).unwrap()
+fn segment_turn(frame: &RgbImage, turn: &TurnStatistics, hints: &Hints) -> Result<Mask, MaskError> {
+    let settings = SegmentSettings::default();
+    segment_with(frame, Some(turn), hints, &settings, Effort::Fine)
+}
+
+fn seeds(marks: impl Fn(u32, u32) -> u8) -> Hints {
+    by_seeds(seeds_image(marks))
+}
+
+fn by_seeds(marks: GrayImage) -> Hints {
+    Hints {
+        seeds: Some(Seeds::from_image(&DynamicImage::from(marks)).unwrap()),
+        ..Hints::default()
+    }
+}
+
+/// Whether one of a mask's warnings has these words.
+fn warns(mask: &Mask, words: &str) -> bool {
+    mask.warnings.iter().any(|warning| warning.contains(words))
 }
 
 #[test]
 fn a_rectangle_finds_the_object_in_it() {
     let mask = segment(&disc(), &around(), &SegmentSettings::default()).unwrap();
-    assert!(disc_share(mask.image()) > 0.98);
-    assert!(mask.image().pixels().all(|p| p.0[0] == 0 || p.0[0] == 255));
-    assert_eq!(mask.warnings(), []);
-    let figures = mask.statistics();
-    let set = mask.image().pixels().filter(|p| p.0[0] == 255).count();
+    assert!(disc_share(&mask.image) > 0.98);
+    assert!(mask.image.pixels().all(|p| p.0[0] == 0 || p.0[0] == 255));
+    assert_eq!(mask.warnings, [""; 0]);
+    let figures = mask.statistics;
+    let set = mask.image.pixels().filter(|p| p.0[0] == 255).count();
     assert_eq!(figures.area_px, set as u64);
     assert_eq!(figures.components_kept, 1);
 }
@@ -71,10 +88,10 @@ fn an_object_that_hardly_differs_from_what_is_around_it_is_found() {
         let level = 90 + (grain % 12) as u8 + busy;
         Rgb([level + if inside(x, y) { 3 } else { 0 }, level, level])
     });
-    let hints = Hints::Rect(Rect::new(176, 56, 48, 48));
+    let hints = Hints::from(Rect::new(176, 56, 48, 48));
     let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
     let (mut both, mut either) = (0, 0);
-    for (x, y, level) in mask.image().enumerate_pixels() {
+    for (x, y, level) in mask.image.enumerate_pixels() {
         let found = level.0[0] >= 128;
         both += u32::from(found && inside(x, y));
         either += u32::from(found || inside(x, y));
@@ -87,21 +104,21 @@ fn an_object_that_hardly_differs_from_what_is_around_it_is_found() {
 
 #[test]
 fn strokes_alone_find_the_object() {
-    let hints = Hints::Seeds(seeds(strokes));
+    let hints = seeds(strokes);
     let mask = segment(&disc(), &hints, &SegmentSettings::default()).unwrap();
-    assert!(disc_share(mask.image()) > 0.98);
+    assert!(disc_share(&mask.image) > 0.98);
 }
 
 #[test]
 fn a_stroke_on_the_object_alone_is_enough_on_a_plain_background() {
-    let hints = Hints::Seeds(seeds(|x, y| strokes(x, y).max(128)));
+    let hints = seeds(|x, y| strokes(x, y).max(128));
     let mask = segment(&disc(), &hints, &SegmentSettings::default()).unwrap();
-    assert!(disc_share(mask.image()) > 0.9);
+    assert!(disc_share(&mask.image) > 0.9);
 }
 
 #[test]
 fn seeds_overrule_the_rectangle() {
-    let rect = AROUND.parse().unwrap();
+    let rect: Rect = AROUND.parse().unwrap();
     let marks = |x, y| {
         if (30..36).contains(&x) && (20..44).contains(&y) {
             0
@@ -109,23 +126,23 @@ fn seeds_overrule_the_rectangle() {
             strokes(x, y)
         }
     };
-    let hints = Hints::Both {
-        rect,
-        seeds: seeds(marks),
+    let hints = Hints {
+        rect: Some(rect),
+        ..seeds(marks)
     };
     let mask = segment(&disc(), &hints, &SegmentSettings::default()).unwrap();
-    assert!((20..44).all(|y| mask.image().get_pixel(33, y).0[0] == 0));
-    assert_eq!(mask.image().get_pixel(48, 31).0[0], 255);
+    assert!((20..44).all(|y| mask.image.get_pixel(33, y).0[0] == 0));
+    assert_eq!(mask.image.get_pixel(48, 31).0[0], 255);
 }
 
 #[test]
 fn the_same_input_gives_the_same_mask() {
     let make = || {
-        let hints = [around(), Hints::Seeds(seeds(strokes))];
+        let hints = [around(), seeds(strokes)];
         hints.map(|hints| {
             segment(&noisy(), &hints, &SegmentSettings::default())
                 .unwrap()
-                .image()
+                .image
                 .clone()
         })
     };
@@ -147,28 +164,13 @@ fn noisy() -> RgbImage {
 }
 
 #[test]
-fn a_feathered_mask_gives_the_hard_one_back_at_half() {
-    let feathered = SegmentSettings {
-        feather: Feather::new(8).unwrap(),
-        ..SegmentSettings::default()
-    };
-    let hard = segment(&disc(), &around(), &SegmentSettings::default()).unwrap();
-    let soft = segment(&disc(), &around(), &feathered).unwrap();
-    assert!(soft.image().pixels().any(|p| (1..255).contains(&p.0[0])));
-    for (soft, hard) in soft.image().pixels().zip(hard.image().pixels()) {
-        assert_eq!(soft.0[0] >= 128, hard.0[0] == 255);
-    }
-    assert_eq!(soft.statistics(), hard.statistics());
-}
-
-#[test]
 fn hints_that_do_not_fit_the_frame_are_refused_with_a_sentence() {
     let refused = |hints: Hints| {
         let error = segment(&disc(), &hints, &SegmentSettings::default()).unwrap_err();
         assert!(error.to_string().contains(": "), "{error}");
         error
     };
-    let rect = |x, y, w, h| Hints::Rect(Rect::new(x, y, w, h));
+    let rect = |x, y, w, h| Hints::from(Rect::new(x, y, w, h));
     assert!(matches!(
         refused(rect(96, 0, 5, 5)),
         MaskError::RectOutside { .. }
@@ -183,19 +185,18 @@ fn hints_that_do_not_fit_the_frame_are_refused_with_a_sentence() {
     ));
     assert!(matches!(
         refused(rect(0, 0, 96, 64)),
-        MaskError::NoBackground { .. }
+        MaskError::NoBackground
     ));
     assert!(matches!(
         refused(rect(-1, -1, 999, 999)),
-        MaskError::NoBackground { .. }
+        MaskError::NoBackground
     ));
     assert!(matches!(
-        refused(Hints::Seeds(seeds(|_, _| 255))),
-        MaskError::NoBackground { .. }
+        refused(seeds(|_, _| 255)),
+        MaskError::NoBackground
     ));
     let other = GrayImage::from_pixel(9, 7, Luma([255]));
-    let other = Seeds::from_image(&other.into()).unwrap();
-    let error = refused(Hints::Seeds(other));
+    let error = refused(by_seeds(other));
     assert!(error.to_string().contains("9 x 7") && error.to_string().contains("96 x 64"));
 }
 
@@ -205,7 +206,7 @@ fn frames_that_cannot_be_segmented_are_refused() {
     let result = segment(&tiny, &around(), &SegmentSettings::default());
     assert!(matches!(
         result,
-        Err(MaskError::FrameTooSmall { width: 15, .. })
+        Err(MaskError::FrameSize { width: 15, .. })
     ));
 }
 
@@ -214,7 +215,7 @@ fn a_frame_of_one_colour_yields_a_mask_with_a_warning_or_a_refusal() {
     for level in [0, 128, 255] {
         let plain = RgbImage::from_pixel(WIDTH, HEIGHT, Rgb([level; 3]));
         match segment(&plain, &around(), &SegmentSettings::default()) {
-            Ok(mask) => assert!(!mask.warnings().is_empty()),
+            Ok(mask) => assert!(!mask.warnings.is_empty()),
             Err(error) => assert!(matches!(error, MaskError::Empty), "{error}"),
         }
     }
@@ -246,51 +247,44 @@ fn statistics(frames: u32) -> TurnStatistics {
 
 #[test]
 fn a_turn_alone_finds_the_object_before_a_room_of_its_colours() {
-    let settings = SegmentSettings::default();
-    let mask = segment_turn(&turn_frame(0), &statistics(16), None, &settings).unwrap();
+    let mask = segment_turn(&turn_frame(0), &statistics(16), &Hints::default()).unwrap();
     assert!(
-        disc_share(mask.image()) > 0.95,
+        disc_share(&mask.image) > 0.95,
         "{}",
-        disc_share(mask.image())
+        disc_share(&mask.image)
     );
-    assert_eq!(mask.warnings(), []);
+    assert_eq!(mask.warnings, [""; 0]);
 }
 
 #[test]
 fn a_turn_of_too_few_frames_leaves_the_decision_to_the_hints_and_says_so() {
-    let settings = SegmentSettings::default();
-    let alone = segment_turn(&turn_frame(0), &statistics(2), None, &settings);
+    let alone = segment_turn(&turn_frame(0), &statistics(2), &Hints::default());
     assert!(matches!(alone, Err(MaskError::FewFrames { found: 2 })));
-    let mask = segment_turn(&disc(), &statistics(2), Some(&around()), &settings).unwrap();
-    assert!(disc_share(mask.image()) > 0.98);
-    let dropped = |warning: &Warning| matches!(warning, Warning::TurnDropped { .. });
-    assert!(mask.warnings().iter().any(dropped));
+    let mask = segment_turn(&disc(), &statistics(2), &around()).unwrap();
+    assert!(disc_share(&mask.image) > 0.98);
+    assert!(warns(&mask, "the turn was not used"), "{:?}", mask.warnings);
 }
 
 #[test]
 fn a_turn_without_any_frame_is_refused() {
-    let settings = SegmentSettings::default();
-    let alone = segment_turn(&turn_frame(0), &statistics(0), None, &settings);
+    let alone = segment_turn(&turn_frame(0), &statistics(0), &Hints::default());
     assert!(matches!(alone, Err(MaskError::FewFrames { found: 0 })));
-    let other = TurnStatistics::new(&TurnFrames::new(0, 0));
-    assert_eq!(other.frames(), 0);
+    let of_nothing = TurnStatistics::new(&TurnFrames::new(0, 0));
+    let alone = segment_turn(&turn_frame(0), &of_nothing, &Hints::default());
+    assert!(matches!(alone, Err(MaskError::FewFrames { found: 0 })));
 }
 
 #[test]
 fn a_video_in_which_nothing_moves_gives_a_warning() {
     let mut still = TurnFrames::new(WIDTH, HEIGHT);
     (0..8).for_each(|_| still.push(&disc()));
-    let settings = SegmentSettings::default();
-    let mask = segment_turn(
-        &disc(),
-        &TurnStatistics::new(&still),
-        Some(&around()),
-        &settings,
-    )
-    .unwrap();
-    assert!(disc_share(mask.image()) > 0.95);
-    let nothing = |warning: &Warning| matches!(warning, Warning::NothingMoves);
-    assert!(mask.warnings().iter().any(nothing));
+    let mask = segment_turn(&disc(), &TurnStatistics::new(&still), &around()).unwrap();
+    assert!(disc_share(&mask.image) > 0.95);
+    assert!(
+        warns(&mask, "hardly anything changes"),
+        "{:?}",
+        mask.warnings
+    );
 }
 
 #[test]
@@ -301,20 +295,12 @@ fn a_large_frame_is_cut_along_the_same_edge_as_a_small_one() {
         HEIGHT * 8,
         image::imageops::FilterType::Nearest,
     );
-    let hints = Hints::Rect(Rect::new(24 * 8, 8 * 8, 50 * 8, 48 * 8));
+    let hints = Hints::from(Rect::new(24 * 8, 8 * 8, 50 * 8, 48 * 8));
     let mask = segment(&large, &hints, &SegmentSettings::default()).unwrap();
     let small = GrayImage::from_fn(WIDTH, HEIGHT, |x, y| {
-        *mask.image().get_pixel(8 * x + 4, 8 * y + 4)
+        *mask.image.get_pixel(8 * x + 4, 8 * y + 4)
     });
     assert!(disc_share(&small) > 0.97);
-}
-
-#[test]
-fn the_soft_mask_equals_the_hard_one_away_from_the_edge() {
-    let mask = segment(&disc(), &around(), &SegmentSettings::default()).unwrap();
-    let soft = alpha(&disc(), mask.image());
-    assert_eq!(soft.get_pixel(48, 32).0, [255]);
-    assert_eq!(soft.get_pixel(5, 5).0, [0]);
 }
 
 #[test]
@@ -327,12 +313,14 @@ fn an_object_at_the_border_gives_warnings() {
             [20, (x % 5) as u8, 60]
         })
     });
-    let hints = Hints::Rect(Rect::new(-10, 15, 50, 30));
+    let hints = Hints::from(Rect::new(-10, 15, 50, 30));
     let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
-    let is_border = |w: &Warning| matches!(w, Warning::TouchesBorder { .. });
-    let is_clipped = |w: &Warning| matches!(w, Warning::RectClipped { .. });
-    assert!(mask.warnings().iter().any(is_border));
-    assert!(mask.warnings().iter().any(is_clipped));
+    assert!(
+        warns(&mask, "touches the left border"),
+        "{:?}",
+        mask.warnings
+    );
+    assert!(warns(&mask, "was clipped"), "{:?}", mask.warnings);
 }
 
 prop_compose! {
@@ -361,7 +349,12 @@ fn any_hints(width: u32, height: u32) -> impl Strategy<Value = Option<Hints>> {
     (rect, prop::option::of(marks)).prop_map(move |(rect, marks)| {
         let image = marks.and_then(|marks| GrayImage::from_raw(width, height, marks));
         let seeds = image.and_then(|image| Seeds::from_image(&image.into()).ok());
-        Hints::from_parts(rect, seeds).ok()
+        let hints = Hints {
+            rect,
+            seeds,
+            ..Hints::default()
+        };
+        (!hints.is_empty()).then_some(hints)
     })
 }
 
@@ -374,20 +367,13 @@ proptest! {
             let hints = any_hints(frame.width(), frame.height());
             (Just(frame), hints)
         }),
-        count in 1u32..4,
-        feather in 0u32..20,
         keep_all in any::<bool>(),
     ) {
-        let settings = SegmentSettings {
-            iterations: Iterations::new(count).unwrap(),
-            feather: Feather::new(feather).unwrap(),
-            keep_all,
-            alpha: false,
-        };
+        let settings = SegmentSettings { keep_all };
         if let Some(hints) = hints
             && let Ok(mask) = segment(&frame, &hints, &settings)
         {
-            prop_assert!(mask.statistics().area_px > 0);
+            prop_assert!(mask.statistics.area_px > 0);
         }
     }
 }

@@ -1,22 +1,25 @@
 //! Masks by the turn of objects with holes, handles, dark parts and parts in shade, and what their check says.
 
 use image::{GrayImage, RgbImage};
-use relit_grabcut::{
-    Effort, Hints, MaskCheck, Seeds, SegmentSettings, TurnFrames, TurnStatistics, score,
-    segment_turn,
-};
+use relit_grabcut::{Effort, Hints, MaskCheck, TurnFrames, TurnStatistics};
 
 use super::scene::{HEIGHT, WIDTH, in_disc, seeds_image};
 use super::turn_scene::{Scene, TROUBLES, Trouble, scene};
+use super::{by_seeds, segment_turn};
 
 /// Small enough to be made on the fly.
 const SMALL: (u32, u32) = (176, 132);
 /// Seeds of the tests; others were used to choose constants.
 const SEED: u64 = 4_000;
 
-fn mask_of(frame: &RgbImage, turn: &TurnStatistics, hints: Option<&Hints>) -> GrayImage {
-    let mask = segment_turn(frame, turn, hints, &SegmentSettings::default()).unwrap();
-    mask.image().clone()
+/// Intersection over union.
+fn iou(mask: &GrayImage, truth: &GrayImage) -> f64 {
+    let pairs = || {
+        let pixels = mask.pixels().zip(truth.pixels());
+        pixels.map(|(mask, truth)| (mask.0[0] >= 128, truth.0[0] >= 128))
+    };
+    let both = pairs().filter(|(mask, truth)| *mask && *truth).count();
+    both as f64 / pairs().filter(|(mask, truth)| *mask || *truth).count() as f64
 }
 
 /// The share of the critical part of which the mask is right.
@@ -35,7 +38,8 @@ fn right_there(mask: &GrayImage, scene: &Scene) -> f64 {
 /// Intersection over union, and the share of the critical part that is right.
 fn figures(trouble: Trouble, size: (u32, u32), frames: usize, seed: u64) -> (f64, f64) {
     let scene = scene(trouble, size, frames, seed);
-    let mask = mask_of(&scene.frames[0], &scene.statistics(), None);
+    let mask = segment_turn(&scene.frames[0], &scene.statistics(), &Hints::default());
+    let mask = mask.unwrap().image;
     if let Some(folder) = std::env::var_os("RELIT_LOOK") {
         let folder = std::path::Path::new(&folder);
         mask.save(folder.join(format!("{trouble:?}-{seed}.png")))
@@ -44,10 +48,7 @@ fn figures(trouble: Trouble, size: (u32, u32), frames: usize, seed: u64) -> (f64
             .save(folder.join(format!("{trouble:?}-{seed}-frame.png")))
             .unwrap();
     }
-    (
-        score(&mask, &scene.truth, None).unwrap().iou,
-        right_there(&mask, &scene),
-    )
+    (iou(&mask, &scene.truth), right_there(&mask, &scene))
 }
 
 #[test]
@@ -129,21 +130,16 @@ fn a_stroke_over_the_opening_of_a_handle_is_told() {
         let critical = scene.critical.get_pixel(x, y).0[0] > 0;
         image::Luma([if critical { 255 } else { 128 }])
     });
-    let seeds = Hints::Seeds(Seeds::from_image(&marks.into()).unwrap());
-    let painted = segment_turn(
-        &scene.frames[0],
-        &turn,
-        Some(&seeds),
-        &SegmentSettings::default(),
-    )
-    .unwrap();
-    let told: Vec<String> = painted.warnings().iter().map(ToString::to_string).collect();
+    let seeds = by_seeds(marks);
+    let told = segment_turn(&scene.frames[0], &turn, &seeds)
+        .unwrap()
+        .warnings;
     assert!(
         told.iter().any(|text| text.contains("a hole of")),
         "{told:?}"
     );
-    let plain = segment_turn(&scene.frames[0], &turn, None, &SegmentSettings::default()).unwrap();
-    assert!(plain.warnings().is_empty(), "{:?}", plain.warnings());
+    let plain = segment_turn(&scene.frames[0], &turn, &Hints::default()).unwrap();
+    assert!(plain.warnings.is_empty(), "{:?}", plain.warnings);
 }
 
 /// A disc with a pattern of its own that stands still before stripes that move.

@@ -157,7 +157,7 @@ fn what_cannot_be_checked_is_named() {
     };
     failed("mask.png could not be read");
     fs::write(path.join("mask.png"), "painted").unwrap();
-    failed("cannot be checked");
+    failed("cannot be used");
     mask(path, |_, _| false);
     failed("is empty");
     GrayImage::new(9, 9).save(path.join("mask.png")).unwrap();

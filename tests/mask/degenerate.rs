@@ -35,12 +35,11 @@ const SEEDS: [Choice; 9] = [
     &["--seeds", "empty.png"],
     &["--seeds", "nothing.png"],
 ];
-const WAYS: [Choice; 5] = [
+const WAYS: [Choice; 4] = [
     &[],
     &["--auto"],
     &["--frame", "99"],
-    &["--iterations", "0"],
-    &["--auto", "--feather", "100", "--keep-all", "--alpha"],
+    &["--auto", "--keep-all"],
 ];
 const INPUTS: [&str; 8] = [
     "clip.y4m",
@@ -91,7 +90,7 @@ fn fault(folder: &Path, arguments: &[&str]) -> Option<String> {
         1 | 2 => !sentence || folder.join("out.png").exists(),
         _ => true,
     };
-    for name in ["out.png", "out.json", "out-preview.png", "out-alpha.png"] {
+    for name in ["out.png", "out.json", "out-preview.png"] {
         // It may not be there.
         let _ = fs::remove_file(folder.join(name));
     }
@@ -159,7 +158,7 @@ fn a_recipe_that_was_changed_by_hand_ends_with_a_sentence() {
         whole.replace("\"frame\": 0", "\"frame\": 77"),
         whole.replace("\"frame\": 0", "\"frame\": -1"),
         whole.replace("\"width\": 96", "\"width\": 4294967295"),
-        whole.replace("\"iterations\": 5", "\"iterations\": 4000000000"),
+        whole.replace("\"keep_all\": false", "\"keep_all\": 5"),
         whole.replace("\"seeds\": null", "\"seeds\": \"%%%\""),
         whole.replace("\"seeds\": null", "\"seeds\": \"aaaa\""),
         stroke(r#"{"brush": "object", "radius": -1, "points": [[1, 1]]}"#),

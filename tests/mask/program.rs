@@ -34,15 +34,7 @@ fn a_recipe_makes_the_same_files_again() {
     let folder = clip();
     let path = folder.path();
     seeds_image(strokes).save(path.join("seeds.png")).unwrap();
-    let arguments = [
-        "clip.y4m",
-        "--seeds",
-        "seeds.png",
-        "--feather",
-        "3",
-        "-o",
-        "a.png",
-    ];
+    let arguments = ["clip.y4m", "--seeds", "seeds.png", "-o", "a.png"];
     assert_eq!(code(&relit_mask(path, &arguments)), 0);
     fs::remove_file(path.join("seeds.png")).unwrap();
     let output = relit_mask(path, &["clip.y4m", "--recipe", "a.json", "-o", "b.png"]);
@@ -204,14 +196,11 @@ fn wrong_usage_exits_with_2_and_a_failure_with_1() {
     let folder = clip();
     let path = folder.path();
     seeds_image(|_, _| 0).save(path.join("black.png")).unwrap();
-    let wrong: [&[&str]; 9] = [
+    let wrong: [&[&str]; 6] = [
         &["clip.y4m"],
-        &["bench"],
-        &["bench", "nothing", "--rect", AROUND],
+        &["check"],
         &["clip.y4m", "--recipe", "mask.json", "--auto"],
         &["clip.y4m", "--rect", "1,2,3"],
-        &["clip.y4m", "--rect", AROUND, "--iterations", "0"],
-        &["clip.y4m", "--rect", AROUND, "--feather", "9999"],
         &["clip.y4m", "--rect", AROUND, "-o", "mask.jpg"],
         &["clip.y4m", "--recipe", "mask.json", "--rect", AROUND],
     ];
@@ -265,7 +254,7 @@ fn auto_needs_no_hint_and_its_recipe_makes_the_same_files_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     fs::write(path.join("turn.y4m"), turn_video()).unwrap();
-    let output = relit_mask(path, &["turn.y4m", "--auto", "--alpha", "-o", "a.png"]);
+    let output = relit_mask(path, &["turn.y4m", "--auto", "-o", "a.png"]);
     assert_eq!(code(&output), 0, "{}", said(&output));
     let mask = image::load_from_memory(&read(path, "a.png")).unwrap();
     let share = disc_share(mask.as_luma8().unwrap());
@@ -274,48 +263,9 @@ fn auto_needs_no_hint_and_its_recipe_makes_the_same_files_again() {
     assert_eq!(record["hints"]["turn_frames"].as_array().unwrap().len(), 16);
     let output = relit_mask(path, &["turn.y4m", "--recipe", "a.json", "-o", "b.png"]);
     assert_eq!(code(&output), 0, "{}", said(&output));
-    for (first, second) in [
-        ("a.png", "b.png"),
-        ("a.json", "b.json"),
-        ("a-alpha.png", "b-alpha.png"),
-    ] {
+    for (first, second) in [("a.png", "b.png"), ("a.json", "b.json")] {
         assert!(read(path, first) == read(path, second), "{second} differs");
     }
-}
-
-#[test]
-fn bench_measures_every_hint_and_names_what_is_wrong() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
-    let output = relit_mask(path, &["bench", "."]);
-    assert_eq!(code(&output), 1);
-    assert!(
-        said(&output).contains("holds no image"),
-        "{}",
-        said(&output)
-    );
-    let frame = image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match in_disc(x, y) {
-        true => image::Rgb([200, 150, 60 + ((x + y) % 5) as u8]),
-        false => image::Rgb([20, 30, 40 + ((x + y) % 5) as u8]),
-    });
-    frame.save(path.join("disc.png")).unwrap();
-    let truth = seeds_image(|x, y| if in_disc(x, y) { 255 } else { 0 });
-    truth.save(path.join("disc.gt.png")).unwrap();
-    fs::write(path.join("disc.box.txt"), "24 8 73 55\n").unwrap();
-    let output = relit_mask(path, &["bench", ".", "--json"]);
-    assert_eq!(code(&output), 0, "{}", said(&output));
-    let events = String::from_utf8(output.stdout).unwrap();
-    let average = events.lines().last().unwrap();
-    let average: serde_json::Value = serde_json::from_str(average).unwrap();
-    assert_eq!(average["event"], "average");
-    assert_eq!(average["hint"], "box");
-    assert!(average["ours"]["iou"].as_f64().unwrap() > 0.97);
-    let opencv = average["opencv"]["iou"].as_f64();
-    assert_eq!(opencv.is_some(), cfg!(feature = "opencv"), "{average}");
-    fs::write(path.join("disc.box.txt"), "24 8 73").unwrap();
-    let output = relit_mask(path, &["bench", "."]);
-    assert_eq!(code(&output), 1);
-    assert!(said(&output).contains("disc.box.txt"), "{}", said(&output));
 }
 
 /// A session folder `<name>` in `root` with the disc as its video.
@@ -393,30 +343,4 @@ fn a_session_gets_its_mask_in_its_folder() {
     for name in ["mask.png", "mask.json", "mask-preview.png"] {
         assert!(folder.join(name).is_file(), "{name}");
     }
-}
-
-#[test]
-fn a_soft_mask_goes_with_its_mask_and_a_painted_one_is_kept() {
-    let folder = clip();
-    let run = |more: &[&str]| {
-        let hints = ["clip.y4m", "--rect", AROUND, "-o", "n.png"];
-        relit_mask(folder.path(), &[&hints, more].concat())
-    };
-    fs::write(folder.path().join("n-alpha.png"), "painted").unwrap();
-    let refused = run(&["--alpha"]);
-    assert_eq!(code(&refused), 1);
-    assert!(said(&refused).contains("n-alpha.png"), "{}", said(&refused));
-    assert_eq!(code(&run(&[])), 0);
-    assert_eq!(read(folder.path(), "n-alpha.png"), b"painted");
-
-    let made = run(&["--alpha", "--force", "--json"]);
-    assert!(
-        said(&made).contains("\"alpha\":\"n-alpha.png\""),
-        "{}",
-        said(&made)
-    );
-    assert_ne!(read(folder.path(), "n-alpha.png"), b"painted");
-    assert_eq!(code(&run(&["--alpha"])), 0);
-    assert_eq!(code(&run(&[])), 0);
-    assert!(!folder.path().join("n-alpha.png").exists());
 }

@@ -53,7 +53,7 @@ export class Engine extends EventTarget {
     return this.#prepared;
   }
 
-  /** Asks the engine. Its answer's parts are in `parts`; its refusals and faults are thrown as sentences. */
+  /** Asks the engine. Its answer's parts are in `parts`, and `seconds` is how long it took; refusals and faults are thrown as sentences. */
   async ask(op, fields = {}, parts = []) {
     if (this.#restarting) await this.#restarting;
     if (NEED_NETWORKS.has(op)) await this.prepare();
@@ -91,14 +91,15 @@ export class Engine extends EventTarget {
     const { request, resolve, reject, began } = this.#open.get(id);
     this.#open.delete(id);
     this.#tellBusy();
-    performance.measure(`relight:${request.fields.op}`, { start: began, end: performance.now() });
+    const end = performance.now();
+    performance.measure(`relight:${request.fields.op}`, { start: began, end });
     if (fault !== undefined) {
       this.#restart(fault);
       return reject(new Fault(`The engine gave up (${fault}).`));
     }
     this.memory = memory ?? this.memory;
     if (reply.error) return reject(new Error(reply.error));
-    resolve({ ...reply, parts });
+    resolve({ ...reply, parts, seconds: (end - began) / 1000 });
   }
 
   /** The worker itself broke: nothing that is open will be answered. */

@@ -17,11 +17,6 @@ export function bindTabs() {
   });
 }
 
-/** Shows the tools of a tab by its name. */
-export function showTab(name) {
-  choose([...document.querySelectorAll("[role=tab]")], $(`tab-${name}`));
-}
-
 function choose(tabs, chosen) {
   for (const tab of tabs) {
     const is = tab === chosen;

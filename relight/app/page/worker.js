@@ -19,9 +19,9 @@ async function begin(module) {
   }
 }
 
-/** The clock, and for every other import of the module, which nothing calls, a function that says so if it is called. */
+/** For every import of the module, which nothing calls, a function that says so if it is called. */
 function importsOf(module) {
-  const imports = { env: { relight_now: () => performance.now() } };
+  const imports = {};
   for (const { module: from, name } of WebAssembly.Module.imports(module)) {
     imports[from] ??= {};
     imports[from][name] ??= () => {

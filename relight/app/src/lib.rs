@@ -6,16 +6,12 @@
 //! | `studio` | the engine: photographs, masks, scenes and what is asked of them |
 //! | `scenery` | panoramas that are made, so that a scene needs no file |
 //! | `browser` | the engine's functions that the page's worker calls |
-#![cfg_attr(
-    feature = "server",
-    doc = "| [`server`] | the page handed out, or written to a folder |"
-)]
+#![cfg_attr(feature = "server", doc = "| [`server`] | the page handed out |")]
 //!
 //! It knows the libraries of photographs, light and masks, and no terminal.
 
 #[cfg(target_arch = "wasm32")]
 mod browser;
-mod clock;
 mod message;
 mod scenery;
 #[cfg(feature = "server")]
@@ -23,7 +19,7 @@ pub mod server;
 mod studio;
 
 pub use message::{MessageFault, pack, unpack};
-pub use studio::{Studio, StudioError};
+pub use studio::Studio;
 
 /// The example of the README compiles.
 #[cfg(doctest)]

@@ -8,60 +8,36 @@ use relight_photo::insert::DiscLamp;
 const EXTENT: Extent = Extent::new(1024, 512);
 
 /// A panorama that is made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Scenery {
-    /// A photographer's room with two soft boxes.
-    Studio,
-    /// A room with a window on the left and a lamp.
-    Room,
-    /// A meadow under a clouded sky.
-    Overcast,
-    /// A meadow at noon.
-    Noon,
-    /// A beach before sunset.
-    Evening,
-    /// A square at night, between coloured lamps.
-    Night,
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scenery {
+    /// By what the page asks for it.
+    pub(crate) id: &'static str,
+    /// What a person reads.
+    pub(crate) name: &'static str,
+    radiance: fn(Direction) -> Colour,
 }
 
 impl Scenery {
-    /// All of them.
+    /// All of them: a photographer's room with two soft boxes, a room with a window on the left and a lamp, a meadow under a
+    /// clouded sky and at noon, a beach before sunset, a square at night between coloured lamps.
     pub(crate) const ALL: [Self; 6] = [
-        Self::Studio,
-        Self::Room,
-        Self::Overcast,
-        Self::Noon,
-        Self::Evening,
-        Self::Night,
+        Self::new("studio", "Studio", studio),
+        Self::new("room", "Room with a window", room),
+        Self::new("overcast", "Clouds", |towards| outside(towards, &OVERCAST)),
+        Self::new("noon", "Noon", |towards| outside(towards, &NOON)),
+        Self::new("evening", "Evening sun", |towards| {
+            outside(towards, &EVENING)
+        }),
+        Self::new("night", "Night", night),
     ];
 
-    /// By what the page asks for it.
-    pub(crate) const fn id(self) -> &'static str {
-        match self {
-            Self::Studio => "studio",
-            Self::Room => "room",
-            Self::Overcast => "overcast",
-            Self::Noon => "noon",
-            Self::Evening => "evening",
-            Self::Night => "night",
-        }
-    }
-
-    /// What a person reads.
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Studio => "Studio",
-            Self::Room => "Room with a window",
-            Self::Overcast => "Clouds",
-            Self::Noon => "Noon",
-            Self::Evening => "Evening sun",
-            Self::Night => "Night",
-        }
+    const fn new(id: &'static str, name: &'static str, radiance: fn(Direction) -> Colour) -> Self {
+        Self { id, name, radiance }
     }
 
     /// That of this id.
     pub(crate) fn of(id: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|scenery| scenery.id() == id)
+        Self::ALL.into_iter().find(|scenery| scenery.id == id)
     }
 
     /// The panorama.
@@ -83,21 +59,10 @@ impl Scenery {
             let places = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
             let sum = places.iter().fold([0.0; 3], |sum, (dx, dy)| {
                 let towards = blank.direction(x as f64 + dx, y as f64 + dy);
-                add(sum, self.radiance(towards))
+                add(sum, (self.radiance)(towards))
             });
             sum.map(|value| (value / places.len() as f64) as f32)
         })))
-    }
-
-    fn radiance(self, towards: Direction) -> Colour {
-        match self {
-            Self::Studio => studio(towards),
-            Self::Room => room(towards),
-            Self::Overcast => outside(towards, &OVERCAST),
-            Self::Noon => outside(towards, &NOON),
-            Self::Evening => outside(towards, &EVENING),
-            Self::Night => night(towards),
-        }
     }
 }
 
@@ -367,13 +332,16 @@ mod tests {
     #[test]
     fn each_has_a_name_of_its_own_and_is_found_by_its_id() {
         for scenery in Scenery::ALL {
-            assert_eq!(Scenery::of(scenery.id()), Some(scenery));
+            assert_eq!(
+                Scenery::of(scenery.id).map(|found| found.name),
+                Some(scenery.name)
+            );
             let names = Scenery::ALL
                 .iter()
-                .filter(|other| other.name() == scenery.name());
+                .filter(|other| other.name == scenery.name);
             assert_eq!(names.count(), 1);
         }
-        assert_eq!(Scenery::of("moon"), None);
+        assert!(Scenery::of("moon").is_none());
     }
 
     #[test]
@@ -390,13 +358,15 @@ mod tests {
 
     #[test]
     fn a_low_sun_is_warm_and_a_window_lights_from_the_left() {
-        let evening = Scenery::Evening
+        let evening = Scenery::of("evening")
+            .unwrap()
             .panorama_of(SMALL)
             .unwrap()
             .project(Order::TWO);
         let [r, _, b] = evening.coefficients()[0];
         assert!(r > 1.5 * b, "{r} {b}");
-        let room = Scenery::Room
+        let room = Scenery::of("room")
+            .unwrap()
             .panorama_of(SMALL)
             .unwrap()
             .project(Order::TWO);

@@ -60,12 +60,12 @@ export async function cutBall(page, size = { width: 640, height: 480 }) {
   const line = async (from, to) => draw(page, await onPhoto(page, size, from), await onPhoto(page, size, to));
   await line([x, y], [x + w, y + h]);
   await cutIsDone(page);
-  await page.click("[data-brush=object]");
+  await page.click("[data-tool=object]");
   await line([0.45, 0.5], [0.55, 0.5]);
-  await page.click("[data-brush=background]");
+  await page.click("[data-tool=background]");
   await line([0.05, 0.1], [0.2, 0.1]);
   await line([0.05, 0.9], [0.2, 0.9]);
-  await page.click("[data-brush=eraser]");
+  await page.click("[data-tool=eraser]");
   await line([0.05, 0.9], [0.2, 0.9]);
   await page.click("#cut-undo");
   await page.click("#cut-redo");

@@ -18,6 +18,8 @@ const COMPRESSED = /\.(png|jpg)$/;
 const folder = process.argv[2];
 const [digest, files, rows] = [createHash("sha256"), {}, []];
 for (const name of readdirSync(folder).sort()) {
+  // What a server is told, and no browser can ask for.
+  if (name === "_headers") continue;
   const bytes = readFileSync(join(folder, name));
   digest.update(name).update(bytes);
   files[name] = bytes.length;

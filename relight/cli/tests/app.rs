@@ -486,24 +486,16 @@ fn others_need_the_token_which_becomes_a_cookie() {
 }
 
 #[test]
-fn the_page_is_exported_for_any_server_and_what_is_missing_is_named() {
+fn a_page_that_is_missing_or_not_whole_is_named_and_so_is_a_taken_address() {
     let folder = tempfile::tempdir().unwrap();
     drop(Server::start(folder.path(), &["--listen", "127.0.0.1:0"]));
-    let (code, errors) = relight(
-        folder.path(),
-        &["serve", "--page", "page", "--export", "a/site"],
-    );
-    assert_eq!((code, errors.as_str()), (0, ""));
-    let site = folder.path().join("a/site");
-    assert_eq!(fs::read(site.join("a.wasm")).unwrap(), b"\0asm");
-    assert!(
-        fs::read_to_string(site.join("_headers"))
-            .unwrap()
-            .contains("require-corp")
-    );
-    assert_eq!(fs::read(site.join("a.wasm.gz")).unwrap(), b"compressed");
-    fs::write(site.join("index.html"), "half").unwrap();
-    for page in ["nowhere", "a/site"] {
+    let half = folder.path().join("half");
+    fs::create_dir(&half).unwrap();
+    for name in ["files.json", "a.wasm"] {
+        fs::copy(folder.path().join("page").join(name), half.join(name)).unwrap();
+    }
+    fs::write(half.join("index.html"), "half").unwrap();
+    for page in ["nowhere", "half"] {
         let (code, errors) = relight(folder.path(), &["serve", "--page", page]);
         assert!(
             code == 1 && errors.contains(page) && errors.contains("make app"),

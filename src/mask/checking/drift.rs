@@ -31,7 +31,6 @@ impl FrameDrift {
 
 /// How far the object lies beside the mask over the turn.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct DriftCheck {
     /// The median, pixels.
     pub median_px: f32,

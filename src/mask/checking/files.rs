@@ -1,23 +1,15 @@
 //! Where what was found about a mask is written: the page for a person, and the record for programs.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use relit_data::session::{MANIFEST_FILE, Recording};
 use serde::Serialize;
 
 use super::super::{MaskFiles, MaskingError};
-use super::report::MaskReport;
+use super::MaskReport;
 
 /// The schema of the record.
 const CHECK_SCHEMA: &str = "relit.mask-check/1";
-
-/// The files of one check.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct CheckFiles {
-    pub(super) page: PathBuf,
-    pub(super) record: PathBuf,
-}
 
 /// What the record holds.
 #[derive(Serialize)]
@@ -30,26 +22,20 @@ struct CheckRecord<'a> {
     report: &'a MaskReport,
 }
 
-impl CheckFiles {
-    /// `NAME-check.html` and `NAME-check.json` beside the mask. Where the mask is another session's, or lies apart
-    /// from the session that it is held against, the names have that session's too: the files of the mask's own
-    /// session stay.
-    pub(super) fn of(files: &MaskFiles, recording: &Recording) -> Self {
-        let mut stem = files.mask.file_stem().unwrap_or_default().to_owned();
-        if !is_own(&files.mask, recording) {
-            stem.push("-on-");
-            stem.push(&recording.id);
-        }
-        let named = |ending: &str| {
-            let mut name = OsString::from(&stem);
-            name.push(ending);
-            files.mask.with_file_name(name)
-        };
-        Self {
-            page: named("-check.html"),
-            record: named("-check.json"),
-        }
+/// The page and the record: `NAME-check.html` and `NAME-check.json` beside the mask. Where the mask is another session's, or
+/// lies apart from the session that it is held against, the names have that session's too: the files of the mask's own
+/// session stay.
+pub(super) fn check_files(files: &MaskFiles, recording: &Recording) -> [PathBuf; 2] {
+    let mut stem = files.mask.file_stem().unwrap_or_default().to_owned();
+    if !is_own(&files.mask, recording) {
+        stem.push("-on-");
+        stem.push(&recording.id);
     }
+    ["-check.html", "-check.json"].map(|ending| {
+        let mut name = stem.clone();
+        name.push(ending);
+        files.mask.with_file_name(name)
+    })
 }
 
 /// Whether the mask is that of the recording, as far as its place says.

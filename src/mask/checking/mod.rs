@@ -3,7 +3,6 @@
 mod drift;
 mod files;
 mod page;
-mod report;
 mod verdict;
 
 use std::path::{Path, PathBuf};
@@ -11,25 +10,51 @@ use std::path::{Path, PathBuf};
 use image::GrayImage;
 use relit_data::mask::{MaskPicture, size_hint};
 use relit_data::session::{MASK_FILE, Recording};
-use relit_grabcut::{Effort, MaskCheck, Registration, TURN_FRAMES, TurnFrames, TurnStatistics};
+use relit_grabcut::{Effort, MaskCheck, Registration, ShapeCheck, TURN_FRAMES};
 use relit_video::Video;
+use serde::Serialize;
 
 use super::files::{read_if_exists, write};
+use super::sampling::sampled;
 use super::{MaskFiles, MaskRecord, MaskingError};
 use drift::{drifts, summary, worst};
-use files::{CheckFiles, record};
+use files::{check_files, record};
 use verdict::verdict;
 
 pub use drift::{DriftCheck, FrameDrift};
-pub use report::{CheckOutput, MaskReport};
 pub use verdict::MaskVerdict;
+
+/// Everything that was found about a mask.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MaskReport {
+    /// Whether it fits.
+    pub verdict: MaskVerdict,
+    /// Why not, one sentence each; empty if it fits.
+    pub reasons: Vec<String>,
+    /// Where the object is over the turn; none if it was found in no frame.
+    pub drift: Option<DriftCheck>,
+    /// The mask's shape; none if hardly anything moves in the video.
+    pub shape: Option<ShapeCheck>,
+}
+
+/// A report that was written.
+#[derive(Debug, Clone)]
+pub struct CheckOutput {
+    /// The recording's id.
+    pub recording: String,
+    /// The report.
+    pub report: MaskReport,
+    /// The page: `NAME-check.html` beside the mask, or `NAME-on-RECORDING-check.html` where the mask is not the
+    /// recording's own.
+    pub page: PathBuf,
+}
 
 /// Holds a recording's mask (`mask`, or else the one in the session folder) against all its frames, and
 /// writes a page and a record about it beside the mask. `advanced` is called after each frame. Memory does not grow with the
 /// video, except for a few bytes a frame.
 ///
 /// # Errors
-/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Checked`] around the cause.
+/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Recording`] around the cause.
 pub fn check_mask(
     input: &Path,
     mask: Option<&Path>,
@@ -37,10 +62,7 @@ pub fn check_mask(
 ) -> Result<CheckOutput, MaskingError> {
     let recording = Recording::open(input)?;
     let checked = check_recording(&recording, mask, advanced);
-    let (report, page) = checked.map_err(|source| MaskingError::Checked {
-        recording: recording.id.clone(),
-        source: Box::new(source),
-    })?;
+    let (report, page) = checked.map_err(MaskingError::of(&recording))?;
     Ok(CheckOutput {
         recording: recording.id,
         report,
@@ -60,9 +82,8 @@ fn check_recording(
     check_size(&files.mask, picture.size(), &video)?;
     let image = object_of(&files.mask, &picture)?;
     let source = source_frame(&files, &video)?;
-    let sampled = video.spread(TURN_FRAMES);
-    let statistics = statistics(&video, image.dimensions(), &sampled)?;
-    let check = MaskCheck::new(&image, &statistics)?;
+    let turn = sampled(&video, image.dimensions(), &video.spread(TURN_FRAMES))?;
+    let check = MaskCheck::new(&image, &turn.statistics)?;
     let frame = video.frame(source)?;
     let origin = check.register(&frame);
     let registered = register_all(&video, &check, image.dimensions(), advanced)?;
@@ -78,29 +99,26 @@ fn check_recording(
     };
     let shown = worst(&drifts, source, video.frames().len());
     let page = page::page(&recording.id, &report, &drifts, &shown, &video, &image)?;
-    let files = CheckFiles::of(&files, recording);
-    let record = record(&recording.id, &report, &png, &files.record)?;
-    write(&files.page, page.as_bytes())?;
-    write(&files.record, &record)?;
-    Ok((report, files.page))
+    let [page_file, record_file] = check_files(&files, recording);
+    let record = record(&recording.id, &report, &png, &record_file)?;
+    write(&page_file, page.as_bytes())?;
+    write(&record_file, &record)?;
+    Ok((report, page_file))
 }
 
 /// The picture of the mask, and its file.
 fn read_mask(path: &Path) -> Result<(MaskPicture, Vec<u8>), MaskingError> {
     let bytes = std::fs::read(path).map_err(MaskingError::io(path, "read"))?;
-    let image = relit_still::decode(&bytes).map_err(|error| MaskingError::Check {
-        path: path.to_owned(),
-        why: format!("it {error}"),
-    })?;
+    let image = relit_still::decode(&bytes);
+    let image = image.map_err(|error| MaskingError::unusable("mask", path, &error))?;
     Ok((MaskPicture::of_image(&image), bytes))
 }
 
 /// What the mask marks: 255, and 0 elsewhere.
 fn object_of(path: &Path, picture: &MaskPicture) -> Result<GrayImage, MaskingError> {
-    let object = picture.object().map_err(|fault| MaskingError::Check {
-        path: path.to_owned(),
-        why: format!("it {fault}"),
-    })?;
+    let object = picture.object();
+    let object =
+        object.map_err(|fault| MaskingError::unusable("mask", path, &format!("it {fault}")))?;
     let levels = object.inside.iter().map(|&inside| u8::from(inside) * 255);
     let (width, height) = picture.size();
     Ok(GrayImage::from_raw(width, height, levels.collect()).unwrap_or_default())
@@ -113,15 +131,13 @@ fn check_size(path: &Path, mask: (u32, u32), video: &Video) -> Result<(), Maskin
         return Ok(());
     }
     let hint = size_hint((width, height), (facts.width, facts.height));
-    Err(MaskingError::Check {
-        path: path.to_owned(),
-        why: format!(
-            "it is {width} x {height} pixels and the frames are {} x {}{}",
-            facts.width,
-            facts.height,
-            hint.map(|hint| format!("; {hint}")).unwrap_or_default()
-        ),
-    })
+    let why = format!(
+        "it is {width} x {height} pixels and the frames are {} x {}{}",
+        facts.width,
+        facts.height,
+        hint.map(|hint| format!("; {hint}")).unwrap_or_default()
+    );
+    Err(MaskingError::unusable("mask", path, &why))
 }
 
 /// The frame on which the mask was made, if its record says so and the video has it.
@@ -133,18 +149,6 @@ fn source_frame(files: &MaskFiles, video: &Video) -> Result<u64, MaskingError> {
         Ok(at) if at < video.frames().len() => frame,
         _ => 0,
     })
-}
-
-fn statistics(
-    video: &Video,
-    size: (u32, u32),
-    frames: &[u64],
-) -> Result<TurnStatistics, MaskingError> {
-    let mut turn = TurnFrames::new(size.0, size.1);
-    for picture in video.pictures(frames, size)? {
-        turn.push(&picture.1);
-    }
-    Ok(TurnStatistics::new(&turn))
 }
 
 /// Where the object is in each frame in which it is found, in the order of the frames.

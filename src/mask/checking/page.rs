@@ -1,4 +1,4 @@
-//! The page about a mask: verdict, figures, the drift over the turn, and the worst frames. One file without
+//! The page about a mask: verdict and reasons, the drift over the turn, and the worst frames. One file without
 //! scripts that loads nothing.
 
 use std::fmt::Write;
@@ -8,13 +8,12 @@ use base64::engine::general_purpose::STANDARD;
 use image::codecs::jpeg::JpegEncoder;
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
-use relit_grabcut::{DoubtfulRegion, MaskError, preview};
+use relit_grabcut::{MaskError, preview};
 use relit_video::Video;
 
 use super::super::MaskingError;
+use super::MaskReport;
 use super::drift::FrameDrift;
-use super::report::MaskReport;
-use super::verdict::MaskVerdict;
 
 /// JPEG quality of the frames, 1 to 100.
 const QUALITY: u8 = 85;
@@ -25,7 +24,6 @@ const LEAST_HEIGHT: f32 = 2.0;
 
 const STYLE: &str = "body{font:16px/1.4 system-ui,sans-serif;max-width:56rem;margin:1rem auto;padding:0 1rem;color:#1b1e24}\
 h1{font-size:1.2rem}.verdict{font-weight:700}.fits{color:#13703a}.drifts,.unknown{color:#96550a}.wrong{color:#b3261e}\
-table{border-collapse:collapse}td{padding:.1rem 1rem .1rem 0;font-variant-numeric:tabular-nums}\
 svg{width:100%;height:auto;background:#f4f5f7}figure{display:inline-block;margin:.3rem;vertical-align:top}img{max-width:26rem;width:100%}";
 
 pub(super) fn page(
@@ -36,12 +34,7 @@ pub(super) fn page(
     video: &Video,
     mask: &GrayImage,
 ) -> Result<String, MaskingError> {
-    let (word, class) = match report.verdict {
-        MaskVerdict::Fits => ("The mask fits.", "fits"),
-        MaskVerdict::Drifts => ("The object moves beside the mask.", "drifts"),
-        MaskVerdict::Wrong => ("The mask is not that of the object.", "wrong"),
-        MaskVerdict::Unknown => ("Nothing can be said about the mask.", "unknown"),
-    };
+    let (class, word) = report.verdict.words();
     let id = escaped(id);
     let reasons: String = report
         .reasons
@@ -52,9 +45,8 @@ pub(super) fn page(
     Ok(format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
          <title>The mask of {id}</title><style>{STYLE}</style></head><body>\n<h1>The mask of {id}</h1>\n\
-         <p class=\"verdict {class}\">{word}</p>\n<ul>{reasons}</ul>\n<table>{}</table>\n\
+         <p class=\"verdict {class}\">{word}.</p>\n<ul>{reasons}</ul>\n\
          <h2>Drift over the turn, pixels</h2>\n{}\n<h2>The mask's own frame, and the worst ones</h2>\n{frames}</body></html>\n",
-        table(report),
         plot(drifts, video.frames().len()),
     ))
 }
@@ -64,55 +56,6 @@ fn escaped(text: &str) -> String {
     text.replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
-}
-
-fn table(report: &MaskReport) -> String {
-    let mut rows = Vec::new();
-    if let Some(drift) = &report.drift {
-        let most = drift.most;
-        rows.push(("Drift, median", format!("{:.2} px", drift.median_px)));
-        rows.push((
-            "Drift, 95 % of frames below",
-            format!("{:.2} px", drift.p95_px),
-        ));
-        rows.push((
-            "Drift, largest",
-            format!("{:.2} px in frame {}", most.px(), most.frame),
-        ));
-        rows.push((
-            "Frames",
-            format!(
-                "{}, and {} in which the object was not found",
-                drift.frames, drift.unsure
-            ),
-        ));
-    }
-    if let Some(shape) = &report.shape {
-        let sum = |regions: &[DoubtfulRegion]| regions.iter().map(|region| region.px).sum::<u64>();
-        rows.push((
-            "The turn's own mask, intersection over union",
-            format!("{:.3}", shape.iou),
-        ));
-        rows.push((
-            "Distance of the outlines, median and 95 %",
-            format!("{:.1} and {:.1} px", shape.edge_px[0], shape.edge_px[1]),
-        ));
-        rows.push((
-            "Outline along what moves, this and the turn's",
-            format!("{:.2} and {:.2}", shape.outline, shape.outline_of_turn),
-        ));
-        rows.push((
-            "Background in the mask",
-            format!("{} px", sum(&shape.leaks)),
-        ));
-        rows.push((
-            "Object outside the mask",
-            format!("{} px", sum(&shape.missing)),
-        ));
-        rows.push(("Holes in the object", format!("{} px", sum(&shape.holes))));
-    }
-    let row = |(name, value): (&str, String)| format!("<tr><td>{name}</td><td>{value}</td></tr>");
-    rows.into_iter().map(row).collect()
 }
 
 /// Drift over the frames as a line.

@@ -24,6 +24,19 @@ pub enum MaskVerdict {
     Unknown,
 }
 
+impl MaskVerdict {
+    /// In a word, and in a sentence.
+    #[must_use]
+    pub const fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Fits => ("fits", "The mask fits"),
+            Self::Drifts => ("drifts", "The object moves beside the mask"),
+            Self::Wrong => ("wrong", "The mask is not that of the object"),
+            Self::Unknown => ("unknown", "Nothing can be said about the mask"),
+        }
+    }
+}
+
 /// The verdict about a mask, and why it is not "fits".
 pub(super) fn verdict(
     drift: Option<&DriftCheck>,
@@ -69,8 +82,6 @@ mod tests {
             outline: 0.8,
             outline_of_turn: 0.8,
             contradicted: false,
-            iou: 0.99,
-            edge_px: [0.0, 1.0],
             leaks: Vec::new(),
             missing: Vec::new(),
             holes: Vec::new(),

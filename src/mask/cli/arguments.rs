@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use clap::error::ErrorKind;
-use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand};
 use relit_data::geometry::Rect;
-use relit_grabcut::{Drawing, Feather, Iterations, SegmentSettings};
-use relit_mask::{BoxKind, MaskEngine, MaskFiles, MaskRequest, MaskingError, read_seeds};
+use relit_grabcut::{Hints, SegmentSettings};
+use relit_mask::{
+    MaskEngine, MaskFiles, MaskRequest, MaskingError, OPENCV_KNOWS_NO_TURN, read_seeds,
+};
 use relit_web::ListenAddress;
 
 const EXAMPLES: &str = "\
@@ -17,7 +19,6 @@ Examples:
   relit-mask clip.mp4 --seeds seeds.png --frame 30 -o masks/mug.png
   relit-mask sessions/ --rect 610,240,420,380 --keep-all
   relit-mask check 20261120T093015Z-mug
-  relit-mask bench images/
 
 Check mask-preview.png afterwards. Exit codes: 0 all masks made, 1 none, 2 wrong usage, \
 3 some recordings have no mask.";
@@ -59,60 +60,6 @@ pub(crate) enum Verb {
         #[arg(long, requires = "json")]
         progress: bool,
     },
-    /// Measure masks of images with ground truth, and OpenCV's GrabCut beside them if it is built in
-    #[command(after_help = "Example:\n  relit-mask bench images/")]
-    Bench {
-        /// A folder with NAME.jpg, NAME.gt.png, and NAME.box.txt or NAME.scribble.png for each image
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-        /// Rectangles made from the ground truth in place of NAME.box.txt: 2 pixels around the object, 12 % around it,
-        /// or without its left tenth
-        #[arg(long, value_name = "KIND", value_delimiter = ',')]
-        boxes: Vec<BoxName>,
-        /// Choose where cuts of a rectangle start anew for each of N parts of the images, on the other parts
-        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..))]
-        folds: Option<u8>,
-        /// Measure also our masks cut at each image's own size, which coarse to fine comes close to
-        #[arg(long)]
-        whole: bool,
-        /// Print one JSON line per event on standard output
-        #[arg(long)]
-        json: bool,
-    },
-}
-
-/// The names of rectangles that are made from the ground truth.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum BoxName {
-    Tight,
-    Loose,
-    Cut,
-}
-
-impl From<BoxName> for BoxKind {
-    fn from(name: BoxName) -> Self {
-        match name {
-            BoxName::Tight => Self::Tight,
-            BoxName::Loose => Self::Loose,
-            BoxName::Cut => Self::Cut,
-        }
-    }
-}
-
-/// The names of the engines.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum EngineName {
-    Relit,
-    Opencv,
-}
-
-impl From<EngineName> for MaskEngine {
-    fn from(name: EngineName) -> Self {
-        match name {
-            EngineName::Relit => Self::Relit,
-            EngineName::Opencv => Self::OpenCv,
-        }
-    }
 }
 
 /// What mask is to be made.
@@ -159,23 +106,11 @@ pub(crate) struct MaskArguments {
         default_value = "relit",
         conflicts_with = "edit"
     )]
-    engine: EngineName,
-
-    /// Number of GrabCut's iterations
-    #[arg(long, value_name = "N", default_value = "5", value_parser = iterations)]
-    iterations: Iterations,
+    engine: MaskEngine,
 
     /// Keep every connected part, not only the largest
     #[arg(long)]
     keep_all: bool,
-
-    /// Width of a soft edge in pixels; 0 is a hard edge
-    #[arg(long, value_name = "PX", default_value = "0", value_parser = feather)]
-    feather: Feather,
-
-    /// Write also how much of each pixel is object: alpha.png beside mask.png
-    #[arg(long)]
-    alpha: bool,
 
     /// The mask's file name, ending in .png [default: mask.png in the session folder, or here]
     #[arg(short, long, value_name = "PNG", value_parser = output)]
@@ -187,7 +122,7 @@ pub(crate) struct MaskArguments {
 
     /// Make the mask again that this mask.json describes, to the same bytes
     #[arg(long, value_name = "JSON", conflicts_with_all =
-        ["rect", "seeds", "auto", "frame", "engine", "iterations", "keep_all", "feather", "alpha"])]
+        ["rect", "seeds", "auto", "frame", "engine", "keep_all"])]
     recipe: Option<PathBuf>,
 
     /// Print one JSON line per event on standard output
@@ -201,22 +136,23 @@ impl MaskArguments {
     /// # Errors
     /// If seeds or recipe cannot be read, or the engine is not built in.
     pub(crate) fn request(&self) -> Result<MaskRequest, MaskingError> {
-        let request = match &self.recipe {
-            Some(path) => MaskRequest::from_recipe(path)?,
-            None => {
-                let drawing = Drawing {
-                    rect: self.rect,
-                    seeds: self.seeds.as_deref().map(read_seeds).transpose()?,
-                    ..Drawing::default()
-                };
-                let request = match self.auto {
-                    true => MaskRequest::auto(self.frame, drawing, self.settings()),
-                    false => MaskRequest::new(self.frame, drawing, self.settings()),
-                };
-                request.with_engine(self.engine.into())?
-            }
+        if let Some(path) = &self.recipe {
+            let mut request = MaskRequest::from_recipe(path)?;
+            request.force = self.force;
+            return Ok(request);
+        }
+        let hints = Hints {
+            rect: self.rect,
+            seeds: self.seeds.as_deref().map(read_seeds).transpose()?,
+            ..Hints::default()
         };
-        Ok(request.with_force(self.force))
+        let keep_all = self.keep_all;
+        let mut request = MaskRequest::new(self.frame, hints, SegmentSettings { keep_all });
+        if self.auto {
+            request = request.by_turn();
+        }
+        request.force = self.force;
+        request.with_engine(self.engine)
     }
 
     /// Refuses OpenCV's engine for a turn, and one name, or one page, for the masks of several recordings.
@@ -226,9 +162,7 @@ impl MaskArguments {
     pub(crate) fn check(&self, recordings: usize) -> Result<(), clap::Error> {
         let input = self.input.display();
         let text = match (self.edit, &self.output) {
-            _ if self.auto && matches!(self.engine, EngineName::Opencv) => {
-                MaskingError::OpenCvKnowsNoTurn.to_string()
-            }
+            _ if self.auto && self.engine == MaskEngine::OpenCv => OPENCV_KNOWS_NO_TURN.to_owned(),
             _ if recordings == 1 => return Ok(()),
             (true, _) => format!(
                 "--edit shows one recording, but {input} holds {recordings}: name one of them"
@@ -240,25 +174,6 @@ impl MaskArguments {
         };
         Err(CommandLine::command().error(ErrorKind::ArgumentConflict, text))
     }
-
-    fn settings(&self) -> SegmentSettings {
-        SegmentSettings {
-            iterations: self.iterations,
-            keep_all: self.keep_all,
-            feather: self.feather,
-            alpha: self.alpha,
-        }
-    }
-}
-
-fn iterations(text: &str) -> Result<Iterations, String> {
-    let count = text.parse().map_err(|_| "not a whole number".to_owned())?;
-    Iterations::new(count).map_err(|error| error.to_string())
-}
-
-fn feather(text: &str) -> Result<Feather, String> {
-    let px = text.parse().map_err(|_| "not a whole number".to_owned())?;
-    Feather::new(px).map_err(|error| error.to_string())
 }
 
 fn output(text: &str) -> Result<MaskFiles, MaskingError> {

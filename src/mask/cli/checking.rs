@@ -41,12 +41,7 @@ pub(crate) fn run(
 
 fn print(output: &CheckOutput, console: Console) {
     let (id, report) = (&output.recording, &output.report);
-    let word = match report.verdict {
-        MaskVerdict::Fits => "the mask fits",
-        MaskVerdict::Drifts => "the object moves beside the mask",
-        MaskVerdict::Wrong => "the mask is not that of the object",
-        MaskVerdict::Unknown => "nothing can be said about the mask",
-    };
+    let (_, word) = report.verdict.words();
     let drift = report.drift.as_ref().map_or(String::new(), |drift| {
         format!(
             "; drift {:.2} px in the median, {:.2} px at most (frame {})",

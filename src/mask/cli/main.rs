@@ -1,16 +1,13 @@
 //! `relit-mask`: finds the object in recordings.
 
 mod arguments;
-mod benching;
 mod checking;
 mod making;
-mod report;
 
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
 use relit_console::Console;
-use relit_mask::BoxKind;
 
 use arguments::{CommandLine, Verb};
 
@@ -31,20 +28,6 @@ fn main() -> ExitCode {
         ) => {
             let console = Console::new(json).with_progress(progress);
             console.finish(checking::run(console, &input, mask.as_deref()))
-        }
-        (
-            Some(Verb::Bench {
-                folder,
-                boxes,
-                folds,
-                whole,
-                json,
-            }),
-            _,
-        ) => {
-            let console = Console::new(json);
-            let boxes = boxes.into_iter().map(BoxKind::from).collect();
-            console.finish(benching::run(console, &folder, boxes, folds, whole))
         }
         (None, Some(arguments)) => making::run(&arguments),
         (None, None) => {

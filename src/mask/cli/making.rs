@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use relit_console::{Console, Outcome};
+use relit_console::{Console, Event, Outcome};
 use relit_data::session::{beside_sessions, recordings};
-use relit_mask::{MaskingError, edit, make_mask};
+use relit_mask::{MaskOutput, MaskingError, edit, make_mask};
 use relit_web::Announcement;
+use serde_json::json;
 
 use super::arguments::MaskArguments;
-use super::report;
 
 /// Makes the mask of every recording that the arguments name.
 pub(crate) fn run(arguments: &MaskArguments) -> ExitCode {
@@ -55,10 +55,10 @@ fn says_unused(paths: &[PathBuf], input: &Path, console: Console) -> bool {
 fn draw(path: &Path, arguments: &MaskArguments, console: Console) -> Result<Outcome, MaskingError> {
     let request = arguments.request()?;
     let output = arguments.output.clone();
-    let announce = |announcement: &Announcement| report::print_editor(announcement, console);
+    let announce = |announcement: &Announcement| print_editor(announcement, console);
     match edit(path, output, request, arguments.listen.socket(), announce)? {
         Some(output) => {
-            report::print(&output, console);
+            print(&output, console);
             Ok(Outcome::Whole)
         }
         None => {
@@ -78,7 +78,7 @@ fn make(
     let mut failed = 0;
     for path in paths {
         match make_mask(path, arguments.output.clone(), &request) {
-            Ok(output) => bar.suspend(|| report::print(&output, console)),
+            Ok(output) => bar.suspend(|| print(&output, console)),
             Err(error) if paths.len() == 1 => return Err(error),
             Err(error) => {
                 failed += 1;
@@ -93,4 +93,55 @@ fn make(
         all if all == paths.len() => Outcome::Wrong,
         _ => Outcome::Incomplete,
     })
+}
+
+/// Prints the warnings about one mask, its files and its size.
+fn print(output: &MaskOutput, console: Console) {
+    let id = &output.recording;
+    for notice in &output.notices {
+        console.warn(&format!("{id}: {}", notice.text()));
+    }
+    for warning in &output.record.warnings {
+        console.warn(&format!("{id}: {warning}"));
+    }
+    let (source, result) = (&output.record.source, &output.record.result);
+    let found = result.statistics;
+    let frame_px = f64::from(source.width) * f64::from(source.height);
+    let text = format!(
+        "{id}: {} with {} pixels ({:.1} % of the frame) at {}, {} of {} parts; check {}",
+        output.files.mask.display(),
+        found.area_px,
+        100.0 * found.area_px as f64 / frame_px,
+        found.bounding_box,
+        found.components_kept,
+        found.components,
+        output.files.preview.display(),
+    );
+    let path = |path: &Path| path.to_string_lossy().into_owned();
+    let event = Event::Mask {
+        recording: id.clone(),
+        mask: path(&output.files.mask),
+        record: path(&output.files.record),
+        preview: path(&output.files.preview),
+        source: json!(source),
+        result: json!(result),
+        warnings: output.record.warnings.clone(),
+    };
+    console.say(&text, &event);
+}
+
+/// Prints where the editor is.
+fn print_editor(announcement: &Announcement, console: Console) {
+    let url = &announcement.url;
+    let qr = match (announcement.address.ip().is_loopback(), &announcement.qr) {
+        (false, Some(qr)) => format!("{qr}\n"),
+        _ => String::new(),
+    };
+    console.say(
+        &format!("{qr}Open in a browser: {url}"),
+        &Event::Editor {
+            address: announcement.address.to_string(),
+            url: url.clone(),
+        },
+    );
 }

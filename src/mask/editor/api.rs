@@ -10,59 +10,63 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use relit_data::causes::with_causes;
-use relit_data::geometry::Rect;
-use relit_grabcut::{Effort, Warning, outline};
+use relit_grabcut::{Effort, outline};
 use relit_video::VideoError;
-use relit_web::{AccessPolicy, BodyLimit, Failure, Index, JsonBody, QueryParams, Shutdown, guard};
-use serde::{Deserialize, Serialize};
+use relit_web::{
+    AccessPolicy, BodyLimit, Failure, Index, JsonBody, PageAsset, QueryParams, SCRIPT, SKETCH,
+    STYLE, Shutdown, asset, guard,
+};
+use serde::Deserialize;
+use serde_json::{Value, json};
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
 use super::super::{MaskRecord, MaskingError};
-use super::page;
-use super::session::{Description, EditorSession, Sketch};
+use super::session::{EditorSession, Sketch};
+
+/// The page itself.
+pub(super) const INDEX: Index = Index(include_str!("page/index.html"));
+/// Its files that are not shared with other pages.
+const ASSETS: [PageAsset; 3] = [
+    asset("/editor.css", STYLE, include_str!("page/editor.css")),
+    asset("/editor.js", SCRIPT, include_str!("page/editor.js")),
+    asset("/icon.svg", "image/svg+xml", include_str!("page/icon.svg")),
+];
+
+/// All files but the page itself.
+fn assets() -> impl Iterator<Item = &'static PageAsset> {
+    ASSETS.iter().chain(&SKETCH)
+}
+
+/// The paths of the page and its files, which hold nothing of the recording and need no token.
+pub(super) fn page_paths() -> Vec<&'static str> {
+    assets().map(|asset| asset.path).chain(["/"]).collect()
+}
 
 /// Largest sketch: some hundred thousand points.
-const BODY: BodyLimit = BodyLimit {
+pub(super) const BODY: BodyLimit = BodyLimit {
     bytes: 4 << 20,
     time: Duration::from_secs(20),
 };
-/// Frames decoded, and masks cut, at once.
-const AT_ONCE: usize = 2;
 /// Widest picture of a frame that can be asked for, pixels.
 const WIDEST: u32 = 8192;
+
+/// The record of the mask that was written.
+pub(super) type Accepted = Arc<Mutex<Option<MaskRecord>>>;
 
 /// What all requests share.
 #[derive(Clone, FromRef)]
 pub(super) struct App {
-    session: Arc<EditorSession>,
-    policy: Arc<AccessPolicy>,
-    shutdown: Shutdown,
-    accepted: Arc<Mutex<Option<MaskRecord>>>,
-    permits: Arc<Semaphore>,
+    pub(super) session: Arc<EditorSession>,
+    pub(super) policy: Arc<AccessPolicy>,
+    pub(super) shutdown: Shutdown,
+    pub(super) accepted: Accepted,
+    pub(super) permits: Arc<Semaphore>,
+    pub(super) index: Index,
+    pub(super) limit: BodyLimit,
 }
 
 impl App {
-    pub(super) fn new(
-        session: Arc<EditorSession>,
-        policy: Arc<AccessPolicy>,
-        shutdown: Shutdown,
-    ) -> Self {
-        Self {
-            session,
-            policy,
-            shutdown,
-            accepted: Arc::default(),
-            permits: Arc::new(Semaphore::new(AT_ONCE)),
-        }
-    }
-
-    /// The record of the mask that was written.
-    pub(super) fn accepted(&self) -> Option<MaskRecord> {
-        let accepted = self.accepted.lock();
-        accepted.unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
     /// Works on the recording, on a thread for it.
     async fn work<T: Send + 'static>(
         &self,
@@ -80,18 +84,6 @@ impl App {
     }
 }
 
-impl FromRef<App> for Index {
-    fn from_ref(_: &App) -> Self {
-        page::INDEX
-    }
-}
-
-impl FromRef<App> for BodyLimit {
-    fn from_ref(_: &App) -> Self {
-        BODY
-    }
-}
-
 /// Everything that is served.
 pub(super) fn router(app: &App) -> Router {
     let mut router = Router::new()
@@ -101,7 +93,7 @@ pub(super) fn router(app: &App) -> Router {
         .route("/api/v1/mask", post(mask))
         .route("/api/v1/accept", post(accept))
         .route("/api/v1/discard", post(discard));
-    for asset in &page::ASSETS {
+    for asset in assets() {
         router = router.route(asset.path, get(async || asset.answer()));
     }
     router
@@ -120,7 +112,7 @@ fn failure(error: MaskingError) -> Failure {
     Failure::new(status, with_causes(&error))
 }
 
-async fn recording(State(session): State<Arc<EditorSession>>) -> Json<Description> {
+async fn recording(State(session): State<Arc<EditorSession>>) -> Json<Value> {
     Json(session.description())
 }
 
@@ -149,60 +141,40 @@ struct Wanted {
     draft: bool,
 }
 
-/// The mask of a sketch, for showing it.
-#[derive(Serialize)]
-struct Shown {
-    /// Polygons, to be filled by the even-odd rule.
-    outline: Vec<Vec<[u32; 2]>>,
-    area_px: u64,
-    bounding_box: Rect,
-    warnings: Vec<String>,
-    /// Whether accepting writes just this mask.
-    exact: bool,
-    /// How long the cut took.
-    ms: u64,
-}
-
+/// The mask of a sketch, for showing it. The outline is polygons, to be filled by the even-odd rule.
 async fn mask(
     State(app): State<App>,
     QueryParams(Wanted { draft }): QueryParams<Wanted>,
     JsonBody(sketch): JsonBody<Sketch>,
-) -> Result<Json<Shown>, Failure> {
+) -> Result<Json<Value>, Failure> {
     let effort = if draft { Effort::Draft } else { Effort::Fine };
     let exact = !draft || app.session.is_small();
     let shown = app.work(move |session| {
         let began = Instant::now();
         let mask = session.cut(sketch, effort)?;
-        Ok(Shown {
-            outline: outline(mask.image()),
-            area_px: mask.statistics().area_px,
-            bounding_box: mask.statistics().bounding_box,
-            warnings: mask.warnings().iter().map(Warning::to_string).collect(),
-            exact,
-            ms: began.elapsed().as_millis() as u64,
-        })
+        Ok(json!({
+            "outline": outline(&mask.image),
+            "area_px": mask.statistics.area_px,
+            "bounding_box": mask.statistics.bounding_box,
+            "warnings": mask.warnings,
+            // Whether accepting writes just this mask.
+            "exact": exact,
+            "ms": began.elapsed().as_millis() as u64,
+        }))
     });
     Ok(Json(shown.await?))
-}
-
-/// What was written.
-#[derive(Serialize)]
-struct Accepted {
-    area_px: u64,
-    mask_blake3: String,
-    warnings: Vec<String>,
 }
 
 async fn accept(
     State(app): State<App>,
     JsonBody(sketch): JsonBody<Sketch>,
-) -> Result<Json<Accepted>, Failure> {
+) -> Result<Json<Value>, Failure> {
     let record = app.work(move |session| session.write(sketch)).await?;
-    let accepted = Accepted {
-        area_px: record.result.area_px,
-        mask_blake3: record.result.mask_blake3.clone(),
-        warnings: record.warnings.clone(),
-    };
+    let accepted = json!({
+        "area_px": record.result.statistics.area_px,
+        "mask_blake3": record.result.mask_blake3,
+        "warnings": record.warnings,
+    });
     *app.accepted.lock().unwrap_or_else(PoisonError::into_inner) = Some(record);
     app.shutdown.cancel();
     Ok(Json(accepted))

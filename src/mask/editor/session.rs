@@ -6,9 +6,10 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ImageError, RgbImage, imageops};
 use relit_data::geometry::Rect;
 use relit_data::session::Recording;
-use relit_grabcut::{Drawing, Effort, MIN_TURN_FRAMES, Mask, Seeds, Strokes};
+use relit_grabcut::{Effort, Hints, MIN_TURN_FRAMES, Mask, Strokes};
 use relit_video::Video;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde_json::{Value, json};
 
 use super::super::files::{check_replaceable, make_folder};
 use super::super::making::{cut, write_files};
@@ -20,7 +21,7 @@ use super::super::{MaskFiles, MaskRecord, MaskRequest, MaskingError, SourceFrame
 const QUALITY: u8 = 88;
 
 /// Everything that was drawn.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Sketch {
     /// The frame on which the mask is made.
@@ -29,22 +30,6 @@ pub(super) struct Sketch {
     auto: bool,
     rect: Option<Rect>,
     strokes: Strokes,
-}
-
-/// What the page has to know at its start.
-#[derive(Debug, Serialize)]
-pub(super) struct Description {
-    recording: String,
-    width: u32,
-    height: u32,
-    frames: usize,
-    /// Whether there are enough frames to look at the turn.
-    turn: bool,
-    /// Whether painted seeds apply besides what is drawn.
-    seeds: bool,
-    /// The mask's file.
-    output: String,
-    sketch: Sketch,
 }
 
 /// A frame of the recording.
@@ -61,7 +46,6 @@ pub(super) struct EditorSession {
     video: Video,
     files: MaskFiles,
     request: MaskRequest,
-    seeds: Option<Seeds>,
     frame: Mutex<Option<Arc<Frame>>>,
     turn: Mutex<Option<Arc<SampledTurn>>>,
 }
@@ -77,7 +61,6 @@ impl EditorSession {
             recording: recording.id.clone(),
             video,
             files,
-            seeds: request.drawing.seeds.clone(),
             request,
             frame: Mutex::default(),
             turn: Mutex::default(),
@@ -86,43 +69,40 @@ impl EditorSession {
         Ok(session)
     }
 
-    pub(super) fn description(&self) -> Description {
+    /// What the page has to know at its start.
+    pub(super) fn description(&self) -> Value {
         let facts = self.video.facts();
         let frames = self.video.frames().len();
-        Description {
-            recording: self.recording.clone(),
-            width: facts.width,
-            height: facts.height,
-            frames,
-            turn: frames >= MIN_TURN_FRAMES,
-            seeds: self.seeds.is_some(),
-            output: self.files.mask.display().to_string(),
-            sketch: Sketch {
-                frame: self.request.frame,
-                auto: self.request.turn != TurnRequest::None,
-                rect: self.request.drawing.rect,
-                strokes: self.request.drawing.strokes.clone(),
+        let MaskRequest {
+            frame, hints, turn, ..
+        } = &self.request;
+        json!({
+            "recording": self.recording,
+            "width": facts.width,
+            "height": facts.height,
+            "frames": frames,
+            // Whether there are enough frames to look at the turn.
+            "turn": frames >= MIN_TURN_FRAMES,
+            // Whether painted seeds apply besides what is drawn.
+            "seeds": hints.seeds.is_some(),
+            "output": self.files.mask.display().to_string(),
+            "sketch": {
+                "frame": frame,
+                "auto": *turn != TurnRequest::None,
+                "rect": hints.rect,
+                "strokes": hints.strokes,
             },
-        }
+        })
     }
 
     /// A frame as JPEG, scaled to `width` where it is wider.
     pub(super) fn jpeg(&self, number: u64, width: u32) -> Result<Vec<u8>, MaskingError> {
-        let kept = self.kept_frame(number);
-        let decoded = match &kept {
-            Some(_) => None,
-            None => Some(self.video.frame(number)?),
+        let encoded = match self.kept_frame(number) {
+            Some(frame) => encode(&frame.picture, width),
+            None => encode(&self.video.frame(number)?, width),
         };
-        let picture = kept
-            .as_ref()
-            .map(|frame| &frame.picture)
-            .or(decoded.as_ref());
-        let encoded = picture.map(|picture| encode(picture, width)).transpose();
-        let encoded = encoded.map_err(|source| relit_grabcut::MaskError::Encode {
-            what: "the frame",
-            source,
-        })?;
-        Ok(encoded.unwrap_or_default())
+        let what = "the frame";
+        Ok(encoded.map_err(|source| relit_grabcut::MaskError::Encode { what, source })?)
     }
 
     /// The mask of a sketch.
@@ -145,7 +125,7 @@ impl EditorSession {
         let mask = cut(&frame.picture, turn.as_deref(), &request, Effort::Fine)?;
         let _made = make_folder(&self.files)?;
         // Somebody may have painted one meanwhile.
-        check_replaceable(&self.files, request.force, request.settings.alpha)?;
+        check_replaceable(&self.files, request.force)?;
         let source = frame.source.clone();
         let turn = turn.as_deref();
         write_files(&frame.picture, source, turn, &mask, &self.files, &request)
@@ -154,21 +134,21 @@ impl EditorSession {
     /// Whether a draft of the mask is the mask itself.
     pub(super) fn is_small(&self) -> bool {
         let facts = self.video.facts();
-        Effort::Draft.covers(facts.width, facts.height)
+        Effort::Draft.covers(facts.width as usize * facts.height as usize)
     }
 
     fn request_of(&self, sketch: Sketch) -> MaskRequest {
-        let drawing = Drawing {
+        let hints = Hints {
             rect: sketch.rect,
-            seeds: self.seeds.clone(),
+            seeds: self.request.hints.seeds.clone(),
             strokes: sketch.strokes,
         };
-        let settings = self.request.settings;
-        let request = match sketch.auto {
-            true => MaskRequest::auto(sketch.frame, drawing, settings),
-            false => MaskRequest::new(sketch.frame, drawing, settings),
-        };
-        request.with_force(self.request.force)
+        let mut request = MaskRequest::new(sketch.frame, hints, self.request.settings);
+        if sketch.auto {
+            request = request.by_turn();
+        }
+        request.force = self.request.force;
+        request
     }
 
     fn frame(&self, number: u64) -> Result<Arc<Frame>, MaskingError> {

@@ -28,17 +28,17 @@ fn check(bytes: &[u8]) {
     let read = MaskRecord::from_json(&written).expect("what was written can be read");
     assert_eq!(read, record);
 
-    let Ok(drawing) = record.hints.drawing() else {
+    let Ok(hints) = record.hints.hints() else {
         return;
     };
-    assert_eq!(drawing.rect, record.hints.rect);
-    let again = RecordedHints::new(&drawing, &record.hints.turn_frames)
+    assert_eq!(hints.rect, record.hints.rect);
+    let again = RecordedHints::new(&hints, &record.hints.turn_frames)
         .expect("hints that were read can be recorded");
-    assert_eq!(again.drawing().ok().as_ref(), Some(&drawing));
+    assert_eq!(again.hints().ok().as_ref(), Some(&hints));
 
     // A frame of any size can be said to be the source; what is painted on a small one shows the same.
     let (width, height) = (record.source.width.min(64), record.source.height.min(64));
-    if let Ok(Some(seeds)) = drawing.strokes.paint((width, height), None) {
+    if let Ok(Some(seeds)) = hints.strokes.paint((width, height), None) {
         assert_eq!(seeds.size(), (width, height));
     }
 }

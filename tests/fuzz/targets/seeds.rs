@@ -4,7 +4,7 @@
 #![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 use libfuzzer_sys::fuzz_target;
-use relit_grabcut::{Drawing, Mark, Seeds};
+use relit_grabcut::{Hints, Mark, Seeds};
 use relit_mask::RecordedHints;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -17,11 +17,11 @@ fuzz_target!(|bytes: &[u8]| {
         u64::from(width) * u64::from(height)
     );
     assert!(seeds.marks().iter().any(|&mark| mark != Mark::Unknown));
-    let drawing = Drawing {
+    let hints = Hints {
         seeds: Some(seeds),
-        ..Drawing::default()
+        ..Hints::default()
     };
-    let recorded = RecordedHints::new(&drawing, &[]).expect("seeds can be recorded");
-    let again = recorded.drawing().expect("what was recorded can be read");
-    assert_eq!(again, drawing);
+    let recorded = RecordedHints::new(&hints, &[]).expect("seeds can be recorded");
+    let again = recorded.hints().expect("what was recorded can be read");
+    assert_eq!(again, hints);
 });

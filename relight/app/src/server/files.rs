@@ -1,20 +1,14 @@
-//! The files of the page: read whole from a folder, and written to another for any web server.
+//! The files of the page, read whole from a folder.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use relit_data::durable::write_whole;
 use serde::Deserialize;
 
 /// The list of the files, by which the page keeps them for work without a network.
 pub(super) const LIST: &str = "files.json";
-/// The headers that a server of the exported page should send, as several hosts read them from a file.
-const HEADERS: &str = "_headers";
-/// How the page is served, for the person who exported it.
-const README: &str = "README.txt";
-
 /// What the page may load: only its own files, and nothing runs in it that is not part of them.
 pub(super) const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; \
     img-src 'self' blob: data:; media-src 'self' blob:; connect-src 'self' blob:; worker-src 'self'; \
@@ -27,17 +21,6 @@ const CODINGS: [(&str, &str); 2] = [("br", "br"), ("gzip", "gz")];
 #[derive(Debug, Clone)]
 pub struct PageFiles {
     files: BTreeMap<String, PageFile>,
-}
-
-/// How large a page is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PageSize {
-    /// Files that a browser can ask for.
-    pub files: usize,
-    /// Their bytes.
-    pub bytes: u64,
-    /// The bytes that a browser receives which takes every coding.
-    pub compressed: u64,
 }
 
 /// A file, which was compressed when the page was built.
@@ -60,70 +43,23 @@ pub(super) struct Encoding {
 
 /// Why a page cannot be read or written.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum PageFault {
-    /// No folder is there in which a page would be.
+    /// There is none where one would be.
     #[error(
         "there is no page of relight in {}: build it by 'make app', install the Debian package relight, or give its folder by --page",
         either(places)
     )]
-    NotInstalled {
+    NoPage {
         /// Where it would be.
         places: Vec<PathBuf>,
     },
-    /// The folder has no list of files.
-    #[error(
-        "{} holds no page of relight: build it by 'make app', install the Debian package relight, or give its folder by --page",
-        path.display()
-    )]
-    NoPage {
-        /// The folder.
-        path: PathBuf,
-        /// What the system answers.
-        source: io::Error,
-    },
-    /// The list cannot be parsed.
-    #[error("{} is not a list of the page's files: build the page again by 'make app'", path.display())]
-    List {
-        /// The list.
-        path: PathBuf,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
-    /// A file of the list is missing, or leads elsewhere.
-    #[error("the page is incomplete, {} cannot be read: build the page again by 'make app'", path.display())]
-    Missing {
+    /// Its list or a file of that is missing, damaged or not whole.
+    #[error("the page is incomplete, {} {why}: build the page again by 'make app'", path.display())]
+    Incomplete {
         /// The file.
         path: PathBuf,
-        /// What the system answers.
-        source: io::Error,
-    },
-    /// A file is shorter or longer than the list says.
-    #[error(
-        "the page is incomplete, {} has {found} bytes instead of {expected}: build the page again by 'make app'",
-        path.display()
-    )]
-    Length {
-        /// The file.
-        path: PathBuf,
-        /// Its bytes.
-        found: u64,
-        /// The bytes that it has in the list.
-        expected: u64,
-    },
-    /// The folder for the export holds something else.
-    #[error("{} is not empty, and holds no page of relight: give a new folder", path.display())]
-    Occupied {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A file cannot be written.
-    #[error("{} cannot be written", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system answers.
-        source: io::Error,
+        /// What is wrong with it.
+        why: String,
     },
 }
 
@@ -146,12 +82,14 @@ impl PageFiles {
     /// Where there is none, or a file of its list is missing or not whole.
     pub fn read(folder: &Path) -> Result<Self, PageFault> {
         let path = folder.join(LIST);
-        let list = fs::read(&path).map_err(|source| PageFault::NoPage {
-            path: folder.to_owned(),
-            source,
+        let list = fs::read(&path).map_err(|_| PageFault::NoPage {
+            places: vec![folder.to_owned()],
         })?;
-        let FileList { files: listed } =
-            serde_json::from_slice(&list).map_err(|source| PageFault::List { path, source })?;
+        let listed = serde_json::from_slice(&list).map_err(|fault| PageFault::Incomplete {
+            path,
+            why: format!("is not a list of its files ({fault})"),
+        });
+        let FileList { files: listed } = listed?;
         let mut files = BTreeMap::new();
         for (name, expected) in listed {
             files.insert(name.clone(), PageFile::read(folder, &name, expected)?);
@@ -166,51 +104,6 @@ impl PageFiles {
     pub(super) fn get(&self, name: &str) -> Option<&PageFile> {
         self.files.get(name)
     }
-
-    /// How large it is.
-    #[must_use]
-    pub fn size(&self) -> PageSize {
-        let bytes = |of: fn(&PageFile) -> Option<&Encoding>| {
-            let encodings = self.files.values().filter_map(of);
-            encodings
-                .map(|encoding| encoding.content.len() as u64)
-                .sum()
-        };
-        PageSize {
-            files: self.files.len(),
-            bytes: bytes(|file| file.encodings.last()),
-            compressed: bytes(|file| file.encodings.first()),
-        }
-    }
-
-    /// Writes the page into a folder, which is made where there is none, with the headers that its server should send. An older
-    /// page in it is replaced.
-    ///
-    /// # Errors
-    /// Where the folder holds something else, or a file cannot be written.
-    pub fn export(&self, folder: &Path) -> Result<(), PageFault> {
-        let failed = |path: &Path| {
-            let path = path.to_owned();
-            |source| PageFault::Write { path, source }
-        };
-        fs::create_dir_all(folder).map_err(failed(folder))?;
-        let mut others = fs::read_dir(folder).map_err(failed(folder))?;
-        if others.next().is_some() && !folder.join(LIST).is_file() {
-            return Err(PageFault::Occupied {
-                path: folder.to_owned(),
-            });
-        }
-        let texts = [(HEADERS, headers()), (README, readme())];
-        let texts = texts.map(|(name, text)| (name.to_owned(), text.into()));
-        let own = self.files.iter().flat_map(|(name, file)| file.named(name));
-        // The list comes last: what it names is there.
-        let (list, files): (Vec<_>, Vec<_>) = own.chain(texts).partition(|(name, _)| name == LIST);
-        for (name, content) in files.iter().chain(&list) {
-            let path = folder.join(name);
-            write_whole(&path, content).map_err(failed(&path))?;
-        }
-        Ok(())
-    }
 }
 
 impl PageFile {
@@ -222,18 +115,12 @@ impl PageFile {
         } else {
             Err(io::ErrorKind::InvalidInput.into())
         };
-        let content = content.map_err(|source| PageFault::Missing {
-            path: path.clone(),
-            source,
-        })?;
-        let found = content.len() as u64;
-        if found != expected {
-            return Err(PageFault::Length {
-                path,
-                found,
-                expected,
-            });
-        }
+        let whole = match content {
+            Ok(content) if content.len() as u64 == expected => Ok(content),
+            Ok(content) => Err(format!("has {} bytes instead of {expected}", content.len())),
+            Err(error) => Err(format!("cannot be read ({error})")),
+        };
+        let content = whole.map_err(|why| PageFault::Incomplete { path, why })?;
         let compressed = |(coding, ending)| {
             let content = fs::read(folder.join(format!("{name}.{ending}"))).ok()?;
             Some(Encoding::new(Some(coding), content))
@@ -249,23 +136,6 @@ impl PageFile {
         let accepted =
             |encoding: &&Encoding| encoding.coding.is_none_or(|coding| accepts(accept, coding));
         self.encodings.iter().find(accepted)
-    }
-
-    /// The files that hold it, with their content.
-    fn named<'a>(
-        &'a self,
-        name: &'a str,
-    ) -> impl Iterator<Item = (String, axum::body::Bytes)> + 'a {
-        self.encodings.iter().map(move |encoding| {
-            let ending = CODINGS
-                .iter()
-                .find(|(coding, _)| encoding.coding == Some(*coding));
-            let name = match ending {
-                Some((_, ending)) => format!("{name}.{ending}"),
-                None => name.to_owned(),
-            };
-            (name, encoding.content.clone())
-        })
     }
 }
 
@@ -311,28 +181,6 @@ fn kind(name: &str) -> &'static str {
     }
 }
 
-/// The headers in the form that static hosts read.
-fn headers() -> String {
-    format!(
-        "/*\n  Content-Security-Policy: {POLICY}\n  X-Content-Type-Options: nosniff\n  \
-         Referrer-Policy: no-referrer\n  Cross-Origin-Opener-Policy: same-origin\n  \
-         Cross-Origin-Embedder-Policy: require-corp\n"
-    )
-}
-
-fn readme() -> String {
-    format!(
-        "The app of relight, for any web server: copy this folder, and serve it by https (or on localhost).\n\
-         It is opened by index.html, and works without a network after that. No picture leaves it.\n\n\
-         The server has to send .wasm as application/wasm. Large files are here compressed as well, as NAME.br and\n\
-         NAME.gz: let it send these where the browser accepts them (nginx: gzip_static and brotli_static; Caddy:\n\
-         precompressed br gzip), or compress by itself. It should send these headers, which many hosts read\n\
-         from the file _headers:\n\n{}\n\
-         The last two make the page isolated from others, which threads would need; the page also works without.\n",
-        headers()
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -351,33 +199,13 @@ mod tests {
     }
 
     #[test]
-    fn a_page_is_exported_with_its_headers_and_read_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let (built, out) = (folder.path().join("built"), folder.path().join("a/out"));
-        page(&built);
-        let files = PageFiles::read(&built).unwrap();
-        files.export(&out).unwrap();
-        // A second time over the first.
-        files.export(&out).unwrap();
-        let size = files.size();
-        assert_eq!((size.files, size.bytes - size.compressed), (3, 2));
-        assert_eq!(PageFiles::read(&out).unwrap().size(), size);
-        let headers = fs::read_to_string(out.join(HEADERS)).unwrap();
-        for name in ["Opener", "Embedder"] {
-            assert!(
-                headers.contains(&format!("Cross-Origin-{name}-Policy: ")),
-                "{headers}"
-            );
-        }
-        assert!(
-            fs::read_to_string(out.join(README))
-                .unwrap()
-                .contains("require-corp")
-        );
+    fn another_server_of_the_page_is_told_the_same_policy() {
+        let headers = include_str!("../../page/_headers");
+        assert!(headers.contains(&format!("Content-Security-Policy: {POLICY}\n")));
     }
 
     #[test]
-    fn what_is_no_page_is_refused_and_nothing_is_written_over() {
+    fn what_is_no_whole_page_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         assert!(matches!(
             PageFiles::read(folder.path()),
@@ -385,43 +213,19 @@ mod tests {
         ));
         let built = folder.path().join("built");
         page(&built);
-        let files = PageFiles::read(&built).unwrap();
-        let other = folder.path().join("other");
-        fs::create_dir(&other).unwrap();
-        fs::write(other.join("index.html"), "mine").unwrap();
-        assert!(matches!(
-            files.export(&other),
-            Err(PageFault::Occupied { .. })
-        ));
-        assert_eq!(
-            fs::read_to_string(other.join("index.html")).unwrap(),
-            "mine"
-        );
         fs::write(built.join("a.wasm"), b"\0as").unwrap();
-        assert!(matches!(
-            PageFiles::read(&built),
-            Err(PageFault::Length {
-                found: 3,
-                expected: 4,
-                ..
-            })
-        ));
+        let incomplete = || match PageFiles::read(&built) {
+            Err(PageFault::Incomplete { path, why }) => format!("{} {why}", path.display()),
+            other => panic!("{other:?}"),
+        };
+        assert!(incomplete().ends_with("a.wasm has 3 bytes instead of 4"));
         fs::remove_file(built.join("a.wasm")).unwrap();
-        assert!(matches!(
-            PageFiles::read(&built),
-            Err(PageFault::Missing { .. })
-        ));
+        assert!(incomplete().contains("a.wasm cannot be read"));
         fs::write(built.join(LIST), r#"{"files": {"../secret": 1}}"#).unwrap();
         fs::write(folder.path().join("secret"), "x").unwrap();
-        assert!(matches!(
-            PageFiles::read(&built),
-            Err(PageFault::Missing { .. })
-        ));
+        assert!(incomplete().contains("secret cannot be read"));
         fs::write(built.join(LIST), "[").unwrap();
-        assert!(matches!(
-            PageFiles::read(&built),
-            Err(PageFault::List { .. })
-        ));
+        assert!(incomplete().contains("is not a list"));
     }
 
     #[test]

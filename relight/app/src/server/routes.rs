@@ -16,32 +16,18 @@ use super::files::{Encoding, POLICY, PageFiles};
 /// The page itself.
 const INDEX: &str = "index.html";
 
-#[derive(Clone)]
+#[derive(Clone, FromRef)]
 struct Served {
     files: Arc<PageFiles>,
     policy: Arc<AccessPolicy>,
 }
 
-impl FromRef<Served> for Arc<PageFiles> {
-    fn from_ref(served: &Served) -> Self {
-        Self::clone(&served.files)
-    }
-}
-
-impl FromRef<Served> for Arc<AccessPolicy> {
-    fn from_ref(served: &Served) -> Self {
-        Self::clone(&served.policy)
-    }
-}
-
 /// Paths that need no token: there the token in the URL becomes a cookie.
-pub(super) fn open_paths() -> Vec<&'static str> {
-    vec!["/"]
-}
+pub(super) const OPEN_PATHS: &[&str] = &["/"];
 
-pub(super) fn router(files: Arc<PageFiles>, policy: Arc<AccessPolicy>) -> Router {
+pub(super) fn router(files: PageFiles, policy: Arc<AccessPolicy>) -> Router {
     let served = Served {
-        files,
+        files: Arc::new(files),
         policy: Arc::clone(&policy),
     };
     Router::new()

@@ -8,19 +8,20 @@ use std::path::{Path, PathBuf};
 use relight_photo::insert::SceneDescription;
 use relit_data::text;
 use relit_grabcut::grey_png;
+use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-use super::StudioError;
 use super::background::StudioBackground;
+use super::error::{Refusal, refused};
 use super::object::{StudioObject, stem};
 use super::page_scene::ObjectFiles;
 
 /// The description's entry.
 const SCENE: &str = "scene.toml";
-/// The most that an archive unpacks to, MB.
-const MOST_MEGABYTES: u64 = 256;
-const MEGABYTE: u64 = 1_000_000;
+/// The most that an archive unpacks to, bytes.
+const MOST_BYTES: u64 = 256_000_000;
+const TOO_LARGE: &str = "the archive is too large: it holds more than 256 MB";
 
 /// The files of a scene by their names in an archive.
 #[derive(Default)]
@@ -33,7 +34,7 @@ impl SceneFiles {
     ///
     /// # Errors
     /// Where its mask cannot be encoded.
-    pub(super) fn add_object(&mut self, object: &StudioObject) -> Result<ObjectFiles, StudioError> {
+    pub(super) fn add_object(&mut self, object: &StudioObject) -> Result<ObjectFiles, Refusal> {
         let photo = self.add(&object.name, object.file.clone());
         let mask = match object.mask_file() {
             Some(mask) => {
@@ -56,7 +57,7 @@ impl SceneFiles {
     pub(super) fn add_background(
         &mut self,
         background: &StudioBackground,
-    ) -> Result<PathBuf, StudioError> {
+    ) -> Result<PathBuf, Refusal> {
         Ok(self.add(&background.name, background.file()?).into())
     }
 
@@ -87,7 +88,7 @@ impl SceneFiles {
     ///
     /// # Errors
     /// Where the scene cannot be written.
-    pub(super) fn packed(&self, scene: &SceneDescription) -> Result<Vec<u8>, StudioError> {
+    pub(super) fn packed(&self, scene: &SceneDescription) -> Result<Vec<u8>, Refusal> {
         let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         archive.start_file(SCENE, stored)?;
@@ -103,10 +104,11 @@ impl SceneFiles {
     ///
     /// # Errors
     /// Where it is no archive, too large, or its scene names a file that it has not.
-    pub(super) fn unpacked(archive: &[u8]) -> Result<(SceneDescription, Self), StudioError> {
-        let mut archive = ZipArchive::new(Cursor::new(archive))?;
+    pub(super) fn unpacked(archive: &[u8]) -> Result<(SceneDescription, Self), Refusal> {
+        let mut archive = ZipArchive::new(Cursor::new(archive)).map_err(|fault| damaged(&fault))?;
         let text = text::decode(entry(&mut archive, SCENE)?);
-        let scene = SceneDescription::parse(&text.map_err(|_| StudioError::NoText)?)?;
+        let text = text.map_err(|_| Refusal("scene.toml is not UTF-8".to_owned()))?;
+        let scene = SceneDescription::parse(&text)?;
         let mut files = Self::default();
         let mut all = 0;
         for path in scene.files() {
@@ -116,8 +118,8 @@ impl SceneFiles {
             }
             let content = entry(&mut archive, &name)?;
             all += content.len() as u64;
-            if all > MOST_MEGABYTES * MEGABYTE {
-                return Err(StudioError::ArchiveTooLarge(MOST_MEGABYTES));
+            if all > MOST_BYTES {
+                return refused(TOO_LARGE);
             }
             files.entries.insert(name, content);
         }
@@ -128,32 +130,41 @@ impl SceneFiles {
     ///
     /// # Errors
     /// Where there is none.
-    pub(super) fn content(&self, path: &Path) -> Result<&Vec<u8>, StudioError> {
+    pub(super) fn content(&self, path: &Path) -> Result<&Vec<u8>, Refusal> {
         let name = path.to_string_lossy();
-        self.entries
-            .get(name.as_ref())
-            .ok_or_else(|| StudioError::NotInArchive {
-                name: name.into_owned(),
-            })
+        let content = self.entries.get(name.as_ref());
+        content.ok_or_else(|| missing(&name))
     }
 }
 
-fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>, StudioError> {
+fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>, Refusal> {
     let found = match archive.by_name(name) {
         Ok(found) => found,
-        Err(zip::result::ZipError::FileNotFound) => {
-            let name = name.to_owned();
-            return Err(StudioError::NotInArchive { name });
-        }
-        Err(fault) => return Err(fault.into()),
+        Err(ZipError::FileNotFound) => return Err(missing(name)),
+        Err(fault) => return Err(damaged(&fault)),
     };
-    let most = MOST_MEGABYTES * MEGABYTE;
     let mut content = Vec::new();
-    found.take(most + 1).read_to_end(&mut content)?;
-    if content.len() as u64 > most {
-        return Err(StudioError::ArchiveTooLarge(MOST_MEGABYTES));
+    found
+        .take(MOST_BYTES + 1)
+        .read_to_end(&mut content)
+        .map_err(|fault| damaged(&fault))?;
+    match content.len() as u64 > MOST_BYTES {
+        true => refused(TOO_LARGE),
+        false => Ok(content),
     }
-    Ok(content)
+}
+
+fn missing(name: &str) -> Refusal {
+    Refusal(format!(
+        "{name} is not in the archive, and its scene.toml names it"
+    ))
+}
+
+fn damaged(fault: &(dyn std::error::Error + 'static)) -> Refusal {
+    Refusal::because(
+        "the file is no scene that was kept: it is no ZIP archive, or damaged",
+        fault,
+    )
 }
 
 /// A name that is one on every system, and leads nowhere else.
@@ -194,7 +205,7 @@ mod tests {
         assert_eq!(back, scene("a.png"));
         assert_eq!(unpacked.content(Path::new("a.png")).unwrap(), &vec![7; 20]);
         let lacking = files.packed(&scene("b.png")).unwrap();
-        let fault = SceneFiles::unpacked(&lacking).err().unwrap().to_string();
+        let fault = SceneFiles::unpacked(&lacking).err().unwrap().0;
         assert!(fault.contains("b.png"), "{fault}");
         assert!(SceneFiles::unpacked(b"no archive").is_err());
         for length in (0..archive.len()).step_by(7) {

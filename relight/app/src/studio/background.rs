@@ -7,7 +7,7 @@ use relight_core::light::Panorama;
 use relight_photo::insert::{PanoramaView, SceneBackground, SceneDescription, SceneSetting};
 use relit_still::Format;
 
-use super::StudioError;
+use super::error::{Refusal, refused};
 use super::object::{OpenedFile, png_of, stem};
 use super::pixels::rgba;
 use super::request::BackgroundRequest;
@@ -55,12 +55,12 @@ impl StudioBackground {
     ///
     /// # Errors
     /// Where it cannot be read, or is no panorama.
-    pub(super) fn open(asked: &BackgroundRequest, bytes: &[u8]) -> Result<Self, StudioError> {
+    pub(super) fn open(asked: &BackgroundRequest, bytes: &[u8]) -> Result<Self, Refusal> {
         match asked {
             BackgroundRequest::Panorama { id } => {
                 let scenery = Scenery::of(id);
-                let scenery = scenery.ok_or_else(|| StudioError::NoPanorama(id.clone()))?;
-                Ok(Self::made(scenery)?)
+                let none = || Refusal(format!("there is no panorama {id}"));
+                Ok(Self::made(scenery.ok_or_else(none)?)?)
             }
             BackgroundRequest::Photo { name } => Self::photo(name, bytes.to_vec()),
             BackgroundRequest::PhotoPixels {
@@ -77,7 +77,7 @@ impl StudioBackground {
 
     fn made(scenery: Scenery) -> Result<Self, relight_core::light::LightError> {
         Ok(Self {
-            name: format!("{}.exr", scenery.id()),
+            name: format!("{}.exr", scenery.id),
             content: Content::Panorama(PanoramaBackground {
                 file: None,
                 scenery: Some(scenery),
@@ -91,13 +91,15 @@ impl StudioBackground {
     ///
     /// # Errors
     /// Where it cannot be read, or has values that are no light.
-    pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+    pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         let opened = OpenedFile::read(name, bytes, None)?;
         let (name, file) = (opened.name, opened.bytes);
         let picture = opened.image.into_light();
         let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
         if !picture.planes().planes().into_iter().all(is_light) {
-            return Err(StudioError::NotLight { name });
+            return refused(format!(
+                "{name} has a value that is negative, infinite or not a number"
+            ));
         }
         Ok(Self {
             name,
@@ -113,37 +115,29 @@ impl StudioBackground {
     ///
     /// # Errors
     /// Where it cannot be read or has another shape.
-    pub(super) fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+    pub(super) fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         let opened = OpenedFile::read(name, bytes, None)?;
         let Extent { width, height } = opened.image.stored().planes.extent();
         // Making it smaller rounds its sides.
         if width.abs_diff(2 * height) > 2 || height < 4 {
-            return Err(StudioError::PanoramaShape {
-                name: name.to_owned(),
-                width,
-                height,
-            });
+            return refused(format!(
+                "{name} has {width} x {height} pixels: a panorama is twice as wide as high"
+            ));
         }
         let is_float = opened.image.stored().samples == Samples::Float;
         let own_file = opened.bytes;
-        let panorama = Panorama::new(opened.image.into_light())?;
+        let mut panorama = Panorama::new(opened.image.into_light())?;
         let columns = width.min(MOST_COLUMNS) / 2 * 2;
         let wanted = Extent::new(columns, columns / 2);
-        let is_as_kept = is_float && wanted == Extent::new(width, height);
-        let panorama = if is_as_kept || wanted == Extent::new(width, height) {
-            panorama
+        let is_of_size = wanted == Extent::new(width, height);
+        if !is_of_size {
+            panorama = panorama.resized(wanted);
+        }
+        let (name, file) = if is_float && is_of_size {
+            (name.to_owned(), own_file)
         } else {
-            panorama.resized(wanted)
-        };
-        let file = if is_as_kept {
-            own_file
-        } else {
-            encode_exr(Path::new(name), panorama.image().planes())?
-        };
-        let name = if is_as_kept {
-            name.to_owned()
-        } else {
-            format!("{}.exr", stem(name))
+            let file = encode_exr(Path::new(name), panorama.image().planes())?;
+            (format!("{}.exr", stem(name)), file)
         };
         Ok(Self {
             name,
@@ -160,10 +154,10 @@ impl StudioBackground {
     ///
     /// # Errors
     /// Where it cannot be read.
-    pub(super) fn kept(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+    pub(super) fn kept(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         let made = Scenery::ALL
             .into_iter()
-            .find(|scenery| name == format!("{}.exr", scenery.id()));
+            .find(|scenery| name == format!("{}.exr", scenery.id));
         if let Some(scenery) = made {
             let background = Self::made(scenery)?;
             if background.file()? == bytes {
@@ -184,7 +178,7 @@ impl StudioBackground {
     pub(super) fn panorama_id(&self) -> Option<Option<&'static str>> {
         match &self.content {
             Content::Photo(_) => None,
-            Content::Panorama(panorama) => Some(panorama.scenery.map(Scenery::id)),
+            Content::Panorama(panorama) => Some(panorama.scenery.map(|scenery| scenery.id)),
         }
     }
 
@@ -192,7 +186,7 @@ impl StudioBackground {
     ///
     /// # Errors
     /// Where a panorama that is made cannot be encoded.
-    pub(super) fn file(&self) -> Result<Vec<u8>, StudioError> {
+    pub(super) fn file(&self) -> Result<Vec<u8>, Refusal> {
         match &self.content {
             Content::Photo(photo) => Ok(photo.file.clone()),
             Content::Panorama(PanoramaBackground {
@@ -285,7 +279,7 @@ impl PhotoBackground {
 ///
 /// # Errors
 /// None: their values are finite.
-pub(super) fn made_panoramas() -> Result<Vec<(Scenery, Vec<u8>)>, StudioError> {
+pub(super) fn made_panoramas() -> Result<Vec<(Scenery, Vec<u8>)>, Refusal> {
     let made = |scenery: Scenery| {
         let panorama = scenery.panorama_of(THUMBNAIL)?;
         Ok((scenery, thumbnail(&panorama)))

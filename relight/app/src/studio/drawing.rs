@@ -4,10 +4,10 @@ use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_photo::insert::{
     InsertScene, SceneDescription, SceneLayer, SceneObject, SceneSetting, Subject,
 };
-use serde::Serialize;
+use serde_json::{Value, json};
 
-use super::StudioError;
 use super::background::{StudioBackground, reduced};
+use super::error::Refusal;
 use super::pixels::{covering, rgba, shown};
 
 /// How much of a pixel an object covers at least where it counts as seen.
@@ -15,26 +15,12 @@ const SEEN: f32 = 0.5;
 /// A larger part of a picture that is clipped is told.
 const MUCH_CLIPPED: f32 = 0.25;
 
-/// The setting that was made last: while only objects and the light's angle change it stays.
+/// The setting that was made last, with all that it depends on: a background, the scene without objects and without the
+/// light's angle, and its longest side. While only those change it stays.
 #[derive(Default)]
-pub(super) struct KeptSetting {
-    made: Option<(SettingKey, SceneSetting)>,
-}
-
-/// All that a setting depends on.
-#[derive(PartialEq)]
-struct SettingKey {
-    /// The scene without objects and without the light's angle.
-    scene: SceneDescription,
-    longest: Option<u32>,
-}
+pub(super) struct KeptSetting(Option<((SceneDescription, Option<u32>), SceneSetting)>);
 
 impl KeptSetting {
-    /// Another background was chosen.
-    pub(super) fn forget(&mut self) {
-        self.made = None;
-    }
-
     /// The setting of a scene, `longest` pixels at most; the background is made ready for it.
     ///
     /// # Errors
@@ -44,17 +30,14 @@ impl KeptSetting {
         scene: &SceneDescription,
         background: &mut StudioBackground,
         longest: Option<u32>,
-    ) -> Result<&SceneSetting, StudioError> {
+    ) -> Result<&SceneSetting, Refusal> {
         background.prepare(scene, longest);
         let mut bare = scene.clone();
         bare.objects.clear();
         bare.light.turn = 0.0;
-        let key = SettingKey {
-            scene: bare,
-            longest,
-        };
+        let key = (bare, longest);
         let tilt = SceneSetting::ground_tilt(scene, background.for_scene());
-        let kept = self.made.take().filter(|(was, _)| *was == key);
+        let kept = self.0.take().filter(|(was, _)| *was == key);
         let mut setting = match kept {
             Some((_, setting)) => setting,
             None => {
@@ -66,7 +49,7 @@ impl KeptSetting {
             }
         };
         setting.tilt = tilt;
-        Ok(&self.made.insert((key, setting)).1)
+        Ok(&self.0.insert((key, setting)).1)
     }
 }
 
@@ -79,20 +62,6 @@ pub(super) fn of_size(
     let extent = reduced(background.extent(scene.size), Some(longest));
     scene.size = [extent.width as u32, extent.height as u32];
     scene
-}
-
-/// A picture of a scene.
-pub(super) struct Drawn {
-    pub(super) picture: Rgb<Linear>,
-    pub(super) boxes: Vec<ObjectBox>,
-}
-
-/// Where an object is seen.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct ObjectBox {
-    /// Column and row of the first pixel, width and height.
-    #[serde(rename = "box")]
-    pub(super) seen: [i64; 4],
 }
 
 /// A scene ready to be drawn: its objects in their setting before their background.
@@ -114,7 +83,7 @@ impl<'a> Drawing<'a> {
         background: &'a StudioBackground,
         subjects: &[&'a Subject],
         before: bool,
-    ) -> Result<Self, StudioError> {
+    ) -> Result<Self, Refusal> {
         let pairs = scene.objects.iter().zip(subjects);
         let objects = pairs.map(|(described, &subject)| {
             let object = SceneObject::described(described, subject);
@@ -132,34 +101,36 @@ impl<'a> Drawing<'a> {
         })
     }
 
-    /// Background, shadows and objects in one picture.
+    /// Background, shadows and objects in one picture, and where each object is seen.
     ///
     /// # Errors
     /// Those of the render layers.
-    pub(super) fn picture(&self) -> Result<Drawn, StudioError> {
+    pub(super) fn picture(&self) -> Result<(Rgb<Linear>, Vec<Value>), Refusal> {
         let layers = self.scene.layers(self.turn)?;
         let background = self.background.seen(self.setting, self.turn);
-        Ok(Drawn {
-            picture: self.scene.compose(&background, &layers, 0),
-            boxes: layers.iter().map(ObjectBox::of).collect(),
-        })
+        let boxes = layers.iter().map(|layer| json!({ "box": seen(layer) }));
+        let picture = self.scene.compose(&background, &layers, 0);
+        Ok((picture, boxes.collect()))
     }
 
-    /// Background, shadows and objects apart.
+    /// The background, then for each object its colours and its shadow; and where each lies.
     ///
     /// # Errors
     /// Those of the render layers.
-    pub(super) fn layers(&self) -> Result<DrawnLayers, StudioError> {
-        let layers = self.scene.layers(self.turn)?;
+    pub(super) fn layers(&self) -> Result<(Vec<Vec<u8>>, Vec<Value>), Refusal> {
         let background = self.background.seen(self.setting, self.turn);
-        let mut drawn = DrawnLayers {
-            objects: Vec::with_capacity(layers.len()),
-            parts: vec![shown(&background)],
-        };
-        for layer in &layers {
-            drawn.add(layer);
+        let (mut parts, mut objects) = (vec![shown(&background)], Vec::new());
+        for layer in &self.scene.layers(self.turn)? {
+            parts.push(covering(layer.colours(), layer.alpha()));
+            let mut lies = placed(layer.place(), layer.alpha().extent());
+            lies["box"] = json!(seen(layer));
+            lies["shadow"] = layer.shadow().map_or(Value::Null, |(place, arriving)| {
+                parts.push(rgba(arriving));
+                placed(place, arriving.extent())
+            });
+            objects.push(lies);
         }
-        Ok(drawn)
+        Ok((parts, objects))
     }
 
     /// What the person at the page should know of the setting.
@@ -183,62 +154,15 @@ impl<'a> Drawing<'a> {
     }
 }
 
-/// A scene in layers.
-pub(super) struct DrawnLayers {
-    pub(super) objects: Vec<LayerPlace>,
-    /// The background, then for each object its colours and its shadow.
-    pub(super) parts: Vec<Vec<u8>>,
+fn placed(place: [i64; 2], Extent { width, height }: Extent) -> Value {
+    json!({ "place": place, "width": width, "height": height })
 }
 
-/// Where a layer lies.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct LayerPlace {
-    place: [i64; 2],
-    width: usize,
-    height: usize,
-    #[serde(rename = "box")]
-    seen: [i64; 4],
-    shadow: Option<ShadowPlace>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct ShadowPlace {
-    place: [i64; 2],
-    width: usize,
-    height: usize,
-}
-
-impl DrawnLayers {
-    fn add(&mut self, layer: &SceneLayer) {
-        self.parts.push(covering(layer.colours(), layer.alpha()));
-        let shadow = layer.shadow().map(|(place, arriving)| {
-            self.parts.push(rgba(arriving));
-            let Extent { width, height } = arriving.extent();
-            ShadowPlace {
-                place,
-                width,
-                height,
-            }
-        });
-        let Extent { width, height } = layer.alpha().extent();
-        self.objects.push(LayerPlace {
-            place: layer.place(),
-            width,
-            height,
-            seen: ObjectBox::of(layer).seen,
-            shadow,
-        });
-    }
-}
-
-impl ObjectBox {
-    fn of(layer: &SceneLayer) -> Self {
-        let [x, y, width, height] = covered(layer.alpha());
-        let [left, top] = layer.place();
-        Self {
-            seen: [left + x, top + y, width, height],
-        }
-    }
+/// Where an object is seen: column and row of the first pixel, width and height.
+fn seen(layer: &SceneLayer) -> [i64; 4] {
+    let [x, y, width, height] = covered(layer.alpha());
+    let [left, top] = layer.place();
+    [left + x, top + y, width, height]
 }
 
 /// The smallest rectangle around all that is covered: column, row, width and height.

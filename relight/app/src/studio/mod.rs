@@ -27,16 +27,13 @@ use relight_core::image::{ColourSpace, Depth, Extent, Planes, Srgb, encode_jpeg,
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
 use relight_photo::insert::{SceneDescription, Subject};
-use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
-pub use error::StudioError;
-
-use crate::clock::Moment;
 use crate::message::{pack, unpack};
 use archive::SceneFiles;
 use background::{StudioBackground, made_panoramas};
 use drawing::{Drawing, KeptSetting, of_size};
+use error::{Refusal, refused};
 use object::StudioObject;
 use page_scene::{ObjectFiles, PageScene};
 use request::{FileFormat, Request};
@@ -60,22 +57,23 @@ const PANORAMA_PICTURE: [u32; 2] = [1280, 960];
 #[derive(Default)]
 pub struct Studio {
     decomposer: Option<Decomposer>,
-    objects: BTreeMap<u32, StudioObject>,
+    objects: Objects,
     background: Option<StudioBackground>,
     setting: KeptSetting,
 }
 
-/// An answer: what is said, and the pictures and files with it.
-struct Answer {
-    says: Value,
-    parts: Vec<Vec<u8>>,
-}
+/// By the page's numbers.
+#[derive(Default)]
+struct Objects(BTreeMap<u32, StudioObject>);
 
-impl Answer {
-    fn new(says: Value, parts: Vec<Vec<u8>>) -> Self {
-        Self { says, parts }
+impl Objects {
+    fn get(&mut self, number: u32) -> Result<&mut StudioObject, Refusal> {
+        self.0.get_mut(&number).ok_or_else(|| no_object(number))
     }
 }
+
+/// What is said, and the pictures and files with it.
+type Answer = (Value, Vec<Vec<u8>>);
 
 impl Studio {
     /// An engine without networks, objects and background.
@@ -87,27 +85,24 @@ impl Studio {
     /// Answers a message. What cannot be done is answered by `{"error": "a sentence"}`, and nothing has changed then.
     #[must_use]
     pub fn answer(&mut self, message: &[u8]) -> Vec<u8> {
-        let answered = self.answered(message).and_then(|answer| {
-            let says = serde_json::to_vec(&answer.says).map_err(StudioError::Answer)?;
-            Ok((says, answer.parts))
-        });
-        match answered {
-            Ok((says, parts)) => {
-                let others = parts.iter().map(Vec::as_slice);
-                let parts: Vec<&[u8]> = std::iter::once(&says[..]).chain(others).collect();
-                pack(&parts)
-            }
-            Err(fault) => {
-                let says = json!({ "error": with_causes(&fault) }).to_string();
-                pack(&[says.as_bytes()])
-            }
-        }
+        let (says, parts) = match self.answered(message) {
+            Ok(answer) => answer,
+            Err(Refusal(why)) => (json!({ "error": why }), Vec::new()),
+        };
+        let says = says.to_string();
+        let others = parts.iter().map(Vec::as_slice);
+        let parts: Vec<&[u8]> = std::iter::once(says.as_bytes()).chain(others).collect();
+        pack(&parts)
     }
 
-    fn answered(&mut self, message: &[u8]) -> Result<Answer, StudioError> {
+    fn answered(&mut self, message: &[u8]) -> Result<Answer, Refusal> {
         let parts = unpack(message)?;
-        let request: Request = serde_json::from_slice(parts[0]).map_err(StudioError::Request)?;
-        let part = |what| parts.get(1).copied().ok_or(StudioError::Part(what));
+        let unknown = |fault| Refusal::because("the engine does not know this request", &fault);
+        let request: Request = serde_json::from_slice(parts[0]).map_err::<Refusal, _>(unknown)?;
+        let part = |what| match parts.get(1) {
+            Some(part) => Ok(*part),
+            None => refused(format!("the request has no {what}")),
+        };
         match request {
             Request::Load => self.load(part("weights")?),
             Request::OpenPhoto { object, name } => {
@@ -129,19 +124,14 @@ impl Studio {
                 rect,
                 strokes,
             } => {
-                let start = Moment::now();
-                let made = self.object(object)?.cut_out(rect, strokes)?;
-                let says = json!({
-                    "area": made.area,
-                    "seconds": start.seconds(),
-                    "warnings": made.warnings,
-                });
-                Ok(Answer::new(says, vec![made.levels]))
+                let made = self.objects.get(object)?.cut_out(rect, strokes)?;
+                let says = json!({ "area": made.statistics.area_px, "warnings": made.warnings });
+                Ok((says, vec![made.image.into_raw()]))
             }
             Request::Decompose { object } => self.decompose(object),
             Request::Close { object } => {
-                self.objects.remove(&object);
-                Ok(Answer::new(json!({}), Vec::new()))
+                self.objects.0.remove(&object);
+                Ok((json!({}), Vec::new()))
             }
             Request::Backgrounds => backgrounds(),
             Request::Background(asked) => {
@@ -152,46 +142,40 @@ impl Studio {
                 scene,
                 longest,
                 before,
-            } => self.render(&scene, longest, before),
-            Request::Layers { scene, longest } => self.layers(&scene, longest),
+            } => self.draw(&scene, longest, before, false),
+            Request::Layers { scene, longest } => self.draw(&scene, longest, false, true),
             Request::Save { scene, format } => self.save(&scene, format),
             Request::Export { scene, name } => self.export(&scene, &name),
             Request::Import => self.import(part("archive")?),
         }
     }
 
-    fn load(&mut self, weights: &[u8]) -> Result<Answer, StudioError> {
-        let weights = Weights::from_bytes(weights).map_err(StudioError::Weights)?;
+    fn load(&mut self, weights: &[u8]) -> Result<Answer, Refusal> {
+        let weights = Weights::from_bytes(weights)
+            .map_err(|why| Refusal(format!("the weights of the networks are damaged: {why}")))?;
         self.decomposer = Some(Decomposer::new(&weights)?);
         let says = json!({ "version": env!("CARGO_PKG_VERSION") });
-        Ok(Answer::new(says, Vec::new()))
+        Ok((says, Vec::new()))
     }
 
-    fn object(&mut self, number: u32) -> Result<&mut StudioObject, StudioError> {
-        let object = self.objects.get_mut(&number);
-        object.ok_or(StudioError::NoObject(number))
-    }
-
-    fn opened(&mut self, number: u32, object: StudioObject) -> Result<Answer, StudioError> {
-        let others = self.objects.keys().filter(|&&key| key != number).count();
+    fn opened(&mut self, number: u32, object: StudioObject) -> Result<Answer, Refusal> {
+        let others = self.objects.0.keys().filter(|&&key| key != number).count();
         if others >= MOST_OBJECTS {
-            return Err(StudioError::ManyObjects(others));
+            return refused(format!(
+                "there are {others} objects already, and a scene has at most that many: remove one first"
+            ));
         }
-        let (says, parts) = told(&object);
-        self.objects.insert(number, object);
-        Ok(Answer::new(says, parts))
+        let answer = told(&object);
+        self.objects.0.insert(number, object);
+        Ok(answer)
     }
 
-    fn decompose(&mut self, number: u32) -> Result<Answer, StudioError> {
-        let decomposer = self.decomposer.as_ref().ok_or(StudioError::NoNetwork)?;
-        let object = self.objects.get_mut(&number);
-        let object = object.ok_or(StudioError::NoObject(number))?;
-        let start = Moment::now();
-        let found = object.decomposed(decomposer)?;
-        let seconds = start.seconds();
+    fn decompose(&mut self, number: u32) -> Result<Answer, Refusal> {
+        let decomposer = self.decomposer.as_ref().ok_or_else(no_network)?;
+        let found = self.objects.get(number)?.decomposed(decomposer)?;
         let Extent { width, height } = found.shading.extent();
         let most = most_shading(&found.shading);
-        let grey = |plane: &Planes<1>, scale: f32| -> Result<Vec<u8>, StudioError> {
+        let grey = |plane: &Planes<1>, scale: f32| -> Result<Vec<u8>, Refusal> {
             let values = plane.plane(0).iter();
             let shown: Vec<f32> = values.map(|v| Srgb::from_linear(v * scale)).collect();
             let planes = [shown.clone(), shown.clone(), shown];
@@ -204,104 +188,70 @@ impl Studio {
             grey(&found.highlight, 1.0)?,
         ];
         let says = json!({
-            "seconds": seconds,
             "glossy": found.is_glossy,
             "saturated": found.saturated_fraction,
             "width": width,
             "height": height,
         });
-        Ok(Answer::new(says, parts))
+        Ok((says, parts))
     }
 
-    fn choose(&mut self, background: StudioBackground) -> Result<Answer, StudioError> {
+    fn choose(&mut self, background: StudioBackground) -> Result<Answer, Refusal> {
         let extent = background.extent(PANORAMA_PICTURE);
-        self.setting.forget();
+        self.setting = KeptSetting::default();
         self.background = Some(background);
         let says = json!({ "width": extent.width, "height": extent.height });
-        Ok(Answer::new(says, Vec::new()))
+        Ok((says, Vec::new()))
     }
 
-    /// A scene as it is drawn while it is worked on: smaller, of objects that are ready.
-    fn draw<T>(
+    /// A scene as it is drawn while it is worked on: smaller, of objects that are ready; in layers or in one picture.
+    fn draw(
         &mut self,
         scene: &PageScene,
         longest: u32,
         before: bool,
-        draw: impl FnOnce(&Drawing<'_>) -> Result<T, StudioError>,
-    ) -> Result<T, StudioError> {
-        let background = self.background.as_mut().ok_or(StudioError::NoBackground)?;
+        layered: bool,
+    ) -> Result<Answer, Refusal> {
+        let background = self.background.as_mut().ok_or_else(no_background)?;
         // A background alone needs no network.
         for placed in &scene.objects {
-            let decomposer = self.decomposer.as_ref().ok_or(StudioError::NoNetwork)?;
-            let object = self.objects.get_mut(&placed.object);
-            let object = object.ok_or(StudioError::NoObject(placed.object))?;
-            object.prepare(decomposer)?;
+            let decomposer = self.decomposer.as_ref().ok_or_else(no_network)?;
+            self.objects.get(placed.object)?.prepare(decomposer)?;
         }
-        let described = in_engine(scene)?;
-        let described = of_size(described, background, longest);
+        let described = of_size(in_engine(scene)?, background, longest);
         let setting = self.setting.of(&described, background, Some(longest))?;
         let ready = |placed: &page_scene::PageObject| {
-            let object = self.objects.get(&placed.object);
+            let object = self.objects.0.get(&placed.object);
             let subject = object.and_then(StudioObject::prepared);
-            subject.ok_or(StudioError::NoObject(placed.object))
+            subject.ok_or_else(|| no_object(placed.object))
         };
         let subjects: Vec<&Subject> = scene.objects.iter().map(ready).collect::<Result<_, _>>()?;
-        draw(&Drawing::new(
-            &described, setting, background, &subjects, before,
-        )?)
+        let drawing = Drawing::new(&described, setting, background, &subjects, before)?;
+        let (parts, objects) = if layered {
+            drawing.layers()?
+        } else {
+            let (picture, boxes) = drawing.picture()?;
+            (vec![pixels::shown(&picture)], boxes)
+        };
+        let Extent { width, height } = setting.extent;
+        let notes = drawing.notes();
+        let says = json!({ "width": width, "height": height, "objects": objects, "notes": notes });
+        Ok((says, parts))
     }
 
-    fn render(
-        &mut self,
-        scene: &PageScene,
-        longest: u32,
-        before: bool,
-    ) -> Result<Answer, StudioError> {
-        let start = Moment::now();
-        let (drawn, notes) = self.draw(scene, longest, before, |drawing| {
-            Ok((drawing.picture()?, drawing.notes()))
-        })?;
-        let Extent { width, height } = drawn.picture.planes().extent();
-        let picture = pixels::shown(&drawn.picture);
-        let says = json!({
-            "width": width,
-            "height": height,
-            "seconds": start.seconds(),
-            "objects": drawn.boxes,
-            "notes": notes,
-        });
-        Ok(Answer::new(says, vec![picture]))
-    }
-
-    fn layers(&mut self, scene: &PageScene, longest: u32) -> Result<Answer, StudioError> {
-        let start = Moment::now();
-        let (drawn, extent, notes) = self.draw(scene, longest, false, |drawing| {
-            Ok((drawing.layers()?, drawing.setting.extent, drawing.notes()))
-        })?;
-        let says = json!({
-            "width": extent.width,
-            "height": extent.height,
-            "seconds": start.seconds(),
-            "objects": drawn.objects,
-            "notes": notes,
-        });
-        Ok(Answer::new(says, drawn.parts))
-    }
-
-    fn save(&mut self, scene: &PageScene, format: FileFormat) -> Result<Answer, StudioError> {
-        let decomposer = self.decomposer.as_ref().ok_or(StudioError::NoNetwork)?;
-        let background = self.background.as_mut().ok_or(StudioError::NoBackground)?;
+    fn save(&mut self, scene: &PageScene, format: FileFormat) -> Result<Answer, Refusal> {
+        let decomposer = self.decomposer.as_ref().ok_or_else(no_network)?;
+        let background = self.background.as_mut().ok_or_else(no_background)?;
         let described = in_engine(scene)?;
         let setting = self.setting.of(&described, background, None)?;
         let mut subjects = Vec::with_capacity(scene.objects.len());
         for (placed, described) in scene.objects.iter().zip(&described.objects) {
-            let object = self.objects.get_mut(&placed.object);
-            let object = object.ok_or(StudioError::NoObject(placed.object))?;
+            let object = self.objects.get(placed.object)?;
             subjects.push(object.subject(setting, described, decomposer)?);
         }
         let subjects: Vec<&Subject> = subjects.iter().collect();
         let drawing = Drawing::new(&described, setting, background, &subjects, false)?;
-        let picture = drawing.picture()?.picture.encode::<Srgb>().into_planes();
+        let picture = drawing.picture()?.0.encode::<Srgb>().into_planes();
         let Extent { width, height } = picture.extent();
         let path = Path::new("the picture");
         let file = match format {
@@ -309,30 +259,28 @@ impl Studio {
             FileFormat::Jpeg => encode_jpeg(path, &picture)?,
         };
         let says = json!({ "width": width, "height": height });
-        Ok(Answer::new(says, vec![file]))
+        Ok((says, vec![file]))
     }
 
-    fn export(&mut self, scene: &PageScene, name: &str) -> Result<Answer, StudioError> {
-        let background = self.background.as_ref().ok_or(StudioError::NoBackground)?;
+    fn export(&mut self, scene: &PageScene, name: &str) -> Result<Answer, Refusal> {
+        let background = self.background.as_ref().ok_or_else(no_background)?;
         if scene.objects.is_empty() {
-            return Err(StudioError::Empty);
+            return refused("the scene has no objects yet");
         }
         let mut files = SceneFiles::default();
         let mut named = Vec::with_capacity(scene.objects.len());
         for placed in &scene.objects {
-            let object = self.objects.get(&placed.object);
-            let object = object.ok_or(StudioError::NoObject(placed.object))?;
-            named.push(files.add_object(object)?);
+            named.push(files.add_object(self.objects.get(placed.object)?)?);
         }
         let described = scene.described(files.add_background(background)?, named)?;
         let says = json!({ "name": name });
-        Ok(Answer::new(says, vec![files.packed(&described)?]))
+        Ok((says, vec![files.packed(&described)?]))
     }
 
-    fn import(&mut self, archive: &[u8]) -> Result<Answer, StudioError> {
+    fn import(&mut self, archive: &[u8]) -> Result<Answer, Refusal> {
         let (described, files) = SceneFiles::unpacked(archive)?;
         if described.objects.len() > MOST_OBJECTS {
-            return Err(StudioError::ManyObjects(MOST_OBJECTS));
+            return refused(format!("a scene has at most {MOST_OBJECTS} objects"));
         }
         let background_name = described.background.to_string_lossy();
         let content = files.content(&described.background)?.clone();
@@ -355,7 +303,7 @@ impl Studio {
         parts.push(background.thumbnail());
         let extent = background.extent(described.size);
         let says = json!({
-            "scene": serde_json::to_value(&scene).map_err(StudioError::Answer)?,
+            "scene": serde_json::to_value(&scene)?,
             "objects": says_objects,
             "background": {
                 "kind": if background.panorama_id().is_some() { "panorama" } else { "photo" },
@@ -365,14 +313,28 @@ impl Studio {
                 "height": extent.height,
             },
         });
-        self.objects = objects;
+        self.objects = Objects(objects);
         self.choose(background)?;
-        Ok(Answer::new(says, parts))
+        Ok((says, parts))
     }
 }
 
+fn no_network() -> Refusal {
+    Refusal("the networks are not loaded yet: wait a moment".to_owned())
+}
+
+fn no_background() -> Refusal {
+    Refusal("choose a scene first".to_owned())
+}
+
+fn no_object(number: u32) -> Refusal {
+    Refusal(format!(
+        "there is no object {number}: open its photograph again"
+    ))
+}
+
 /// An object for the page, with its picture and its mask.
-fn told(object: &StudioObject) -> (Value, Vec<Vec<u8>>) {
+fn told(object: &StudioObject) -> Answer {
     let (extent, picture) = object.picture();
     let mask = object.mask();
     let says = json!({
@@ -388,7 +350,7 @@ fn told(object: &StudioObject) -> (Value, Vec<Vec<u8>>) {
 fn kept_object(
     described: &relight_photo::insert::ObjectDescription,
     files: &SceneFiles,
-) -> Result<StudioObject, StudioError> {
+) -> Result<StudioObject, Refusal> {
     let name = described.photo.to_string_lossy();
     let content = files.content(&described.photo)?.clone();
     match &described.mask {
@@ -401,19 +363,19 @@ fn kept_object(
 }
 
 /// A scene whose files are all in the engine.
-fn in_engine(scene: &PageScene) -> Result<SceneDescription, StudioError> {
+fn in_engine(scene: &PageScene) -> Result<SceneDescription, Refusal> {
     let files = vec![ObjectFiles::default(); scene.objects.len()];
     scene.described(PathBuf::new(), files)
 }
 
-fn backgrounds() -> Result<Answer, StudioError> {
+fn backgrounds() -> Result<Answer, Refusal> {
     let made = made_panoramas()?;
     let panoramas: Vec<Value> = made
         .iter()
-        .map(|(scenery, _)| json!({ "id": scenery.id(), "name": scenery.name() }))
+        .map(|(scenery, _)| json!({ "id": scenery.id, "name": scenery.name }))
         .collect();
     let thumbnails = made.into_iter().map(|(_, thumbnail)| thumbnail).collect();
-    Ok(Answer::new(json!({ "panoramas": panoramas }), thumbnails))
+    Ok((json!({ "panoramas": panoramas }), thumbnails))
 }
 
 /// The brightest shading, but for one pixel in a hundred: what is shown as white.

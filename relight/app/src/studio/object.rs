@@ -11,11 +11,10 @@ use relight_photo::decompose::{
 };
 use relight_photo::insert::{ObjectDescription, SceneSetting, Subject};
 use relit_data::geometry::Rect;
-use relit_grabcut::{Hints, SegmentSettings, Stroke, Strokes, segment};
+use relit_grabcut::{Hints, Mask, SegmentSettings, Stroke, Strokes, segment};
 
-use super::StudioError;
+use super::error::{Refusal, refused};
 use super::pixels::{levels, on_screen, opaque, shown, stored, without_alpha};
-use super::request::ObjectKind;
 
 /// Larger photographs are made smaller: the page keeps several, on a phone.
 pub(super) const MOST_PIXELS: usize = 2_000_000;
@@ -58,19 +57,12 @@ struct Cut {
     preview: Option<Subject>,
 }
 
-/// A mask that was made.
-pub(super) struct MadeMask {
-    pub(super) levels: Vec<u8>,
-    pub(super) area: u64,
-    pub(super) warnings: Vec<String>,
-}
-
 impl StudioObject {
     /// Opens a file.
     ///
     /// # Errors
     /// Where it is no photograph and no captured object, or too large.
-    pub(super) fn open(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+    pub(super) fn open(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         if is_captured(name) {
             let captured = CapturedObject::from_bytes(&bytes)?;
             let subject = Subject::of_captured(&captured)?;
@@ -95,7 +87,7 @@ impl StudioObject {
         bytes: Vec<u8>,
         mask: &[u8],
         transfer: Option<Transfer>,
-    ) -> Result<Self, StudioError> {
+    ) -> Result<Self, Refusal> {
         let opened = OpenedFile::read(name, bytes, transfer)?;
         let image = StoredImage::from_bytes(Path::new(MASK), mask)?;
         let (mask, _) = image.object_mask(Path::new(MASK))?;
@@ -104,7 +96,7 @@ impl StudioObject {
         Self::of_file(opened, mask)
     }
 
-    fn of_file(opened: OpenedFile, mask: Option<GrayImage>) -> Result<Self, StudioError> {
+    fn of_file(opened: OpenedFile, mask: Option<GrayImage>) -> Result<Self, Refusal> {
         let mut object = Self {
             name: opened.name,
             file: opened.bytes,
@@ -118,25 +110,23 @@ impl StudioObject {
             })),
         };
         // A photograph may show by itself where its object is.
-        match object.photo() {
-            Ok(_) | Err(StudioError::NoMask { .. }) => Ok(object),
-            Err(fault) => Err(fault),
-        }
+        object.read_photo()?;
+        Ok(object)
     }
 
     /// A photograph that a browser has decoded.
     ///
     /// # Errors
     /// Where the pixels are not as many as they should be.
-    pub(super) fn of_pixels(name: &str, size: [u32; 2], rgba: &[u8]) -> Result<Self, StudioError> {
+    pub(super) fn of_pixels(name: &str, size: [u32; 2], rgba: &[u8]) -> Result<Self, Refusal> {
         Self::open(&format!("{}.png", stem(name)), png_of(name, size, rgba)?)
     }
 
-    /// What it is made of.
-    pub(super) const fn kind(&self) -> ObjectKind {
+    /// What it is made of: a photograph, which is decomposed, or maps that were measured.
+    pub(super) const fn kind(&self) -> &'static str {
         match self.content {
-            Content::Photo(_) => ObjectKind::Photo,
-            Content::Captured(_) => ObjectKind::Captured,
+            Content::Photo(_) => "photo",
+            Content::Captured(_) => "captured",
         }
     }
 
@@ -182,62 +172,64 @@ impl StudioObject {
         &mut self,
         rect: Option<[i32; 4]>,
         strokes: Vec<Stroke>,
-    ) -> Result<MadeMask, StudioError> {
+    ) -> Result<Mask, Refusal> {
         let Content::Photo(cut) = &mut self.content else {
-            let name = self.name.clone();
-            return Err(StudioError::Captured { name });
+            return refused(captured(&self.name));
         };
-        let seeds = Strokes::new(strokes)?.paint(cut.shown.dimensions(), None)?;
         let rect = rect.map(|[x, y, width, height]| {
             Rect::new(x, y, width.max(0) as u32, height.max(0) as u32)
         });
-        let hints = Hints::from_parts(rect, seeds)?;
-        let mask = segment(&cut.shown, &hints, &SegmentSettings::default())?;
-        let made = MadeMask {
-            levels: mask.image().as_raw().clone(),
-            area: mask.statistics().area_px,
-            warnings: mask.warnings().iter().map(ToString::to_string).collect(),
+        let hints = Hints {
+            rect,
+            seeds: None,
+            strokes: Strokes::new(strokes)?,
         };
-        cut.mask = Some(mask.image().clone());
+        let mask = segment(&cut.shown, &hints, &SegmentSettings::default())?;
+        cut.mask = Some(mask.image.clone());
         (cut.photo, cut.preview) = (None, None);
-        Ok(made)
+        Ok(mask)
     }
 
-    /// The photograph with its mask: the same that `relight` reads of its files.
-    fn photo(&mut self) -> Result<&Photo, StudioError> {
+    /// Reads the photograph with its mask, where there is one: the same that `relight` reads of its files.
+    fn read_photo(&mut self) -> Result<(), Refusal> {
         let Content::Photo(cut) = &mut self.content else {
-            let name = self.name.clone();
-            return Err(StudioError::Captured { name });
+            return Ok(());
         };
-        if cut.photo.is_none() {
-            let mask = cut.mask.as_ref().map(stored).transpose()?;
-            let hints = PhotoHints {
-                mask: mask.as_ref().map(|mask| (Path::new(MASK), mask)),
-                transfer: self.transfer,
-                rectangle: None,
-            };
-            let read = Photo::from_bytes(Path::new(&self.name), &self.file, &hints);
-            cut.photo = Some(read.map_err(|fault| match fault {
-                DecomposeError::NoMask { .. } | DecomposeError::Black { .. } => {
-                    let name = self.name.clone();
-                    StudioError::NoMask { name }
-                }
-                fault => fault.into(),
-            })?);
+        if cut.photo.is_some() {
+            return Ok(());
         }
-        cut.photo.as_ref().ok_or_else(|| StudioError::NoMask {
-            name: self.name.clone(),
-        })
+        let mask = cut.mask.as_ref().map(stored).transpose()?;
+        let hints = PhotoHints {
+            mask: mask.as_ref().map(|mask| (Path::new(MASK), mask)),
+            transfer: self.transfer,
+            rectangle: None,
+        };
+        match Photo::from_bytes(Path::new(&self.name), &self.file, &hints) {
+            Ok(photo) => cut.photo = Some(photo),
+            Err(DecomposeError::NoMask { .. } | DecomposeError::Black { .. }) => {}
+            Err(fault) => return Err(fault.into()),
+        }
+        Ok(())
+    }
+
+    fn photo(&mut self) -> Result<&Photo, Refusal> {
+        self.read_photo()?;
+        let name = &self.name;
+        match &self.content {
+            Content::Captured(_) => refused(captured(name)),
+            Content::Photo(cut) => cut.photo.as_ref().ok_or_else(|| {
+                Refusal(format!(
+                    "{name}: mark the object first, by a rectangle or strokes"
+                ))
+            }),
+        }
     }
 
     /// The photograph decomposed as it is; none of a captured object.
     ///
     /// # Errors
     /// Where it is not cut out yet, or cannot be decomposed.
-    pub(super) fn decomposed(
-        &mut self,
-        decomposer: &Decomposer,
-    ) -> Result<Decomposition, StudioError> {
+    pub(super) fn decomposed(&mut self, decomposer: &Decomposer) -> Result<Decomposition, Refusal> {
         let photo = self.photo()?.clone().at_most(PREVIEW_SIDE);
         let options = photo.options(&DecomposeOptions::default());
         Ok(decomposer.decompose(&photo.picture, &photo.mask, &options)?)
@@ -247,7 +239,7 @@ impl StudioObject {
     ///
     /// # Errors
     /// Where it is not cut out yet, or cannot be decomposed.
-    pub(super) fn prepare(&mut self, decomposer: &Decomposer) -> Result<(), StudioError> {
+    pub(super) fn prepare(&mut self, decomposer: &Decomposer) -> Result<(), Refusal> {
         if self.prepared().is_some() {
             return Ok(());
         }
@@ -282,7 +274,7 @@ impl StudioObject {
         setting: &SceneSetting,
         described: &ObjectDescription,
         decomposer: &Decomposer,
-    ) -> Result<Subject, StudioError> {
+    ) -> Result<Subject, Refusal> {
         if let Content::Captured(object) = &self.content {
             return Ok(object.1.clone());
         }
@@ -311,7 +303,7 @@ impl OpenedFile {
         name: &str,
         bytes: Vec<u8>,
         transfer: Option<Transfer>,
-    ) -> Result<Self, StudioError> {
+    ) -> Result<Self, Refusal> {
         let path = Path::new(name);
         let extent = stated_extent(&bytes);
         let has_at_most = |most: usize| {
@@ -320,12 +312,10 @@ impl OpenedFile {
         if let Some(Extent { width, height }) = extent
             && !has_at_most(MOST_READ)
         {
-            return Err(StudioError::TooLarge {
-                name: name.to_owned(),
-                width,
-                height,
-                most: MOST_READ,
-            });
+            return refused(format!(
+                "{name} has {width} x {height} pixels: at most {} million are read",
+                MOST_READ / 1_000_000
+            ));
         }
         // What says that it is small is not decoded to see whether it is.
         let smaller = if has_at_most(MOST_PIXELS) {
@@ -359,9 +349,9 @@ pub(super) fn png_of(
     name: &str,
     [width, height]: [u32; 2],
     rgba: &[u8],
-) -> Result<Vec<u8>, StudioError> {
+) -> Result<Vec<u8>, Refusal> {
     if rgba.len() as u64 != 4 * u64::from(width) * u64::from(height) || rgba.is_empty() {
-        return Err(StudioError::Part("pixels of its size"));
+        return refused("the request has no pixels of its size");
     }
     let (colours, has_alpha) = without_alpha(rgba);
     let (pixels, kind) = if has_alpha {
@@ -377,6 +367,10 @@ pub(super) fn png_of(
             source,
         })?;
     Ok(file)
+}
+
+fn captured(name: &str) -> String {
+    format!("{name} is a captured object: it has its own mask")
 }
 
 /// Whether a file is called as a captured object.

@@ -2,64 +2,53 @@
 
 use std::path::PathBuf;
 
+use relight_core::image::Transfer;
 use relight_photo::insert::{
-    DiscLamp, LightDescription, ObjectDescription, SceneDescription, SceneFault, WhiteBalance,
+    DiscLamp, LightDescription, ObjectDescription, SceneDescription, SceneFault,
 };
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
-use super::StudioError;
+use super::error::{Refusal, refused};
 
-/// A scene, whose objects are numbers and whose background is the engine's.
+/// A scene as a file has it, but that its objects are numbers, its background is the engine's, and its lamp is in parts.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 pub(super) struct PageScene {
-    pub(super) size: [u32; 2],
-    pub(super) field: f64,
-    pub(super) down: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) tilt: Option<f64>,
-    #[serde(rename = "match")]
-    pub(super) matches: bool,
-    pub(super) white_balance: WhiteBalance,
-    pub(super) exposure: f32,
-    pub(super) light: PageLight,
+    light: PageLight,
     pub(super) objects: Vec<PageObject>,
+    #[serde(flatten)]
+    rest: Map<String, Value>,
 }
 
 /// The light of a scene.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
-pub(super) struct PageLight {
-    pub(super) kind: LightKind,
-    pub(super) azimuth: f64,
-    pub(super) elevation: f64,
+struct PageLight {
+    kind: LightKind,
+    azimuth: f64,
+    elevation: f64,
     /// As `relight insert --lamp` takes it.
-    pub(super) colour: String,
-    pub(super) size: f64,
-    pub(super) ambient: f64,
-    pub(super) turn: f64,
+    colour: String,
+    size: f64,
+    ambient: f64,
+    turn: f64,
 }
 
 /// Where the light comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum LightKind {
+enum LightKind {
     /// From the background.
     Background,
     /// From a lamp.
     Lamp,
 }
 
-/// An object of a scene.
+/// An object of a scene, as a file has it, but for its files.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 pub(super) struct PageObject {
     pub(super) object: u32,
-    pub(super) at: [f64; 2],
-    pub(super) height: f64,
-    pub(super) rotation: f64,
-    pub(super) tint: [f32; 3],
-    #[serde(default)]
-    pub(super) gloss: Option<[f32; 2]>,
-    pub(super) exposure: f32,
-    pub(super) shadow: f32,
+    #[serde(flatten)]
+    rest: Map<String, Value>,
 }
 
 /// The files of an object.
@@ -67,34 +56,35 @@ pub(super) struct PageObject {
 pub(super) struct ObjectFiles {
     pub(super) photo: PathBuf,
     pub(super) mask: Option<PathBuf>,
-    pub(super) transfer: Option<relight_core::image::Transfer>,
+    pub(super) transfer: Option<Transfer>,
 }
 
 impl PageScene {
     /// The scene as a file has it, with the files of its background and of each object.
     ///
     /// # Errors
-    /// Where a number is out of its range.
+    /// Where something is missing or unknown, or a number is out of its range.
     pub(super) fn described(
         &self,
         background: PathBuf,
         files: Vec<ObjectFiles>,
-    ) -> Result<SceneDescription, StudioError> {
-        let pairs = self.objects.iter().zip(files);
-        let scene = SceneDescription {
-            background,
-            size: self.size,
-            field: self.field,
-            down: self.down,
-            tilt: self.tilt,
-            light: self.light.described(),
-            matches: self.matches,
-            white_balance: self.white_balance,
-            exposure: self.exposure,
-            objects: pairs
-                .map(|(object, files)| object.described(files))
-                .collect(),
-        };
+    ) -> Result<SceneDescription, Refusal> {
+        let objects = self.objects.iter().map(|object| {
+            let mut described = object.rest.clone();
+            described.insert("photo".to_owned(), "".into());
+            described
+        });
+        let objects: Vec<_> = objects.collect();
+        let mut scene = self.rest.clone();
+        scene.insert("background".to_owned(), "".into());
+        scene.insert("object".to_owned(), objects.into());
+        let mut scene: SceneDescription = serde_json::from_value(scene.into())?;
+        scene.background = background;
+        scene.light = self.light.described();
+        for (object, files) in scene.objects.iter_mut().zip(files) {
+            (object.photo, object.mask) = (files.photo, files.mask);
+            object.transfer = files.transfer;
+        }
         match scene.check() {
             // A background alone is a picture too.
             Ok(()) | Err(SceneFault::Objects(0)) => Ok(scene),
@@ -106,20 +96,35 @@ impl PageScene {
     ///
     /// # Errors
     /// Where its light is one that the page has not.
-    pub(super) fn of(scene: &SceneDescription, numbers: &[u32]) -> Result<Self, StudioError> {
+    pub(super) fn of(scene: &SceneDescription, numbers: &[u32]) -> Result<Self, Refusal> {
         let objects = scene.objects.iter().zip(numbers);
+        let mut rest = fields(scene)?;
+        rest.retain(|name, _| !["background", "light", "object"].contains(&name.as_str()));
         Ok(Self {
-            size: scene.size,
-            field: scene.field,
-            down: scene.down,
-            tilt: scene.tilt,
-            matches: scene.matches,
-            white_balance: scene.white_balance,
-            exposure: scene.exposure,
+            rest,
             light: PageLight::of(&scene.light)?,
             objects: objects
                 .map(|(object, &number)| PageObject::of(object, number))
-                .collect(),
+                .collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+/// The fields of what has fields, as JSON.
+fn fields(of: &impl Serialize) -> Result<Map<String, Value>, Refusal> {
+    match serde_json::to_value(of)? {
+        Value::Object(fields) => Ok(fields),
+        other => refused(format!("{other} has no fields")),
+    }
+}
+
+impl PageObject {
+    fn of(object: &ObjectDescription, number: u32) -> Result<Self, Refusal> {
+        let mut rest = fields(object)?;
+        rest.retain(|name, _| !["photo", "mask", "transfer"].contains(&name.as_str()));
+        Ok(Self {
+            object: number,
+            rest,
         })
     }
 }
@@ -142,14 +147,16 @@ impl PageLight {
         }
     }
 
-    fn of(light: &LightDescription) -> Result<Self, StudioError> {
+    fn of(light: &LightDescription) -> Result<Self, Refusal> {
         if light.panorama.is_some() || light.coefficients.is_some() {
-            return Err(StudioError::Unsupported("light from a file of its own"));
+            return refused(
+                "the page cannot open scenes with light from a file of its own: relight insert can",
+            );
         }
         if light.object.is_some() {
-            return Err(StudioError::Unsupported(
-                "light from an object of the background",
-            ));
+            return refused(
+                "the page cannot open scenes with light from an object of the background: relight insert can",
+            );
         }
         let found = light.lamp()?;
         let lamp = found.unwrap_or_default();
@@ -174,36 +181,6 @@ impl PageLight {
 fn colour_of(lamp: &str) -> Option<&str> {
     let mut parts = lamp.split(',').skip(2).map(str::trim);
     parts.find(|part| part.parse::<f64>().is_err())
-}
-
-impl PageObject {
-    fn described(&self, files: ObjectFiles) -> ObjectDescription {
-        ObjectDescription {
-            photo: files.photo,
-            mask: files.mask,
-            transfer: files.transfer,
-            at: self.at,
-            height: self.height,
-            rotation: self.rotation,
-            tint: self.tint,
-            gloss: self.gloss,
-            exposure: self.exposure,
-            shadow: self.shadow,
-        }
-    }
-
-    fn of(object: &ObjectDescription, number: u32) -> Self {
-        Self {
-            object: number,
-            at: object.at,
-            height: object.height,
-            rotation: object.rotation,
-            tint: object.tint,
-            gloss: object.gloss,
-            exposure: object.exposure,
-            shadow: object.shadow,
-        }
-    }
 }
 
 #[cfg(test)]
@@ -250,10 +227,7 @@ mod tests {
 
     #[test]
     fn light_that_the_page_has_not_is_refused_by_name() {
-        let refused = |light: &str| {
-            let fault = PageScene::of(&parsed(light), &[1]).unwrap_err();
-            fault.to_string()
-        };
+        let refused = |light: &str| PageScene::of(&parsed(light), &[1]).unwrap_err().0;
         assert!(refused("panorama = \"c.hdr\"").contains("a file of its own"));
         assert!(refused("object = \"m.png\"").contains("object of the background"));
     }
@@ -261,8 +235,8 @@ mod tests {
     #[test]
     fn numbers_out_of_range_are_refused() {
         let mut page = PageScene::of(&parsed(""), &[1]).unwrap();
-        page.field = f64::NAN;
-        let fault = page.described("a.jpg".into(), vec![ObjectFiles::default()]);
-        assert!(matches!(fault, Err(StudioError::Scene(_))));
+        page.rest.insert("field".to_owned(), 1e9.into());
+        let described = page.described("a.jpg".into(), vec![ObjectFiles::default()]);
+        assert!(described.is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! What the page asks, as JSON: docs/relight-serve.md has the whole of it.
 
 use relit_grabcut::Stroke;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use super::page_scene::PageScene;
 
@@ -81,14 +81,4 @@ pub(super) enum FileFormat {
     Png,
     /// Smaller.
     Jpeg,
-}
-
-/// What an object is made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum ObjectKind {
-    /// A photograph, which is decomposed.
-    Photo,
-    /// Maps that were measured.
-    Captured,
 }

@@ -1,10 +1,10 @@
-//! `relight serve`: the app's page, handed out or written to a folder.
+//! `relight serve`: the app's page, handed out.
 
 use std::env;
 use std::path::PathBuf;
 
 use clap::Args;
-use relight_app::server::{PageFiles, PageServerOptions, installed_page, serve_page};
+use relight_app::server::{PageFiles, installed_page, serve_page};
 use relit_console::{Console, Outcome};
 use relit_web::{ListenAddress, Shutdown, Token};
 use serde_json::json;
@@ -16,9 +16,7 @@ Examples:
   relight serve
       the app in a browser of this machine: open the address that is printed
   relight serve --listen 0.0.0.0:8430
-      for a phone in the same network, which scans the code; the address holds a token
-  relight serve --export site
-      the same page in a folder, for any web server";
+      for a phone in the same network, which scans the code; the address holds a token";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -35,9 +33,6 @@ pub(crate) struct Arguments {
     /// The folder of the page [default: the one that was built or installed with this program].
     #[arg(long, value_name = "FOLDER")]
     page: Option<PathBuf>,
-    /// Write the page into a folder, for any web server, and serve nothing.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["listen", "token_file", "name"])]
-    export: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
@@ -46,31 +41,14 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         None => installed_page(&env::current_exe()?)?,
     };
     let files = PageFiles::read(&folder)?;
-    if let Some(folder) = &arguments.export {
-        files.export(folder)?;
-        let size = files.size();
-        let megabytes = |bytes: u64| bytes as f64 / 1e6;
-        let text = format!(
-            "{}: {} files, {:.1} MB ({:.1} MB compressed); README.txt says what the server should send",
-            folder.display(),
-            size.files,
-            megabytes(size.bytes),
-            megabytes(size.compressed)
-        );
-        let event = json!({ "event": "exported", "folder": folder, "files": size.files, "bytes": size.bytes,
-            "compressed": size.compressed });
-        console.say(&text, &event);
-        return Ok(Outcome::Whole);
-    }
     let token = match &arguments.token_file {
         Some(file) => Some(Token::from_file_or_new(file)?),
         None => None,
     };
-    let options = PageServerOptions {
-        address: arguments.listen.socket(),
-        token,
-        names: arguments.listen.names(&arguments.name),
-    };
+    let (address, names) = (
+        arguments.listen.socket(),
+        arguments.listen.names(&arguments.name),
+    );
     let announce = |announcement: &relit_web::Announcement| {
         let url = &announcement.url;
         let mut text = format!("open {url} (end with Ctrl+C)");
@@ -83,6 +61,6 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         let event = json!({ "event": "serving", "url": url, "address": announcement.address });
         console.say(&text, &event);
     };
-    serve_page(files, options, announce, &Shutdown::new())?;
+    serve_page(files, address, token, names, announce, &Shutdown::new())?;
     Ok(Outcome::Whole)
 }

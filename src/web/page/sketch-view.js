@@ -1,14 +1,12 @@
-// The photograph while its object is cut out: zoom and place on the canvas; mask, strokes, rectangle and cursor over it.
+// The picture on which a sketch is drawn: zoom and place on the canvas; mask, strokes, rectangle and cursor over it.
 
-import { pixels } from "./dom.js";
+/** So many pixels of the screen a pixel of the picture can become. */
+const CLOSEST = 32;
+const COLOURS = { object: "#3ddc6c", background: "#ff5a5a" };
+/** Strokes let so much of the picture through. */
+const COVER = 0.5;
 
-/** So many pixels of the screen a pixel of the photograph can become. */
-const CLOSEST = 12;
-const COLOURS = { object: "#3ddc6ccc", background: "#ff5a5acc" };
-const OUTSIDE = [12, 12, 16, 170];
-const EDGE = [255, 214, 120, 255];
-
-export class View {
+export class SketchView {
   /** The sketch as it is, and what is being drawn. */
   sketch = { rect: null, strokes: [] };
   stroke = null;
@@ -21,8 +19,8 @@ export class View {
   scale = 1;
 
   #canvas;
-  #photo = null;
-  #cut = null;
+  #picture = null;
+  #mask = null;
   #fitted = true;
   #waiting = false;
 
@@ -31,34 +29,40 @@ export class View {
     new ResizeObserver(() => this.#resize()).observe(canvas);
   }
 
-  /** Shows a photograph, all of it. */
-  open(photo) {
+  /** Shows all of a picture: { picture, width, height }, where `picture` may be null and of another size. */
+  open(picture) {
     Object.assign(this, { stroke: null, rect: null, brush: null, cross: null });
-    this.#photo = photo;
-    this.setMask(photo.mask);
+    this.#picture = picture;
+    this.#mask = null;
     this.#resize();
     this.fit();
   }
 
-  /** Darkens what is not the object. */
-  setMask(mask) {
-    this.#cut = mask && overlay(mask, this.#photo.width, this.#photo.height);
+  /** Shows another picture in place of the one that was opened. */
+  show(picture) {
+    this.#picture = { ...this.#picture, picture };
     this.draw();
   }
 
-  /** The place in the photograph under a pointer. */
+  /** Paints the mask by a function of the context, in pixels of the picture, and of a pixel of the page; null for none. */
+  setMask(paint) {
+    this.#mask = paint;
+    this.draw();
+  }
+
+  /** The place in the picture under a pointer. */
   place({ clientX, clientY }) {
     const box = this.#canvas.getBoundingClientRect();
     const ratio = this.#canvas.width / box.width;
     return [((clientX - box.left) * ratio - this.x) / this.scale, ((clientY - box.top) * ratio - this.y) / this.scale];
   }
 
-  /** Pixels of the photograph that are `css` pixels of the page. */
+  /** Pixels of the picture that are `css` pixels of the page. */
   length(css) {
     return (css * devicePixelRatio) / this.scale;
   }
 
-  /** Zooms by a factor, so that a place of the page keeps its place in the photograph. */
+  /** Zooms by a factor, so that a place of the page keeps its place in the picture. */
   zoom(factor, event = this.#middle()) {
     const [x, y] = this.place(event);
     const least = this.#fitScale();
@@ -70,7 +74,7 @@ export class View {
     this.#hold();
   }
 
-  /** Moves the photograph by a way on the page. */
+  /** Moves the picture by a way on the page. */
   move(dx, dy) {
     this.x += dx * devicePixelRatio;
     this.y += dy * devicePixelRatio;
@@ -85,7 +89,7 @@ export class View {
 
   /** Draws before the next picture of the screen. */
   draw() {
-    if (this.#waiting || !this.#photo) return;
+    if (this.#waiting || !this.#picture) return;
     this.#waiting = true;
     requestAnimationFrame(() => {
       this.#waiting = false;
@@ -99,23 +103,23 @@ export class View {
   }
 
   #fitScale() {
-    return Math.min(this.#canvas.width / this.#photo.width, this.#canvas.height / this.#photo.height);
+    return Math.min(this.#canvas.width / this.#picture.width, this.#canvas.height / this.#picture.height);
   }
 
   #resize() {
     const box = this.#canvas.getBoundingClientRect();
-    if (!this.#photo || box.width === 0) return;
+    if (!this.#picture || box.width === 0) return;
     this.#canvas.width = Math.round(box.width * devicePixelRatio);
     this.#canvas.height = Math.round(box.height * devicePixelRatio);
     if (this.#fitted) this.fit();
     else this.#hold();
   }
 
-  /** Keeps the photograph in sight: centred where it is smaller than the canvas. */
+  /** Keeps the picture in sight: centred where it is smaller than the canvas. */
   #hold() {
-    const hold = (at, photo, canvas) => (photo <= canvas ? (canvas - photo) / 2 : Math.min(0, Math.max(canvas - photo, at)));
-    this.x = hold(this.x, this.#photo.width * this.scale, this.#canvas.width);
-    this.y = hold(this.y, this.#photo.height * this.scale, this.#canvas.height);
+    const hold = (at, side, canvas) => (side <= canvas ? (canvas - side) / 2 : Math.min(0, Math.max(canvas - side, at)));
+    this.x = hold(this.x, this.#picture.width * this.scale, this.#canvas.width);
+    this.y = hold(this.y, this.#picture.height * this.scale, this.#canvas.height);
     this.draw();
   }
 
@@ -124,14 +128,15 @@ export class View {
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, this.#canvas.width, this.#canvas.height);
     context.setTransform(this.scale, 0, 0, this.scale, this.x, this.y);
-    // Where the photograph is on the screen, for tests and for programs that help to use the page.
+    // Where the picture is on the screen, for tests and for programs that help to use the page.
     this.#canvas.dataset.view = [this.scale, this.x, this.y].map((value) => value / devicePixelRatio).join(" ");
     context.imageSmoothingEnabled = this.scale < 3;
-    context.drawImage(this.#photo.picture, 0, 0);
-    if (this.#cut) context.drawImage(this.#cut, 0, 0);
+    const pixel = devicePixelRatio / this.scale;
+    const { picture, width, height } = this.#picture;
+    if (picture) context.drawImage(picture, 0, 0, width, height);
+    this.#mask?.(context, pixel);
     const strokes = [...this.sketch.strokes, ...(this.stroke ? [this.stroke] : [])];
     if (strokes.length > 0) this.#paintStrokes(context, strokes);
-    const pixel = devicePixelRatio / this.scale;
     const rect = this.rect ?? this.sketch.rect;
     if (rect) paintRect(context, rect, pixel);
     if (this.brush) paintRing(context, this.brush, pixel);
@@ -157,7 +162,7 @@ export class View {
     }
     context.save();
     context.setTransform(1, 0, 0, 1, 0, 0);
-    context.globalAlpha = 0.55;
+    context.globalAlpha = COVER;
     context.drawImage(layer, 0, 0);
     context.restore();
   }
@@ -166,22 +171,6 @@ export class View {
 /** The corners of a rectangle: upper left, upper right, lower right, lower left. */
 export function corners([x, y, w, h]) {
   return [[x, y], [x + w, y], [x + w, y + h], [x, y + h]];
-}
-
-/** Dark outside of the mask, and a line at its edge. */
-function overlay(mask, width, height) {
-  const rgba = new Uint8Array(4 * mask.length);
-  const inside = (at) => mask[at] >= 128;
-  for (let y = 0, at = 0; y < height; y++) {
-    for (let x = 0; x < width; x++, at++) {
-      if (inside(at)) continue;
-      const edge = (x > 0 && inside(at - 1)) || (x + 1 < width && inside(at + 1)) || (y > 0 && inside(at - width)) || (y + 1 < height && inside(at + width));
-      rgba.set(edge ? EDGE : OUTSIDE, 4 * at);
-    }
-  }
-  const canvas = new OffscreenCanvas(width, height);
-  canvas.getContext("2d").putImageData(pixels(rgba, width, height), 0, 0);
-  return canvas;
 }
 
 function paintRect(context, rect, pixel) {
