@@ -1,16 +1,16 @@
 //! The mask of the object, read from a file.
 
-use std::io::Cursor;
 use std::path::Path;
 
+use image::GrayImage;
 use image::imageops::{FilterType, resize};
-use image::metadata::Orientation;
-use image::{DynamicImage, GrayImage, ImageDecoder, ImageReader, Limits};
 
+use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use relit_data::mask::{MaskPicture, ObjectPixels};
+use relit_data::mask::{MaskFault, MaskPicture, ObjectPixels, size_hint};
 use relit_data::session::{MASK_FILE, Recording};
 use relit_data::shard::Digest;
+use relit_data::still;
 
 use super::{ExtractError, bounding_box};
 
@@ -41,34 +41,37 @@ impl ObjectMask {
         frame: (u32, u32),
         stored: (u32, u32),
     ) -> Result<Self, ExtractError> {
+        let refused = |text| Err(ExtractError::Refused(text));
         let path = match (named, &recording.folder) {
             (Some(named), _) if named.is_file() => named.to_owned(),
-            (Some(named), _) => return Err(ExtractError::MaskNotThere(named.to_owned())),
+            (Some(named), _) => {
+                let named = named.display();
+                return refused(format!(
+                    "there is no mask {named}: make one with relit-mask, or correct the name given to --mask"
+                ));
+            }
             (None, Some(folder)) if folder.join(MASK_FILE).is_file() => folder.join(MASK_FILE),
-            (None, Some(folder)) => return Err(ExtractError::NoMask(folder.clone())),
-            (None, None) => return Err(ExtractError::NoMask(recording.video.clone())),
+            (None, folder) => {
+                let recording = folder.as_ref().unwrap_or(&recording.video).display();
+                return refused(format!(
+                    "{recording} has no mask: make one with relit-mask, or name one with --mask"
+                ));
+            }
         };
-        let bytes = std::fs::read(&path).map_err(|source| ExtractError::Read {
-            path: path.clone(),
-            source,
-        })?;
-        let picture = decode(&bytes).map_err(|source| ExtractError::Mask {
-            path: path.clone(),
-            source,
-        })?;
+        let bytes = std::fs::read(&path).map_err(ExtractError::io("read", &path))?;
+        let of_this_mask =
+            |what: String| ExtractError::Refused(format!("the mask {} {what}", path.display()));
+        let picture = still::decode(&bytes).map_err(|error| of_this_mask(with_causes(&error)))?;
         let picture = MaskPicture::of_image(&picture);
         let size = picture.size();
         if size != frame && size != stored {
-            return Err(ExtractError::MaskSize {
-                path,
-                mask: size,
-                frame,
-            });
+            let hint = size_hint(size, frame).unwrap_or("make the mask on a frame of this video");
+            return Err(of_this_mask(format!(
+                "is {} x {} pixels and the frames are {} x {}: {hint}",
+                size.0, size.1, frame.0, frame.1
+            )));
         }
-        let no_object = |fault| ExtractError::NotAMask {
-            path: path.clone(),
-            fault,
-        };
+        let no_object = |fault: MaskFault| of_this_mask(fault.to_string());
         let ObjectPixels { inside, basis } = picture.object().map_err(no_object)?;
         let levels = inside.iter().map(|&inside| if inside { 255 } else { 0 });
         let mut image = GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default();
@@ -107,19 +110,6 @@ impl ObjectMask {
             )
         })
     }
-}
-
-/// The picture in a mask's file, as it is displayed.
-fn decode(bytes: &[u8]) -> image::ImageResult<DynamicImage> {
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
-    let mut decoder = reader.into_decoder()?;
-    // A file whose orientation cannot be read is shown as it is stored.
-    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let mut limits = Limits::default();
-    limits.reserve(decoder.total_bytes())?;
-    let mut image = DynamicImage::from_decoder(decoder)?;
-    image.apply_orientation(orientation);
-    Ok(image)
 }
 
 /// The frame on which a mask was made, by the record beside it (`mask.json` of `mask.png`). A record that is

@@ -27,7 +27,7 @@ pub enum MaskingError {
         /// The photograph.
         path: PathBuf,
         /// What it says of its colours.
-        fault: relit_still::ColourError,
+        fault: relit_data::still::ColourError,
     },
     /// A name for the mask that does not end in `.png`.
     #[error("{0} cannot be the mask's name: give one that ends in .png")]

@@ -180,7 +180,7 @@ fn write_turn(
         duplicates: 0,
         spec_net: spec_net as u32,
         lossy: false,
-        quality: Some(SessionQuality::of(&page.records, false, None)),
+        quality: SessionQuality::of(&page.records, false, None),
         warnings: Vec::new(),
         table: files.table,
         report: Some(report),
