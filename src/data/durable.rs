@@ -69,6 +69,12 @@ impl Partial {
         }
     }
 
+    /// The final path.
+    #[must_use]
+    pub fn target(&self) -> &Path {
+        &self.names.target
+    }
+
     /// Writes and syncs all bytes to disk.
     ///
     /// # Errors
@@ -94,6 +100,12 @@ impl Write for Partial {
 }
 
 impl SealedPartial {
+    /// The final path.
+    #[must_use]
+    pub fn target(&self) -> &Path {
+        &self.names.target
+    }
+
     /// Renames the file to its final name, replacing an older one.
     ///
     /// # Errors

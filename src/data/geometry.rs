@@ -98,16 +98,13 @@ impl fmt::Display for Rect {
     }
 }
 
-/// Why a text is not a rectangle.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not a rectangle: give X,Y,W,H in whole pixels, W and H at least 1")]
-pub struct NotARect(String);
-
 impl FromStr for Rect {
-    type Err = NotARect;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, NotARect> {
-        let wrong = || NotARect(text.to_owned());
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!("{text:?} is not a rectangle: give X,Y,W,H in whole pixels, W and H at least 1")
+        };
         let mut parts = text.split(',').map(str::trim);
         let mut next = || parts.next().ok_or_else(wrong);
         let (x, y, w, h) = (next()?, next()?, next()?, next()?);

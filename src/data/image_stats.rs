@@ -82,12 +82,8 @@ pub fn measure_whole(image: &RgbImage, level: u8) -> Measures {
     MaskSpans::whole(image.width(), image.height()).sum(image, level)
 }
 
-/// Part of a row: columns `start..end`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Span {
-    start: usize,
-    end: usize,
-}
+/// Part of a row: columns.
+type Span = Range<usize>;
 
 /// A mask prepared for measuring many images, as runs of pixels in each row.
 #[derive(Debug, Clone)]
@@ -106,16 +102,11 @@ impl MaskSpans {
     fn whole(width: u32, height: u32) -> Self {
         let (w, h) = (width as usize, height as usize);
         let is_inner = |y: usize| w > 2 && y > 0 && y + 1 < h;
-        let inner = |y| {
-            is_inner(y).then_some(Span {
-                start: 1,
-                end: w - 1,
-            })
-        };
+        let inner = |y| is_inner(y).then_some(1..w - 1);
         Self {
             width,
             height,
-            rows: vec![vec![Span { start: 0, end: w }]; h],
+            rows: vec![std::iter::once(0..w).collect(); h],
             inner: (0..h).map(|y| inner(y).into_iter().collect()).collect(),
             pixels: u64::from(width) * u64::from(height),
         }
@@ -161,7 +152,7 @@ impl MaskSpans {
             let (columns, rows) = (seen(&columns), seen(&rows));
             let cut = |span: &Span| {
                 let (start, end) = (span.start.max(columns.start), span.end.min(columns.end));
-                (start < end).then_some(Span { start, end })
+                (start < end).then_some(start..end)
             };
             let row = |(y, spans): (usize, &Vec<Span>)| {
                 let spans = if rows.contains(&y) {
@@ -278,10 +269,7 @@ fn runs(row: &[bool]) -> Vec<Span> {
         match (start, under) {
             (None, true) => start = Some(x),
             (Some(from), false) => {
-                spans.push(Span {
-                    start: from,
-                    end: x,
-                });
+                spans.push(from..x);
                 start = None;
             }
             _ => {}
@@ -429,13 +417,13 @@ impl Laplacian {
             }
         }
         let inner = y.checked_sub(1).and_then(|above| spans.inner.get(above));
-        for &span in inner.into_iter().flatten() {
-            self.add_span(span);
+        for span in inner.into_iter().flatten() {
+            self.add_span(span.start, span.end);
         }
     }
 
     #[inline(always)]
-    fn add_span(&mut self, Span { start, end }: Span) {
+    fn add_span(&mut self, start: usize, end: usize) {
         // An inner pixel has a left and a right neighbour, so the slices exist.
         let (Some(above), Some(left), Some(here), Some(right), Some(below)) = (
             self.above.get(start..end),

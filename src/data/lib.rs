@@ -12,6 +12,7 @@
 //! | [`geometry`] | pixel rectangles |
 //! | [`image_stats`] | statistics of an image's pixels, all or under a mask |
 //! | [`srgb`] | sRGB values to light and back |
+//! | `still` | still image files as they are displayed, with the feature `still` |
 //! | [`text`] | text in files, with or without a byte order mark |
 //! | [`colour`] | colours as videos code them (HDR, wide gamut) to sRGB |
 //! | [`turn_light`] | how much light changes over a turn |
@@ -67,8 +68,8 @@
 //! use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 //! use relit_data::shard::{
 //!     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
-//!     OutputFolder, Sample, SamplingBasis, SessionEntry, ShardReader, ShardWriter,
-//!     SourceVideo, decode_rgb, verify,
+//!     OutputFolder, Sample, SamplingBasis, SessionEntry, SessionQuality, ShardReader,
+//!     ShardWriter, SourceVideo, decode_rgb, verify,
 //! };
 //!
 //! const SESSION: &str = "20261120T093015Z-mug";
@@ -92,18 +93,19 @@
 //! let spans = MaskSpans::of(&mask);
 //! let mut writer =
 //!     ShardWriter::create(folder.path(), settings.layout, SESSION, SAMPLES, &mask)?;
+//! let mut records = Vec::new();
 //! for index in 0..SAMPLES {
 //!     let image = RgbImage::from_fn(8, 8, |x, _| {
 //!         Rgb(if x < 4 { [20 * index as u8, 128, 255] } else { [0; 3] })
 //!     });
 //!     let measures = spans.measure(&image, settings.saturation_level)?;
 //!     let crop = Rect::new(0, 0, 8, 8);
-//!     let record =
-//!         FrameRecord::new(SESSION, "mug", index, crop, &measures, settings.gate).of_frame(
-//!             u64::from(index),
-//!             33_333 * i64::from(index),
-//!             Some(30.0 * f64::from(index)),
-//!         );
+//!     let record = FrameRecord {
+//!         t_us: 33_333 * i64::from(index),
+//!         angle_deg: Some(30.0 * f64::from(index)),
+//!         ..FrameRecord::new(SESSION, "mug", index, crop, &measures, settings.gate)
+//!     };
+//!     records.push(record.clone());
 //!     writer.push(Sample::encode(record, image)?)?;
 //! }
 //! let files = writer.finish()?;
@@ -134,7 +136,7 @@
 //!     duplicates: 0,
 //!     spec_net: 0,
 //!     lossy: false,
-//!     quality: None,
+//!     quality: SessionQuality::of(&records, false, None),
 //!     warnings: Vec::new(),
 //!     table: files.table,
 //!     report: None,
@@ -177,5 +179,7 @@ pub mod session;
 #[cfg(feature = "files")]
 pub mod shard;
 pub mod srgb;
+#[cfg(feature = "still")]
+pub mod still;
 pub mod text;
 pub mod turn_light;

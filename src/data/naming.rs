@@ -24,6 +24,13 @@ pub fn is_session_name(name: &str) -> bool {
             .all(|c| c.is_alphanumeric() || matches!(c, '-' | '_' | '.'))
 }
 
+/// That a text cannot be a session's name, and what can.
+pub(crate) fn not_a_name(name: &str) -> String {
+    format!(
+        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most {LONGEST} bytes, neither starting nor ending with '.', and no device's name of Windows such as con"
+    )
+}
+
 /// Whether Windows takes a file of this name for a device.
 fn is_device(name: &str) -> bool {
     let stem = name.split('.').next().unwrap_or_default();

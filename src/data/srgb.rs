@@ -26,3 +26,27 @@ pub fn from_linear(light: f64) -> f64 {
         1.055 * light.powf(1.0 / 2.4) - 0.055
     }
 }
+
+/// [`to_linear`] in single precision; negative values are mirrored.
+#[must_use]
+pub fn to_linear_f32(value: f32) -> f32 {
+    let size = value.abs();
+    let light = if size <= 0.04045 {
+        size / 12.92
+    } else {
+        ((size + 0.055) / 1.055).powf(2.4)
+    };
+    light.copysign(value)
+}
+
+/// [`from_linear`] in single precision; negative light is mirrored.
+#[must_use]
+pub fn from_linear_f32(light: f32) -> f32 {
+    let size = light.abs();
+    let value = if size <= 0.003_130_8 {
+        size * 12.92
+    } else {
+        1.055 * size.powf(1.0 / 2.4) - 0.055
+    };
+    value.copysign(light)
+}

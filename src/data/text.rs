@@ -7,21 +7,10 @@ use std::path::Path;
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 const UTF16_MARKS: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 
-/// Why bytes are no text.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum TextFault {
-    /// They are in another encoding that editors offer.
-    #[error("it is UTF-16: save it as UTF-8")]
-    Utf16,
-    /// They are in no encoding that is known by a mark.
-    #[error("it is not UTF-8, first at byte {0}: save it as UTF-8")]
-    NotUtf8(usize),
-}
-
 /// The text of a file, without its byte order mark.
 ///
 /// # Errors
-/// Where the file cannot be read; with the kind `InvalidData` and a [`TextFault`] where it is no text.
+/// Where the file cannot be read; with the kind `InvalidData` where it is no text.
 pub fn read(path: &Path) -> io::Result<String> {
     let text = decode(fs::read(path)?);
     text.map_err(|fault| io::Error::new(io::ErrorKind::InvalidData, fault))
@@ -30,15 +19,17 @@ pub fn read(path: &Path) -> io::Result<String> {
 /// The text of a file's content, without its byte order mark.
 ///
 /// # Errors
-/// Where it is no UTF-8.
-pub fn decode(mut bytes: Vec<u8>) -> Result<String, TextFault> {
+/// Where it is no UTF-8: what to do.
+pub fn decode(mut bytes: Vec<u8>) -> Result<String, String> {
     if UTF16_MARKS.iter().any(|mark| bytes.starts_with(mark)) {
-        return Err(TextFault::Utf16);
+        return Err("it is UTF-16: save it as UTF-8".to_owned());
     }
     let mark = bytes.len() - unmarked(&bytes).len();
     bytes.drain(..mark);
-    let place = |fault: std::string::FromUtf8Error| fault.utf8_error().valid_up_to();
-    String::from_utf8(bytes).map_err(|fault| TextFault::NotUtf8(mark + place(fault)))
+    String::from_utf8(bytes).map_err(|fault| {
+        let place = mark + fault.utf8_error().valid_up_to();
+        format!("it is not UTF-8, first at byte {place}: save it as UTF-8")
+    })
 }
 
 /// A file's content without a byte order mark of UTF-8, which parsers of JSON refuse.
@@ -62,9 +53,9 @@ mod tests {
 
     #[test]
     fn other_encodings_are_named() {
-        let decoded = |bytes: &[u8]| decode(bytes.to_vec());
-        assert_eq!(decoded(b"\xff\xfe1\0"), Err(TextFault::Utf16));
-        assert_eq!(decoded(b"\xfe\xff\x001"), Err(TextFault::Utf16));
-        assert_eq!(decoded(b"\xef\xbb\xbfab\xe4"), Err(TextFault::NotUtf8(5)));
+        let refused = |bytes: &[u8]| decode(bytes.to_vec()).unwrap_err();
+        assert!(refused(b"\xff\xfe1\0").contains("UTF-16"));
+        assert!(refused(b"\xfe\xff\x001").contains("UTF-16"));
+        assert!(refused(b"\xef\xbb\xbfab\xe4").contains("byte 5"));
     }
 }

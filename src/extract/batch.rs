@@ -8,12 +8,33 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use relit_data::file_names::folded;
 use relit_data::session::{self, beside_sessions, recording_name, recordings};
-use relit_data::shard::OutputFolder;
+use relit_data::shard::{Dataset, OutputFolder};
 
 use super::catalog::Catalog;
 use super::job::Job;
-use super::storage::StorageBackend;
 use super::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally};
+
+/// Brings recordings to the local disk, and takes extracted sessions away from there; `()` leaves everything where it is.
+pub(super) trait StorageBackend {
+    /// The recording as a file or folder on the local disk.
+    fn fetch(&self, recording: &Path) -> Result<PathBuf, ExtractError> {
+        Ok(recording.to_owned())
+    }
+
+    /// Whether the files of a session that the data set lists are as it says; `out` is the folder on the local
+    /// disk.
+    fn holds(&self, dataset: &Dataset, out: &Path, session: &str) -> bool {
+        dataset.check_integrity(out, session).is_ok()
+    }
+
+    /// The recording is done with, and what became of it is noted. `extracted` is the session that it was
+    /// extracted to just now.
+    fn ended(&self, _: &Path, _: &Dataset, _extracted: Option<&str>) -> Result<(), ExtractError> {
+        Ok(())
+    }
+}
+
+impl StorageBackend for () {}
 
 /// Extracts the recordings `found` into the folder `out`, and adds the outcomes to `tally`.
 pub(super) fn extract_recordings(
@@ -25,7 +46,7 @@ pub(super) fn extract_recordings(
     mut tally: Tally,
 ) -> Result<Tally, ExtractError> {
     if out.join(session::MANIFEST_FILE).exists() {
-        return Err(ExtractError::IntoSession(out.to_owned()));
+        return Err(into_session(out));
     }
     let folder = match options.task {
         None => OutputFolder::lock(out)?,
@@ -33,7 +54,10 @@ pub(super) fn extract_recordings(
     };
     let pool = ThreadPoolBuilder::new()
         .num_threads(options.threads)
-        .build()?;
+        .build()
+        .map_err(|error| {
+            ExtractError::Refused(format!("the worker threads could not be started: {error}"))
+        })?;
     let mut run = Run {
         catalog: Catalog::open(&folder, found, options)?,
         folder,
@@ -53,6 +77,13 @@ pub(super) fn extract_recordings(
         }
     }
     Ok(tally)
+}
+
+pub(super) fn into_session(out: &Path) -> ExtractError {
+    ExtractError::Refused(format!(
+        "{} is a session folder: give another one for the data set",
+        out.display()
+    ))
 }
 
 /// All recordings in the inputs, in the order in which tasks share them; inputs without any are reported, and so is, by one
@@ -83,7 +114,7 @@ pub(super) fn find(
                         .as_ref()
                         .is_some_and(|mask| is_same(&path, mask))
                 {
-                    report(&path, RecordingOutcome::LeftOut(ExtractError::NoRecording));
+                    report(&path, RecordingOutcome::LeftOut(ExtractError::Refused("it is no session and holds no video".to_owned())));
                 }
             }
         }
@@ -122,7 +153,10 @@ impl Run<'_> {
     ) -> Result<(), ExtractError> {
         // What a panic leaves behind of this recording lies under temporary names.
         let extracted = panic::catch_unwind(AssertUnwindSafe(|| self.extract_one(recording)));
-        let outcome = RecordingOutcome::of(extracted.unwrap_or(Err(ExtractError::Panic)));
+        let outcome = RecordingOutcome::of(extracted.unwrap_or_else(|_| {
+            let text = "a fault of the program, described above: please report it";
+            Err(ExtractError::Refused(text.to_owned()))
+        }));
         tally.count(&outcome);
         self.observer.ended(recording, &outcome);
         self.catalog.note(&self.folder, position, &outcome)?;
@@ -143,20 +177,16 @@ impl Run<'_> {
         let id = job.id().to_owned();
         if let Some(other) = self.names.get(&folded(&id)) {
             return Err(match *other == id {
-                true => ExtractError::SameName(id),
-                false => ExtractError::NameAlike {
-                    id,
-                    other: other.clone(),
-                },
+                true => ExtractError::Refused(format!(
+                    "another recording of this call is also named {id}: extract them into different folders, or rename one"
+                )),
+                false => name_alike(&id, other),
             });
         }
         self.names.insert(folded(&id), id);
         let dataset = self.catalog.dataset();
         if let Some(other) = job.alike(dataset) {
-            return Err(ExtractError::NameAlike {
-                id: job.id().to_owned(),
-                other: other.to_owned(),
-            });
+            return Err(name_alike(job.id(), other));
         }
         if options.resume
             && let Some(entry) = job.existing_entry(dataset, options)
@@ -165,8 +195,11 @@ impl Run<'_> {
             return Ok(RecordingOutcome::Skipped(Box::new(entry.clone())));
         }
         if !options.replace && job.would_replace_another(dataset) {
-            let (out, id) = (folder.path().to_owned(), job.id().to_owned());
-            return Err(ExtractError::NameTaken { out, id });
+            return Err(ExtractError::Refused(format!(
+                "{} holds a session {} from another video: extract into another folder, rename the input, or give --replace",
+                folder.path().display(),
+                job.id()
+            )));
         }
         if options.task.is_some() {
             folder.clear_leftovers_of(job.id())?;
@@ -176,4 +209,11 @@ impl Run<'_> {
         self.catalog.add(folder, entry.clone(), shards)?;
         Ok(RecordingOutcome::Extracted(Box::new(entry)))
     }
+}
+
+/// That two recordings have names that are one on some file systems.
+fn name_alike(id: &str, other: &str) -> ExtractError {
+    ExtractError::Refused(format!(
+        "the name {id} is that of {other} where a file system ignores case, and their files would replace each other: rename one, or extract it into another folder"
+    ))
 }

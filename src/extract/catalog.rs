@@ -30,7 +30,7 @@ impl Catalog {
         let Some(task) = options.task else {
             let dataset = match Dataset::read(out) {
                 Ok(existing) => existing,
-                Err(ShardError::NoDataset { .. }) => Dataset::new(settings.clone()),
+                Err(ShardError::NoDataset(_)) => Dataset::new(settings.clone()),
                 Err(error) => return Err(error.into()),
             };
             check_settings(out, &dataset.settings, &settings)?;
@@ -122,8 +122,9 @@ fn check_settings(
     names.dedup();
     let differ = names.into_iter().filter(|name| old[*name] != new[*name]);
     let differ = differ.map(|name| format!("{name} {} there, {} now", old[name], new[name]));
-    Err(ExtractError::OtherSettings {
-        out: out.to_owned(),
-        differ: differ.collect::<Vec<_>>().join("; "),
-    })
+    Err(ExtractError::Refused(format!(
+        "{} holds a data set with other settings ({}): give the same ones, or another folder",
+        out.display(),
+        differ.collect::<Vec<_>>().join("; ")
+    )))
 }

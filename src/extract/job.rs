@@ -3,12 +3,14 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use image::RgbImage;
+use image::imageops::thumbnail;
 use rayon::ThreadPool;
 
 use relit_data::causes::with_causes;
 use relit_data::counts::count_of;
 use relit_data::image_stats::MaskSpans;
-use relit_data::report::{self, Page};
+use relit_data::report::{self, Page, THUMBNAIL_SIDE, Thumbnail};
 use relit_data::session::{INDEX_FILE, Notice, Recording, Status};
 use relit_data::shard::{
     Align, Dataset, Digest, FrameRecord, ImageSize, MaskInfo, MaskMisfit, OutputFolder, Sample,
@@ -16,7 +18,6 @@ use relit_data::shard::{
 };
 use relit_video::Video;
 
-use super::collected::Collected;
 use super::interpolate::ShiftCourse;
 use super::mask_doubts::mask_doubts;
 use super::object::ObjectMask;
@@ -27,6 +28,8 @@ use super::select::{TURN_DEG, TURN_TOLERANCE_DEG};
 use super::steadiness::Steadiness;
 use super::{Aligner, ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
 
+/// Images on the report's contact sheet.
+const THUMBNAILS: u32 = 24;
 /// Number of runs of damaged frames that are reported one by one.
 const MAX_REPORTED: usize = 8;
 /// Frames in which shifts are learnt, spread over the turn.
@@ -68,7 +71,7 @@ impl Job {
         let mut notices = recording.notices.clone();
         notices.extend(differences(&recording, &input));
         notices.extend(contradictions(&recording, &video));
-        notices.extend(video.damage().iter().map(|d| Notice::Loss(d.to_string())));
+        notices.extend(video.damage().iter().cloned().map(Notice::Loss));
         notices.extend(video.notes().iter().cloned().map(Notice::Warning));
         notices.extend(mask.warnings().map(Notice::Warning));
         Ok(Self {
@@ -83,11 +86,7 @@ impl Job {
     /// What a few frames of the video say against the mask, and how much that is.
     fn doubts_about_the_mask(&self) -> (Vec<Notice>, Option<MaskMisfit>) {
         match mask_doubts(&self.video, &self.mask.image, self.mask.frame) {
-            Ok(doubts) => {
-                let misfit = doubts.misfit;
-                let reasons = doubts.reasons.into_iter();
-                (reasons.map(Notice::Warning).collect(), misfit)
-            }
+            Ok((reasons, misfit)) => (reasons.into_iter().map(Notice::Warning).collect(), misfit),
             Err(error) => {
                 let text = format!("the mask could not be checked: {}", with_causes(&error));
                 (vec![Notice::Warning(text)], None)
@@ -108,8 +107,7 @@ impl Job {
     ) -> Option<&'a SessionEntry> {
         let entry = dataset.session(self.id())?;
         let same = entry.input == self.input && entry.mask.blake3 == self.mask.blake3;
-        let accepted = (options.partial || entry.covered_deg.is_none())
-            && (!options.strict || (!entry.lossy && entry.duplicates == 0));
+        let accepted = options.partial || entry.covered_deg.is_none();
         (same && accepted).then_some(entry)
     }
 
@@ -143,9 +141,6 @@ impl Job {
         let samples = u32::try_from(plan.selection.frames.len()).unwrap_or(options.frames);
         let mut notices = self.notices.clone();
         notices.extend(self.notices_of_plan(&plan, options.frames));
-        if options.strict {
-            check_strict(&plan, &notices)?;
-        }
         let mut stage = self.stage(options)?;
         let mut steadiness = Steadiness::new(options.max_shift);
         let mut writer = ShardWriter::create(
@@ -155,7 +150,7 @@ impl Job {
             samples,
             stage.scaler.mask(),
         )?;
-        let mut collected = Collected::new(samples);
+        let mut thumbnails = Vec::new();
         let mut assignments = plan.assignments();
         let mut lost = Vec::new();
         let mut doubts = None;
@@ -170,20 +165,22 @@ impl Job {
             let mut all_known = false;
             while !assignments.is_empty() {
                 let newly_lost = stage.run(&assignments, pool, |frame| {
-                    let samples = assignments.get(&frame.number);
+                    let assigned = assignments.get(&frame.number).into_iter().flatten();
                     if let Some(alignment) = &frame.alignment {
                         course.add(frame.number, alignment);
                         if alignment.shift.is_none() && !all_known {
                             // It waits until the frames around it are known.
-                            let samples = samples.into_iter().flatten().copied();
-                            waiting.entry(frame.number).or_default().extend(samples);
+                            waiting.entry(frame.number).or_default().extend(assigned);
                             return Ok(());
                         }
                         steadiness.add(frame.number, alignment, frame.interpolated);
                     }
-                    for &sample in samples.into_iter().flatten() {
+                    for &sample in assigned {
                         let record = self.record(&stage, &plan, &frame, sample, options);
-                        collected.add(&record, &frame.image);
+                        if is_thumbnail(record.index, samples) {
+                            let (index, image) = (record.index, small(&frame.image));
+                            thumbnails.push(Thumbnail { index, image });
+                        }
                         let (image, png) = (frame.image.clone(), frame.png.clone());
                         writer.push(Sample { record, image, png })?;
                         observer.advanced();
@@ -193,10 +190,6 @@ impl Job {
                 assignments =
                     plan.replace(&newly_lost.iter().map(|frame| frame.number).collect())?;
                 lost.extend(newly_lost);
-                if options.strict && !lost.is_empty() {
-                    let first = notices_of_lost(&lost).swap_remove(0);
-                    return Err(ExtractError::Strict(first.text().to_owned()));
-                }
                 if assignments.is_empty() && !all_known {
                     all_known = true;
                     assignments = std::mem::take(&mut waiting);
@@ -205,7 +198,7 @@ impl Job {
                     }
                 }
             }
-            Ok(())
+            Ok::<(), ExtractError>(())
         })?;
         let (doubts, misfit) = doubts.unwrap_or_default();
         notices.extend(doubts);
@@ -216,7 +209,7 @@ impl Job {
             ));
         }
         steadiness.check()?;
-        let mut collected = collected.sorted();
+        thumbnails.sort_by_key(|thumbnail| thumbnail.index);
         notices.extend(notices_of_lost(&lost));
         if let Some(align) = &stage.align {
             notices.extend(steadiness.notices(align.aligner.least_confidence()));
@@ -224,17 +217,23 @@ impl Job {
         let taken: Vec<_> = (0..samples).filter_map(|k| writer.sample(k)).collect();
         let findings = quality::findings(&taken, options.frames);
         for found in &findings {
-            writer.set_finding(*found)?;
-            collected.complete(found);
+            if let Some(record) = writer.record_mut(found.index) {
+                record.exposure_step = found.exposure_step;
+                record.identical_to = found.identical_to;
+                record.blur = found.blur;
+            }
         }
+        let taken = (0..samples).filter_map(|k| writer.sample(k));
+        let records: Vec<FrameRecord> = taken.map(|(record, _)| record.clone()).collect();
         notices.extend(quality::notices(&findings));
         let lossy = notices.iter().any(Notice::is_loss);
-        let quality = SessionQuality::of(&collected.records, lossy, part_of_turn(&plan));
+        let quality = SessionQuality::of(&records, lossy, part_of_turn(&plan));
         let quality = quality.with_mask(misfit);
         // Whatever can fail is done before the shard of an earlier run is replaced.
-        let page = self.page(options, &collected, &notices, &quality)?;
+        let page = self.page(options, &records, &thumbnails, &notices, &quality)?;
         let files = writer.finish()?;
         let report = folder.write(&format!("{}.html", self.id()), page.as_bytes())?;
+        let count = |is: fn(&FrameRecord) -> bool| records.iter().filter(|r| is(r)).count() as u32;
         let entry = SessionEntry {
             id: self.recording.id.clone(),
             object: self.recording.object.clone(),
@@ -252,10 +251,10 @@ impl Job {
                 .manifest
                 .as_ref()
                 .and_then(|manifest| manifest.rig),
-            duplicates: collected.count(|r| r.duplicate),
-            spec_net: collected.count(|r| r.spec_net),
+            duplicates: count(|r| r.duplicate),
+            spec_net: count(|r| r.spec_net),
             lossy,
-            quality: Some(quality),
+            quality,
             warnings: texts(&notices),
             table: files.table,
             report: Some(report),
@@ -271,7 +270,9 @@ impl Job {
     /// That the recording is a whole turn, or part of one where that is asked for.
     fn check_turn(&self, plan: &Plan, partial: bool) -> Result<(), ExtractError> {
         if let Some(covered_deg) = part_of_turn(plan).filter(|_| !partial) {
-            return Err(ExtractError::PartOfATurn { covered_deg });
+            return Err(ExtractError::TooLittle(format!(
+                "the frames cover {covered_deg:.1} of 360 degrees: --partial makes the samples that are there, or record it again"
+            )));
         }
         let Some(manifest) = self.recording.manifest.as_ref() else {
             return Ok(());
@@ -280,7 +281,9 @@ impl Job {
             Some(table) if !plan.has_angles() && manifest.status != Status::Complete => {
                 let covered_deg = plan.seconds() * table.degrees_per_second;
                 match covered_deg < TURN_DEG - TURN_TOLERANCE_DEG {
-                    true => Err(ExtractError::NoAngles { covered_deg }),
+                    true => Err(ExtractError::TooLittle(format!(
+                        "the frames cover about {covered_deg:.0} of 360 degrees, and their angles are not known: record it again, or give the video file itself to spread the frames over time"
+                    ))),
                     false => Ok(()),
                 }
             }
@@ -296,7 +299,10 @@ impl Job {
             (facts.width, facts.height),
         );
         if u64::from(crop.w) * u64::from(crop.h) > MAX_CROP_PIXELS {
-            return Err(ExtractError::CropTooLarge(crop));
+            return Err(ExtractError::Refused(format!(
+                "a crop of {} x {} pixels is too large: give a smaller --margin",
+                crop.w, crop.h
+            )));
         }
         let crop_mask = cut(&self.mask.image, crop);
         let side = match options.size {
@@ -361,27 +367,25 @@ impl Job {
         let candidate = plan.candidate(frame.number);
         let alignment = frame.alignment;
         let shift = alignment.and_then(|alignment| alignment.shift);
-        FrameRecord::new(
-            &self.recording.id,
-            &self.recording.object,
-            sample.index,
-            stage.crop,
-            &frame.measures,
-            options.gate,
-        )
-        .of_frame(
-            frame.number,
-            candidate.map_or(0, |candidate| candidate.t_us),
-            candidate.and_then(|candidate| candidate.angle_deg),
-        )
-        .flagged_duplicate(sample.duplicate)
-        .scaled_to(frame.image.dimensions().into())
-        .aligned(
-            shift.map(|shift| shift.map(thousandths)),
-            frame.shift_applied,
-            alignment.map(|alignment| thousandths(alignment.confidence)),
-        )
-        .interpolated(frame.interpolated.map(thousandths))
+        FrameRecord {
+            source_frame: frame.number,
+            t_us: candidate.map_or(0, |candidate| candidate.t_us),
+            angle_deg: candidate.and_then(|candidate| candidate.angle_deg),
+            duplicate: sample.duplicate,
+            size: frame.image.dimensions().into(),
+            shift_px: shift.map(|shift| shift.map(thousandths)),
+            shift_applied: frame.shift_applied,
+            align_confidence: alignment.map(|alignment| thousandths(alignment.confidence)),
+            shift_interpolated_sd_px: frame.interpolated.map(thousandths),
+            ..FrameRecord::new(
+                &self.recording.id,
+                &self.recording.object,
+                sample.index,
+                stage.crop,
+                &frame.measures,
+                options.gate,
+            )
+        }
     }
 
     /// What the plan shows: repeated frames, an incomplete turn, gaps.
@@ -430,19 +434,17 @@ impl Job {
     fn page(
         &self,
         options: &ExtractOptions,
-        collected: &Collected,
+        records: &[FrameRecord],
+        thumbnails: &[Thumbnail],
         notices: &[Notice],
         quality: &SessionQuality,
     ) -> Result<String, ExtractError> {
         let facts = self.video.facts();
         let pair = |name: &str, value: String| (name.to_owned(), value);
-        let crop = collected
-            .records
-            .first()
-            .map_or_else(String::new, |record| record.crop.to_string());
+        let crop = records.first().map(|record| record.crop.to_string());
         Ok(report::render(&Page {
-            records: &collected.records,
-            thumbnails: &collected.thumbnails,
+            records,
+            thumbnails,
             settings: &options.settings().rows(),
             facts: &[
                 pair("video", self.input.video.clone()),
@@ -453,7 +455,7 @@ impl Job {
                 ),
                 pair("frames in the video", self.input.frames.to_string()),
                 pair("mask, bounding box", self.mask.bounding_box.to_string()),
-                pair("crop", crop),
+                pair("crop", crop.unwrap_or_default()),
                 pair("video BLAKE3", self.input.blake3.to_string()),
                 pair("mask BLAKE3", self.mask.blake3.to_string()),
             ],
@@ -504,18 +506,19 @@ fn texts(notices: &[Notice]) -> Vec<String> {
         .collect()
 }
 
-/// With `strict`: an error if something is lost or a frame is repeated.
-fn check_strict(plan: &Plan, notices: &[Notice]) -> Result<(), ExtractError> {
-    if let Some(loss) = notices.iter().find(|notice| notice.is_loss()) {
-        return Err(ExtractError::Strict(loss.text().to_owned()));
+/// Whether a sample is on the contact sheet, whose samples are evenly spread.
+fn is_thumbnail(index: u32, samples: u32) -> bool {
+    let slot = |index: u32| u64::from(index) * u64::from(THUMBNAILS) / u64::from(samples);
+    index == 0 || slot(index) != slot(index - 1)
+}
+
+fn small(image: &RgbImage) -> RgbImage {
+    let (width, height) = image.dimensions();
+    if width.max(height) <= THUMBNAIL_SIDE {
+        return image.clone();
     }
-    match plan.repeated() {
-        0 => Ok(()),
-        n => Err(ExtractError::Strict(format!(
-            "{} would repeat a source frame",
-            count_of(n as u64, "sample")
-        ))),
-    }
+    // Crops are square.
+    thumbnail(image, THUMBNAIL_SIDE, THUMBNAIL_SIDE)
 }
 
 /// One loss for each run of consecutive frames that were lost for the same reason.
@@ -555,10 +558,7 @@ fn index_digest(recording: &Recording) -> Result<Option<Digest>, ExtractError> {
 }
 
 fn digest(path: &Path) -> Result<(u64, Digest), ExtractError> {
-    Digest::of_file(path).map_err(|source| ExtractError::Read {
-        path: path.to_owned(),
-        source,
-    })
+    Digest::of_file(path).map_err(ExtractError::io("read", path))
 }
 
 /// Differences between the video and what manifest and index say about it.

@@ -2,7 +2,7 @@
 //! measure -> scale -> encode -> write, as one streaming pipeline whose memory does not grow with the video.
 //!
 //! [`extract`] extracts any number of recordings into one data set; a failure does not stop the
-//! others. The steps can be used alone: [`Selection`] chooses the frames of a turn, [`square_around`]
+//! others. The steps can be used alone: [`square_around`]
 //! makes the crop, [`Aligner`] measures how far the object moved, [`Scaler`] scales without mixing object and background.
 //!
 //! The crate knows the formats (`relit-data`) and videos (`relit-video`), and looks at a mask before it is
@@ -38,9 +38,7 @@
 mod align;
 mod batch;
 mod blur;
-pub mod card;
 mod catalog;
-mod collected;
 mod crop;
 mod crop_view;
 mod error;
@@ -57,24 +55,18 @@ mod quality;
 mod scale;
 mod select;
 mod steadiness;
-mod storage;
-mod tally;
 mod timeline;
 
 use std::path::{Path, PathBuf};
-
-use storage::LocalDisk;
 
 pub use align::{AlignBuffers, AlignSample, Aligner, Alignment};
 pub use crop::{bounding_box, cut, square_around};
 pub use crop_view::CropView;
 pub use error::ExtractError;
-pub use mask_doubts::{MaskDoubts, mask_doubts};
-pub use observer::{Observer, RecordingOutcome};
+pub use mask_doubts::mask_doubts;
+pub use observer::{Observer, RecordingOutcome, Tally};
 pub use options::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
-pub use scale::{APRON, ScaleBuffers, Scaler, Scaling};
-pub use select::{Candidate, Selection, TimeGap, TurnSpan, runs_back_at, time_gaps};
-pub use tally::Tally;
+pub use scale::{APRON, ScaleBuffers, Scaler};
 
 /// Extracts all recordings in `inputs` (session folders, folders of sessions, video files) into the
 /// data set in the folder `out`, which is created if it does not exist. With the feature `object-store`, both may
@@ -96,5 +88,5 @@ pub fn extract(
     }
     let mut tally = Tally::default();
     let found = batch::find(inputs, out, options, observer, &mut tally);
-    batch::extract_recordings(&found, out, options, observer, &LocalDisk, tally)
+    batch::extract_recordings(&found, out, options, observer, &(), tally)
 }

@@ -19,15 +19,8 @@ const FRAMES: usize = 12;
 /// Frames are halved until they have at most so many pixels.
 const MOST_PIXELS: u64 = 310_000;
 
-/// What is worth a warning about a mask.
-#[derive(Debug, Clone, Default, PartialEq)]
-#[non_exhaustive]
-pub struct MaskDoubts {
-    /// One sentence each; none if the mask fits, or the video says nothing about it.
-    pub reasons: Vec<String>,
-    /// How much it does not fit; `None` without a reason.
-    pub misfit: Option<MaskMisfit>,
-}
+/// One sentence for each thing that is worth a warning about a mask, and how much the mask does not fit.
+type MaskDoubts = (Vec<String>, Option<MaskMisfit>);
 
 /// What is worth a warning about a mask; nothing if the video says nothing about it. `frame` is the one on which the
 /// mask was made, if that is known: in others the object may lie elsewhere.
@@ -111,7 +104,7 @@ fn doubts(shape: &ShapeCheck) -> MaskDoubts {
         (false, false) => Some(MaskMisfit::InPart),
         (false, true) => Some(MaskMisfit::AsAWhole),
     };
-    MaskDoubts { reasons, misfit }
+    (reasons, misfit)
 }
 
 #[cfg(test)]

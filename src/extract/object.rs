@@ -5,10 +5,12 @@ use std::path::Path;
 use image::GrayImage;
 use image::imageops::{FilterType, resize};
 
+use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use relit_data::mask::{MaskPicture, ObjectPixels};
+use relit_data::mask::{MaskFault, MaskPicture, ObjectPixels, size_hint};
 use relit_data::session::{MASK_FILE, Recording};
 use relit_data::shard::Digest;
+use relit_data::still;
 
 use super::{ExtractError, bounding_box};
 
@@ -39,34 +41,37 @@ impl ObjectMask {
         frame: (u32, u32),
         stored: (u32, u32),
     ) -> Result<Self, ExtractError> {
+        let refused = |text| Err(ExtractError::Refused(text));
         let path = match (named, &recording.folder) {
             (Some(named), _) if named.is_file() => named.to_owned(),
-            (Some(named), _) => return Err(ExtractError::MaskNotThere(named.to_owned())),
+            (Some(named), _) => {
+                let named = named.display();
+                return refused(format!(
+                    "there is no mask {named}: make one with relit-mask, or correct the name given to --mask"
+                ));
+            }
             (None, Some(folder)) if folder.join(MASK_FILE).is_file() => folder.join(MASK_FILE),
-            (None, Some(folder)) => return Err(ExtractError::NoMask(folder.clone())),
-            (None, None) => return Err(ExtractError::NoMask(recording.video.clone())),
+            (None, folder) => {
+                let recording = folder.as_ref().unwrap_or(&recording.video).display();
+                return refused(format!(
+                    "{recording} has no mask: make one with relit-mask, or name one with --mask"
+                ));
+            }
         };
-        let bytes = std::fs::read(&path).map_err(|source| ExtractError::Read {
-            path: path.clone(),
-            source,
-        })?;
-        let picture = relit_still::decode(&bytes).map_err(|source| ExtractError::Mask {
-            path: path.clone(),
-            source,
-        })?;
+        let bytes = std::fs::read(&path).map_err(ExtractError::io("read", &path))?;
+        let of_this_mask =
+            |what: String| ExtractError::Refused(format!("the mask {} {what}", path.display()));
+        let picture = still::decode(&bytes).map_err(|error| of_this_mask(with_causes(&error)))?;
         let picture = MaskPicture::of_image(&picture);
         let size = picture.size();
         if size != frame && size != stored {
-            return Err(ExtractError::MaskSize {
-                path,
-                mask: size,
-                frame,
-            });
+            let hint = size_hint(size, frame).unwrap_or("make the mask on a frame of this video");
+            return Err(of_this_mask(format!(
+                "is {} x {} pixels and the frames are {} x {}: {hint}",
+                size.0, size.1, frame.0, frame.1
+            )));
         }
-        let no_object = |fault| ExtractError::NotAMask {
-            path: path.clone(),
-            fault,
-        };
+        let no_object = |fault: MaskFault| of_this_mask(fault.to_string());
         let ObjectPixels { inside, basis } = picture.object().map_err(no_object)?;
         let levels = inside.iter().map(|&inside| if inside { 255 } else { 0 });
         let mut image = GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default();

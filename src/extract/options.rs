@@ -40,8 +40,6 @@ pub struct ExtractOptions {
     pub max_shift: f64,
     /// The mask for all recordings; `None` uses the `mask.png` in each session folder.
     pub mask: Option<PathBuf>,
-    /// Refuse recordings in which a frame would be used twice or something is lost.
-    pub strict: bool,
     /// Extract the part of a turn where a recording is no whole one; otherwise it is left out.
     pub partial: bool,
     /// Skip sessions that the data set already holds, intact and made from the same input.
@@ -50,9 +48,6 @@ pub struct ExtractOptions {
     pub replace: bool,
     /// The task whose part of the recordings is extracted; `None` extracts all of them.
     pub task: Option<ArrayTask>,
-    /// The folder through which recordings and data sets of object stores pass; `None` is the system's folder
-    /// for temporary files.
-    pub cache: Option<PathBuf>,
     /// Number of worker threads, at least 1.
     pub threads: usize,
 }
@@ -70,12 +65,10 @@ impl Default for ExtractOptions {
             align_tolerance: 0.1,
             max_shift: 8.0,
             mask: None,
-            strict: false,
             partial: false,
             resume: false,
             replace: false,
             task: None,
-            cache: None,
             threads: available_parallelism().map_or(1, std::num::NonZero::get),
         }
     }
@@ -102,36 +95,28 @@ impl ExtractOptions {
     }
 
     pub(super) fn check(&self) -> Result<(), ExtractError> {
-        let wrong = |name, value: f64, allowed| {
-            Err(ExtractError::Option {
-                name,
-                value,
-                allowed,
-            })
+        let side = match self.size {
+            ImageSize::Pixels(side) => side,
+            ImageSize::Native(_) => 1,
         };
-        if self.frames == 0 {
-            return wrong("frames", 0.0, "at least 1");
-        }
-        if let ImageSize::Pixels(side) = self.size
-            && !(1..=MAX_SIDE).contains(&side)
+        let ranges = [
+            ("frames", f64::from(self.frames), 1.0, f64::INFINITY),
+            ("size", f64::from(side), 1.0, f64::from(MAX_SIDE)),
+            ("margin", self.margin, 0.0, MAX_MARGIN),
+            ("gate", self.gate, 0.0, 1.0),
+            ("align-tolerance", self.align_tolerance, 0.0, MAX_SHIFT),
+            ("max-shift", self.max_shift, 1.0, MAX_SHIFT),
+            ("threads", self.threads as f64, 1.0, f64::INFINITY),
+        ];
+        // A range contains no NaN.
+        match ranges
+            .iter()
+            .find(|(_, value, least, most)| !(least..=most).contains(&value))
         {
-            return wrong("size", f64::from(side), "1 to 8192 pixels, or native");
+            None => Ok(()),
+            Some((name, value, least, most)) => Err(ExtractError::Refused(format!(
+                "{name} is {value}: give {least} to {most}"
+            ))),
         }
-        if !(0.0..=MAX_MARGIN).contains(&self.margin) {
-            return wrong("margin", self.margin, "0 to 4");
-        }
-        if !(0.0..=1.0).contains(&self.gate) {
-            return wrong("gate", self.gate, "0 to 1");
-        }
-        if !(0.0..=MAX_SHIFT).contains(&self.align_tolerance) {
-            return wrong("align-tolerance", self.align_tolerance, "0 to 64 pixels");
-        }
-        if !(1.0..=MAX_SHIFT).contains(&self.max_shift) {
-            return wrong("max-shift", self.max_shift, "1 to 64 pixels");
-        }
-        if self.threads == 0 {
-            return wrong("threads", 0.0, "at least 1");
-        }
-        Ok(())
     }
 }

@@ -20,10 +20,9 @@ use relit_video::{DecodeFault, Pending, Reader, Video};
 use super::crop::repeat_edge;
 use super::interpolate::InterpolatedShift;
 use super::plan::Assignments;
-use super::scale::APRON;
+use super::scale::{APRON, Scaling};
 use super::{
     AlignBuffers, AlignSample, Aligner, Alignment, CropView, ExtractError, ScaleBuffers, Scaler,
-    Scaling,
 };
 
 /// The processing of the frames of one video.
@@ -190,7 +189,9 @@ impl Stage<'_> {
             Ok(()) => {}
             // The other frames have the same pixel format.
             Err(fault @ DecodeFault::PixelFormat(_)) => {
-                return Err(ExtractError::Frame { number, fault });
+                return Err(ExtractError::Refused(format!(
+                    "frame {number}: {fault}; convert the video to another pixel format, for example with ffmpeg"
+                )));
             }
             Err(fault) => return Ok(Err(LostFrame { number, fault })),
         }

@@ -6,9 +6,9 @@ use relit_data::session::FrameIndex;
 use relit_data::shard::SamplingBasis;
 use relit_video::Video;
 
-use super::select::{Candidate, Selection};
+use super::ExtractError;
+use super::select::{Candidate, Selection, runs_back_at, time_gaps};
 use super::timeline::timeline;
-use super::{ExtractError, runs_back_at, time_gaps};
 
 /// The frames of a video that may be chosen, and those that were chosen.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use relit_data::counts::count_of;
 use relit_data::session::Notice;
-use relit_data::shard::{Digest, FrameRecord, TurnFinding};
+use relit_data::shard::{Digest, FrameRecord};
 use relit_data::srgb::to_linear;
 
 use super::blur::blurs;
@@ -18,6 +18,15 @@ const LEAST_STEP: f64 = 0.1;
 const BEYOND_LIGHT: f64 = 6.0;
 /// Linear light, of all channels together, below which nothing is compared: steps of 8 bits are large there.
 const DARKEST: f64 = 1e-3;
+
+/// What only the whole turn shows of a sample: fields of its record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TurnFinding {
+    pub(super) index: u32,
+    pub(super) exposure_step: Option<f64>,
+    pub(super) identical_to: Option<u64>,
+    pub(super) blur: Option<f64>,
+}
 
 /// The samples of which there is something to say; `samples` are sorted by index, each with the digest of its
 /// image. A whole turn would have `whole_turn` of them.

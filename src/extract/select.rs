@@ -6,13 +6,13 @@ use super::ExtractError;
 
 /// A source frame that may be chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Candidate {
+pub(super) struct Candidate {
     /// Position in the video.
-    pub frame: u64,
+    pub(super) frame: u64,
     /// Time stamp, microseconds.
-    pub t_us: i64,
+    pub(super) t_us: i64,
     /// Angle of the table, degrees, where it is known.
-    pub angle_deg: Option<f64>,
+    pub(super) angle_deg: Option<f64>,
 }
 
 /// A turn that lacks less than this counts as complete: its last samples repeat a frame, which is
@@ -22,7 +22,7 @@ pub(super) const TURN_DEG: f64 = 360.0;
 
 /// The range over which samples are spread: its start, direction and extent.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TurnSpan {
+pub(super) struct TurnSpan {
     basis: SamplingBasis,
     /// Angle (degrees) or time stamp (microseconds) of sample 0.
     origin: f64,
@@ -43,11 +43,11 @@ impl TurnSpan {
     /// first frame to the end of the last.
     ///
     /// # Errors
-    /// [`ExtractError::NoFrameLeft`] without candidates, [`ExtractError::OneFrame`] with one,
+    /// [`ExtractError::Refused`] without candidates, [`ExtractError::OneFrame`] with one,
     /// [`ExtractError::TableStands`] if the angle does not change.
-    pub fn of(candidates: &[Candidate]) -> Result<Self, ExtractError> {
+    pub(super) fn of(candidates: &[Candidate]) -> Result<Self, ExtractError> {
         let (first, last) = match candidates {
-            [] => return Err(ExtractError::NoFrameLeft),
+            [] => return Err(no_frame_left()),
             [_] => return Err(ExtractError::OneFrame),
             [first, .., last] => (first, last),
         };
@@ -135,13 +135,13 @@ impl TurnSpan {
 
 /// The chosen frames.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Selection {
+pub(super) struct Selection {
     span: TurnSpan,
     /// The source frame of each sample, by index.
-    pub frames: Vec<u64>,
+    pub(super) frames: Vec<u64>,
     /// The distance of each sample's frame from the sample's position, by index: degrees or
     /// microseconds.
-    pub distances: Vec<f64>,
+    pub(super) distances: Vec<f64>,
 }
 
 impl Selection {
@@ -149,21 +149,21 @@ impl Selection {
     ///
     /// # Errors
     /// As [`TurnSpan::of`].
-    pub fn choose(candidates: &[Candidate], samples: u32) -> Result<Self, ExtractError> {
+    pub(super) fn choose(candidates: &[Candidate], samples: u32) -> Result<Self, ExtractError> {
         Self::among(candidates, TurnSpan::of(candidates)?, samples)
     }
 
     /// Chooses `samples` frames, evenly spread over a given span.
     ///
     /// # Errors
-    /// [`ExtractError::NoFrameLeft`] without candidates.
-    pub fn among(
+    /// [`ExtractError::Refused`] without candidates.
+    pub(super) fn among(
         candidates: &[Candidate],
         span: TurnSpan,
         samples: u32,
     ) -> Result<Self, ExtractError> {
         if candidates.is_empty() {
-            return Err(ExtractError::NoFrameLeft);
+            return Err(no_frame_left());
         }
         let (frames, distances) = span.nearest(candidates, samples);
         Ok(Self {
@@ -174,29 +174,30 @@ impl Selection {
     }
 
     /// The span over which the samples are spread.
-    #[must_use]
-    pub fn span(&self) -> TurnSpan {
+    pub(super) fn span(&self) -> TurnSpan {
         self.span
     }
 
     /// The quantity over which the samples are evenly spread.
-    #[must_use]
-    pub fn basis(&self) -> SamplingBasis {
+    pub(super) fn basis(&self) -> SamplingBasis {
         self.span.basis
     }
 
     /// The part of a turn that the candidates cover, 0..=360 degrees; `None` without angles.
-    #[must_use]
-    pub fn covered_deg(&self) -> Option<f64> {
+    pub(super) fn covered_deg(&self) -> Option<f64> {
         self.span.covered_deg
     }
 
     /// True if the candidates cover less than a turn.
-    #[must_use]
-    pub fn is_partial(&self) -> bool {
+    pub(super) fn is_partial(&self) -> bool {
         self.covered_deg()
             .is_some_and(|covered| covered < TURN_DEG - TURN_TOLERANCE_DEG)
     }
+}
+
+fn no_frame_left() -> ExtractError {
+    let text = "no frame of the video can be decoded: record it again, or give another file";
+    ExtractError::Refused(text.to_owned())
 }
 
 /// The median distance between neighbours, 0 for a single position.
@@ -210,8 +211,7 @@ fn median_step(positions: &[f64]) -> f64 {
 }
 
 /// The first frame at which the table goes back against its direction by more than a degree.
-#[must_use]
-pub fn runs_back_at(candidates: &[Candidate]) -> Option<u64> {
+pub(super) fn runs_back_at(candidates: &[Candidate]) -> Option<u64> {
     let angles: Option<Vec<f64>> = candidates.iter().map(|c| c.angle_deg).collect();
     let angles = angles?;
     let direction = (angles.last()? - angles.first()?).signum();
@@ -222,16 +222,15 @@ pub fn runs_back_at(candidates: &[Candidate]) -> Option<u64> {
 
 /// A gap in the time stamps, where frames seem to be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TimeGap {
+pub(super) struct TimeGap {
     /// The frame after the gap.
-    pub before: u64,
+    pub(super) before: u64,
     /// Number of frames that would fit into it.
-    pub missing: u64,
+    pub(super) missing: u64,
 }
 
 /// Finds gaps in the time stamps: neighbours more than 1.5 median steps apart.
-#[must_use]
-pub fn time_gaps(candidates: &[Candidate]) -> Vec<TimeGap> {
+pub(super) fn time_gaps(candidates: &[Candidate]) -> Vec<TimeGap> {
     let times: Vec<f64> = candidates.iter().map(|c| c.t_us as f64).collect();
     let step = median_step(&times);
     if step <= 0.0 {

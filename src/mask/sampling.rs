@@ -3,8 +3,8 @@
 use std::fs;
 
 use image::RgbImage;
+use relit_data::still::Colour;
 use relit_grabcut::{TURN_FRAMES, TurnFrames, TurnStatistics};
-use relit_still::Colour;
 use relit_video::Video;
 
 use super::request::TurnRequest;

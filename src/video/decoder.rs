@@ -76,7 +76,7 @@ impl Pool {
             .unwrap_or_else(PoisonError::into_inner)
             .push(decoder);
         if picture.is_corrupt() || picture.has_decode_errors() {
-            return Err(DecodeFault::Concealed);
+            return Err(DecodeFault::concealed());
         }
         Ok(picture)
     }

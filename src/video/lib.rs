@@ -76,9 +76,7 @@ use std::sync::Once;
 use ffmpeg_next::Dictionary;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::input_with_dictionary;
-use relit_data::colour::ColourFault;
 use relit_data::disk::DISK_FULL;
-use relit_still::Format;
 
 use photograph::{format_of, is_misread};
 
@@ -91,59 +89,20 @@ pub use order::FrameInfo;
 pub use packets::{CodedFrame, Packets};
 pub use picture::Picture;
 pub use reader::{Pending, Reader};
-pub use scan::{Damage, Facts, Video};
+pub use scan::{Facts, Video};
 pub use seek::first_picture;
 
 /// Why a video could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VideoError {
-    /// FFmpeg cannot read the file.
-    #[error(
-        "{path} cannot be opened as a video ({why}): is it complete, and is it a video? `ffprobe` shows more"
-    )]
-    Open {
+    /// The file has no pictures that can be read: why, as the rest of a sentence, and what to do.
+    #[error("{path} {why}")]
+    Unreadable {
         /// The file.
         path: PathBuf,
-        /// FFmpeg's answer.
-        why: ffmpeg_next::Error,
-    },
-    /// A still image in a format that is not read.
-    #[error("{path} is {}, which is not read: {}", format.name(), format.advice())]
-    Still {
-        /// The file.
-        path: PathBuf,
-        /// Its format.
-        format: Format,
-    },
-    /// A name that FFmpeg cannot take.
-    #[error("the name of {0} is not plain text: rename the file")]
-    Name(PathBuf),
-    /// No picture track.
-    #[error("{0} has no video stream: give a file with a picture")]
-    NoVideo(PathBuf),
-    /// A picture track without a single frame.
-    #[error("{0} has no complete frame: it was truncated too early; record it again")]
-    NoFrames(PathBuf),
-    /// The codec is not supported by this FFmpeg, or refuses the stream.
-    #[error("{path}: no decoder for its codec {codec} can be opened ({why})")]
-    Decoder {
-        /// The file.
-        path: PathBuf,
-        /// The codec's name.
-        codec: String,
-        /// FFmpeg's answer.
-        why: ffmpeg_next::Error,
-    },
-    /// Colours that are not known here.
-    #[error(
-        "{path}: {fault} cannot be converted to sRGB: convert the video to SDR with BT.709 colours first"
-    )]
-    Colour {
-        /// The file.
-        path: PathBuf,
-        /// What cannot be converted.
-        fault: ColourFault,
+        /// What is wrong with it.
+        why: String,
     },
     /// A frame beyond the end.
     #[error("{path} has no frame {number}: give one of 0 to {last}")]
@@ -188,39 +147,32 @@ pub enum VideoError {
         /// The system's answer.
         source: io::Error,
     },
-    /// FFmpeg cannot create the file.
-    #[error("{path} could not be created ({why}): does this FFmpeg write Matroska and FFV1?")]
-    Mux {
-        /// The file.
-        path: PathBuf,
-        /// FFmpeg's answer.
-        why: ffmpeg_next::Error,
-    },
-    /// An uncompressed format that cannot have this size.
-    #[error("{width} x {height} pixels are not possible in this pixel format: choose another mode")]
-    PictureSize {
-        /// Width, pixels.
-        width: u32,
-        /// Height, pixels.
-        height: u32,
-    },
-    /// An uncompressed picture with the wrong number of bytes.
-    #[error(
-        "a picture of {width} x {height} pixels has {found} bytes instead of {wanted}: the camera sends another size than agreed, or half a picture"
-    )]
-    PictureBytes {
-        /// Bytes that it has.
-        found: usize,
-        /// Bytes that it should have.
-        wanted: usize,
-        /// Width, pixels.
-        width: u32,
-        /// Height, pixels.
-        height: u32,
-    },
-    /// H.264 in another form than cameras deliver it.
-    #[error("the stream for {0} is not H.264 with start codes: choose another mode of the camera")]
-    NotAnnexB(PathBuf),
+    /// FFmpeg cannot code the pictures, or they are not what was agreed: what is wrong, and what to do.
+    #[error("{0}")]
+    Refused(String),
+}
+
+impl VideoError {
+    fn unreadable(path: &Path, why: impl Into<String>) -> Self {
+        Self::Unreadable {
+            path: path.to_owned(),
+            why: why.into(),
+        }
+    }
+
+    fn no_video(path: &Path) -> Self {
+        Self::unreadable(path, "has no video stream: give a file with a picture")
+    }
+
+    /// For `map_err`: that no decoder can be opened.
+    fn decoder(path: &Path, codec: &str) -> impl FnOnce(ffmpeg_next::Error) -> Self {
+        move |why| {
+            let why = format!(
+                "cannot be decoded: no decoder for its codec {codec} can be opened ({why})"
+            );
+            Self::unreadable(path, why)
+        }
+    }
 }
 
 /// The folder of a file.
@@ -238,36 +190,28 @@ pub enum DecodeFault {
     /// The decoder refused its data.
     #[error("its data are damaged ({0})")]
     Damaged(ffmpeg_next::Error),
-    /// According to the container or a checksum, its data are incomplete.
-    #[error("its data are not whole")]
-    NotWhole,
-    /// The decoder concealed missing parts.
-    #[error("parts of it are missing and were covered up by the decoder")]
-    Concealed,
-    /// It is predicted from a damaged frame.
-    #[error("it builds on the damaged frame {0}")]
-    BuildsOnDamaged(u64),
-    /// The decoder returned nothing for it.
-    #[error("the decoder gave no picture for it")]
-    NoPicture,
-    /// The picture's size changes in the middle of the video.
-    #[error("it is {found_w} x {found_h} pixels in a video of {wanted_w} x {wanted_h}")]
-    Size {
-        /// Width found.
-        found_w: u32,
-        /// Height found.
-        found_h: u32,
-        /// The video's width.
-        wanted_w: u32,
-        /// The video's height.
-        wanted_h: u32,
-    },
+    /// There is no picture of it that can be trusted, or none of the right kind: why.
+    #[error("{0}")]
+    Unusable(String),
     /// The pixel format cannot be converted to RGB.
     #[error("its pixel format {0} cannot be converted to RGB")]
     PixelFormat(String),
-    /// Its colours cannot be converted to sRGB.
-    #[error("{0} cannot be converted to sRGB")]
-    Colour(#[from] ColourFault),
+}
+
+impl DecodeFault {
+    /// The decoder concealed missing parts.
+    fn concealed() -> Self {
+        Self::Unusable("parts of it are missing and were covered up by the decoder".to_owned())
+    }
+
+    fn no_picture() -> Self {
+        Self::Unusable("the decoder gave no picture for it".to_owned())
+    }
+
+    /// According to the container or a checksum, its data are incomplete.
+    fn not_whole() -> Self {
+        Self::Unusable("its data are not whole".to_owned())
+    }
 }
 
 /// Opens a file, and only this file: FFmpeg takes a name with a colon for a URL, and that of a picture with a per cent sign
@@ -275,17 +219,22 @@ pub enum DecodeFault {
 fn open_input(path: &Path) -> Result<Input, VideoError> {
     initialise();
     let name = path.to_str().filter(|name| !name.contains('\0'));
-    let name = name.ok_or_else(|| VideoError::Name(path.to_owned()))?;
+    let no_text = "has a name that is not plain text: rename the file";
+    let name = name.ok_or_else(|| VideoError::unreadable(path, no_text))?;
     let still = format_of(path);
-    let failed = |why| match still.filter(|format| !format.is_read()) {
-        Some(format) => VideoError::Still {
-            path: path.to_owned(),
-            format,
-        },
-        None => VideoError::Open {
-            path: path.to_owned(),
-            why,
-        },
+    let failed = |why| {
+        let why = match still.filter(|format| !format.is_read()) {
+            Some(format) => format!(
+                "is {}, which is not read: {}",
+                format.name(),
+                format.advice()
+            ),
+            None => format!(
+                "cannot be opened as a video ({why}): is it complete, and is it a video? `ffprobe` shows more"
+            ),
+        };
+        VideoError::unreadable(path, why)
+    };
     };
     if still.is_some_and(is_misread) {
         return Err(failed(ffmpeg_next::Error::InvalidData));

@@ -61,9 +61,11 @@ impl LiveDecoder {
                 None => return Ok(None),
             },
             None => lossless::frame(self.format, data, self.width, self.height)
-                .ok_or(DecodeFault::NotWhole)?,
+                .ok_or_else(DecodeFault::not_whole)?,
         };
-        let colour = Stated::by_picture(&frame).colour()?;
+        let colour = Stated::by_picture(&frame).colour().map_err(|fault| {
+            DecodeFault::Unusable(format!("{fault} cannot be converted to sRGB"))
+        })?;
         self.number += 1;
         let display = Display::default();
         Ok(Some(Picture::new(self.number - 1, frame, colour, display)))
@@ -91,7 +93,7 @@ fn compressed(
         let mut picture = frame::Video::empty();
         match decoder.receive_frame(&mut picture) {
             Ok(()) if picture.is_corrupt() || picture.has_decode_errors() => {
-                return Err(DecodeFault::Concealed);
+                return Err(DecodeFault::concealed());
             }
             Ok(()) => newest = Some(picture),
             Err(_) => return Ok(newest),

@@ -40,8 +40,7 @@ impl Video {
     /// Opens the file again to read its coded frames.
     ///
     /// # Errors
-    /// What opening the file answers; [`VideoError::NoVideo`] where the stream is gone or its
-    /// parameters cannot be read.
+    /// [`VideoError::Unreadable`], also where the stream is gone or its parameters cannot be read.
     pub fn packets(&self) -> Result<Packets, VideoError> {
         let input = open_input(self.path())?;
         let stream = input.stream(self.track.stream);
@@ -49,7 +48,7 @@ impl Video {
             Id::H264 => ByteStream::from_extra_data(&extra_data(&stream.parameters())),
             _ => Some(ByteStream::AsIs),
         });
-        let byte_stream = byte_stream.ok_or_else(|| VideoError::NoVideo(self.path().to_owned()))?;
+        let byte_stream = byte_stream.ok_or_else(|| VideoError::no_video(self.path()))?;
         Ok(Packets {
             input,
             stream: self.track.stream,

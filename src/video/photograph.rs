@@ -6,7 +6,7 @@ use std::path::Path;
 
 use ffmpeg_next::format::context::Input;
 use image::metadata::Orientation as Exif;
-use relit_still::Format;
+use relit_data::still::Format;
 
 /// Bytes of a file that show its format.
 const HEAD: u64 = 4096;
@@ -17,7 +17,7 @@ pub(super) fn exif_orientation(input: &Input, path: &Path) -> Option<Exif> {
         return None;
     }
     // A file whose orientation cannot be read is shown as it is stored.
-    relit_still::orientation(&fs::read(path).ok()?)
+    relit_data::still::orientation(&fs::read(path).ok()?)
 }
 
 /// Whether a file is AVIF or HEIF, which FFmpeg reads as it reads MP4.

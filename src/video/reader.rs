@@ -88,16 +88,12 @@ impl<'a> Reader<'a> {
         let input = open_input(path)?;
         let stream = input
             .stream(track.stream)
-            .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
+            .ok_or_else(|| VideoError::no_video(path))?;
         let chain = if opening::frames_stand_alone(track.codec) {
             None
         } else {
             let chain = Chain::open(stream.parameters(), threads);
-            Some(chain.map_err(|why| VideoError::Decoder {
-                path: path.to_owned(),
-                codec: codec.to_owned(),
-                why,
-            })?)
+            Some(chain.map_err(VideoError::decoder(path, codec))?)
         };
         let is_key = |number: &u64| track.is_key(*number);
         Ok(Self {
@@ -150,7 +146,7 @@ impl<'a> Reader<'a> {
         for number in self.wanted.rest() {
             self.ready.push_back(Pending {
                 number,
-                state: State::Lost(DecodeFault::NoPicture),
+                state: State::Lost(DecodeFault::no_picture()),
             });
         }
     }
@@ -341,11 +337,11 @@ pub(super) fn fault_of(
         *broken_by = broken_by.or(Some(number));
         return fault;
     }
-    broken_by.map(DecodeFault::BuildsOnDamaged)
+    broken_by.map(|frame| DecodeFault::Unusable(format!("it builds on the damaged frame {frame}")))
 }
 
 /// Whether the decoder covered up missing parts.
 fn concealed(picture: &frame::Video) -> Option<DecodeFault> {
     let covered = picture.is_corrupt() || picture.has_decode_errors();
-    covered.then_some(DecodeFault::Concealed)
+    covered.then(DecodeFault::concealed)
 }

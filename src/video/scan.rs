@@ -7,17 +7,16 @@ use std::path::{Path, PathBuf};
 use ffmpeg_next::codec::Parameters;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::stream::Stream;
-use ffmpeg_next::{Packet, Rational, ffi, frame, media};
+use ffmpeg_next::{Packet, Rational, ffi};
 use image::RgbImage;
 use image::metadata::Orientation as Exif;
 
-use super::colour::{Colour, Stated};
+use super::colour::Colour;
 use super::contents::Inspector;
-use super::decoder::{self, Pool, VideoDecoder};
+use super::decoder::{Pool, VideoDecoder};
 use super::display::Display;
 use super::order::{FrameInfo, Ordered, Stamp, mark_wrong_checksums, microseconds, needs_decoding};
-use super::photograph::exif_orientation;
-use super::seek::first_frame;
+use super::seek::{Opened, first_frame, no_frames};
 use super::survey::Survey;
 use super::track::{Numbering, Track};
 use super::{DecodeFault, Pending, Reader, Truncation, VideoError, find_truncation, open_input};
@@ -46,73 +45,12 @@ pub struct Facts {
     pub colour_conversion: Option<String>,
 }
 
-/// A sign that a video is incomplete or damaged.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Damage {
-    /// The file ends inside an element, or an element does not fit into its parent.
-    #[error(
-        "truncated: {what} the element at byte {at}",
-        what = missing_words(.0), at = .0.element_at
-    )]
-    Truncated(Truncation),
-    /// The container promises more frames than there are.
-    #[error("the file promises {promised} frames and holds {found}")]
-    FewerFrames {
-        /// The number in the container.
-        promised: u64,
-        /// The number found.
-        found: u64,
-    },
-    /// The container promises a longer time than its frames cover.
-    #[error(
-        "the file promises {:.3} s and its frames end at {:.3} s",
-        *promised_us as f64 / 1e6, *found_us as f64 / 1e6
-    )]
-    Shorter {
-        /// The duration in the container, microseconds.
-        promised_us: i64,
-        /// The end of the last frame, microseconds.
-        found_us: i64,
-    },
-    /// Frames whose data the container knows to be damaged.
-    #[error("{count} frames are damaged in the file, the first is frame {first}")]
-    DamagedFrames {
-        /// How many.
-        count: u64,
-        /// The first one's number.
-        first: u64,
-    },
-    /// Packets of pictures that the decoder refuses.
-    #[error("the decoder refuses {count} packets of the file")]
-    RefusedPackets {
-        /// How many.
-        count: u64,
-    },
-    /// Reading stopped with an error.
-    #[error("reading stopped after {found} frames: {why}")]
-    ReadError {
-        /// Frames found up to there.
-        found: u64,
-        /// FFmpeg's answer.
-        why: ffmpeg_next::Error,
-    },
-}
-
-fn missing_words(truncation: &Truncation) -> String {
-    match truncation.missing {
-        Some(1) => "1 byte is missing in".to_owned(),
-        Some(n) => format!("{n} bytes are missing in"),
-        None => "a part is missing or damaged in".to_owned(),
-    }
-}
-
 /// A video file that was read through once.
 pub struct Video {
     path: PathBuf,
     facts: Facts,
     frames: Vec<FrameInfo>,
-    damage: Vec<Damage>,
+    damage: Vec<String>,
     notes: Vec<String>,
     pub(super) track: Track,
     pub(super) pool: Pool,
@@ -131,28 +69,16 @@ impl Video {
     /// Opens a file and reads through it once.
     ///
     /// # Errors
-    /// [`VideoError::Open`], [`VideoError::NoVideo`], [`VideoError::NoFrames`], [`VideoError::Decoder`] or
-    /// [`VideoError::Colour`]. A file that
-    /// is damaged but has frames is opened; see [`Self::damage`].
+    /// [`VideoError::Unreadable`]. A file that is damaged but has frames is opened; see [`Self::damage`].
     pub fn open(path: &Path) -> Result<Self, VideoError> {
-        let mut input = open_input(path)?;
-        let stream = input
-            .streams()
-            .best(media::Type::Video)
-            .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
-        let index = stream.index();
+        let mut opened = Opened::open(path)?;
+        let stream = opened.input.stream(opened.stream);
+        let stream = stream.ok_or_else(|| VideoError::no_video(path))?;
         let (time_base, rate) = (stream.time_base(), stream.avg_frame_rate());
-        let promised = Promised::of(&input, &stream);
-        let parameters = stream.parameters();
-        let codec = format!("{:?}", parameters.id());
-        let mut decoder =
-            decoder::open(parameters.clone(), 1).map_err(|why| VideoError::Decoder {
-                path: path.to_owned(),
-                codec: codec.clone(),
-                why,
-            })?;
+        let promised = Promised::of(&opened.input, &stream);
+        let (index, parameters) = (opened.stream, stream.parameters());
 
-        let mut packets = read_through(&mut input, index, &parameters);
+        let mut packets = read_through(&mut opened.input, index, &parameters);
         mark_wrong_checksums(&mut packets.stamps);
         let stamps = &packets.stamps;
         let mut refused = 0;
@@ -164,33 +90,26 @@ impl Video {
             };
             (ordered, numbering)
         } else {
-            let survey = Survey::decode(path, index, &codec)?;
+            let survey = Survey::decode(path, index, &opened.codec)?;
             refused = survey.refused;
             let pictures = survey.pictures();
             let ordered = Ordered::from_pictures(&pictures, stamps, time_base, rate);
             (ordered, Numbering::Decoder(survey.faults))
         };
         if ordered.frames.is_empty() {
-            return Err(VideoError::NoFrames(path.to_owned()));
+            return Err(no_frames(path));
         }
         let first = open_input(path).ok();
-        let first = first.and_then(|mut input| first_frame(&mut input, index, &mut decoder));
-        let first = first.as_ref();
-        let colour = colour(&decoder, first).map_err(|fault| VideoError::Colour {
-            path: path.to_owned(),
-            fault,
-        })?;
-        let exif = exif_orientation(&input, path);
-        let stream = input.stream(index);
-        let stream = stream.ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
-        let (display, mut notes) = Display::of(&input, &stream, first, exif);
+        let first = first.and_then(|mut input| first_frame(&mut input, index, &mut opened.decoder));
+        let (colour, display, exif, mut notes) = opened.shown(path, first.as_ref())?;
+        let decoder = &opened.decoder;
         notes.extend(ordered.note);
         notes.extend(display.note(decoder.width(), decoder.height()));
         notes.extend(colour.notes());
         let coded = (decoder.width(), decoder.height());
         Ok(Self {
             path: path.to_owned(),
-            facts: facts(&decoder, &colour, display, exif),
+            facts: facts(decoder, &colour, display, exif),
             damage: find_damage(path, &ordered.frames, &packets, refused, &promised),
             frames: ordered.frames,
             notes,
@@ -235,9 +154,9 @@ impl Video {
         &self.track.keys
     }
 
-    /// Signs that the file is incomplete or damaged; empty if there are none.
+    /// Signs that the file is incomplete or damaged, one phrase each; empty if there are none.
     #[must_use]
-    pub fn damage(&self) -> &[Damage] {
+    pub fn damage(&self) -> &[String] {
         &self.damage
     }
 
@@ -280,13 +199,15 @@ impl Video {
             .iter()
             .any(|frame| frame.number == number && frame.damaged)
         {
-            return Err(wrong(DecodeFault::NotWhole));
+            return Err(wrong(DecodeFault::not_whole()));
         }
         let all = Rect::new(0, 0, self.facts.width, self.facts.height);
         if let Some(picture) = self.sought(number) {
             return picture.rgb(all).map_err(wrong);
         }
-        let pending = reader.next().ok_or_else(|| wrong(DecodeFault::NoPicture))?;
+        let pending = reader
+            .next()
+            .ok_or_else(|| wrong(DecodeFault::no_picture()))?;
         self.picture(pending)
             .and_then(|picture| picture.rgb(all))
             .map_err(wrong)
@@ -300,16 +221,6 @@ impl Video {
     pub fn picture(&self, pending: Pending) -> Result<super::Picture, DecodeFault> {
         pending.decode(&self.track, &self.pool)
     }
-}
-
-/// What the first picture states of its colours, or else the stream.
-fn colour(
-    decoder: &VideoDecoder,
-    first: Option<&frame::Video>,
-) -> Result<Colour, relit_data::colour::ColourFault> {
-    let by_stream = Stated::by_stream(decoder);
-    let stated = first.map_or(by_stream, |first| Stated::by_picture(first).or(by_stream));
-    stated.colour()
 }
 
 fn facts(decoder: &VideoDecoder, colour: &Colour, display: Display, exif: Option<Exif>) -> Facts {
@@ -405,32 +316,43 @@ fn find_damage(
     packets: &FoundPackets,
     refused: u64,
     promised: &Promised,
-) -> Vec<Damage> {
-    let found = frames.len() as u64;
+) -> Vec<String> {
+    let found = frames.len();
     let mut damage = Vec::new();
     let cut = File::open(path).and_then(|file| find_truncation(&mut BufReader::new(file)));
-    if let Ok(Some(cut)) = cut {
-        damage.push(Damage::Truncated(cut));
+    if let Ok(Some(Truncation {
+        element_at,
+        missing,
+    })) = cut
+    {
+        let what = match missing {
+            Some(1) => "1 byte is missing in".to_owned(),
+            Some(n) => format!("{n} bytes are missing in"),
+            None => "a part is missing or damaged in".to_owned(),
+        };
+        damage.push(format!(
+            "truncated: {what} the element at byte {element_at}"
+        ));
     }
     if let Some(why) = packets.error {
-        damage.push(Damage::ReadError { found, why });
+        damage.push(format!("reading stopped after {found} frames: {why}"));
     }
-    let read = packets.stamps.len() as u64;
-    if promised.packets > read {
-        damage.push(Damage::FewerFrames {
-            promised: promised.packets,
-            found: read,
-        });
+    let (promised_packets, read) = (promised.packets, packets.stamps.len() as u64);
+    if promised_packets > read {
+        damage.push(format!(
+            "the file promises {promised_packets} frames and holds {read}"
+        ));
     }
     if refused > 0 {
-        damage.push(Damage::RefusedPackets { count: refused });
+        damage.push(format!("the decoder refuses {refused} packets of the file"));
     }
     let mut damaged = frames.iter().filter(|frame| frame.damaged);
     if let Some(first) = damaged.next() {
-        damage.push(Damage::DamagedFrames {
-            count: 1 + damaged.count() as u64,
-            first: first.number,
-        });
+        damage.push(format!(
+            "{} frames are damaged in the file, the first is frame {}",
+            1 + damaged.count(),
+            first.number
+        ));
     }
     if damage.is_empty() {
         damage.extend(shorter(frames, packets.end_us, promised.duration_us));
@@ -439,7 +361,7 @@ fn find_damage(
 }
 
 /// Whether the file is shorter than it promises. A slow last frame is no damage; a tenth of the length is.
-fn shorter(frames: &[FrameInfo], end_us: i64, promised_us: i64) -> Option<Damage> {
+fn shorter(frames: &[FrameInfo], end_us: i64, promised_us: i64) -> Option<String> {
     let [first, .., last] = frames else {
         return None;
     };
@@ -448,8 +370,8 @@ fn shorter(frames: &[FrameInfo], end_us: i64, promised_us: i64) -> Option<Damage
     let span = end_us.saturating_sub(first.t_us.min(0));
     let found_us = span.max(last.t_us.saturating_add(step));
     let tolerance = promised_us / 10 + step.saturating_mul(2);
-    (promised_us > found_us.saturating_add(tolerance)).then_some(Damage::Shorter {
-        promised_us,
-        found_us,
+    (promised_us > found_us.saturating_add(tolerance)).then(|| {
+        let [promised, found] = [promised_us, found_us].map(|time| time as f64 / 1e6);
+        format!("the file promises {promised:.3} s and its frames end at {found:.3} s")
     })
 }

@@ -7,8 +7,9 @@ use ffmpeg_next::codec::Parameters;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::{Packet, frame, media};
 use image::RgbImage;
+use image::metadata::Orientation as Exif;
 
-use super::colour::Stated;
+use super::colour::{Colour, Stated};
 use super::decoder::{self as opening, VideoDecoder};
 use super::display::Display;
 use super::photograph::exif_orientation;
@@ -24,32 +25,12 @@ const MOST_PACKETS: usize = 600;
 /// that the time it takes does not grow with the file.
 ///
 /// # Errors
-/// As [`Video::open`]; [`VideoError::NoFrames`] where nothing at the file's beginning can be decoded.
+/// As [`Video::open`]; also where nothing at the file's beginning can be decoded.
 pub fn first_picture(path: &Path) -> Result<RgbImage, VideoError> {
-    let mut input = open_input(path)?;
-    let stream = input
-        .streams()
-        .best(media::Type::Video)
-        .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
-    let index = stream.index();
-    let codec = format!("{:?}", stream.parameters().id());
-    let mut decoder = opening::open(stream.parameters(), 1).map_err(|why| VideoError::Decoder {
-        path: path.to_owned(),
-        codec,
-        why,
-    })?;
-    let frame = first_frame(&mut input, index, &mut decoder);
-    let frame = frame.ok_or_else(|| VideoError::NoFrames(path.to_owned()))?;
-    let stated = Stated::by_picture(&frame).or(Stated::by_stream(&decoder));
-    let colour = stated.colour().map_err(|fault| VideoError::Colour {
-        path: path.to_owned(),
-        fault,
-    })?;
-    let stream = input
-        .stream(index)
-        .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?;
-    let exif = exif_orientation(&input, path);
-    let (display, _) = Display::of(&input, &stream, Some(&frame), exif);
+    let mut opened = Opened::open(path)?;
+    let frame = first_frame(&mut opened.input, opened.stream, &mut opened.decoder);
+    let frame = frame.ok_or_else(|| no_frames(path))?;
+    let (colour, display, ..) = opened.shown(path, Some(&frame))?;
     let picture = Picture::new(0, frame, colour, display);
     let (width, height) = picture.size();
     let wrong = |fault: DecodeFault| VideoError::Frame {
@@ -58,6 +39,59 @@ pub fn first_picture(path: &Path) -> Result<RgbImage, VideoError> {
         fault,
     };
     picture.rgb(Rect::new(0, 0, width, height)).map_err(wrong)
+}
+
+pub(super) fn no_frames(path: &Path) -> VideoError {
+    let why = "has no complete frame: it was truncated too early; record it again";
+    VideoError::unreadable(path, why)
+}
+
+/// A file's stream of pictures, and a decoder for it.
+pub(super) struct Opened {
+    pub(super) input: Input,
+    pub(super) stream: usize,
+    /// The codec's name in FFmpeg.
+    pub(super) codec: String,
+    pub(super) decoder: VideoDecoder,
+}
+
+impl Opened {
+    pub(super) fn open(path: &Path) -> Result<Self, VideoError> {
+        let input = open_input(path)?;
+        let best = input.streams().best(media::Type::Video);
+        let best = best.ok_or_else(|| VideoError::no_video(path))?;
+        let (stream, parameters) = (best.index(), best.parameters());
+        let codec = format!("{:?}", parameters.id());
+        let decoder = opening::open(parameters, 1).map_err(VideoError::decoder(path, &codec))?;
+        Ok(Self {
+            input,
+            stream,
+            codec,
+            decoder,
+        })
+    }
+
+    /// How its pictures are shown, by what the first of them states, or else the stream; how a photograph is turned by
+    /// Exif; and remarks.
+    pub(super) fn shown(
+        &self,
+        path: &Path,
+        first: Option<&frame::Video>,
+    ) -> Result<(Colour, Display, Option<Exif>, Vec<String>), VideoError> {
+        let by_stream = Stated::by_stream(&self.decoder);
+        let stated = first.map_or(by_stream, |first| Stated::by_picture(first).or(by_stream));
+        let colour = stated.colour().map_err(|fault| {
+            let why = format!(
+                "has other colours than SDR: {fault} cannot be converted to sRGB: convert the video to SDR with BT.709 colours first"
+            );
+            VideoError::unreadable(path, why)
+        })?;
+        let exif = exif_orientation(&self.input, path);
+        let stream = self.input.stream(self.stream);
+        let stream = stream.ok_or_else(|| VideoError::no_video(path))?;
+        let (display, notes) = Display::of(&self.input, &stream, first, exif);
+        Ok((colour, display, exif, notes))
+    }
 }
 
 impl Video {
@@ -201,7 +235,7 @@ mod tests {
         }
         assert!(matches!(
             first_picture(&fixture("no such session")),
-            Err(VideoError::Open { .. })
+            Err(VideoError::Unreadable { .. })
         ));
     }
 }

@@ -35,20 +35,15 @@ impl Survey {
         let mut input = open_input(path)?;
         let parameters = input
             .stream(stream)
-            .ok_or_else(|| VideoError::NoVideo(path.to_owned()))?
+            .ok_or_else(|| VideoError::no_video(path))?
             .parameters();
         let byte_stream = match parameters.id() {
             Id::H264 => ByteStream::from_extra_data(&extra_data(&parameters)),
             _ => None,
         };
         let threads = thread::available_parallelism().map_or(1, NonZero::get);
-        let mut decoder = decoder::open(parameters, threads.min(MAX_THREADS)).map_err(|why| {
-            VideoError::Decoder {
-                path: path.to_owned(),
-                codec: codec.to_owned(),
-                why,
-            }
-        })?;
+        let decoder = decoder::open(parameters, threads.min(MAX_THREADS));
+        let mut decoder = decoder.map_err(VideoError::decoder(path, codec))?;
         let mut survey = Self {
             stamps: Vec::new(),
             faults: BTreeMap::new(),

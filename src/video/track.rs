@@ -41,15 +41,12 @@ pub(super) enum Numbering {
 impl Track {
     /// A decoded frame as a picture of this track.
     pub(super) fn picture(&self, number: u64, frame: frame::Video) -> Result<Picture, DecodeFault> {
-        let (wanted_w, wanted_h) = self.coded;
-        let (found_w, found_h) = (frame.width(), frame.height());
-        if (found_w, found_h) != self.coded {
-            return Err(DecodeFault::Size {
-                found_w,
-                found_h,
-                wanted_w,
-                wanted_h,
-            });
+        let (width, height) = self.coded;
+        let (w, h) = (frame.width(), frame.height());
+        if (w, h) != self.coded {
+            return Err(DecodeFault::Unusable(format!(
+                "it is {w} x {h} pixels in a video of {width} x {height}"
+            )));
         }
         let (colour, display) = (self.colour.clone(), self.display);
         Ok(Picture::new(number, frame, colour, display))

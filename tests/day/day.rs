@@ -157,7 +157,7 @@ impl<'a> Day<'a> {
         let entry = dataset.sessions.iter().find(|entry| entry.id == session);
         let entry = entry.unwrap();
         assert_eq!(entry.samples, 1500);
-        let verdict = entry.quality.as_ref().unwrap().verdict;
+        let verdict = entry.quality.verdict;
         phone.wait_text("#extract-text", &format!("1500 samples, {verdict}"));
         phone.see("extracted");
         phone.tap("#report-page");

@@ -25,7 +25,6 @@ fn main() -> ExitCode {
         tasks::doubles_failures_and_tasks_of_different_inputs_are_refused,
         tasks::a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed,
         tasks::a_task_without_recordings_says_so,
-        tasks::a_page_of_sums_takes_no_file_of_the_data_set,
     ];
     #[cfg(not(feature = "object-store"))]
     trials.extend(trials![

@@ -36,6 +36,7 @@ impl Workshop {
             image::Luma([if far < 22.0 { 255 } else { 0 }])
         });
         mask.save(folder.path().join("mask.png")).unwrap();
+        fs::create_dir(folder.path().join("temporary")).unwrap();
         Self { folder }
     }
 
@@ -47,6 +48,7 @@ impl Workshop {
         let mut command = Command::new(PROGRAM);
         command
             .args(line.split_whitespace())
+            .env("TMPDIR", self.path("temporary"))
             .current_dir(self.folder.path());
         command
     }

@@ -119,21 +119,6 @@ pub(crate) fn a_task_without_recordings_says_so() {
     );
 }
 
-pub(crate) fn a_page_of_sums_takes_no_file_of_the_data_set() {
-    let workshop = workshop();
-    workshop.errors(0, &format!("a.mkv {SETTINGS} -o out"));
-    let whole = files(&workshop.path("out"));
-    for page in ["dataset.json", "a.html", "a.parquet"] {
-        let errors = workshop.errors(1, &format!("stats out --html out/{page}"));
-        assert!(errors.contains("is a file of the data set"), "{errors}");
-    }
-    assert!(files(&workshop.path("out")) == whole);
-    for _ in 0..2 {
-        workshop.errors(0, "stats out --html out/index.html");
-    }
-    assert!(workshop.path("out/index.html").is_file());
-}
-
 #[cfg(not(feature = "object-store"))]
 pub(crate) fn a_url_is_refused_by_a_program_without_object_stores() {
     let workshop = Workshop::with(&[]);

@@ -22,11 +22,11 @@ fn a_data_set_at_a_url_is_that_of_a_folder_and_nothing_stays_on_the_way() {
         let line = format!("{SETTINGS} --layout {layout}");
         workshop.errors(0, &format!("in {line} -o whole-{layout}"));
         let whole = files(&workshop.path(&format!("whole-{layout}")));
-        let remote = format!("{url}/in {line} -o {url}/out-{layout} --cache cache");
+        let remote = format!("{url}/in {line} -o {url}/out-{layout}");
         workshop.errors(0, &remote);
         let out = workshop.path(&format!("out-{layout}"));
         assert!(files(&out) == whole, "{:?}", files(&out).keys());
-        assert_eq!(fs::read_dir(workshop.path("cache")).unwrap().count(), 0);
+        assert_eq!(fs::read_dir(workshop.path("temporary")).unwrap().count(), 0);
         // What is there is skipped, and what is gone is made again.
         let printed = workshop.run(&format!("{remote} --resume"));
         assert!(String::from_utf8_lossy(&printed.stdout).contains("2 skipped"));

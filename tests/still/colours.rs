@@ -2,7 +2,7 @@
 
 use image::{DynamicImage, ImageFormat, RgbImage};
 use moxcms::{ColorProfile, DataColorSpace, ToneReprCurve, curve_from_gamma};
-use relit_still::{Colour, ColourError, decode};
+use relit_data::still::{Colour, decode};
 
 use crate::files::{
     AREAS, areas, encoded, exif, exif_segment, hundred_thousandths, jpeg_with, middles, png_with,
@@ -194,7 +194,12 @@ fn a_grey_profile_is_for_pictures_without_colours() {
         shown(&bytes)
     );
     let fault = Colour::of_file(&png_with_icc(&areas(AREAS), icc)).unwrap_err();
-    assert!(matches!(fault, ColourError::ProfileSpace { .. }), "{fault}");
+    assert!(
+        fault
+            .to_string()
+            .contains("which is for pictures without colours"),
+        "{fault}"
+    );
 }
 
 #[test]
@@ -205,34 +210,38 @@ fn what_is_not_converted_is_refused_by_its_name() {
     let fault = |bytes: &[u8]| Colour::of_file(bytes).unwrap_err();
     let cmyk = fault(&png_with_profile(&image, &inks));
     assert!(
-        matches!(cmyk, ColourError::ProfileSpace { .. }) && cmyk.to_string().contains("CMYK"),
+        cmyk.to_string().contains("which is for inks (CMYK)"),
         "{cmyk}"
     );
     let pq = fault(&png_with_profile(&image, &ColorProfile::new_bt2020_pq()));
-    assert!(
-        matches!(pq, ColourError::ProfileTransfer { transfer: "PQ", .. }),
-        "{pq}"
-    );
+    assert!(pq.to_string().contains("which is encoded by PQ"), "{pq}");
     for (function, name) in [(16, "PQ"), (18, "HLG"), (9, "logarithm")] {
         let fault = fault(&png_with(&image, &[(b"cICP", vec![9, function, 0, 1])]));
-        assert!(
-            matches!(&fault, ColourError::Transfer(text) if text.contains(name)),
-            "{fault}"
-        );
+        let text = fault.to_string();
+        assert!(text.contains("encoded by") && text.contains(name), "{text}");
     }
     let narrow = fault(&png_with(&image, &[(b"cICP", vec![1, 13, 0, 0])]));
-    assert!(matches!(narrow, ColourError::Transfer(_)), "{narrow}");
+    assert!(
+        narrow.to_string().contains("narrow range of videos"),
+        "{narrow}"
+    );
     let other = fault(&png_with(&image, &[(b"cICP", vec![99, 13, 0, 1])]));
-    assert!(matches!(other, ColourError::Space(_)), "{other}");
+    assert!(
+        other.to_string().contains("unknown primaries (number 99"),
+        "{other}"
+    );
     let broken = fault(&png_with_icc(&image, b"no profile at all".to_vec()));
-    assert_eq!(broken, ColourError::Profile);
+    assert_eq!(broken.to_string(), "has a damaged colour profile");
     let flat = [0.3127, 0.3290, 0.64, 0.33, 0.64, 0.33, 0.15, 0.06];
     let flat = fault(&png_with(&image, &[(b"cHRM", hundred_thousandths(&flat))]));
-    assert!(matches!(flat, ColourError::Primaries(_)), "{flat}");
+    assert!(
+        flat.to_string().contains("primaries that are not possible"),
+        "{flat}"
+    );
     // The second of two parts of a profile is missing.
     let jpeg = encoded(image, ImageFormat::Jpeg);
     let parts = profile_segments(&p3(), p3().len() / 2 + 1);
-    assert_eq!(fault(&jpeg_with(&jpeg, &parts[..1])), ColourError::Profile);
+    assert_eq!(fault(&jpeg_with(&jpeg, &parts[..1])), broken);
 }
 
 #[test]
@@ -242,7 +251,8 @@ fn a_jpeg_of_inks_is_refused() {
         8, 0, 8, 0, 8, 4, 1, 0x11, 0, 2, 0x11, 0, 3, 0x11, 0, 4, 0x11, 0,
     ];
     let bytes = jpeg_with(&[0xff, 0xd8, 0xff, 0xda, 0, 2], &[(0xc0, sof.to_vec())]);
-    assert_eq!(Colour::of_file(&bytes).unwrap_err(), ColourError::Cmyk);
+    let fault = Colour::of_file(&bytes).unwrap_err();
+    assert!(fault.to_string().contains("CMYK"), "{fault}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Where files end, and what is missing of them.
 
 use image::ImageFormat;
-use relit_still::{StillError, decode};
+use relit_data::still::{StillError, decode};
 
 use crate::files::{AREAS, areas, encoded, jpeg_with};
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use image::{RgbImage, RgbaImage};
 use relit_data::geometry::Rect;
 use relit_test_support::{ffmpeg, packets};
-use relit_video::{CodedFrame, Damage, DecodeFault, PixelFormat, Video, VideoError};
+use relit_video::{CodedFrame, DecodeFault, PixelFormat, Video, VideoError};
 use tempfile::TempDir;
 
 const PATTERN: &str = "testsrc2=size=70x50:rate=25:duration=0.4";
@@ -462,8 +462,12 @@ fn colours_that_are_not_known_are_refused_by_name() {
     ] {
         let (_folder, path) = plain_10_bit([400, 512, 512], statements);
         let error = Video::open(&path).unwrap_err();
-        assert!(matches!(error, VideoError::Colour { .. }), "{error}");
-        assert!(error.to_string().contains(name), "{error}");
+        assert!(matches!(error, VideoError::Unreadable { .. }), "{error}");
+        let text = error.to_string();
+        assert!(
+            text.contains(name) && text.contains("cannot be converted to sRGB"),
+            "{text}"
+        );
     }
 }
 
@@ -631,12 +635,8 @@ fn a_cut_is_told_with_its_place() {
     let cut = folder.path().join("cut.mkv");
     fs::write(&cut, &bytes[..bytes.len() * 2 / 3]).unwrap();
     let video = Video::open(&cut).unwrap();
-    assert!(
-        matches!(video.damage()[0], Damage::Truncated(_)),
-        "{:?}",
-        video.damage()
-    );
-    assert!(video.damage()[0].to_string().starts_with("truncated: "));
+    let damage = video.damage();
+    assert!(damage[0].starts_with("truncated: "), "{damage:?}");
 }
 
 #[test]
@@ -792,7 +792,8 @@ fn what_is_no_video_is_refused_with_a_sentence() {
         "{message}"
     );
     let (_folder, path) = made("sine=duration=0.2", "a.wav", "");
-    assert!(matches!(Video::open(&path), Err(VideoError::NoVideo(_))));
+    let message = Video::open(&path).unwrap_err().to_string();
+    assert!(message.contains("has no video stream"), "{message}");
 }
 
 #[test]

@@ -50,11 +50,10 @@ fn sample(session: &str, index: u32) -> Sample {
         .measure(&image, SATURATION_LEVEL)
         .unwrap();
     let whole = Rect::new(0, 0, WIDTH, HEIGHT);
-    let record = FrameRecord::new(session, "mug", index, whole, &measures, SPEC_NET_GATE).of_frame(
-        u64::from(index),
-        i64::from(index),
-        None,
-    );
+    let record = FrameRecord {
+        t_us: i64::from(index),
+        ..FrameRecord::new(session, "mug", index, whole, &measures, SPEC_NET_GATE)
+    };
     Sample::encode(record, image).unwrap()
 }
 
@@ -139,18 +138,6 @@ fn a_shard_is_given_as_it_was_written() {
             }
         }
     }
-}
-
-#[test]
-fn a_data_set_of_an_earlier_version_is_given_too() {
-    let earlier = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/earlier");
-    let turns = open(&earlier);
-    assert_eq!(turns.turns(), [12]);
-    let drawn = whole(stream(&turns, 1, Cursor::default()));
-    let frames = drawn.iter().flat_map(|drawn| &drawn.batch.frames);
-    let records: Vec<&FrameRecord> = frames.filter_map(|frame| frame.record.as_ref()).collect();
-    assert_eq!(records.len(), 12);
-    assert!(records.iter().all(|record| record.blur.is_none()));
 }
 
 #[test]

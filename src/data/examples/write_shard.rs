@@ -11,7 +11,8 @@ use relit_data::geometry::Rect;
 use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{
     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
-    OutputFolder, Sample, SamplingBasis, SessionEntry, ShardFiles, ShardWriter, SourceVideo,
+    OutputFolder, Sample, SamplingBasis, SessionEntry, SessionQuality, ShardFiles, ShardWriter,
+    SourceVideo,
 };
 
 const SESSION: &str = "20261120T093015Z-disc";
@@ -30,17 +31,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mask = mask();
     let spans = MaskSpans::of(&mask);
     let mut writer = ShardWriter::create(folder.path(), settings.layout, SESSION, SAMPLES, &mask)?;
-    let mut spec_net = 0;
+    let mut records = Vec::new();
     for index in 0..SAMPLES {
         let sample = sample(index, &mask, &spans)?;
-        spec_net += u32::from(sample.record.spec_net);
+        records.push(sample.record.clone());
         writer.push(sample)?;
     }
     let files = writer.finish()?;
 
     // What is not in dataset.json is not part of the data set.
     let mut dataset = Dataset::new(settings);
-    dataset.replace(entry(&files, &mask, spec_net)?, files.shards);
+    dataset.replace(entry(&files, &mask, &records)?, files.shards);
     dataset.write(folder.path())?;
     println!("{SAMPLES} samples are in {}", out.display());
     Ok(())
@@ -81,19 +82,18 @@ fn sample(index: u32, mask: &GrayImage, spans: &MaskSpans) -> Result<Sample, Box
     });
     let measures = spans.measure(&image, SATURATION_LEVEL)?;
     let whole = Rect::new(0, 0, SIDE, SIDE);
-    let record = FrameRecord::new(SESSION, OBJECT, index, whole, &measures, SPEC_NET_GATE)
-        .of_frame(
-            u64::from(index),
-            STEP_US * i64::from(index),
-            Some(angle_deg),
-        );
+    let record = FrameRecord {
+        t_us: STEP_US * i64::from(index),
+        angle_deg: Some(angle_deg),
+        ..FrameRecord::new(SESSION, OBJECT, index, whole, &measures, SPEC_NET_GATE)
+    };
     Ok(Sample::encode(record, image)?)
 }
 
 fn entry(
     files: &ShardFiles,
     mask: &GrayImage,
-    spec_net: u32,
+    records: &[FrameRecord],
 ) -> Result<SessionEntry, Box<dyn Error>> {
     let stored_mask = relit_data::shard::encode_mask(mask)?;
     Ok(SessionEntry {
@@ -119,9 +119,9 @@ fn entry(
         covered_deg: None,
         rig: None,
         duplicates: 0,
-        spec_net,
+        spec_net: records.iter().filter(|record| record.spec_net).count() as u32,
         lossy: false,
-        quality: None,
+        quality: SessionQuality::of(records, false, None),
         warnings: Vec::new(),
         table: files.table.clone(),
         report: None,

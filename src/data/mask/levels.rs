@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{LabelList, MaskFault};
+use super::{MaskFault, several};
 
 /// Labels are at most so many; a picture of more levels is none of labels.
 const MAX_LABELS: usize = 64;
@@ -162,5 +162,5 @@ impl<'a> Levels<'a> {
 }
 
 fn labels(levels: impl IntoIterator<Item = u16>) -> MaskFault {
-    MaskFault::Labels(LabelList::of_levels(levels))
+    several("values", levels.into_iter().map(|level| level.to_string()))
 }

@@ -16,9 +16,10 @@ mod colours;
 mod levels;
 mod picture;
 
-use std::fmt::{self, Display, Formatter};
-
 pub use picture::MaskPicture;
+
+/// How many labels a message lists.
+const LISTED: usize = 6;
 
 /// By what a mask says where the object is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -62,11 +63,9 @@ pub enum MaskFault {
         "is a picture, not a mask: make a mask with relit-mask, or paint the object white and all else black"
     )]
     Photograph,
-    /// It marks several things.
-    #[error(
-        "has {}: paint the one object white and all else black", .0
-    )]
-    Labels(LabelList),
+    /// It marks several things, which are named.
+    #[error("has {0}: paint the one object white and all else black")]
+    Labels(String),
     /// It marks nothing.
     #[error(
         "is empty: its brightest pixel has {brightest} of {white}, and the object has to be at least half as bright as white; make it again with relit-mask, or paint the object white"
@@ -84,50 +83,15 @@ pub enum MaskFault {
     Transparent,
 }
 
-/// Several labels of a picture, as a person may know them.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LabelList {
-    /// Values or colours, the smallest first.
-    labels: Vec<String>,
-    /// What they are called.
-    noun: &'static str,
-}
-
-impl LabelList {
-    /// How many are listed.
-    const LISTED: usize = 6;
-
-    fn of_levels(levels: impl IntoIterator<Item = u16>) -> Self {
-        Self {
-            labels: levels.into_iter().map(|level| level.to_string()).collect(),
-            noun: "values",
-        }
-    }
-
-    fn of_colours(colours: impl IntoIterator<Item = String>) -> Self {
-        Self {
-            labels: colours.into_iter().collect(),
-            noun: "colours",
-        }
-    }
-
-    /// The labels, the smallest first.
-    #[must_use]
-    pub fn labels(&self) -> &[String] {
-        &self.labels
-    }
-}
-
-impl Display for LabelList {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { labels, noun } = self;
-        let listed = &labels[..labels.len().min(Self::LISTED)];
-        write!(f, "the {noun} {}", listed.join(", "))?;
-        match labels.len() - listed.len() {
-            0 => Ok(()),
-            more => write!(f, " and {more} more"),
-        }
-    }
+/// That there are several labels: values or colours, the smallest first.
+fn several(noun: &str, labels: impl IntoIterator<Item = String>) -> MaskFault {
+    let labels: Vec<String> = labels.into_iter().collect();
+    let listed = &labels[..labels.len().min(LISTED)];
+    let more = match labels.len() - listed.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    MaskFault::Labels(format!("the {noun} {}{more}", listed.join(", ")))
 }
 
 /// What a mask of another size than its picture's may be, after "the mask PATH is W x H pixels".

@@ -4,7 +4,7 @@ use image::{DynamicImage, GenericImageView};
 
 use super::colours::Colours;
 use super::levels::Levels;
-use super::{LabelList, MaskBasis, MaskFault, ObjectPixels};
+use super::{MaskBasis, MaskFault, ObjectPixels, several};
 
 /// What is opaque is a painted mask if so much of it is nearly black or nearly white.
 const PAINTED: f64 = 0.95;
@@ -178,7 +178,7 @@ impl MaskPicture {
             return self.by_levels(&levels);
         }
         Err(match colours.few() {
-            Some(names) => MaskFault::Labels(LabelList::of_colours(names)),
+            Some(names) => several("colours", names),
             None => MaskFault::Photograph,
         })
     }

@@ -71,7 +71,12 @@ fn assert_nearly_disc(image: impl Into<DynamicImage>, off: usize) {
 #[track_caller]
 fn assert_labels(image: impl Into<DynamicImage>, wanted: &[&str]) {
     match read(image) {
-        Err(MaskFault::Labels(list)) => assert_eq!(list.labels(), wanted),
+        Err(MaskFault::Labels(named)) => {
+            let (listed, left) = wanted.split_at(wanted.len().min(6));
+            let more = if left.is_empty() { "" } else { " and 4 more" };
+            let wanted = format!("{}{more}", listed.join(", "));
+            assert_eq!(named.split_once(['s']).unwrap().1.trim_start(), wanted);
+        }
         other => panic!("{:?}", other.map(|object| object.basis)),
     }
 }

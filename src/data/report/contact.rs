@@ -7,28 +7,23 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder as _, RgbImage};
 
 use super::axis::{degrees, percent};
-use super::error::ReportError;
-use super::page::{Page, THUMBNAIL_SIDE, Thumbnail};
 use super::turn::Turn;
+use super::{Page, THUMBNAIL_SIDE, Thumbnail};
 use crate::shard::record::FrameRecord;
 
 /// Good enough to judge mask and light; a quarter of a PNG's size on a real frame.
 const JPEG_QUALITY: u8 = 85;
 
 /// The thumbnails as figures, in the given order.
-pub(super) fn sheet(page: &Page<'_>, turn: &Turn) -> Result<String, ReportError> {
+pub(super) fn sheet(page: &Page<'_>, turn: &Turn) -> Result<String, String> {
     page.thumbnails
         .iter()
         .map(|thumbnail| figure(page.records, turn, thumbnail))
         .collect()
 }
 
-fn figure(
-    records: &[FrameRecord],
-    turn: &Turn,
-    thumbnail: &Thumbnail,
-) -> Result<String, ReportError> {
-    let unknown = || ReportError::UnknownSample(thumbnail.index);
+fn figure(records: &[FrameRecord], turn: &Turn, thumbnail: &Thumbnail) -> Result<String, String> {
+    let unknown = || format!("sample {} has a thumbnail and no record", thumbnail.index);
     let position = records
         .binary_search_by_key(&thumbnail.index, |r| r.index)
         .map_err(|_| unknown())?;
@@ -68,18 +63,16 @@ fn marks(record: &FrameRecord) -> String {
 }
 
 /// The image as JPEG or PNG, whichever is smaller: PNG is smaller for small and flat images.
-fn data_uri(thumbnail: &Thumbnail) -> Result<String, ReportError> {
+fn data_uri(thumbnail: &Thumbnail) -> Result<String, String> {
     let (index, image) = (thumbnail.index, &thumbnail.image);
     let (width, height) = image.dimensions();
     let fits = |side| (1..=THUMBNAIL_SIDE).contains(&side);
     if !fits(width) || !fits(height) {
-        return Err(ReportError::Size {
-            index,
-            width,
-            height,
-        });
+        return Err(format!(
+            "the thumbnail of sample {index} is {width} x {height} pixels"
+        ));
     }
-    let failed = |source| ReportError::Encode { index, source };
+    let failed = |error| format!("the thumbnail of sample {index} could not be encoded: {error}");
     let jpeg = jpeg(image).map_err(failed)?;
     let png = png(image).map_err(failed)?;
     Ok(if jpeg.len() < png.len() {

@@ -1,4 +1,4 @@
-//! What the pages share: the document around a body, and text that is safe inside HTML, for any name of a
+//! The document around a body, and text that is safe inside HTML, for any name of a
 //! session, an object or a path.
 
 use crate::shard::QualityVerdict;
@@ -19,11 +19,8 @@ pub(super) fn document(title: &str, body: &str) -> String {
 }
 
 /// A verdict as a mark.
-pub(super) fn badge(verdict: Option<QualityVerdict>) -> String {
-    match verdict {
-        Some(verdict) => format!("<b class=\"badge {verdict}\">{verdict}</b>"),
-        None => format!("<b class=\"badge none\">{}</b>", QualityVerdict::NONE),
-    }
+pub(super) fn badge(verdict: QualityVerdict) -> String {
+    format!("<b class=\"badge {verdict}\">{verdict}</b>")
 }
 
 /// `text` for an element's content or a quoted attribute: markup is escaped, and characters that

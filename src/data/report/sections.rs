@@ -1,8 +1,8 @@
 //! The sections of the page, from the title to the tables.
 
+use super::Page;
 use super::axis::{degrees, number, percent};
 use super::html::{self, badge, counted, escape, table, warnings};
-use super::page::Page;
 use super::plot::{Level, Plot, Series};
 use super::turn::Turn;
 use crate::image_stats::fraction;
@@ -52,7 +52,7 @@ fn quality(quality: &SessionQuality) -> String {
         [] => "nothing was found that speaks against its use".to_owned(),
         reasons => escape(&reasons.join("; ")),
     };
-    format!("<p>{}: {reasons}.</p>\n", badge(Some(quality.verdict)))
+    format!("<p>{}: {reasons}.</p>\n", badge(quality.verdict))
 }
 
 fn verdict(page: &Page<'_>) -> String {
@@ -114,6 +114,11 @@ fn plots(page: &Page<'_>, turn: &Turn) -> String {
     )
 }
 
+/// Fraction of the mask in which any channel is saturated, 0..=1.
+fn any_channel(record: &FrameRecord) -> f64 {
+    fraction(record.saturated_any_px, record.mask_px)
+}
+
 fn saturated(page: &Page<'_>, turn: &Turn) -> String {
     let extremes = Extremes::of(page.records, turn, |r| r.saturated_fraction);
     let caption = format!(
@@ -123,27 +128,20 @@ fn saturated(page: &Page<'_>, turn: &Turn) -> String {
         gate = percent(page.gate),
         extremes = extremes.sentence(percent),
     );
+    let points = turn.points(page.records, |r| 100.0 * r.saturated_fraction);
     let plot = Plot {
-        alternative: &caption,
-        quantity: "saturated, all channels (% of the mask)",
-        abscissa: turn.label(),
-        height: TALL,
-        series: vec![Series {
-            class: "all",
-            label: "",
-            points: turn.points(page.records, |r| 100.0 * r.saturated_fraction),
-        }],
         level: Some(Level {
             at: 100.0 * page.gate,
             fraction: page.gate,
         }),
+        ..one_line(
+            "saturated, all channels (% of the mask)",
+            "all",
+            points,
+            TALL,
+        )
     };
-    figure(&plot, &caption)
-}
-
-/// Fraction of the mask in which any channel is saturated, 0..=1.
-fn any_channel(record: &FrameRecord) -> f64 {
-    fraction(record.saturated_any_px, record.mask_px)
+    figure(plot, turn, &caption)
 }
 
 /// A plot of its own: on a coloured object this fraction is ten times the gated one, and on a common
@@ -155,43 +153,27 @@ fn saturated_any(page: &Page<'_>, turn: &Turn) -> String {
         level = page.saturation_level,
         extremes = extremes.sentence(percent),
     );
-    let plot = Plot {
-        alternative: &caption,
-        quantity: "saturated, any channel (% of the mask)",
-        abscissa: turn.label(),
-        height: LOW,
-        series: vec![Series {
-            class: "any",
-            label: "",
-            points: turn.points(page.records, |r| 100.0 * any_channel(r)),
-        }],
-        level: None,
-    };
-    figure(&plot, &caption)
+    let points = turn.points(page.records, |r| 100.0 * any_channel(r));
+    let quantity = "saturated, any channel (% of the mask)";
+    figure(one_line(quantity, "any", points, LOW), turn, &caption)
 }
 
 fn colour(page: &Page<'_>, turn: &Turn) -> String {
     let channel = |class, label, index: usize| Series {
         class,
         label,
-        points: turn.points(page.records, |r| {
-            r.mean_rgb.get(index).copied().unwrap_or(0.0)
-        }),
+        points: turn.points(page.records, |r| r.mean_rgb[index]),
     };
-    let caption = "Mean red (R), green (G) and blue (B) of the source pixels.";
     let plot = Plot {
-        alternative: caption,
-        quantity: "mean colour (8-bit sRGB value)",
-        abscissa: turn.label(),
-        height: TALL,
         series: vec![
             channel("r", "R", 0),
             channel("g", "G", 1),
             channel("b", "B", 2),
         ],
-        level: None,
+        ..one_line("mean colour (8-bit sRGB value)", "", Vec::new(), TALL)
     };
-    figure(&plot, caption)
+    let caption = "Mean red (R), green (G) and blue (B) of the source pixels.";
+    figure(plot, turn, caption)
 }
 
 fn sharpness(page: &Page<'_>, turn: &Turn) -> String {
@@ -200,22 +182,38 @@ fn sharpness(page: &Page<'_>, turn: &Turn) -> String {
         "Variance of the Laplacian; larger is sharper. {}",
         extremes.sentence(|value| number(value, 1))
     );
-    let plot = Plot {
-        alternative: &caption,
-        quantity: "sharpness (squared luma steps)",
-        abscissa: turn.label(),
-        height: LOW,
-        series: vec![Series {
-            class: "sharp",
-            label: "",
-            points: turn.points(page.records, |r| r.sharpness),
-        }],
-        level: None,
-    };
-    figure(&plot, &caption)
+    let points = turn.points(page.records, |r| r.sharpness);
+    let quantity = "sharpness (squared luma steps)";
+    figure(one_line(quantity, "sharp", points, LOW), turn, &caption)
 }
 
-fn figure(plot: &Plot<'_>, caption: &str) -> String {
+fn one_line<'a>(
+    quantity: &'a str,
+    class: &'static str,
+    points: Vec<(f64, f64)>,
+    height: f64,
+) -> Plot<'a> {
+    let label = "";
+    Plot {
+        alternative: "",
+        quantity,
+        abscissa: "",
+        height,
+        series: vec![Series {
+            class,
+            label,
+            points,
+        }],
+        level: None,
+    }
+}
+
+fn figure(plot: Plot<'_>, turn: &Turn, caption: &str) -> String {
+    let plot = Plot {
+        alternative: caption,
+        abscissa: turn.label(),
+        ..plot
+    };
     format!(
         "<figure class=\"plot\">\n{}<figcaption>{caption}</figcaption>\n</figure>\n",
         plot.svg()

@@ -29,56 +29,6 @@ pub struct Gap {
     pub missing: u64,
 }
 
-/// What is wrong in a frame index.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum IndexFault {
-    /// A line is not a frame's.
-    #[error("line {line} is not a frame's entry ({what})")]
-    Line {
-        /// 1-based line.
-        line: u64,
-        /// The parser's message.
-        what: String,
-    },
-    /// Positions do not count up from 0.
-    #[error("line {line} says n = {found}, but {expected} was expected")]
-    Position {
-        /// 1-based line.
-        line: u64,
-        /// The expected position.
-        expected: u64,
-        /// The position in the file.
-        found: u64,
-    },
-    /// The driver's counter did not grow.
-    #[error("line {line} repeats or goes back in the driver's sequence ({found} after {previous})")]
-    Sequence {
-        /// 1-based line.
-        line: u64,
-        /// The counter in the line before.
-        previous: u64,
-        /// The counter in this line.
-        found: u64,
-    },
-    /// Time did not grow.
-    #[error("line {line} is not later than the line before ({found} us after {previous} us)")]
-    Time {
-        /// 1-based line.
-        line: u64,
-        /// The time stamp in the line before, microseconds.
-        previous: i64,
-        /// The time stamp in this line, microseconds.
-        found: i64,
-    },
-    /// The angle is not finite, or implausibly large.
-    #[error("line {line} has an angle that no turntable reaches")]
-    Angle {
-        /// 1-based line.
-        line: u64,
-    },
-}
-
 /// All frames of a session, checked: `entries()[i].n == i`, and sequence and time grow.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameIndex {
@@ -91,41 +41,30 @@ impl FrameIndex {
     /// parsed was cut off by a power failure: it is skipped, and [`Self::is_torn`] is true.
     ///
     /// # Errors
-    /// [`IndexFault`] with the first line that is wrong.
-    pub fn parse(bytes: &[u8]) -> Result<Self, IndexFault> {
-        let mut index = Self::default();
-        let mut lines = unmarked(bytes)
-            .split_inclusive(|&byte| byte == b'\n')
-            .zip(1_u64..)
-            .peekable();
-        while let Some((text, line)) = lines.next() {
-            let ended = text.ends_with(b"\n");
-            match serde_json::from_slice::<FrameEntry>(text) {
-                Ok(entry) => index.push_as(entry, line)?,
-                Err(_) if !ended && lines.peek().is_none() => index.torn = true,
-                Err(error) => {
-                    return Err(IndexFault::Line {
-                        line,
-                        what: error.to_string(),
-                    });
-                }
-            }
+    /// The first line that is no frame's, or does not continue those before it, and what is wrong with it.
+    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+        let bytes = unmarked(bytes);
+        let (index, fault) = Self::parse_until_fault(bytes);
+        // Every line before the first fault is an entry.
+        let mut lines = bytes.split_inclusive(|&byte| byte == b'\n');
+        let faulty = lines.nth(index.entries.len()).unwrap_or_default();
+        let is_torn =
+            !faulty.ends_with(b"\n") && serde_json::from_slice::<FrameEntry>(faulty).is_err();
+        match fault {
+            Some(fault) if !is_torn => Err(fault),
+            _ => Ok(index),
         }
-        Ok(index)
     }
 
     /// Reads an index up to the first fault, and returns that fault too: after a power cut the end of
     /// the file can hold anything.
     #[must_use]
-    pub fn parse_until_fault(bytes: &[u8]) -> (Self, Option<IndexFault>) {
+    pub fn parse_until_fault(bytes: &[u8]) -> (Self, Option<String>) {
         let mut index = Self::default();
-        for (text, line) in bytes.split_inclusive(|&byte| byte == b'\n').zip(1_u64..) {
+        for text in unmarked(bytes).split_inclusive(|&byte| byte == b'\n') {
             let read = match serde_json::from_slice::<FrameEntry>(text) {
-                Ok(entry) => index.push_as(entry, line),
-                Err(error) => Err(IndexFault::Line {
-                    line,
-                    what: error.to_string(),
-                }),
+                Ok(entry) => index.push(entry),
+                Err(error) => Err(index.fault(&format!("is not a frame's entry ({error})"))),
             };
             if let Err(fault) = read {
                 index.torn = true;
@@ -172,45 +111,32 @@ impl FrameIndex {
     /// Adds the next frame.
     ///
     /// # Errors
-    /// [`IndexFault`] if the entry does not continue the index, which is then unchanged.
-    pub fn push(&mut self, entry: FrameEntry) -> Result<(), IndexFault> {
-        self.push_as(entry, self.entries.len() as u64 + 1)
+    /// Why the entry does not continue the index, which is then unchanged.
+    pub fn push(&mut self, entry: FrameEntry) -> Result<(), String> {
+        let (n, sequence, t_us) = (entry.n, entry.sequence, entry.t_us);
+        let expected = self.entries.len() as u64;
+        let reaches = |angle: &f64| (-MOST_DEGREES..=MOST_DEGREES).contains(angle);
+        let last = self.entries.last();
+        let what = if n != expected {
+            format!("says n = {n}, but {expected} was expected")
+        } else if !entry.angle_deg.as_ref().is_none_or(reaches) {
+            "has an angle that no turntable reaches".to_owned()
+        } else if let Some(last) = last.filter(|last| sequence <= last.sequence) {
+            let previous = last.sequence;
+            format!("repeats or goes back in the driver's sequence ({sequence} after {previous})")
+        } else if let Some(last) = last.filter(|last| t_us <= last.t_us) {
+            let previous = last.t_us;
+            format!("is not later than the line before ({t_us} us after {previous} us)")
+        } else {
+            self.entries.push(entry);
+            return Ok(());
+        };
+        Err(self.fault(&what))
     }
 
-    fn push_as(&mut self, entry: FrameEntry, line: u64) -> Result<(), IndexFault> {
-        let expected = self.entries.len() as u64;
-        if entry.n != expected {
-            return Err(IndexFault::Position {
-                line,
-                expected,
-                found: entry.n,
-            });
-        }
-        if entry
-            .angle_deg
-            .is_some_and(|angle| !(-MOST_DEGREES..=MOST_DEGREES).contains(&angle))
-        {
-            return Err(IndexFault::Angle { line });
-        }
-        if let Some(last) = self.entries.last() {
-            if entry.sequence <= last.sequence {
-                let (previous, found) = (last.sequence, entry.sequence);
-                return Err(IndexFault::Sequence {
-                    line,
-                    previous,
-                    found,
-                });
-            }
-            if entry.t_us <= last.t_us {
-                return Err(IndexFault::Time {
-                    line,
-                    previous: last.t_us,
-                    found: entry.t_us,
-                });
-            }
-        }
-        self.entries.push(entry);
-        Ok(())
+    /// What is wrong with the line after those that were read.
+    fn fault(&self, what: &str) -> String {
+        format!("line {} {what}", self.entries.len() + 1)
     }
 
     /// The frames, in order.
@@ -312,14 +238,21 @@ mod tests {
         let zeros = [whole.as_bytes(), &[0; 100]].concat();
         let (index, fault) = FrameIndex::parse_until_fault(&zeros);
         assert_eq!(index.entries().len(), 2);
-        assert!(matches!(fault, Some(IndexFault::Line { line: 3, .. })));
+        let fault = fault.unwrap();
+        assert!(
+            fault.starts_with("line 3 is not a frame's entry"),
+            "{fault}"
+        );
     }
 
     #[test]
     fn a_broken_line_in_the_middle_is_named() {
         let broken = text(&[entry(0)]) + "{\"n\":\n" + &text(&[entry(1)]);
         let fault = FrameIndex::parse(broken.as_bytes()).unwrap_err();
-        assert!(matches!(fault, IndexFault::Line { line: 2, .. }), "{fault}");
+        assert!(
+            fault.starts_with("line 2 is not a frame's entry"),
+            "{fault}"
+        );
     }
 
     #[test]
@@ -330,36 +263,15 @@ mod tests {
         early.t_us = 0;
         let mut repeated = entry(1);
         repeated.sequence = 0;
+        let clock = "line 2 is not later than the line before (0 us after 0 us)";
+        let counter = "line 2 repeats or goes back in the driver's sequence (0 after 0)";
         for (second, wanted) in [
-            (
-                skipped,
-                IndexFault::Position {
-                    line: 2,
-                    expected: 1,
-                    found: 2,
-                },
-            ),
-            (
-                early,
-                IndexFault::Time {
-                    line: 2,
-                    previous: 0,
-                    found: 0,
-                },
-            ),
-            (
-                repeated,
-                IndexFault::Sequence {
-                    line: 2,
-                    previous: 0,
-                    found: 0,
-                },
-            ),
+            (skipped, "line 2 says n = 2, but 1 was expected"),
+            (early, clock),
+            (repeated, counter),
         ] {
-            assert_eq!(
-                FrameIndex::parse(text(&[entry(0), second]).as_bytes()),
-                Err(wanted)
-            );
+            let read = FrameIndex::parse(text(&[entry(0), second]).as_bytes());
+            assert_eq!(read.unwrap_err().to_string(), wanted);
         }
     }
 }

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::writer::{close, keep_as_found, write_index};
 use super::{
-    FrameIndex, INDEX_FILE, IndexFault, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status,
-    TurnJournal,
+    FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status, TurnJournal,
 };
 
 /// A session that is marked as recording although its recorder has died. It stays locked while this
@@ -17,7 +16,8 @@ pub struct InterruptedSession {
     folder: PathBuf,
     manifest: Manifest,
     index: FrameIndex,
-    fault: Option<IndexFault>,
+    /// Whether the index has a fault, up to which it was read.
+    is_faulty: bool,
     journal: Option<TurnJournal>,
     lock: SessionLock,
 }
@@ -27,13 +27,13 @@ impl InterruptedSession {
     ///
     /// # Errors
     /// [`SessionError::InUse`] if its recorder is still running, [`SessionError::Ended`] if it has ended,
-    /// [`SessionError::Manifest`], or [`SessionError::Io`].
+    /// [`SessionError::Unusable`], or [`SessionError::Io`].
     pub fn open(folder: &Path) -> Result<Self, SessionError> {
         let lock = SessionLock::acquire(folder)?;
         let path = folder.join(MANIFEST_FILE);
         let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
         let manifest =
-            Manifest::from_json(&bytes).map_err(|fault| SessionError::Manifest { path, fault })?;
+            Manifest::from_json(&bytes).map_err(|fault| SessionError::manifest(&path, &fault))?;
         if manifest.status != Status::Recording {
             lock.remove()?;
             return Err(SessionError::Ended(folder.to_owned()));
@@ -49,7 +49,7 @@ impl InterruptedSession {
             folder: folder.to_owned(),
             manifest,
             index,
-            fault,
+            is_faulty: fault.is_some(),
             journal: TurnJournal::read(folder),
             lock,
         })
@@ -65,12 +65,6 @@ impl InterruptedSession {
     #[must_use]
     pub fn index(&self) -> &FrameIndex {
         &self.index
-    }
-
-    /// The first fault in the index, if there is one.
-    #[must_use]
-    pub fn index_fault(&self) -> Option<&IndexFault> {
-        self.fault.as_ref()
     }
 
     /// What the turntable reported of the turn, if there was one.
@@ -92,7 +86,7 @@ impl InterruptedSession {
         angle: &dyn Fn(i64) -> Option<f64>,
         reason: &str,
     ) -> Result<Manifest, SessionError> {
-        let is_cut = self.fault.is_some() || frames < self.index.entries().len();
+        let is_cut = self.is_faulty || frames < self.index.entries().len();
         if is_cut {
             keep_as_found(&self.folder)?;
             self.index.truncate(frames);
@@ -146,7 +140,7 @@ mod tests {
         let found = fs::read(folder.join(INDEX_FILE)).unwrap();
         let session = InterruptedSession::open(&folder).unwrap();
         assert_eq!(session.index().entries().len(), 5);
-        assert!(session.index_fault().is_some());
+        assert!(session.is_faulty);
         let manifest = session.abort(3, &|_| None, "interrupted").unwrap();
         assert_eq!(manifest.video.frames, Some(3));
         let cut = FrameIndex::parse(&fs::read(folder.join(INDEX_FILE)).unwrap()).unwrap();

@@ -15,7 +15,7 @@ const RESERVE: usize = 512 << 10;
 /// The lock on a session folder, and some disk space reserved for the end of the session. Dropping it
 /// releases the lock and leaves the file.
 #[derive(Debug)]
-pub struct SessionLock {
+pub(super) struct SessionLock {
     path: PathBuf,
     file: File,
 }
@@ -25,7 +25,7 @@ impl SessionLock {
     ///
     /// # Errors
     /// [`SessionError::InUse`] if another process holds the lock, or [`SessionError::Io`].
-    pub fn acquire(folder: &Path) -> Result<Self, SessionError> {
+    pub(super) fn acquire(folder: &Path) -> Result<Self, SessionError> {
         let path = folder.join(LOCK_FILE);
         let mut options = OpenOptions::new();
         let opened = options.create(true).truncate(false).write(true).open(&path);

@@ -4,7 +4,7 @@
 //! - Reading: [`recordings`] lists the sessions at a path, [`Recording::open`] reads one. A video file
 //!   without a session folder is accepted too: it is a [`Recording`] without manifest and frame
 //!   index.
-//! - Writing: [`SessionWriter`], which holds the [`SessionLock`].
+//! - Writing: [`SessionWriter`], which holds the folder's lock (`lock`).
 //! - [`TurnJournal`]: what the turntable reported, until the index has the angles.
 //! - Salvaging what a killed recorder left behind: [`InterruptedSession`].
 //!
@@ -23,10 +23,10 @@ mod writer;
 
 pub use crate::naming::is_session_name;
 pub use error::SessionError;
-pub use frames::{FrameEntry, FrameIndex, Gap, IndexFault};
+pub use frames::{FrameEntry, FrameIndex, Gap};
 pub use interrupted::InterruptedSession;
 pub use journal::{JOURNAL_FILE, JournaledReport, JournaledTurn, TurnJournal};
-pub use lock::SessionLock;
+use lock::SessionLock;
 pub use manifest::{
     CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts,
     Status, TurntableFacts, VideoFacts, object_of,

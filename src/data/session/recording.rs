@@ -74,7 +74,7 @@ impl Recording {
             return Self::open_plain_folder(path);
         }
         if !path.is_file() {
-            return Err(SessionError::NotThere(path.to_owned()));
+            return Err(not_there(path));
         }
         Ok(Self::bare(path, path.file_stem(), None))
     }
@@ -82,14 +82,15 @@ impl Recording {
     fn open_session(folder: &Path) -> Result<Self, SessionError> {
         let manifest_path = folder.join(MANIFEST_FILE);
         let bytes = fs::read(&manifest_path).map_err(SessionError::io(&manifest_path, "read"))?;
-        let manifest = Manifest::from_json(&bytes).map_err(|fault| SessionError::Manifest {
-            path: manifest_path,
-            fault,
-        })?;
+        let manifest = Manifest::from_json(&bytes)
+            .map_err(|fault| SessionError::manifest(&manifest_path, &fault))?;
         let mut notices = Vec::new();
         match &manifest.status {
             Status::Complete => {}
-            Status::Recording => return Err(SessionError::StillRecording(folder.to_owned())),
+            Status::Recording => {
+                let what = "is marked as still recording: wait for the capture to end, let the capture program salvage it, or give the video file itself";
+                return Err(SessionError::unusable(folder, what));
+            }
             Status::Aborted(reason) => {
                 notices.push(Notice::Loss(format!("the capture was aborted: {reason}")));
             }
@@ -100,7 +101,7 @@ impl Recording {
         let video = folder.join(&manifest.video.file);
         let found = match fs::metadata(&video) {
             Ok(data) if data.is_file() => data.len(),
-            _ => return Err(SessionError::VideoMissing(video)),
+            _ => return Err(video_missing(&video)),
         };
         if let Some(recorded) = manifest.video.bytes
             && recorded != found
@@ -131,7 +132,7 @@ impl Recording {
     fn open_plain_folder(folder: &Path) -> Result<Self, SessionError> {
         let mut videos = videos_in(folder)?;
         match (videos.pop(), videos.len()) {
-            (None, _) => Err(SessionError::NoSession(folder.to_owned())),
+            (None, _) => Err(no_session(folder)),
             (Some(video), 0) => {
                 // A path such as "." has no usable name.
                 let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
@@ -141,10 +142,13 @@ impl Recording {
                 ));
                 Ok(recording)
             }
-            (Some(_), more) => Err(SessionError::SeveralVideos {
-                folder: folder.to_owned(),
-                count: more + 1,
-            }),
+            (Some(_), more) => {
+                let what = format!(
+                    "has no session.json and {} video files: give the video file instead of the folder",
+                    more + 1
+                );
+                Err(SessionError::unusable(folder, &what))
+            }
         }
     }
 
@@ -167,16 +171,16 @@ impl Recording {
 /// that cannot be looked into, are listed too, so that opening them reports it.
 ///
 /// # Errors
-/// [`SessionError::NotThere`], [`SessionError::NoSession`], [`SessionError::VideoAmongSessions`], or [`SessionError::Io`].
+/// [`SessionError::Unusable`] if there is none, or sessions and videos; or [`SessionError::Io`].
 pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
     if !path.exists() {
-        return Err(SessionError::NotThere(path.to_owned()));
+        return Err(not_there(path));
     }
     if path.is_file() || path.join(MANIFEST_FILE).exists() {
         return Ok(vec![path.to_owned()]);
     }
     if !path.is_dir() {
-        return Err(SessionError::NoSession(path.to_owned()));
+        return Err(no_session(path));
     }
     let mut inner = Vec::new();
     for entry in fs::read_dir(path).map_err(SessionError::io(path, "listed"))? {
@@ -188,13 +192,16 @@ pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
     }
     inner.sort();
     match (videos_in(path)?.into_iter().next(), inner.is_empty()) {
-        (None, true) => Err(SessionError::NoSession(path.to_owned())),
+        (None, true) => Err(no_session(path)),
         (None, false) => Ok(inner),
         (Some(_), true) => Ok(vec![path.to_owned()]),
-        (Some(video), false) => Err(SessionError::VideoAmongSessions {
-            folder: path.to_owned(),
-            video,
-        }),
+        (Some(video), false) => {
+            let what = format!(
+                "holds sessions and also the video {}: give the sessions by name, or move the video away",
+                video.display()
+            );
+            Err(SessionError::unusable(path, &what))
+        }
     }
 }
 
@@ -214,6 +221,21 @@ pub fn beside_sessions(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
     }
     beside.sort();
     Ok(beside)
+fn not_there(path: &Path) -> SessionError {
+    SessionError::Unusable(format!(
+        "there is no {}: give a session folder, a folder of sessions, or a video file",
+        path.display()
+    ))
+}
+
+fn no_session(folder: &Path) -> SessionError {
+    let what = "holds no session (no session.json, no video file, and no folders that have one): give another folder";
+    SessionError::unusable(folder, what)
+}
+
+pub(super) fn video_missing(video: &Path) -> SessionError {
+    let what = "is missing, but the session's manifest names it: put it back";
+    SessionError::unusable(video, what)
 }
 
 /// Whether a folder is a session, complete or not.
@@ -292,9 +314,11 @@ fn read_index(
         return Ok(None);
     }
     let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
-    let index = FrameIndex::parse(&bytes).map_err(|fault| SessionError::Index {
-        path: path.clone(),
-        fault,
+    let index = FrameIndex::parse(&bytes).map_err(|fault| {
+        let what = format!(
+            "is damaged: {fault}; repair that line, or give the video file itself to go on without angles"
+        );
+        SessionError::unusable(&path, &what)
     })?;
     if index.is_torn() {
         notices.push(Notice::Loss(format!(

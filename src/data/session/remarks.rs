@@ -12,14 +12,11 @@ use crate::durable;
 /// other fields, also those that this version does not know, stay as they are.
 ///
 /// # Errors
-/// [`SessionError::Manifest`] if the manifest, or the rating, is not usable, or [`SessionError::Io`].
+/// [`SessionError::Unusable`] if the manifest, or the rating, is not usable, or [`SessionError::Io`].
 pub fn remark(folder: &Path, note: Option<&str>, rating: Option<u8>) -> Result<(), SessionError> {
     let path = folder.join(MANIFEST_FILE);
     let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
-    let fault = |fault| SessionError::Manifest {
-        path: path.clone(),
-        fault,
-    };
+    let fault = |fault| SessionError::manifest(&path, &fault);
     let bytes = with_remarks(&bytes, note, rating).map_err(fault)?;
     durable::write_whole(&path, &bytes).map_err(SessionError::io(&path, "written"))
 }

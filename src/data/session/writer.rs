@@ -5,11 +5,13 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::journal::JournalWriter;
+use super::recording::video_missing;
 use super::{
     FrameEntry, FrameIndex, INDEX_FILE, JournaledReport, JournaledTurn, MANIFEST_FILE, Manifest,
     SessionError, SessionLock, Status, TurnJournal, is_session_name,
 };
 use crate::durable;
+use crate::naming::not_a_name;
 
 /// Name under which the original index is kept if lines of it are removed.
 pub(super) const INDEX_AS_FOUND: &str = "frames.interrupted.jsonl";
@@ -17,7 +19,7 @@ pub(super) const INDEX_AS_FOUND: &str = "frames.interrupted.jsonl";
 /// A session folder that is being recorded. The manifest says "recording" until [`Self::finish`] or
 /// [`Self::abort`]. A writer that is dropped leaves it so, for the next start of a capture to find
 /// ([`InterruptedSession`](super::InterruptedSession)). The folder is locked while the writer lives:
-/// see [`SessionLock`].
+/// see `lock`.
 #[derive(Debug)]
 pub struct SessionWriter {
     folder: PathBuf,
@@ -39,16 +41,17 @@ impl SessionWriter {
     /// video's figures in `manifest` are ignored: they are set at the end.
     ///
     /// # Errors
-    /// [`SessionError::Exists`], [`SessionError::BadName`], [`SessionError::Manifest`] if the manifest could not be read
-    /// back, or [`SessionError::Io`].
+    /// [`SessionError::Unusable`] if there is such a session, its name is not one, or the manifest could not be read
+    /// back; or [`SessionError::Io`].
     pub fn create(root: &Path, mut manifest: Manifest) -> Result<Self, SessionError> {
         if !is_session_name(&manifest.id) {
-            return Err(SessionError::BadName(manifest.id));
+            return Err(SessionError::Unusable(not_a_name(&manifest.id)));
         }
         let folder = root.join(&manifest.id);
         match fs::create_dir(&folder) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                return Err(SessionError::Exists(folder));
+                let what = "exists already: a session never replaces another one";
+                return Err(SessionError::unusable(&folder, what));
             }
             made => made.map_err(SessionError::io(&folder, "made"))?,
         }
@@ -101,10 +104,11 @@ impl SessionWriter {
     /// Appends a frame's line to the index.
     ///
     /// # Errors
-    /// [`SessionError::BadEntry`] if it does not continue the index, or [`SessionError::Io`]. The index is then
+    /// [`SessionError::Unusable`] if it does not continue the index, or [`SessionError::Io`]. The index is then
     /// unchanged, and the same entry may be pushed again.
     pub fn push(&mut self, entry: FrameEntry) -> Result<(), SessionError> {
-        self.push_to_index(entry)?;
+        let pushed = self.index.push(entry);
+        pushed.map_err(|fault| self.bad_entry(entry.n, &fault))?;
         let written = self.append_line(&entry);
         if written.is_err() {
             self.remove_last();
@@ -112,14 +116,12 @@ impl SessionWriter {
         written.map_err(SessionError::io(self.folder.join(INDEX_FILE), "written"))
     }
 
-    fn push_to_index(&mut self, entry: FrameEntry) -> Result<(), SessionError> {
-        self.index
-            .push(entry)
-            .map_err(|fault| SessionError::BadEntry {
-                path: self.folder.join(INDEX_FILE),
-                n: entry.n,
-                fault,
-            })
+    fn bad_entry(&self, n: u64, fault: &str) -> SessionError {
+        let path = self.folder.join(INDEX_FILE);
+        SessionError::Unusable(format!(
+            "frame {n} cannot follow in {}: {fault}",
+            path.display()
+        ))
     }
 
     /// Writes an entry's line after the last complete one.
@@ -176,7 +178,7 @@ impl SessionWriter {
     /// rewritten, whole or not at all, when the session ends.
     ///
     /// # Errors
-    /// [`SessionError::BadEntry`] for the first invalid entry; then none is changed.
+    /// [`SessionError::Unusable`] for the first invalid entry; then none is changed.
     pub fn amend(
         &mut self,
         amended: impl Fn(&FrameEntry) -> FrameEntry,
@@ -184,11 +186,8 @@ impl SessionWriter {
         let mut index = FrameIndex::default();
         for entry in self.index.entries() {
             let entry = amended(entry);
-            index.push(entry).map_err(|fault| SessionError::BadEntry {
-                path: self.folder.join(INDEX_FILE),
-                n: entry.n,
-                fault,
-            })?;
+            let pushed = index.push(entry);
+            pushed.map_err(|fault| self.bad_entry(entry.n, &fault))?;
         }
         self.rewrite |= index != self.index;
         self.index = index;
@@ -222,7 +221,7 @@ impl SessionWriter {
     /// marks it complete. The video must have been closed.
     ///
     /// # Errors
-    /// [`SessionError::VideoMissing`] or [`SessionError::Io`]; the status then stays "recording".
+    /// [`SessionError::Unusable`] if the video is missing, or [`SessionError::Io`]; the status then stays "recording".
     pub fn finish(self) -> Result<Manifest, SessionError> {
         self.end(Status::Complete)
     }
@@ -286,7 +285,7 @@ pub(super) fn close(
         manifest.video.bytes = Some(hashed.count());
         manifest.video.blake3 = Some(hashed.finalize().to_hex().to_string());
     } else if status == Status::Complete {
-        return Err(SessionError::VideoMissing(path));
+        return Err(video_missing(&path));
     }
     manifest.status = status;
     manifest.video.frames = Some(frames);
@@ -304,10 +303,8 @@ pub(super) fn write_index(folder: &Path, index: &FrameIndex) -> Result<(), Sessi
 
 fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), SessionError> {
     let path = folder.join(MANIFEST_FILE);
-    let bytes = manifest.to_json().map_err(|fault| SessionError::Manifest {
-        path: path.clone(),
-        fault,
-    })?;
+    let bytes = manifest.to_json();
+    let bytes = bytes.map_err(|fault| SessionError::manifest(&path, &fault))?;
     durable::write_whole(&path, &bytes).map_err(SessionError::io(path, "written"))
 }
 
@@ -376,10 +373,11 @@ pub(super) mod tests {
         fs::write(writer.video_path(), b"two frames").unwrap();
         let path = writer.folder().join(INDEX_FILE);
         let wrong = |entry: &FrameEntry| FrameEntry { n: 7, ..*entry };
-        assert!(matches!(
-            writer.amend(wrong),
-            Err(SessionError::BadEntry { .. })
-        ));
+        let error = writer.amend(wrong).unwrap_err();
+        assert!(
+            error.to_string().contains("frame 7 cannot follow"),
+            "{error}"
+        );
         writer.amend(with_angle).unwrap();
         writer.finish().unwrap();
         let index = FrameIndex::parse(&fs::read(path).unwrap()).unwrap();

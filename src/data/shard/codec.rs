@@ -13,7 +13,7 @@ const MAX_PIXELS: u64 = 1 << 26;
 /// An image as PNG, 8-bit RGB.
 ///
 /// # Errors
-/// [`ShardError::Encode`] if the image has no pixels.
+/// [`ShardError::Image`] if the image has no pixels.
 pub fn encode_rgb(image: &RgbImage) -> Result<Vec<u8>, ShardError> {
     encode(image.as_raw(), image.dimensions(), ColorType::Rgb)
 }
@@ -21,7 +21,7 @@ pub fn encode_rgb(image: &RgbImage) -> Result<Vec<u8>, ShardError> {
 /// A mask as PNG, 8-bit grey.
 ///
 /// # Errors
-/// [`ShardError::Encode`] if the mask has no pixels.
+/// [`ShardError::Image`] if the mask has no pixels.
 pub fn encode_mask(mask: &GrayImage) -> Result<Vec<u8>, ShardError> {
     encode(mask.as_raw(), mask.dimensions(), ColorType::Grayscale)
 }
@@ -29,15 +29,10 @@ pub fn encode_mask(mask: &GrayImage) -> Result<Vec<u8>, ShardError> {
 /// The image in a PNG of 8-bit RGB.
 ///
 /// # Errors
-/// [`ShardError::Decode`] if the PNG is damaged, [`ShardError::PixelFormat`] if it has another pixel format,
-/// [`ShardError::TooManyPixels`] above 64 Mi pixels.
+/// [`ShardError::Image`] if the PNG is damaged, has another pixel format, or more than 64 Mi pixels.
 pub fn decode_rgb(bytes: &[u8]) -> Result<RgbImage, ShardError> {
-    let (width, height, pixels) = decode(bytes, ColorType::Rgb, "8-bit RGB")?;
-    RgbImage::from_raw(width, height, pixels).ok_or(ShardError::TooManyPixels {
-        width,
-        height,
-        limit: MAX_PIXELS,
-    })
+    let ((width, height), pixels) = decode(bytes, ColorType::Rgb)?;
+    RgbImage::from_raw(width, height, pixels).ok_or_else(|| too_many((width, height)))
 }
 
 /// The mask in a PNG of 8-bit grey.
@@ -45,27 +40,26 @@ pub fn decode_rgb(bytes: &[u8]) -> Result<RgbImage, ShardError> {
 /// # Errors
 /// As [`decode_rgb`].
 pub fn decode_mask(bytes: &[u8]) -> Result<GrayImage, ShardError> {
-    let (width, height, pixels) = decode(bytes, ColorType::Grayscale, "8-bit grey")?;
-    GrayImage::from_raw(width, height, pixels).ok_or(ShardError::TooManyPixels {
-        width,
-        height,
-        limit: MAX_PIXELS,
-    })
+    let ((width, height), pixels) = decode(bytes, ColorType::Grayscale)?;
+    GrayImage::from_raw(width, height, pixels).ok_or_else(|| too_many((width, height)))
 }
 
 /// Checks that a mask holds 0 and 255 only.
 pub(super) fn check_mask(mask: &GrayImage) -> Result<(), ShardError> {
-    match mask
-        .enumerate_pixels()
-        .find(|(_, _, pixel)| !matches!(pixel.0[0], 0 | 255))
-    {
-        Some((x, y, pixel)) => Err(ShardError::MaskValue {
-            value: pixel.0[0],
-            x,
-            y,
-        }),
+    let mut pixels = mask.enumerate_pixels();
+    match pixels.find(|(_, _, pixel)| !matches!(pixel.0[0], 0 | 255)) {
+        Some((x, y, pixel)) => Err(ShardError::Image(format!(
+            "the mask has the value {} at pixel ({x}, {y}): only 0 and 255 are allowed",
+            pixel.0[0]
+        ))),
         None => Ok(()),
     }
+}
+
+fn too_many((width, height): (u32, u32)) -> ShardError {
+    ShardError::Image(format!(
+        "the PNG claims {width}x{height} pixels, more than the limit of {MAX_PIXELS}"
+    ))
 }
 
 fn encode(
@@ -73,48 +67,48 @@ fn encode(
     (width, height): (u32, u32),
     color: ColorType,
 ) -> Result<Vec<u8>, ShardError> {
-    let failed = |source| ShardError::Encode {
-        width,
-        height,
-        source,
-    };
     let mut bytes = Vec::with_capacity(pixels.len() / 2 + 1024);
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(color);
     encoder.set_depth(BitDepth::Eight);
     encoder.set_compression(Compression::Fast);
-    let mut writer = encoder.write_header().map_err(failed)?;
-    writer.write_image_data(pixels).map_err(failed)?;
-    writer.finish().map_err(failed)?;
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(pixels)?;
+        writer.finish()
+    });
+    written.map_err(|error| {
+        ShardError::Image(format!(
+            "could not encode an image of {width}x{height} pixels as PNG: {error}"
+        ))
+    })?;
     Ok(bytes)
 }
 
-fn decode(
-    bytes: &[u8],
-    color: ColorType,
-    expected: &'static str,
-) -> Result<(u32, u32, Vec<u8>), ShardError> {
+fn decode(bytes: &[u8], color: ColorType) -> Result<((u32, u32), Vec<u8>), ShardError> {
+    let damaged = |error| {
+        ShardError::Image(format!(
+            "the PNG is damaged: restore it, or extract the session again: {error}"
+        ))
+    };
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.ignore_checksums(false);
-    let mut reader = decoder.read_info()?;
+    let mut reader = decoder.read_info().map_err(damaged)?;
     let info = reader.info();
-    let (width, height) = (info.width, info.height);
+    let size = (info.width, info.height);
     if (info.color_type, info.bit_depth) != (color, BitDepth::Eight) {
-        let found = format!("{:?} with {} bits", info.color_type, info.bit_depth as u8);
-        return Err(ShardError::PixelFormat { found, expected });
+        return Err(ShardError::Image(format!(
+            "the PNG is {:?} with {} bits, but {color:?} with 8 bits was expected",
+            info.color_type, info.bit_depth as u8
+        )));
     }
-    let too_many = ShardError::TooManyPixels {
-        width,
-        height,
-        limit: MAX_PIXELS,
-    };
-    if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(too_many);
+    if u64::from(size.0) * u64::from(size.1) > MAX_PIXELS {
+        return Err(too_many(size));
     }
-    let mut pixels = vec![0; reader.output_buffer_size().ok_or(too_many)?];
-    reader.next_frame(&mut pixels)?;
-    reader.finish()?;
-    Ok((width, height, pixels))
+    let length = reader.output_buffer_size();
+    let mut pixels = vec![0; length.ok_or_else(|| too_many(size))?];
+    reader.next_frame(&mut pixels).map_err(damaged)?;
+    reader.finish().map_err(damaged)?;
+    Ok((size, pixels))
 }
 
 #[cfg(test)]
@@ -139,10 +133,7 @@ mod tests {
     #[test]
     fn another_pixel_format_is_refused() {
         let png = encode_rgb(&image()).unwrap();
-        assert!(matches!(
-            decode_mask(&png),
-            Err(ShardError::PixelFormat { .. })
-        ));
+        assert!(matches!(decode_mask(&png), Err(ShardError::Image(_))));
         assert!(encode_rgb(&RgbImage::new(0, 3)).is_err());
     }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::digest::Digest;
@@ -22,11 +23,9 @@ const MAX_BYTES: u64 = 1 << 30;
 
 /// The program that wrote the data set.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DatasetSoftware {
-    /// The program's name.
-    pub name: String,
-    /// Its version.
-    pub version: String,
+struct Software {
+    name: String,
+    version: String,
 }
 
 /// A shard: a tar, or in the layout `relit` a folder of images.
@@ -121,9 +120,8 @@ pub struct SessionEntry {
     pub spec_net: u32,
     /// True if something of the source was lost; the warnings say what.
     pub lossy: bool,
-    /// Its figures summed, with a verdict; `None` in data sets of earlier versions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub quality: Option<SessionQuality>,
+    /// Its figures summed, with a verdict.
+    pub quality: SessionQuality,
     /// What a user should know, one sentence each.
     pub warnings: Vec<String>,
     /// The table, `<session>.parquet`.
@@ -137,23 +135,18 @@ impl SessionEntry {
     /// part may be a false alarm of the look at a few frames: it only lowers the verdict.
     #[must_use]
     pub fn has_misfit(&self) -> bool {
-        let misfit = self
-            .quality
-            .as_ref()
-            .and_then(|quality| quality.mask_misfit);
-        misfit == Some(MaskMisfit::AsAWhole)
+        self.quality.mask_misfit == Some(MaskMisfit::AsAWhole)
     }
 }
 
 /// An object with all its turns: it may have been put on the table in several poses.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ObjectTurns {
-    /// The object's name.
-    pub name: String,
+#[derive(Serialize)]
+struct ObjectTurns {
+    name: String,
     /// The ids of its sessions, sorted.
-    pub sessions: Vec<String>,
+    sessions: Vec<String>,
     /// Samples of all of them.
-    pub samples: u64,
+    samples: u64,
 }
 
 /// What is written: the description, and what follows from it for readers that know no more than JSON.
@@ -170,7 +163,7 @@ pub struct Dataset {
     /// `relit.dataset/1`.
     pub schema: String,
     /// The program that wrote it.
-    pub software: DatasetSoftware,
+    software: Software,
     /// How all sessions were extracted.
     pub settings: ExtractionSettings,
     /// The sessions, sorted by id.
@@ -188,7 +181,7 @@ impl Dataset {
     pub fn new(settings: ExtractionSettings) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
-            software: DatasetSoftware {
+            software: Software {
                 name: "relit".to_owned(),
                 version: env!("CARGO_PKG_VERSION").to_owned(),
             },
@@ -201,34 +194,16 @@ impl Dataset {
     /// Reads the description of the data set in the folder `out`.
     ///
     /// # Errors
-    /// [`ShardError::NoDataset`] if there is none, [`ShardError::Schema`] if it is from another version,
-    /// [`ShardError::Description`] if it is damaged, [`ShardError::UnsafePath`] or [`ShardError::SessionName`] if
-    /// it names a file outside the folder, [`ShardError::Io`].
+    /// [`ShardError::NoDataset`] if there is none, [`ShardError::Description`] if it is damaged or of another version,
+    /// [`ShardError::UnsafePath`] or [`ShardError::SessionName`] if it names a file outside the folder,
+    /// [`ShardError::Io`].
     pub fn read(out: &Path) -> Result<Self, ShardError> {
         let path = out.join(Self::FILE);
-        let bytes = read_limited(&path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => ShardError::NoDataset {
-                path: out.to_owned(),
-            },
-            _ => ShardError::Io {
-                doing: "read",
-                path: path.clone(),
-                source,
-            },
+        let bytes = read_limited(&path).map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound => ShardError::NoDataset(out.to_owned()),
+            _ => ShardError::io("read", &path)(error),
         })?;
-        let damaged = |source| ShardError::Description {
-            path: path.clone(),
-            source,
-        };
-        let Header { schema } = serde_json::from_slice(&bytes).map_err(damaged)?;
-        if schema != SCHEMA {
-            return Err(ShardError::Schema {
-                path,
-                found: schema,
-                expected: SCHEMA,
-            });
-        }
-        let dataset: Self = serde_json::from_slice(&bytes).map_err(damaged)?;
+        let dataset: Self = described(&path, &bytes, SCHEMA)?;
         dataset.check_names()?;
         Ok(dataset)
     }
@@ -237,25 +212,18 @@ impl Dataset {
     ///
     /// # Errors
     /// [`ShardError::UnsafePath`] or [`ShardError::SessionName`] if an entry could not be read back,
-    /// [`ShardError::Json`] if a number is not finite, [`ShardError::Io`].
+    /// [`ShardError::Refused`] if a number is not finite, [`ShardError::Io`].
     pub fn write(&self, out: &Path) -> Result<(), ShardError> {
         self.check_names()?;
         let written = WrittenDataset {
             dataset: self,
             objects: self.objects(),
         };
-        let mut bytes = serde_json::to_vec_pretty(&written).map_err(|source| ShardError::Json {
-            what: Self::FILE.to_owned(),
-            source,
-        })?;
-        bytes.push(b'\n');
-        output::write_whole(out, Self::FILE, &bytes)?;
-        Ok(())
+        output::write_whole(out, Self::FILE, &json_of(&written, Self::FILE)?).map(|_| ())
     }
 
     /// The objects, sorted by name, each with all its turns.
-    #[must_use]
-    pub fn objects(&self) -> Vec<ObjectTurns> {
+    fn objects(&self) -> Vec<ObjectTurns> {
         let mut objects: BTreeMap<&str, ObjectTurns> = BTreeMap::new();
         for session in &self.sessions {
             let object = objects
@@ -294,17 +262,17 @@ impl Dataset {
 
     /// The files of a session, with their lengths; a folder of images has none.
     pub fn files_of<'a>(&'a self, id: &'a str) -> impl Iterator<Item = (&'a str, Option<u64>)> {
-        let tables = self.session(id).into_iter();
-        let tables =
-            tables.flat_map(|session| std::iter::once(&session.table).chain(&session.report));
-        let shards = self.shards_of(id).flat_map(|shard| {
+        let sessions = self.session(id).into_iter();
+        let files =
+            sessions.flat_map(|session| std::iter::once(&session.table).chain(&session.report));
+        let shards = self.shards_of(id);
+        let files = files.chain(shards.flat_map(|shard| shard.mask.iter().chain(&shard.mean_img)));
+        let own = self.shards_of(id).map(|shard| {
             let is_folder = shard.mask.is_some();
-            let own = (shard.file.as_str(), (!is_folder).then_some(shard.bytes));
-            let others = shard.mask.iter().chain(&shard.mean_img);
-            std::iter::once(own).chain(others.map(|entry| (entry.file.as_str(), Some(entry.bytes))))
+            (shard.file.as_str(), (!is_folder).then_some(shard.bytes))
         });
-        let tables = tables.map(|entry| (entry.file.as_str(), Some(entry.bytes)));
-        tables.chain(shards)
+        let files = files.map(|entry| (entry.file.as_str(), Some(entry.bytes)));
+        files.chain(own)
     }
 
     /// Adds a session and its shards, replacing an older entry with the same id.
@@ -324,16 +292,16 @@ impl Dataset {
 
     /// All files of all sessions that the description lists. A folder of images counts as one.
     pub(super) fn files(&self) -> impl Iterator<Item = &str> {
-        let session_files = self.sessions.iter().flat_map(|session| {
-            std::iter::once(&session.table)
-                .chain(&session.report)
-                .map(|entry| &entry.file)
-        });
-        let shard_files = self.shards.iter().flat_map(|shard| {
-            let others = shard.mask.iter().chain(&shard.mean_img);
-            std::iter::once(&shard.file).chain(others.map(|entry| &entry.file))
-        });
-        session_files.chain(shard_files).map(String::as_str)
+        let sessions = self.sessions.iter();
+        let files =
+            sessions.flat_map(|session| std::iter::once(&session.table).chain(&session.report));
+        let shards = self.shards.iter();
+        let files = files.chain(shards.flat_map(|shard| shard.mask.iter().chain(&shard.mean_img)));
+        let shards = self.shards.iter().map(|shard| &shard.file);
+        files
+            .map(|entry| &entry.file)
+            .chain(shards)
+            .map(String::as_str)
     }
 
     pub(super) fn check_names(&self) -> Result<(), ShardError> {
@@ -347,10 +315,37 @@ impl Dataset {
     }
 }
 
-/// The field that is read first.
-#[derive(Deserialize)]
-struct Header {
-    schema: String,
+/// A description with its schema, which is read first: complaints about the fields of another version would mislead.
+pub(super) fn described<T: DeserializeOwned>(
+    path: &Path,
+    bytes: &[u8],
+    expected: &str,
+) -> Result<T, ShardError> {
+    #[derive(Deserialize)]
+    struct Header {
+        schema: String,
+    }
+    let wrong = |what| ShardError::Description {
+        path: path.to_owned(),
+        what,
+    };
+    let damaged = |error| wrong(format!("restore it, or write the data set again ({error})"));
+    let Header { schema } = serde_json::from_slice(bytes).map_err(damaged)?;
+    if schema != expected {
+        return Err(wrong(format!(
+            "its schema is {schema:?}, and this version reads {expected:?}: use the version of relit that wrote it"
+        )));
+    }
+    serde_json::from_slice(bytes).map_err(damaged)
+}
+
+/// The content of a description's file.
+pub(super) fn json_of(value: &impl Serialize, file: &str) -> Result<Vec<u8>, ShardError> {
+    let json = serde_json::to_vec_pretty(value);
+    let mut bytes =
+        json.map_err(|error| ShardError::Refused(format!("could not write {file}: {error}")))?;
+    bytes.push(b'\n');
+    Ok(bytes)
 }
 
 fn read_limited(path: &Path) -> io::Result<Vec<u8>> {

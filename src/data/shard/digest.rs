@@ -4,7 +4,6 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
@@ -25,9 +24,9 @@ impl Digest {
     /// # Errors
     /// If the file cannot be opened or read.
     pub fn of_file(path: &Path) -> io::Result<(u64, Self)> {
-        let mut reader = HashingReader::new(File::open(path)?);
+        let mut reader = Hashing::new(File::open(path)?);
         reader.drain()?;
-        Ok(reader.finish())
+        Ok(reader.found())
     }
 
     /// The 32 bytes.
@@ -50,30 +49,21 @@ impl From<Digest> for String {
 }
 
 impl TryFrom<String> for Digest {
-    type Error = NotADigest;
+    type Error = String;
 
-    fn try_from(text: String) -> Result<Self, NotADigest> {
-        text.parse()
+    fn try_from(text: String) -> Result<Self, String> {
+        match blake3::Hash::from_hex(&text) {
+            Ok(hash) => Ok(hash.into()),
+            Err(_) => Err(format!(
+                "{text:?} is not a BLAKE3 digest: 64 hexadecimal digits were expected"
+            )),
+        }
     }
 }
 
 impl fmt::Display for Digest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(blake3::Hash::from_bytes(self.0).to_hex().as_str())
-    }
-}
-
-/// A text that is not a digest.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not a BLAKE3 digest: 64 hexadecimal digits were expected")]
-pub struct NotADigest(String);
-
-impl FromStr for Digest {
-    type Err = NotADigest;
-
-    fn from_str(text: &str) -> Result<Self, NotADigest> {
-        let hash = blake3::Hash::from_hex(text).map_err(|_| NotADigest(text.to_owned()))?;
-        Ok(hash.into())
     }
 }
 
@@ -91,15 +81,15 @@ impl FolderHasher {
     }
 }
 
-/// A writer that counts and hashes the bytes that pass through it.
-pub(super) struct HashingWriter<W> {
-    inner: W,
+/// A reader or writer that counts and hashes the bytes that pass through it.
+pub(super) struct Hashing<T> {
+    inner: T,
     hasher: blake3::Hasher,
     bytes: u64,
 }
 
-impl<W: Write> HashingWriter<W> {
-    pub(super) fn new(inner: W) -> Self {
+impl<T> Hashing<T> {
+    pub(super) fn new(inner: T) -> Self {
         Self {
             inner,
             hasher: blake3::Hasher::new(),
@@ -107,17 +97,25 @@ impl<W: Write> HashingWriter<W> {
         }
     }
 
-    /// The writer, the number of bytes and their digest.
-    pub(super) fn finish(self) -> (W, u64, Digest) {
-        (self.inner, self.bytes, self.hasher.finalize().into())
+    /// The number of bytes so far and their digest.
+    pub(super) fn found(&self) -> (u64, Digest) {
+        (self.bytes, self.hasher.finalize().into())
+    }
+
+    pub(super) fn into_inner(self) -> T {
+        self.inner
+    }
+
+    fn take(&mut self, bytes: &[u8]) {
+        self.hasher.update(bytes);
+        self.bytes += bytes.len() as u64;
     }
 }
 
-impl<W: Write> Write for HashingWriter<W> {
+impl<W: Write> Write for Hashing<W> {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         let written = self.inner.write(buffer)?;
-        self.hasher.update(buffer.get(..written).unwrap_or(buffer));
-        self.bytes += written as u64;
+        self.take(buffer.get(..written).unwrap_or(buffer));
         Ok(written)
     }
 
@@ -126,26 +124,11 @@ impl<W: Write> Write for HashingWriter<W> {
     }
 }
 
-/// A reader that counts and hashes the bytes that pass through it.
-pub(super) struct HashingReader<R> {
-    inner: R,
-    hasher: blake3::Hasher,
-    bytes: u64,
-}
-
-impl<R: Read> HashingReader<R> {
-    pub(super) fn new(inner: R) -> Self {
-        Self {
-            inner,
-            hasher: blake3::Hasher::new(),
-            bytes: 0,
-        }
-    }
-
+impl<R: Read> Hashing<R> {
     /// Reads to the end and returns the number of bytes read.
     pub(super) fn drain(&mut self) -> io::Result<u64> {
-        let mut buffer = vec![0; 1 << 17];
         let before = self.bytes;
+        let mut buffer = vec![0; 1 << 17];
         loop {
             match self.read(&mut buffer) {
                 Ok(0) => return Ok(self.bytes - before),
@@ -155,18 +138,12 @@ impl<R: Read> HashingReader<R> {
             }
         }
     }
-
-    /// The number of bytes read so far and their digest.
-    pub(super) fn finish(&self) -> (u64, Digest) {
-        (self.bytes, self.hasher.finalize().into())
-    }
 }
 
-impl<R: Read> Read for HashingReader<R> {
+impl<R: Read> Read for Hashing<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = self.inner.read(buffer)?;
-        self.hasher.update(buffer.get(..read).unwrap_or_default());
-        self.bytes += read as u64;
+        self.take(buffer.get(..read).unwrap_or_default());
         Ok(read)
     }
 }
@@ -186,19 +163,20 @@ mod tests {
     #[test]
     fn a_text_that_is_no_digest_is_refused() {
         for text in ["", "00", &"g".repeat(64), &"0".repeat(65)] {
-            assert!(text.parse::<Digest>().is_err(), "{text}");
+            assert!(Digest::try_from(text.to_owned()).is_err(), "{text}");
         }
     }
 
     #[test]
     fn a_stream_has_the_digest_of_its_bytes_when_written_and_when_read() {
         let bytes = vec![7_u8; 300_000];
-        let mut writer = HashingWriter::new(Vec::new());
+        let mut writer = Hashing::new(Vec::new());
         writer.write_all(&bytes).unwrap();
-        let (copy, written, digest) = writer.finish();
-        let mut reader = HashingReader::new(copy.as_slice());
+        let (written, digest) = writer.found();
+        let copy = writer.into_inner();
+        let mut reader = Hashing::new(copy.as_slice());
         assert_eq!(reader.drain().unwrap(), 300_000);
-        assert_eq!(reader.finish(), (written, digest));
+        assert_eq!(reader.found(), (written, digest));
         assert_eq!(digest, Digest::of(&bytes));
     }
 }

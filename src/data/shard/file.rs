@@ -1,10 +1,12 @@
-//! A file of a data set as `dataset.json` lists it: path, length and digest.
+//! The files of a data set as `dataset.json` lists them, and whether they are still as it says.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::digest::Digest;
+use super::dataset::{Dataset, ShardEntry};
+use super::digest::{Digest, FolderHasher};
+use super::settings::Layout;
 use super::{ShardError, names};
 
 /// A file that `dataset.json` lists.
@@ -20,15 +22,16 @@ pub struct FileEntry {
 
 impl FileEntry {
     /// Checks that the file exists in the data set `out` and has this length and digest.
-    ///
-    /// # Errors
-    /// [`ShardError::Changed`] if it differs, [`ShardError::UnsafePath`], or [`ShardError::Io`].
     pub(super) fn check(&self, out: &Path) -> Result<(), ShardError> {
-        names::check_path(&self.file)?;
-        let path = out.join(&self.file);
-        let found = Digest::of_file(&path).map_err(ShardError::io("read", &path))?;
-        compare(&self.file, (self.bytes, self.blake3), found)
+        check_file(out, &self.file, (self.bytes, self.blake3))
     }
+}
+
+fn check_file(out: &Path, file: &str, expected: (u64, Digest)) -> Result<(), ShardError> {
+    names::check_path(file)?;
+    let path = out.join(file);
+    let found = Digest::of_file(&path).map_err(ShardError::io("read", &path))?;
+    compare(file, expected, found)
 }
 
 /// Compares the expected length and digest of `file` with those that were found.
@@ -40,17 +43,62 @@ pub(super) fn compare(
     expected: (u64, Digest),
     found: (u64, Digest),
 ) -> Result<(), ShardError> {
-    let changed = |what| {
-        Err(ShardError::Changed {
-            file: file.to_owned(),
-            what,
-        })
+    let what = if found.0 != expected.0 {
+        format!("it has {} bytes, not {}", found.0, expected.0)
+    } else if found.1 != expected.1 {
+        format!("its BLAKE3 is {}, not {}", found.1, expected.1)
+    } else {
+        return Ok(());
     };
-    if found.0 != expected.0 {
-        return changed(format!("it has {} bytes, not {}", found.0, expected.0));
+    Err(changed(file, what))
+}
+
+fn changed(file: &str, what: String) -> ShardError {
+    ShardError::Changed {
+        file: file.to_owned(),
+        what,
     }
-    if found.1 != expected.1 {
-        return changed(format!("its BLAKE3 is {}, not {}", found.1, expected.1));
+}
+
+impl Dataset {
+    /// Checks that the session `id` is listed and that each of its files in the data set `out` exists
+    /// with the listed length and BLAKE3. Every file is read once, but not decoded: [`verify`] does
+    /// that. Settings, source and mask are for the caller to compare.
+    ///
+    /// # Errors
+    /// [`ShardError::Changed`] or [`ShardError::Io`].
+    ///
+    /// [`verify`]: super::verify()
+    pub fn check_integrity(&self, out: &Path, id: &str) -> Result<(), ShardError> {
+        let session = self.session(id);
+        let session = session.ok_or_else(|| changed(id, "no such session is listed".to_owned()))?;
+        for entry in std::iter::once(&session.table).chain(&session.report) {
+            entry.check(out)?;
+        }
+        if self.shards_of(id).next().is_none() {
+            return Err(changed(id, "it has no shard".to_owned()));
+        }
+        self.shards_of(id)
+            .try_for_each(|shard| check_shard(out, shard, self.settings.layout))
     }
-    Ok(())
+}
+
+fn check_shard(out: &Path, shard: &ShardEntry, layout: Layout) -> Result<(), ShardError> {
+    for entry in shard.mask.iter().chain(&shard.mean_img) {
+        entry.check(out)?;
+    }
+    let expected = (shard.bytes, shard.blake3);
+    if layout == Layout::Webdataset {
+        return check_file(out, &shard.file, expected);
+    }
+    names::check_path(&shard.file)?;
+    let mut hasher = FolderHasher::default();
+    let mut total = 0;
+    for index in 0..shard.samples {
+        let path = out.join(&shard.file).join(format!("{index}.png"));
+        let (bytes, digest) = Digest::of_file(&path).map_err(ShardError::io("read", &path))?;
+        hasher.add(&digest);
+        total += bytes;
+    }
+    compare(&shard.file, expected, (total, hasher.finish()))
 }

@@ -1,7 +1,6 @@
 //! The layout `relit`: images in a folder that gets its final name when it is complete.
 
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
@@ -46,14 +45,7 @@ impl FolderStore {
             fs::create_dir_all(&path).map_err(ShardError::io("make the folder", &path))?;
         }
         let path = out.join(names::IMAGES).join(names::partial(session));
-        fs::create_dir(&path).map_err(|source| match source.kind() {
-            io::ErrorKind::AlreadyExists => ShardError::Busy { path: path.clone() },
-            _ => ShardError::Io {
-                doing: "make the folder",
-                path: path.clone(),
-                source,
-            },
-        })?;
+        fs::create_dir(&path).map_err(output::busy("make the folder", &path))?;
         Ok(Self {
             out: out.to_owned(),
             session: session.to_owned(),
@@ -62,10 +54,6 @@ impl FolderStore {
             mean: MeanImage::new(size),
             bytes: 0,
         })
-    }
-
-    pub(super) fn out(&self) -> &Path {
-        &self.out
     }
 
     pub(super) fn push(
@@ -117,11 +105,7 @@ impl FolderStore {
         if let Err(source) = fs::rename(&self.partial.path, &path) {
             // Restore the older one; if that fails too, the next run does it.
             let _ = fs::rename(&old, &path);
-            return Err(ShardError::Io {
-                doing: "rename a finished folder to",
-                path,
-                source,
-            });
+            return Err(ShardError::io("rename a finished folder to", &path)(source));
         }
         output::sync(&images)?;
         output::remove_folder(&old)
@@ -164,10 +148,7 @@ impl MeanImage {
             .sums
             .iter()
             .map(|sum| u8::try_from(round(sum)).unwrap_or(u8::MAX));
-        RgbImage::from_raw(width, height, pixels.collect()).ok_or(ShardError::SizeMismatch {
-            what: "the mean image",
-            size: self.size,
-            expected: self.size,
-        })
+        RgbImage::from_raw(width, height, pixels.collect())
+            .ok_or_else(|| ShardError::Image("the mean image has another size".to_owned()))
     }
 }

@@ -13,7 +13,7 @@
 //! | [`OutputFolder`] | locks the folder; writes files that appear whole or not at all |
 //! | [`ShardWriter`] | writes one session (layouts: `spool` for the tar, `folder` for images) |
 //! | [`SessionQuality`] | a session's figures summed, with a verdict |
-//! | [`Dataset`], [`ExtractionSettings`] | `dataset.json`; `integrity` compares the files with it |
+//! | [`Dataset`], [`ExtractionSettings`] | `dataset.json`; `file` compares the files with it |
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
 //! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
 //! | [`ArrayTask`], [`TaskPiece`], [`merge`] | a data set that several tasks write |
@@ -24,7 +24,6 @@
 //! ([`image_stats`](crate::image_stats)). It knows nothing of videos, of how a mask was made, of the rig
 //! or of session folders: here a session is a name and its samples.
 
-mod array_task;
 mod codec;
 mod dataset;
 mod digest;
@@ -32,7 +31,6 @@ mod error;
 mod file;
 mod folder;
 mod index;
-mod integrity;
 mod names;
 mod order;
 mod output;
@@ -48,30 +46,24 @@ mod tarball;
 mod verify;
 mod writer;
 
-pub use array_task::{ArrayTask, MAX_TASKS};
 pub use codec::{decode_mask, decode_rgb, encode_mask, encode_rgb};
-pub use dataset::{
-    Dataset, DatasetSoftware, MaskInfo, ObjectTurns, SamplingBasis, SessionEntry, ShardEntry,
-    SourceVideo,
-};
-pub use digest::{Digest, NotADigest};
+pub use dataset::{Dataset, MaskInfo, SamplingBasis, SessionEntry, ShardEntry, SourceVideo};
+pub use digest::Digest;
 pub use error::ShardError;
 pub use file::FileEntry;
 pub use index::{SampleSpan, SampleSpans};
 pub use names::{check_session, sample_key};
 pub use order::order;
 pub use output::OutputFolder;
-pub use overview::{
-    Overview, OverviewTotals, SATURATION_BOUNDS, SaturationHistogram, SessionOverview,
-};
+pub use overview::{Overview, OverviewTotals, SATURATION_BOUNDS, SaturationHistogram};
 pub use parquet_table::{TableRow, read_table};
-pub use pieces::{Merged, TaskOutcome, TaskPiece, merge, merge_with};
+pub use pieces::{ArrayTask, MAX_TASKS, Merged, TaskOutcome, TaskPiece, merge};
 pub use quality::{MaskMisfit, QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;
 pub use settings::{Align, ExtractionSettings, ImageSize, Layout, Native};
 pub use verify::{VerifyProblem, VerifyReport, verify};
-pub use writer::{Sample, ShardFiles, ShardWriter, TurnFinding};
+pub use writer::{Sample, ShardFiles, ShardWriter};
 
 /// Largest number of samples of a session.
 pub const MAX_SAMPLES: u32 = 1_000_000;

@@ -12,9 +12,7 @@ pub fn check_session(name: &str) -> Result<(), ShardError> {
     if is_session_name(name) {
         Ok(())
     } else {
-        Err(ShardError::SessionName {
-            name: name.to_owned(),
-        })
+        Err(ShardError::SessionName(name.to_owned()))
     }
 }
 
@@ -26,9 +24,7 @@ pub(super) fn check_path(path: &str) -> Result<(), ShardError> {
     if path.split('/').all(plain) && !path.contains(forbidden) {
         Ok(())
     } else {
-        Err(ShardError::UnsafePath {
-            path: path.to_owned(),
-        })
+        Err(ShardError::UnsafePath(path.to_owned()))
     }
 }
 
@@ -131,17 +127,12 @@ pub(super) fn session_of_outgoing(name: &str) -> Option<&str> {
 
 /// Whether a file of this name in the data set's folder was left behind by an interrupted writer.
 pub(super) fn is_leftover(name: &str) -> bool {
-    let Some(rest) = name.strip_prefix('.') else {
-        return false;
+    let is_data = |file: &str| {
+        let ends = [".tar", ".parquet", ".html", ".json", ".png"];
+        ends.iter().any(|end| file.ends_with(end))
     };
-    let finished = |file: &str| {
-        [".tar", ".parquet", ".html", ".json", ".png"]
-            .iter()
-            .any(|end| file.ends_with(end))
-    };
-    // Earlier versions used no numbers in the name.
-    let written = |plain| finished(durable::target_of(name).unwrap_or(plain));
-    rest.ends_with(".spool") || rest.strip_suffix(".partial").is_some_and(written)
+    let is_spool = name.starts_with('.') && name.ends_with(".spool");
+    is_spool || durable::target_of(name).is_some_and(is_data)
 }
 
 /// Whether a file of this name was left behind by an interrupted writer of `session`.
@@ -222,7 +213,6 @@ mod tests {
         for name in [
             ".a.tar.7.0.partial",
             ".dataset.json.12.34.partial",
-            ".a.tar.partial",
             ".a.spool",
         ] {
             assert!(is_leftover(name), "{name}");

@@ -4,9 +4,9 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::array_task::ArrayTask;
-use super::digest::HashingWriter;
+use super::digest::Hashing;
 use super::file::FileEntry;
+use super::pieces::ArrayTask;
 use super::{ShardError, names};
 use crate::durable::{self, MadeFolder, Partial, SealedPartial};
 
@@ -108,14 +108,8 @@ impl OutputFolder {
 
 fn locked(result: Result<(), TryLockError>, path: &Path) -> Result<(), ShardError> {
     result.map_err(|reason| match reason {
-        TryLockError::WouldBlock => ShardError::Locked {
-            path: path.to_owned(),
-        },
-        TryLockError::Error(source) => ShardError::Io {
-            doing: "lock",
-            path: path.to_owned(),
-            source,
-        },
+        TryLockError::WouldBlock => ShardError::Locked(path.to_owned()),
+        TryLockError::Error(source) => ShardError::io("lock", path)(source),
     })
 }
 
@@ -132,14 +126,13 @@ pub(super) fn seal_whole(out: &Path, file: &str, bytes: &[u8]) -> Result<SealedF
     let mut partial = PartialFile::create(out, file)?;
     partial
         .write_all(bytes)
-        .map_err(ShardError::io("write", &partial.path))?;
+        .map_err(ShardError::io("write", &out.join(file)))?;
     partial.seal()
 }
 
 /// A file of the data set that is being written and hashed. Dropping it removes the file.
 pub(super) struct PartialFile {
-    writer: HashingWriter<Partial>,
-    path: PathBuf,
+    writer: Hashing<Partial>,
     file: String,
 }
 
@@ -147,7 +140,6 @@ pub(super) struct PartialFile {
 /// the file.
 pub(super) struct SealedFile {
     sealed: SealedPartial,
-    path: PathBuf,
     entry: FileEntry,
 }
 
@@ -158,26 +150,25 @@ impl PartialFile {
         let path = out.join(file);
         let partial = Partial::create(&path).map_err(ShardError::io("create", &path))?;
         Ok(Self {
-            writer: HashingWriter::new(partial),
-            path,
+            writer: Hashing::new(partial),
             file: file.to_owned(),
         })
     }
 
     /// Writes and syncs all bytes to disk.
     pub(super) fn seal(self) -> Result<SealedFile, ShardError> {
-        let Self { writer, path, file } = self;
-        let (partial, bytes, blake3) = writer.finish();
+        let (bytes, blake3) = self.writer.found();
+        let partial = self.writer.into_inner();
+        let path = partial.target().to_owned();
         let sealed = partial.seal().map_err(ShardError::io("write", &path))?;
-        let entry = FileEntry {
-            file,
-            bytes,
-            blake3,
-        };
+        let file = self.file;
         Ok(SealedFile {
             sealed,
-            path,
-            entry,
+            entry: FileEntry {
+                file,
+                bytes,
+                blake3,
+            },
         })
     }
 }
@@ -195,9 +186,9 @@ impl Write for PartialFile {
 impl SealedFile {
     /// Renames the file to its final name, replacing an older one.
     pub(super) fn publish(self) -> Result<FileEntry, ShardError> {
-        self.sealed
-            .publish()
-            .map_err(ShardError::io("rename a finished file to", &self.path))?;
+        let path = self.sealed.target().to_owned();
+        let published = self.sealed.publish();
+        published.map_err(ShardError::io("rename a finished file to", &path))?;
         Ok(self.entry)
     }
 }
@@ -217,13 +208,16 @@ impl ScratchFile {
             .open(&path);
         match opened {
             Ok(file) => Ok(Self { file, path }),
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(ShardError::Busy { path }),
-            Err(source) => Err(ShardError::Io {
-                doing: "create",
-                path,
-                source,
-            }),
+            Err(error) => Err(busy("create", &path)(error)),
         }
+    }
+}
+
+/// For `map_err`: another writer has what this one wants to create, or it cannot be created.
+pub(super) fn busy(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> ShardError {
+    move |error| match error.kind() {
+        io::ErrorKind::AlreadyExists => ShardError::Busy(path.to_owned()),
+        _ => ShardError::io(doing, path)(error),
     }
 }
 
@@ -266,11 +260,7 @@ fn sync_file_system(_: &Path) -> bool {
 /// Removes a folder and its content, if it exists.
 pub(super) fn remove_folder(path: &Path) -> Result<(), ShardError> {
     match fs::remove_dir_all(path) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(ShardError::Io {
-            doing: "remove",
-            path: path.to_owned(),
-            source: e,
-        }),
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(ShardError::io("remove", path)(e)),
         _ => Ok(()),
     }
 }
@@ -281,13 +271,7 @@ pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, ShardError> {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(source) => {
-            return Err(ShardError::Io {
-                doing: "list",
-                path: folder.to_owned(),
-                source,
-            });
-        }
+        Err(error) => return Err(ShardError::io("list", folder)(error)),
     };
     let mut names = entries
         .map(|entry| entry.map(|e| e.file_name().to_string_lossy().into_owned()))

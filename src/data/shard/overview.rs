@@ -5,16 +5,11 @@ use std::path::Path;
 
 use super::ShardError;
 use super::dataset::{Dataset, SessionEntry};
-use super::parquet_table::read_table;
+use super::parquet_table::{TableRow, read_table};
 use super::pieces::read_pieces;
-use super::quality::{QualityVerdict, SessionQuality};
-use super::record::FrameRecord;
-use super::settings::ExtractionSettings;
+use super::quality::QualityVerdict;
 use crate::causes::with_causes;
 use crate::image_stats::SPEC_NET_GATE;
-
-/// Places of the turn at which a session's saturation is kept.
-const PLACES: usize = 90;
 
 /// The bounds of the classes of `saturated_fraction`: the first class holds exactly 0, each further one what
 /// is above the bound before it and not above its own, the last one what is above the last bound.
@@ -28,26 +23,10 @@ pub type SaturationHistogram = [u64; SATURATION_BOUNDS.len() + 1];
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Overview {
-    /// How all sessions were extracted.
-    pub settings: ExtractionSettings,
-    /// The sessions whose tables could be read, sorted by id.
-    pub sessions: Vec<SessionOverview>,
+    /// The sessions whose tables could be read, sorted by id, each with its samples by saturated fraction.
+    pub sessions: Vec<(SessionEntry, SaturationHistogram)>,
     /// What a reader must know of the whole: tables that cannot be read, pieces that are not merged.
     pub problems: Vec<String>,
-}
-
-/// A session at a glance.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct SessionOverview {
-    /// Its entry in the description.
-    pub entry: SessionEntry,
-    /// The figures of its table, summed. For the verdict, see [`SessionOverview::verdict`].
-    pub quality: SessionQuality,
-    /// Its samples by saturated fraction.
-    pub histogram: SaturationHistogram,
-    /// The largest saturated fraction in each of up to 90 equal parts of the samples, by index.
-    pub profile: Vec<f64>,
 }
 
 /// Sums over the sessions of an [`Overview`].
@@ -66,8 +45,6 @@ pub struct OverviewTotals {
     pub moved: u64,
     /// Samples whose frame could not be registered.
     pub unregistered: u64,
-    /// Samples whose shift comes from the frames around.
-    pub interpolated: u64,
     /// Samples with `exposure_step`.
     pub exposure_steps: u64,
     /// Samples with `identical_to`.
@@ -94,10 +71,7 @@ impl Overview {
         for entry in dataset.sessions {
             let (id, wanted) = (entry.id.clone(), entry.samples as usize);
             match read_table(out, &entry.table) {
-                Ok(rows) if rows.len() == wanted => {
-                    let records: Vec<FrameRecord> = rows.into_iter().map(|r| r.record).collect();
-                    sessions.push(SessionOverview::of(entry, &records));
-                }
+                Ok(rows) if rows.len() == wanted => sessions.push((entry, histogram(&rows))),
                 Ok(rows) => problems.push(format!(
                     "session {id} is left out: its table has {} rows for {wanted} samples",
                     rows.len()
@@ -107,11 +81,7 @@ impl Overview {
                 }
             }
         }
-        Ok(Self {
-            settings: dataset.settings,
-            sessions,
-            problems,
-        })
+        Ok(Self { sessions, problems })
     }
 
     /// Sums over all sessions.
@@ -119,20 +89,14 @@ impl Overview {
     pub fn totals(&self) -> OverviewTotals {
         let mut totals = OverviewTotals::default();
         let mut objects = BTreeSet::new();
-        for SessionOverview {
-            entry,
-            quality,
-            histogram,
-            ..
-        } in &self.sessions
-        {
+        for (entry, histogram) in &self.sessions {
+            let quality = &entry.quality;
             objects.insert(&entry.object);
             totals.samples += u64::from(entry.samples);
             totals.spec_net += u64::from(entry.spec_net);
             totals.duplicates += u64::from(entry.duplicates);
             totals.moved += u64::from(quality.moved);
             totals.unregistered += u64::from(quality.unregistered);
-            totals.interpolated += u64::from(quality.interpolated);
             totals.exposure_steps += u64::from(quality.exposure_steps);
             totals.identical += u64::from(quality.identical);
             totals.blurred += u64::from(quality.blurred);
@@ -146,62 +110,29 @@ impl Overview {
         totals
     }
 
-    /// Number of sessions with this verdict; `None` counts those that were never judged.
+    /// Number of sessions with this verdict.
     #[must_use]
-    pub fn count(&self, verdict: Option<QualityVerdict>) -> usize {
-        let verdicts = self.sessions.iter().map(SessionOverview::verdict);
+    pub fn count(&self, verdict: QualityVerdict) -> usize {
+        let verdicts = self.sessions.iter().map(|(entry, _)| entry.quality.verdict);
         verdicts.filter(|&found| found == verdict).count()
     }
 }
 
-impl SessionOverview {
-    /// The verdict in the description; `None` where an earlier version wrote none: the fields that it rests on
-    /// are missing in such a table, too.
-    #[must_use]
-    pub fn verdict(&self) -> Option<QualityVerdict> {
-        self.entry.quality.as_ref().map(|quality| quality.verdict)
+/// The samples by saturated fraction.
+fn histogram(rows: &[TableRow]) -> SaturationHistogram {
+    let mut histogram = SaturationHistogram::default();
+    for row in rows {
+        let above = |bound: &&f64| row.record.saturated_fraction > **bound;
+        let class = SATURATION_BOUNDS.iter().take_while(above).count();
+        histogram[class] += 1;
     }
-
-    /// Why the verdict is not good, one phrase each.
-    #[must_use]
-    pub fn reasons(&self) -> &[String] {
-        let judged = self.entry.quality.as_ref();
-        judged.map_or(&[], |quality| &quality.reasons)
-    }
-
-    fn of(entry: SessionEntry, records: &[FrameRecord]) -> Self {
-        let mut histogram = SaturationHistogram::default();
-        for record in records {
-            let above = |bound: &&f64| record.saturated_fraction > **bound;
-            let class = SATURATION_BOUNDS.iter().take_while(above).count();
-            if let Some(samples) = histogram.get_mut(class) {
-                *samples += 1;
-            }
-        }
-        let parts = records.chunks(records.len().div_ceil(PLACES).max(1));
-        let largest = |part: &[FrameRecord]| {
-            part.iter()
-                .map(|r| r.saturated_fraction)
-                .fold(0.0, f64::max)
-        };
-        let judged = entry.quality.as_ref();
-        Self {
-            quality: SessionQuality {
-                // The records do not tell it.
-                mask_misfit: judged.and_then(|quality| quality.mask_misfit),
-                ..SessionQuality::of(records, entry.lossy, entry.covered_deg)
-            },
-            histogram,
-            profile: parts.map(largest).collect(),
-            entry,
-        }
-    }
+    histogram
 }
 
 /// The description, or what the tasks' pieces describe together, and what is to say of that.
 fn described(out: &Path) -> Result<(Dataset, Vec<String>), ShardError> {
     let none = match Dataset::read(out) {
-        Err(none @ ShardError::NoDataset { .. }) => none,
+        Err(none @ ShardError::NoDataset(_)) => none,
         read => return Ok((read?, Vec::new())),
     };
     let pieces = read_pieces(out)?;
@@ -215,13 +146,8 @@ fn described(out: &Path) -> Result<(Dataset, Vec<String>), ShardError> {
         }
     }
     let (there, all) = (pieces.len(), first.task_count());
-    let (done, recordings) = (
-        pieces
-            .iter()
-            .map(|piece| piece.outcomes.len())
-            .sum::<usize>(),
-        first.recordings.len(),
-    );
+    let done: usize = pieces.iter().map(|piece| piece.outcomes.len()).sum();
+    let recordings = first.recordings.len();
     let problem = format!(
         "this is what {there} of {all} tasks have written so far, {done} of {recordings} recordings: when all are done, run relit-extract merge {}",
         out.display()

@@ -18,8 +18,9 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::record::Field;
 use parquet::schema::parser::parse_message_type;
+use serde_json::{Map, Value};
 
-use super::digest::{Digest, HashingReader};
+use super::digest::{Digest, Hashing};
 use super::file::{FileEntry, compare};
 use super::record::FrameRecord;
 use super::{MAX_SAMPLES, ShardError, names};
@@ -36,162 +37,127 @@ pub struct TableRow {
     pub mask_blake3: Digest,
 }
 
-/// A column: its name, and how its value is taken from a row and put into one.
-struct Column {
-    name: &'static str,
-    /// True if tables of earlier versions lack it. It is null then.
-    is_later: bool,
-    kind: Kind,
-}
-
-/// The type of a column's values, and where in a row they are.
+/// The type of a column's values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    Text(Access<String>),
-    Hash(Access<Digest>),
-    U32(Access<u32>),
-    I32(Access<i32>),
-    U64(Access<u64>),
-    I64(Access<i64>),
-    Real(Access<f64>),
-    MaybeReal(Access<Option<f64>>),
-    MaybeU64(Access<Option<u64>>),
-    Flag(Access<bool>),
+    Text,
+    U32,
+    I32,
+    U64,
+    I64,
+    Real,
+    MaybeReal,
+    MaybeU64,
+    Flag,
 }
 
-/// How a value is taken from a row, and how one is put into it: false where it contradicts what the row has already.
-struct Access<T> {
-    get: fn(&TableRow) -> T,
-    set: fn(&mut TableRow, T) -> bool,
-}
-
-/// `column!(KIND "name": PLACE)` is the column of the value at that place of a row; `KIND?` is one that tables of earlier
-/// versions lack.
-macro_rules! column {
-    ($kind:ident $name:literal: $($place:tt)+) => {
-        column!($kind, $name, false, $($place)+)
-    };
-    ($kind:ident? $name:literal: $($place:tt)+) => {
-        column!($kind, $name, true, $($place)+)
-    };
-    ($kind:ident, $name:literal, $is_later:literal, $($place:tt)+) => {
-        Column {
-            name: $name,
-            is_later: $is_later,
-            kind: Kind::$kind(Access {
-                get: |row| row.$($place)+.to_owned(),
-                set: |row, value| {
-                    row.$($place)+ = value;
-                    true
-                },
-            }),
-        }
-    };
-}
-
-/// All columns, in the order of the file, for writing and for reading.
-const COLUMNS: [Column; 32] = [
-    column!(Text "session": record.session),
-    column!(Text "object": record.object),
-    column!(U32 "index": record.index),
-    column!(U64 "source_frame": record.source_frame),
-    column!(I64 "t_us": record.t_us),
-    column!(MaybeReal "angle_deg": record.angle_deg),
-    column!(Flag "duplicate": record.duplicate),
-    column!(I32 "crop_x": record.crop.x),
-    column!(I32 "crop_y": record.crop.y),
-    column!(U32 "crop_w": record.crop.w),
-    column!(U32 "crop_h": record.crop.h),
-    column!(U32 "size_w": record.size[0]),
-    column!(U32 "size_h": record.size[1]),
-    Column {
-        name: "shift_dx",
-        is_later: false,
-        kind: Kind::MaybeReal(Access {
-            get: |row| row.record.shift_px.map(|[dx, _]| dx),
-            set: |row, dx| {
-                row.record.shift_px = dx.map(|dx| [dx, 0.0]);
-                true
-            },
-        }),
-    },
-    Column {
-        name: "shift_dy",
-        is_later: false,
-        kind: Kind::MaybeReal(Access {
-            get: |row| row.record.shift_px.map(|[_, dy]| dy),
-            set: |row, dy| match (&mut row.record.shift_px, dy) {
-                (Some(shift), Some(dy)) => {
-                    shift[1] = dy;
-                    true
-                }
-                (shift, dy) => shift.is_none() && dy.is_none(),
-            },
-        }),
-    },
-    column!(Flag "shift_applied": record.shift_applied),
-    column!(MaybeReal? "align_confidence": record.align_confidence),
-    column!(MaybeReal? "shift_interpolated_sd_px": record.shift_interpolated_sd_px),
-    column!(U64 "mask_px": record.mask_px),
-    column!(U64 "saturated_px": record.saturated_px),
-    column!(Real "saturated_fraction": record.saturated_fraction),
-    column!(U64 "saturated_any_px": record.saturated_any_px),
-    column!(Flag "spec_net": record.spec_net),
-    column!(Real "mean_r": record.mean_rgb[0]),
-    column!(Real "mean_g": record.mean_rgb[1]),
-    column!(Real "mean_b": record.mean_rgb[2]),
-    column!(Real "sharpness": record.sharpness),
-    column!(MaybeReal? "exposure_step": record.exposure_step),
-    column!(MaybeU64? "identical_to": record.identical_to),
-    column!(MaybeReal? "blur": record.blur),
-    column!(Hash "png_blake3": png_blake3),
-    column!(Hash "mask_blake3": mask_blake3),
+/// All columns, in the order of the file. Their values are those of the record as JSON.
+const COLUMNS: [(&str, Kind); 32] = [
+    ("session", Kind::Text),
+    ("object", Kind::Text),
+    ("index", Kind::U32),
+    ("source_frame", Kind::U64),
+    ("t_us", Kind::I64),
+    ("angle_deg", Kind::MaybeReal),
+    ("duplicate", Kind::Flag),
+    ("crop_x", Kind::I32),
+    ("crop_y", Kind::I32),
+    ("crop_w", Kind::U32),
+    ("crop_h", Kind::U32),
+    ("size_w", Kind::U32),
+    ("size_h", Kind::U32),
+    ("shift_dx", Kind::MaybeReal),
+    ("shift_dy", Kind::MaybeReal),
+    ("shift_applied", Kind::Flag),
+    ("align_confidence", Kind::MaybeReal),
+    ("shift_interpolated_sd_px", Kind::MaybeReal),
+    ("mask_px", Kind::U64),
+    ("saturated_px", Kind::U64),
+    ("saturated_fraction", Kind::Real),
+    ("saturated_any_px", Kind::U64),
+    ("spec_net", Kind::Flag),
+    ("mean_r", Kind::Real),
+    ("mean_g", Kind::Real),
+    ("mean_b", Kind::Real),
+    ("sharpness", Kind::Real),
+    ("exposure_step", Kind::MaybeReal),
+    ("identical_to", Kind::MaybeU64),
+    ("blur", Kind::MaybeReal),
+    ("png_blake3", Kind::Text),
+    ("mask_blake3", Kind::Text),
 ];
 
-impl Column {
+/// Fields of the record that are lists, whose numbers have columns of their own.
+const LISTS: [(&str, &[&str]); 4] = [
+    ("crop", &["crop_x", "crop_y", "crop_w", "crop_h"]),
+    ("size", &["size_w", "size_h"]),
+    ("shift_px", &["shift_dx", "shift_dy"]),
+    ("mean_rgb", &["mean_r", "mean_g", "mean_b"]),
+];
+
+impl Kind {
     /// The column's line in the schema.
-    fn declaration(&self) -> String {
-        let name = self.name;
-        match self.kind {
-            Kind::Text(_) | Kind::Hash(_) => format!("required binary {name} (string);"),
-            Kind::U32(_) => format!("required int32 {name} (integer(32,false));"),
-            Kind::I32(_) => format!("required int32 {name} (integer(32,true));"),
-            Kind::U64(_) => format!("required int64 {name} (integer(64,false));"),
-            Kind::I64(_) => format!("required int64 {name} (integer(64,true));"),
-            Kind::Real(_) => format!("required double {name};"),
-            Kind::MaybeReal(_) => format!("optional double {name};"),
-            Kind::MaybeU64(_) => format!("optional int64 {name} (integer(64,false));"),
-            Kind::Flag(_) => format!("required boolean {name};"),
+    fn declaration(self, name: &str) -> String {
+        match self {
+            Self::Text => format!("required binary {name} (string);"),
+            Self::U32 => format!("required int32 {name} (integer(32,false));"),
+            Self::I32 => format!("required int32 {name} (integer(32,true));"),
+            Self::U64 => format!("required int64 {name} (integer(64,false));"),
+            Self::I64 => format!("required int64 {name} (integer(64,true));"),
+            Self::Real => format!("required double {name};"),
+            Self::MaybeReal => format!("optional double {name};"),
+            Self::MaybeU64 => format!("optional int64 {name} (integer(64,false));"),
+            Self::Flag => format!("required boolean {name};"),
         }
     }
 
-    /// Puts the value of a field of a table into the row; false if there is no valid one.
-    fn read(&self, field: Option<&Field>, row: &mut TableRow) -> bool {
-        let Some(field) = field else {
-            return self.is_later;
-        };
-        match (&self.kind, field) {
-            (Kind::Text(at), Field::Str(text)) => (at.set)(row, text.clone()),
-            (Kind::Hash(at), Field::Str(text)) => {
-                text.parse().is_ok_and(|digest| (at.set)(row, digest))
-            }
-            (Kind::U32(at), &Field::UInt(value)) => (at.set)(row, value),
-            (Kind::I32(at), &Field::Int(value)) => (at.set)(row, value),
-            (Kind::U64(at), &Field::ULong(value)) => (at.set)(row, value),
-            (Kind::I64(at), &Field::Long(value)) => (at.set)(row, value),
-            (Kind::Real(at), &Field::Double(value)) => (at.set)(row, value),
-            (Kind::MaybeReal(at), &Field::Double(value)) => (at.set)(row, Some(value)),
-            (Kind::MaybeReal(at), Field::Null) => (at.set)(row, None),
-            (Kind::MaybeU64(at), &Field::ULong(value)) => (at.set)(row, Some(value)),
-            (Kind::MaybeU64(at), Field::Null) => (at.set)(row, None),
-            (Kind::Flag(at), &Field::Bool(value)) => (at.set)(row, value),
-            _ => false,
+    fn is_optional(self) -> bool {
+        matches!(self, Self::MaybeReal | Self::MaybeU64)
+    }
+
+    /// The value of a field of a table; `None` if it has another type.
+    fn value_of(self, field: &Field) -> Option<Value> {
+        Some(match (self, field) {
+            (Self::Text, Field::Str(text)) => text.as_str().into(),
+            (Self::U32, &Field::UInt(value)) => value.into(),
+            (Self::I32, &Field::Int(value)) => value.into(),
+            (Self::U64 | Self::MaybeU64, &Field::ULong(value)) => value.into(),
+            (Self::I64, &Field::Long(value)) => value.into(),
+            (Self::Real | Self::MaybeReal, &Field::Double(value)) => value.into(),
+            (Self::MaybeReal | Self::MaybeU64, Field::Null) => Value::Null,
+            (Self::Flag, &Field::Bool(value)) => value.into(),
+            _ => return None,
+        })
+    }
+}
+
+/// The values of a row by column.
+fn values_of(row: &TableRow) -> ParquetResult<Map<String, Value>> {
+    let record = serde_json::to_value(&row.record);
+    let Value::Object(mut values) = record.map_err(|e| ParquetError::External(e.into()))? else {
+        return Err(ParquetError::General(
+            "a record is not an object".to_owned(),
+        ));
+    };
+    for (field, columns) in LISTS {
+        let list = values.remove(field).unwrap_or_default();
+        for (at, column) in columns.iter().enumerate() {
+            let value = list.get(at).cloned().unwrap_or_default();
+            values.insert((*column).to_owned(), value);
         }
     }
+    for (column, digest) in [
+        ("png_blake3", row.png_blake3),
+        ("mask_blake3", row.mask_blake3),
+    ] {
+        values.insert(column.to_owned(), digest.to_string().into());
+    }
+    Ok(values)
 }
 
 /// Writes the rows to `out` in the given order.
 pub(super) fn write_rows(out: &mut (impl Write + Send), rows: &[TableRow]) -> ParquetResult<()> {
-    let lines: String = COLUMNS.iter().map(Column::declaration).collect();
+    let lines = COLUMNS.map(|(name, kind)| kind.declaration(name)).concat();
     let schema = Arc::new(parse_message_type(&format!(
         "message frames {{ {lines} }}"
     ))?);
@@ -199,13 +165,18 @@ pub(super) fn write_rows(out: &mut (impl Write + Send), rows: &[TableRow]) -> Pa
         .set_compression(Compression::UNCOMPRESSED)
         .set_created_by(concat!("relit ", env!("CARGO_PKG_VERSION")).to_owned())
         .build();
+    let rows: Vec<Map<String, Value>> = rows.iter().map(values_of).collect::<ParquetResult<_>>()?;
     let mut file = SerializedFileWriter::new(out, schema, Arc::new(properties))?;
     let mut group = file.next_row_group()?;
-    for column in &COLUMNS {
+    for (name, kind) in COLUMNS {
         let mut writer = group
             .next_column()?
             .ok_or_else(|| ParquetError::General("the schema lost a column".to_owned()))?;
-        write_column(writer.untyped(), &column.kind, rows)?;
+        let values: Vec<&Value> = rows
+            .iter()
+            .map(|row| row.get(name).unwrap_or(&Value::Null))
+            .collect();
+        write_column(writer.untyped(), kind, &values)?;
         writer.close()?;
     }
     group.close()?;
@@ -213,59 +184,38 @@ pub(super) fn write_rows(out: &mut (impl Write + Send), rows: &[TableRow]) -> Pa
     Ok(())
 }
 
-fn write_column(
-    writer: &mut ColumnWriter<'_>,
-    kind: &Kind,
-    rows: &[TableRow],
-) -> ParquetResult<()> {
-    fn all<T>(rows: &[TableRow], value: impl Fn(&TableRow) -> T) -> Vec<T> {
-        rows.iter().map(value).collect()
+fn write_column(writer: &mut ColumnWriter<'_>, kind: Kind, values: &[&Value]) -> ParquetResult<()> {
+    /// What is null is left out: in a column that needs each value, the library notices that.
+    fn all<T>(values: &[&Value], value: impl Fn(&Value) -> Option<T>) -> Vec<T> {
+        values.iter().filter_map(|found| value(found)).collect()
     }
-    let text = |value: String| ByteArray::from(value.into_bytes());
-    match (writer, kind) {
-        (ColumnWriter::ByteArrayColumnWriter(w), Kind::Text(at)) => {
-            w.write_batch(&all(rows, |row| text((at.get)(row))), None, None)
+    let present = all(values, |value| Some(i16::from(!value.is_null())));
+    let present = kind.is_optional().then_some(present.as_slice());
+    let long = |value: &Value| {
+        value
+            .as_i64()
+            .or_else(|| value.as_u64().map(u64::cast_signed))
+    };
+    match writer {
+        ColumnWriter::ByteArrayColumnWriter(w) => {
+            let texts = all(values, |value| value.as_str().map(ByteArray::from));
+            w.write_batch(&texts, present, None)
         }
-        (ColumnWriter::ByteArrayColumnWriter(w), Kind::Hash(at)) => w.write_batch(
-            &all(rows, |row| text((at.get)(row).to_string())),
-            None,
-            None,
-        ),
-        (ColumnWriter::Int32ColumnWriter(w), Kind::U32(at)) => {
-            w.write_batch(&all(rows, |row| (at.get)(row).cast_signed()), None, None)
+        ColumnWriter::Int32ColumnWriter(w) => {
+            let numbers = all(values, |value| long(value).map(|number| number as i32));
+            w.write_batch(&numbers, present, None)
         }
-        (ColumnWriter::Int32ColumnWriter(w), Kind::I32(at)) => {
-            w.write_batch(&all(rows, at.get), None, None)
+        ColumnWriter::Int64ColumnWriter(w) => w.write_batch(&all(values, long), present, None),
+        ColumnWriter::DoubleColumnWriter(w) => {
+            w.write_batch(&all(values, Value::as_f64), present, None)
         }
-        (ColumnWriter::Int64ColumnWriter(w), Kind::U64(at)) => {
-            w.write_batch(&all(rows, |row| (at.get)(row).cast_signed()), None, None)
+        ColumnWriter::BoolColumnWriter(w) => {
+            w.write_batch(&all(values, Value::as_bool), present, None)
         }
-        (ColumnWriter::Int64ColumnWriter(w), Kind::I64(at)) => {
-            w.write_batch(&all(rows, at.get), None, None)
+        _ => {
+            let text = "a column has another type in the schema".to_owned();
+            return Err(ParquetError::General(text));
         }
-        (ColumnWriter::DoubleColumnWriter(w), Kind::Real(at)) => {
-            w.write_batch(&all(rows, at.get), None, None)
-        }
-        (ColumnWriter::DoubleColumnWriter(w), Kind::MaybeReal(at)) => {
-            let values: Vec<f64> = rows.iter().filter_map(at.get).collect();
-            let present = all(rows, |row| i16::from((at.get)(row).is_some()));
-            w.write_batch(&values, Some(&present), None)
-        }
-        (ColumnWriter::Int64ColumnWriter(w), Kind::MaybeU64(at)) => {
-            let values: Vec<i64> = rows
-                .iter()
-                .filter_map(at.get)
-                .map(u64::cast_signed)
-                .collect();
-            let present = all(rows, |row| i16::from((at.get)(row).is_some()));
-            w.write_batch(&values, Some(&present), None)
-        }
-        (ColumnWriter::BoolColumnWriter(w), Kind::Flag(at)) => {
-            w.write_batch(&all(rows, at.get), None, None)
-        }
-        _ => Err(ParquetError::General(
-            "a column has another type in the schema".to_owned(),
-        )),
     }
     .map(|_| ())
 }
@@ -274,17 +224,16 @@ fn write_column(
 /// is refused before it is parsed, so that the parser never sees damaged data.
 ///
 /// # Errors
-/// [`ShardError::Changed`] if the file differs from its entry, [`ShardError::Table`] if it is not Parquet,
-/// [`ShardError::TableValue`] if a column is missing or a value is out of range, [`ShardError::Io`],
-/// [`ShardError::UnsafePath`].
+/// [`ShardError::Changed`] if the file differs from its entry, [`ShardError::Table`] if it is not Parquet, a column
+/// is missing or a value is out of range, [`ShardError::Io`], [`ShardError::UnsafePath`].
 pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<TableRow>, ShardError> {
     names::check_path(&entry.file)?;
     let path = out.join(&entry.file);
     let io = |doing| ShardError::io(doing, &path);
     let file = File::open(&path).map_err(io("open"))?;
-    let mut hashed = HashingReader::new(&file);
+    let mut hashed = Hashing::new(&file);
     hashed.drain().map_err(io("read"))?;
-    compare(&entry.file, (entry.bytes, entry.blake3), hashed.finish())?;
+    compare(&entry.file, (entry.bytes, entry.blake3), hashed.found())?;
     read_rows(file, &path)
 }
 
@@ -292,50 +241,54 @@ pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<TableRow>, ShardE
 /// is only such a file if somebody meant it, but it must not end the program. The panic hook still
 /// runs: by default it prints a message to standard error.
 fn read_rows(file: File, path: &Path) -> Result<Vec<TableRow>, ShardError> {
-    std::panic::catch_unwind(|| parse_rows(file, path)).unwrap_or_else(|_| {
-        let source = ParquetError::General("the file is malformed".to_owned());
-        Err(ShardError::Table {
-            path: path.to_owned(),
-            doing: "read",
-            source,
-        })
-    })
-}
-
-fn parse_rows(file: File, path: &Path) -> Result<Vec<TableRow>, ShardError> {
-    let failed = |source| ShardError::Table {
+    let parsed = std::panic::catch_unwind(|| parse_rows(file))
+        .unwrap_or_else(|_| Err(ParquetError::General("the file is malformed".to_owned())));
+    parsed.map_err(|source| ShardError::Table {
         path: path.to_owned(),
         doing: "read",
         source,
-    };
-    let reader = SerializedFileReader::new(file).map_err(failed)?;
-    let rows = reader.get_row_iter(None).map_err(failed)?;
+    })
+}
+
+fn parse_rows(file: File) -> ParquetResult<Vec<TableRow>> {
+    let reader = SerializedFileReader::new(file)?;
+    let rows = reader.get_row_iter(None)?;
     let mut found = Vec::new();
     for (number, row) in rows.enumerate().take(MAX_SAMPLES as usize) {
-        let fields = row.map_err(failed)?.into_columns().into_iter().collect();
-        let row = row_of(&fields).map_err(|column| ShardError::TableValue {
-            path: path.to_owned(),
-            row: number,
-            column,
-        })?;
-        found.push(row);
+        let fields = row?.into_columns().into_iter().collect();
+        let wrong = |what| ParquetError::General(format!("row {number} has {what}"));
+        found.push(row_of(&fields).map_err(wrong)?);
     }
     Ok(found)
 }
 
-/// The row with these values, or the column without a valid one.
-fn row_of(fields: &HashMap<String, Field>) -> Result<TableRow, &'static str> {
-    let mut row = TableRow {
-        record: FrameRecord::empty(),
-        png_blake3: Digest::of(&[]),
-        mask_blake3: Digest::of(&[]),
-    };
-    for column in &COLUMNS {
-        if !column.read(fields.get(column.name), &mut row) {
-            return Err(column.name);
-        }
+/// The row with these values, or what is wrong with them.
+fn row_of(fields: &HashMap<String, Field>) -> Result<TableRow, String> {
+    let mut values = Map::new();
+    for (name, kind) in COLUMNS {
+        let value = fields.get(name).and_then(|field| kind.value_of(field));
+        let value = value.ok_or_else(|| format!("no valid {name}"))?;
+        values.insert(name.to_owned(), value);
     }
-    Ok(row)
+    for (field, columns) in LISTS {
+        let list: Vec<Value> = columns.iter().filter_map(|at| values.remove(*at)).collect();
+        let is_null = list.iter().all(Value::is_null);
+        values.insert(
+            field.to_owned(),
+            if is_null { Value::Null } else { list.into() },
+        );
+    }
+    let mut digest = |name: &str| {
+        let digest = values.remove(name).unwrap_or_default();
+        serde_json::from_value(digest).map_err(|error| error.to_string())
+    };
+    let (png_blake3, mask_blake3) = (digest("png_blake3")?, digest("mask_blake3")?);
+    let record = serde_json::from_value(values.into());
+    Ok(TableRow {
+        record: record.map_err(|error| error.to_string())?,
+        png_blake3,
+        mask_blake3,
+    })
 }
 
 #[cfg(test)]
@@ -361,19 +314,15 @@ mod tests {
                 exposure_step: even.then_some(-0.5),
                 identical_to: even.then_some(u64::MAX),
                 blur: (!even).then_some(1.25),
+                source_frame: u64::MAX - u64::from(index),
+                t_us: -5 - i64::from(index),
+                angle_deg: even.then_some(0.1 * f64::from(index)),
+                size: [256, 255],
+                shift_px: (!even).then_some([0.25, -1.0 / 3.0]),
+                shift_applied: !even,
+                align_confidence: (!even).then_some(0.75),
+                shift_interpolated_sd_px: (!even).then_some(0.3),
                 ..FrameRecord::new("s", "mug \"ö\"", index, crop, &measures, SPEC_NET_GATE)
-                    .of_frame(
-                        u64::MAX - u64::from(index),
-                        -5 - i64::from(index),
-                        even.then_some(0.1 * f64::from(index)),
-                    )
-                    .scaled_to([256, 255])
-                    .aligned(
-                        (!even).then_some([0.25, -1.0 / 3.0]),
-                        !even,
-                        (!even).then_some(0.75),
-                    )
-                    .interpolated((!even).then_some(0.3))
             },
             png_blake3: Digest::of(&index.to_le_bytes()),
             mask_blake3: Digest::of(b"mask"),
@@ -410,43 +359,37 @@ mod tests {
     }
 
     #[test]
-    fn a_shift_of_which_one_number_is_missing_is_refused() {
-        let mut fields: HashMap<String, Field> = HashMap::new();
-        let mut read = |name: &str, field| {
+    fn every_column_is_needed_and_both_numbers_of_a_shift() {
+        let field = |(name, kind)| match kind {
+            Kind::Text if name == "session" || name == "object" => Field::Str("s".to_owned()),
+            Kind::Text => Field::Str(Digest::of(b"x").to_string()),
+            Kind::U32 => Field::UInt(1),
+            Kind::I32 => Field::Int(1),
+            Kind::U64 | Kind::MaybeU64 => Field::ULong(1),
+            Kind::I64 => Field::Long(1),
+            Kind::Real | Kind::MaybeReal => Field::Double(0.5),
+            Kind::Flag => Field::Bool(true),
+        };
+        let whole: HashMap<String, Field> = COLUMNS
+            .map(|column| (column.0.to_owned(), field(column)))
+            .into();
+        let with = |name: &str, field| {
+            let mut fields = whole.clone();
             fields.insert(name.to_owned(), field);
             row_of(&fields)
         };
-        for column in &COLUMNS {
-            let field = match column.kind {
-                Kind::Text(_) => Field::Str("s".to_owned()),
-                Kind::Hash(_) => Field::Str(Digest::of(b"x").to_string()),
-                Kind::U32(_) => Field::UInt(1),
-                Kind::I32(_) => Field::Int(1),
-                Kind::U64(_) | Kind::MaybeU64(_) => Field::ULong(1),
-                Kind::I64(_) => Field::Long(1),
-                Kind::Real(_) | Kind::MaybeReal(_) => Field::Double(0.5),
-                Kind::Flag(_) => Field::Bool(true),
-            };
-            let _ = read(column.name, field);
+        assert_eq!(row_of(&whole).unwrap().record.shift_px, Some([0.5; 2]));
+        for (name, kind) in COLUMNS {
+            let mut fields = whole.clone();
+            fields.remove(name);
+            assert_eq!(row_of(&fields), Err(format!("no valid {name}")));
+            let is_shift = name.starts_with("shift_d");
+            assert_eq!(
+                with(name, Field::Null).is_ok(),
+                kind.is_optional() && !is_shift,
+                "{name}"
+            );
         }
-        assert_eq!(
-            read("mean_r", Field::Double(0.5)).unwrap().record.shift_px,
-            Some([0.5; 2])
-        );
-        assert_eq!(read("shift_dy", Field::Null), Err("shift_dy"));
-        assert!(read("shift_dx", Field::Null).is_ok());
-        assert_eq!(read("shift_dy", Field::Double(0.5)), Err("shift_dy"));
-    }
-
-    #[test]
-    fn only_a_column_that_later_versions_added_may_be_missing() {
-        let needed: Vec<&str> = COLUMNS
-            .iter()
-            .filter(|column| !column.read(None, &mut row(0)))
-            .map(|column| column.name)
-            .collect();
-        assert_eq!(needed.len(), COLUMNS.len() - 5);
-        assert!(needed.contains(&"angle_deg") && !needed.contains(&"blur"));
     }
 
     #[test]

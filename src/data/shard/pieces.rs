@@ -4,19 +4,62 @@
 //! `tasks/<task>-of-<count>.json`. [`merge`] joins the pieces to `dataset.json`.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::fs;
 use std::io;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::array_task::{ArrayTask, file_of};
-use super::dataset::Dataset;
+use super::dataset::{Dataset, described, json_of};
 use super::output::{self, OutputFolder};
 use super::{ShardError, names};
 
 /// The schema that this version writes and reads.
 const SCHEMA: &str = "relit.task/1";
+/// Largest number of tasks.
+pub const MAX_TASKS: u32 = 100_000;
+
+/// One of several tasks that write a data set together, as those of a cluster's job array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ArrayTask {
+    index: u32,
+    count: u32,
+}
+
+impl ArrayTask {
+    /// Task `index` (from 0) of `count`; `None` if there is none, or if there are more than
+    /// [`MAX_TASKS`].
+    #[must_use]
+    pub fn new(index: u32, count: u32) -> Option<Self> {
+        (index < count && count <= MAX_TASKS).then_some(Self { index, count })
+    }
+
+    /// How many tasks there are.
+    #[must_use]
+    pub fn count(self) -> u32 {
+        self.count
+    }
+
+    /// Whether the recording at this position of the list of all is this task's.
+    #[must_use]
+    pub fn takes(self, position: usize) -> bool {
+        position % self.count as usize == self.index as usize
+    }
+
+    /// The file of its piece, relative to the data set.
+    #[must_use]
+    pub fn file(self) -> String {
+        format!("{}/{self}.json", names::TASKS)
+    }
+}
+
+impl fmt::Display for ArrayTask {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-of-{}", self.index, self.count)
+    }
+}
+
 /// What became of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "outcome")]
@@ -58,8 +101,8 @@ impl TaskPiece {
     pub fn new(task: ArrayTask, recordings: Vec<String>, dataset: Dataset) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
-            task: task.index(),
-            count: task.count(),
+            task: task.index,
+            count: task.count,
             recordings,
             outcomes: BTreeMap::new(),
             dataset,
@@ -69,7 +112,7 @@ impl TaskPiece {
     /// The piece that the task wrote into the data set `out`, if there is one.
     ///
     /// # Errors
-    /// [`ShardError::Description`] or [`ShardError::Schema`] if it cannot be read, [`ShardError::Io`].
+    /// [`ShardError::Description`] if it cannot be read, [`ShardError::Io`].
     pub fn read(out: &Path, task: ArrayTask) -> Result<Option<Self>, ShardError> {
         let path = out.join(task.file());
         match fs::read(&path) {
@@ -82,15 +125,11 @@ impl TaskPiece {
     /// Writes the piece into the data set `out`, whole or not at all.
     ///
     /// # Errors
-    /// [`ShardError::Json`] if a number is not finite, [`ShardError::Io`].
+    /// [`ShardError::Refused`] if a number is not finite, [`ShardError::Io`].
     pub fn write(&self, out: &Path) -> Result<(), ShardError> {
-        let file = file_of(self.task, self.count);
-        let mut bytes = serde_json::to_vec_pretty(self).map_err(|source| ShardError::Json {
-            what: file.clone(),
-            source,
-        })?;
-        bytes.push(b'\n');
-        output::write_whole(out, &file, &bytes).map(|_| ())
+        let (index, count) = (self.task, self.count);
+        let file = ArrayTask { index, count }.file();
+        output::write_whole(out, &file, &json_of(self, &file)?).map(|_| ())
     }
 
     /// Number of tasks that write the data set together.
@@ -99,18 +138,7 @@ impl TaskPiece {
     }
 
     fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ShardError> {
-        let piece: Self =
-            serde_json::from_slice(bytes).map_err(|source| ShardError::Description {
-                path: path.to_owned(),
-                source,
-            })?;
-        if piece.schema != SCHEMA {
-            return Err(ShardError::Schema {
-                path: path.to_owned(),
-                found: piece.schema,
-                expected: SCHEMA,
-            });
-        }
+        let piece: Self = described(path, bytes, SCHEMA)?;
         piece.dataset.check_names()?;
         Ok(piece)
     }
@@ -129,27 +157,14 @@ pub struct Merged {
 }
 
 /// Joins the pieces in the data set `out` and writes its `dataset.json`: the same bytes as one run over all
-/// recordings writes. It can be repeated, and changes nothing else.
+/// recordings writes. It can be repeated, and changes nothing else. `length` is that of a file of the data set, or of
+/// anything for a folder of images, or an error where there is none.
 ///
 /// # Errors
 /// [`ShardError::Pieces`] if a task or a recording is missing, failed, or is there twice, if tasks saw
 /// different recordings or settings, or a file is missing; then nothing is written.
 /// [`ShardError::Locked`] while a task is running, [`ShardError::Description`], [`ShardError::Io`].
-pub fn merge(out: &Path) -> Result<Merged, ShardError> {
-    merge_with(out, &|file| {
-        fs::metadata(out.join(file)).map(|found| found.len())
-    })
-}
-
-/// As [`merge`], of a data set whose files are elsewhere: `length` is that of a file, or of anything for a folder of
-/// images, or an error where there is none.
-///
-/// # Errors
-/// As [`merge`].
-pub fn merge_with(
-    out: &Path,
-    length: &dyn Fn(&str) -> io::Result<u64>,
-) -> Result<Merged, ShardError> {
+pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Merged, ShardError> {
     let folder = OutputFolder::lock_existing(out)?;
     let pieces = read_pieces(out)?;
     let mut problems = Vec::new();
@@ -194,23 +209,20 @@ fn join(pieces: &[TaskPiece], problems: &mut Vec<String>) -> Option<Merged> {
     };
     for piece in pieces {
         let (a, b) = (first.task, piece.task);
-        if piece.count != first.count {
+        let problem = if piece.count != first.count {
             let (a, b) = (first.count, piece.count);
-            problems.push(format!(
-                "some are of {a} tasks, others of {b}: remove those of an earlier run"
-            ));
-            return None;
-        }
-        if piece.recordings != first.recordings {
-            problems.push(format!(
+            format!("some are of {a} tasks, others of {b}: remove those of an earlier run")
+        } else if piece.recordings != first.recordings {
+            format!(
                 "tasks {a} and {b} saw different recordings: run them again with the same inputs"
-            ));
-            return None;
-        }
-        if piece.dataset.settings != first.dataset.settings {
-            problems.push(format!("tasks {a} and {b} had different settings"));
-            return None;
-        }
+            )
+        } else if piece.dataset.settings != first.dataset.settings {
+            format!("tasks {a} and {b} had different settings")
+        } else {
+            continue;
+        };
+        problems.push(problem);
+        return None;
     }
     let by_task: BTreeMap<u32, &TaskPiece> = pieces.iter().map(|p| (p.task, p)).collect();
     let missing: Vec<String> = (0..first.count)
@@ -235,22 +247,23 @@ fn join(pieces: &[TaskPiece], problems: &mut Vec<String>) -> Option<Merged> {
                 problems.push(format!("task {task} failed with {name}: {why}"));
             }
             Some(TaskOutcome::LeftOut { why }) => left_out.push((name.clone(), why.clone())),
-            Some(TaskOutcome::Extracted { session }) => match piece.dataset.session(session) {
-                _ if dataset.session_alike(session).is_some() => {
-                    let other = dataset.session_alike(session).map_or("", |other| &other.id);
-                    problems.push(match other == session {
-                        true => format!("session {session} is there twice"),
-                        false => format!(
-                            "the sessions {other} and {session} are one where a file system ignores case: rename one and extract it again"
-                        ),
-                    });
+            Some(TaskOutcome::Extracted { session }) => {
+                let there = dataset.session_alike(session);
+                match (there, piece.dataset.session(session)) {
+                    (Some(other), _) if other.id == *session => {
+                        problems.push(format!("session {session} is there twice"));
+                    }
+                    (Some(other), _) => problems.push(format!(
+                        "the sessions {} and {session} are one where a file system ignores case: rename one and extract it again",
+                        other.id
+                    )),
+                    (None, Some(entry)) => dataset.replace(
+                        entry.clone(),
+                        piece.dataset.shards_of(session).cloned().collect(),
+                    ),
+                    (None, None) => problems.push(format!("the piece of task {task} lacks {session}")),
                 }
-                Some(entry) => dataset.replace(
-                    entry.clone(),
-                    piece.dataset.shards_of(session).cloned().collect(),
-                ),
-                None => problems.push(format!("the piece of task {task} lacks {session}")),
-            },
+            }
         }
     }
     Some(Merged {
@@ -277,7 +290,7 @@ fn missing_files(dataset: &Dataset, length: &dyn Fn(&str) -> io::Result<u64>) ->
 fn not_of_a_task(out: &Path, dataset: &Dataset) -> Result<Vec<String>, ShardError> {
     let existing = match Dataset::read(out) {
         Ok(existing) => existing,
-        Err(ShardError::NoDataset { .. }) => return Ok(Vec::new()),
+        Err(ShardError::NoDataset(_)) => return Ok(Vec::new()),
         Err(error) => return Err(error),
     };
     let others = existing
@@ -288,4 +301,20 @@ fn not_of_a_task(out: &Path, dataset: &Dataset) -> Result<Vec<String>, ShardErro
         format!("dataset.json also has session {id}, which is no task's: use a folder of its own")
     };
     Ok(others.map(|session| problem(&session.id)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_recording_is_one_tasks() {
+        for count in [1, 3, 7] {
+            for position in 0..20 {
+                let takers = (0..count).filter_map(|index| ArrayTask::new(index, count));
+                assert_eq!(takers.filter(|task| task.takes(position)).count(), 1);
+            }
+        }
+        assert!(ArrayTask::new(3, 3).is_none() && ArrayTask::new(0, 0).is_none());
+    }
 }

@@ -36,9 +36,6 @@ impl QualityVerdict {
     /// All verdicts, from the best to the worst.
     pub const ALL: [Self; 3] = [Self::Good, Self::Usable, Self::Broken];
 
-    /// What is said of a session without a verdict.
-    pub const NONE: &'static str = "not judged";
-
     /// The word in `dataset.json`.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -4,7 +4,7 @@
 use std::io::Read;
 
 use super::ShardError;
-use super::tarball::{Member, TarReader};
+use super::tarball::{Member, TarReader, too_large};
 
 /// Largest total size of the members of a sample, bytes.
 pub(super) const MAX_BYTES: u64 = 256 << 20;
@@ -38,8 +38,8 @@ impl ShardSample {
 /// most 256 MiB and 64 members.
 ///
 /// A shard that is damaged or truncated gives one error ([`ShardError::ShardTruncated`],
-/// [`ShardError::ShardHeader`], [`ShardError::ShardTooLarge`], [`ShardError::ShardName`], [`ShardError::ShardSample`],
-/// [`ShardError::ShardRead`]) and then ends; the sample that is affected is not returned.
+/// [`ShardError::ShardDamaged`], [`ShardError::Refused`], [`ShardError::ShardRead`]) and then ends; the sample that is
+/// affected is not returned.
 pub struct ShardReader<R> {
     tar: TarReader<R>,
     /// The first member of the next sample.
@@ -95,19 +95,14 @@ impl ShardSample {
     fn add(&mut self, suffix: String, data: Vec<u8>, bytes: u64) -> Result<(), ShardError> {
         let path = || format!("{}.{suffix}", self.key);
         if bytes > MAX_BYTES {
-            return Err(ShardError::ShardTooLarge {
-                path: path(),
-                offset: bytes,
-                limit: MAX_BYTES,
-            });
+            return Err(too_large(&path(), bytes, MAX_BYTES));
         }
         if self.member(&suffix).is_some() || self.members.len() == MAX_MEMBERS {
-            let (key, path) = (self.key.clone(), path());
-            return Err(ShardError::ShardSample {
-                key,
-                path,
-                limit: MAX_MEMBERS,
-            });
+            return Err(ShardError::Refused(format!(
+                "sample {:?} has {:?} twice, or has more than {MAX_MEMBERS} members: pack the shard again, each member once",
+                self.key,
+                path()
+            )));
         }
         self.members.push((suffix, data));
         Ok(())
@@ -171,7 +166,7 @@ mod tests {
             ("b.png", b"3"),
         ]));
         assert_eq!(results.len(), 1);
-        assert!(matches!(results[0], Err(ShardError::ShardSample { .. })));
+        assert!(matches!(results[0], Err(ShardError::Refused(_))));
     }
 
     #[test]

@@ -8,7 +8,6 @@ use crate::image_stats::Measures;
 /// The record of one sample, as it is in `<session>/<kkkk>.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct FrameRecord {
     /// The session's id; the folder part of the sample's key.
     pub session: String,
@@ -78,8 +77,7 @@ impl FrameRecord {
     /// The record of sample `index` of a session, whose image shows the part `crop` of its source frame at the source's
     /// own size, with what was measured of it. `gate`: the saturated fraction above which Spec-Net should run.
     ///
-    /// The source frame is the one of the same number, at time 0; angle, shifts and findings are not known. The methods
-    /// that follow, and the fields, say more.
+    /// The source frame is the one of the same number, at time 0; angle, shifts and findings are not known.
     #[must_use]
     pub fn new(
         session: &str,
@@ -116,63 +114,6 @@ impl FrameRecord {
             blur: None,
         }
     }
-
-    /// A record to be filled, field by field.
-    pub(super) fn empty() -> Self {
-        let nothing = Measures {
-            mask_px: 0,
-            saturated_px: 0,
-            saturated_any_px: 0,
-            mean_rgb: [0.0; 3],
-            sharpness: 0.0,
-        };
-        Self::new("", "", 0, Rect::new(0, 0, 0, 0), &nothing, 1.0)
-    }
-
-    /// Which frame of the video the sample shows, when it was taken (microseconds) and at which angle of the table
-    /// (degrees).
-    #[must_use]
-    pub fn of_frame(self, source_frame: u64, t_us: i64, angle_deg: Option<f64>) -> Self {
-        Self {
-            source_frame,
-            t_us,
-            angle_deg,
-            ..self
-        }
-    }
-
-    /// Another size of image and mask, pixels.
-    #[must_use]
-    pub fn scaled_to(self, size: [u32; 2]) -> Self {
-        Self { size, ..self }
-    }
-
-    /// Whether another sample shows the same source frame: see [`duplicate`](Self::duplicate).
-    #[must_use]
-    pub fn flagged_duplicate(self, duplicate: bool) -> Self {
-        Self { duplicate, ..self }
-    }
-
-    /// The shift that was measured, whether the image was corrected by it, and how well the structures fit: see the
-    /// fields.
-    #[must_use]
-    pub fn aligned(self, shift: Option<[f64; 2]>, applied: bool, confidence: Option<f64>) -> Self {
-        Self {
-            shift_px: shift,
-            shift_applied: applied,
-            align_confidence: confidence,
-            ..self
-        }
-    }
-
-    /// How uncertain a shift is that comes from the frames around; `None` for one that was measured.
-    #[must_use]
-    pub fn interpolated(self, sd_px: Option<f64>) -> Self {
-        Self {
-            shift_interpolated_sd_px: sd_px,
-            ..self
-        }
-    }
 }
 
 #[cfg(test)]
@@ -190,32 +131,23 @@ pub(super) mod tests {
             sharpness: 12.5,
         };
         let crop = Rect::new(0, 0, 8, 8);
-        FrameRecord::new("s", "o", index, crop, &measures, SPEC_NET_GATE).of_frame(
-            u64::from(index),
-            i64::from(index) * 33_333,
-            None,
-        )
-    }
-
-    #[test]
-    fn a_record_as_earlier_versions_wrote_it_is_read() {
-        let text = r#"{"session":"s","object":"o","index":3,"source_frame":3,"t_us":99999,
-            "angle_deg":null,"duplicate":false,"crop":[0,0,8,8],"size":[8,8],"shift_px":null,
-            "shift_applied":false,"mask_px":40,"saturated_px":2,"saturated_fraction":0.05,
-            "saturated_any_px":4,"spec_net":false,"mean_rgb":[90.0,90.0,90.0],"sharpness":12.5}"#;
-        assert_eq!(
-            serde_json::from_str::<FrameRecord>(text).unwrap(),
-            record(3)
-        );
+        FrameRecord {
+            t_us: i64::from(index) * 33_333,
+            ..FrameRecord::new("s", "o", index, crop, &measures, SPEC_NET_GATE)
+        }
     }
 
     #[test]
     fn an_interpolated_shift_is_written_only_where_there_is_one() {
         let measured = serde_json::to_string(&record(3)).unwrap();
         assert!(!measured.contains("interpolated"), "{measured}");
-        let placed = record(3)
-            .aligned(Some([0.5, -0.25]), true, Some(0.1))
-            .interpolated(Some(0.3));
+        let placed = FrameRecord {
+            shift_px: Some([0.5, -0.25]),
+            shift_applied: true,
+            align_confidence: Some(0.1),
+            shift_interpolated_sd_px: Some(0.3),
+            ..record(3)
+        };
         let text = serde_json::to_string(&placed).unwrap();
         assert!(text.contains(r#""shift_interpolated_sd_px":0.3"#), "{text}");
         assert_eq!(serde_json::from_str::<FrameRecord>(&text).unwrap(), placed);

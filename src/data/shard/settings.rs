@@ -1,11 +1,10 @@
 //! How the sessions of a data set are extracted and stored, as `dataset.json` records it.
 
 use std::fmt;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{ShardError, names};
+use super::names;
 
 /// How samples are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -42,17 +41,6 @@ impl Layout {
 impl fmt::Display for Layout {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-impl FromStr for Layout {
-    type Err = ShardError;
-
-    fn from_str(text: &str) -> Result<Self, ShardError> {
-        let found = Self::ALL.into_iter().find(|layout| layout.name() == text);
-        found.ok_or_else(|| ShardError::UnknownLayout {
-            name: text.to_owned(),
-        })
     }
 }
 
@@ -145,13 +133,5 @@ mod tests {
             assert_eq!(serde_json::from_str::<ImageSize>(json).unwrap(), size);
         }
         assert!(serde_json::from_str::<ImageSize>("\"large\"").is_err());
-    }
-
-    #[test]
-    fn a_layout_is_read_by_its_name() {
-        for layout in Layout::ALL {
-            assert_eq!(layout.to_string().parse::<Layout>().unwrap(), layout);
-        }
-        assert!("tar".parse::<Layout>().is_err());
     }
 }

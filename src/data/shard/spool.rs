@@ -4,7 +4,6 @@
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::dataset::ShardEntry;
 use super::names::{self, Part};
 use super::order::order;
 use super::output::{PartialFile, ScratchFile, SealedFile};
@@ -28,13 +27,6 @@ pub(super) struct SpoolStore {
     bytes: u64,
 }
 
-/// A complete tar, still under its temporary name.
-pub(super) struct SealedShard {
-    file: SealedFile,
-    session: String,
-    samples: u32,
-}
-
 impl SpoolStore {
     pub(super) fn create(out: &Path, session: &str, samples: u32) -> Result<Self, ShardError> {
         Ok(Self {
@@ -44,10 +36,6 @@ impl SpoolStore {
             extents: vec![Extent::default(); samples as usize],
             bytes: 0,
         })
-    }
-
-    pub(super) fn out(&self) -> &Path {
-        &self.out
     }
 
     pub(super) fn push(&mut self, index: u32, png: &[u8]) -> Result<(), ShardError> {
@@ -72,7 +60,7 @@ impl SpoolStore {
         &self,
         rows: &[TableRow],
         mask_png: &[u8],
-    ) -> Result<SealedShard, ShardError> {
+    ) -> Result<SealedFile, ShardError> {
         let partial = PartialFile::create(&self.out, &names::tar_file(&self.session))?;
         let samples = u32::try_from(rows.len()).unwrap_or(u32::MAX);
         let mut tar = tar::Builder::new(partial);
@@ -83,9 +71,10 @@ impl SpoolStore {
                 continue;
             };
             self.read(extent, &mut png)?;
-            let json = serde_json::to_vec(&row.record).map_err(|source| ShardError::Json {
-                what: format!("the record of {}", names::sample_key(&self.session, index)),
-                source,
+            let json = serde_json::to_vec(&row.record);
+            let json = json.map_err(|error| {
+                let key = names::sample_key(&self.session, index);
+                ShardError::Refused(format!("could not write the record of {key}: {error}"))
             })?;
             for (part, data) in [
                 (Part::Image, png.as_slice()),
@@ -95,12 +84,10 @@ impl SpoolStore {
                 self.append(&mut tar, &names::member(&self.session, index, part), data)?;
             }
         }
-        let file = tar.into_inner().map_err(self.failed_to_write())?.seal()?;
-        Ok(SealedShard {
-            file,
-            session: self.session.clone(),
-            samples,
-        })
+        let partial = tar.into_inner();
+        partial
+            .map_err(ShardError::io("write", &self.path()))?
+            .seal()
     }
 
     fn append(
@@ -109,20 +96,13 @@ impl SpoolStore {
         path: &str,
         data: &[u8],
     ) -> Result<(), ShardError> {
-        tarball::header(path, data.len() as u64)
-            .and_then(|header| tar.append(&header, data))
-            .map_err(self.failed_to_write())
+        let written =
+            tarball::header(path, data.len() as u64).and_then(|header| tar.append(&header, data));
+        written.map_err(ShardError::io("write", &self.path()))
     }
 
-    fn failed_to_write(&self) -> impl FnOnce(io::Error) -> ShardError {
-        move |source| {
-            let path = self.out.join(names::tar_file(&self.session));
-            ShardError::Io {
-                doing: "write",
-                path,
-                source,
-            }
-        }
+    fn path(&self) -> PathBuf {
+        self.out.join(names::tar_file(&self.session))
     }
 
     fn read(&self, extent: Extent, png: &mut Vec<u8>) -> Result<(), ShardError> {
@@ -137,21 +117,5 @@ impl SpoolStore {
                     .ok_or_else(|| io::ErrorKind::UnexpectedEof.into())
             })
             .map_err(ShardError::io("read back", &self.scratch.path))
-    }
-}
-
-impl SealedShard {
-    /// Renames the tar to its final name, replacing an older one.
-    pub(super) fn publish(self) -> Result<ShardEntry, ShardError> {
-        let entry = self.file.publish()?;
-        Ok(ShardEntry {
-            file: entry.file,
-            session: self.session,
-            samples: self.samples,
-            bytes: entry.bytes,
-            blake3: entry.blake3,
-            mask: None,
-            mean_img: None,
-        })
     }
 }

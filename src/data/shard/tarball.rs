@@ -115,10 +115,8 @@ impl<R: Read> TarReader<R> {
                 self.end(start)?;
                 continue;
             }
-            let header = valid_header(&block).ok_or(ShardError::ShardHeader { offset: start })?;
-            let claimed = header
-                .entry_size()
-                .map_err(|_| ShardError::ShardHeader { offset: start })?;
+            let header = valid_header(&block).ok_or_else(|| no_header(start))?;
+            let claimed = header.entry_size().map_err(|_| no_header(start))?;
             let bytes = named.size.unwrap_or(claimed);
             match header.entry_type() {
                 EntryType::Regular | EntryType::Continuous => {
@@ -136,7 +134,7 @@ impl<R: Read> TarReader<R> {
                     let data = self.data(start, &path, claimed, MAX_EXTENSION)?.0;
                     named.add(header.entry_type(), &data);
                 }
-                EntryType::GNUSparse => return Err(ShardError::ShardHeader { offset: start }),
+                EntryType::GNUSparse => return Err(no_header(start)),
                 EntryType::GNULongLink | EntryType::XGlobalHeader => self.skip(claimed)?,
                 _ => {
                     self.skip(bytes)?;
@@ -155,7 +153,7 @@ impl<R: Read> TarReader<R> {
         loop {
             let block = match self.header_block() {
                 Ok(block) => block,
-                Err(ShardError::ShardTruncated { .. }) => return Ok(false),
+                Err(ShardError::ShardTruncated(_)) => return Ok(false),
                 Err(error) => return Err(error),
             };
             if valid_header(&block).is_some() {
@@ -170,7 +168,7 @@ impl<R: Read> TarReader<R> {
             self.ended = true;
             Ok(())
         } else {
-            Err(ShardError::ShardHeader { offset: start })
+            Err(no_header(start))
         }
     }
 
@@ -208,23 +206,14 @@ impl<R: Read> TarReader<R> {
         limit: u64,
     ) -> Result<(Vec<u8>, bool), ShardError> {
         if bytes > limit {
-            return Err(ShardError::ShardTooLarge {
-                path: path.to_owned(),
-                offset: start,
-                limit,
-            });
+            return Err(too_large(path, start, limit));
         }
         let mut data = Vec::new();
         let read = (&mut self.source).take(bytes).read_to_end(&mut data);
         self.offset += data.len() as u64;
-        read.map_err(|source| ShardError::ShardRead {
-            offset: self.offset,
-            source,
-        })?;
+        read.map_err(|source| self.unread(source))?;
         if (data.len() as u64) < bytes {
-            return Err(ShardError::ShardTruncated {
-                offset: self.offset,
-            });
+            return Err(ShardError::ShardTruncated(self.offset));
         }
         Ok((data, self.skip_padding()?))
     }
@@ -243,18 +232,11 @@ impl<R: Read> TarReader<R> {
     }
 
     fn skip(&mut self, bytes: u64) -> Result<(), ShardError> {
-        let skipped =
-            io::copy(&mut (&mut self.source).take(bytes), &mut io::sink()).map_err(|source| {
-                ShardError::ShardRead {
-                    offset: self.offset,
-                    source,
-                }
-            })?;
+        let skipped = io::copy(&mut (&mut self.source).take(bytes), &mut io::sink());
+        let skipped = skipped.map_err(|source| self.unread(source))?;
         self.offset += skipped;
         if skipped < bytes {
-            return Err(ShardError::ShardTruncated {
-                offset: self.offset,
-            });
+            return Err(ShardError::ShardTruncated(self.offset));
         }
         self.skip_padding().map(|_| ())
     }
@@ -270,17 +252,17 @@ impl<R: Read> TarReader<R> {
     }
 
     fn count(&mut self, read: io::Result<usize>, wanted: usize) -> Result<(), ShardError> {
-        let read = read.map_err(|source| ShardError::ShardRead {
-            offset: self.offset,
-            source,
-        })?;
+        let read = read.map_err(|source| self.unread(source))?;
         self.offset += read as u64;
         if read < wanted {
-            return Err(ShardError::ShardTruncated {
-                offset: self.offset,
-            });
+            return Err(ShardError::ShardTruncated(self.offset));
         }
         Ok(())
+    }
+
+    fn unread(&self, source: io::Error) -> ShardError {
+        let offset = self.offset;
+        ShardError::ShardRead { offset, source }
     }
 }
 
@@ -294,15 +276,11 @@ impl<R: Read + Seek> TarReader<R> {
             .named
             .path_of(Header::from_byte_slice(&head.block), head.offset)?;
         if head.bytes > self.limit {
-            return Err(ShardError::ShardTooLarge {
-                path,
-                offset: head.offset,
-                limit: self.limit,
-            });
+            return Err(too_large(&path, head.offset, self.limit));
         }
         let end = self.offset + head.bytes.next_multiple_of(BLOCK as u64);
         if end > length {
-            return Err(ShardError::ShardTruncated { offset: length });
+            return Err(ShardError::ShardTruncated(length));
         }
         self.jump(end)?;
         Ok(Some(MemberSpan {
@@ -314,15 +292,27 @@ impl<R: Read + Seek> TarReader<R> {
 
     fn jump(&mut self, to: u64) -> Result<(), ShardError> {
         let by = i64::try_from(to - self.offset).unwrap_or(i64::MAX);
-        self.source
-            .seek_relative(by)
-            .map_err(|source| ShardError::ShardRead {
-                offset: self.offset,
-                source,
-            })?;
+        let jumped = self.source.seek_relative(by);
+        jumped.map_err(|source| self.unread(source))?;
         self.offset = to;
         Ok(())
     }
+}
+
+fn damaged(offset: u64, what: String) -> ShardError {
+    ShardError::ShardDamaged { offset, what }
+}
+
+fn no_header(offset: u64) -> ShardError {
+    damaged(offset, "the block is not a tar header".to_owned())
+}
+
+/// That a member, or a sample, is too large to be held in memory.
+pub(super) fn too_large(path: &str, offset: u64, limit: u64) -> ShardError {
+    damaged(
+        offset,
+        format!("{path:?} claims more than the limit of {limit} bytes"),
+    )
 }
 
 /// Path and size that extension headers give for the member that follows them.
@@ -336,7 +326,8 @@ impl Extensions {
     /// The member's name: from the extensions, else from its own header.
     fn path_of(self, own: &Header, offset: u64) -> Result<String, ShardError> {
         let name = self.path.unwrap_or_else(|| own.path_bytes().into_owned());
-        String::from_utf8(name).map_err(|_| ShardError::ShardName { offset })
+        let not_text = |_| damaged(offset, "the name of its member is not UTF-8".to_owned());
+        String::from_utf8(name).map_err(not_text)
     }
 
     fn add(&mut self, kind: EntryType, data: &[u8]) {
@@ -477,7 +468,7 @@ pub(super) mod tests {
         for end in 0..tar.len() {
             let error = read_all(&tar[..end]).unwrap_err();
             assert!(
-                matches!(error, ShardError::ShardTruncated { .. }),
+                matches!(error, ShardError::ShardTruncated(_)),
                 "{end}: {error}"
             );
         }
@@ -491,7 +482,7 @@ pub(super) mod tests {
         assert_eq!(reader.next().unwrap().unwrap().path, "a.png");
         assert!(matches!(
             reader.next(),
-            Err(ShardError::ShardHeader { offset: 1024 })
+            Err(ShardError::ShardDamaged { offset: 1024, .. })
         ));
         assert!(reader.resume().unwrap());
         let member = reader.next().unwrap().unwrap();
@@ -503,11 +494,11 @@ pub(super) mod tests {
     fn a_size_above_the_limit_allocates_no_memory() {
         let block = header("a.png", u64::MAX >> 3).unwrap();
         let read = read_all(block.as_bytes());
-        assert!(matches!(read, Err(ShardError::ShardTooLarge { .. })));
+        assert!(matches!(read, Err(ShardError::ShardDamaged { .. })));
         let block = header("a.png", 1 << 20).unwrap();
         assert!(matches!(
             read_all(block.as_bytes()),
-            Err(ShardError::ShardTruncated { .. })
+            Err(ShardError::ShardTruncated(_))
         ));
     }
 }

@@ -32,24 +32,11 @@ impl Sample {
     /// many threads.
     ///
     /// # Errors
-    /// [`ShardError::Encode`] if the image has no pixels.
+    /// [`ShardError::Image`] if the image has no pixels.
     pub fn encode(record: FrameRecord, image: RgbImage) -> Result<Self, ShardError> {
         let png = encode_rgb(&image)?;
         Ok(Self { record, image, png })
     }
-}
-
-/// What only the whole turn shows of a sample: fields of its record.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TurnFinding {
-    /// The sample.
-    pub index: u32,
-    /// [`FrameRecord::exposure_step`].
-    pub exposure_step: Option<f64>,
-    /// [`FrameRecord::identical_to`].
-    pub identical_to: Option<u64>,
-    /// [`FrameRecord::blur`].
-    pub blur: Option<f64>,
 }
 
 /// The files of a session that was written.
@@ -65,36 +52,6 @@ pub struct ShardFiles {
 enum Store {
     Spool(SpoolStore),
     Folder(FolderStore),
-}
-
-/// The bytes of a session that is being written, for a message about a full disk.
-#[derive(Debug, Clone)]
-struct Needs {
-    out: PathBuf,
-    layout: Layout,
-    samples: u64,
-    pushed: u64,
-    images: u64,
-    mask: u64,
-}
-
-impl Needs {
-    /// What all files take until the last is written, by the images so far.
-    fn estimate(&self) -> u64 {
-        let images = self.images.checked_div(self.pushed).unwrap_or_default() * self.samples;
-        match self.layout {
-            // The images are in the spool and in the tar, whose members have headers and are padded.
-            Layout::Webdataset => {
-                2 * images + self.samples * (self.mask + RECORD_BYTES + 3 * TAR_MEMBER_BYTES)
-            }
-            Layout::Relit => images + self.samples * IMAGE_PADDING,
-        }
-    }
-
-    fn explain(&self, session: &str, error: ShardError) -> ShardError {
-        let (needed, written) = (self.estimate(), self.images);
-        error.with_needs(&format!("session {session}"), &self.out, needed, written)
-    }
 }
 
 /// A record as JSON, about.
@@ -118,7 +75,9 @@ pub struct ShardWriter {
     mask_blake3: Digest,
     rows: Vec<Option<TableRow>>,
     store: Store,
-    needs: Needs,
+    out: PathBuf,
+    /// Bytes of the images so far.
+    images: u64,
 }
 
 impl ShardWriter {
@@ -126,8 +85,9 @@ impl ShardWriter {
     /// `out`, which must exist. `mask` holds 0 and 255 only and has the size of the images.
     ///
     /// # Errors
-    /// [`ShardError::SessionName`], [`ShardError::SampleCount`], [`ShardError::MaskValue`], [`ShardError::Encode`] if the
-    /// mask has no pixels, [`ShardError::Busy`] if the session is being written already, [`ShardError::Io`].
+    /// [`ShardError::SessionName`], [`ShardError::Refused`] for another number of samples, [`ShardError::Image`] if the
+    /// mask has other values or no pixels, [`ShardError::Busy`] if the session is being written already,
+    /// [`ShardError::Io`].
     pub fn create(
         out: &Path,
         layout: Layout,
@@ -137,7 +97,9 @@ impl ShardWriter {
     ) -> Result<Self, ShardError> {
         names::check_session(session)?;
         if samples == 0 || samples > MAX_SAMPLES {
-            return Err(ShardError::SampleCount { samples });
+            return Err(ShardError::Refused(format!(
+                "a session of {samples} samples cannot be written: give 1 to {MAX_SAMPLES}"
+            )));
         }
         check_mask(mask)?;
         let mask_png = encode_mask(mask)?;
@@ -146,55 +108,43 @@ impl ShardWriter {
             Layout::Webdataset => Store::Spool(SpoolStore::create(out, session, samples)?),
             Layout::Relit => Store::Folder(FolderStore::create(out, session, samples, size)?),
         };
-        let needs = Needs {
-            out: out.to_owned(),
-            layout,
-            samples: u64::from(samples),
-            pushed: 0,
-            images: 0,
-            mask: mask_png.len() as u64,
-        };
         Ok(Self {
             session: session.to_owned(),
-            needs,
             size,
             mask_blake3: Digest::of(&mask_png),
             mask_png,
             rows: vec![None; samples as usize],
             store,
+            out: out.to_owned(),
+            images: 0,
         })
     }
 
     /// Adds a sample. Each index must be given exactly once, in any order.
     ///
     /// # Errors
-    /// [`ShardError::WrongSession`], [`ShardError::OutOfRange`], [`ShardError::DoubledSample`],
-    /// [`ShardError::SizeMismatch`] if image, record and mask differ in size, [`ShardError::NotFinite`],
-    /// [`ShardError::DiskFull`], [`ShardError::Io`]. The sample is then not added.
+    /// [`ShardError::Refused`] if it is another session's, there is no such sample or it was given already, a number
+    /// is not finite, or image, record and mask differ in size; [`ShardError::DiskFull`], [`ShardError::Io`]. The
+    /// sample is then not added.
     pub fn push(&mut self, sample: Sample) -> Result<(), ShardError> {
         let Sample { record, image, png } = sample;
-        self.check(&record, &image)?;
+        self.check(&record, &image).map_err(ShardError::Refused)?;
         let index = record.index;
-        let out_of_range = || ShardError::OutOfRange {
-            session: self.session.clone(),
-            index,
-            last: u32::try_from(self.rows.len()).unwrap_or(MAX_SAMPLES) - 1,
-        };
-        let slot = index as usize;
-        if self.rows.get(slot).ok_or_else(out_of_range)?.is_some() {
-            return Err(ShardError::DoubledSample {
-                session: self.session.clone(),
-                index,
-            });
-        }
         let pushed = match &mut self.store {
             Store::Spool(spool) => spool.push(index, &png),
             Store::Folder(folder) => folder.push(index, &png, &image),
         };
-        pushed.map_err(|error| self.needs.explain(&self.session, error))?;
-        self.needs.pushed += 1;
-        self.needs.images += png.len() as u64;
-        if let Some(row) = self.rows.get_mut(slot) {
+        let (needed, written) = self.needs();
+        pushed.map_err(|error| {
+            error.with_needs(
+                &format!("session {}", self.session),
+                &self.out,
+                needed,
+                written,
+            )
+        })?;
+        self.images += png.len() as u64;
+        if let Some(row) = self.rows.get_mut(index as usize) {
             *row = Some(TableRow {
                 png_blake3: Digest::of(&png),
                 record,
@@ -211,147 +161,140 @@ impl ShardWriter {
         Some((&row.record, row.png_blake3))
     }
 
-    /// Completes the record of a sample that was added, by what only the whole turn shows.
-    ///
-    /// # Errors
-    /// [`ShardError::NotFinite`]; the record is then as it was.
-    pub fn set_finding(&mut self, finding: TurnFinding) -> Result<(), ShardError> {
-        let TurnFinding {
-            index,
-            exposure_step,
-            identical_to,
-            blur,
-        } = finding;
-        for (field, value) in [("exposure_step", exposure_step), ("blur", blur)] {
-            if value.is_some_and(|value| !value.is_finite()) {
-                return Err(ShardError::NotFinite {
-                    session: self.session.clone(),
-                    index,
-                    field,
-                });
-            }
-        }
-        if let Some(Some(row)) = self.rows.get_mut(index as usize) {
-            row.record.exposure_step = exposure_step;
-            row.record.identical_to = identical_to;
-            row.record.blur = blur;
-        }
-        Ok(())
+    /// The record of a sample that was added, to complete it by what only the whole turn shows.
+    pub fn record_mut(&mut self, index: u32) -> Option<&mut FrameRecord> {
+        let row = self.rows.get_mut(index as usize)?.as_mut()?;
+        Some(&mut row.record)
     }
 
     /// Writes the session's files under their final names, replacing older ones.
     ///
     /// # Errors
-    /// [`ShardError::MissingSample`] if samples were not given; [`ShardError::DiskFull`], [`ShardError::Io`],
-    /// [`ShardError::Table`] or [`ShardError::Json`] if a file could not be written. Then nothing of the session is left, except
-    /// files that got their names before the error, which `dataset.json` does not list.
+    /// [`ShardError::Refused`] if samples were not given or a number is not finite; [`ShardError::DiskFull`],
+    /// [`ShardError::Io`] or [`ShardError::Table`] if a file could not be written. Then nothing of the session is left,
+    /// except files that got their names before the error, which `dataset.json` does not list.
     pub fn finish(self) -> Result<ShardFiles, ShardError> {
-        let (needs, session) = (self.needs.clone(), self.session.clone());
+        let (needed, written) = self.needs();
+        let (what, out) = (format!("session {}", self.session), self.out.clone());
         self.write_files()
-            .map_err(|error| needs.explain(&session, error))
+            .map_err(|error| error.with_needs(&what, &out, needed, written))
     }
 
     fn write_files(self) -> Result<ShardFiles, ShardError> {
-        let Self {
-            session,
-            mask_png,
-            rows,
-            store,
-            ..
-        } = self;
-        let rows = complete(&session, rows)?;
-        match store {
+        let session = self.session;
+        let rows = complete(&session, self.rows).map_err(ShardError::Refused)?;
+        let (shard, table) = match self.store {
             Store::Spool(spool) => {
-                let shard = spool.seal(&rows, &mask_png)?;
-                let table = seal_table(spool.out(), &session, &rows)?;
-                Ok(ShardFiles {
-                    shards: vec![shard.publish()?],
-                    table: table.publish()?,
-                })
+                let tar = spool.seal(&rows, &self.mask_png)?;
+                let table = seal_table(&self.out, &session, &rows)?;
+                let tar = tar.publish()?;
+                let shard = ShardEntry {
+                    file: tar.file,
+                    session,
+                    samples: rows.len() as u32,
+                    bytes: tar.bytes,
+                    blake3: tar.blake3,
+                    mask: None,
+                    mean_img: None,
+                };
+                (shard, table)
             }
             Store::Folder(folder) => {
-                let table = seal_table(folder.out(), &session, &rows)?;
-                let shard = folder.publish(&rows, &mask_png)?;
-                Ok(ShardFiles {
-                    shards: vec![shard],
-                    table: table.publish()?,
-                })
+                let table = seal_table(&self.out, &session, &rows)?;
+                (folder.publish(&rows, &self.mask_png)?, table)
             }
-        }
+        };
+        Ok(ShardFiles {
+            shards: vec![shard],
+            table: table.publish()?,
+        })
     }
 
-    fn check(&self, record: &FrameRecord, image: &RgbImage) -> Result<(), ShardError> {
-        let index = record.index;
-        if record.session != self.session {
-            let (found, expected) = (record.session.clone(), self.session.clone());
-            return Err(ShardError::WrongSession {
-                index,
-                found,
-                expected,
-            });
+    /// What all files take until the last is written, by the images so far, and the images.
+    fn needs(&self) -> (u64, u64) {
+        let (samples, mask) = (self.rows.len() as u64, self.mask_png.len() as u64);
+        let pushed = self.rows.iter().flatten().count() as u64;
+        let images = self.images.checked_div(pushed).unwrap_or_default() * samples;
+        let needed = match self.store {
+            // The images are in the spool and in the tar, whose members have headers and are padded.
+            Store::Spool(_) => 2 * images + samples * (mask + RECORD_BYTES + 3 * TAR_MEMBER_BYTES),
+            Store::Folder(_) => images + samples * IMAGE_PADDING,
+        };
+        (needed, self.images)
+    }
+
+    /// Why a sample is not taken.
+    fn check(&self, record: &FrameRecord, image: &RgbImage) -> Result<(), String> {
+        let (index, session) = (record.index, &self.session);
+        if record.session != *session {
+            let found = &record.session;
+            return Err(format!(
+                "sample {index} belongs to session {found:?}, but {session:?} is being written"
+            ));
         }
         let sizes = [
             ("the image", [image.width(), image.height()]),
             ("the record's size", record.size),
         ];
-        for (what, size) in sizes {
-            if size != self.size {
-                return Err(ShardError::SizeMismatch {
-                    what,
-                    size,
-                    expected: self.size,
-                });
+        let [width, height] = self.size;
+        for (what, [w, h]) in sizes {
+            if [w, h] != self.size {
+                return Err(format!(
+                    "{what} is {w}x{h} pixels, but {width}x{height} were expected"
+                ));
             }
         }
-        match first_not_finite(record) {
-            Some(field) => Err(ShardError::NotFinite {
-                session: self.session.clone(),
-                index,
-                field,
-            }),
-            None => Ok(()),
+        check_finite(session, record)?;
+        match self.rows.get(index as usize) {
+            Some(None) => Ok(()),
+            Some(Some(_)) => Err(format!(
+                "sample {index} of session {session:?} was given twice"
+            )),
+            None => Err(format!(
+                "session {session:?} has samples 0 to {}, but sample {index} was given",
+                self.rows.len() - 1
+            )),
         }
     }
 }
 
-/// All rows, or an error with the first missing index.
-fn complete(session: &str, rows: Vec<Option<TableRow>>) -> Result<Vec<TableRow>, ShardError> {
+/// All rows, or what is wrong with them.
+fn complete(session: &str, rows: Vec<Option<TableRow>>) -> Result<Vec<TableRow>, String> {
     let missing = rows.iter().filter(|row| row.is_none()).count();
     if let Some(index) = rows.iter().position(Option::is_none) {
-        let index = u32::try_from(index).unwrap_or(MAX_SAMPLES);
-        return Err(ShardError::MissingSample {
-            session: session.to_owned(),
-            index,
-            missing,
-        });
+        return Err(format!(
+            "session {session:?} is not complete: {missing} samples were not given, the first is sample {index}"
+        ));
     }
-    Ok(rows.into_iter().flatten().collect())
+    let rows: Vec<TableRow> = rows.into_iter().flatten().collect();
+    rows.iter()
+        .try_for_each(|row| check_finite(session, &row.record))?;
+    Ok(rows)
 }
 
-fn first_not_finite(record: &FrameRecord) -> Option<&'static str> {
+/// That all numbers of a record are such as JSON can hold.
+fn check_finite(session: &str, record: &FrameRecord) -> Result<(), String> {
     let [dx, dy] = record.shift_px.unwrap_or_default();
     let [r, g, b] = record.mean_rgb;
     let fields = [
-        ("angle_deg", record.angle_deg.unwrap_or_default()),
-        ("shift_px", dx + dy),
-        (
-            "align_confidence",
-            record.align_confidence.unwrap_or_default(),
-        ),
-        (
-            "shift_interpolated_sd_px",
-            record.shift_interpolated_sd_px.unwrap_or_default(),
-        ),
-        ("saturated_fraction", record.saturated_fraction),
-        ("mean_rgb", r + g + b),
-        ("sharpness", record.sharpness),
-        ("exposure_step", record.exposure_step.unwrap_or_default()),
-        ("blur", record.blur.unwrap_or_default()),
+        ("angle_deg", record.angle_deg),
+        ("shift_px", Some(dx + dy)),
+        ("align_confidence", record.align_confidence),
+        ("shift_interpolated_sd_px", record.shift_interpolated_sd_px),
+        ("saturated_fraction", Some(record.saturated_fraction)),
+        ("mean_rgb", Some(r + g + b)),
+        ("sharpness", Some(record.sharpness)),
+        ("exposure_step", record.exposure_step),
+        ("blur", record.blur),
     ];
-    fields
-        .into_iter()
-        .find(|(_, value)| !value.is_finite())
-        .map(|(field, _)| field)
+    let is_wrong = |(_, value): &&(_, Option<f64>)| value.is_some_and(|value| !value.is_finite());
+    match fields.iter().find(is_wrong) {
+        Some((field, _)) => Err(format!(
+            "{field} of sample {} of session {session:?} is not a finite number",
+            record.index
+        )),
+        None => Ok(()),
+    }
 }
 
 fn seal_table(out: &Path, session: &str, rows: &[TableRow]) -> Result<SealedFile, ShardError> {

@@ -1,8 +1,6 @@
-//! `relit-extract`: turns recordings into training shards of masked frames, joins, verifies and
-//! sums them up, and describes them for those who publish them.
+//! `relit-extract`: turns recordings into training shards of masked frames, joins, verifies and sums them up.
 
 mod arguments;
-mod carding;
 mod extracting;
 mod merging;
 mod stats;
@@ -10,24 +8,50 @@ mod verifying;
 
 use std::process::ExitCode;
 
-use arguments::Command;
+use arguments::{CommandLine, Verb};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 use relit_console::Console;
 
 fn main() -> ExitCode {
-    if let Some(code) = relit_console::written_manual(arguments::command()) {
+    if let Some(code) = relit_console::written_manual(CommandLine::command()) {
         return code;
     }
-    let arguments = arguments::parse();
-    let console = Console::new(arguments.json).with_progress(arguments.progress);
-    match arguments.command {
-        Command::Extract {
-            inputs,
-            out,
-            options,
-        } => console.finish(extracting::run(console, &inputs, &out, &options)),
-        Command::Card { out, facts } => console.finish(carding::run(console, &out, &facts)),
-        Command::Merge { out } => console.finish(merging::run(console, &out)),
-        Command::Stats { out, html } => console.finish(stats::run(console, &out, html.as_deref())),
-        Command::Verify { out } => console.finish(verifying::run(console, &out)),
+    let line = CommandLine::parse();
+    let wrong = |kind, text: &str| CommandLine::command().error(kind, text).exit();
+    match (line.verb, line.extract) {
+        (
+            Some(Verb::Verify {
+                out,
+                json,
+                progress,
+            }),
+            _,
+        ) => {
+            let console = Console::new(json).with_progress(progress);
+            console.finish(verifying::run(console, &out))
+        }
+        (Some(Verb::Merge { out, json }), _) => {
+            let console = Console::new(json);
+            console.finish(merging::run(console, &out))
+        }
+        (Some(Verb::Stats { out, json }), _) => {
+            let console = Console::new(json);
+            console.finish(stats::run(console, &out))
+        }
+        (None, Some(extract)) => {
+            let console = Console::new(extract.json).with_progress(extract.progress);
+            match extract.options() {
+                Ok(options) => {
+                    let (inputs, out) = (&extract.inputs, &extract.out);
+                    console.finish(extracting::run(console, inputs, out, &options))
+                }
+                Err(text) => wrong(ErrorKind::ValueValidation, &text),
+            }
+        }
+        (None, None) => wrong(
+            ErrorKind::MissingRequiredArgument,
+            "INPUT and --out are required",
+        ),
     }
 }

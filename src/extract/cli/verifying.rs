@@ -6,15 +6,17 @@ use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
 use relit_data::shard::verify;
 use relit_extract::ExtractError;
-use relit_extract::objects::{ObjectError, is_url};
+use relit_extract::objects::is_url;
 
 /// Number of problems that are printed for a person.
 const MAX_PRINTED: usize = 50;
 
 pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
     if is_url(out) {
-        let url = out.display().to_string();
-        return Err(ObjectError::FolderOnly(url).into());
+        return Err(ExtractError::Refused(format!(
+            "{} is a URL, and this command reads a folder: copy the data set to the local disk first",
+            out.display()
+        )));
     }
     let bar = console.progress(0, "verify");
     let report = verify(out, &|done, total| {

@@ -21,8 +21,8 @@ use url::Url;
 
 use relit_data::durable::Partial;
 
-use super::ObjectError;
 use super::url::{check, without_credentials};
+use crate::ExtractError;
 
 /// Bytes that are uploaded at once; a longer object goes up in parts of this size.
 const PART: usize = 8 << 20;
@@ -44,18 +44,16 @@ pub(super) struct Bucket {
 impl Bucket {
     /// The objects below `url`; credentials, endpoint and region come from the environment, by the
     /// store's usual names (`AWS_ACCESS_KEY_ID`, ...).
-    pub(super) fn open(url: &Path) -> Result<Self, ObjectError> {
+    pub(super) fn open(url: &Path) -> Result<Self, ExtractError> {
         check(url)?;
         let text = url.to_string_lossy();
-        let parsed = Url::parse(&text).map_err(|error| ObjectError::Url {
-            url: without_credentials(&text),
-            why: error.to_string(),
-        })?;
         let shown = without_credentials(&text);
-        let wrong = |why: &str| ObjectError::Url {
-            url: shown.clone(),
-            why: why.to_owned(),
+        let wrong = |why: &str| {
+            ExtractError::Refused(format!(
+                "{shown} is no object store: {why}; give s3://BUCKET/PATH, gs://BUCKET/PATH, az://CONTAINER/PATH or file:///PATH"
+            ))
         };
+        let parsed = Url::parse(&text).map_err(|error| wrong(&error.to_string()))?;
         let unknown = |_| wrong("its kind is not known");
         let (scheme, _) = ObjectStoreScheme::parse(&parsed).map_err(unknown)?;
         let invalid = |_| wrong("its path cannot be an object's");
@@ -89,24 +87,32 @@ impl Bucket {
         parts.fold(self.root.clone(), |key, part| key.join(part))
     }
 
-    fn failed(&self, doing: &'static str, name: &str, error: &object_store::Error) -> ObjectError {
+    fn failed(&self, doing: &'static str, name: &str, error: &object_store::Error) -> ExtractError {
         let url = self.url(name);
         let why = reason(error);
         // Listing has no kinds of errors of its own: the store's answer tells.
         let answered = |status: &str| why.contains(&format!("status code: {status}"));
-        match error {
-            object_store::Error::NotFound { .. } => ObjectError::NotThere(url),
+        let is_refused = matches!(
+            error,
             object_store::Error::PermissionDenied { .. }
-            | object_store::Error::Unauthenticated { .. } => ObjectError::Forbidden { url, doing },
-            _ if answered("404") => ObjectError::NotThere(url),
-            _ if answered("403") || answered("401") => ObjectError::Forbidden { url, doing },
-            _ => ObjectError::Failed { url, doing, why },
+                | object_store::Error::Unauthenticated { .. }
+        );
+        if matches!(error, object_store::Error::NotFound { .. }) || answered("404") {
+            return not_there(&url);
         }
+        ExtractError::Refused(match is_refused || answered("403") || answered("401") {
+            true => format!(
+                "{url} may not be {doing}: check the credentials in the environment and what they allow"
+            ),
+            false => format!(
+                "{url} could not be {doing}: {why}; what was finished is there, run again with --resume"
+            ),
+        })
     }
 
     /// The names of all objects below the URL with their lengths, sorted. That of an object under the very
     /// URL is empty.
-    pub(super) fn list(&self) -> Result<Vec<(String, u64)>, ObjectError> {
+    pub(super) fn list(&self) -> Result<Vec<(String, u64)>, ExtractError> {
         let failed = |error| self.failed("listed", "", &error);
         let below = self.store.list(Some(&self.root));
         let found: Vec<_> = self.runtime.block_on(below.try_collect()).map_err(failed)?;
@@ -128,7 +134,7 @@ impl Bucket {
     }
 
     /// The length of an object, if it is there.
-    pub(super) fn length(&self, name: &str) -> Result<Option<u64>, ObjectError> {
+    pub(super) fn length(&self, name: &str) -> Result<Option<u64>, ExtractError> {
         match self.runtime.block_on(self.store.head(&self.key(name))) {
             Ok(found) => Ok(Some(found.size)),
             Err(object_store::Error::NotFound { .. }) => Ok(None),
@@ -137,7 +143,7 @@ impl Bucket {
     }
 
     /// Whether there is an object under the name or below it.
-    pub(super) fn holds_any(&self, name: &str) -> Result<bool, ObjectError> {
+    pub(super) fn holds_any(&self, name: &str) -> Result<bool, ExtractError> {
         let key = self.key(name);
         let failed = |error| self.failed("listed", name, &error);
         let mut below = self.store.list(Some(&key));
@@ -146,10 +152,10 @@ impl Bucket {
     }
 
     /// Brings an object to a file, which appears when it is whole.
-    pub(super) fn download(&self, name: &str, to: &Path) -> Result<(), ObjectError> {
-        let local = |doing| ObjectError::local(doing, to);
+    pub(super) fn download(&self, name: &str, to: &Path) -> Result<(), ExtractError> {
+        let local = |doing| ExtractError::io(doing, to);
         if let Some(folder) = to.parent() {
-            std::fs::create_dir_all(folder).map_err(ObjectError::local("made", folder))?;
+            std::fs::create_dir_all(folder).map_err(ExtractError::io("made", folder))?;
         }
         let mut file = Partial::create(to).map_err(local("created"))?;
         let failed = |error| self.failed("read", name, &error);
@@ -159,15 +165,15 @@ impl Bucket {
             while let Some(piece) = pieces.try_next().await.map_err(failed)? {
                 file.write_all(&piece).map_err(local("written"))?;
             }
-            Ok::<(), ObjectError>(())
+            Ok::<(), ExtractError>(())
         })?;
         let sealed = file.seal().map_err(local("written"))?;
         sealed.publish().map_err(local("written"))
     }
 
     /// Brings a file to the store, where it appears when it is whole.
-    pub(super) fn upload(&self, from: &Path, name: &str) -> Result<(), ObjectError> {
-        let local = |doing| ObjectError::local(doing, from);
+    pub(super) fn upload(&self, from: &Path, name: &str) -> Result<(), ExtractError> {
+        let local = |doing| ExtractError::io(doing, from);
         let failed = |error| self.failed("written", name, &error);
         let mut file = File::open(from).map_err(local("read"))?;
         let length = file.metadata().map_err(local("read"))?.len();
@@ -204,6 +210,13 @@ impl Bucket {
             upload.finish().await.map(|_| ()).map_err(failed)
         })
     }
+}
+
+/// That a bucket or object does not exist.
+pub(super) fn not_there(url: &str) -> ExtractError {
+    ExtractError::Refused(format!(
+        "{url} is not there: check the name of the bucket and the path"
+    ))
 }
 
 /// The store of a URL; `None` for a kind that is none of ours.
@@ -279,6 +292,6 @@ mod tests {
         assert_eq!(bucket.length("a/c").unwrap(), None);
         assert!(bucket.holds_any("a").unwrap() && !bucket.holds_any("c").unwrap());
         let missing = bucket.download("a/c", &to).unwrap_err();
-        assert!(matches!(missing, ObjectError::NotThere(_)), "{missing}");
+        assert!(missing.to_string().contains("is not there"), "{missing}");
     }
 }

@@ -15,31 +15,22 @@
 
 #[cfg(feature = "object-store")]
 mod bucket;
-mod error;
 #[cfg(feature = "object-store")]
 mod staging;
 mod url;
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
-use relit_data::shard::{Merged, Overview};
+use relit_data::shard::{self, Merged, Overview};
 
 use super::{ExtractError, ExtractOptions, Observer, Tally};
 
-pub use error::ObjectError;
-pub use url::{check, is_url};
+#[cfg(feature = "object-store")]
+pub(super) use staging::extract;
+pub use url::is_url;
 
 /// As [`extract`](super::extract), where some of the inputs or `out` are URLs.
-#[cfg(feature = "object-store")]
-pub(super) fn extract(
-    inputs: &[PathBuf],
-    out: &Path,
-    options: &ExtractOptions,
-    observer: &dyn Observer,
-) -> Result<Tally, ExtractError> {
-    staging::extract(inputs, out, options, observer)
-}
-
 #[cfg(not(feature = "object-store"))]
 pub(super) fn extract(
     inputs: &[PathBuf],
@@ -48,39 +39,44 @@ pub(super) fn extract(
     _: &dyn Observer,
 ) -> Result<Tally, ExtractError> {
     let mut all = inputs.iter().map(PathBuf::as_path).chain([out]);
-    let url = all.find(|path| is_url(path)).unwrap_or(out);
-    Err(not_built(url).into())
+    Err(not_built(all.find(|path| is_url(path)).unwrap_or(out)))
 }
 
 #[cfg(not(feature = "object-store"))]
-fn not_built(path: &Path) -> ObjectError {
-    ObjectError::NotBuilt(url::without_credentials(&path.to_string_lossy()))
+fn not_built(path: &Path) -> ExtractError {
+    ExtractError::Refused(format!(
+        "{} is a URL, and this program was built without object stores: build it with `--features object-store`, or give a folder",
+        url::without_credentials(&path.to_string_lossy())
+    ))
 }
 
 /// The data set in `out` at a glance, a folder or a URL, of which descriptions and tables are downloaded.
 ///
 /// # Errors
-/// As [`Overview::read`]; [`ObjectError`].
+/// As [`Overview::read`]; [`ExtractError::Refused`] where an object store cannot be used.
 pub fn overview(out: &Path) -> Result<Overview, ExtractError> {
     match is_url(out) {
         false => Ok(Overview::read(out)?),
         #[cfg(feature = "object-store")]
         true => staging::overview(out),
         #[cfg(not(feature = "object-store"))]
-        true => Err(not_built(out).into()),
+        true => Err(not_built(out)),
     }
 }
 
-/// Joins the pieces of several tasks in `out`, a folder or a URL: see [`merge`](relit_data::shard::merge()).
+/// Joins the pieces of several tasks in `out`, a folder or a URL: see [`merge`](shard::merge()).
 ///
 /// # Errors
-/// As [`merge`](relit_data::shard::merge()); [`ObjectError`].
+/// As [`merge`](shard::merge()); [`ExtractError::Refused`] where an object store cannot be used.
 pub fn merge(out: &Path) -> Result<Merged, ExtractError> {
     match is_url(out) {
-        false => Ok(relit_data::shard::merge(out)?),
+        false => {
+            let length = |file: &str| fs::metadata(out.join(file)).map(|found| found.len());
+            Ok(shard::merge(out, &length)?)
+        }
         #[cfg(feature = "object-store")]
         true => staging::merge(out),
         #[cfg(not(feature = "object-store"))]
-        true => Err(not_built(out).into()),
+        true => Err(not_built(out)),
     }
 }

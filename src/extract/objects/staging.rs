@@ -11,15 +11,13 @@ use relit_data::session::{self, recordings};
 use relit_data::shard::{self, ArrayTask, Dataset, Merged, Overview, ShardError};
 use tempfile::TempDir;
 
-use super::ObjectError;
-use super::bucket::Bucket;
+use super::bucket::{Bucket, not_there};
 use super::url::{check, is_url};
-use crate::batch::extract_recordings;
-use crate::storage::StorageBackend;
+use crate::batch::{StorageBackend, extract_recordings, into_session};
 use crate::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally};
 
 /// As [`extract`](crate::extract), where some of the inputs or `out` are URLs.
-pub(super) fn extract(
+pub(crate) fn extract(
     inputs: &[PathBuf],
     out: &Path,
     options: &ExtractOptions,
@@ -30,7 +28,7 @@ pub(super) fn extract(
             check(url)?;
         }
     }
-    let folder = temporary(options.cache.as_deref())?;
+    let folder = temporary()?;
     let target = match is_url(out) {
         true => Some(Target::open(out, folder.path(), options.task)?),
         false => None,
@@ -64,7 +62,7 @@ pub(super) fn extract(
 
 /// The data set at a URL at a glance.
 pub(super) fn overview(out: &Path) -> Result<Overview, ExtractError> {
-    let folder = temporary(None)?;
+    let folder = temporary()?;
     let bucket = Bucket::open(out)?;
     for (name, _) in bucket.list()? {
         if name == Dataset::FILE || is_piece(&name) || name.ends_with(".parquet") {
@@ -83,7 +81,7 @@ pub(super) fn overview(out: &Path) -> Result<Overview, ExtractError> {
 
 /// Joins the pieces of several tasks at a URL.
 pub(super) fn merge(out: &Path) -> Result<Merged, ExtractError> {
-    let folder = temporary(None)?;
+    let folder = temporary()?;
     let bucket = Bucket::open(out)?;
     for (name, _) in bucket.list()? {
         if name == Dataset::FILE || is_piece(&name) {
@@ -97,7 +95,7 @@ pub(super) fn merge(out: &Path) -> Result<Merged, ExtractError> {
         Ok(None) => Err(io::Error::new(io::ErrorKind::NotFound, "it is not there")),
         Err(error) => Err(io::Error::other(error)),
     };
-    let merged = shard::merge_with(folder.path(), &length)
+    let merged = shard::merge(folder.path(), &length)
         .map_err(|error| named_by_url(error, &bucket.url("")))?;
     bucket.upload(&folder.path().join(Dataset::FILE), Dataset::FILE)?;
     Ok(merged)
@@ -107,7 +105,7 @@ pub(super) fn merge(out: &Path) -> Result<Merged, ExtractError> {
 fn named_by_url(error: ShardError, url: &str) -> ExtractError {
     let path = PathBuf::from(url);
     match error {
-        ShardError::NoDataset { .. } => ShardError::NoDataset { path }.into(),
+        ShardError::NoDataset(_) => ShardError::NoDataset(path).into(),
         ShardError::Pieces { problems, .. } => ShardError::Pieces { path, problems }.into(),
         other => other.into(),
     }
@@ -118,14 +116,11 @@ fn is_piece(name: &str) -> bool {
     inside.is_some_and(|piece| !piece.starts_with('.') && piece.ends_with(".json"))
 }
 
-/// A folder that is removed in the end.
-fn temporary(cache: Option<&Path>) -> Result<TempDir, ObjectError> {
-    let cache = cache.map_or_else(std::env::temp_dir, Path::to_owned);
-    let made = fs::create_dir_all(&cache).and_then(|()| {
-        let mut name = tempfile::Builder::new();
-        name.prefix("relit-extract-").tempdir_in(&cache)
-    });
-    made.map_err(ObjectError::local("made", &cache))
+/// A folder that is removed in the end, where the system puts temporary files.
+fn temporary() -> Result<TempDir, ExtractError> {
+    let mut name = tempfile::Builder::new();
+    let made = name.prefix("relit-extract-").tempdir();
+    made.map_err(ExtractError::io("made", &std::env::temp_dir()))
 }
 
 /// A recording in an object store.
@@ -155,7 +150,7 @@ impl Staging {
         let root = into.join(shown.rsplit('/').next().unwrap_or_default());
         let files = bucket.list()?;
         if files.is_empty() {
-            return Err(ObjectError::NotThere(shown).into());
+            return Err(not_there(&shown));
         }
         let place = |name: &str| match name {
             "" => root.clone(),
@@ -165,7 +160,7 @@ impl Staging {
             .iter()
             .filter(|(name, _)| name.split('/').count() <= 2)
         {
-            placeholder(&place(name)).map_err(ObjectError::local("made", &root))?;
+            placeholder(&place(name)).map_err(ExtractError::io("made", &root))?;
         }
         let mut found = Vec::new();
         for local in recordings(&root)? {
@@ -217,7 +212,7 @@ impl StorageBackend for Staging {
     ) -> Result<(), ExtractError> {
         if let Some(remote) = self.sources.get(recording) {
             for (_, place) in &remote.files {
-                fs::remove_file(place).map_err(ObjectError::local("removed", place))?;
+                fs::remove_file(place).map_err(ExtractError::io("removed", place))?;
             }
         }
         if let Some((target, session)) = self.target.as_ref().zip(extracted) {
@@ -245,7 +240,7 @@ impl Target {
         // A bucket that does not exist is noticed before anything is extracted.
         bucket.holds_any("")?;
         if bucket.length(session::MANIFEST_FILE)?.is_some() {
-            return Err(ExtractError::IntoSession(url.to_owned()));
+            return Err(into_session(url));
         }
         let target = Self {
             bucket,
@@ -261,7 +256,7 @@ impl Target {
     }
 
     /// Whether all files of a session are there with their lengths.
-    fn holds(&self, dataset: &Dataset, session: &str) -> Result<bool, ObjectError> {
+    fn holds(&self, dataset: &Dataset, session: &str) -> Result<bool, ExtractError> {
         for (file, bytes) in dataset.files_of(session) {
             let there = match bytes {
                 Some(bytes) => self.bucket.length(file)? == Some(bytes),
@@ -275,14 +270,14 @@ impl Target {
     }
 
     /// Uploads the files of a session, then the description, and removes the files from the local disk.
-    fn deliver(&self, dataset: &Dataset, session: &str) -> Result<(), ObjectError> {
+    fn deliver(&self, dataset: &Dataset, session: &str) -> Result<(), ExtractError> {
         let files: Vec<&str> = dataset.files_of(session).map(|(file, _)| file).collect();
         for file in &files {
             let place = self.folder.join(file);
             if place.is_dir() {
-                let inside = fs::read_dir(&place).map_err(ObjectError::local("listed", &place))?;
+                let inside = fs::read_dir(&place).map_err(ExtractError::io("listed", &place))?;
                 for image in inside {
-                    let image = image.map_err(ObjectError::local("listed", &place))?;
+                    let image = image.map_err(ExtractError::io("listed", &place))?;
                     let name = format!("{file}/{}", image.file_name().to_string_lossy());
                     self.bucket.upload(&image.path(), &name)?;
                 }
@@ -297,19 +292,19 @@ impl Target {
                 true => fs::remove_dir_all(&place),
                 false => fs::remove_file(&place),
             };
-            removed.map_err(ObjectError::local("removed", &place))?;
+            removed.map_err(ExtractError::io("removed", &place))?;
         }
         Ok(())
     }
 
     /// Uploads the description, if it changed.
-    fn describe(&self) -> Result<(), ObjectError> {
+    fn describe(&self) -> Result<(), ExtractError> {
         let place = self.folder.join(&self.description);
         let bytes = match fs::read(&place) {
             Ok(bytes) => bytes,
             // Nothing was extracted.
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            Err(error) => return Err(ObjectError::local("read", &place)(error)),
+            Err(error) => return Err(ExtractError::io("read", &place)(error)),
         };
         if *self.described.borrow() != bytes {
             self.bucket.upload(&place, &self.description)?;

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::ObjectError;
+#[cfg(any(feature = "object-store", test))]
+use super::ExtractError;
 
 /// Whether a path is a URL, such as `s3://bucket/sessions`.
 #[must_use]
@@ -15,15 +16,16 @@ pub fn is_url(path: &Path) -> bool {
 }
 
 /// That a URL holds no credentials, which would be printed and recorded.
-///
-/// # Errors
-/// [`ObjectError::Credentials`].
-pub fn check(url: &Path) -> Result<(), ObjectError> {
+#[cfg(any(feature = "object-store", test))]
+pub(super) fn check(url: &Path) -> Result<(), ExtractError> {
     let text = url.to_string_lossy();
     let rest = text.split_once("://").map_or("", |(_, rest)| rest);
     let host = rest.split('/').next().unwrap_or_default();
     match host.contains('@') || rest.contains('?') {
-        true => Err(ObjectError::Credentials(without_credentials(&text))),
+        true => Err(ExtractError::Refused(format!(
+            "{} is given with credentials or a query: they belong into the environment",
+            without_credentials(&text)
+        ))),
         false => Ok(()),
     }
 }

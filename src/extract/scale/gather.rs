@@ -90,7 +90,7 @@ pub(super) struct Gather<'a> {
 
 /// How far the gathering of a crop has come.
 #[derive(Debug)]
-pub(super) struct Progress {
+pub(crate) struct Progress {
     pub(super) scaled: RgbImage,
     /// The next row, with the apron's.
     at: usize,

@@ -29,10 +29,7 @@ pub(super) const NO_METHOD: &str = "none";
 
 /// The scaling of one crop, as far as its rows have come.
 #[derive(Debug)]
-pub struct Scaling(Work);
-
-#[derive(Debug)]
-enum Work {
+pub(super) enum Scaling {
     Scaled(Progress),
     /// The source pixels are kept: of so many rows so far.
     Kept(RgbImage, u32),
@@ -40,11 +37,10 @@ enum Work {
 
 impl Scaling {
     /// The image, when all rows were taken.
-    #[must_use]
-    pub fn into_image(self) -> RgbImage {
-        match self.0 {
-            Work::Scaled(Progress { scaled, .. }) => scaled,
-            Work::Kept(image, _) => image,
+    pub(super) fn into_image(self) -> RgbImage {
+        match self {
+            Self::Scaled(Progress { scaled, .. }) => scaled,
+            Self::Kept(image, _) => image,
         }
     }
 }
@@ -72,7 +68,7 @@ impl Scaler {
     /// A scaler for crops with this mask (0 or 255), to `side` x `side` pixels or without scaling.
     ///
     /// # Errors
-    /// [`ExtractError::ObjectTooSmall`] if the object covers half of no output pixel.
+    /// [`ExtractError::Refused`] if the object covers half of no output pixel.
     pub fn new(crop_mask: GrayImage, side: Option<u32>) -> Result<Self, ExtractError> {
         let to = match side {
             None => None,
@@ -97,7 +93,7 @@ impl Scaler {
     /// Masks and scales one crop, which has the size of the mask, and measures it.
     ///
     /// # Errors
-    /// [`ExtractError::Scaling`] if the crop has another size.
+    /// [`ExtractError::Refused`] if the crop has another size.
     pub fn scale(
         &self,
         crop: CropView<'_>,
@@ -113,25 +109,23 @@ impl Scaler {
     /// Begins to mask and scale a crop, which has the size of the mask, and of which rows come by and by.
     ///
     /// # Errors
-    /// [`ExtractError::Scaling`] if the crop has another size.
-    pub fn begin(
+    /// [`ExtractError::Refused`] if the crop has another size.
+    pub(super) fn begin(
         &self,
         crop: CropView<'_>,
         buffers: &mut ScaleBuffers,
     ) -> Result<Scaling, ExtractError> {
         if crop.dimensions() != self.source.image.dimensions() {
-            return Err(ExtractError::Scaling(
-                "the crop and its mask differ in size",
-            ));
+            return Err(other_size());
         }
-        Ok(Scaling(match &self.to {
-            Some(target) => Work::Scaled(self.gather(crop, target).begin(buffers)),
-            None => Work::Kept(RgbImage::new(crop.dimensions().0, crop.dimensions().1), 0),
-        }))
+        Ok(match &self.to {
+            Some(target) => Scaling::Scaled(self.gather(crop, target).begin(buffers)),
+            None => Scaling::Kept(RgbImage::new(crop.dimensions().0, crop.dimensions().1), 0),
+        })
     }
 
     /// Masks, scales and measures the rows of a crop before row `until` that were not taken yet.
-    pub fn take_rows(
+    pub(super) fn take_rows(
         &self,
         scaling: &mut Scaling,
         crop: CropView<'_>,
@@ -139,12 +133,12 @@ impl Scaler {
         buffers: &mut ScaleBuffers,
         measuring: &mut Measuring<'_>,
     ) {
-        match (&mut scaling.0, &self.to) {
-            (Work::Scaled(progress), Some(target)) => {
+        match (scaling, &self.to) {
+            (Scaling::Scaled(progress), Some(target)) => {
                 let gather = self.gather(crop, target);
                 gather.advance(until as usize, progress, buffers, measuring);
             }
-            (Work::Kept(image, taken), _) => {
+            (Scaling::Kept(image, taken), _) => {
                 for y in *taken..until {
                     let row = crop.row(i64::from(y), 0);
                     measuring.add_row::<4>(row);
@@ -153,7 +147,7 @@ impl Scaler {
                 *taken = until.max(*taken);
             }
             // A scaling that another scaler began.
-            (Work::Scaled(_), None) => {}
+            (Scaling::Scaled(_), None) => {}
         }
     }
 
@@ -176,7 +170,7 @@ impl Scaler {
     /// on each side. Mask and image move together: the background stays out.
     ///
     /// # Errors
-    /// [`ExtractError::Scaling`] if the crop has another size or no apron.
+    /// [`ExtractError::Refused`] if the crop has another size or no apron.
     pub fn scale_moved(
         &self,
         crop: CropView<'_>,
@@ -186,9 +180,7 @@ impl Scaler {
     ) -> Result<RgbImage, ExtractError> {
         let fits = crop.dimensions() == self.source.image.dimensions();
         if !fits || crop.moved([0, 0], APRON).is_none() {
-            return Err(ExtractError::Scaling(
-                "the crop and its mask differ in size",
-            ));
+            return Err(other_size());
         }
         let (width, height) = self.source.image.dimensions();
         let filter = self.to.as_ref().map_or(Filter::CatmullRom, |to| to.filter);
@@ -209,6 +201,11 @@ impl Scaler {
         };
         Ok(gather.run(buffers, measuring))
     }
+}
+
+fn other_size() -> ExtractError {
+    let text = "a frame could not be scaled: the crop and its mask differ in size";
+    ExtractError::Refused(text.to_owned())
 }
 
 /// Copies row `y` of a crop to its place, where it is under the mask.
@@ -256,7 +253,9 @@ impl Target {
             }
         }
         if mask.as_raw().iter().all(|&m| m == 0) {
-            return Err(ExtractError::ObjectTooSmall { side });
+            return Err(ExtractError::Refused(format!(
+                "the object is too small: at {side} pixels it covers half of no pixel of the output; give a larger --size or a smaller --margin"
+            )));
         }
         Ok(Self {
             filter,
@@ -474,7 +473,7 @@ mod tests {
             &mut buffers,
             &mut spans.measuring(SATURATION_LEVEL),
         );
-        assert!(matches!(refused, Err(ExtractError::Scaling(_))));
+        assert!(matches!(refused, Err(ExtractError::Refused(_))));
     }
 
     #[test]
@@ -483,7 +482,7 @@ mod tests {
         mask.put_pixel(50, 50, Luma([255]));
         assert!(matches!(
             Scaler::new(mask, Some(8)),
-            Err(ExtractError::ObjectTooSmall { side: 8 })
+            Err(ExtractError::Refused(_))
         ));
     }
 }

@@ -109,7 +109,7 @@ fn check_recording(
 /// The picture of the mask, and its file.
 fn read_mask(path: &Path) -> Result<(MaskPicture, Vec<u8>), MaskingError> {
     let bytes = std::fs::read(path).map_err(MaskingError::io(path, "read"))?;
-    let image = relit_still::decode(&bytes);
+    let image = relit_data::still::decode(&bytes);
     let image = image.map_err(|error| MaskingError::unusable("mask", path, &error))?;
     Ok((MaskPicture::of_image(&image), bytes))
 }

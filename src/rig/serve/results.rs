@@ -195,14 +195,10 @@ impl ResultsReader {
 
 fn entries_of(dataset: &Dataset) -> BTreeMap<String, Entry> {
     let entries = dataset.sessions.iter().map(|session| {
-        let quality = session.quality.as_ref();
-        let verdict = quality.map_or(QualityVerdict::NONE.to_owned(), |quality| {
-            quality.verdict.to_string()
-        });
-        let mut reasons = quality.map_or(Vec::new(), |quality| quality.reasons.clone());
+        let mut reasons = session.quality.reasons.clone();
         reasons.extend(session.warnings.iter().cloned());
         let state = ExtractionState {
-            verdict,
+            verdict: session.quality.verdict.to_string(),
             reasons,
             samples: session.samples,
             is_lossy: session.lossy,

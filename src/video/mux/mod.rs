@@ -72,24 +72,24 @@ impl Muxer {
     /// Creates a new file at `path`.
     ///
     /// # Errors
-    /// [`VideoError::PictureSize`] if the format cannot have this size, [`VideoError::Write`] if the
-    /// file cannot be created or exists, [`VideoError::Mux`] if this FFmpeg lacks the codec.
+    /// [`VideoError::Refused`] if the format cannot have this size or this FFmpeg lacks the codec,
+    /// [`VideoError::Write`] if the file cannot be created or exists.
     pub fn create(path: &Path, stream: StreamFormat) -> Result<Self, VideoError> {
         initialise();
         let refused = |source| VideoError::Write {
             path: path.to_owned(),
             source,
         };
-        let failed = |why| VideoError::Mux {
-            path: path.to_owned(),
-            why,
-        };
+        let failed = |why| not_created(path, why);
         let (format, width, height) = (stream.format, stream.width, stream.height);
         let encoder = match format {
             PixelFormat::Mjpeg | PixelFormat::H264 => None,
             _ => {
-                lossless::picture_bytes(format, width, height)
-                    .ok_or(VideoError::PictureSize { width, height })?;
+                lossless::picture_bytes(format, width, height).ok_or_else(|| {
+                    VideoError::Refused(format!(
+                        "{width} x {height} pixels are not possible in this pixel format: choose another mode"
+                    ))
+                })?;
                 Some(lossless::encoder(format, width, height).map_err(failed)?)
             }
         };
@@ -133,13 +133,16 @@ impl Muxer {
     ///
     /// # Errors
     /// [`VideoError::DiskFull`] where the disk is full, [`VideoError::Write`] where it fails otherwise,
-    /// [`VideoError::PictureBytes`] where an uncompressed picture has not the bytes of one (nothing was
-    /// written then, and the next may follow), [`VideoError::NotAnnexB`], or [`VideoError::Mux`].
+    /// [`VideoError::Refused`] where an uncompressed picture has not the bytes of one (nothing was
+    /// written then, and the next may follow), H.264 has no start codes, or FFmpeg cannot code it.
     pub fn write(&mut self, data: &[u8], t_us: i64) -> Result<Written, VideoError> {
         let chained = self.stream.format == PixelFormat::H264;
         if chained {
             if !nal::is_annex_b(data) {
-                return Err(VideoError::NotAnnexB(self.path.clone()));
+                return Err(VideoError::Refused(format!(
+                    "the stream for {} is not H.264 with start codes: choose another mode of the camera",
+                    self.path.display()
+                )));
             }
             self.sets.gather(data);
         }
@@ -232,11 +235,11 @@ impl Muxer {
     fn encode(&mut self, data: &[u8], ms: i64) -> Result<Packet, VideoError> {
         let (format, width, height) = (self.stream.format, self.stream.width, self.stream.height);
         let frame = lossless::frame(format, data, width, height);
-        let mut frame = frame.ok_or_else(|| VideoError::PictureBytes {
-            found: data.len(),
-            wanted: format.frame_bytes(width, height).unwrap_or(0),
-            width,
-            height,
+        let mut frame = frame.ok_or_else(|| {
+            let (found, wanted) = (data.len(), format.frame_bytes(width, height).unwrap_or(0));
+            VideoError::Refused(format!(
+                "a picture of {width} x {height} pixels has {found} bytes instead of {wanted}: the camera sends another size than agreed, or half a picture"
+            ))
         })?;
         frame.set_pts(Some(ms));
         let mut packet = Packet::empty();
@@ -274,8 +277,7 @@ impl Muxer {
     }
 
     fn failed(&self, why: ffmpeg_next::Error) -> VideoError {
-        let path = self.path.clone();
-        VideoError::Mux { path, why }
+        not_created(&self.path, why)
     }
 
     /// The error for a write that the system refused.
@@ -292,4 +294,11 @@ impl Muxer {
         }
         VideoError::Write { path, source }
     }
+}
+
+fn not_created(path: &Path, why: ffmpeg_next::Error) -> VideoError {
+    VideoError::Refused(format!(
+        "{} could not be created ({why}): does this FFmpeg write Matroska and FFV1?",
+        path.display()
+    ))
 }

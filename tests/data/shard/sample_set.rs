@@ -7,8 +7,8 @@ use relit_data::geometry::Rect;
 use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{
     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
-    OutputFolder, Sample, SamplingBasis, SessionEntry, ShardWriter, SourceVideo, VerifyProblem,
-    VerifyReport, verify,
+    OutputFolder, Sample, SamplingBasis, SessionEntry, SessionQuality, ShardWriter, SourceVideo,
+    VerifyProblem, VerifyReport, verify,
 };
 
 pub(crate) const SESSION: &str = "20261120T093015Z-mug";
@@ -47,13 +47,13 @@ pub(crate) fn record(session: &str, index: u32, image: &RgbImage) -> FrameRecord
         .unwrap();
     let duplicate = index == 5;
     let crop = Rect::new(-2, 5, WIDTH, HEIGHT);
-    FrameRecord::new(session, "mug", index, crop, &measures, SPEC_NET_GATE)
-        .of_frame(
-            u64::from(index) * 3 - if duplicate { 3 } else { 0 },
-            1_000_000 + i64::from(index) * 33_333,
-            (index != 2).then_some(f64::from(index) * 0.24),
-        )
-        .flagged_duplicate(duplicate)
+    FrameRecord {
+        source_frame: u64::from(index) * 3 - if duplicate { 3 } else { 0 },
+        t_us: 1_000_000 + i64::from(index) * 33_333,
+        angle_deg: (index != 2).then_some(f64::from(index) * 0.24),
+        duplicate,
+        ..FrameRecord::new(session, "mug", index, crop, &measures, SPEC_NET_GATE)
+    }
 }
 
 pub(crate) fn sample(session: &str, index: u32) -> Sample {
@@ -83,6 +83,8 @@ pub(crate) fn entry(
     let count = |flag: fn(&FrameRecord) -> bool| {
         all.iter().filter(|sample| flag(&sample.record)).count() as u32
     };
+    let mut records: Vec<FrameRecord> = all.iter().map(|s| s.record.clone()).collect();
+    records.sort_by_key(|record| record.index);
     let blake3 = Digest::of(b"input");
     SessionEntry {
         id: id.to_owned(),
@@ -108,7 +110,7 @@ pub(crate) fn entry(
         duplicates: count(|r| r.duplicate),
         spec_net: count(|r| r.spec_net),
         lossy: false,
-        quality: None,
+        quality: SessionQuality::of(&records, false, None),
         warnings: Vec::new(),
         table: files.table.clone(),
         report: None,

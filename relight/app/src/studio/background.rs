@@ -5,7 +5,7 @@ use std::path::Path;
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Samples, Srgb, encode_exr};
 use relight_core::light::Panorama;
 use relight_photo::insert::{PanoramaView, SceneBackground, SceneDescription, SceneSetting};
-use relit_still::Format;
+use relit_data::still::Format;
 
 use super::error::{Refusal, refused};
 use super::object::{OpenedFile, png_of, stem};

@@ -9,7 +9,6 @@ use image::{DynamicImage, ImageFormat};
 use relight_core::image::ImageError;
 use relight_photo::decompose::DecomposeError;
 use relight_photo::files::{FoundPhotos, PhotoInput, UnusedFile};
-use relit_still::Format;
 
 use crate::support::{Folder, HEIGHT, WIDTH, is_inside, load, mask, object, with_mask};
 
@@ -112,7 +111,8 @@ fn every_file_of_a_folder_is_used_or_named() {
         [
             UnusedFile::NotRead {
                 path: path("c.heic"),
-                format: Format::Heic
+                name: "a HEIC image",
+                advice: "save it as JPEG or PNG, or let the telephone write JPEG",
             },
             UnusedFile::NoPicture {
                 path: path("h.txt")

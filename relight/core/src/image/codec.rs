@@ -1,4 +1,4 @@
-//! Encoded pictures: what `relit-still` decodes in, JPEG and EXR out. Knows bytes only: a path is how errors name a picture.
+//! Encoded pictures: what `relit_data::still` decodes in, JPEG and EXR out. Knows bytes only: a path is how errors name a picture.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -134,7 +134,7 @@ impl StoredImage {
 
 /// The picture as it is displayed.
 pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<DynamicImage, ImageError> {
-    relit_still::decode(bytes).map_err(ImageError::still(path))
+    relit_data::still::decode(bytes).map_err(ImageError::still(path))
 }
 
 fn split<P: Pixel<Subpixel = f32>, const C: usize>(image: &ImageBuffer<P, Vec<f32>>) -> Planes<C> {

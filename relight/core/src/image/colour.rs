@@ -6,6 +6,8 @@
 use std::fmt::Debug;
 use std::marker::PhantomData;
 
+use relit_data::srgb;
+
 use super::Planes;
 use crate::sealed::OwnMarker;
 
@@ -45,23 +47,11 @@ impl ColourSpace for Linear {
 
 impl ColourSpace for Srgb {
     fn to_linear(encoded: f32) -> f32 {
-        let size = encoded.abs();
-        let light = if size <= 0.04045 {
-            size / 12.92
-        } else {
-            ((size + 0.055) / 1.055).powf(2.4)
-        };
-        light.copysign(encoded)
+        srgb::to_linear_f32(encoded)
     }
 
     fn from_linear(light: f32) -> f32 {
-        let size = light.abs();
-        let encoded = if size <= 0.003_130_8 {
-            size * 12.92
-        } else {
-            1.055 * size.powf(1.0 / 2.4) - 0.055
-        };
-        encoded.copysign(light)
+        srgb::from_linear_f32(light)
     }
 }
 

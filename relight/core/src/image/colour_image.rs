@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use relit_still::Colour;
+use relit_data::still::Colour;
 
 use super::{ColourSpace, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer};
 

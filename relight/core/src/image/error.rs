@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use relit_still::{ColourError, StillError};
+use relit_data::still::{ColourError, StillError};
 
 use relit_data::mask::MaskFault;
 

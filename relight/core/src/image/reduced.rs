@@ -6,7 +6,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::imageops::FilterType as Kernel;
 use image::{ColorType, DynamicImage};
 
-use relit_still::Colour;
+use relit_data::still::Colour;
 
 use super::codec::{decode, encode_exr, to_integer};
 use super::colour_image::colour_of;

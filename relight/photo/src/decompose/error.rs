@@ -13,7 +13,7 @@ use relight_nets::NetError;
 #[cfg(feature = "files")]
 use relight_reader::{DamagedSample, OpenError};
 use relit_data::mask::size_hint;
-use relit_still::ColourError;
+use relit_data::still::ColourError;
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]

@@ -149,7 +149,7 @@ pub(crate) fn stem(path: &Path) -> String {
 /// The size that a file says it has; none where it cannot be read.
 #[must_use]
 pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
-    let (width, height) = relit_still::stored_size(bytes)?;
+    let (width, height) = relit_data::still::stored_size(bytes)?;
     Some(Extent::new(width as usize, height as usize))
 }
 
@@ -158,7 +158,8 @@ pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
 fn check_extent(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), DecomposeError> {
     let is_turned = found == Extent::new(expected.height, expected.width) && found != expected;
     // Exif's orientations from 5 on swap the sides.
-    let orientation = relit_still::orientation(bytes).map(relit_still::Orientation::to_exif);
+    let orientation =
+        relit_data::still::orientation(bytes).map(relit_data::still::Orientation::to_exif);
     if is_turned && orientation.is_some_and(|number| number >= 5) {
         return Err(DecomposeError::MaskStored { found, expected });
     }

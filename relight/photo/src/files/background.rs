@@ -7,7 +7,7 @@ use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::{ColourImage, Extent, ImageError, Linear, Rgb};
 use relight_core::light::Panorama;
 use relit_data::file_names::{VIDEO_EXTENSIONS, has_extension};
-use relit_still::Format;
+use relit_data::still::Format;
 
 use super::InsertionError;
 use crate::decompose::stated_extent;

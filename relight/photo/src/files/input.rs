@@ -10,7 +10,7 @@ use relight_core::image::{Extent, ImageError, Planes, Rgb, StoredImage, Transfer
 use relight_reader::{Encoding, SampleId, Source, Turns};
 use relit_data::file_names::{alike_beside, folded, has_extension, is_hidden};
 use relit_data::shard::Dataset;
-use relit_still::{Format, Orientation, is_named};
+use relit_data::still::{Format, Orientation, is_named};
 
 use super::mask_record::check_turned;
 use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
@@ -63,12 +63,14 @@ pub struct FoundPhotos {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UnusedFile {
     /// It is in a format that is not read.
-    #[error("{} is {}, which is not read: {}", path.display(), format.name(), format.advice())]
+    #[error("{} is {}, which is not read: {}", path.display(), name, advice)]
     NotRead {
         /// The file.
         path: PathBuf,
-        /// Its format.
-        format: Format,
+        /// What a file of its format is called.
+        name: &'static str,
+        /// What to do with it.
+        advice: &'static str,
     },
     /// It is no picture.
     #[error("{} is not used: it is not a picture", path.display())]
@@ -212,8 +214,11 @@ fn use_of(path: PathBuf) -> Option<UnusedFile> {
     // What cannot be read is known by its name alone.
     let _ = file.and_then(|file| file.take(HEAD).read_to_end(&mut head));
     match Format::of(&head) {
-        Some(format) if format.is_read() => None,
-        Some(format) => Some(UnusedFile::NotRead { path, format }),
+        Some(format) => {
+            format
+                .unread()
+                .map(|(name, advice)| UnusedFile::NotRead { path, name, advice })
+        }
         None if is_named(&path) => None,
         None => Some(UnusedFile::NoPicture { path }),
     }
@@ -276,7 +281,7 @@ fn read_file(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErro
     let mask = match &reading.mask {
         Some(file) => {
             let file = mask_file(file, &stem(path))?;
-            let orientation = relit_still::orientation(&bytes).map(Orientation::to_exif);
+            let orientation = relit_data::still::orientation(&bytes).map(Orientation::to_exif);
             check_turned(&file, path, orientation)?;
             let image = StoredImage::read(&file)?;
             Some((file, image))

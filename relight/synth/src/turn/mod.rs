@@ -170,7 +170,7 @@ fn write_turn(
         duplicates: 0,
         spec_net: spec_net as u32,
         lossy: false,
-        quality: Some(SessionQuality::of(&records, false, None)),
+        quality: SessionQuality::of(&records, false, None),
         warnings: Vec::new(),
         table: files.table,
         report: None,

@@ -219,13 +219,11 @@ impl<'a> SimulatedTurn<'a> {
         let size = self.description.size;
         let whole = Rect::new(0, 0, size, size);
         let (session, object) = (&self.session, &self.object);
-        let record = FrameRecord::new(session, object, index, whole, &measures, SPEC_NET_GATE)
-            .of_frame(
-                u64::from(index),
-                (f64::from(index) * 1e6 / RATE).round() as i64,
-                Some(self.angle_deg(index)),
-            );
-        Ok(record)
+        Ok(FrameRecord {
+            t_us: (f64::from(index) * 1e6 / RATE).round() as i64,
+            angle_deg: Some(self.angle_deg(index)),
+            ..FrameRecord::new(session, object, index, whole, &measures, SPEC_NET_GATE)
+        })
     }
 }
 

@@ -4,7 +4,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use super::problem::VerifyProblem;
+use super::VerifyProblem;
 use crate::causes::with_causes;
 use crate::file_names::folded;
 use crate::shard::dataset::{Dataset, SessionEntry, ShardEntry};

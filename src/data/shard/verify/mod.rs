@@ -3,12 +3,12 @@
 
 mod folder;
 mod listing;
-mod problem;
 mod records;
 mod sample;
 mod session;
 mod tarball;
 
+use std::fmt;
 use std::path::Path;
 
 use super::ShardError;
@@ -17,7 +17,40 @@ use super::record::FrameRecord;
 use super::settings::Layout;
 use session::{Found, Progress, SessionCheck};
 
-pub use problem::{VerifyProblem, VerifyReport};
+/// The result of a verification.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct VerifyReport {
+    /// Sessions that `dataset.json` lists.
+    pub sessions: u64,
+    /// Shards that were read.
+    pub shards: u64,
+    /// Samples of which every part was found.
+    pub samples: u64,
+    /// What is wrong; empty if the data set is intact.
+    pub problems: Vec<VerifyProblem>,
+}
+
+/// Something that is wrong with a data set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct VerifyProblem {
+    /// The file, or the folder of images, relative to the data set.
+    pub file: String,
+    /// The key of the sample, `<session>/<kkkk>`, if the problem concerns one.
+    pub sample: Option<String>,
+    /// What is wrong.
+    pub what: String,
+}
+
+impl fmt::Display for VerifyProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.sample {
+            Some(sample) => write!(f, "{}: sample {sample}: {}", self.file, self.what),
+            None => write!(f, "{}: {}", self.file, self.what),
+        }
+    }
+}
 
 /// Reads the data set in the folder `out` back and checks everything that can be checked: counts,
 /// names and order; length and BLAKE3 of every file and every member; that images and masks decode,
@@ -29,9 +62,9 @@ pub use problem::{VerifyProblem, VerifyReport};
 /// rayon's threads, in batches of bounded size.
 ///
 /// # Errors
-/// Only if there is no data set to check: [`ShardError::NoDataset`], [`ShardError::Schema`],
-/// [`ShardError::Description`], [`ShardError::UnsafePath`], [`ShardError::SessionName`], or [`ShardError::Io`] on the
-/// folder. Everything else is a [`VerifyProblem`].
+/// Only if there is no data set to check: [`ShardError::NoDataset`], [`ShardError::Description`],
+/// [`ShardError::UnsafePath`], [`ShardError::SessionName`], or [`ShardError::Io`] on the folder. Everything else is a
+/// [`VerifyProblem`].
 pub fn verify(
     out: &Path,
     progress: &(dyn Fn(u64, u64) + Sync),

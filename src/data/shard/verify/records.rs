@@ -21,17 +21,12 @@ pub(super) fn check(
         let wrong = record_problems(settings, session, index, record);
         problems.extend(wrong.into_iter().map(|what| (Some(index), what)));
     }
-    problems.extend(
-        duplicate_flags(records)
-            .into_iter()
-            .map(|(index, what)| (Some(index), what)),
-    );
-    if records.iter().all(Option::is_some) && !records.is_empty() {
-        problems.extend(
-            totals(session, records)
-                .into_iter()
-                .map(|what| (None, what)),
-        );
+    let flags = duplicate_flags(records).into_iter();
+    problems.extend(flags.map(|(index, what)| (Some(index), what)));
+    let known: Vec<FrameRecord> = records.iter().copied().flatten().cloned().collect();
+    if known.len() == records.len() && !known.is_empty() {
+        let wrong = totals(session, &known).into_iter();
+        problems.extend(wrong.map(|what| (None, what)));
     }
     problems
 }
@@ -140,45 +135,30 @@ fn record_problems(
 }
 
 /// The problems with the counts in the session's entry.
-fn totals(session: &SessionEntry, records: &[Option<&FrameRecord>]) -> Vec<String> {
-    let count = |flag: fn(&FrameRecord) -> bool| {
-        records
-            .iter()
-            .flatten()
-            .filter(|record| flag(record))
-            .count() as u64
-    };
+fn totals(session: &SessionEntry, records: &[FrameRecord]) -> Vec<String> {
+    let count = |flag: fn(&FrameRecord) -> bool| records.iter().filter(|r| flag(r)).count() as u32;
     let counts = [
-        (
-            "duplicates",
-            u64::from(session.duplicates),
-            count(|r| r.duplicate),
-        ),
-        (
-            "spec_net",
-            u64::from(session.spec_net),
-            count(|r| r.spec_net),
-        ),
+        ("duplicates", session.duplicates, count(|r| r.duplicate)),
+        ("spec_net", session.spec_net, count(|r| r.spec_net)),
     ];
-    let mut problems: Vec<String> = counts
+    let wrong = counts
         .into_iter()
-        .filter(|(_, listed, found)| listed != found)
+        .filter(|(_, listed, found)| listed != found);
+    let mut problems: Vec<String> = wrong
         .map(|(what, listed, found)| {
             format!("dataset.json says {listed} samples have {what}, the records say {found}")
         })
         .collect();
-    if let Some(listed) = &session.quality {
-        let records: Vec<FrameRecord> = records.iter().copied().flatten().cloned().collect();
-        // The verdict is that of the version that wrote it.
-        let found = SessionQuality {
-            verdict: listed.verdict,
-            reasons: listed.reasons.clone(),
-            mask_misfit: listed.mask_misfit,
-            ..SessionQuality::of(&records, session.lossy, session.covered_deg)
-        };
-        if found != *listed {
-            problems.push("the figures under quality are not those of the records".to_owned());
-        }
+    // The records do not tell whether the mask fits, nor how that lowers the verdict.
+    let listed = &session.quality;
+    let found = SessionQuality {
+        verdict: listed.verdict,
+        reasons: listed.reasons.clone(),
+        mask_misfit: listed.mask_misfit,
+        ..SessionQuality::of(records, session.lossy, session.covered_deg)
+    };
+    if found != *listed {
+        problems.push("the figures under quality are not those of the records".to_owned());
     }
     problems
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::problem::VerifyProblem;
+use super::VerifyProblem;
 use crate::causes::with_causes;
 use crate::shard::dataset::{SessionEntry, ShardEntry};
 use crate::shard::names::sample_key;

@@ -12,7 +12,7 @@ use super::session::{Found, SessionCheck};
 use crate::causes::with_causes;
 use crate::image_stats::MaskSpans;
 use crate::shard::ShardError;
-use crate::shard::digest::{Digest, HashingReader};
+use crate::shard::digest::{Digest, Hashing};
 use crate::shard::file::compare;
 use crate::shard::names::{Part, parse_member};
 use crate::shard::order::order;
@@ -25,14 +25,14 @@ const MAX_BYTES: u64 = 256 << 20;
 const BATCH_SAMPLES: usize = 64;
 const BATCH_BYTES: usize = 64 << 20;
 
-type Source = HashingReader<BufReader<File>>;
+type Source = Hashing<BufReader<File>>;
 
 pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
     let path = check.out.join(&check.shard.file);
     let samples = check.session.samples as usize;
     match File::open(&path).map_err(ShardError::io("open", &path)) {
         Ok(file) => {
-            let source = HashingReader::new(BufReader::with_capacity(1 << 18, file));
+            let source = Hashing::new(BufReader::with_capacity(1 << 18, file));
             TarCheck::new(check, TarReader::new(source, MAX_BYTES)).run()
         }
         Err(error) => {
@@ -109,11 +109,7 @@ impl<'a, 'b> TarCheck<'a, 'b> {
                 Err(error) => {
                     let index = self.expected();
                     self.check.note(index, with_causes(&error));
-                    let ended = matches!(
-                        error,
-                        ShardError::ShardRead { .. } | ShardError::ShardTruncated { .. }
-                    );
-                    if ended || !self.resume() {
+                    if error.ends_the_shard() || !self.resume() {
                         break;
                     }
                 }
@@ -270,7 +266,7 @@ impl<'a, 'b> TarCheck<'a, 'b> {
             Err(error) => check.note(None, format!("it could not be read to its end: {error}")),
         }
         let shard = check.shard;
-        if let Err(error) = compare(&shard.file, (shard.bytes, shard.blake3), source.finish()) {
+        if let Err(error) = compare(&shard.file, (shard.bytes, shard.blake3), source.found()) {
             check.note(None, with_causes(&error));
         }
         let complete = seen

@@ -28,7 +28,7 @@ pub(super) fn describe(
         .notices
         .iter()
         .map(|notice| notice.text().to_owned());
-    let damage = video.damage().iter().map(ToString::to_string);
+    let damage = video.damage().iter().cloned();
     DeviceInfo {
         address,
         name: camera.map_or_else(|| recording.id.clone(), |camera| camera.name.clone()),

@@ -5,9 +5,9 @@ use std::io::Cursor;
 use image::{ColorType, ImageDecoder, ImageReader};
 
 use super::icc::colour_of_profile;
-use super::{Colour, Curve, Primaries, png_chunks};
-use crate::tiff::{self, Directory};
-use crate::{ColourError, Format, exr, jpeg, png_exif, radiance};
+use super::{Colour, Curve, Primaries, png_chunks, to_rec709};
+use crate::still::tiff::{self, Directory};
+use crate::still::{ColourError, Format, exr, jpeg, png_exif, radiance};
 
 /// Exif's colour spaces.
 const EXIF_ADOBE_RGB: u32 = 2;
@@ -60,7 +60,7 @@ fn check_inks(format: Format, bytes: &[u8]) -> Result<(), ColourError> {
         _ => false,
     };
     if has_inks {
-        Err(ColourError::Cmyk)
+        Err(ColourError("has its colours in CMYK".to_owned()))
     } else {
         Ok(())
     }
@@ -76,7 +76,7 @@ fn of_decoder(format: Format, bytes: &[u8]) -> Result<Colour, ColourError> {
     match decoder.icc_profile() {
         Ok(Some(icc)) => return colour_of_profile(&icc, is_grey),
         _ if format == Format::Jpeg && jpeg::has_profile(bytes) => {
-            return Err(ColourError::Profile);
+            return Err(ColourError::profile());
         }
         _ if is_float => return Ok(Colour::LINEAR),
         _ => {}
@@ -104,6 +104,6 @@ fn of_exif(exif: &[u8]) -> Result<Colour, ColourError> {
     if !is_adobe {
         return Ok(Colour::SRGB);
     }
-    let matrix = Primaries::ADOBE_RGB.to_rec709()?;
+    let matrix = to_rec709(Primaries::ADOBE_RGB)?;
     Ok(Colour::new(Curve::Power(563.0 / 256.0), matrix))
 }

@@ -5,9 +5,9 @@ use std::io::Read;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder, ImageError};
 
-use crate::colour::{Matrix, Primaries};
-use crate::decode::reserve;
-use crate::{ColourError, StillError};
+use crate::still::colour::{Matrix, Primaries, to_rec709 as matrix_of};
+use crate::still::decode::reserve;
+use crate::still::{ColourError, StillError};
 
 /// Headers are no longer.
 const LONGEST_HEADER: usize = 65_536;
@@ -37,7 +37,7 @@ struct Layout {
 /// The matrix from the primaries that the file states to Rec. 709, which it has without a statement.
 pub(crate) fn to_rec709(bytes: &[u8]) -> Result<Option<Matrix>, ColourError> {
     match Header::read(bytes).and_then(|header| header.primaries) {
-        Some(primaries) => primaries.to_rec709(),
+        Some(primaries) => matrix_of(primaries),
         None => Ok(None),
     }
 }

@@ -3,8 +3,7 @@
 use super::tiff;
 
 /// A format of still images.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Portable Network Graphics.
     Png,
@@ -22,33 +21,22 @@ pub enum Format {
     Exr,
     /// Radiance.
     Radiance,
-    /// AVIF.
+    /// AVIF, which is not read.
     Avif,
-    /// HEIF with HEVC, as telephones write it.
+    /// HEIF with HEVC, as telephones write it, which is not read.
     Heic,
-    /// JPEG XL.
-    JpegXl,
-    /// JPEG 2000.
-    Jpeg2000,
-    /// A camera's raw file.
-    Raw,
-    /// Photoshop.
-    Psd,
-    /// GIMP.
-    Xcf,
-    /// Portable anymap or float map.
-    Pnm,
-    /// Quite OK Image.
-    Qoi,
-    /// DirectDraw surface.
-    Dds,
-    /// Portable document.
-    Pdf,
-    /// Scalable vector graphics.
-    Svg,
-    /// A page of a website.
-    Html,
+    /// Another one that is not read: what a file of it is called, with its article, and what to do with it.
+    Other(&'static str, &'static str),
 }
+
+const SAVE: &str = "save it as PNG or JPEG";
+const EXPORT: &str = "export it as PNG";
+const RAW: Format = Format::Other(
+    "a camera's raw file",
+    "develop it, and export it as PNG or TIFF of 16 bits",
+);
+const SVG: Format = Format::Other("an SVG", EXPORT);
+const HTML: Format = Format::Other("a page of a website", "download the picture itself");
 
 /// Endings of the files that are read.
 pub const ENDINGS: [&str; 18] = [
@@ -74,7 +62,7 @@ impl Format {
             _ if starts(b"#?") => Self::Radiance,
             _ if starts(b"GIF87a") || starts(b"GIF89a") => Self::Gif,
             _ if starts(b"BM") && bytes.len() > 26 => Self::Bmp,
-            _ if is_raw(bytes) => Self::Raw,
+            _ if is_raw(bytes) => RAW,
             _ if [&b"II*\0"[..], b"MM\0*", b"II+\0", b"MM\0+"]
                 .iter()
                 .any(|magic| starts(magic)) =>
@@ -82,76 +70,38 @@ impl Format {
                 Self::Tiff
             }
             _ if at(4, b"ftyp") => return of_brands(bytes),
-            _ if starts(b"\xff\x0a") || starts(b"\0\0\0\x0cJXL ") => Self::JpegXl,
-            _ if starts(b"\0\0\0\x0cjP  ") || starts(b"\xff\x4f\xff\x51") => Self::Jpeg2000,
-            _ if starts(b"8BPS") => Self::Psd,
-            _ if starts(b"gimp xcf") => Self::Xcf,
+            _ if starts(b"\xff\x0a") || starts(b"\0\0\0\x0cJXL ") => {
+                Self::Other("a JPEG XL image", SAVE)
+            }
+            _ if starts(b"\0\0\0\x0cjP  ") || starts(b"\xff\x4f\xff\x51") => {
+                Self::Other("a JPEG 2000 image", SAVE)
+            }
+            _ if starts(b"8BPS") => Self::Other("a Photoshop file", EXPORT),
+            _ if starts(b"gimp xcf") => Self::Other("a GIMP file", EXPORT),
             [
                 b'P',
                 b'1'..=b'7' | b'F' | b'f',
                 b' ' | b'\n' | b'\r' | b'\t' | b'#',
                 ..,
-            ] => Self::Pnm,
-            _ if starts(b"qoif") => Self::Qoi,
-            _ if starts(b"DDS ") => Self::Dds,
-            _ if starts(b"%PDF-") => Self::Pdf,
+            ] => Self::Other("a PNM image", SAVE),
+            _ if starts(b"qoif") => Self::Other("a QOI image", SAVE),
+            _ if starts(b"DDS ") => Self::Other("a DDS image", SAVE),
+            _ if starts(b"%PDF-") => Self::Other("a PDF", EXPORT),
             _ => return of_markup(bytes),
         })
     }
 
-    /// Whether it is decoded here.
+    /// Of a format that is not read: what a file of it is called, with its article, and what to do with it.
     #[must_use]
-    pub const fn is_read(self) -> bool {
-        matches!(
-            self,
-            Self::Png
-                | Self::Jpeg
-                | Self::WebP
-                | Self::Tiff
-                | Self::Bmp
-                | Self::Gif
-                | Self::Exr
-                | Self::Radiance
-        )
-    }
-
-    /// What a file of it is called, with its article.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub const fn unread(self) -> Option<(&'static str, &'static str)> {
         match self {
-            Self::Png => "a PNG",
-            Self::Jpeg => "a JPEG",
-            Self::WebP => "a WebP image",
-            Self::Tiff => "a TIFF",
-            Self::Bmp => "a BMP",
-            Self::Gif => "a GIF",
-            Self::Exr => "an EXR",
-            Self::Radiance => "a Radiance HDR image",
-            Self::Avif => "an AVIF image",
-            Self::Heic => "a HEIC image",
-            Self::JpegXl => "a JPEG XL image",
-            Self::Jpeg2000 => "a JPEG 2000 image",
-            Self::Raw => "a camera's raw file",
-            Self::Psd => "a Photoshop file",
-            Self::Xcf => "a GIMP file",
-            Self::Pnm => "a PNM image",
-            Self::Qoi => "a QOI image",
-            Self::Dds => "a DDS image",
-            Self::Pdf => "a PDF",
-            Self::Svg => "an SVG",
-            Self::Html => "a page of a website",
-        }
-    }
-
-    /// What to do with a file that is not read.
-    #[must_use]
-    pub const fn advice(self) -> &'static str {
-        match self {
-            Self::Raw => "develop it, and export it as PNG or TIFF of 16 bits",
-            Self::Heic => "save it as JPEG or PNG, or let the telephone write JPEG",
-            Self::Psd | Self::Xcf | Self::Pdf | Self::Svg => "export it as PNG",
-            Self::Html => "download the picture itself",
-            _ => "save it as PNG or JPEG",
+            Self::Avif => Some(("an AVIF image", SAVE)),
+            Self::Heic => Some((
+                "a HEIC image",
+                "save it as JPEG or PNG, or let the telephone write JPEG",
+            )),
+            Self::Other(name, advice) => Some((name, advice)),
+            _ => None,
         }
     }
 }
@@ -168,7 +118,7 @@ fn of_brands(bytes: &[u8]) -> Option<Format> {
         all.any(|brand| brands.iter().any(|&known| known == brand))
     };
     if major == b"crx " {
-        Some(Format::Raw)
+        Some(RAW)
     } else if is_one_of(&[b"avif", b"avis"]) {
         Some(Format::Avif)
     } else if [
@@ -217,9 +167,9 @@ fn of_markup(bytes: &[u8]) -> Option<Format> {
     let text = String::from_utf8_lossy(start).to_ascii_lowercase();
     let text = text.trim_start_matches('\u{feff}').trim_start();
     if text.starts_with("<svg") || text.starts_with("<?xml") && text.contains("<svg") {
-        Some(Format::Svg)
+        Some(SVG)
     } else if text.starts_with("<!doctype html") || text.starts_with("<html") {
-        Some(Format::Html)
+        Some(HTML)
     } else {
         None
     }
@@ -238,15 +188,18 @@ mod tests {
             (&heic[..], Some(Format::Heic)),
             (avif, Some(Format::Avif)),
             (video, None),
-            (b"\0\0\0\x18ftypcrx \0\0\0\0crx ", Some(Format::Raw)),
+            (b"\0\0\0\x18ftypcrx \0\0\0\0crx ", Some(RAW)),
             (b"#?RGBE\n", Some(Format::Radiance)),
-            (b"\xff\x0a\0", Some(Format::JpegXl)),
-            (b"P6\n1 1\n", Some(Format::Pnm)),
-            (b"II*\0\x10\0\0\0CR\x02\0", Some(Format::Raw)),
+            (b"\xff\x0a\0", Some(Format::Other("a JPEG XL image", SAVE))),
+            (b"P6\n1 1\n", Some(Format::Other("a PNM image", SAVE))),
+            (b"II*\0\x10\0\0\0CR\x02\0", Some(RAW)),
             (b"II*\0\x08\0\0\0\0\0\0\0\0\0", Some(Format::Tiff)),
-            (b"\xef\xbb\xbf<!DOCTYPE html>", Some(Format::Html)),
-            (b"<?xml version=\"1.0\"?><svg/>", Some(Format::Svg)),
-            (b"8BPS\0\x01", Some(Format::Psd)),
+            (b"\xef\xbb\xbf<!DOCTYPE html>", Some(HTML)),
+            (b"<?xml version=\"1.0\"?><svg/>", Some(SVG)),
+            (
+                b"8BPS\0\x01",
+                Some(Format::Other("a Photoshop file", EXPORT)),
+            ),
             (b"a photograph", None),
             (b"", None),
         ] {
@@ -271,8 +224,8 @@ mod tests {
         let nef = ifd(&[(254, 4, 1), (271, 2, 65), (330, 4, 99)]);
         let dng = ifd(&[(254, 4, 0), (50706, 1, 4)]);
         let plain = ifd(&[(254, 4, 0), (256, 4, 8), (271, 2, 65)]);
-        assert_eq!(Format::of(&nef), Some(Format::Raw));
-        assert_eq!(Format::of(&dng), Some(Format::Raw));
+        assert_eq!(Format::of(&nef), Some(RAW));
+        assert_eq!(Format::of(&dng), Some(RAW));
         assert_eq!(Format::of(&plain), Some(Format::Tiff));
     }
 }

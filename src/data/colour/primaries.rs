@@ -1,6 +1,4 @@
-//! Primaries and white, and the matrix that turns light in them into Rec. 709.
-
-use crate::ColourError;
+//! Primaries and white, and the matrix that turns light in them into Rec. 709, whose primaries sRGB has.
 
 /// A matrix whose rows give red, green and blue of Rec. 709.
 pub(crate) type Matrix = [[f32; 3]; 3];
@@ -15,6 +13,8 @@ const BRADFORD: Exact = [
     [0.0389, -0.0685, 1.0296],
 ];
 const D65: [f64; 2] = [0.3127, 0.3290];
+/// Illuminant C.
+const C: [f64; 2] = [0.310, 0.316];
 const EQUAL_ENERGY: [f64; 2] = [1.0 / 3.0, 1.0 / 3.0];
 
 /// The chromaticities x and y of three primaries and white.
@@ -27,90 +27,76 @@ pub(crate) struct Primaries {
 }
 
 impl Primaries {
-    pub(crate) const REC709: Self = Self::d65([0.64, 0.33], [0.30, 0.60], [0.15, 0.06]);
-    pub(crate) const REC2020: Self = Self::d65([0.708, 0.292], [0.170, 0.797], [0.131, 0.046]);
-    pub(crate) const DISPLAY_P3: Self = Self::d65([0.680, 0.320], [0.265, 0.690], [0.150, 0.060]);
-    pub(crate) const ADOBE_RGB: Self = Self::d65([0.64, 0.33], [0.21, 0.71], [0.15, 0.06]);
+    pub(crate) const REC709: Self = Self::new([0.64, 0.33], [0.30, 0.60], [0.15, 0.06], D65);
+    pub(crate) const REC2020: Self = Self::new([0.708, 0.292], [0.170, 0.797], [0.131, 0.046], D65);
+    pub(crate) const DISPLAY_P3: Self =
+        Self::new([0.680, 0.320], [0.265, 0.690], [0.150, 0.060], D65);
+    pub(crate) const ADOBE_RGB: Self = Self::new([0.64, 0.33], [0.21, 0.71], [0.15, 0.06], D65);
     /// CIE XYZ itself.
-    pub(crate) const XYZ: Self = Self {
-        red: [1.0, 0.0],
-        green: [0.0, 1.0],
-        blue: [0.0, 0.0],
-        white: EQUAL_ENERGY,
-    };
+    pub(crate) const XYZ: Self = Self::new([1.0, 0.0], [0.0, 1.0], [0.0, 0.0], EQUAL_ENERGY);
 
-    const fn d65(red: [f64; 2], green: [f64; 2], blue: [f64; 2]) -> Self {
+    pub(crate) const fn new(
+        red: [f64; 2],
+        green: [f64; 2],
+        blue: [f64; 2],
+        white: [f64; 2],
+    ) -> Self {
         Self {
             red,
             green,
             blue,
-            white: D65,
+            white,
         }
     }
 
-    /// The primaries of a number of ITU-T H.273; none where that says nothing.
-    pub(crate) fn of_code(code: u8) -> Result<Option<Self>, ColourError> {
-        let c = [0.310, 0.316];
-        Ok(Some(match code {
-            1 => Self::REC709,
-            2 => return Ok(None),
-            4 => Self {
-                red: [0.67, 0.33],
-                green: [0.21, 0.71],
-                blue: [0.14, 0.08],
-                white: c,
-            },
-            5 => Self::d65([0.64, 0.33], [0.29, 0.60], [0.15, 0.06]),
-            6 | 7 => Self::d65([0.630, 0.340], [0.310, 0.595], [0.155, 0.070]),
-            8 => Self {
-                red: [0.681, 0.319],
-                green: [0.243, 0.692],
-                blue: [0.145, 0.049],
-                white: c,
-            },
-            9 => Self::REC2020,
-            10 => Self::XYZ,
-            11 => Self {
-                white: [0.314, 0.351],
-                ..Self::DISPLAY_P3
-            },
-            12 => Self::DISPLAY_P3,
-            22 => Self::d65([0.630, 0.340], [0.295, 0.605], [0.155, 0.077]),
-            _ => {
-                let text = format!("unknown primaries (number {code} in cICP)");
-                return Err(ColourError::Space(text));
+    /// Name and primaries of a number of ITU-T H.273 (table 2); none of one that says nothing or is not known.
+    pub(crate) const fn of_code(code: u32) -> Option<(&'static str, Self)> {
+        let (name, [red, green, blue], white) = match code {
+            1 => return Some(("BT.709", Self::REC709)),
+            4 => ("BT.470 M", [[0.67, 0.33], [0.21, 0.71], [0.14, 0.08]], C),
+            5 => (
+                "BT.601 (625 lines)",
+                [[0.64, 0.33], [0.29, 0.60], [0.15, 0.06]],
+                D65,
+            ),
+            6 | 7 => (
+                "BT.601 (525 lines)",
+                [[0.630, 0.340], [0.310, 0.595], [0.155, 0.070]],
+                D65,
+            ),
+            8 => ("film", [[0.681, 0.319], [0.243, 0.692], [0.145, 0.049]], C),
+            9 => return Some(("BT.2020", Self::REC2020)),
+            10 => return Some(("XYZ", Self::XYZ)),
+            11 => {
+                let Self {
+                    red, green, blue, ..
+                } = Self::DISPLAY_P3;
+                ("DCI-P3", [red, green, blue], [0.314, 0.351])
             }
-        }))
+            12 => return Some(("Display P3", Self::DISPLAY_P3)),
+            22 => (
+                "EBU 3213",
+                [[0.630, 0.340], [0.295, 0.605], [0.155, 0.077]],
+                D65,
+            ),
+            _ => return None,
+        };
+        Some((name, Self::new(red, green, blue, white)))
     }
 
     /// The eight numbers in the order of files.
     pub(crate) const fn from_numbers(n: [f64; 8]) -> Self {
-        Self {
-            red: [n[0], n[1]],
-            green: [n[2], n[3]],
-            blue: [n[4], n[5]],
-            white: [n[6], n[7]],
-        }
+        Self::new([n[0], n[1]], [n[2], n[3]], [n[4], n[5]], [n[6], n[7]])
     }
 
-    /// The matrix to Rec. 709, whose white these become; none where nothing would change.
-    pub(crate) fn to_rec709(self) -> Result<Option<Matrix>, ColourError> {
-        let impossible = || {
-            let pairs = [self.red, self.green, self.blue, self.white];
-            let pairs = pairs.map(|[x, y]| format!("{x:.4} {y:.4}"));
-            ColourError::Primaries(pairs.join(", "))
-        };
-        let matrix = self.matrix().ok_or_else(impossible)?;
-        Ok(significant(matrix))
-    }
-
-    fn matrix(self) -> Option<Exact> {
+    /// The matrix to Rec. 709, whose white these become; none for primaries that are not possible.
+    pub(crate) fn to_rec709(self) -> Option<Exact> {
         let own = multiply(&adaptation(self.white)?, &self.to_xyz()?);
         Some(multiply(&inverse(&Self::REC709.to_xyz()?)?, &own))
     }
 
-    /// From these primaries to XYZ.
-    fn to_xyz(self) -> Option<Exact> {
+    /// From these primaries to CIE XYZ, with white at a luminance of 1 (SMPTE RP 177).
+    pub(crate) fn to_xyz(self) -> Option<Exact> {
         let columns = [self.red, self.green, self.blue].map(|[x, y]| [x, y, 1.0 - x - y]);
         let rows = std::array::from_fn(|row| columns.map(|column| column[row]));
         let scales = apply(&inverse(&rows)?, white_xyz(self.white)?);
@@ -174,7 +160,11 @@ mod tests {
     use super::*;
 
     fn light(primaries: Primaries, rgb: [f64; 3]) -> [f64; 3] {
-        apply(&primaries.matrix().unwrap(), rgb)
+        apply(&primaries.to_rec709().unwrap(), rgb)
+    }
+
+    fn of_code(code: u32) -> Primaries {
+        Primaries::of_code(code).unwrap().1
     }
 
     fn is_near(a: [f64; 3], b: [f64; 3], by: f64) -> bool {
@@ -183,13 +173,17 @@ mod tests {
 
     #[test]
     fn the_matrices_are_those_of_the_literature() {
-        // BT.2087 and SMPTE EG 432.
-        let green = light(Primaries::REC2020, [0.0, 1.0, 0.0]);
-        assert!(
-            is_near(green, [-0.5876, 1.1329, -0.1006], 2e-4),
-            "{green:?}"
-        );
-        let red = light(Primaries::DISPLAY_P3, [1.0, 0.0, 0.0]);
+        // BT.2087, annex 1, rounded to four digits.
+        for (rgb, published) in [
+            ([1.0, 0.0, 0.0], [1.6605, -0.1246, -0.0182]),
+            ([0.0, 1.0, 0.0], [-0.5876, 1.1329, -0.1006]),
+            ([0.0, 0.0, 1.0], [-0.0728, -0.0083, 1.1187]),
+        ] {
+            let found = light(of_code(9), rgb);
+            assert!(is_near(found, published, 2e-4), "{found:?}");
+        }
+        // SMPTE EG 432.
+        let red = light(of_code(12), [1.0, 0.0, 0.0]);
         assert!(is_near(red, [1.2249, -0.0420, -0.0197], 2e-4), "{red:?}");
         // ACEScg to linear sRGB with Bradford.
         let ap1 =
@@ -200,23 +194,24 @@ mod tests {
 
     #[test]
     fn white_stays_white() {
-        for primaries in [Primaries::XYZ, Primaries::ADOBE_RGB, Primaries::REC2020] {
+        for primaries in [4, 5, 6, 8, 9, 10, 11, 12, 22].map(of_code) {
             assert!(is_near(light(primaries, [1.0; 3]), [1.0; 3], 1e-9));
         }
     }
 
     #[test]
     fn what_would_change_nothing_is_no_matrix() {
-        assert_eq!(Primaries::REC709.to_rec709(), Ok(None));
         let rounded = Primaries {
             white: [0.312_71, 0.329_02],
             ..Primaries::REC709
         };
-        assert_eq!(rounded.to_rec709(), Ok(None));
+        for primaries in [Primaries::REC709, rounded] {
+            assert_eq!(significant(primaries.to_rec709().unwrap()), None);
+        }
     }
 
     #[test]
-    fn impossible_primaries_are_refused() {
+    fn impossible_primaries_have_no_matrix() {
         let flat = Primaries {
             green: [0.64, 0.33],
             ..Primaries::REC709
@@ -230,10 +225,7 @@ mod tests {
             ..Primaries::REC709
         };
         for primaries in [flat, dark, odd] {
-            assert!(matches!(
-                primaries.to_rec709(),
-                Err(ColourError::Primaries(_))
-            ));
+            assert_eq!(primaries.to_rec709(), None);
         }
     }
 }

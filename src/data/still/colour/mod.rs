@@ -2,7 +2,6 @@
 
 mod icc;
 mod png_chunks;
-pub(crate) mod primaries;
 mod statement;
 
 use std::fmt;
@@ -10,7 +9,10 @@ use std::sync::Arc;
 
 use moxcms::TransformF32Executor;
 
-pub(crate) use primaries::{Matrix, Primaries};
+use super::ColourError;
+use crate::colour::primaries::significant;
+pub(super) use crate::colour::primaries::{Matrix, Primaries};
+use crate::srgb::{from_linear_f32, to_linear_f32};
 
 /// Pixels that are converted at a time.
 const CHUNK: usize = 4096;
@@ -125,7 +127,7 @@ impl Colour {
             self.to_light([red, green, blue]);
             for at in 0..count {
                 for (channel, plane) in planes.iter().enumerate() {
-                    let level = srgb_of_light(plane[at]).clamp(0.0, 1.0) * 255.0;
+                    let level = from_linear_f32(plane[at]).clamp(0.0, 1.0) * 255.0;
                     chunk[3 * at + channel] = level.round() as u8;
                 }
             }
@@ -161,6 +163,24 @@ impl Colour {
     }
 }
 
+/// The matrix to Rec. 709, whose white that of these primaries becomes; none where nothing would change.
+pub(super) fn to_rec709(primaries: Primaries) -> Result<Option<Matrix>, ColourError> {
+    let impossible = || {
+        let pairs = [
+            primaries.red,
+            primaries.green,
+            primaries.blue,
+            primaries.white,
+        ];
+        let pairs = pairs.map(|[x, y]| format!("{x:.4} {y:.4}")).join(", ");
+        ColourError(format!("states primaries that are not possible ({pairs})"))
+    };
+    primaries
+        .to_rec709()
+        .map(significant)
+        .ok_or_else(impossible)
+}
+
 impl fmt::Debug for Colour {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match &self.0 {
@@ -189,7 +209,7 @@ fn through_table(table: &TransformF32Executor, [red, green, blue]: [&mut [f32]; 
         }
         let places = red.iter_mut().zip(green).zip(blue);
         for (((r, g), b), srgb) in places.zip(converted.chunks_exact(3)) {
-            [*r, *g, *b] = [0, 1, 2].map(|channel| light_of_srgb(srgb[channel].clamp(0.0, 1.0)));
+            [*r, *g, *b] = [0, 1, 2].map(|channel| to_linear_f32(srgb[channel].clamp(0.0, 1.0)));
         }
     }
 }
@@ -209,7 +229,7 @@ impl Curve {
             Self::Linear => {}
             Self::Srgb => plane
                 .iter_mut()
-                .for_each(|value| *value = light_of_srgb(*value)),
+                .for_each(|value| *value = to_linear_f32(*value)),
             Self::Power(power) => {
                 for value in plane {
                     *value = value.abs().powf(*power).copysign(*value);
@@ -236,25 +256,4 @@ fn looked_up(table: &[f32], value: f32) -> f32 {
         table[(entry + 1).min(LAST_ENTRY)],
     );
     low + (high - low) * (place - entry as f32)
-}
-
-/// IEC 61966-2-1.
-fn light_of_srgb(encoded: f32) -> f32 {
-    let size = encoded.abs();
-    let light = if size <= 0.04045 {
-        size / 12.92
-    } else {
-        ((size + 0.055) / 1.055).powf(2.4)
-    };
-    light.copysign(encoded)
-}
-
-fn srgb_of_light(light: f32) -> f32 {
-    let size = light.abs();
-    let encoded = if size <= 0.003_130_8 {
-        size * 12.92
-    } else {
-        1.055 * size.powf(1.0 / 2.4) - 0.055
-    };
-    encoded.copysign(light)
 }

@@ -9,9 +9,9 @@ use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, Vec2, read};
 use image::error::{DecodingError, ImageFormatHint};
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat, Rgb, Rgba};
 
-use crate::colour::{Matrix, Primaries};
-use crate::decode::reserve;
-use crate::{ColourError, StillError};
+use crate::still::colour::{Matrix, Primaries, to_rec709 as matrix_of};
+use crate::still::decode::reserve;
+use crate::still::{ColourError, StillError};
 
 /// Names of layers that are the picture itself, next to those that it was made of.
 const BEAUTY: [&str; 4] = ["combined", "beauty", "rgba", "main"];
@@ -38,20 +38,24 @@ pub(crate) fn to_rec709(bytes: &[u8]) -> Result<Option<Matrix>, ColourError> {
     };
     let shared = &header.shared_attributes;
     match (shared.chromaticities, interoperability(header)) {
-        (Some(chromaticities), _) => primaries_of(chromaticities).to_rec709(),
-        (None, Some(id)) => primaries_of_id(&id)?.to_rec709(),
+        (Some(chromaticities), _) => matrix_of(primaries_of(chromaticities)),
+        (None, Some(id)) => match id.as_str() {
+            "lin_rec709_scene" | "data" | "unknown" | "" => Ok(None),
+            id => matrix_of(primaries_of_id(id)?),
+        },
         (None, None) => Ok(None),
     }
 }
 
 fn primaries_of(chromaticities: Chromaticities) -> Primaries {
     let pair = |pair: Vec2<f32>| [pair.x(), pair.y()].map(f64::from);
-    Primaries {
-        red: pair(chromaticities.red),
-        green: pair(chromaticities.green),
-        blue: pair(chromaticities.blue),
-        white: pair(chromaticities.white),
-    }
+    let Chromaticities {
+        red,
+        green,
+        blue,
+        white,
+    } = chromaticities;
+    Primaries::new(pair(red), pair(green), pair(blue), pair(white))
 }
 
 /// The name of the colour space that newer programs write.
@@ -66,7 +70,6 @@ fn interoperability(header: &Header) -> Option<String> {
 
 fn primaries_of_id(id: &str) -> Result<Primaries, ColourError> {
     Ok(match id {
-        "lin_rec709_scene" | "data" | "unknown" | "" => Primaries::REC709,
         "lin_rec2020_scene" => Primaries::REC2020,
         "lin_p3d65_scene" => Primaries::DISPLAY_P3,
         "lin_adobergb_scene" => Primaries::ADOBE_RGB,
@@ -76,7 +79,11 @@ fn primaries_of_id(id: &str) -> Result<Primaries, ColourError> {
         "lin_ap0_scene" => {
             Primaries::from_numbers([0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.0770, 0.32168, 0.33767])
         }
-        _ => return Err(ColourError::Space(format!("{id} (colorInteropID)"))),
+        _ => {
+            return Err(ColourError(format!(
+                "says that its colours are in {id} (colorInteropID)"
+            )));
+        }
     })
 }
 
@@ -91,13 +98,15 @@ pub(crate) fn size(bytes: &[u8]) -> Option<(u32, u32)> {
 pub(crate) fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|fault| {
         if has_chroma(bytes) {
-            StillError::Chroma
+            let text =
+                "has its colours as luminance and chroma (Y, RY, BY): write them as R, G and B";
+            StillError::NotRead(text.to_owned())
         } else {
             decoding(fault)
         }
     })?;
     let channels = choose(&meta)?;
-    let header = header_of(&meta, &channels).ok_or_else(|| StillError::Channels(names(&meta)))?;
+    let header = header_of(&meta, &channels).ok_or_else(|| no_picture(&meta))?;
     let canvas = Canvas::of(header, &channels)?;
     canvas.image(canvas.read(bytes, channels)?)
 }
@@ -230,8 +239,13 @@ fn header_of<'a>(meta: &'a MetaData, channels: &Channels) -> Option<&'a Header> 
     meta.headers.iter().find(has)
 }
 
-fn names(meta: &MetaData) -> Vec<String> {
-    flat_names(meta).iter().map(ToString::to_string).collect()
+/// That a file has several layers, or none that shows a picture.
+fn no_picture(meta: &MetaData) -> StillError {
+    let names: Vec<String> = flat_names(meta).iter().map(ToString::to_string).collect();
+    StillError::NotRead(format!(
+        "has no channels R, G and B, and not one channel alone: write the wanted one as R, G and B; it has {}",
+        names.join(", ")
+    ))
 }
 
 fn flat_names(meta: &MetaData) -> Vec<Text> {
@@ -292,9 +306,7 @@ fn choose(meta: &MetaData) -> Result<Channels, StillError> {
     };
     match grey {
         Some((grey, alpha)) if layers.is_empty() => Ok(Channels::Grey(grey.clone(), alpha)),
-        _ => Err(StillError::Channels(
-            text.into_iter().map(|(name, _)| name).collect(),
-        )),
+        _ => Err(no_picture(meta)),
     }
 }
 

@@ -3,7 +3,10 @@
 //! HDR is scaled as Report ITU-R BT.2408 maps it to SDR: reference white, 203 cd/m², becomes white, and what is brighter
 //! is clipped.
 
+pub(crate) mod primaries;
+
 use crate::srgb;
+use primaries::Primaries;
 
 /// Luminance of diffuse white in HDR (BT.2408), which becomes white, cd/m².
 const HDR_WHITE: f64 = 203.0;
@@ -113,130 +116,10 @@ fn hlg_to_scene(value: f64) -> f64 {
     }
 }
 
-/// Chromaticities of red, green, blue and white (ITU-T H.273, table 2).
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Primaries {
-    name: &'static str,
-    chromaticities: [[f64; 2]; 4],
-}
-
-const D65: [f64; 2] = [0.3127, 0.3290];
-const BT709: Primaries = Primaries {
-    name: "BT.709",
-    chromaticities: [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], D65],
-};
-
-impl Primaries {
-    fn from_code(code: u32) -> Result<Self, ColourFault> {
-        let c = [0.310, 0.316];
-        let (name, [red, green, blue, white]) = match code {
-            0..=3 => return Ok(BT709),
-            4 => ("BT.470 M", [[0.67, 0.33], [0.21, 0.71], [0.14, 0.08], c]),
-            5 => (
-                "BT.601 (625 lines)",
-                [[0.64, 0.33], [0.29, 0.60], [0.15, 0.06], D65],
-            ),
-            6 | 7 => (
-                "BT.601 (525 lines)",
-                [[0.630, 0.340], [0.310, 0.595], [0.155, 0.070], D65],
-            ),
-            8 => ("film", [[0.681, 0.319], [0.243, 0.692], [0.145, 0.049], c]),
-            9 => (
-                "BT.2020",
-                [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046], D65],
-            ),
-            10 => (
-                "XYZ",
-                [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0 / 3.0, 1.0 / 3.0]],
-            ),
-            11 => (
-                "DCI-P3",
-                [
-                    [0.680, 0.320],
-                    [0.265, 0.690],
-                    [0.150, 0.060],
-                    [0.314, 0.351],
-                ],
-            ),
-            12 => (
-                "Display P3",
-                [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060], D65],
-            ),
-            22 => (
-                "EBU 3213",
-                [[0.630, 0.340], [0.295, 0.605], [0.155, 0.077], D65],
-            ),
-            _ => return Err(ColourFault::Primaries(numbered(code))),
-        };
-        Ok(Self {
-            name,
-            chromaticities: [red, green, blue, white],
-        })
-    }
-
-    /// From these primaries to CIE XYZ, with white at a luminance of 1 (SMPTE RP 177).
-    fn to_xyz(self) -> Matrix {
-        let [red, green, blue, white] = self.chromaticities;
-        let columns = transposed([red, green, blue].map(|[x, y]| [x, y, 1.0 - x - y]));
-        let sums = times(inverse(columns), xyz_of(white));
-        columns.map(|row| [row[0] * sums[0], row[1] * sums[1], row[2] * sums[2]])
-    }
-}
-
-fn xyz_of([x, y]: [f64; 2]) -> [f64; 3] {
-    [x / y, 1.0, (1.0 - x - y) / y]
-}
-
-type Matrix = [[f64; 3]; 3];
-
-/// Bradford's matrix, for the adaptation to another white.
-const BRADFORD: Matrix = [
-    [0.8951, 0.2664, -0.1614],
-    [-0.7502, 1.7135, 0.0367],
-    [0.0389, -0.0685, 1.0296],
-];
-
-fn times(matrix: Matrix, [x, y, z]: [f64; 3]) -> [f64; 3] {
-    matrix.map(|row| row[0] * x + row[1] * y + row[2] * z)
-}
-
-fn transposed(m: Matrix) -> Matrix {
-    [0, 1, 2].map(|column| [m[0][column], m[1][column], m[2][column]])
-}
-
-fn product(a: Matrix, b: Matrix) -> Matrix {
-    transposed(transposed(b).map(|column| times(a, column)))
-}
-
-fn inverse(m: Matrix) -> Matrix {
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
-    let rows = [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])];
-    let determinant = m[0][0] * rows[0][0] + m[0][1] * rows[0][1] + m[0][2] * rows[0][2];
-    transposed(rows).map(|row| row.map(|entry| entry / determinant))
-}
-
-/// From light of these primaries to that of BT.709, which sRGB shares.
-fn to_bt709(from: Primaries) -> Matrix {
-    let cone = |white| times(BRADFORD, xyz_of(white));
-    let (source, target) = (cone(from.chromaticities[3]), cone(BT709.chromaticities[3]));
-    let mut scale = [[0.0; 3]; 3];
-    for at in 0..3 {
-        scale[at][at] = target[at] / source[at];
-    }
-    let adapted = product(inverse(BRADFORD), product(scale, BRADFORD));
-    product(inverse(BT709.to_xyz()), product(adapted, from.to_xyz()))
-}
-
 /// The conversion of coded RGB to sRGB.
 pub struct ToSrgb {
     transfer: Transfer,
-    primaries: Primaries,
+    primaries: &'static str,
     /// Light by value.
     light: Vec<f32>,
     /// The sRGB level by light.
@@ -261,7 +144,7 @@ impl PartialEq for ToSrgb {
 /// What is converted, and how.
 impl std::fmt::Display for ToSrgb {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (transfer, primaries) = (self.transfer.name(), self.primaries.name);
+        let (transfer, primaries) = (self.transfer.name(), self.primaries);
         write!(f, "{transfer} with {primaries} primaries to sRGB")?;
         match self.transfer {
             Transfer::Pq | Transfer::Hlg => write!(f, ", {HDR_WHITE} cd/m² as white (BT.2408)"),
@@ -278,21 +161,26 @@ impl ToSrgb {
     /// [`ColourFault`] for those that are not known here.
     pub fn new(transfer: u32, primaries: u32) -> Result<Option<Self>, ColourFault> {
         let transfer = Transfer::from_code(transfer)?;
-        let primaries = Primaries::from_code(primaries)?;
-        if transfer == Transfer::Sdr && primaries == BT709 {
+        let unknown = || ColourFault::Primaries(numbered(primaries));
+        // What is not stated, or reserved, is BT.709.
+        let code = if primaries <= 3 { 1 } else { primaries };
+        let (name, primaries) = Primaries::of_code(code).ok_or_else(unknown)?;
+        if transfer == Transfer::Sdr && primaries == Primaries::REC709 {
             return Ok(None);
         }
+        let to_rec709 = primaries.to_rec709().ok_or_else(unknown)?;
+        let to_xyz = primaries.to_xyz().ok_or_else(unknown)?;
         let part = |level: usize| level as f64 / (LEVELS - 1) as f64;
         let light = (0..LEVELS).map(|level| transfer.to_light(part(level)) as f32);
         let level = (0..LEVELS).map(|light| (255.0 * srgb::from_linear(part(light))).round() as u8);
         let narrow = |row: [f64; 3]| row.map(|entry| entry as f32);
         Ok(Some(Self {
             transfer,
-            primaries,
+            primaries: name,
             light: light.collect(),
             level: level.collect(),
-            matrix: to_bt709(primaries).map(narrow),
-            luminance: narrow(primaries.to_xyz()[1]),
+            matrix: to_rec709.map(narrow),
+            luminance: narrow(to_xyz[1]),
         }))
     }
 
@@ -423,8 +311,6 @@ impl YuvDecoding {
 mod tests {
     use super::*;
 
-    const WHITE: [f64; 3] = [1.0; 3];
-
     fn near(found: [u8; 3], wanted: [u8; 3], most: u8) {
         let off = found.iter().zip(wanted).map(|(a, b)| a.abs_diff(b)).max();
         assert!(off <= Some(most), "{found:?} {wanted:?}");
@@ -454,26 +340,6 @@ mod tests {
         for primaries in [4, 5, 6, 8, 9, 11, 12, 22] {
             let by = ToSrgb::new(13, primaries).unwrap().unwrap();
             near(by.levels([128.0 / 255.0; 3]), [128; 3], 1);
-            let white = times(to_bt709(Primaries::from_code(primaries).unwrap()), WHITE);
-            assert!(white.iter().all(|part| (part - 1.0).abs() < 1e-9));
-        }
-    }
-
-    #[test]
-    fn bt2020_becomes_bt709_by_the_published_matrix() {
-        // BT.2087, annex 1, rounded to four digits.
-        let published = [
-            [1.6605, -0.5876, -0.0728],
-            [-0.1246, 1.1329, -0.0083],
-            [-0.0182, -0.1006, 1.1187],
-        ];
-        let found = to_bt709(Primaries::from_code(9).unwrap());
-        for (found, published) in found
-            .into_iter()
-            .flatten()
-            .zip(published.into_iter().flatten())
-        {
-            assert!((found - published).abs() < 2e-4, "{found} {published}");
         }
     }
 

@@ -5,9 +5,10 @@ use moxcms::{
     ToneReprCurve, TransferCharacteristics, TransformOptions,
 };
 
-use super::primaries::{inverse, multiply, significant};
-use super::{Colour, Curve, Curves, Model, srgb_of_light};
-use crate::ColourError;
+use super::{Colour, Curve, Curves, Model};
+use crate::colour::primaries::{inverse, multiply, significant};
+use crate::srgb::from_linear_f32;
+use crate::still::ColourError;
 
 /// How far a curve may be from sRGB's, encoded: about half a level of 8 bits.
 const SAME_CURVE: f32 = 0.6 / 255.0;
@@ -19,7 +20,7 @@ pub(super) fn colour_of_profile(icc: &[u8], is_grey: bool) -> Result<Colour, Col
     let profile = ColorProfile::new_from_slice(icc).map_err(|_| unread(icc))?;
     check(&profile, is_grey)?;
     if profile.color_space == DataColorSpace::Gray {
-        let curve = profile.gray_trc.as_ref().ok_or(ColourError::Profile)?;
+        let curve = profile.gray_trc.as_ref().ok_or_else(ColourError::profile)?;
         return Ok(Colour::new(curve_of(curve)?, None));
     }
     let has_table = profile.lut_a_to_b_perceptual.is_some()
@@ -34,22 +35,14 @@ pub(super) fn colour_of_profile(icc: &[u8], is_grey: bool) -> Result<Colour, Col
 /// What is wrong with a profile that the library does not read.
 fn unread(icc: &[u8]) -> ColourError {
     match icc.get(16..20) {
-        Some(b"CMYK") => ColourError::ProfileSpace {
-            name: "without a name".to_owned(),
-            space: INKS,
-        },
-        _ => ColourError::Profile,
+        Some(b"CMYK") => other_space("without a name", INKS),
+        _ => ColourError::profile(),
     }
 }
 
 /// Refuses by its name what is not converted.
 fn check(profile: &ColorProfile, is_grey: bool) -> Result<(), ColourError> {
-    let wrong = |space| {
-        Err(ColourError::ProfileSpace {
-            name: name_of(profile),
-            space,
-        })
-    };
+    let wrong = |space| Err(other_space(&name_of(profile), space));
     match profile.color_space {
         DataColorSpace::Rgb => {}
         DataColorSpace::Gray if is_grey => {}
@@ -68,21 +61,27 @@ fn check(profile: &ColorProfile, is_grey: bool) -> Result<(), ColourError> {
         Some(TransferCharacteristics::Hlg) => "HLG",
         _ => return Ok(()),
     };
-    Err(ColourError::ProfileTransfer {
-        name: name_of(profile),
-        transfer,
-    })
+    Err(ColourError(format!(
+        "has the colour profile {}, which is encoded by {transfer}",
+        name_of(profile)
+    )))
+}
+
+fn other_space(name: &str, space: &str) -> ColourError {
+    ColourError(format!(
+        "has the colour profile {name}, which is for {space}"
+    ))
 }
 
 fn of_matrix(profile: &ColorProfile) -> Result<Colour, ColourError> {
     let own = profile.colorant_matrix().v;
     let to_rec709 = inverse(&ColorProfile::new_srgb().colorant_matrix().v);
-    let matrix = multiply(&to_rec709.ok_or(ColourError::Profile)?, &own);
+    let matrix = multiply(&to_rec709.ok_or_else(ColourError::profile)?, &own);
     if inverse(&own).is_none() || matrix.iter().flatten().any(|value| !value.is_finite()) {
-        return Err(ColourError::Profile);
+        return Err(ColourError::profile());
     }
     let curves = [&profile.red_trc, &profile.green_trc, &profile.blue_trc];
-    let curves = curves.map(|curve| curve_of(curve.as_ref().ok_or(ColourError::Profile)?));
+    let curves = curves.map(|curve| curve_of(curve.as_ref().ok_or_else(ColourError::profile)?));
     let [red, green, blue] = curves;
     let curves = match [red?, green?, blue?] {
         [Curve::Srgb, Curve::Srgb, Curve::Srgb] => Curves::Same(Curve::Srgb),
@@ -100,7 +99,7 @@ fn of_table(profile: &ColorProfile) -> Result<Colour, ColourError> {
     let options = TransformOptions::default();
     let table = profile.create_transform_f32(Layout::Rgb, &srgb, Layout::Rgb, options);
     Ok(Colour(Model::Table(
-        table.map_err(|_| ColourError::Profile)?,
+        table.map_err(|_| ColourError::profile())?,
     )))
 }
 
@@ -108,17 +107,17 @@ fn of_table(profile: &ColorProfile) -> Result<Colour, ColourError> {
 fn curve_of(curve: &ToneReprCurve) -> Result<Curve, ColourError> {
     let evaluator = curve
         .make_linear_evaluator()
-        .map_err(|_| ColourError::Profile)?;
+        .map_err(|_| ColourError::profile())?;
     let at = |value: f32| evaluator.evaluate_value(value).clamp(0.0, 1.0);
     let levels = (0..=255_u8).map(|level| f32::from(level) / 255.0);
     if levels.clone().any(|value| !at(value).is_finite()) {
-        return Err(ColourError::Profile);
+        return Err(ColourError::profile());
     }
     let is = |known: fn(f32) -> f32| {
         let mut levels = levels.clone();
         levels.all(|value| (known(at(value)) - value).abs() <= SAME_CURVE)
     };
-    Ok(if is(srgb_of_light) {
+    Ok(if is(from_linear_f32) {
         Curve::Srgb
     } else if is(|light| light) {
         Curve::Linear

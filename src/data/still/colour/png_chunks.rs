@@ -3,10 +3,10 @@
 use png::Info;
 
 use super::icc::colour_of_profile;
-use super::{Colour, Curve, Primaries};
-use crate::ColourError;
+use super::{Colour, Curve, Primaries, to_rec709};
+use crate::still::ColourError;
 
-/// The transfer function of ITU-T H.273 that says nothing.
+/// The number of ITU-T H.273 that says nothing.
 const UNSPECIFIED: u8 = 2;
 /// How far a gamma may be from one that is known.
 const SAME_GAMMA: f32 = 0.02;
@@ -17,13 +17,18 @@ const GAMMAS: std::ops::RangeInclusive<f32> = 0.1..=10.0;
 pub(super) fn stated(info: &Info<'_>, is_grey: bool) -> Result<Option<Colour>, ColourError> {
     if let Some(points) = info.coding_independent_code_points {
         if !points.is_video_full_range_image {
-            return Err(ColourError::Transfer(
-                "the narrow range of videos (cICP)".to_owned(),
-            ));
+            return Err(ColourError::transfer("the narrow range of videos (cICP)"));
         }
-        let matrix = match Primaries::of_code(points.color_primaries)? {
-            Some(primaries) => primaries.to_rec709()?,
-            None => None,
+        let matrix = match points.color_primaries {
+            UNSPECIFIED => None,
+            code => match Primaries::of_code(code.into()) {
+                Some((_, primaries)) => to_rec709(primaries)?,
+                None => {
+                    return Err(ColourError(format!(
+                        "says that its colours are in unknown primaries (number {code} in cICP)"
+                    )));
+                }
+            },
         };
         let curve = match points.transfer_function {
             UNSPECIFIED => Curve::Srgb,
@@ -42,13 +47,7 @@ pub(super) fn stated(info: &Info<'_>, is_grey: bool) -> Result<Option<Colour>, C
             let pairs = [c.red, c.green, c.blue, c.white];
             let [red, green, blue, white] =
                 pairs.map(|(x, y)| [x, y].map(|v| f64::from(v.into_value())));
-            let stated = Primaries {
-                red,
-                green,
-                blue,
-                white,
-            };
-            stated.to_rec709()?
+            to_rec709(Primaries::new(red, green, blue, white))?
         }
         None => None,
     };
@@ -72,7 +71,7 @@ fn curve_of_gamma(gamma: f32) -> Result<Curve, ColourError> {
     } else if GAMMAS.contains(&gamma) {
         Ok(Curve::Power(1.0 / gamma))
     } else {
-        Err(ColourError::Transfer(format!("the power {gamma} (gAMA)")))
+        Err(ColourError::transfer(&format!("the power {gamma} (gAMA)")))
     }
 }
 
@@ -90,5 +89,5 @@ fn curve_of_function(function: u8) -> Result<Curve, ColourError> {
         _ => "an unknown function",
     };
     let text = format!("{name} (transfer function {function} in cICP)");
-    Err(ColourError::Transfer(text))
+    Err(ColourError::transfer(&text))
 }

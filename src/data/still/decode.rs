@@ -5,10 +5,10 @@ use std::io::Cursor;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use crate::{Format, StillError, exr, isobmff, jpeg, png_exif, radiance};
+use crate::still::{Format, StillError, exr, isobmff, jpeg, png_exif, radiance};
 
 /// Decodes the content of a file, turned as it is displayed. The numbers stay as they are stored; what they stand for
-/// says [`crate::Colour::of_file`].
+/// says [`crate::still::Colour::of_file`].
 ///
 /// # Errors
 /// Where it is no picture of a format that is read, too large, or cut off.
@@ -17,8 +17,12 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     match format {
         Some(Format::Radiance) => return radiance::decode(bytes),
         Some(Format::Exr) => return exr::decode(bytes),
-        Some(format) if !format.is_read() => return Err(StillError::NotRead(format)),
         _ => {}
+    }
+    if let Some((name, advice)) = format.and_then(Format::unread) {
+        return Err(StillError::NotRead(format!(
+            "is {name}, which is not read: {advice}"
+        )));
     }
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let reader = reader.map_err(|fault| StillError::Decode(ImageError::IoError(fault)))?;
