@@ -1,88 +1,63 @@
 //! Values of options that several verbs take.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
 use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_photo::decompose::SpecularGate;
 use relight_photo::insert::WhiteBalance;
 use relight_turn::RotationDirection;
 
-/// How integers in files of colour are encoded.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum TransferName {
-    /// The transfer function of sRGB.
-    Srgb,
-    /// The power 1 / 2.2.
-    Gamma22,
-    /// In proportion to light.
-    Linear,
+/// One of some values by its name; each with what the help says of it.
+pub(crate) fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
+    values: [(&'static str, T, &'static str); N],
+) -> impl TypedValueParser<Value = T> {
+    let named = values.map(|(name, _, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(named).try_map(move |given| {
+        let found = values.iter().find(|(name, ..)| *name == given);
+        found.map(|(_, value, _)| *value).ok_or("no such value")
+    })
 }
 
-impl From<TransferName> for Transfer {
-    fn from(name: TransferName) -> Self {
-        match name {
-            TransferName::Srgb => Self::Srgb,
-            TransferName::Gamma22 => Self::Gamma22,
-            TransferName::Linear => Self::Linear,
-        }
-    }
+/// How integers in files of colour are encoded.
+pub(crate) fn transfer() -> impl TypedValueParser<Value = Transfer> {
+    one_of([
+        ("srgb", Transfer::Srgb, "The transfer function of sRGB"),
+        ("gamma22", Transfer::Gamma22, "The power 1 / 2.2"),
+        ("linear", Transfer::Linear, "In proportion to light"),
+    ])
 }
 
 /// Which way y points in maps of normals.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum YName {
-    /// As relight writes them.
-    Up,
-    /// As in the paper's figures and released code and data.
-    Down,
-}
-
-impl From<YName> for NormalsFrame {
-    fn from(name: YName) -> Self {
-        match name {
-            YName::Up => Self::YUp,
-            YName::Down => Self::YDown,
-        }
-    }
+pub(crate) fn normals_frame() -> impl TypedValueParser<Value = NormalsFrame> {
+    let paper = "As in the paper's figures and released code and data";
+    one_of([
+        ("up", NormalsFrame::YUp, "As relight writes them"),
+        ("down", NormalsFrame::YDown, paper),
+    ])
 }
 
 /// How the colour of new light is shown.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum WhiteName {
-    /// As the light has it.
-    Light,
-    /// As by a camera that is balanced for it: white is as grey as in the picture around.
-    Auto,
-}
-
-impl From<WhiteName> for WhiteBalance {
-    fn from(name: WhiteName) -> Self {
-        match name {
-            WhiteName::Light => Self::Light,
-            WhiteName::Auto => Self::Auto,
-        }
-    }
+pub(crate) fn white_balance() -> impl TypedValueParser<Value = WhiteBalance> {
+    let auto = "As by a camera that is balanced for it: white is as grey as in the picture around";
+    one_of([
+        ("light", WhiteBalance::Light, "As the light has it"),
+        ("auto", WhiteBalance::Auto, auto),
+    ])
 }
 
 /// Whether highlights are separated.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum GateName {
-    /// Where more than 5 % of the object's pixels are saturated.
-    Auto,
-    /// Always.
-    On,
-    /// Never.
-    Off,
-}
-
-impl From<GateName> for SpecularGate {
-    fn from(name: GateName) -> Self {
-        match name {
-            GateName::Auto => Self::Auto,
-            GateName::On => Self::On,
-            GateName::Off => Self::Off,
-        }
-    }
+pub(crate) fn gate() -> impl TypedValueParser<Value = SpecularGate> {
+    let auto = "Where more than 5 % of the object's pixels are saturated";
+    one_of([
+        ("auto", SpecularGate::Auto, auto),
+        ("on", SpecularGate::On, "Always"),
+        ("off", SpecularGate::Off, "Never"),
+    ])
 }
 
 /// Which way a table turns as its angle grows, seen from above.
@@ -100,5 +75,24 @@ impl From<DirectionName> for RotationDirection {
             DirectionName::CounterClockwise => Self::CounterClockwise,
             DirectionName::Clockwise => Self::Clockwise,
         }
+    }
+}
+
+/// An angle that a light is turned by.
+pub(crate) fn degrees() -> impl Fn(&str) -> Result<f64, String> + Clone {
+    within(-36_000.0..=36_000.0, "degrees")
+}
+
+/// A number within a range, of what the range counts.
+pub(crate) fn within<T>(
+    range: RangeInclusive<T>,
+    what: &'static str,
+) -> impl Fn(&str) -> Result<T, String> + Clone
+where
+    T: FromStr + PartialOrd + Display + Clone,
+{
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("give {what} from {} to {}", range.start(), range.end()))
     }
 }

@@ -6,8 +6,8 @@ use relight_core::image::{Extent, ImageError};
 use relight_core::light::LightError;
 use relight_core::metrics::MetricError;
 use relight_core::parallel::JobPanic;
+use relight_core::reader::{DamagedSample, OpenError};
 use relight_photo::insert::InsertError;
-use relight_reader::{DamagedSample, OpenError};
 
 /// Why an evaluation cannot be made.
 #[derive(Debug, thiserror::Error)]

@@ -1,11 +1,10 @@
-//! Weights as bytes: safetensors in and out, PyTorch's `.pth` in.
+//! Weights as bytes: safetensors in and out.
 
 use std::collections::HashMap;
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
 use super::error::NetError;
-use super::pickle;
 use super::weights::{Tensor, Weights};
 
 /// How numbers are kept in a file.
@@ -18,17 +17,34 @@ pub enum WeightPrecision {
 }
 
 impl Weights {
-    /// Weights out of the bytes of a safetensors file, or of a state dict that PyTorch saved (`.pth`, `.pt`); the first
-    /// bytes show which of them it is. Half precision becomes single. Integers of 8 bits (`I8`) become what they are times
-    /// the scale of their output channel, which the tensor `NAME.scale` has.
+    /// Weights out of the bytes of a safetensors file. Half precision becomes single. Integers of 8 bits (`I8`) become what they
+    /// are times the scale of their output channel, which the tensor `NAME.scale` has.
     ///
     /// # Errors
     /// A sentence that says what is wrong.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
-        match bytes {
-            [b'P', b'K', ..] => pickle::read_state_dict(bytes),
-            _ => from_safetensors(bytes),
+        if bytes.starts_with(b"PK") {
+            return Err(
+                "PyTorch saved it: make a safetensors file of it (docs/relight-decompose.md)"
+                    .to_owned(),
+            );
         }
+        let file = SafeTensors::deserialize(bytes)
+            .map_err(|error| format!("it is no safetensors file ({error})"))?;
+        let views = file.iter();
+        let views = views.filter(|(name, _)| !is_of_integers(&file, name));
+        views
+            .map(|(name, view)| {
+                let mut values = decode(view.dtype(), view.data())
+                    .ok_or_else(|| format!("{name} holds {:?}, which is not read", view.dtype()))?;
+                if view.dtype() == Dtype::I8 {
+                    scale(&mut values, &file, name)?;
+                }
+                let tensor = Tensor::new(view.shape().to_vec(), values)
+                    .ok_or_else(|| format!("{name} is not as long as its shape says"))?;
+                Ok((name.to_owned(), tensor))
+            })
+            .collect()
     }
 
     /// The bytes of a safetensors file, with facts about them in its header.
@@ -66,10 +82,9 @@ impl Weights {
         let overflows = |value: &f32| value.is_finite() && !half::f16::from_f32(*value).is_finite();
         for (name, tensor) in self.iter() {
             if let Some(&value) = tensor.values().iter().find(|value| overflows(value)) {
-                return Err(NetError::TooLarge {
-                    name: name.to_owned(),
-                    value,
-                });
+                return Err(NetError::Weights(format!(
+                    "{name} holds {value}, and half precision ends at 65504: write it in single precision"
+                )));
             }
         }
         Ok(())
@@ -84,25 +99,6 @@ fn encode(tensor: &Tensor, precision: WeightPrecision) -> Vec<u8> {
             .flat_map(|&value| half::f16::from_f32(value).to_le_bytes())
             .collect(),
     }
-}
-
-fn from_safetensors(bytes: &[u8]) -> Result<Weights, String> {
-    let file = SafeTensors::deserialize(bytes)
-        .map_err(|error| format!("it is no safetensors file and no state dict ({error})"))?;
-    let views = file.iter();
-    let views = views.filter(|(name, _)| !is_of_integers(&file, name));
-    views
-        .map(|(name, view)| {
-            let mut values = decode(view.dtype(), view.data())
-                .ok_or_else(|| format!("{name} holds {:?}, which is not read", view.dtype()))?;
-            if view.dtype() == Dtype::I8 {
-                scale(&mut values, &file, name)?;
-            }
-            let tensor = Tensor::new(view.shape().to_vec(), values)
-                .ok_or_else(|| format!("{name} is not as long as its shape says"))?;
-            Ok((name.to_owned(), tensor))
-        })
-        .collect()
 }
 
 /// How the name of the scales of a tensor of integers ends.
@@ -161,6 +157,8 @@ mod tests {
         for bytes in [&b""[..], b"hello", b"PK\x03\x04", &[0xff; 100]] {
             assert!(Weights::from_bytes(bytes).is_err());
         }
+        let zip = Weights::from_bytes(b"PK\x03\x04").unwrap_err();
+        assert!(zip.contains("PyTorch"), "{zip}");
     }
 
     /// A file of one tensor of integers with its scales.

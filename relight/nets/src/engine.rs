@@ -3,8 +3,14 @@
 
 #[cfg(feature = "onnxruntime")]
 use super::onnxruntime::OnnxRuntime;
-use super::plan::{GivenNumber, Plan};
 use super::tract::TractPlan;
+use super::weights::Tensor;
+
+/// A network in an engine, ready to be run.
+pub(super) trait Plan: Send + Sync {
+    /// The outputs for an input of the shape it was made ready for, or the engine's own words.
+    fn run(&self, input: &[f32]) -> Result<Vec<Tensor>, String>;
+}
 
 /// What computes a network.
 #[derive(Debug, Clone, Default)]
@@ -28,7 +34,7 @@ impl InferenceEngine {
         }
     }
 
-    /// Makes an ONNX file ready for inputs of a shape; its other inputs are the given numbers.
+    /// Makes an ONNX file ready for inputs of a shape; its other inputs, by their names, are the given numbers.
     ///
     /// # Errors
     /// The engine's own words.
@@ -36,7 +42,7 @@ impl InferenceEngine {
         &self,
         onnx: &[u8],
         shape: [usize; 4],
-        given: &[GivenNumber],
+        given: &[(String, i64)],
     ) -> Result<Box<dyn Plan>, String> {
         Ok(match self {
             Self::Tract => Box::new(TractPlan::new(onnx, shape, given)?),

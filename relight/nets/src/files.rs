@@ -7,10 +7,8 @@ use std::path::{Component, Path};
 use relit_data::durable;
 
 use super::codec::WeightPrecision;
-use super::engine::InferenceEngine;
 use super::error::NetError;
-use super::external::{ExternalFault, ExternalPart, with_external_weights};
-use super::inference::Inference;
+use super::external::{ExternalPart, with_external_weights};
 use super::weights::Weights;
 
 /// Largest file of weights that is read, bytes: the released Light-Net has 554 MB.
@@ -37,7 +35,7 @@ impl Weights {
     /// Writes a safetensors file, whole or not at all.
     ///
     /// # Errors
-    /// [`NetError::TooLarge`], [`NetError::Io`] or [`NetError::File`].
+    /// [`NetError::Weights`], [`NetError::Io`] or [`NetError::File`].
     pub fn write(&self, path: &Path, precision: WeightPrecision) -> Result<(), NetError> {
         self.check_range(precision)?;
         let bytes = self
@@ -54,49 +52,29 @@ impl Weights {
     }
 }
 
-impl Inference {
-    /// Reads an ONNX file with one input, and makes it ready for one picture of `channels` channels,
-    /// `width` x `height` pixels.
-    ///
-    /// # Errors
-    /// [`NetError::Io`], or [`NetError::Onnx`] where it is no network or cannot take such a picture.
-    pub fn read_onnx(
-        path: &Path,
-        channels: usize,
-        size: (usize, usize),
-        engine: &InferenceEngine,
-    ) -> Result<Self, NetError> {
-        Self::from_onnx(path, &read_onnx(path)?, channels, size, engine)
-    }
-}
-
 /// Reads an ONNX file with all its weights, also those that stand in files beside it.
 ///
 /// # Errors
-/// [`NetError::Io`] where it or such a file cannot be read, [`NetError::Onnx`] where what it says of them is damaged.
+/// [`NetError::Io`] where it cannot be read, [`NetError::File`] where such a file cannot, or what it says of them is damaged.
 pub fn read_onnx(path: &Path) -> Result<Vec<u8>, NetError> {
     let bytes = fs::read(path).map_err(not_read(path))?;
     let merged = with_external_weights(&bytes, |part| read_part(path, part));
-    match merged {
-        Ok(merged) => Ok(merged.unwrap_or(bytes)),
-        Err(ExternalFault::Part(fault)) => Err(fault),
-        Err(ExternalFault::Damaged(fault)) => Err(NetError::Onnx {
-            path: path.to_owned(),
-            fault,
-        }),
-    }
+    let merged = merged.map_err(|fault| NetError::File {
+        path: path.to_owned(),
+        fault,
+    })?;
+    Ok(merged.unwrap_or(bytes))
 }
 
 /// A part of a file that lies in the folder of an ONNX file, or below.
-fn read_part(onnx: &Path, part: &ExternalPart) -> Result<Vec<u8>, NetError> {
+fn read_part(onnx: &Path, part: &ExternalPart) -> Result<Vec<u8>, String> {
     let location = part.location.replace('\\', "/");
     let named = Path::new(&location);
-    let wrong = |what: &str| NetError::Onnx {
-        path: onnx.to_owned(),
-        fault: format!(
+    let wrong = |what: &str| {
+        format!(
             "its weights stand in the file {:?}, which {what}",
             part.location
-        ),
+        )
     };
     let mut parts = named.components();
     let lies_below = parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
@@ -104,13 +82,13 @@ fn read_part(onnx: &Path, part: &ExternalPart) -> Result<Vec<u8>, NetError> {
     if !lies_below || named.file_name().is_none() {
         return Err(wrong("does not lie in its folder"));
     }
+    let unread = |fault: io::Error| wrong(&format!("cannot be read: {fault}"));
     let path = onnx.with_file_name(named);
-    let mut file = match File::open(&path) {
-        Ok(file) => file,
-        Err(_) if !path.exists() => return Err(wrong("is not there: put it beside it")),
-        Err(source) => return Err(not_read(&path)(source)),
-    };
-    let metadata = file.metadata().map_err(not_read(&path))?;
+    if !path.exists() {
+        return Err(wrong("is not there: put it beside it"));
+    }
+    let mut file = File::open(&path).map_err(unread)?;
+    let metadata = file.metadata().map_err(unread)?;
     if !metadata.is_file() {
         return Err(wrong("is not a file"));
     }
@@ -121,7 +99,7 @@ fn read_part(onnx: &Path, part: &ExternalPart) -> Result<Vec<u8>, NetError> {
     let mut bytes = vec![0; part.length as usize];
     file.seek(SeekFrom::Start(part.offset))
         .and_then(|_| file.read_exact(&mut bytes))
-        .map_err(not_read(&path))?;
+        .map_err(unread)?;
     Ok(bytes)
 }
 
@@ -168,7 +146,7 @@ mod tests {
         let error = weights(-1e5).write(&path, WeightPrecision::Half);
         let error = error.unwrap_err();
         assert!(
-            matches!(&error, NetError::TooLarge { name, .. } if name == "layer.bias"),
+            matches!(&error, NetError::Weights(text) if text.contains("layer.bias")),
             "{error}"
         );
         assert!(!path.exists());
@@ -238,7 +216,7 @@ mod tests {
         ] {
             fs::write(&path, needing(location)).unwrap();
             let fault = match read_onnx(&path) {
-                Err(NetError::Onnx { fault, .. }) => fault,
+                Err(NetError::File { fault, .. }) => fault,
                 other => panic!("{location}: {other:?}"),
             };
             assert!(fault.contains(&format!("{location:?}")), "{fault}");

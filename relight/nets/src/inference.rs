@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use super::engine::InferenceEngine;
+use super::engine::{InferenceEngine, Plan};
 use super::error::NetError;
 use super::external::first_location;
 use super::graph::Graph;
 use super::onnx::to_onnx;
-use super::plan::{GivenNumber, Plan};
 use super::weights::{Tensor, Weights};
 
 /// A network ready to be run on single pictures of one size.
@@ -32,7 +31,7 @@ impl Inference {
     /// Makes a network ready for pictures of `width` x `height` pixels, by tract.
     ///
     /// # Errors
-    /// [`NetError::PictureSize`], what [`Weights::fitted_to`] answers, or [`NetError::Engine`].
+    /// [`NetError::Run`], or what [`Weights::fitted_to`] answers.
     pub fn new(graph: &Graph, weights: &Weights, size: (usize, usize)) -> Result<Self, NetError> {
         Self::with_engine(graph, weights, size, &InferenceEngine::default())
     }
@@ -40,7 +39,7 @@ impl Inference {
     /// Makes a network ready for pictures of `width` x `height` pixels.
     ///
     /// # Errors
-    /// [`NetError::PictureSize`], what [`Weights::fitted_to`] answers, or [`NetError::Engine`].
+    /// [`NetError::Run`], or what [`Weights::fitted_to`] answers.
     pub fn with_engine(
         graph: &Graph,
         weights: &Weights,
@@ -49,14 +48,10 @@ impl Inference {
     ) -> Result<Self, NetError> {
         let bytes = to_onnx(graph, weights, 1, (width, height))?;
         let shape = [1, graph.input_channels(), height, width];
-        let plan = engine
-            .prepare(&bytes, shape, &[])
-            .map_err(|fault| NetError::Engine {
-                engine: engine.name(),
-                doing: "prepare",
-                net: graph.name(),
-                fault,
-            });
+        let plan = engine.prepare(&bytes, shape, &[]).map_err(|fault| {
+            let (engine, net) = (engine.name(), graph.name());
+            NetError::Run(format!("{engine} could not prepare {net}: {fault}"))
+        });
         Ok(Self {
             name: graph.name(),
             engine: engine.name(),
@@ -65,21 +60,21 @@ impl Inference {
         })
     }
 
-    /// The same for a file whose further inputs are numbers that stay the same: the picture goes into the input that is
-    /// none of them.
+    /// Makes the content of an ONNX file ready for one picture of `channels` channels, `width` x `height` pixels. Further
+    /// inputs, by their names, are the `given` numbers: the picture goes into the input that is none of them.
     ///
     /// # Errors
-    /// As [`Self::from_onnx`].
-    pub fn from_onnx_with(
+    /// [`NetError::File`], which names it as `path`, where it is no network or cannot take such a picture.
+    pub fn from_onnx(
         path: &Path,
         bytes: &[u8],
         channels: usize,
         (width, height): (usize, usize),
-        given: &[GivenNumber],
+        given: &[(String, i64)],
         engine: &InferenceEngine,
     ) -> Result<Self, NetError> {
         let shape = [1, channels, height, width];
-        let unusable = |fault| NetError::Onnx {
+        let unusable = |fault| NetError::File {
             path: path.to_owned(),
             fault,
         };
@@ -97,43 +92,24 @@ impl Inference {
         })
     }
 
-    /// Makes the content of an ONNX file with one input ready for one picture of `channels` channels,
-    /// `width` x `height` pixels.
-    ///
-    /// # Errors
-    /// [`NetError::Onnx`], which names it as `path`, where it is no network or cannot take such a picture.
-    pub fn from_onnx(
-        path: &Path,
-        bytes: &[u8],
-        channels: usize,
-        size: (usize, usize),
-        engine: &InferenceEngine,
-    ) -> Result<Self, NetError> {
-        Self::from_onnx_with(path, bytes, channels, size, &[], engine)
-    }
-
     /// Runs it on one picture: channel by channel, row by row. The outputs come in the graph's order.
     ///
     /// # Errors
-    /// [`NetError::PictureSize`] where the input is not as long as its shape, or [`NetError::Engine`].
+    /// [`NetError::Run`], also where the input is not as long as its shape.
     pub fn run(&self, input: &[f32]) -> Result<Vec<Tensor>, NetError> {
         let [_, channels, height, width] = self.shape;
         if input.len() != channels * height * width {
-            return Err(NetError::PictureSize {
-                net: self.name,
-                width,
-                height,
-                needs: format!(
-                    "{channels} channels of that size, not {} numbers",
-                    input.len()
-                ),
-            });
+            return Err(NetError::Run(format!(
+                "{} takes {channels} channels of {width} x {height} pixels, not {} numbers",
+                self.name,
+                input.len()
+            )));
         }
-        self.plan.run(input).map_err(|fault| NetError::Engine {
-            engine: self.engine,
-            doing: "run",
-            net: self.name,
-            fault,
+        self.plan.run(input).map_err(|fault| {
+            NetError::Run(format!(
+                "{} could not run {}: {fault}",
+                self.engine, self.name
+            ))
         })
     }
 }

@@ -2,8 +2,8 @@
 //! of parameters are made; their weights in files; and their inference.
 //!
 //! [`paper`] has the paper's four networks with the released shapes and parameter names, and
-//! [`decomposer`] and [`turn_network`] ours. [`Weights`] reads safetensors and PyTorch's state dicts (a reader that
-//! executes nothing), [`to_onnx`] writes what any engine runs, and [`Inference`] runs it here, by an [`InferenceEngine`].
+//! [`decomposer`] and [`turn_network`] ours. [`Weights`] reads safetensors,
+//! [`to_onnx`] writes what any engine runs, and [`Inference`] runs it here, by an [`InferenceEngine`].
 //! Knows nothing of pictures, colour or light: tensors go in and come out.
 //!
 //! ```
@@ -31,8 +31,6 @@ mod onnx;
 mod onnxruntime;
 pub mod paper;
 mod parameter;
-mod pickle;
-mod plan;
 mod signature;
 mod tract;
 mod turn_network;
@@ -45,7 +43,7 @@ pub use decomposer::{
 };
 pub use engine::InferenceEngine;
 pub use error::NetError;
-pub use external::{ExternalFault, ExternalPart, with_external_weights};
+pub use external::{ExternalPart, with_external_weights};
 #[cfg(feature = "files")]
 pub use files::read_onnx;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Value};
@@ -54,7 +52,6 @@ pub use onnx::{INPUT, check_size, to_onnx};
 #[cfg(feature = "onnxruntime")]
 pub use onnxruntime::OnnxRuntime;
 pub use parameter::{Parameter, Role};
-pub use plan::GivenNumber;
 pub use signature::{OnnxElement, OnnxSignature, OnnxValue};
 pub use turn_network::{
     ALBEDO_OUTPUTS, ALBEDO_PARAMETERS, LOG_MEANS, TURN_INPUTS, TURN_OUTPUTS, turn_network,

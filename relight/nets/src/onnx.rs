@@ -1,11 +1,18 @@
 //! A network as an ONNX file: the graph in ONNX's operators for one size of picture, with its
 //! weights.
 //!
-//! Only what [`Graph`] can hold is written. Messages are the part of `onnx.proto3` (ONNX 1.17, IR
-//! version 8, operator set 13) that this needs, with the field numbers given there. Normalisation of groups is
-//! written as instance normalisation of a reshaped tensor, since operator set 13 has no other.
+//! Only what [`Graph`] can hold is written, in IR version 8 and operator set 13. Normalisation of groups is written as
+//! instance normalisation of a reshaped tensor, since operator set 13 has no other.
 
 use prost::Message;
+use tract_onnx::pb::attribute_proto::AttributeType;
+use tract_onnx::pb::tensor_proto::DataType;
+use tract_onnx::pb::tensor_shape_proto::{Dimension, dimension};
+use tract_onnx::pb::type_proto::{Tensor, Value};
+use tract_onnx::pb::{
+    AttributeProto, GraphProto, ModelProto, NodeProto, OperatorSetIdProto, TensorProto,
+    TensorShapeProto, TypeProto, ValueInfoProto,
+};
 
 use super::error::NetError;
 use super::graph::{EPSILON, Graph, Node, Operation};
@@ -16,14 +23,12 @@ pub const INPUT: &str = "input";
 
 const IR_VERSION: i64 = 8;
 const OPERATOR_SET: i64 = 13;
-const FLOAT: i32 = 1;
-const INT64: i32 = 7;
 
 /// The graph with its weights as the bytes of an ONNX file, for a batch of `batch` pictures of
 /// `width` x `height` pixels.
 ///
 /// # Errors
-/// [`NetError::PictureSize`], or what [`Weights::fitted_to`] answers.
+/// [`NetError::Run`], or what [`Weights::fitted_to`] answers.
 pub fn to_onnx(
     graph: &Graph,
     weights: &Weights,
@@ -38,7 +43,7 @@ pub fn to_onnx(
         nodes: Vec::new(),
         tensors: weights
             .iter()
-            .map(|(name, tensor)| TensorProto::floats(name, tensor.shape(), tensor.values()))
+            .map(|(name, tensor)| float_tensor(name, tensor.shape(), tensor.values()))
             .collect(),
     };
     for (at, node) in graph.nodes().iter().enumerate().skip(1) {
@@ -48,7 +53,7 @@ pub fn to_onnx(
         let node = graph.node(output.value);
         let shape = writer.shape(node);
         let name = name_of(output.value.index());
-        let identity = NodeProto::new("Identity", vec![name], output.name.to_owned());
+        let identity = operator("Identity", vec![name], output.name.to_owned());
         (identity, value_info(output.name, &shape))
     });
     let (identities, outputs): (Vec<_>, Vec<_>) = outputs.unzip();
@@ -64,11 +69,13 @@ pub fn to_onnx(
             initializer: writer.tensors,
             input: vec![value_info(INPUT, &input)],
             output: outputs,
+            ..GraphProto::default()
         }),
-        opset_import: vec![OperatorSetId {
+        opset_import: vec![OperatorSetIdProto {
             domain: String::new(),
             version: OPERATOR_SET,
         }],
+        ..ModelProto::default()
     };
     Ok(model.encode_to_vec())
 }
@@ -76,7 +83,7 @@ pub fn to_onnx(
 /// Whether the network can take pictures of this size.
 ///
 /// # Errors
-/// [`NetError::PictureSize`].
+/// [`NetError::Run`].
 pub fn check_size(graph: &Graph, (width, height): (usize, usize)) -> Result<(), NetError> {
     let multiple = graph.multiple();
     let divides = width.is_multiple_of(multiple) && height.is_multiple_of(multiple);
@@ -87,12 +94,10 @@ pub fn check_size(graph: &Graph, (width, height): (usize, usize)) -> Result<(), 
         }
         _ => return Ok(()),
     };
-    Err(NetError::PictureSize {
-        net: graph.name(),
-        width,
-        height,
-        needs,
-    })
+    Err(NetError::Run(format!(
+        "{} cannot take a picture of {width} x {height} pixels: {needs}",
+        graph.name()
+    )))
 }
 
 /// Collects the nodes and tensors of a file.
@@ -114,6 +119,10 @@ impl Writer {
         }
     }
 
+    fn push(&mut self, node: NodeProto, attribute: Vec<AttributeProto>) {
+        self.nodes.push(NodeProto { attribute, ..node });
+    }
+
     fn write(&mut self, graph: &Graph, at: usize, node: &Node) {
         let inputs: Vec<String> = node
             .inputs
@@ -121,7 +130,7 @@ impl Writer {
             .map(|value| name_of(value.index()))
             .collect();
         let output = name_of(at);
-        let plain = |kind| NodeProto::new(kind, inputs.clone(), output.clone());
+        let plain = |kind| operator(kind, inputs.clone(), output.clone());
         match &node.operation {
             Operation::Input => {}
             Operation::Convolution {
@@ -130,13 +139,12 @@ impl Writer {
                 stride,
             } => {
                 let (kernel, stride) = (*kernel as i64, *stride as i64);
-                let mut proto = plain("Conv").with_parameters(name);
-                proto.attribute = vec![
-                    Attribute::integers("kernel_shape", vec![kernel; 2]),
-                    Attribute::integers("pads", vec![kernel / 2; 4]),
-                    Attribute::integers("strides", vec![stride; 2]),
+                let attributes = vec![
+                    integers("kernel_shape", vec![kernel; 2]),
+                    integers("pads", vec![kernel / 2; 4]),
+                    integers("strides", vec![stride; 2]),
                 ];
-                self.nodes.push(proto);
+                self.push(with_parameters(plain("Conv"), name), attributes);
             }
             Operation::GroupNorm { name, groups } => {
                 self.write_norm(node, &inputs[0], &output, name.as_deref(), *groups);
@@ -145,8 +153,7 @@ impl Writer {
             Operation::Tanh => self.nodes.push(plain("Tanh")),
             Operation::Add => self.nodes.push(plain("Add")),
             Operation::Concatenate => {
-                let proto = plain("Concat").with(Attribute::integer("axis", 1));
-                self.nodes.push(proto);
+                self.push(plain("Concat"), vec![integer("axis", 1)]);
             }
             Operation::Upsample { align_corners } => {
                 self.write_upsample(&inputs[0], &output, *align_corners);
@@ -161,12 +168,11 @@ impl Writer {
             Operation::MeanPool => self.write_pool("GlobalAveragePool", node, &inputs[0], &output),
             Operation::MaxPool => self.write_pool("GlobalMaxPool", node, &inputs[0], &output),
             Operation::Flatten { .. } => {
-                let proto = plain("Flatten").with(Attribute::integer("axis", 1));
-                self.nodes.push(proto);
+                self.push(plain("Flatten"), vec![integer("axis", 1)]);
             }
             Operation::Linear { name } => {
-                let proto = plain("Gemm").with_parameters(name);
-                self.nodes.push(proto.with(Attribute::integer("transB", 1)));
+                let proto = with_parameters(plain("Gemm"), name);
+                self.push(proto, vec![integer("transB", 1)]);
             }
         }
     }
@@ -189,13 +195,16 @@ impl Writer {
         let ones = self.constant(&format!("{output}.one"), &[groups], &vec![1.0; groups]);
         let zeros = self.constant(&format!("{output}.zero"), &[groups], &vec![0.0; groups]);
         let normal = format!("{output}.normal");
-        let proto = NodeProto::new(
+        let proto = operator(
             "InstanceNormalization",
             vec![grouped, ones, zeros],
             normal.clone(),
         );
-        self.nodes
-            .push(proto.with(Attribute::float("epsilon", EPSILON)));
+        let epsilon = AttributeProto {
+            f: EPSILON,
+            ..attribute("epsilon", AttributeType::Float)
+        };
+        self.push(proto, vec![epsilon]);
         let Some(name) = name else {
             self.reshape(&normal, output, &shape);
             return;
@@ -214,12 +223,9 @@ impl Writer {
         );
         let scaled = format!("{output}.scaled");
         self.nodes
-            .push(NodeProto::new("Mul", vec![back, gain], scaled.clone()));
-        self.nodes.push(NodeProto::new(
-            "Add",
-            vec![scaled, offset],
-            output.to_owned(),
-        ));
+            .push(operator("Mul", vec![back, gain], scaled.clone()));
+        self.nodes
+            .push(operator("Add", vec![scaled, offset], output.to_owned()));
     }
 
     fn write_upsample(&mut self, input: &str, output: &str, align_corners: bool) {
@@ -229,10 +235,11 @@ impl Writer {
             false => "half_pixel",
         };
         let inputs = vec![input.to_owned(), String::new(), scales];
-        let proto = NodeProto::new("Resize", inputs, output.to_owned())
-            .with(Attribute::text("mode", "linear"))
-            .with(Attribute::text("coordinate_transformation_mode", corners));
-        self.nodes.push(proto);
+        let attributes = vec![
+            text("mode", "linear"),
+            text("coordinate_transformation_mode", corners),
+        ];
+        self.push(operator("Resize", inputs, output.to_owned()), attributes);
     }
 
     fn write_unshuffle(&mut self, node: &Node, input: &str, output: &str, factor: usize) {
@@ -262,29 +269,28 @@ impl Writer {
     fn write_pool(&mut self, kind: &str, node: &Node, input: &str, output: &str) {
         let pooled = format!("{output}.pooled");
         self.nodes
-            .push(NodeProto::new(kind, vec![input.to_owned()], pooled.clone()));
+            .push(operator(kind, vec![input.to_owned()], pooled.clone()));
         let shape = self.shape(node);
         self.reshape(&pooled, output, &shape);
     }
 
     fn reshape(&mut self, input: &str, output: &str, shape: &[usize]) -> String {
         let target = format!("{output}.shape");
-        self.tensors.push(TensorProto::integers(&target, shape));
+        self.tensors.push(integer_tensor(&target, shape));
         let inputs = vec![input.to_owned(), target];
         self.nodes
-            .push(NodeProto::new("Reshape", inputs, output.to_owned()));
+            .push(operator("Reshape", inputs, output.to_owned()));
         output.to_owned()
     }
 
     fn transpose(&mut self, input: &str, output: &str, order: &[i64]) -> String {
-        let proto = NodeProto::new("Transpose", vec![input.to_owned()], output.to_owned());
-        self.nodes
-            .push(proto.with(Attribute::integers("perm", order.to_vec())));
+        let proto = operator("Transpose", vec![input.to_owned()], output.to_owned());
+        self.push(proto, vec![integers("perm", order.to_vec())]);
         output.to_owned()
     }
 
     fn constant(&mut self, name: &str, shape: &[usize], values: &[f32]) -> String {
-        self.tensors.push(TensorProto::floats(name, shape, values));
+        self.tensors.push(float_tensor(name, shape, values));
         name.to_owned()
     }
 }
@@ -296,226 +302,95 @@ fn name_of(node: usize) -> String {
     }
 }
 
-fn value_info(name: &str, shape: &[usize]) -> ValueInfo {
-    let dimensions = shape.iter().map(|&side| Dimension { value: side as i64 });
-    ValueInfo {
-        name: name.to_owned(),
-        kind: Some(TypeProto {
-            tensor: Some(TensorType {
-                element: FLOAT,
-                shape: Some(Shape {
-                    dimensions: dimensions.collect(),
-                }),
-            }),
+fn value_info(name: &str, shape: &[usize]) -> ValueInfoProto {
+    let dimension = |&side: &usize| Dimension {
+        value: Some(dimension::Value::DimValue(side as i64)),
+        ..Dimension::default()
+    };
+    let tensor = Tensor {
+        elem_type: DataType::Float as i32,
+        shape: Some(TensorShapeProto {
+            dim: shape.iter().map(dimension).collect(),
         }),
+    };
+    ValueInfoProto {
+        name: name.to_owned(),
+        r#type: Some(TypeProto {
+            value: Some(Value::TensorType(tensor)),
+            ..TypeProto::default()
+        }),
+        ..ValueInfoProto::default()
     }
 }
 
-#[derive(Message)]
-struct ModelProto {
-    #[prost(int64, tag = "1")]
-    ir_version: i64,
-    #[prost(string, tag = "2")]
-    producer_name: String,
-    #[prost(string, tag = "3")]
-    producer_version: String,
-    #[prost(message, optional, tag = "7")]
-    graph: Option<GraphProto>,
-    #[prost(message, repeated, tag = "8")]
-    opset_import: Vec<OperatorSetId>,
+/// The node with the parameters of a layer as further inputs.
+fn with_parameters(mut node: NodeProto, layer: &str) -> NodeProto {
+    node.input.push(format!("{layer}.weight"));
+    node.input.push(format!("{layer}.bias"));
+    node
 }
 
-#[derive(Message)]
-struct OperatorSetId {
-    #[prost(string, tag = "1")]
-    domain: String,
-    #[prost(int64, tag = "2")]
-    version: i64,
-}
-
-#[derive(Message)]
-struct GraphProto {
-    #[prost(message, repeated, tag = "1")]
-    node: Vec<NodeProto>,
-    #[prost(string, tag = "2")]
-    name: String,
-    #[prost(message, repeated, tag = "5")]
-    initializer: Vec<TensorProto>,
-    #[prost(message, repeated, tag = "11")]
-    input: Vec<ValueInfo>,
-    #[prost(message, repeated, tag = "12")]
-    output: Vec<ValueInfo>,
-}
-
-#[derive(Message)]
-struct NodeProto {
-    #[prost(string, repeated, tag = "1")]
-    input: Vec<String>,
-    #[prost(string, repeated, tag = "2")]
-    output: Vec<String>,
-    #[prost(string, tag = "3")]
-    name: String,
-    #[prost(string, tag = "4")]
-    op_type: String,
-    #[prost(message, repeated, tag = "5")]
-    attribute: Vec<Attribute>,
-}
-
-impl NodeProto {
-    fn new(kind: &str, input: Vec<String>, output: String) -> Self {
-        Self {
-            input,
-            name: output.clone(),
-            output: vec![output],
-            op_type: kind.to_owned(),
-            attribute: Vec::new(),
-        }
-    }
-
-    fn with(mut self, attribute: Attribute) -> Self {
-        self.attribute.push(attribute);
-        self
-    }
-
-    fn with_parameters(mut self, name: &str) -> Self {
-        self.input.push(format!("{name}.weight"));
-        self.input.push(format!("{name}.bias"));
-        self
+fn operator(kind: &str, input: Vec<String>, output: String) -> NodeProto {
+    NodeProto {
+        input,
+        name: output.clone(),
+        output: vec![output],
+        op_type: kind.to_owned(),
+        ..NodeProto::default()
     }
 }
 
-/// The types of an attribute's value, as `AttributeProto.AttributeType` numbers them.
-#[derive(Clone, Copy)]
-enum AttributeType {
-    Float = 1,
-    Int = 2,
-    String = 3,
-    Ints = 7,
-}
-
-#[derive(Message)]
-struct Attribute {
-    #[prost(string, tag = "1")]
-    name: String,
-    #[prost(float, tag = "2")]
-    f: f32,
-    #[prost(int64, tag = "3")]
-    i: i64,
-    #[prost(bytes = "vec", tag = "4")]
-    s: Vec<u8>,
-    #[prost(int64, repeated, tag = "8")]
-    ints: Vec<i64>,
-    #[prost(int32, tag = "20")]
-    kind: i32,
-}
-
-impl Attribute {
-    fn named(name: &str, kind: AttributeType) -> Self {
-        Self {
-            name: name.to_owned(),
-            kind: kind as i32,
-            ..Self::default()
-        }
-    }
-
-    fn float(name: &str, f: f32) -> Self {
-        Self {
-            f,
-            ..Self::named(name, AttributeType::Float)
-        }
-    }
-
-    fn integer(name: &str, i: i64) -> Self {
-        Self {
-            i,
-            ..Self::named(name, AttributeType::Int)
-        }
-    }
-
-    fn integers(name: &str, ints: Vec<i64>) -> Self {
-        Self {
-            ints,
-            ..Self::named(name, AttributeType::Ints)
-        }
-    }
-
-    fn text(name: &str, text: &str) -> Self {
-        let s = text.as_bytes().to_vec();
-        Self {
-            s,
-            ..Self::named(name, AttributeType::String)
-        }
+fn attribute(name: &str, kind: AttributeType) -> AttributeProto {
+    AttributeProto {
+        name: name.to_owned(),
+        r#type: kind as i32,
+        ..AttributeProto::default()
     }
 }
 
-#[derive(Message)]
-struct TensorProto {
-    #[prost(int64, repeated, tag = "1")]
-    dims: Vec<i64>,
-    #[prost(int32, tag = "2")]
-    data_type: i32,
-    #[prost(string, tag = "8")]
-    name: String,
-    #[prost(bytes = "vec", tag = "9")]
-    raw_data: Vec<u8>,
+fn integer(name: &str, i: i64) -> AttributeProto {
+    AttributeProto {
+        i,
+        ..attribute(name, AttributeType::Int)
+    }
 }
 
-impl TensorProto {
-    fn floats(name: &str, shape: &[usize], values: &[f32]) -> Self {
-        Self {
-            dims: shape.iter().map(|&side| side as i64).collect(),
-            data_type: FLOAT,
-            name: name.to_owned(),
-            raw_data: values
-                .iter()
-                .flat_map(|value| value.to_le_bytes())
-                .collect(),
-        }
+fn integers(name: &str, ints: Vec<i64>) -> AttributeProto {
+    AttributeProto {
+        ints,
+        ..attribute(name, AttributeType::Ints)
     }
+}
 
-    fn integers(name: &str, values: &[usize]) -> Self {
-        let bytes = values
+fn text(name: &str, text: &str) -> AttributeProto {
+    AttributeProto {
+        s: text.as_bytes().to_vec(),
+        ..attribute(name, AttributeType::String)
+    }
+}
+
+fn float_tensor(name: &str, shape: &[usize], values: &[f32]) -> TensorProto {
+    TensorProto {
+        dims: shape.iter().map(|&side| side as i64).collect(),
+        data_type: DataType::Float as i32,
+        name: name.to_owned(),
+        raw_data: values
             .iter()
-            .flat_map(|&value| (value as i64).to_le_bytes());
-        Self {
-            dims: vec![values.len() as i64],
-            data_type: INT64,
-            name: name.to_owned(),
-            raw_data: bytes.collect(),
-        }
+            .flat_map(|value| value.to_le_bytes())
+            .collect(),
+        ..TensorProto::default()
     }
 }
 
-#[derive(Message)]
-struct ValueInfo {
-    #[prost(string, tag = "1")]
-    name: String,
-    #[prost(message, optional, tag = "2")]
-    kind: Option<TypeProto>,
-}
-
-#[derive(Message)]
-struct TypeProto {
-    #[prost(message, optional, tag = "1")]
-    tensor: Option<TensorType>,
-}
-
-#[derive(Message)]
-struct TensorType {
-    #[prost(int32, tag = "1")]
-    element: i32,
-    #[prost(message, optional, tag = "2")]
-    shape: Option<Shape>,
-}
-
-#[derive(Message)]
-struct Shape {
-    #[prost(message, repeated, tag = "1")]
-    dimensions: Vec<Dimension>,
-}
-
-#[derive(Message)]
-struct Dimension {
-    #[prost(int64, tag = "1")]
-    value: i64,
+fn integer_tensor(name: &str, values: &[usize]) -> TensorProto {
+    let bytes = values
+        .iter()
+        .flat_map(|&value| (value as i64).to_le_bytes());
+    TensorProto {
+        dims: vec![values.len() as i64],
+        data_type: DataType::Int64 as i32,
+        name: name.to_owned(),
+        raw_data: bytes.collect(),
+        ..TensorProto::default()
+    }
 }

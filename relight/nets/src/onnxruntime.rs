@@ -10,8 +10,8 @@ use ort::session::{Session, SessionInputValue};
 use ort::value::{Tensor as OrtTensor, TensorRef};
 use relit_data::causes::with_causes;
 
+use super::engine::Plan;
 use super::error::NetError;
-use super::plan::{GivenNumber, Plan};
 use super::weights::Tensor;
 
 /// The library of ONNX Runtime, 1.17 or later, loaded.
@@ -38,7 +38,7 @@ impl OnnxRuntime {
     /// already, it stays.
     ///
     /// # Errors
-    /// [`NetError::NoLibrary`] where there is none; [`NetError::Library`] where it cannot be used.
+    /// [`NetError::NoLibrary`] where there is none; [`NetError::File`] where it cannot be used.
     pub fn load(library: &Path) -> Result<Self, NetError> {
         let is_name = library.components().count() < 2 && !library.exists();
         let path = if is_name {
@@ -46,9 +46,11 @@ impl OnnxRuntime {
         } else {
             path::absolute(library)
         };
-        let unusable = |fault: &dyn std::fmt::Display| NetError::Library {
+        let unusable = |fault: &dyn std::fmt::Display| NetError::File {
             path: library.to_owned(),
-            fault: fault.to_string(),
+            fault: format!(
+                "{fault}; set ORT_DYLIB_PATH to the library of ONNX Runtime 1.17 or later, or use --engine tract"
+            ),
         };
         let path = path.map_err(|fault| unusable(&fault))?;
         let environment = ort::init_from(&path).map_err(|fault| match fault {
@@ -67,7 +69,7 @@ impl OnnxRuntime {
         &self,
         onnx: &[u8],
         shape: [usize; 4],
-        given: &[GivenNumber],
+        given: &[(String, i64)],
     ) -> Result<impl Plan + use<>, String> {
         let session = Session::builder(&self.environment)
             .and_then(
@@ -78,8 +80,8 @@ impl OnnxRuntime {
         let inputs = session.inputs().iter();
         let inputs = inputs.map(|input| {
             let name = input.name().to_owned();
-            let number = given.iter().find(|given| given.name == name);
-            (name, number.map(|given| given.value))
+            let number = given.iter().find(|(given, _)| *given == name);
+            (name, number.map(|(_, number)| *number))
         });
         Ok(SessionPlan {
             inputs: inputs.collect(),

@@ -1,11 +1,9 @@
 //! What goes into and comes out of a network in an ONNX file, without its weights.
 
 use prost::Message;
-
-/// Type of 32-bit floating point numbers, as `TensorProto.DataType` numbers it.
-const FLOAT: i32 = 1;
-/// Type of 64-bit whole numbers.
-const INT64: i32 = 7;
+use tract_onnx::pb::tensor_proto::DataType;
+use tract_onnx::pb::tensor_shape_proto::{Dimension, dimension};
+use tract_onnx::pb::{ModelProto, ValueInfoProto, type_proto};
 
 /// Inputs and outputs of a network in an ONNX file, in its order.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -42,8 +40,9 @@ impl OnnxSignature {
     /// The signature in the content of a file; none where it is no ONNX file.
     #[must_use]
     pub fn read(bytes: &[u8]) -> Option<Self> {
-        let graph = Model::decode(bytes).ok()?.graph?;
-        let is_weight = |value: &Value| graph.initializer.iter().any(|w| w.name == value.name);
+        let graph = ModelProto::decode(bytes).ok()?.graph?;
+        let is_weight =
+            |value: &ValueInfoProto| graph.initializer.iter().any(|w| w.name == value.name);
         let inputs = graph.input.iter().filter(|value| !is_weight(value));
         Some(Self {
             inputs: inputs.map(OnnxValue::of).collect(),
@@ -65,79 +64,24 @@ impl OnnxSignature {
 }
 
 impl OnnxValue {
-    fn of(value: &Value) -> Self {
-        let tensor = value.kind.as_ref().and_then(|kind| kind.tensor.as_ref());
+    fn of(value: &ValueInfoProto) -> Self {
+        let kind = value.r#type.as_ref().and_then(|kind| kind.value.as_ref());
+        let tensor = kind.map(|type_proto::Value::TensorType(tensor)| tensor);
         let shape = tensor.and_then(|tensor| tensor.shape.as_ref());
-        let side = |side: &Side| usize::try_from(side.value).ok().filter(|&side| side > 0);
+        let side = |side: &Dimension| match side.value {
+            Some(dimension::Value::DimValue(side)) if side > 0 => usize::try_from(side).ok(),
+            _ => None,
+        };
         Self {
             name: value.name.clone(),
-            element: match tensor.map(|tensor| tensor.element) {
-                Some(FLOAT) => OnnxElement::Float,
-                Some(INT64) => OnnxElement::Integer,
+            element: match tensor.map(type_proto::Tensor::elem_type) {
+                Some(DataType::Float) => OnnxElement::Float,
+                Some(DataType::Int64) => OnnxElement::Integer,
                 _ => OnnxElement::Other,
             },
-            sides: shape.map_or_else(Vec::new, |shape| shape.sides.iter().map(side).collect()),
+            sides: shape.map_or_else(Vec::new, |shape| shape.dim.iter().map(side).collect()),
         }
     }
-}
-
-// The part of `onnx.proto3` that this needs, with the field numbers given there. Fields that are not named here, weights
-// above all, are skipped.
-
-#[derive(Message)]
-struct Model {
-    #[prost(message, optional, tag = "7")]
-    graph: Option<Graph>,
-}
-
-#[derive(Message)]
-struct Graph {
-    #[prost(message, repeated, tag = "5")]
-    initializer: Vec<Named>,
-    #[prost(message, repeated, tag = "11")]
-    input: Vec<Value>,
-    #[prost(message, repeated, tag = "12")]
-    output: Vec<Value>,
-}
-
-#[derive(Message)]
-struct Named {
-    #[prost(string, tag = "8")]
-    name: String,
-}
-
-#[derive(Message)]
-struct Value {
-    #[prost(string, tag = "1")]
-    name: String,
-    #[prost(message, optional, tag = "2")]
-    kind: Option<Kind>,
-}
-
-#[derive(Message)]
-struct Kind {
-    #[prost(message, optional, tag = "1")]
-    tensor: Option<TensorKind>,
-}
-
-#[derive(Message)]
-struct TensorKind {
-    #[prost(int32, tag = "1")]
-    element: i32,
-    #[prost(message, optional, tag = "2")]
-    shape: Option<Sides>,
-}
-
-#[derive(Message)]
-struct Sides {
-    #[prost(message, repeated, tag = "1")]
-    sides: Vec<Side>,
-}
-
-#[derive(Message)]
-struct Side {
-    #[prost(int64, tag = "1")]
-    value: i64,
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use tract_onnx::prelude::{
 };
 use tract_onnx::tract_core::plan::eval;
 
-use super::plan::{GivenNumber, Plan};
+use super::engine::Plan;
 use super::weights::Tensor;
 
 /// A network in tract.
@@ -23,7 +23,7 @@ impl TractPlan {
     pub(super) fn new(
         onnx: &[u8],
         shape: [usize; 4],
-        given: &[GivenNumber],
+        given: &[(String, i64)],
     ) -> Result<Self, String> {
         let plan = Self::prepared(onnx, shape, given).map_err(|fault| format!("{fault:#}"))?;
         if plan.inputs.contains(&None) {
@@ -33,14 +33,14 @@ impl TractPlan {
         }
     }
 
-    fn prepared(mut onnx: &[u8], shape: [usize; 4], given: &[GivenNumber]) -> TractResult<Self> {
+    fn prepared(mut onnx: &[u8], shape: [usize; 4], given: &[(String, i64)]) -> TractResult<Self> {
         let mut model = tract_onnx::onnx().model_for_read(&mut onnx)?;
         let mut inputs = Vec::new();
         for at in 0..model.input_outlets()?.len() {
             let node = model.input_outlets()?[at].node;
             let name = &model.node(node).name;
-            let number = given.iter().find(|given| given.name == *name);
-            let number = number.map(|given| TractTensor::from(given.value));
+            let number = given.iter().find(|(given, _)| given == name);
+            let number = number.map(|(_, number)| TractTensor::from(*number));
             // A number that is known now may decide the sizes of what follows.
             let fact = match &number {
                 Some(number) => number.clone().into(),

@@ -100,8 +100,7 @@ impl Weights {
     /// before every name of a network that ran on several devices.
     ///
     /// # Errors
-    /// [`NetError::Missing`], [`NetError::Shape`], [`NetError::Unknown`] or [`NetError::NotFinite`], with the
-    /// parameter's name.
+    /// [`NetError::Weights`], with the parameter's name.
     pub fn fitted_to(&self, graph: &Graph) -> Result<Self, NetError> {
         let all_wrapped = self.tensors.keys().all(|name| name.starts_with("module."));
         let mut given = if all_wrapped {
@@ -112,28 +111,29 @@ impl Weights {
         let mut tensors = BTreeMap::new();
         for parameter in graph.parameters() {
             let name = parameter.name;
-            let tensor = given.remove(&name).ok_or_else(|| NetError::Missing {
-                net: graph.name(),
-                name: name.clone(),
-            })?;
+            let tensor = given
+                .remove(&name)
+                .ok_or_else(|| NetError::missing(graph.name(), &name))?;
             if tensor.shape != parameter.shape {
-                return Err(NetError::Shape {
-                    net: graph.name(),
-                    name,
-                    found: tensor.shape,
-                    expected: parameter.shape,
-                });
+                return Err(NetError::Weights(format!(
+                    "{name} is of shape {:?} where {} needs {:?}: are they another network's weights?",
+                    tensor.shape,
+                    graph.name(),
+                    parameter.shape
+                )));
             }
             if !tensor.values.iter().all(|value| value.is_finite()) {
-                return Err(NetError::NotFinite { name });
+                return Err(NetError::Weights(format!(
+                    "{name} holds a value that is not a finite number: the training that made it failed"
+                )));
             }
             tensors.insert(name, tensor);
         }
         match given.into_keys().next() {
-            Some(name) => Err(NetError::Unknown {
-                net: graph.name(),
-                name,
-            }),
+            Some(name) => Err(NetError::Weights(format!(
+                "the weights hold {name}, which {} does not have: are they another network's?",
+                graph.name()
+            ))),
             None => Ok(Self { tensors }),
         }
     }
@@ -297,29 +297,22 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_named() {
         let graph = normal_net();
+        let fault = |weights: &Weights| weights.fitted_to(&graph).unwrap_err().to_string();
         let mut weights = Weights::initial(&graph, 7);
         weights.tensors.remove("mid.0.bias");
-        let missing = weights.fitted_to(&graph);
-        assert!(matches!(missing, Err(NetError::Missing { name, .. }) if name == "mid.0.bias"));
-        let short = Tensor::new(vec![1], vec![0.0]).unwrap();
-        weights.tensors.insert("mid.0.bias".to_owned(), short);
-        assert!(matches!(
-            weights.fitted_to(&graph),
-            Err(NetError::Shape { .. })
-        ));
-        let mut weights = Weights::initial(&graph, 7);
-        let nan = Tensor::new(vec![256], vec![f32::NAN; 256]).unwrap();
-        weights.tensors.insert("mid.0.bias".to_owned(), nan);
-        assert!(matches!(
-            weights.fitted_to(&graph),
-            Err(NetError::NotFinite { .. })
-        ));
+        assert!(fault(&weights).contains("have no mid.0.bias"));
+        let mut bias = |values: Vec<f32>| {
+            let tensor = Tensor::new(vec![values.len()], values).unwrap();
+            weights.tensors.insert("mid.0.bias".to_owned(), tensor);
+            fault(&weights)
+        };
+        assert!(bias(vec![0.0]).contains("mid.0.bias is of shape [1]"));
+        assert!(
+            bias(vec![f32::NAN; 256]).contains("mid.0.bias holds a value that is not a finite")
+        );
         let mut weights = Weights::initial(&graph, 7);
         let more = Tensor::new(vec![0], vec![]).unwrap();
         weights.tensors.insert("fc.weight".to_owned(), more);
-        assert!(matches!(
-            weights.fitted_to(&graph),
-            Err(NetError::Unknown { .. })
-        ));
+        assert!(fault(&weights).contains("hold fc.weight"));
     }
 }

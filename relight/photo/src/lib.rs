@@ -8,11 +8,13 @@
 //! | [`insert`] | objects of photographs in another light and in other pictures |
 #![cfg_attr(
     feature = "files",
-    doc = "| [`files`] | photographs and decompositions in files and shards |"
+    doc = "| [`files`], [`export`] | photographs and decompositions in files and shards; objects for other programs |"
 )]
 //!
 //! The feature `files` reads photographs from files and shards and writes results, `threads` works on rayon's threads.
 pub mod decompose;
+#[cfg(feature = "files")]
+pub mod export;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod insert;

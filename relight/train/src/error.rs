@@ -21,7 +21,7 @@ pub enum TrainError {
     Synth(#[from] relight_synth::SynthError),
     /// A data set cannot be opened.
     #[error(transparent)]
-    Data(#[from] relight_reader::OpenError),
+    Data(#[from] relight_core::reader::OpenError),
     /// A data set without two frames of one turn that can be read.
     #[error("the turns have no batch of two frames that can be read")]
     NoFrames,
@@ -134,7 +134,7 @@ pub enum TrainError {
     },
     /// The first of the labels cannot be read.
     #[error("the first of the labels")]
-    Label(#[source] relight_reader::DamagedSample),
+    Label(#[source] relight_core::reader::DamagedSample),
     /// Labels of a size that the networks do not take.
     #[error(
         "the labels have {width} x {height} pixels, and both have to be multiples of 32: extract the turns with another --size"

@@ -8,7 +8,7 @@ use super::error::TrainError;
 use super::sample::{DrawnSample, TruthArrays};
 use super::symmetry::Symmetry;
 use relight_core::image::Extent;
-use relight_reader::{DamagedSample, Rank, SampleFault, TruthLayout, TruthSet};
+use relight_core::reader::{DamagedSample, Rank, SampleFault, TruthLayout, TruthSet};
 use relight_synth::stream;
 
 /// A folder of them.
@@ -90,16 +90,13 @@ impl LabelledFrames {
         let fault = if sample.extent() == self.extent {
             match TruthArrays::of_truth(&sample) {
                 Ok(arrays) => return Ok(arrays),
-                Err(part) => SampleFault::Missing {
-                    part: part.to_owned(),
-                },
+                Err(part) => SampleFault::missing(part),
             }
         } else {
-            SampleFault::Size {
-                part: "mask",
-                found: sample.extent(),
-                expected: self.extent,
-            }
+            let Extent { width, height } = sample.extent();
+            SampleFault::Part(format!(
+                "its mask has {width} x {height} pixels, as no other picture of the set"
+            ))
         };
         Err(DamagedSample {
             sample: sample.name,

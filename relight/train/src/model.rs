@@ -172,7 +172,7 @@ impl Model {
     /// precision's [`ComputePrecision::kind`].
     ///
     /// # Errors
-    /// [`relight_nets::NetError::PictureSize`] or [`TrainError::Torch`].
+    /// [`relight_nets::NetError::Run`] or [`TrainError::Torch`].
     pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, TrainError> {
         let size = input.size();
         if let &[_, _, height, width] = size.as_slice() {
@@ -213,10 +213,7 @@ impl Model {
         let part = |part: &str| {
             let name = format!("{name}.{part}");
             let parameter = self.parameters.get(&name);
-            let missing = || relight_nets::NetError::Missing {
-                net: self.graph.name(),
-                name,
-            };
+            let missing = || relight_nets::NetError::missing(self.graph.name(), &name);
             Ok::<_, TrainError>(self.cast(parameter.ok_or_else(missing)?)?)
         };
         Ok((part("weight")?, part("bias")?))

@@ -16,7 +16,7 @@ use super::error::TrainError;
 use super::resources::Resources;
 use super::sample::{DrawnSample, TruthArrays};
 use super::symmetry::Symmetry;
-use relight_reader::Rank;
+use relight_core::reader::Rank;
 use relight_synth::stream;
 
 /// How samples are drawn.

@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use relight_reader::{TruthLayout, TruthSet};
+use relight_core::reader::{TruthLayout, TruthSet};
 use relight_synth::{Folders, Library, Recipe, write_samples};
 use relight_train::{
     Composition, DataSettings, DrawnSample, PaperInputs, PaperPhase, PaperSettings, PaperTask,

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
 use relight_core::files::write_png;
-use relight_core::image::{Depth, Planes};
+use relight_core::image::{Depth, Planes, Transfer};
+use relight_core::light::NormalsFrame;
+use relight_core::reader::{JudgedImages, TruthLayout, TruthSet};
 use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
     EvalError, HighlightMethod, InsertionRecipe, IntrinsicBaseline, IntrinsicInput,
@@ -17,7 +19,6 @@ use relight_eval::{
 };
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
-use relight_reader::{JudgedImages, TruthLayout, TruthSet};
 use relight_synth::Folders;
 use relight_turn::TurnNetwork;
 use relit_console::{Console, Outcome};
@@ -29,7 +30,7 @@ use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::library::read_library;
 use crate::shipped;
-use crate::values::{TransferName, YName};
+use crate::values::{normals_frame, transfer};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -130,11 +131,11 @@ struct CommonArguments {
     predictions: Vec<PathBuf>,
     /// How PNG files of colour among the estimates are encoded; EXR is linear [default: as decomposition.json says, linear
     /// where there is none].
-    #[arg(long, value_enum, value_name = "SPACE")]
-    transfer: Option<TransferName>,
+    #[arg(long, value_name = "SPACE", value_parser = transfer())]
+    transfer: Option<Transfer>,
     /// Which way y points in estimated normals.
-    #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
-    normals_y: YName,
+    #[arg(long, value_name = "WAY", default_value = "up", value_parser = normals_frame())]
+    normals_y: NormalsFrame,
     /// Write the table as JSON, with the scores of each image, to this file.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -306,10 +307,7 @@ impl CommonArguments {
     }
 
     fn predictions(&self) -> impl Iterator<Item = Predictions> {
-        let folder = |path: &PathBuf| {
-            let transfer = self.transfer.map(Into::into);
-            Predictions::new(path.clone(), transfer, self.normals_y.into())
-        };
+        let folder = |path: &PathBuf| Predictions::new(path.clone(), self.transfer, self.normals_y);
         self.predictions.iter().map(folder)
     }
 }

@@ -16,9 +16,9 @@ use crate::photos::not_an_input;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  relight weights export net.pth -o net.safetensors --half
-      what PyTorch saved, as a safetensors file of half precision
-  relight weights export net.pth --net normal-net -o normal-net.onnx
+  relight weights export net.safetensors -o half.safetensors --half
+      in half precision
+  relight weights export net.safetensors --net normal-net -o normal-net.onnx
       the paper's Normal-Net for any ONNX engine, for pictures of 256 x 256 pixels
   relight weights export a/decomposer.safetensors b/decomposer.safetensors -o mean.safetensors --half
       the mean of two runs that began with the same weights";
@@ -38,8 +38,7 @@ enum Verb {
 
 #[derive(Args)]
 struct Export {
-    /// The weights (.safetensors, or a state dict that PyTorch saved: .pth, .pt). Several are those of runs that began with the
-    /// same weights.
+    /// The weights (.safetensors). Several are those of runs that began with the same weights.
     #[arg(value_name = "IN", required = true)]
     inputs: Vec<PathBuf>,
     /// The file to write: .onnx or .safetensors.

@@ -65,7 +65,7 @@ fn normals_of_another_network_replace_ours() {
         .read_normals(&file, Some(NormalsFrame::YUp))
         .unwrap_err();
     assert!(
-        error.to_string().contains("normals.onnx cannot be run"),
+        error.to_string().contains("normals.onnx cannot be used"),
         "{error}"
     );
 }

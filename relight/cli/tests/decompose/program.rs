@@ -116,9 +116,9 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
             "w.safetensors cannot be the folder for the results",
         ),
         (
-            "decompose photos/black.png -o o --weights none.pth",
+            "decompose photos/black.png -o o --weights none.safetensors",
             1,
-            "none.pth could not be read",
+            "none.safetensors could not be read",
         ),
         (
             "decompose photos --mask w.safetensors -o o",

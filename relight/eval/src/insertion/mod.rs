@@ -6,7 +6,7 @@ mod stage;
 use super::run::{Scored, add_lines};
 use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
 use relight_core::image::{Linear, Planes, Rgb, Srgb};
-use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
+use relight_core::metrics::{Comparison, SSIM_WINDOW, ScaleFit, dssim};
 use relight_photo::decompose::{DecomposeOptions, Decomposer};
 use relight_photo::insert::{
     EdgeColours, InsertError, InsertScene, LightSource, Matching, MaterialChange, SceneObject,
@@ -178,7 +178,7 @@ pub fn evaluate_insertion(
             ),
             "one photograph under another panorama in; light, ground and place are given"
                 .to_owned(),
-            format!("SSIM by {}", Ssim::Gaussian.name()),
+            format!("SSIM by {SSIM_WINDOW}"),
         ],
         lines: Vec::new(),
         images: Vec::new(),
@@ -253,7 +253,7 @@ fn score(
         let (truth_planes, found_planes) = (truth.planes(), found.planes());
         let pair =
             Comparison::new(truth.extent(), &truth_planes, &found_planes, mask).map_err(failed)?;
-        let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed)?;
+        let ssim = pair.ssim().map_err(failed)?;
         lines.push(Scored {
             part,
             measures: vec![("MSE", pair.mse(ScaleFit::None)), ("DSSIM", dssim(ssim))],

@@ -13,7 +13,7 @@ pub use set::RelightingSet;
 use super::run::{Scored, add_lines, each};
 use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
 use relight_core::image::Planes;
-use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
+use relight_core::metrics::{Comparison, SSIM_WINDOW, ScaleFit, dssim};
 use set::{Object, Part, object_folder};
 
 /// MSE and DSSIM of relit images, for each method: the mean over all objects and target lights.
@@ -32,7 +32,7 @@ pub fn evaluate_relighting(
             set.about(),
             "one image in; out the images under all other lights; images: how many were compared"
                 .to_owned(),
-            format!("SSIM by {}", Ssim::Gaussian.name()),
+            format!("SSIM by {SSIM_WINDOW}"),
         ],
         lines: Vec::new(),
         images: Vec::new(),
@@ -98,6 +98,6 @@ fn compare(
     let (truth_planes, found_planes) = (truth.planes(), found.planes());
     let pair = Comparison::new(truth.extent(), &truth_planes, &found_planes, mask);
     let pair = pair.map_err(failed)?;
-    let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed)?;
+    let ssim = pair.ssim().map_err(failed)?;
     Ok((pair.mse(ScaleFit::None), dssim(ssim)))
 }

@@ -25,7 +25,7 @@ pub enum NormalsSource {
 
 impl NormalsSource {
     /// What a path names: a map of normals (.png, .exr), a folder with a map `normal`, an ONNX file, or weights
-    /// (.safetensors, .pth).
+    /// (.safetensors).
     #[must_use]
     pub fn of(path: &Path) -> Self {
         let has = |ending: &str| {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf, absolute};
 
 use relight_core::captured_object::{CapturedObject, CapturedObjectError};
-use relight_core::files::{MovieError, MovieWriter};
+use relight_photo::files::{MovieError, MovieWriter};
 
 use crate::error::TurnError;
 use crate::report::files::{ASSET, TurnFiles};

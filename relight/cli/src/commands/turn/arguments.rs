@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use relight_core::light::NormalsFrame;
 use relight_nets::{NetError, Weights};
 use relight_turn::{
     Elevation, Filmed, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace,
@@ -10,7 +11,7 @@ use relight_turn::{
 };
 
 use crate::shipped;
-use crate::values::{DirectionName, YName};
+use crate::values::{DirectionName, normals_frame};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -57,13 +58,13 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, value_name = "KIND", requires = "probe")]
     pub(super) probe_ball: Option<BallName>,
     /// Normals that initialise: "turn" (the network that sees the whole turn), "photo" (that of relight decompose, which
-    /// sees single frames), "none", a network (.onnx, or weights of decompose: .safetensors, .pth), a map of normals
+    /// sees single frames), "none", a network (.onnx, or weights of decompose: .safetensors), a map of normals
     /// (.png, .exr), or a folder with normal.png [default: turn, and none with --light].
     #[arg(long, value_name = "FROM")]
     normals: Option<String>,
     /// Which way y points in these normals.
-    #[arg(long, value_enum, value_name = "WAY", default_value_t = YName::Up)]
-    pub(super) normals_y: YName,
+    #[arg(long, value_name = "WAY", default_value = "up", value_parser = normals_frame())]
+    pub(super) normals_y: NormalsFrame,
     /// How much these normals count beside what the turn says.
     #[arg(long, value_name = "WEIGHT", default_value_t = TurnOptions::default().prior_weight, value_parser = weight)]
     pub(super) normals_weight: f64,

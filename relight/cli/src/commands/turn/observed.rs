@@ -110,7 +110,7 @@ impl Observed {
         let prior: Option<TurnPrior> = match source {
             InitialNormals::Turn => self.prediction.clone().map(TurnPrior::from),
             InitialNormals::Photo(source) => {
-                let y = arguments.normals_y.into();
+                let y = arguments.normals_y;
                 Some(prior_normals(source, shipped::weights, y, shown, mask)?.into())
             }
         };

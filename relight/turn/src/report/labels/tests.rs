@@ -1,5 +1,5 @@
 use relight_core::image::{Linear, Rgb};
-use relight_reader::{TruthLayout, TruthSet};
+use relight_core::reader::{TruthLayout, TruthSet};
 
 use crate::test_turns::{SIDE, SOLVED, ball, even_environment, known, mask, off, read};
 use crate::{TurnError, TurnLabels, solve_turn};

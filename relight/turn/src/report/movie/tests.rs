@@ -1,5 +1,5 @@
-use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::Planes;
+use relight_photo::files::{FrameTiming, MovieReader};
 
 use crate::test_turns::{SIDE, SOLVED, known, metal_ball, read};
 use crate::{ReadTurn, TurnFiles, TurnMaps, TurnSolution, solve_turn};
