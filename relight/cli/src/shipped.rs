@@ -3,32 +3,28 @@
 use relight_nets::{NetError, Weights};
 use relight_photo::decompose::{DecomposeError, Decomposer};
 
-/// Where they stand in the repository.
-const NAME: &str = "relight/cli/weights/decompose.safetensors";
-const BYTES: &[u8] = include_bytes!("../weights/decompose.safetensors");
-
 /// The weights of the decomposing network.
 ///
 /// # Errors
 /// [`NetError::File`] where the program was built with a damaged file.
 pub(crate) fn weights() -> Result<Weights, NetError> {
-    Weights::from_bytes(BYTES).map_err(|fault| NetError::File {
-        path: NAME.into(),
-        fault,
-    })
+    let bytes = include_bytes!("../weights/decompose.safetensors");
+    read("relight/cli/weights/decompose.safetensors", bytes)
 }
-
-/// Where the weights of the network of turns stand in the repository.
-const TURN_NAME: &str = "relight/cli/weights/turn.safetensors";
-const TURN_BYTES: &[u8] = include_bytes!("../weights/turn.safetensors");
 
 /// The weights of the network of turns.
 ///
 /// # Errors
-/// [`NetError::File`] where the program was built with a damaged file.
+/// As [`weights`].
 pub(crate) fn turn_weights() -> Result<Weights, NetError> {
-    Weights::from_bytes(TURN_BYTES).map_err(|fault| NetError::File {
-        path: TURN_NAME.into(),
+    let bytes = include_bytes!("../weights/turn.safetensors");
+    read("relight/cli/weights/turn.safetensors", bytes)
+}
+
+/// The content of a file that stands there in the repository.
+fn read(place: &str, bytes: &[u8]) -> Result<Weights, NetError> {
+    Weights::from_bytes(bytes).map_err(|fault| NetError::File {
+        path: place.into(),
         fault,
     })
 }

@@ -173,41 +173,6 @@ fn the_rotation_direction_that_nobody_says_is_found() {
     let residual = |json: &serde_json::Value| json["residual"].as_f64().unwrap();
     let (as_usual, as_found) = (residual(&usual), residual(&found));
     assert!((as_usual / as_found - 1.0).abs() < 1e-3, "{usual} {found}");
-    exports_no_lamps_of_another_direction(
-        &data.join("synth-12-0000.tar"),
-        &dir.path().join("found"),
-    );
-}
-
-/// Whether `relight export` takes the direction of a turn that was solved as clockwise, and no other.
-fn exports_no_lamps_of_another_direction(shard: &Path, solved: &Path) {
-    let export = |options: &[&str]| {
-        let mut arguments = vec![
-            "export",
-            shard.to_str().unwrap(),
-            "--frames",
-            "4",
-            "--lamps",
-        ];
-        let out = solved.with_file_name("lamps");
-        arguments.extend([solved.to_str().unwrap(), "-o", out.to_str().unwrap()]);
-        arguments.extend(options);
-        String::from_utf8(relight(&arguments).stderr).unwrap()
-    };
-    let mirrored = "the turn was solved as clockwise";
-    assert!(export(&["--direction", "counter-clockwise"]).contains(mirrored));
-    for options in [&[][..], &["--direction", "clockwise"]] {
-        let said = export(options);
-        assert!(
-            !said.contains(mirrored) && !said.contains("give --direction"),
-            "{said}"
-        );
-    }
-    let path = solved.join("light.json");
-    let mut light: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-    light.as_object_mut().unwrap().remove("rotation").unwrap();
-    fs::write(&path, light.to_string()).unwrap();
-    assert!(export(&[]).contains("give --direction"));
 }
 
 #[test]
