@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use relight_nets::{NetError, Weights};
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, SpecularGate};
 use relight_photo::files::UnusedFile;
+use relight_photo::nets::{NetError, Weights};
 use relit_console::Console;
 use serde_json::json;
 

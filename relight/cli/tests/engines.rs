@@ -14,11 +14,11 @@ use std::process::{Command, Output};
 
 use image::{Rgba, RgbaImage};
 use relight_core::image::{Extent, Planes, Rgb};
-use relight_nets::paper::{Head, light_net, normal_net, spec_net};
-use relight_nets::{
+use relight_photo::decompose::{DecomposeOptions, Decomposer, SpecularGate};
+use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
+use relight_photo::nets::{
     Inference, InferenceEngine, NetError, OnnxRuntime, Weights, decomposer_with_heads, to_onnx,
 };
-use relight_photo::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 
 const SIDE: usize = 64;
 

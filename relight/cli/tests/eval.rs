@@ -23,8 +23,8 @@ use relight_eval::{
     ScoreTable, evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals,
     evaluate_relighting, make_relighting,
 };
-use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
+use relight_photo::nets::Weights;
 use relight_synth::{Folders, Library};
 use relit_data::causes::with_causes;
 

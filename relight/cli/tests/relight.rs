@@ -16,7 +16,7 @@ use relight_core::files::{read_planes, write_exr};
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb as Picture, Srgb};
 use relight_core::light::{Normals, Order, Panorama, ShLight};
 use relight_core::render::Surface;
-use relight_nets::{WeightPrecision, Weights, decomposer};
+use relight_photo::nets::{WeightPrecision, Weights, decomposer};
 
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;

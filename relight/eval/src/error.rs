@@ -73,7 +73,7 @@ pub enum EvalError {
     Turn(#[source] Box<relight_turn::TurnError>),
     /// A network cannot be run.
     #[error(transparent)]
-    Network(#[from] relight_nets::NetError),
+    Network(#[from] relight_photo::nets::NetError),
     /// A file cannot be read.
     #[error("{} cannot be read", path.display())]
     Read {

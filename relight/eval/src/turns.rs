@@ -7,7 +7,7 @@ use relight_core::files::write_png;
 use relight_core::image::{ColourSpace, Depth, Linear, Planes, Rgb, Srgb, Transfer};
 use relight_core::light::{Normals, Rotation, ShLight, YUp};
 use relight_core::statistics::median;
-use relight_nets::Weights;
+use relight_photo::nets::Weights;
 use relight_synth::TurnDescription;
 use relight_turn::{
     AzimuthSource, Elevation, MaterialKind, NormalsSource, ReadTurn, RotationDirection, TableFrame,

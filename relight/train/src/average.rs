@@ -6,7 +6,7 @@ use tch::{Tensor, no_grad};
 
 use super::error::TrainError;
 use super::model::{copy_into, to_weights};
-use relight_nets::Weights;
+use relight_photo::nets::Weights;
 
 /// An exponential moving average. In the first steps it forgets faster, so that it does not remember the
 /// initial weights.

@@ -19,7 +19,7 @@ use super::sample::TruthBatch;
 use super::settings::{DecomposeSettings, PrecisionChoice, first_difference};
 use super::sheet::validation_sheet;
 use super::task::{StepLosses, TrainingTask, Validation};
-use relight_nets::{LIGHT_PARAMETERS, PAINT_PARAMETERS, Weights, decomposer_with_heads};
+use relight_photo::nets::{LIGHT_PARAMETERS, PAINT_PARAMETERS, Weights, decomposer_with_heads};
 use relight_synth::{AlbedoKind, LeftOut};
 
 /// Samples that are shown.

@@ -12,7 +12,7 @@ pub enum TrainError {
     Torch(#[from] tch::TchError),
     /// Weights do not fit, or cannot be read or written.
     #[error(transparent)]
-    Weights(#[from] relight_nets::NetError),
+    Weights(#[from] relight_photo::nets::NetError),
     /// An optimiser's memory that is another network's.
     #[error("the saved optimiser has no {0} of the right shape: it is another network's")]
     Memory(String),

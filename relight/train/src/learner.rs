@@ -6,7 +6,7 @@ use super::adam::{Adam, AdamSettings};
 use super::average::WeightAverage;
 use super::error::TrainError;
 use super::model::{ComputePrecision, Model};
-use relight_nets::{Graph, Weights};
+use relight_photo::nets::{Graph, Weights};
 
 /// A network in training.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tch::{Device, Kind, Tensor, no_grad};
 
 use super::error::TrainError;
-use relight_nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
+use relight_photo::nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
 
 /// In which precision layers are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,7 +172,7 @@ impl Model {
     /// precision's [`ComputePrecision::kind`].
     ///
     /// # Errors
-    /// [`relight_nets::NetError::Run`] or [`TrainError::Torch`].
+    /// [`relight_photo::nets::NetError::Run`] or [`TrainError::Torch`].
     pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, TrainError> {
         let size = input.size();
         if let &[_, _, height, width] = size.as_slice() {
@@ -213,7 +213,7 @@ impl Model {
         let part = |part: &str| {
             let name = format!("{name}.{part}");
             let parameter = self.parameters.get(&name);
-            let missing = || relight_nets::NetError::missing(self.graph.name(), &name);
+            let missing = || relight_photo::nets::NetError::missing(self.graph.name(), &name);
             Ok::<_, TrainError>(self.cast(parameter.ok_or_else(missing)?)?)
         };
         Ok((part("weight")?, part("bias")?))
@@ -320,7 +320,7 @@ pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, 
         match values {
             Ok(values) => {
                 let shape = tensor.size().iter().map(|&side| side as usize).collect();
-                let tensor = relight_nets::Tensor::new(shape, values)?;
+                let tensor = relight_photo::nets::Tensor::new(shape, values)?;
                 Some(Ok((name.clone(), tensor)))
             }
             Err(error) => Some(Err(TrainError::from(error))),

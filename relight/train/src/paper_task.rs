@@ -21,7 +21,7 @@ use super::settings::{PaperSettings, first_difference};
 use super::task::{StepLosses, TrainingTask, Validation};
 use super::turn_reader::{TurnGroup, TurnReader};
 use relight_core::reader::Rank;
-use relight_nets::Weights;
+use relight_photo::nets::Weights;
 use relight_synth::{LeftOut, stream};
 
 /// Training of one of the paper's networks.

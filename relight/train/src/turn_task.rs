@@ -15,7 +15,7 @@ use super::task::{StepLosses, TrainingTask, Validation};
 use super::terms::LossTerms;
 use super::turn_samples::{TurnBatch, TurnViews};
 use relight_core::reader::Rank;
-use relight_nets::{ALBEDO_PARAMETERS, LOG_MEANS, Weights, turn_network};
+use relight_photo::nets::{ALBEDO_PARAMETERS, LOG_MEANS, Weights, turn_network};
 use relight_synth::{DrawnTurn, LeftOut, stream};
 
 /// What the expected error counts beside the normals.

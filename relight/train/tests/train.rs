@@ -15,11 +15,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use half::f16;
 use relight_core::image::{Extent, Planes};
 use relight_core::reader::Rank;
-use relight_nets::paper::{Head, light_net, normal_net, spec_net};
-use relight_nets::{
+use relight_photo::decompose::EncodedPicture;
+use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
+use relight_photo::nets::{
     Graph, Inference, LIGHT_PARAMETERS, Weights, decomposer, decomposer_with_heads,
 };
-use relight_photo::decompose::EncodedPicture;
 use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight_train::{
     Adam, AdamSettings, AnsweredTensors, Checkpoint, Composition, ComputePrecision, DataLoader,

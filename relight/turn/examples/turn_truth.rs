@@ -16,7 +16,7 @@ use relight_core::light::{Normals, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::reader::{Encoding, SampleId, Source, Turns};
 use relight_core::render::Surface;
-use relight_nets::{NetError, Weights};
+use relight_photo::nets::{NetError, Weights};
 use relight_turn::{
     Conditioning, Elevation, MaterialKind, NormalsSource, ReadTurn, TableFrame, TableRotation,
     TurnMaps, TurnNetwork, TurnOptions, TurnPrior, fit_turn_light, prior_albedo, prior_normals,

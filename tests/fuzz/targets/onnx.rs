@@ -4,7 +4,7 @@
 #![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 use libfuzzer_sys::fuzz_target;
-use relight_nets::{ExternalPart, OnnxSignature, with_external_weights};
+use relight_photo::nets::{ExternalPart, OnnxSignature, with_external_weights};
 
 /// Longest part of another file that is made up, bytes.
 const LONGEST: u64 = 1 << 16;

@@ -10,13 +10,13 @@ use clap::{Args, ValueEnum};
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_core::parallel;
-use relight_nets::{InferenceEngine, NetError, OnnxRuntime};
 use relight_photo::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, WORKING_SIDE,
 };
 use relight_photo::files::{
     DecompositionFigures, DecompositionFiles, FoundPhotos, PhotoInput, PhotoReading,
 };
+use relight_photo::nets::{InferenceEngine, NetError, OnnxRuntime};
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
 use serde_json::{Value, json};

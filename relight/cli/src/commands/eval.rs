@@ -17,8 +17,8 @@ use relight_eval::{
     evaluate_highlights, evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals,
     evaluate_ordinal, evaluate_relighting, evaluate_turns, make_relighting,
 };
-use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
+use relight_photo::nets::Weights;
 use relight_synth::Folders;
 use relight_turn::TurnNetwork;
 use relit_console::{Console, Outcome};

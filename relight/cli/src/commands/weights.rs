@@ -4,8 +4,8 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use relight_nets::paper::{self, Head};
-use relight_nets::{Graph, WeightPrecision, Weights, decomposer_of, to_onnx, turn_network};
+use relight_photo::nets::paper::{self, Head};
+use relight_photo::nets::{Graph, WeightPrecision, Weights, decomposer_of, to_onnx, turn_network};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde_json::json;

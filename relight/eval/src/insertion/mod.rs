@@ -273,7 +273,7 @@ fn shown(picture: &Rgb<Linear>) -> Planes<3> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use relight_nets::{Weights, decomposer};
+    use relight_photo::nets::{Weights, decomposer};
     use relight_synth::Folders;
 
     #[test]

@@ -5,10 +5,10 @@ use std::ops::Range;
 use super::crop::{enlarged, inside, reduced};
 use super::encoding::{AnsweredMaps, EncodedPicture, LEAST_FACING};
 use super::light::PredictedLight;
+use crate::nets::{Inference, NetError};
 use relight_core::image::{Extent, ImageError, Part, Planes};
 use relight_core::light::{Normals, YUp};
 use relight_core::parallel;
-use relight_nets::{Inference, NetError};
 
 /// What answers an encoded picture of `side` x `side` pixels.
 pub(super) trait MapsNet: Send + Sync {

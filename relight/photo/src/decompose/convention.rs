@@ -1,8 +1,8 @@
 //! What the pictures and vectors of other networks for normals mean: told by the names of what goes in and comes out.
 
+use crate::nets::{OnnxElement, OnnxSignature, OnnxValue};
 use relight_core::image::Extent;
 use relight_core::light::NormalsFrame;
-use relight_nets::{OnnxElement, OnnxSignature, OnnxValue};
 
 /// Tokens that MoGe-2 divides a picture into: the middle of those that it was trained on.
 const TOKENS: i64 = 1800;

@@ -10,13 +10,11 @@ use super::gloss::{FittedGloss, fit_gloss};
 use super::light::light_of_shading;
 use super::other::OtherNormals;
 use super::strips::{Enlargement, LayerPlan};
+use crate::nets::{Inference, InferenceEngine, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, NormalsFrame, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer};
-use relight_nets::{
-    Inference, InferenceEngine, LIGHT_PARAMETERS, NetError, Weights, decomposer_of,
-};
 use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 use relit_data::mask::size_hint;
 
@@ -111,7 +109,7 @@ pub struct Decomposition {
 /// ```
 /// use relight_photo::decompose::{DecomposeOptions, Decomposer};
 /// use relight_core::image::{Extent, Planes, Rgb};
-/// use relight_nets::{Weights, decomposer};
+/// use relight_photo::nets::{Weights, decomposer};
 ///
 /// let weights = Weights::initial(&decomposer(), 1); // not trained
 /// let decomposer = Decomposer::with_side(&weights, 32)?;

@@ -1,10 +1,10 @@
 //! What the decomposing network sees of a picture, and what its answer means: the same for training
 //! and for use.
 
+use crate::nets::{INPUTS, OUTPUTS};
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, YUp};
 use relight_core::statistics::above_part;
-use relight_nets::{INPUTS, OUTPUTS};
 
 /// Part of the pixels that are darker than the encoded picture's white.
 const WHITE_PERCENTILE: f64 = 0.99;

@@ -6,13 +6,13 @@ use std::io;
 use std::path::Path;
 use std::path::PathBuf;
 
+use crate::nets::NetError;
 #[cfg(feature = "files")]
 use relight_core::files::FolderFault;
 use relight_core::image::ImageError;
 use relight_core::light::{LightError, LightFileError};
 #[cfg(feature = "files")]
 use relight_core::reader::{DamagedSample, OpenError};
-use relight_nets::NetError;
 use relit_still::ColourError;
 
 /// Why a photograph cannot be decomposed.

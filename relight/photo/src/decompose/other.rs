@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::convention::{Axes, Channels, Convention};
+use crate::nets::{Inference, InferenceEngine, NetError, OnnxSignature};
 use relight_core::image::{ColourSpace, Extent, Part, Planes, Srgb};
 use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
-use relight_nets::{Inference, InferenceEngine, NetError, OnnxSignature};
 
 /// A network for normals, and what its pictures and vectors mean.
 #[derive(Debug)]

@@ -2,11 +2,11 @@
 
 use super::answer::{MapsNet, NetAnswer, look, to_maps};
 use super::*;
-use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
-use relight_core::light::{Normals, YUp};
-use relight_nets::{
+use crate::nets::{
     INPUTS, LIGHT_PARAMETERS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_heads,
 };
+use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
+use relight_core::light::{Normals, YUp};
 
 /// Answers pixel by pixel, from the encoded values of the pixel.
 struct PixelNet<F> {

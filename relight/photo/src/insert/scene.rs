@@ -204,8 +204,8 @@ mod tests {
     use super::*;
     use crate::decompose::{DecomposeOptions, Decomposer};
     use crate::insert::{DiscLamp, MaterialChange, Placement, Subject};
+    use crate::nets::{Weights, decomposer};
     use relight_core::image::{ColourSpace, Srgb};
-    use relight_nets::{Weights, decomposer};
 
     const PHOTO: Extent = Extent::new(60, 50);
 

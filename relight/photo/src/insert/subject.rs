@@ -29,7 +29,7 @@ const REST_GROWTH: f32 = 3.0;
 /// use relight_photo::decompose::{DecomposeOptions, Decomposer};
 /// use relight_core::image::{Extent, Planes, Rgb};
 /// use relight_photo::insert::{MaterialChange, Subject};
-/// use relight_nets::{Weights, decomposer};
+/// use relight_photo::nets::{Weights, decomposer};
 ///
 /// let weights = Weights::initial(&decomposer(), 1); // not trained
 /// let decomposer = Decomposer::with_side(&weights, 32)?;

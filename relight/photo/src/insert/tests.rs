@@ -4,11 +4,11 @@ use crate::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 use crate::insert::{
     DiscLamp, InsertError, LightSource, MaterialChange, ObjectGloss, Subject, exposure_between,
 };
+use crate::nets::{Weights, decomposer};
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Direction, Normals, Rotation};
 use relight_core::render::Surface;
-use relight_nets::{Weights, decomposer};
 
 const EXTENT: Extent = Extent::new(90, 70);
 

@@ -29,7 +29,7 @@ use super::error::TrainError;
 use super::paper_phases::PaperPhase;
 use file::read_with;
 use loss::{check_coefficient, check_coefficients};
-use relight_nets::{LIGHT_PARAMETERS, PAINT_PARAMETERS};
+use relight_photo::nets::{LIGHT_PARAMETERS, PAINT_PARAMETERS};
 
 pub use data::{DataSettings, TurnSettings};
 pub(super) use file::first_difference;

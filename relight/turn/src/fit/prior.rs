@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
 use relight_core::statistics::median;
-use relight_nets::{NetError, Weights};
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, SpecularGate};
+use relight_photo::nets::{NetError, Weights};
 
 use crate::error::TurnError;
 

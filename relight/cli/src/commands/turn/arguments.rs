@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use relight_core::light::NormalsFrame;
-use relight_nets::{NetError, Weights};
+use relight_photo::nets::{NetError, Weights};
 use relight_turn::{
     Elevation, Filmed, MaterialKind, NormalsSource, Probe, ProbeBall, ProbePlace,
     RotationDirection, TableRotation, TurnNetwork, TurnOptions,

@@ -7,14 +7,14 @@
 //! Knows nothing of pictures, colour or light: tensors go in and come out.
 //!
 //! ```
-//! use relight_nets::{Inference, Weights, decomposer};
+//! use relight_photo::nets::{Inference, Weights, decomposer};
 //!
 //! let graph = decomposer();
 //! let weights = Weights::initial(&graph, 1);
 //! let net = Inference::new(&graph, &weights, (32, 32))?;
 //! let maps = net.run(&vec![0.5; 7 * 32 * 32])?;
 //! assert_eq!(maps[0].shape(), [1, 9, 32, 32]);
-//! # Ok::<(), relight_nets::NetError>(())
+//! # Ok::<(), relight_photo::nets::NetError>(())
 //! ```
 
 mod codec;
@@ -57,8 +57,3 @@ pub use turn_network::{
     ALBEDO_OUTPUTS, ALBEDO_PARAMETERS, LOG_MEANS, TURN_INPUTS, TURN_OUTPUTS, turn_network,
 };
 pub use weights::{Tensor, Weights};
-
-/// The example of the README compiles.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

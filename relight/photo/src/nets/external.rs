@@ -138,7 +138,7 @@ fn bytes_of(tensor: &TensorProto) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Inference, InferenceEngine, Weights, decomposer, to_onnx};
+    use crate::nets::{Inference, InferenceEngine, Weights, decomposer, to_onnx};
     use std::path::Path;
     use tract_onnx::pb::StringStringEntryProto as Entry;
 

@@ -115,8 +115,8 @@ fn not_read(path: &Path) -> impl FnOnce(io::Error) -> NetError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::paper::{Head, light_net};
-    use crate::weights::Tensor;
+    use crate::nets::paper::{Head, light_net};
+    use crate::nets::weights::Tensor;
 
     #[test]
     fn a_file_gives_back_what_was_written() {

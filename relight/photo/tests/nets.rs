@@ -10,8 +10,8 @@
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use relight_nets::paper::{self, Head};
-use relight_nets::{Graph, Inference, Tensor, Weights, decomposer};
+use relight_photo::nets::paper::{self, Head};
+use relight_photo::nets::{Graph, Inference, Tensor, Weights, decomposer};
 
 const SIDE: usize = 128;
 /// Of each output every thirteenth pixel is kept, in both directions.
