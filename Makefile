@@ -192,7 +192,7 @@ bench: setup $(BENCH_VENV)/ready ## Measure relit-extract at 1080p against ffmpe
 	    --video $(BENCH_VIDEO) --mask $(BENCH_MASK) --runs $(BENCH_RUNS) --work $(TARGET)/bench
 
 bench-reader: setup $(DEMO)/mask.png $(BENCH_VENV)/ready ## Measure relight's reader of shards against Python webdataset
-	cargo build --locked --release -p relight-reader --example read_turns
+	cargo build --locked --release -p relight-core --features files,threads --example read_turns
 	$(BENCH_VENV)/bin/python tests/bench/reader.py --reader $(TARGET)/release/examples/read_turns \
 	    --runs $(BENCH_RUNS) $(DEMO)/out
 

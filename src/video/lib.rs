@@ -77,6 +77,7 @@ use ffmpeg_next::Dictionary;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::input_with_dictionary;
 use relit_data::disk::DISK_FULL;
+use relit_data::still::Format;
 
 use photograph::{format_of, is_misread};
 
@@ -223,18 +224,13 @@ fn open_input(path: &Path) -> Result<Input, VideoError> {
     let name = name.ok_or_else(|| VideoError::unreadable(path, no_text))?;
     let still = format_of(path);
     let failed = |why| {
-        let why = match still.filter(|format| !format.is_read()) {
-            Some(format) => format!(
-                "is {}, which is not read: {}",
-                format.name(),
-                format.advice()
-            ),
+        let why = match still.and_then(Format::unread) {
+            Some((name, advice)) => format!("is {name}, which is not read: {advice}"),
             None => format!(
                 "cannot be opened as a video ({why}): is it complete, and is it a video? `ffprobe` shows more"
             ),
         };
         VideoError::unreadable(path, why)
-    };
     };
     if still.is_some_and(is_misread) {
         return Err(failed(ffmpeg_next::Error::InvalidData));

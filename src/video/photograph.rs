@@ -35,8 +35,14 @@ pub(super) fn format_of(path: &Path) -> Option<Format> {
 /// Whether FFmpeg would give another picture than the file shows, or none: of a raw file the small one for display, of a
 /// HEIC one of its tiles.
 pub(super) fn is_misread(format: Format) -> bool {
-    use Format::{Heic, Html, Pdf, Raw, Svg};
-    matches!(format, Raw | Heic | Svg | Pdf | Html)
+    [
+        Format::RAW,
+        Format::Heic,
+        Format::SVG,
+        Format::PDF,
+        Format::HTML,
+    ]
+    .contains(&format)
 }
 
 /// Whether FFmpeg reads the file as one picture.

@@ -51,7 +51,7 @@ enum Verb {
     /// Decompose a whole turn: normals, albedo and light from the angle that the light turns by.
     #[command(after_help = turn::EXAMPLES)]
     Turn(turn::Arguments),
-    /// Write objects and turns for other programs: GLB, layered EXR, a Blender script, frames with their mask.
+    /// Write objects for other programs: GLB, layered EXR, a Blender script.
     #[command(after_help = export::EXAMPLES)]
     Export(export::Arguments),
     /// Hand out the app: a page that cuts objects out of photographs, relights them and puts them into scenes.

@@ -6,6 +6,8 @@ use clap::Args;
 use relight_photo::files::InsertionError;
 use relight_photo::insert::{DiscLamp, LightSource};
 
+use crate::values::within;
+
 /// The new light.
 #[derive(Args)]
 pub(crate) struct NewLightArguments {
@@ -22,7 +24,7 @@ pub(crate) struct NewLightArguments {
     )]
     pub(crate) lamp: Option<DiscLamp>,
     /// Even light beside a lamp, as a part of it.
-    #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = part, requires = "lamp")]
+    #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = within(0.0..=10.0, "a part"), requires = "lamp")]
     pub(crate) ambient: f64,
 }
 
@@ -34,12 +36,5 @@ impl NewLightArguments {
             return Ok(Some(LightSource::Lamp(DiscLamp { ambient, ..lamp })));
         }
         self.light.as_deref().map(LightSource::read).transpose()
-    }
-}
-
-fn part(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(part) if (0.0..=10.0).contains(&part) => Ok(part),
-        _ => Err("give a part from 0 to 10".to_owned()),
     }
 }

@@ -1,24 +1,21 @@
 //! Options of photographs that are decomposed, and of the files that they come from, which several verbs take.
 
-use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use relight_core::files::OutputKind;
-use relight_core::image::Depth;
-use relight_nets::Weights;
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, SpecularGate};
 use relight_photo::files::UnusedFile;
+use relight_photo::nets::{NetError, Weights};
 use relit_console::Console;
 use serde_json::json;
 
 use crate::shipped;
-use crate::values::{Choices, GATES, one_of};
+use crate::values::{GATES, one_of};
 
 /// How photographs are decomposed.
 #[derive(Args)]
 pub(crate) struct NetworkArguments {
-    /// The network's weights (.safetensors or .pth) [default: those that come with the program].
+    /// The network's weights (.safetensors) [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Separate highlights.
@@ -34,44 +31,35 @@ pub(crate) struct Network {
 
 impl NetworkArguments {
     pub(crate) fn read(&self) -> Result<Network, DecomposeError> {
-        let decomposer = match &self.weights {
-            None => shipped::decomposer()?,
-            Some(path) => Decomposer::new(&Weights::read(path)?)?,
-        };
-        let options = DecomposeOptions {
-            specular: self.specular,
-            ..DecomposeOptions::default()
-        };
+        let (weights, _) = self.weights()?;
         Ok(Network {
-            decomposer,
-            options,
+            decomposer: Decomposer::new(&weights)?,
+            options: self.options(),
         })
     }
-}
 
-/// Bits of a PNG.
-pub(crate) const BITS: Choices<Depth> = &[
-    ("8", "Values to 255", Depth::Eight),
-    ("16", "Values to 65535", Depth::Sixteen),
-];
+    /// The weights, and how they are named.
+    pub(crate) fn weights(&self) -> Result<(Weights, String), NetError> {
+        let Some(path) = &self.weights else {
+            return Ok((shipped::weights()?, "shipped".to_owned()));
+        };
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        Ok((Weights::read(path)?, name.to_string_lossy().into_owned()))
+    }
 
-/// What is wrong with so many bits in a file of this name, if anything is.
-pub(crate) fn bits_fault(bits: Depth, output: &Path) -> Option<String> {
-    let is_jpeg = OutputKind::of(output) == Some(OutputKind::Jpeg);
-    (is_jpeg && matches!(bits, Depth::Sixteen)).then(|| {
-        format!(
-            "--output {}: a JPEG has 8 bits; give .png for --bits 16",
-            output.display()
-        )
-    })
+    pub(crate) fn options(&self) -> DecomposeOptions {
+        DecomposeOptions {
+            specular: self.specular,
+            ..DecomposeOptions::default()
+        }
+    }
 }
 
 /// Names the files of folders that are not used.
 pub(crate) fn name_unused(unused: &[UnusedFile], console: Console) {
     for file in unused {
-        let text = file.to_string();
-        let event = json!({ "event": "unused", "file": file.path(), "message": text });
-        console.warn_with(&text, &event);
+        let event = json!({ "event": "unused", "file": file.path, "message": file.message });
+        console.warn_with(&file.message, &event);
     }
 }
 
@@ -88,24 +76,4 @@ pub(crate) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<(), Stri
             output.display()
         ))
     })
-}
-
-/// The files that patterns with *, ? and [...] name; what is no pattern, or names a file, stays.
-pub(crate) fn globbed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Box<dyn Error>> {
-    let mut found = Vec::new();
-    for path in paths {
-        let text = path.to_string_lossy();
-        if path.exists() || !text.contains(['*', '?', '[']) {
-            found.push(path.clone());
-            continue;
-        }
-        let before = found.len();
-        for file in glob::glob(&text)? {
-            found.push(file?);
-        }
-        if found.len() == before {
-            return Err(format!("{text} names no file").into());
-        }
-    }
-    Ok(found)
 }

@@ -1,7 +1,7 @@
 //! The weights that come with the program.
 
-use relight_nets::{NetError, Weights};
 use relight_photo::decompose::{DecomposeError, Decomposer};
+use relight_photo::nets::{NetError, Weights};
 
 /// The weights of the decomposing network.
 ///

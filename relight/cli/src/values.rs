@@ -1,5 +1,9 @@
 //! Values of options that several verbs take.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
@@ -75,4 +79,23 @@ pub(crate) fn one_of<T: Copy + Send + Sync>(
             .map(|&(.., value)| value)
             .ok_or("it is none of the possible values")
     })
+}
+
+/// An angle that a light is turned by.
+pub(crate) fn degrees() -> impl Fn(&str) -> Result<f64, String> + Clone {
+    within(-36_000.0..=36_000.0, "degrees")
+}
+
+/// A number within a range, of what the range counts.
+pub(crate) fn within<T>(
+    range: RangeInclusive<T>,
+    what: &'static str,
+) -> impl Fn(&str) -> Result<T, String> + Clone
+where
+    T: FromStr + PartialOrd + Display + Clone,
+{
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("give {what} from {} to {}", range.start(), range.end()))
+    }
 }

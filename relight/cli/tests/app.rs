@@ -15,7 +15,7 @@ use std::process::{Child, Command, Stdio};
 
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
 use relight_app::{Studio, pack, unpack};
-use relight_nets::{WeightPrecision, Weights, decomposer};
+use relight_photo::nets::{WeightPrecision, Weights, decomposer};
 use serde_json::{Value, json};
 
 const WIDTH: u32 = 120;

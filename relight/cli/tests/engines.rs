@@ -14,11 +14,11 @@ use std::process::{Command, Output};
 
 use image::{Rgba, RgbaImage};
 use relight_core::image::{Extent, Planes, Rgb};
-use relight_nets::paper::{Head, light_net, normal_net, spec_net};
-use relight_nets::{
+use relight_photo::decompose::{DecomposeOptions, Decomposer, SpecularGate};
+use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
+use relight_photo::nets::{
     Inference, InferenceEngine, NetError, OnnxRuntime, Weights, decomposer_with_heads, to_onnx,
 };
-use relight_photo::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 
 const SIDE: usize = 64;
 
@@ -129,17 +129,14 @@ fn a_photograph_has_the_same_layers_by_both_engines() {
 #[test]
 fn what_is_no_network_is_told_by_the_library_too() {
     let Some(engine) = onnx_runtime() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("net.onnx");
-    fs::write(&path, b"not a network").unwrap();
-    let fault = Inference::read_onnx(&path, 3, (SIDE, SIDE), &engine).unwrap_err();
-    assert!(matches!(fault, NetError::Onnx { .. }), "{fault}");
+    let path = Path::new("net.onnx");
+    let read = |bytes: &[u8]| Inference::from_onnx(path, bytes, 3, (SIDE, SIDE), &[], &engine);
+    let fault = read(b"not a network").unwrap_err();
+    assert!(matches!(fault, NetError::File { .. }), "{fault}");
     // A network that takes another number of channels.
     let graph = decomposer_with_heads();
     let bytes = to_onnx(&graph, &Weights::initial(&graph, 1), 1, (SIDE, SIDE)).unwrap();
-    fs::write(&path, bytes).unwrap();
-    let net = Inference::read_onnx(&path, 3, (SIDE, SIDE), &engine);
-    let answered = net.and_then(|net| net.run(&vec![0.0; 3 * SIDE * SIDE]));
+    let answered = read(&bytes).and_then(|net| net.run(&vec![0.0; 3 * SIDE * SIDE]));
     assert!(answered.is_err());
 }
 
@@ -181,7 +178,7 @@ fn a_library_that_cannot_be_used_is_an_error_or_with_auto_a_warning() {
     let asked = decompose(folder.path(), "onnxruntime", "broken.so");
     assert_eq!(asked.status.code(), Some(1), "{}", text(&asked));
     assert!(
-        text(&asked).contains("broken.so cannot be used as ONNX Runtime"),
+        text(&asked).contains("broken.so cannot be used: "),
         "{}",
         text(&asked)
     );

@@ -15,15 +15,15 @@ use relight_core::files::{write_exr, write_png};
 use relight_core::image::{Depth, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::NormalsFrame;
 use relight_core::light::{Direction, Normals, Rotation, ShLight, YDown, YUp};
+use relight_core::reader::{TruthLayout, TruthSet};
 use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, Layers, SpecularForm, Surface};
 use relight_eval::{
     EvalError, IntrinsicInput, MaskRule, Predictions, RelightMethod, RelightingRecipe,
     RelightingSet, ScoreLine, ScoreTable, evaluate_highlights, evaluate_intrinsic, evaluate_light,
     evaluate_normals, evaluate_relighting, make_relighting,
 };
-use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
-use relight_reader::{TruthLayout, TruthSet};
+use relight_photo::nets::Weights;
 use relight_synth::{Folders, Library};
 use relit_data::causes::with_causes;
 

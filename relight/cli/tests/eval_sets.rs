@@ -14,10 +14,10 @@ use std::process::Command;
 use relight_core::files::{write_exr, write_png};
 use relight_core::image::{ColourSpace, Depth, Extent, Planes, Srgb, Transfer};
 use relight_core::light::{Normals, NormalsFrame, YUp};
+use relight_core::reader::{TruthLayout, TruthSet};
 use relight_eval::{
     EvalError, IntrinsicInput, Predictions, ScoreTable, evaluate_intrinsic, evaluate_normals,
 };
-use relight_reader::{TruthLayout, TruthSet};
 use relit_data::causes::with_causes;
 
 const EXTENT: Extent = Extent::new(32, 24);

@@ -67,23 +67,3 @@ fn a_script_whose_light_cannot_be_read_takes_no_file_away() {
         );
     }
 }
-
-#[test]
-fn the_lamps_of_another_turn_are_refused() {
-    let desk = Desk::new();
-    let solved = desk.folder.path().join("mug");
-    fs::create_dir(&solved).unwrap();
-    let (code, said) = desk.export("cup.tar -o frames --frames 4 --lamps mug");
-    assert_eq!(code, 1, "{said}");
-    assert!(
-        said.contains("--lamps takes a folder of relight turn"),
-        "{said}"
-    );
-    let figures = r#"{ "turn": "mug", "conditioning": { "verdict": "good" },
-        "elevation": { "degrees": 20.0 }, "rotation": { "direction": "clockwise" } }"#;
-    fs::write(solved.join("turn.json"), figures).unwrap();
-    let (code, said) = desk.export("cup.tar -o frames --frames 4 --lamps mug");
-    assert_eq!(code, 1, "{said}");
-    assert!(said.contains("of the turn mug, not of cup"), "{said}");
-    assert!(!desk.folder.path().join("frames").exists());
-}

@@ -1,5 +1,5 @@
 //! What all of relight rests on: light, render layers, measures, and the captured object's file. It knows nothing of
-//! networks, data sets and terminals, and builds for a browser (`wasm32-unknown-unknown`).
+//! networks and terminals, and builds for a browser (`wasm32-unknown-unknown`).
 //!
 //! One frame holds for directions, light and normals everywhere: x to the right, y **up**, z out of
 //! the image to the viewer (right-handed). Rows of images count downwards all the same.
@@ -8,14 +8,14 @@
 //! | --- | --- |
 //! | [`image`] | planes of `f32`, colours that know their space, encoded pictures |
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
-//! | [`render`] | diffuse and specular layers on normals, their derivatives, Monte Carlo as the reference |
+//! | [`render`] | diffuse and specular layers on normals, Monte Carlo as the reference |
 //! | [`metrics`] | how far an estimate is from the ground truth |
 //! | [`captured_object`] | a captured object in one file, ready to be lit |
 //! | [`statistics`] | median and quantiles of samples |
 //! | [`parallel`] | rows and parts side by side, where there are threads |
 #![cfg_attr(
     feature = "files",
-    doc = "| [`files`] | pictures, light, maps, videos and results in files |"
+    doc = "| [`files`] | pictures, light, maps and results in files |\n| [`reader`] | shards and the folders of other data sets as streams of arrays |"
 )]
 //!
 //! Without features it takes bytes and gives bytes, on one thread. The feature `files` reads and writes files, and
@@ -27,8 +27,9 @@ pub mod image;
 pub mod light;
 pub mod metrics;
 pub mod parallel;
+#[cfg(feature = "files")]
+pub mod reader;
 pub mod render;
-mod sealed;
 pub mod statistics;
 
 /// The example of the README compiles.

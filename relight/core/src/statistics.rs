@@ -31,6 +31,13 @@ pub fn ranked<T: TotalOrder>(samples: &mut [T], rank: usize) -> Option<T> {
     Some(*found)
 }
 
+/// The sample that this part of all, 0 to 1, lies below. None where there are no samples.
+pub fn above_part<T: TotalOrder>(samples: impl IntoIterator<Item = T>, part: f64) -> Option<T> {
+    let mut samples: Vec<T> = samples.into_iter().collect();
+    let rank = (samples.len() as f64 * part) as usize;
+    ranked(&mut samples, rank)
+}
+
 /// The quantile of a part, 0 to 1: the sample of rank `part (n - 1)`, rounded down. None where there are no samples.
 pub fn quantile<T: TotalOrder>(samples: impl IntoIterator<Item = T>, part: f64) -> Option<T> {
     let mut samples: Vec<T> = samples.into_iter().collect();

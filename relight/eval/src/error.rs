@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{Extent, ImageError};
-use relight_reader::{DamagedSample, OpenError};
+use relight_core::reader::{DamagedSample, OpenError};
 
 /// Why something failed.
 type Cause = Box<dyn Error + Send + Sync>;

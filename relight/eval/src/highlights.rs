@@ -3,8 +3,8 @@
 use super::run::{Scored, add_method, cut_out, largest, measured, need, object};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Planes, Rgb, Srgb};
-use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
-use relight_reader::{TruthSample, TruthSet};
+use relight_core::metrics::{Comparison, SSIM_WINDOW, ScaleFit, dssim};
+use relight_core::reader::{TruthSample, TruthSet};
 
 /// MSE and DSSIM of the highlight, and of the image without it, for no highlight and for each prediction (part `highlight`, in
 /// the image's units). Images are brought to a maximum of 1 and encoded as sRGB, in which highlights are seen.
@@ -21,7 +21,7 @@ pub fn evaluate_highlights(
         "highlight: against the true one; diffuse: the image less the highlight, not below 0, \
          against the image less the true one"
             .to_owned(),
-        format!("SSIM by {}", Ssim::Gaussian.name()),
+        format!("SSIM by {}", SSIM_WINDOW),
     ];
     let mut table = ScoreTable::new("highlights", notes);
     let steps = (1 + predictions.len()) * set.names().len();
@@ -72,7 +72,7 @@ fn score(sample: &TruthSample, found: &Rgb<Linear>) -> Result<Vec<Scored>, EvalE
             let (truth, found) = (truth.planes(), found.planes());
             let pair = Comparison::new(sample.extent(), &truth, &found, mask);
             let pair = measured(sample, pair)?;
-            let ssim = measured(sample, pair.ssim(Ssim::Gaussian, 1.0))?;
+            let ssim = measured(sample, pair.ssim())?;
             lines.push(Scored {
                 part,
                 measures: vec![("MSE", pair.mse(ScaleFit::None)), ("DSSIM", dssim(ssim))],

@@ -5,8 +5,8 @@ use super::run::{Scored, UNLIT, add_method, grey, measured, need, object, of_gre
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Rgb};
 use relight_core::metrics::{Convention, IntrinsicError, Windows, intrinsic_error};
+use relight_core::reader::{TruthSample, TruthSet};
 use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
-use relight_reader::{TruthSample, TruthSet};
 
 /// Which image is decomposed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

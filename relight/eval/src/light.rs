@@ -5,9 +5,9 @@ use super::run::{Scored, UNLIT, add_method, largest, measured, need};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Rgb};
 use relight_core::light::{Direction, Order, ShLight};
-use relight_core::metrics::{Comparison, ScaleFit, Ssim};
+use relight_core::metrics::{Comparison, SSIM_WINDOW, ScaleFit};
+use relight_core::reader::{TruthSample, TruthSet};
 use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
-use relight_reader::{TruthSample, TruthSet};
 
 /// The light of order 2 that is nearest to the true shading on the true normals.
 fn fitted(sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
@@ -34,7 +34,7 @@ pub fn evaluate_light(
         "the shading that the light makes on the true normals, against the true shading".to_owned(),
         format!(
             "MSE and SSIM after both were brought to a maximum of 1; SSIM by {}",
-            Ssim::Gaussian.name()
+            SSIM_WINDOW
         ),
         "direction: degrees between the bands 1 of the light and of the true light (where the set has none, of that \
          fitted to the true shading), 90 where one of them has no direction"
@@ -79,7 +79,7 @@ fn score(
         sample,
         Comparison::new(sample.extent(), &truth, &found, known),
     )?;
-    let ssim = measured(sample, pair.ssim(Ssim::Gaussian, 1.0))?;
+    let ssim = measured(sample, pair.ssim())?;
     let line = |measures, scale: ScaleFit| Scored {
         part: "shading",
         measures,

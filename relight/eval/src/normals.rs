@@ -4,8 +4,10 @@ use super::run::{Scored, add_method, cut_out, measured, need, object};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::Planes;
 use relight_core::light::{Normals, YUp};
-use relight_core::metrics::{AngularError, Comparison, ScaleFit, Ssim, angular_error, dssim};
-use relight_reader::{TruthSample, TruthSet};
+use relight_core::metrics::{
+    AngularError, Comparison, SSIM_WINDOW, ScaleFit, angular_error, dssim,
+};
+use relight_core::reader::{TruthSample, TruthSet};
 
 /// MSE and DSSIM of normal maps, and the angles between normals, for normals that all point to the viewer and for each
 /// prediction (part `normal`).
@@ -21,7 +23,7 @@ pub fn evaluate_normals(
     let notes = vec![
         format!(
             "MSE and DSSIM: of the colours (n + 1) / 2, SSIM by {}",
-            Ssim::Gaussian.name()
+            SSIM_WINDOW
         ),
         "angles: degrees; within: the fraction of pixels with an angle of at most so much"
             .to_owned(),
@@ -66,7 +68,7 @@ fn score(sample: &TruthSample, found: &Normals<YUp>) -> Result<Vec<Scored>, Eval
             sample,
             Comparison::new(sample.extent(), &truth, &found, mask),
         )?;
-        let ssim = measured(sample, pair.ssim(Ssim::Gaussian, 1.0))?;
+        let ssim = measured(sample, pair.ssim())?;
         let mut measures = vec![("MSE", pair.mse(ScaleFit::None)), ("DSSIM", dssim(ssim))];
         if rule == MaskRule::Known {
             measures.extend(named(&angles));

@@ -4,7 +4,7 @@ use super::run::{NOT_MEASURED, Scored, add_lines, each};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Planes, Rgb, Transfer};
 use relight_core::metrics::{ScaleFit, whdr};
-use relight_reader::JudgedImages;
+use relight_core::reader::JudgedImages;
 
 /// By how much a surface must be brighter for the other to be called darker.
 const DELTA: f64 = 0.1;

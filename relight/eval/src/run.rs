@@ -6,7 +6,7 @@ use super::{EvalError, ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine,
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::metrics::MetricError;
 use relight_core::parallel;
-use relight_reader::{TruthSample, TruthSet};
+use relight_core::reader::{TruthSample, TruthSet};
 
 /// Told after each image, from many threads, how many there are in all.
 pub type EvalProgress<'a> = &'a (dyn Fn(usize) + Sync);

@@ -1,21 +1,26 @@
 //! Photographs: an object's normals, albedo, shading, highlight and light out of one picture, and the object in another
-//! light or another picture. It knows the networks' engines and no terminal, and builds for a browser
+//! light or another picture. It knows no terminal, and builds for a browser
 //! (`wasm32-unknown-unknown`).
 //!
 //! | module | concern |
 //! | --- | --- |
 //! | [`decompose`] | a photograph into normals, albedo, shading, highlight and light |
+//! | [`nets`] | the networks as data, their weights, and engines that run them |
 //! | [`insert`] | objects of photographs in another light and in other pictures |
 #![cfg_attr(
     feature = "files",
-    doc = "| [`files`] | photographs and decompositions in files and shards |"
+    doc = "| [`files`], [`export`] | photographs and decompositions in files and shards; objects for other programs |"
 )]
 //!
-//! The feature `files` reads photographs from files and shards and writes results, `threads` works on rayon's threads.
+//! The feature `files` reads photographs from files and shards and writes results, `threads` works on rayon's threads,
+//! `onnxruntime` runs networks by ONNX Runtime where its library is installed.
 pub mod decompose;
+#[cfg(feature = "files")]
+pub mod export;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod insert;
+pub mod nets;
 
 /// The example of the README compiles.
 #[cfg(doctest)]

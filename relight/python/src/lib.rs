@@ -1,4 +1,4 @@
-//! The reader of data sets, `relight-reader`, as the Python module `relit._relit`. The package around it, `relit`, has
+//! The reader of data sets, `relight_core::reader`, as the Python module `relit._relit`. The package around it, `relit`, has
 //! what Python says better: data classes, iteration, torch.
 //!
 //! Decoding runs in threads of Rust without Python's lock. A batch is copied into NumPy arrays once.
@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use numpy::{PyArray4, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use relight_reader::{
+use relight_core::reader::{
     Cursor, Draw, DrawPlan, Encoding, OpenError, Rank, Source, Stream, Streaming, TurnBatch, Turns,
 };
 use relit_data::causes::with_causes;

@@ -8,7 +8,7 @@
 use std::error::Error;
 use std::time::Duration;
 
-use relight_nets::{INPUTS, Inference, Weights, decomposer};
+use relight_photo::nets::{INPUTS, Inference, Weights, decomposer};
 use relight_synth::{Folders, Library, Recipe};
 use relight_train::{Adam, AdamSettings, Composition, ComputePrecision, DataSettings, Model};
 use tch::{Device, Kind, Tensor, no_grad};

@@ -10,7 +10,7 @@ use tch::{Kind, Tensor, no_grad};
 
 use super::error::TrainError;
 use super::model::{copy_into, to_weights};
-use relight_nets::{self, Weights};
+use relight_photo::nets::{self, Weights};
 
 /// The number of steps in a saved memory, in thousands and the rest: 32 bits hold both exactly. Steps of which nothing could
 /// be learned do not count, so it is not that of the run.
@@ -96,7 +96,7 @@ impl Adam {
         all.extend(named("second", &second));
         let steps = [self.steps / STEPS_PART, self.steps % STEPS_PART].map(|part| part as f32);
         all.extend(
-            relight_nets::Tensor::new(vec![2], steps.to_vec())
+            relight_photo::nets::Tensor::new(vec![2], steps.to_vec())
                 .map(|steps| (STEPS.to_owned(), steps)),
         );
         Ok(all.into_iter().collect())
@@ -109,7 +109,7 @@ impl Adam {
     pub fn recall(&mut self, memory: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.first, &memory.under("first."))?;
         copy_into(&mut self.second, &memory.under("second."))?;
-        let steps = memory.get(STEPS).map(relight_nets::Tensor::values);
+        let steps = memory.get(STEPS).map(relight_photo::nets::Tensor::values);
         let Some(&[thousands, rest]) = steps else {
             return Err(TrainError::Memory(STEPS.to_owned()));
         };

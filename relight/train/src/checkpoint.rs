@@ -8,7 +8,7 @@ use relit_data::durable;
 use safetensors::SafeTensors;
 
 use super::error::TrainError;
-use relight_nets::{self, Weights};
+use relight_photo::nets::{self, Weights};
 
 const SCHEMA: &str = "relight.checkpoint/1";
 /// The file in a run's folder.
@@ -54,7 +54,7 @@ impl Checkpoint {
         ]);
         let bytes = self
             .state
-            .to_safetensors(relight_nets::WeightPrecision::Single, Some(facts))
+            .to_safetensors(relight_photo::nets::WeightPrecision::Single, Some(facts))
             .map_err(|fault| TrainError::Checkpoint {
                 path: path.clone(),
                 fault,
@@ -115,7 +115,7 @@ impl Checkpoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use relight_nets::decomposer;
+    use relight_photo::nets::decomposer;
 
     fn checkpoint() -> Checkpoint {
         Checkpoint {
@@ -149,7 +149,7 @@ mod tests {
         }
         let weights = Weights::initial(&decomposer(), 1);
         weights
-            .write(&path, relight_nets::WeightPrecision::Half)
+            .write(&path, relight_photo::nets::WeightPrecision::Half)
             .unwrap();
         assert!(Checkpoint::read(folder.path()).is_err());
     }

@@ -10,7 +10,7 @@ use super::sample::TruthBatch;
 use super::settings::{DataSettings, RunSettings};
 use super::shuffle_buffer::{ShuffleBuffer, ShuffleBufferSettings};
 use super::task::Resources;
-use relight_reader::Rank;
+use relight_core::reader::Rank;
 use relight_synth::{Folders, LeftOut, Library, Recipe, stream};
 
 /// What samples are composed of, with the files that are named read.

@@ -13,7 +13,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::error::TrainError;
 use super::sample::{Linearisation, TruthArrays};
-use relight_reader::Rank;
+use relight_core::reader::Rank;
 use relight_synth::{Library, Recipe, stream};
 
 /// Part of the pictures whose values are taken for sRGB, whatever the camera's response: the user of a photograph

@@ -15,7 +15,7 @@ use super::sample::TruthBatch;
 use super::settings::{DecomposeSettings, first_difference};
 use super::sheet::validation_sheet;
 use super::task::{Resources, StepLosses, TrainingTask, Validation};
-use relight_nets::{Weights, decomposer_with_heads};
+use relight_photo::nets::{Weights, decomposer_with_heads};
 use relight_synth::LeftOut;
 
 /// Samples that are shown.

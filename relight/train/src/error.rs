@@ -12,7 +12,7 @@ pub enum TrainError {
     Torch(#[from] tch::TchError),
     /// Weights do not fit, or cannot be read or written.
     #[error(transparent)]
-    Weights(#[from] relight_nets::NetError),
+    Weights(#[from] relight_photo::nets::NetError),
     /// An optimiser's memory that is another network's.
     #[error("the saved optimiser has no {0} of the right shape: it is another network's")]
     Memory(String),
@@ -21,7 +21,7 @@ pub enum TrainError {
     Synth(#[from] relight_synth::SynthError),
     /// A data set cannot be opened.
     #[error(transparent)]
-    Data(#[from] relight_reader::OpenError),
+    Data(#[from] relight_core::reader::OpenError),
     /// A sheet of answers could not be encoded.
     #[error(transparent)]
     Encode(#[from] relit_data::shard::ShardError),

@@ -1,7 +1,7 @@
 //! How a run over several processes is launched: the environment that torchrun, scripts of Slurm and the training
 //! operators of Kubernetes set. Knows nothing of tensors.
 
-use relight_reader::Rank;
+use relight_core::reader::Rank;
 
 use super::error::TrainError;
 

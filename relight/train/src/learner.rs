@@ -8,7 +8,7 @@ use tch::{Device, Tensor, no_grad};
 use super::adam::{Adam, AdamSettings};
 use super::error::TrainError;
 use super::model::{ComputePrecision, Model, copy_into, to_weights};
-use relight_nets::{Graph, Weights};
+use relight_photo::nets::{Graph, Weights};
 
 /// A network in training.
 #[derive(Debug)]

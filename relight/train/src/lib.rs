@@ -2,7 +2,7 @@
 //!
 //! | module | concern |
 //! | --- | --- |
-//! | `model` | a [`relight_nets::Graph`] on tensors: what is trained is what the ONNX file holds |
+//! | `model` | a [`relight_photo::nets::Graph`] on tensors: what is trained is what the ONNX file holds |
 //! | `adam`, `learner` | how a network learns; all of it can be saved |
 //! | `losses`, `low_rank`, `terms` | what is descended |
 //! | `sample`, `data_loader`, `shuffle_buffer`, `composed` | samples composed while training |

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Tensor, no_grad};
 
 use super::error::TrainError;
-use relight_nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
+use relight_photo::nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
 
 /// In which precision layers are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -138,7 +138,7 @@ impl Model {
     /// precision's [`ComputePrecision::kind`].
     ///
     /// # Errors
-    /// [`relight_nets::NetError::PictureSize`] or [`TrainError::Torch`].
+    /// [`relight_photo::nets::NetError::Run`] or [`TrainError::Torch`].
     pub fn forward(&self, input: &Tensor) -> Result<Vec<Tensor>, TrainError> {
         let size = input.size();
         if let &[_, _, height, width] = size.as_slice() {
@@ -179,10 +179,7 @@ impl Model {
         let part = |part: &str| {
             let name = format!("{name}.{part}");
             let parameter = self.parameters.get(&name);
-            let missing = || relight_nets::NetError::Missing {
-                net: self.graph.name(),
-                name,
-            };
+            let missing = || relight_photo::nets::NetError::missing(self.graph.name(), &name);
             Ok::<_, TrainError>(self.cast(parameter.ok_or_else(missing)?)?)
         };
         Ok((part("weight")?, part("bias")?))
@@ -289,7 +286,7 @@ pub(super) fn to_weights(tensors: &BTreeMap<String, Tensor>) -> Result<Weights, 
         match values {
             Ok(values) => {
                 let shape = tensor.size().iter().map(|&side| side as usize).collect();
-                let tensor = relight_nets::Tensor::new(shape, values)?;
+                let tensor = relight_photo::nets::Tensor::new(shape, values)?;
                 Some(Ok((name.clone(), tensor)))
             }
             Err(error) => Some(Err(TrainError::from(error))),

@@ -18,8 +18,8 @@ use super::paper_phases::{
 use super::sample::TruthBatch;
 use super::settings::PaperSettings;
 use super::turn_reader::TurnTensors;
-use relight_nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
-use relight_nets::{Graph, Weights};
+use relight_photo::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
+use relight_photo::nets::{Graph, Weights};
 
 /// What a run of a phase is given.
 #[derive(Debug, Clone, Default)]

@@ -363,8 +363,8 @@ pub(crate) fn specular_on_turns(
 mod tests {
     use super::*;
     use crate::model::ComputePrecision;
-    use relight_nets::paper::{Head, light_net, normal_net, spec_net};
-    use relight_nets::{Graph, Weights};
+    use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
+    use relight_photo::nets::{Graph, Weights};
     use tch::{Device, Kind};
 
     const SIDE: i64 = 64;

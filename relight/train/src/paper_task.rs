@@ -17,8 +17,8 @@ use super::process_group::{ProcessGroup, indivisible};
 use super::settings::{PaperSettings, first_difference};
 use super::task::{Resources, StepLosses, TrainingTask, Validation};
 use super::turn_reader::{TurnGroup, TurnReader};
-use relight_nets::Weights;
-use relight_reader::Rank;
+use relight_core::reader::Rank;
+use relight_photo::nets::Weights;
 use relight_synth::{LeftOut, stream};
 
 /// Training of one of the paper's networks.
@@ -234,7 +234,7 @@ impl TrainingTask for PaperTask {
     }
 
     fn go_to(&mut self, cursor: &str) -> Result<(), String> {
-        let cursor: Option<relight_reader::Cursor> =
+        let cursor: Option<relight_core::reader::Cursor> =
             serde_json::from_str(cursor).map_err(|error| error.to_string())?;
         match (&mut self.turns, cursor) {
             (Some(reader), Some(cursor)) => reader.go_to(cursor).map_err(|error| error.to_string()),

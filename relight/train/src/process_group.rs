@@ -14,7 +14,7 @@ use torch_sys::C_tensor;
 
 use super::error::TrainError;
 use super::launch::Launch;
-use relight_reader::Rank;
+use relight_core::reader::Rank;
 
 /// How long a process waits for the others to be started.
 const JOIN: Duration = Duration::from_secs(300);

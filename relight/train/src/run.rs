@@ -21,7 +21,7 @@ use super::journal::Journal;
 use super::process_group::ProcessGroup;
 use super::settings::RunSettings;
 use super::task::{StepLosses, TrainingTask, Validation};
-use relight_nets::{WeightPrecision, Weights};
+use relight_photo::nets::{WeightPrecision, Weights};
 
 /// How long a process waits for process 0 to write its checkpoint and end, where the run ends early. No longer, as process 0 can
 /// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.

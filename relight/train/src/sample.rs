@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor};
 use super::error::TrainError;
 use super::symmetry::Symmetry;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
-use relight_nets::{INPUTS, LIGHT_OUTPUTS};
+use relight_core::reader::TruthSample;
 use relight_photo::decompose::{EncodedPicture, PredictedLight};
 use relight_synth::SynthSample;
 

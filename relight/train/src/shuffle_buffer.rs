@@ -17,7 +17,7 @@ use super::process_group::indivisible;
 use super::sample::{DrawnSample, TruthArrays};
 use super::symmetry::Symmetry;
 use super::task::Resources;
-use relight_reader::Rank;
+use relight_core::reader::Rank;
 use relight_synth::stream;
 
 /// How samples are drawn.

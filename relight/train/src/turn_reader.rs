@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor};
 
 use super::error::TrainError;
 use relight_core::image::{ColourSpace, Srgb};
-use relight_reader::{
+use relight_core::reader::{
     Cursor, DrawPlan, Encoding, Rank, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
 };
 use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};

@@ -8,7 +8,7 @@ use tch::{Device, Kind, Tensor};
 use super::error::TrainError;
 use super::settings::TransferSettings;
 use relight_core::light::Panorama;
-use relight_nets::TURN_INPUTS;
+use relight_photo::nets::TURN_INPUTS;
 use relight_synth::{
     DrawnTurn, Folders, LeftOut, Library, Rooms, TransferCache, TransferRecipe, stream,
 };

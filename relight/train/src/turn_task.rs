@@ -12,8 +12,8 @@ use super::settings::{TurnNetworkSettings, first_difference};
 use super::task::{Resources, StepLosses, TrainingTask, Validation};
 use super::terms::LossTerms;
 use super::turn_samples::{TurnBatch, TurnViews};
-use relight_nets::{LOG_MEANS, Weights, turn_network};
-use relight_reader::Rank;
+use relight_core::reader::Rank;
+use relight_photo::nets::{LOG_MEANS, Weights, turn_network};
 use relight_synth::{DrawnTurn, LeftOut, stream};
 
 /// What the expected error counts beside the normals.

@@ -13,10 +13,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use relight_core::image::{Extent, Planes};
-use relight_nets::paper::{Head, light_net, normal_net, spec_net};
-use relight_nets::{Graph, Inference, Weights, decomposer, decomposer_with_heads};
+use relight_core::reader::Rank;
 use relight_photo::decompose::EncodedPicture;
-use relight_reader::Rank;
+use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
+use relight_photo::nets::{Graph, Inference, Weights, decomposer, decomposer_with_heads};
 use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight_train::{
     Adam, AdamSettings, AnsweredTensors, Checkpoint, Composition, ComputePrecision, DataLoader,

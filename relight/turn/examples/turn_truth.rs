@@ -12,9 +12,9 @@ use std::time::Instant;
 use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
+use relight_core::reader::{Encoding, SampleId, Source, Turns};
 use relight_core::render::Surface;
-use relight_nets::{NetError, Weights};
-use relight_reader::{Encoding, SampleId, Source, Turns};
+use relight_photo::nets::{NetError, Weights};
 use relight_turn::{
     Elevation, MaterialKind, ReadTurn, SolvedTurn, TableFrame, TableRotation, TurnLight,
     TurnNetwork, TurnNetworks, TurnOptions, fit_turn_light, read_curves, solve_turn,

@@ -4,12 +4,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use relight_core::captured_object::CapturedObjectError;
-use relight_core::files::{FolderFault, MovieError};
+use relight_core::files::FolderFault;
 use relight_core::image::ImageError;
 use relight_core::light::{LightError, LightFileError, PanoramaError};
-use relight_nets::NetError;
 use relight_photo::decompose::DecomposeError;
-use relight_reader::OpenError;
+use relight_photo::files::MovieError;
+use relight_photo::files::MovieError;
+use relight_photo::nets::NetError;
 use relit_data::session::SessionError;
 
 use crate::observe::probe_place::ProbePlace;

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use relight_core::light::ShLight;
-use relight_nets::Weights;
+use relight_photo::nets::Weights;
 use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::session::Recording;
 use relit_data::shard::Dataset;

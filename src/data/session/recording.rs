@@ -221,6 +221,8 @@ pub fn beside_sessions(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
     }
     beside.sort();
     Ok(beside)
+}
+
 fn not_there(path: &Path) -> SessionError {
     SessionError::Unusable(format!(
         "there is no {}: give a session folder, a folder of sessions, or a video file",

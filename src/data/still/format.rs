@@ -31,12 +31,6 @@ pub enum Format {
 
 const SAVE: &str = "save it as PNG or JPEG";
 const EXPORT: &str = "export it as PNG";
-const RAW: Format = Format::Other(
-    "a camera's raw file",
-    "develop it, and export it as PNG or TIFF of 16 bits",
-);
-const SVG: Format = Format::Other("an SVG", EXPORT);
-const HTML: Format = Format::Other("a page of a website", "download the picture itself");
 
 /// Endings of the files that are read.
 pub const ENDINGS: [&str; 18] = [
@@ -45,6 +39,18 @@ pub const ENDINGS: [&str; 18] = [
 ];
 
 impl Format {
+    /// A camera's raw file.
+    pub const RAW: Self = Self::Other(
+        "a camera's raw file",
+        "develop it, and export it as PNG or TIFF of 16 bits",
+    );
+    /// Portable document.
+    pub const PDF: Self = Self::Other("a PDF", EXPORT);
+    /// Scalable vector graphics.
+    pub const SVG: Self = Self::Other("an SVG", EXPORT);
+    /// A page of a website.
+    pub const HTML: Self = Self::Other("a page of a website", "download the picture itself");
+
     /// The format that the first bytes of a file show.
     #[must_use]
     pub fn of(bytes: &[u8]) -> Option<Self> {
@@ -62,7 +68,7 @@ impl Format {
             _ if starts(b"#?") => Self::Radiance,
             _ if starts(b"GIF87a") || starts(b"GIF89a") => Self::Gif,
             _ if starts(b"BM") && bytes.len() > 26 => Self::Bmp,
-            _ if is_raw(bytes) => RAW,
+            _ if is_raw(bytes) => Self::RAW,
             _ if [&b"II*\0"[..], b"MM\0*", b"II+\0", b"MM\0+"]
                 .iter()
                 .any(|magic| starts(magic)) =>
@@ -86,7 +92,7 @@ impl Format {
             ] => Self::Other("a PNM image", SAVE),
             _ if starts(b"qoif") => Self::Other("a QOI image", SAVE),
             _ if starts(b"DDS ") => Self::Other("a DDS image", SAVE),
-            _ if starts(b"%PDF-") => Self::Other("a PDF", EXPORT),
+            _ if starts(b"%PDF-") => Self::PDF,
             _ => return of_markup(bytes),
         })
     }
@@ -118,7 +124,7 @@ fn of_brands(bytes: &[u8]) -> Option<Format> {
         all.any(|brand| brands.iter().any(|&known| known == brand))
     };
     if major == b"crx " {
-        Some(RAW)
+        Some(Format::RAW)
     } else if is_one_of(&[b"avif", b"avis"]) {
         Some(Format::Avif)
     } else if [
@@ -167,9 +173,9 @@ fn of_markup(bytes: &[u8]) -> Option<Format> {
     let text = String::from_utf8_lossy(start).to_ascii_lowercase();
     let text = text.trim_start_matches('\u{feff}').trim_start();
     if text.starts_with("<svg") || text.starts_with("<?xml") && text.contains("<svg") {
-        Some(SVG)
+        Some(Format::SVG)
     } else if text.starts_with("<!doctype html") || text.starts_with("<html") {
-        Some(HTML)
+        Some(Format::HTML)
     } else {
         None
     }
@@ -188,14 +194,14 @@ mod tests {
             (&heic[..], Some(Format::Heic)),
             (avif, Some(Format::Avif)),
             (video, None),
-            (b"\0\0\0\x18ftypcrx \0\0\0\0crx ", Some(RAW)),
+            (b"\0\0\0\x18ftypcrx \0\0\0\0crx ", Some(Format::RAW)),
             (b"#?RGBE\n", Some(Format::Radiance)),
             (b"\xff\x0a\0", Some(Format::Other("a JPEG XL image", SAVE))),
             (b"P6\n1 1\n", Some(Format::Other("a PNM image", SAVE))),
-            (b"II*\0\x10\0\0\0CR\x02\0", Some(RAW)),
+            (b"II*\0\x10\0\0\0CR\x02\0", Some(Format::RAW)),
             (b"II*\0\x08\0\0\0\0\0\0\0\0\0", Some(Format::Tiff)),
-            (b"\xef\xbb\xbf<!DOCTYPE html>", Some(HTML)),
-            (b"<?xml version=\"1.0\"?><svg/>", Some(SVG)),
+            (b"\xef\xbb\xbf<!DOCTYPE html>", Some(Format::HTML)),
+            (b"<?xml version=\"1.0\"?><svg/>", Some(Format::SVG)),
             (
                 b"8BPS\0\x01",
                 Some(Format::Other("a Photoshop file", EXPORT)),
@@ -224,8 +230,8 @@ mod tests {
         let nef = ifd(&[(254, 4, 1), (271, 2, 65), (330, 4, 99)]);
         let dng = ifd(&[(254, 4, 0), (50706, 1, 4)]);
         let plain = ifd(&[(254, 4, 0), (256, 4, 8), (271, 2, 65)]);
-        assert_eq!(Format::of(&nef), Some(RAW));
-        assert_eq!(Format::of(&dng), Some(RAW));
+        assert_eq!(Format::of(&nef), Some(Format::RAW));
+        assert_eq!(Format::of(&dng), Some(Format::RAW));
         assert_eq!(Format::of(&plain), Some(Format::Tiff));
     }
 }

@@ -20,11 +20,15 @@ mod staging;
 mod url;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+#[cfg(not(feature = "object-store"))]
+use std::path::PathBuf;
 
 use relit_data::shard::{self, Merged, Overview};
 
-use super::{ExtractError, ExtractOptions, Observer, Tally};
+use super::ExtractError;
+#[cfg(not(feature = "object-store"))]
+use super::{ExtractOptions, Observer, Tally};
 
 #[cfg(feature = "object-store")]
 pub(super) use staging::extract;

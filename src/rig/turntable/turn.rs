@@ -199,7 +199,7 @@ impl<'table> Turn<'table> {
         let reports = self.leave();
         let track = sync::fit(&reports, &self.expected());
         let back_to = self.plan.unwind;
-        let back_to = back_to.then(|| self.zero_deg + self.plan.start_deg);
+        let back_to = back_to.then_some(self.zero_deg + self.plan.start_deg);
         let finished = FinishedTurn {
             table: self.table,
             arrived,

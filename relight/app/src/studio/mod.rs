@@ -24,9 +24,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{ColourSpace, Depth, Extent, Planes, Srgb, encode_jpeg, encode_png};
-use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
 use relight_photo::insert::{SceneDescription, Subject};
+use relight_photo::nets::Weights;
 use serde_json::{Value, json};
 
 use crate::message::{pack, unpack};

@@ -362,10 +362,7 @@ pub(super) fn png_of(
     let mut file = Vec::new();
     PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
         .write_image(pixels, width, height, kind)
-        .map_err(|source| ImageError::Encode {
-            path: name.into(),
-            source,
-        })?;
+        .map_err(ImageError::encode(Path::new(name)))?;
     Ok(file)
 }
 

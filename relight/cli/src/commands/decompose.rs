@@ -10,22 +10,20 @@ use clap::{Args, ValueEnum};
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_core::parallel;
-use relight_nets::{InferenceEngine, NetError, OnnxRuntime, Weights};
 use relight_photo::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, SpecularGate,
-    WORKING_SIDE, WorkingSize,
+    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, WORKING_SIDE,
 };
 use relight_photo::files::{
     DecompositionFigures, DecompositionFiles, FoundPhotos, PhotoInput, PhotoReading,
 };
+use relight_photo::nets::{InferenceEngine, NetError, OnnxRuntime};
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
 use crate::commands::CommandResult;
-use crate::photos::name_unused;
-use crate::shipped;
-use crate::values::{GATES, NORMALS_Y, TRANSFERS, one_of};
+use crate::photos::{NetworkArguments, name_unused};
+use crate::values::{NORMALS_Y, TRANSFERS, one_of};
 
 /// Each photograph takes its memory, gigabytes where it is large.
 const MOST_SIDE_BY_SIDE: usize = 4;
@@ -34,8 +32,8 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight decompose mug.jpg --mask mug-mask.png -o mug
       a photograph and its mask: mug/normal.png, albedo.png, shading.png, light.txt, contact.png ...
-  relight decompose cut-out.png --size native -o cut-out
-      a photograph whose alpha is the mask, at its own size
+  relight decompose cut-out.png -o cut-out
+      a photograph whose alpha is the mask
   relight decompose photos --mask masks -o out
       a folder of photographs, with masks of the same names: out/<name>/
   relight decompose turn.tar --count 12 -o out
@@ -56,15 +54,8 @@ pub(crate) struct Arguments {
     /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
     #[arg(long, value_name = "X,Y,W,H", value_parser = rectangle, conflicts_with = "mask")]
     rect: Option<Rectangle>,
-    /// The network's weights (.safetensors or .pth) [default: those that come with the program].
-    #[arg(long, value_name = "FILE")]
-    weights: Option<PathBuf>,
-    /// The size at which the object is decomposed.
-    #[arg(long, value_enum, default_value_t = SizeName::S256)]
-    size: SizeName,
-    /// Separate highlights.
-    #[arg(long, default_value = "auto", value_parser = one_of(GATES))]
-    specular: SpecularGate,
+    #[command(flatten)]
+    network: NetworkArguments,
     /// Leave out the mirror image: faster, and a little worse.
     #[arg(long)]
     no_mirror: bool,
@@ -87,15 +78,6 @@ pub(crate) struct Arguments {
     /// How many photographs are decomposed side by side [default: as many as there are cores, at most 4].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum SizeName {
-    /// At 256 x 256 pixels.
-    #[value(name = "256")]
-    S256,
-    /// At 256 x 256 pixels, and finer by tiles of the photograph at its own size.
-    Native,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -149,13 +131,8 @@ impl Arguments {
 
     fn options(&self) -> DecomposeOptions {
         DecomposeOptions {
-            size: match self.size {
-                SizeName::S256 => WorkingSize::Network,
-                SizeName::Native => WorkingSize::Native,
-            },
             mirror: !self.no_mirror,
-            specular: self.specular,
-            ..DecomposeOptions::default()
+            ..self.network.options()
         }
     }
 
@@ -169,13 +146,7 @@ impl Arguments {
 
     /// The network, and how its weights are named.
     fn decomposer(&self, console: Console) -> Result<(Decomposer, String), DecomposeError> {
-        let (weights, name) = match &self.weights {
-            None => (shipped::weights()?, "shipped".to_owned()),
-            Some(path) => {
-                let name = path.file_name().unwrap_or(path.as_os_str());
-                (Weights::read(path)?, name.to_string_lossy().into_owned())
-            }
-        };
+        let (weights, name) = self.network.weights()?;
         let engine = self.engine.engine(console)?;
         let mut decomposer = Decomposer::with_engine(&weights, WORKING_SIDE, engine)?;
         if let Some(path) = &self.normals {

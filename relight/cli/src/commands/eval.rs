@@ -7,15 +7,15 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
+use relight_core::reader::{JudgedImages, TruthLayout, TruthSet};
 use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
     EvalProgress, IntrinsicInput, Predictions, RelightMethod, RelightingRecipe, RelightingSet,
     ScoreTable, TurnMethod, evaluate_highlights, evaluate_intrinsic, evaluate_light,
     evaluate_normals, evaluate_ordinal, evaluate_relighting, evaluate_turns, make_relighting,
 };
-use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
-use relight_reader::{JudgedImages, TruthLayout, TruthSet};
+use relight_photo::nets::Weights;
 use relight_synth::Folders;
 use relight_turn::{TurnNetwork, TurnNetworks};
 use relit_console::{Console, Outcome};

@@ -6,13 +6,15 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use relight_core::files::{MovieFormat, MovieWriter, OutputKind, write_picture};
-use relight_core::image::{Depth, Transfer};
+use relight_core::image::{Extent, Linear, Rgb, Transfer};
 use relight_photo::decompose::Rectangle;
-use relight_photo::files::{FoundPhotos, InsertionError, PhotoInput, PhotoReading};
+use relight_photo::files::{
+    FoundPhotos, InsertionError, MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading,
+    write_picture,
+};
 use relight_photo::insert::{
-    Backdrop, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, ShotCompanions,
-    Subject, WhiteBalance, likeness,
+    Backdrop, InsertError, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, Subject,
+    WhiteBalance, likeness,
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
@@ -22,10 +24,8 @@ use super::decompose::rectangle;
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::light::NewLightArguments;
-use crate::photos::{
-    BITS, Network, NetworkArguments, bits_fault, globbed, name_unused, not_an_input,
-};
-use crate::values::{TRANSFERS, WHITE_BALANCES, one_of};
+use crate::photos::{Network, NetworkArguments, name_unused, not_an_input};
+use crate::values::{TRANSFERS, WHITE_BALANCES, degrees, one_of, within};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -35,7 +35,7 @@ Examples:
       in the light of a warm lamp from the right, at its own place
   relight relight mug.jpg --mask mug-mask.png --light studio.hdr --turn 360 --seconds 10 -o turn.mp4
       a video in which the light turns once
-  relight relight 'photos/*.jpg' --mask masks --lamp -45,40 --compare -o relit
+  relight relight photos --mask masks --lamp -45,40 --compare -o relit
       many photographs: relit/<name>.png, each beside the photograph and naive insertion";
 
 /// The longest side of a video's frames where nothing is said.
@@ -43,7 +43,7 @@ const MOVIE_SIDE: usize = 1080;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, patterns such as 'photos/*.jpg', or shards (.tar).
+    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
     #[arg(required = true, value_name = "PHOTO")]
     photos: Vec<PathBuf>,
     /// The picture (.png, .jpg, .exr), or for --turn a video (.mp4, .webm); of several photographs a folder. It is made where
@@ -63,13 +63,13 @@ pub(crate) struct Arguments {
     #[arg(long, conflicts_with_all = ["light", "lamp"])]
     own_light: bool,
     /// Turn the light about the vertical first, from the viewer to the right.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = degrees, allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = degrees(), allow_hyphen_values = true)]
     turned: f64,
     /// Turn the light by so many degrees, in a video.
-    #[arg(long, value_name = "DEGREES", value_parser = degrees, allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEGREES", value_parser = degrees(), allow_hyphen_values = true)]
     turn: Option<f64>,
     /// How long the turn takes.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, requires = "turn")]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = within(0.01..=3600.0, "seconds"), requires = "turn")]
     seconds: f64,
     /// Frames a second of a video.
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
@@ -81,22 +81,19 @@ pub(crate) struct Arguments {
     #[arg(long)]
     keep_background: bool,
     /// How many degrees of a panorama the picture's longer side shows.
-    #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = field)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = within(1.0..=150.0, "degrees"))]
     field: f64,
     /// How far the camera looks down into a panorama.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = tilt, allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = within(-89.0..=89.0, "degrees"), allow_hyphen_values = true)]
     down: f64,
-    /// Put the photograph beside the result.
-    #[arg(long)]
-    beside: bool,
     /// Put the photograph and naive insertion beside the result.
-    #[arg(long, conflicts_with = "beside")]
+    #[arg(long)]
     compare: bool,
     /// How the colour of the light is shown.
     #[arg(long, value_parser = one_of(WHITE_BALANCES), default_value = "light")]
     white_balance: WhiteBalance,
     /// Brightness in stops. With 0 the strongest light is as strong as in the photograph.
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_hyphen_values = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = within(-20.0..=20.0, "stops"), allow_hyphen_values = true)]
     exposure: f32,
     /// Multiply the object's albedo with a colour, linear.
     #[arg(long, value_name = "R,G,B", value_parser = tint)]
@@ -107,9 +104,6 @@ pub(crate) struct Arguments {
     /// The longest side of the result, pixels [default: the photograph's; of a video at most 1080].
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=16_384))]
     size: Option<u32>,
-    /// Bits a channel of a PNG.
-    #[arg(long, value_parser = one_of(BITS), default_value = "8")]
-    bits: Depth,
     #[command(flatten)]
     network: NetworkArguments,
     /// How PNG, JPEG and WebP photographs are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
@@ -121,8 +115,6 @@ pub(crate) struct Arguments {
 enum BackgroundName {
     /// The panorama that lights it.
     Light,
-    /// What the photograph shows.
-    Photo,
     /// Grey of 18 %.
     Grey,
     /// Black.
@@ -157,19 +149,15 @@ impl Arguments {
             }
             None if self.turn.is_some() => ".mp4 or .webm",
             None => ".png, .jpg or .exr",
-            Some(_) => return bits_fault(self.bits, &self.output),
+            Some(_) => return None,
         };
         Some(format!("--output {}: give {wanted}", self.output.display()))
     }
 
     /// Whether results go into a folder.
     fn is_set(&self) -> bool {
-        let is_many = |path: &PathBuf| {
-            let text = path.to_string_lossy();
-            path.is_dir()
-                || path.extension().is_some_and(|e| e == "tar")
-                || (!path.exists() && text.contains(['*', '?', '[']))
-        };
+        let is_many =
+            |path: &PathBuf| path.is_dir() || path.extension().is_some_and(|e| e == "tar");
         self.photos.len() > 1 || self.photos.iter().any(is_many)
     }
 
@@ -188,11 +176,12 @@ impl Arguments {
         }
     }
 
-    fn companions(&self) -> ShotCompanions {
-        match (self.compare, self.beside) {
-            (true, _) => ShotCompanions::PhotoAndNaive,
-            (false, true) => ShotCompanions::Photo,
-            (false, false) => ShotCompanions::None,
+    /// The picture after the light has turned by so many radians, as it is written.
+    fn shown(&self, shot: &Shot<'_>, turn: f64) -> Result<Rgb<Linear>, InsertError> {
+        if self.compare {
+            shot.compared(turn)
+        } else {
+            shot.picture(turn)
         }
     }
 
@@ -225,7 +214,7 @@ struct Run<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let FoundPhotos { inputs, unused } = PhotoInput::find(&globbed(&arguments.photos)?, None)?;
+    let FoundPhotos { inputs, unused } = PhotoInput::find(&arguments.photos, None)?;
     name_unused(&unused, console);
     let run = Run {
         arguments,
@@ -283,7 +272,7 @@ impl Run<'_> {
         let start = Instant::now();
         let subject = Subject::of_photo(&photo, &network.decomposer, &network.options)?;
         let decomposed = start.elapsed().as_secs_f64();
-        let own = LightSource::Coefficients(subject.light().clone());
+        let own = LightSource::Coefficients(subject.light.clone());
         let source = self.light.as_ref().unwrap_or(&own);
         let light = source.light()?;
         let backdrop = self.backdrop(photo.picture.planes().extent());
@@ -300,9 +289,8 @@ impl Run<'_> {
         let frames = match OutputKind::of(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
             _ => {
-                let turn = arguments.turned.to_radians();
-                let picture = shot.sheet(turn, arguments.companions())?;
-                write_picture(&output, &picture, arguments.bits)?;
+                let picture = arguments.shown(&shot, arguments.turned.to_radians())?;
+                write_picture(&output, &picture)?;
                 1
             }
         };
@@ -320,7 +308,7 @@ impl Run<'_> {
             "frames": frames,
             "seconds": seconds,
             "decompose_seconds": decomposed,
-            "likeness": likeness(subject.light(), &light),
+            "likeness": likeness(&subject.light, &light),
         });
         console.say(&text, &event);
         Ok(())
@@ -349,7 +337,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn backdrop(&self, extent: relight_core::image::Extent) -> Backdrop {
+    fn backdrop(&self, extent: Extent) -> Backdrop {
         let arguments = self.arguments;
         let grey = Backdrop::Even([0.18; 3]);
         let panorama = || match &self.light {
@@ -363,7 +351,6 @@ impl Run<'_> {
             _ if arguments.keep_background => Backdrop::Photo,
             None if arguments.own_light => Backdrop::Photo,
             None | Some(BackgroundName::Light) => panorama().unwrap_or(grey),
-            Some(BackgroundName::Photo) => Backdrop::Photo,
             Some(BackgroundName::Grey) => grey,
             Some(BackgroundName::Black) => Backdrop::Even([0.0; 3]),
             Some(BackgroundName::White) => Backdrop::Even([1.0; 3]),
@@ -387,8 +374,7 @@ impl Run<'_> {
         let frame = |frame: u32| {
             let part = f64::from(frame) / f64::from(frames);
             let turn = (arguments.turned + all * part).to_radians();
-            let sheet = shot.sheet(turn, arguments.companions())?;
-            Ok::<_, InsertionError>(sheet.encode())
+            Ok::<_, InsertionError>(arguments.shown(shot, turn)?.encode())
         };
         let encoding = (format, arguments.fps);
         MovieWriter::write_frames(output, encoding, frames, frame, || bar.inc(1))?;
@@ -404,53 +390,28 @@ fn file_of(input: &PhotoInput) -> Option<PathBuf> {
     }
 }
 
-fn ranged<T: std::str::FromStr + PartialOrd>(text: &str, least: T, most: T) -> Option<T> {
-    text.parse()
-        .ok()
-        .filter(|value| (least..=most).contains(value))
-}
-
-pub(crate) fn degrees(text: &str) -> Result<f64, String> {
-    ranged(text, -36_000.0, 36_000.0).ok_or_else(|| "give degrees from -36000 to 36000".to_owned())
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    ranged(text, 0.01, 3600.0).ok_or_else(|| "give seconds from 0.01 to 3600".to_owned())
-}
-
-fn field(text: &str) -> Result<f64, String> {
-    ranged(text, 1.0, 150.0).ok_or_else(|| "give degrees from 1 to 150".to_owned())
-}
-
-fn tilt(text: &str) -> Result<f64, String> {
-    ranged(text, -89.0, 89.0).ok_or_else(|| "give degrees from -89 to 89".to_owned())
-}
-
-fn stops(text: &str) -> Result<f32, String> {
-    ranged(text, -20.0, 20.0).ok_or_else(|| "give stops from -20 to 20".to_owned())
-}
-
 fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
     let numbers: Vec<f32> = text
         .split(',')
-        .map(|part| ranged(part.trim(), 0.0, 1000.0))
+        .map(|part| {
+            part.trim()
+                .parse()
+                .ok()
+                .filter(|value| (0.0..=1000.0).contains(value))
+        })
         .collect::<Option<_>>()?;
     numbers.try_into().ok()
 }
 
-pub(crate) fn tint(text: &str) -> Result<[f32; 3], String> {
+fn tint(text: &str) -> Result<[f32; 3], String> {
     numbers(text).ok_or_else(|| "give R,G,B: three factors that are not negative".to_owned())
 }
 
 fn gloss(text: &str) -> Result<ObjectGloss, String> {
-    let [part, smoothness] = gloss_numbers(text)?;
-    Ok(ObjectGloss::of_part(part, smoothness))
-}
-
-/// The part of even light that is reflected, and the smoothness.
-pub(crate) fn gloss_numbers(text: &str) -> Result<[f32; 2], String> {
     match numbers(text) {
-        Some([part, smoothness]) if part <= 1.0 && smoothness > 0.0 => Ok([part, smoothness]),
+        Some([part, smoothness]) if part <= 1.0 && smoothness > 0.0 => {
+            Ok(ObjectGloss::of_part(part, smoothness))
+        }
         _ => Err("give PART,SMOOTHNESS: a part from 0 to 1, and α above 0".to_owned()),
     }
 }

@@ -7,16 +7,16 @@ use clap::Args;
 use rayon::prelude::*;
 use relight_core::captured_object::CapturedObject;
 use relight_core::files::{Map, MapFiles};
-use relight_core::files::{MovieFormat, MovieWriter};
-use relight_core::image::{Linear, Rgb, Transfer};
+use relight_core::image::{ImageError, Linear, Rgb, Srgb, Transfer};
 use relight_core::light::{Direction, NormalsFrame, Order, Panorama, Rotation, ShLight};
 use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_for};
+use relight_photo::files::{InsertionError, MovieWriter, OutputKind, write_picture};
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_empty_folder;
-use crate::values::{Choices, DIFFUSE_FORMS, NORMALS_Y, TRANSFERS, one_of};
+use crate::values::{Choices, DIFFUSE_FORMS, NORMALS_Y, TRANSFERS, degrees, one_of, within};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -111,7 +111,7 @@ struct LightArguments {
         long,
         value_name = "DEGREES",
         default_value_t = 0.0,
-        value_parser = degrees,
+        value_parser = degrees(),
         allow_hyphen_values = true
     )]
     turned: f64,
@@ -139,14 +139,6 @@ enum Exposure {
     Stops(f32),
 }
 
-/// The kinds of file that come out.
-enum Target<'a> {
-    Png(&'a Path),
-    Exr(&'a Path),
-    Movie(&'a Path, MovieFormat),
-    Folder(&'a Path),
-}
-
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
@@ -156,29 +148,15 @@ impl Arguments {
         {
             return Some("--smoothness: give one value or a file".to_owned());
         }
-        let wanted = match self.target() {
-            Target::Png(_) | Target::Exr(_) if is_turn => "a folder, .mp4 or .webm for --turn",
-            Target::Movie(..) | Target::Folder(_) if !is_turn => ".png or .exr",
-            Target::Folder(path) if path.extension().is_some() => {
-                "a folder without an extension, .mp4 or .webm for --turn"
-            }
-            _ => return None,
+        let is_folder = self.output.extension().is_none();
+        let wanted = match OutputKind::of(&self.output) {
+            Some(OutputKind::Png | OutputKind::Exr) if !is_turn => return None,
+            Some(OutputKind::Movie(_)) if is_turn => return None,
+            None if is_turn && is_folder => return None,
+            _ if is_turn => "a folder without an extension, .mp4 or .webm for --turn",
+            _ => ".png or .exr",
         };
         Some(format!("--output {}: give {wanted}", self.output.display()))
-    }
-
-    fn target(&self) -> Target<'_> {
-        let path = self.output.as_path();
-        let has = |name: &str| {
-            path.extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case(name))
-        };
-        match MovieFormat::of(path) {
-            Some(format) => Target::Movie(path, format),
-            None if has("png") => Target::Png(path),
-            None if has("exr") => Target::Exr(path),
-            None => Target::Folder(path),
-        }
     }
 
     fn look(&self, light: &ShLight) -> Look {
@@ -235,39 +213,18 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let surface = arguments.object.read()?;
     let light = arguments.light.read()?;
     let look = arguments.look(&light);
-    let frames = arguments.turn.unwrap_or(1);
-    match arguments.target() {
-        Target::Png(path) => still(arguments, &look, &surface, &light)?
-            .encode()
-            .write_png(path)?,
-        Target::Exr(path) => still(arguments, &look, &surface, &light)?.write_exr(path)?,
-        Target::Folder(folder) => {
-            let bar = console.progress(frames.into(), "frames");
-            make_empty_folder(folder)?;
-            (0..frames).into_par_iter().try_for_each(|frame| {
-                let image = look.turned(&surface, &light, part(frame, frames))?;
-                let name = format!("{frame:0PLACES$}.png");
-                bar.inc(1);
-                image.encode().write_png(&folder.join(name))
-            })?;
-            bar.finish_and_clear();
-        }
-        Target::Movie(path, format) => {
-            let bar = console.progress(frames.into(), "frames");
-            let mut movie = MovieWriter::create(path, format, surface.extent(), arguments.fps)?;
-            for frame in 0..frames {
-                let image = look.turned(&surface, &light, part(frame, frames))?;
-                movie.push(&image.encode())?;
-                bar.inc(1);
-            }
-            movie.finish()?;
-            bar.finish_and_clear();
-        }
+    let path = &arguments.output;
+    if let Some(frames) = arguments.turn {
+        turn(arguments, frames, console, |part| {
+            Ok(look.turned(&surface, &light, part)?.encode())
+        })?;
+    } else {
+        write_picture(path, &still(arguments, &look, &surface, &light)?)?;
     }
-    let output = arguments.output.display().to_string();
+    let output = path.display().to_string();
     console.say(
         &output,
-        &json!({ "event": "rendered", "output": output, "frames": frames, "exposure": look.exposure }),
+        &json!({ "event": "rendered", "output": output, "frames": arguments.turn.unwrap_or(1), "exposure": look.exposure }),
     );
     Ok(Outcome::Whole)
 }
@@ -278,7 +235,7 @@ fn still(
     look: &Look,
     surface: &Surface,
     light: &ShLight,
-) -> Result<Rgb<Linear>, relight_core::image::ImageError> {
+) -> Result<Rgb<Linear>, ImageError> {
     const REFLECTED: [f32; 4] = [0.0, 0.04, 0.15, 0.4];
     const SMOOTHNESSES: [f32; 6] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
     if arguments.sweep {
@@ -288,24 +245,37 @@ fn still(
     }
 }
 
-/// How far the light has turned at a frame.
-fn part(frame: u32, frames: u32) -> f64 {
-    f64::from(frame) / f64::from(frames)
-}
-
-fn degrees(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(degrees) if (-36_000.0..=36_000.0).contains(&degrees) => Ok(degrees),
-        _ => Err("give degrees from -36000 to 36000".to_owned()),
+/// Writes the frames of a turn; `frame` makes one, after a part of the turn.
+fn turn(
+    arguments: &Arguments,
+    frames: u32,
+    console: Console,
+    frame: impl Fn(f64) -> Result<Rgb<Srgb>, InsertionError> + Sync,
+) -> Result<(), Box<dyn Error>> {
+    let frame = |at: u32| frame(f64::from(at) / f64::from(frames));
+    let path = &arguments.output;
+    let bar = console.progress(frames.into(), "frames");
+    if let Some(OutputKind::Movie(format)) = OutputKind::of(path) {
+        let encoding = (format, arguments.fps);
+        MovieWriter::write_frames(path, encoding, frames, frame, || bar.inc(1))?;
+    } else {
+        make_empty_folder(path)?;
+        (0..frames).into_par_iter().try_for_each(|at| {
+            frame(at)?.write_png(&path.join(format!("{at:0PLACES$}.png")))?;
+            bar.inc(1);
+            Ok::<_, InsertionError>(())
+        })?;
     }
+    bar.finish_and_clear();
+    Ok(())
 }
 
 fn exposure(text: &str) -> Result<Exposure, String> {
-    match text.parse::<f32>() {
-        _ if text == "auto" => Ok(Exposure::Auto),
-        Ok(stops) if (-30.0..=30.0).contains(&stops) => Ok(Exposure::Stops(stops)),
-        _ => Err("give stops from -30 to 30, or auto".to_owned()),
+    if text == "auto" {
+        return Ok(Exposure::Auto);
     }
+    let stops = within(-30.0..=30.0, "auto, or stops")(text)?;
+    Ok(Exposure::Stops(stops))
 }
 
 /// One number, three numbers parted by commas, or else a file.

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand};
-use relight_nets::{NetError, Weights};
+use relight_photo::nets::{NetError, Weights};
 use relight_train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
     ProcessGroup, Resources, Run, RunOutcome, RunSettings, TrainError, TrainObserver, TrainingTask,

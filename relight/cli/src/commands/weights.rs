@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::slice;
 
 use clap::{Args, Subcommand, ValueEnum};
-use relight_nets::paper::{self, Head};
-use relight_nets::{Graph, WeightPrecision, Weights, decomposer_of, to_onnx, turn_network};
+use relight_photo::nets::paper::{self, Head};
+use relight_photo::nets::{Graph, WeightPrecision, Weights, decomposer_of, to_onnx, turn_network};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde_json::json;
@@ -16,9 +16,9 @@ use crate::photos::not_an_input;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  relight weights export net.pth -o net.safetensors --half
-      what PyTorch saved, as a safetensors file of half precision
-  relight weights export net.pth --net normal-net -o normal-net.onnx
+  relight weights export net.safetensors -o half.safetensors --half
+      in half precision
+  relight weights export net.safetensors --net normal-net -o normal-net.onnx
       the paper's Normal-Net for any ONNX engine, for pictures of 256 x 256 pixels";
 
 #[derive(Args)]
@@ -35,7 +35,7 @@ enum Verb {
 
 #[derive(Args)]
 struct Export {
-    /// The weights (.safetensors, or a state dict that PyTorch saved: .pth, .pt).
+    /// The weights (.safetensors).
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// The file to write: .onnx or .safetensors.

@@ -6,9 +6,8 @@ use std::path::PathBuf;
 
 use exr::prelude::WritableImage;
 use image::{DynamicImage, ImageFormat};
-use relight_core::image::ImageError;
 use relight_photo::decompose::DecomposeError;
-use relight_photo::files::{FoundPhotos, PhotoInput, UnusedFile};
+use relight_photo::files::{FoundPhotos, PhotoInput};
 
 use crate::support::{Folder, HEIGHT, WIDTH, is_inside, load, mask, object, with_mask};
 
@@ -35,7 +34,7 @@ fn a_jpeg_without_its_end_marker_is_the_same_photograph() {
     let cut = save("cut.jpg", &bare[..bare.len() - 40]);
     let fault = load(&cut, &mask).map(|photo| photo.name).unwrap_err();
     assert!(
-        matches!(fault, DecomposeError::Image(ImageError::CutOff { .. })),
+        matches!(fault, DecomposeError::Image(_)) && fault.to_string().contains("is cut off"),
         "{fault}"
     );
 }
@@ -106,20 +105,10 @@ fn every_file_of_a_folder_is_used_or_named() {
         ["a.jpg", "b.jfif", "d.tif", "e.JPG", "f.heic", "g", "i.png"]
     );
     let path = |name: &str| folder.path("photos").join(name);
-    assert_eq!(
-        unused,
-        [
-            UnusedFile::NotRead {
-                path: path("c.heic"),
-                name: "a HEIC image",
-                advice: "save it as JPEG or PNG, or let the telephone write JPEG",
-            },
-            UnusedFile::NoPicture {
-                path: path("h.txt")
-            },
-        ]
-    );
-    assert!(unused[0].to_string().contains("HEIC"), "{}", unused[0]);
+    let files: Vec<_> = unused.iter().map(|file| file.path.clone()).collect();
+    assert_eq!(files, [path("c.heic"), path("h.txt")]);
+    let message = &unused[0].message;
+    assert!(message.contains("HEIC"), "{message}");
 }
 
 #[test]

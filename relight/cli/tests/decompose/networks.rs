@@ -7,10 +7,10 @@ use relight_core::image::{ColourSpace, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, NormalsFrame, Order, ShLight, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::render::{DiffuseForm, DiffuseLayer};
-use relight_nets::paper::{Head, light_net, normal_net};
-use relight_nets::{Weights, decomposer, to_onnx};
 use relight_photo::decompose::{DecomposeOptions, Decomposer};
 use relight_photo::files::PhotoReading;
+use relight_photo::nets::paper::{Head, light_net, normal_net};
+use relight_photo::nets::{Weights, decomposer, to_onnx};
 
 use relit_data::causes::with_causes;
 
@@ -65,7 +65,7 @@ fn normals_of_another_network_replace_ours() {
         .read_normals(&file, Some(NormalsFrame::YUp))
         .unwrap_err();
     assert!(
-        error.to_string().contains("normals.onnx cannot be run"),
+        error.to_string().contains("normals.onnx cannot be used"),
         "{error}"
     );
 }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::{Command, Output};
 
-use relight_nets::{WeightPrecision, Weights, decomposer};
+use relight_photo::nets::{WeightPrecision, Weights, decomposer};
 
 use crate::shards::write_shard;
 use crate::support::{Folder, names_in, object};
@@ -81,7 +81,7 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
 
     fs::create_dir(folder.path("shards")).unwrap();
     write_shard(&folder.path("shards"));
-    Weights::initial(&relight_nets::paper::normal_net(), 3)
+    Weights::initial(&relight_photo::nets::paper::normal_net(), 3)
         .write(&folder.path("other.safetensors"), WeightPrecision::Single)
         .unwrap();
     for (command, code, expected) in [
@@ -116,9 +116,9 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
             "w.safetensors cannot be the folder for the results",
         ),
         (
-            "decompose photos/black.png -o o --weights none.pth",
+            "decompose photos/black.png -o o --weights none.safetensors",
             1,
-            "none.pth could not be read",
+            "none.safetensors could not be read",
         ),
         (
             "decompose photos --mask w.safetensors -o o",

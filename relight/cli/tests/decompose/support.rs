@@ -4,11 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::{GrayImage, Luma, Rgb as Pixel, RgbImage};
-use relight_nets::{Weights, decomposer};
 use relight_photo::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, SpecularGate,
 };
 use relight_photo::files::{DecompositionFiles, PhotoInput, PhotoReading};
+use relight_photo::nets::{Weights, decomposer};
 
 pub(crate) const WIDTH: u32 = 60;
 pub(crate) const HEIGHT: u32 = 48;

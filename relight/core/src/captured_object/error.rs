@@ -1,82 +1,54 @@
 //! Why a captured object cannot be read or written.
 
-use std::io;
-use std::path::PathBuf;
+use std::error::Error;
+use std::path::{Path, PathBuf};
 
-use crate::image::{Extent, ImageError};
+use relit_data::causes::with_causes;
+
+use crate::image::ImageError;
 
 /// Why a captured object cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CapturedObjectError {
-    /// The file cannot be read.
-    #[error("{} cannot be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system answers.
-        source: io::Error,
-    },
-    /// The file is no captured object.
-    #[error("{} is no object that relight can light", path.display())]
+    /// The file cannot be read or written, or is no captured object.
+    #[error("{} {fault}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// Why.
-        source: Box<Self>,
-    },
-    /// The file is larger than is read.
-    #[error("it has {bytes} bytes, and at most {most} are read")]
-    TooLarge {
-        /// Its size.
-        bytes: u64,
-        /// The largest that is read.
-        most: u64,
-    },
-    /// The archive is damaged, or no archive.
-    #[error("it is no ZIP archive, or damaged")]
-    Archive(#[from] zip::result::ZipError),
-    /// An entry is not there or cannot be read.
-    #[error("its entry {entry} is missing or damaged: {reason}")]
-    Entry {
-        /// The entry.
-        entry: &'static str,
         /// What is wrong with it.
-        reason: String,
+        fault: String,
     },
-    /// Another kind of file, or one of a later version.
-    #[error(
-        "it says that it is \"{found}\", and this program reads \"relight.asset/1\": a newer relight may read it"
-    )]
-    Schema {
-        /// What it says.
-        found: String,
-    },
-    /// It has no pixels or too many.
-    #[error("{} x {} pixels are not from 1 x 1 to 8192 a side and 16777216 in all", extent.width, extent.height)]
-    Size {
-        /// Its size.
-        extent: Extent,
-    },
+    /// Its content cannot be used.
+    #[error("{0}")]
+    Content(String),
     /// Maps do not fit together.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The file cannot be written.
-    #[error("{} cannot be written", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system answers.
-        source: io::Error,
-    },
 }
 
 impl CapturedObjectError {
+    /// For a closure that knows why something cannot be done with a file.
+    #[cfg(feature = "files")]
+    pub(crate) fn file<E: Error + 'static>(path: &Path, what: &'static str) -> impl Fn(E) -> Self {
+        let path = path.to_owned();
+        move |error| Self::File {
+            path: path.clone(),
+            fault: format!("{what}: {}", with_causes(&error)),
+        }
+    }
+
     /// For a closure that knows why an entry is of no use.
     pub(super) fn entry<E: ToString>(entry: &'static str) -> impl Fn(E) -> Self {
-        move |reason| Self::Entry {
-            entry,
-            reason: reason.to_string(),
+        move |reason| {
+            let reason = reason.to_string();
+            Self::Content(format!("its entry {entry} is missing or damaged: {reason}"))
         }
+    }
+}
+
+impl From<zip::result::ZipError> for CapturedObjectError {
+    fn from(fault: zip::result::ZipError) -> Self {
+        Self::Content(format!("it is no ZIP archive, or damaged: {fault}"))
     }
 }

@@ -35,5 +35,7 @@ pub(super) fn check_size(extent: Extent) -> Result<(), CapturedObjectError> {
     if sides.contains(&width) && sides.contains(&height) && width * height <= MOST_PIXELS {
         return Ok(());
     }
-    Err(CapturedObjectError::Size { extent })
+    Err(CapturedObjectError::Content(format!(
+        "{width} x {height} pixels are not from 1 x 1 to {MOST_SIDE} a side and {MOST_PIXELS} in all"
+    )))
 }

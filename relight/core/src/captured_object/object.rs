@@ -2,7 +2,7 @@
 
 use super::CapturedObjectError;
 use super::manifest::check_size;
-use crate::image::{Extent, ImageError, Planes};
+use crate::image::{Extent, Planes, check_extent};
 use crate::render::Surface;
 
 /// An object that can be lit.
@@ -51,13 +51,7 @@ impl CapturedObject {
             ("map of coverage", &alpha),
             ("map of confidence", &confidence),
         ] {
-            if map.extent() != extent {
-                return Err(CapturedObjectError::Image(ImageError::Extent {
-                    what,
-                    found: map.extent(),
-                    expected: extent,
-                }));
-            }
+            check_extent(what, map.extent(), extent)?;
         }
         let part = |value: f32| if value > 0.0 { value.min(1.0) } else { 0.0 };
         Ok(Self {

@@ -30,10 +30,10 @@ impl CapturedObject {
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, CapturedObjectError> {
         let length = bytes.len() as u64;
         if length > Self::MOST_BYTES {
-            return Err(CapturedObjectError::TooLarge {
-                bytes: length,
-                most: Self::MOST_BYTES,
-            });
+            return Err(CapturedObjectError::Content(format!(
+                "it has {length} bytes, and at most {} are read",
+                Self::MOST_BYTES
+            )));
         }
         let mut archive = ZipArchive::new(Cursor::new(bytes))?;
         let manifest = manifest(&mut archive)?;
@@ -56,9 +56,10 @@ fn manifest(archive: &mut Archive<'_>) -> Result<Manifest, CapturedObjectError> 
     let schema: Schema =
         serde_json::from_slice(&json).map_err(CapturedObjectError::entry(MANIFEST))?;
     if schema.schema != CAPTURED_OBJECT_SCHEMA {
-        return Err(CapturedObjectError::Schema {
-            found: schema.schema.chars().take(80).collect(),
-        });
+        let found: String = schema.schema.chars().take(80).collect();
+        return Err(CapturedObjectError::Content(format!(
+            "it says that it is {found:?}, and this program reads {CAPTURED_OBJECT_SCHEMA:?}: a newer relight may read it"
+        )));
     }
     serde_json::from_slice(&json).map_err(CapturedObjectError::entry(MANIFEST))
 }
@@ -124,10 +125,8 @@ impl Maps<'_> {
         if white.is_finite() && white >= 0.0 {
             return Ok(white);
         }
-        Err(CapturedObjectError::Entry {
-            entry: MANIFEST,
-            reason: format!("white.{map} is no number from 0 up"),
-        })
+        let reason = format!("white.{map} is no number from 0 up");
+        Err(CapturedObjectError::entry(MANIFEST)(reason))
     }
 
     fn colours(
@@ -162,10 +161,8 @@ impl Maps<'_> {
         let image = reader.decode().map_err(wrong)?;
         let found = Extent::new(image.width() as usize, image.height() as usize);
         if found != self.extent {
-            return Err(CapturedObjectError::Entry {
-                entry: name,
-                reason: format!("{} x {} pixels", found.width, found.height),
-            });
+            let reason = format!("{} x {} pixels", found.width, found.height);
+            return Err(CapturedObjectError::entry(name)(reason));
         }
         Ok(image)
     }

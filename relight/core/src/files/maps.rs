@@ -64,13 +64,13 @@ impl MapFiles {
             None => normals,
             Some(path) => {
                 let image = StoredImage::read(path)?;
-                check_extent(image.planes.extent(), normals.extent())?;
                 normals.masked(&image.object_mask(path)?.0)?
             }
         };
         if normals.is_empty() {
-            return Err(ImageError::NoSurface {
+            return Err(ImageError::Form {
                 path: self.normals.clone(),
+                fault: "shows no surface: it has no normals, or none inside the mask".to_owned(),
             });
         }
         Ok(normals)
@@ -108,27 +108,17 @@ impl MapFiles {
     }
 }
 
-/// That a mask is as large as the map that it cuts.
-fn check_extent(found: Extent, expected: Extent) -> Result<(), ImageError> {
-    match found == expected {
-        true => Ok(()),
-        false => Err(ImageError::Extent {
-            what: "mask",
-            found,
-            expected,
-        }),
-    }
-}
-
 /// Whether no value is negative or not finite.
 fn check_values(path: &Path, what: &'static str, planes: &Planes<3>) -> Result<(), ImageError> {
     let mut values = planes.planes().into_iter().flatten();
     if values.all(|value| value.is_finite() && *value >= 0.0) {
         return Ok(());
     }
-    Err(ImageError::Value {
+    Err(ImageError::Form {
         path: path.to_owned(),
-        what,
+        fault: format!(
+            "is no map of {what}: it has a value that is negative, infinite or not a number"
+        ),
     })
 }
 

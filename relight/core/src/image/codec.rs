@@ -43,10 +43,7 @@ pub fn encode_jpeg(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageErro
             height,
             image::ExtendedColorType::Rgb8,
         )
-        .map_err(|source| ImageError::Encode {
-            path: path.to_owned(),
-            source,
-        })?;
+        .map_err(ImageError::encode(path))?;
     Ok(bytes)
 }
 
@@ -62,10 +59,7 @@ pub fn encode_exr(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageError
     let buffer = ImageBuffer::<Rgb<f32>, _>::from_raw(width, height, values).unwrap_or_default();
     DynamicImage::ImageRgb32F(buffer)
         .write_to(&mut bytes, ImageFormat::OpenExr)
-        .map_err(|source| ImageError::Encode {
-            path: path.to_owned(),
-            source,
-        })?;
+        .map_err(ImageError::encode(path))?;
     Ok(bytes.into_inner())
 }
 

@@ -7,12 +7,12 @@ use std::fmt::Debug;
 use std::marker::PhantomData;
 
 use relit_data::srgb;
+use serde::{Deserialize, Serialize};
 
 use super::Planes;
-use crate::sealed::OwnMarker;
 
-/// How colour values stand for light. Implemented by [`Linear`], [`Srgb`] and [`Gamma22`] only.
-pub trait ColourSpace: OwnMarker + Copy + Debug + Send + Sync + 'static {
+/// How colour values stand for light. [`Linear`], [`Srgb`] or [`Gamma22`].
+pub trait ColourSpace: Copy + Debug + Send + Sync + 'static {
     /// The light that an encoded value stands for; 1 is white. Negative values are mirrored.
     fn to_linear(encoded: f32) -> f32;
     /// The value that stands for that much light.
@@ -30,10 +30,6 @@ pub enum Srgb {}
 /// Values encoded by the power 1 / 2.2, 0 to 1: the paper's backgrounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gamma22 {}
-
-impl OwnMarker for Linear {}
-impl OwnMarker for Srgb {}
-impl OwnMarker for Gamma22 {}
 
 impl ColourSpace for Linear {
     fn to_linear(encoded: f32) -> f32 {
@@ -67,7 +63,8 @@ impl ColourSpace for Gamma22 {
 
 /// How the integer values of a file are encoded, where that is known only at run time. Files of
 /// floating point values (EXR, HDR) are always linear.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Transfer {
     /// In proportion to light.
     Linear,

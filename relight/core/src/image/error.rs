@@ -1,10 +1,12 @@
 //! What can be wrong with an image or its file.
 
+use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use relit_data::still::{ColourError, StillError};
 
+use relit_data::causes::with_causes;
 use relit_data::mask::MaskFault;
 
 use super::Extent;
@@ -13,24 +15,9 @@ use super::Extent;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
-    /// A plane has not one value a pixel.
-    #[error("a plane of {found} values was given for {} x {} pixels", extent.width, extent.height)]
-    Length {
-        /// The size of the image.
-        extent: Extent,
-        /// The values that the plane has.
-        found: usize,
-    },
-    /// Images that belong together differ in size.
-    #[error("the {what} has {} x {} pixels where {} x {} are needed", found.width, found.height, expected.width, expected.height)]
-    Extent {
-        /// The image that differs.
-        what: &'static str,
-        /// Its size.
-        found: Extent,
-        /// The size that it should have.
-        expected: Extent,
-    },
+    /// Images that belong together, or the planes of one, differ in size.
+    #[error("{0}")]
+    Size(String),
     /// A file is no mask of an object.
     #[error("the mask {} {fault}", path.display())]
     NotAMask {
@@ -38,12 +25,6 @@ pub enum ImageError {
         path: PathBuf,
         /// What it is.
         fault: MaskFault,
-    },
-    /// A map of normals is empty.
-    #[error("{} shows no surface: it has no normals, or none inside the mask", path.display())]
-    NoSurface {
-        /// The map of normals.
-        path: PathBuf,
     },
     /// The file cannot be read.
     #[error("{} cannot be read", path.display())]
@@ -53,27 +34,13 @@ pub enum ImageError {
         /// What the system answers.
         source: io::Error,
     },
-    /// The file is not an image of a known format.
-    #[error("{} is not a readable PNG, JPEG, WebP, TIFF, BMP, GIF, EXR or HDR image", path.display())]
-    Decode {
-        /// The file.
-        path: PathBuf,
-        /// What the decoder found.
-        source: image::ImageError,
-    },
-    /// The file ends before the picture does.
-    #[error("{} is cut off: a part of the picture is missing; copy the file again", path.display())]
-    CutOff {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The image is in a format or form that is known and not read.
+    /// The file holds no image that can be used, or an image cannot become one.
     #[error("{} {fault}", path.display())]
     Form {
         /// The file.
         path: PathBuf,
         /// What it is, and what to do.
-        fault: StillError,
+        fault: String,
     },
     /// The image's colours cannot be converted.
     #[error("{} {fault}: convert it to sRGB", path.display())]
@@ -82,28 +49,6 @@ pub enum ImageError {
         path: PathBuf,
         /// What it says of its colours.
         fault: ColourError,
-    },
-    /// The image has more pixels than are read.
-    #[error("{} is too large: its pixels would take more than 512 MiB of memory", path.display())]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A map has a value that it cannot have.
-    #[error("{} is no map of {what}: it has a value that is negative, infinite or not a number", path.display())]
-    Value {
-        /// The file.
-        path: PathBuf,
-        /// What it should be a map of.
-        what: &'static str,
-    },
-    /// The image cannot be encoded.
-    #[error("{} cannot be encoded", path.display())]
-    Encode {
-        /// The file.
-        path: PathBuf,
-        /// What the encoder answers.
-        source: image::ImageError,
     },
     /// The file cannot be written.
     #[error("{} cannot be written", path.display())]
@@ -116,14 +61,53 @@ pub enum ImageError {
 }
 
 impl ImageError {
-    /// Puts the path to what is wrong with its content.
-    pub(super) fn still(path: &Path) -> impl FnOnce(StillError) -> Self {
+    /// For a closure that knows why a file cannot be read.
+    pub fn open(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
-        |fault| match fault {
-            StillError::Decode(source) => Self::Decode { path, source },
-            StillError::CutOff => Self::CutOff { path },
-            StillError::TooLarge => Self::TooLarge { path },
-            fault => Self::Form { path, fault },
+        |source| Self::Open { path, source }
+    }
+
+    /// For a closure that knows why an image, called `path`, cannot be encoded.
+    pub fn encode<E: Display>(path: &Path) -> impl FnOnce(E) -> Self {
+        let path = path.to_owned();
+        move |reason| Self::Form {
+            path,
+            fault: format!("cannot be encoded: {reason}"),
         }
     }
+
+    /// For a closure that knows what is wrong with the content of a file.
+    pub fn still(path: &Path) -> impl FnOnce(StillError) -> Self {
+        let path = path.to_owned();
+        |fault| {
+            let fault = match fault {
+                StillError::Decode(source) => format!(
+                    "is not a readable PNG, JPEG, WebP, TIFF, BMP, GIF, EXR or HDR image: {}",
+                    with_causes(&source)
+                ),
+                StillError::CutOff => {
+                    "is cut off: a part of the picture is missing; copy the file again".to_owned()
+                }
+                StillError::TooLarge => {
+                    "is too large: its pixels would take more than 512 MiB of memory".to_owned()
+                }
+                fault => fault.to_string(),
+            };
+            Self::Form { path, fault }
+        }
+    }
+}
+
+/// That an image has the size that it needs.
+///
+/// # Errors
+/// [`ImageError::Size`].
+pub fn check_extent(what: &str, found: Extent, expected: Extent) -> Result<(), ImageError> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(ImageError::Size(format!(
+        "the {what} has {} x {} pixels where {} x {} are needed",
+        found.width, found.height, expected.width, expected.height
+    )))
 }

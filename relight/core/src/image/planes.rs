@@ -2,7 +2,7 @@
 
 use std::array;
 
-use super::{Extent, ImageError};
+use super::{Extent, ImageError, check_extent};
 use crate::parallel;
 
 /// `C` planes of one size, each row by row from the top. What the values mean is said by the types
@@ -44,10 +44,12 @@ impl<const C: usize> Planes<C> {
     pub fn from_planes(extent: Extent, planes: [Vec<f32>; C]) -> Result<Self, ImageError> {
         match planes.iter().find(|plane| plane.len() != extent.pixels()) {
             None => Ok(Self { extent, planes }),
-            Some(plane) => Err(ImageError::Length {
-                extent,
-                found: plane.len(),
-            }),
+            Some(plane) => Err(ImageError::Size(format!(
+                "a plane of {} values was given for {} x {} pixels",
+                plane.len(),
+                extent.width,
+                extent.height
+            ))),
         }
     }
 
@@ -74,13 +76,7 @@ impl<const C: usize> Planes<C> {
         let mut sheet = Self::zeros(Extent::new(tile.width * columns, tile.height * rows));
         let width = sheet.extent.width;
         for (at, image) in tiles.iter().enumerate() {
-            if image.extent != tile {
-                return Err(ImageError::Extent {
-                    what: "tile of the sheet",
-                    found: image.extent,
-                    expected: tile,
-                });
-            }
+            check_extent("tile of the sheet", image.extent, tile)?;
             let start = at / columns * tile.height * width + at % columns * tile.width;
             for (from, to) in image.planes.iter().zip(&mut sheet.planes) {
                 for (y, row) in from.chunks_exact(tile.width.max(1)).enumerate() {
@@ -89,6 +85,21 @@ impl<const C: usize> Planes<C> {
             }
         }
         Ok(sheet)
+    }
+
+    /// The part of the image whose first pixel is in this column and row.
+    ///
+    /// # Panics
+    /// Where it does not lie inside.
+    #[must_use]
+    pub fn cut(&self, [x, y]: [usize; 2], extent: Extent) -> Self {
+        let mut part = Self::zeros(extent);
+        for (to, from) in part.planes.iter_mut().zip(&self.planes) {
+            for (row, line) in to.chunks_exact_mut(extent.width.max(1)).enumerate() {
+                line.copy_from_slice(&from[(y + row) * self.extent.width + x..][..extent.width]);
+            }
+        }
+        part
     }
 
     /// Width and height.
@@ -132,6 +143,14 @@ impl<const C: usize> Planes<C> {
     pub fn pixel(&self, x: usize, y: usize) -> [f32; C] {
         let at = self.at(x, y);
         array::from_fn(|channel| self.planes[channel][at])
+    }
+
+    /// The largest channel of each pixel.
+    pub fn brightest(&self) -> impl Iterator<Item = f32> {
+        (0..self.extent.pixels()).map(|at| {
+            let channels = self.planes.iter().map(|plane| plane[at]);
+            channels.fold(f32::NEG_INFINITY, f32::max)
+        })
     }
 
     /// Writes the channels of one pixel.
@@ -207,6 +226,14 @@ mod tests {
         let other = Planes::filled(Extent::new(1, 3), [0.0]);
         assert!(Planes::sheet(&[tile(1.0), other], 2).is_err());
         assert_eq!(Planes::<1>::sheet(&[], 3).unwrap().extent().pixels(), 0);
+    }
+
+    #[test]
+    fn a_part_is_what_the_image_shows_there() {
+        let image = Planes::from_fn(Extent::new(20, 30), |x, y| [x as f32, y as f32]);
+        let part = image.cut([3, 4], Extent::new(15, 26));
+        let expected = Planes::from_fn(part.extent(), |x, y| [(x + 3) as f32, (y + 4) as f32]);
+        assert_eq!(part, expected);
     }
 
     #[test]

@@ -2,9 +2,6 @@
 
 use std::path::Path;
 
-use image::error::{EncodingError, ImageFormatHint};
-use image::{ImageError as EncoderError, ImageFormat};
-
 use super::codec::{sides, to_integer};
 use super::{Depth, Extent, ImageError, Planes};
 use crate::parallel;
@@ -33,13 +30,7 @@ pub fn encode_png_of(
     depth: Depth,
     pixel: impl Fn(usize) -> [f32; 3] + Sync,
 ) -> Result<Vec<u8>, ImageError> {
-    write_rows(extent, depth, pixel).map_err(|error| ImageError::Encode {
-        path: path.to_owned(),
-        source: EncoderError::Encoding(EncodingError::new(
-            ImageFormatHint::Exact(ImageFormat::Png),
-            error,
-        )),
-    })
+    write_rows(extent, depth, pixel).map_err(ImageError::encode(path))
 }
 
 fn write_rows(

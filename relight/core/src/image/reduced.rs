@@ -72,10 +72,7 @@ fn png(path: &Path, image: DynamicImage) -> Result<Vec<u8>, ImageError> {
     let encoder =
         PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive);
     let encoded = plain(image).write_with_encoder(encoder);
-    encoded.map_err(|source| ImageError::Encode {
-        path: path.to_owned(),
-        source,
-    })?;
+    encoded.map_err(ImageError::encode(path))?;
     Ok(file)
 }
 

@@ -157,7 +157,7 @@ fn taps(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
 }
 
 /// For each of `to` equal parts of a line of `from` pixels: the pixels in it and their shares.
-pub fn area_shares(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
+pub(crate) fn area_shares(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     let part = |at: usize| {
         // In units of 1 / to of a pixel, so that nothing is rounded.
         let (start, end) = (at * from, (at + 1) * from);

@@ -53,7 +53,7 @@ pub fn basis_into(order: Order, [x, y, z]: [f64; 3], values: &mut [f64]) {
 
 /// The parts of the spherical harmonics that depend on the polar angle alone, for m >= 0, at
 /// `l (l + 1) / 2 + m`; without the √2 of m > 0, which belongs to the azimuth.
-pub fn polar_functions(order: Order, polar: f64, values: &mut [f64]) {
+pub(crate) fn polar_functions(order: Order, polar: f64, values: &mut [f64]) {
     let (sin, z) = polar.sin_cos();
     let mut diagonal = (1.0 / (4.0 * PI)).sqrt();
     for m in 0..=order.get() {
@@ -71,7 +71,7 @@ pub fn polar_functions(order: Order, polar: f64, values: &mut [f64]) {
 
 /// The factors a and b of `Q_l^m = a z Q_{l-1}^m - b Q_{l-2}^m`, where Q is the normalised associated
 /// Legendre function over sin^m, and l > m.
-pub fn legendre_step(l: usize, m: usize) -> [f64; 2] {
+pub(crate) fn legendre_step(l: usize, m: usize) -> [f64; 2] {
     let (l, m) = (l as f64, m as f64);
     let root = |l: f64| ((4.0 * l * l - 1.0) / (l * l - m * m)).sqrt();
     let a = root(l);

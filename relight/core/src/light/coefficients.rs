@@ -139,7 +139,14 @@ impl FromStr for ShLight {
             !line.is_empty() && !line.starts_with('#')
         });
         let coefficients: Result<Vec<_>, _> = written
-            .map(|(at, line)| three_numbers(line).ok_or(LightError::Line { line: at + 1 }))
+            .map(|(at, line)| {
+                three_numbers(line).ok_or_else(|| {
+                LightError::Coefficients(format!(
+                    "line {} of the coefficients has not three finite numbers (red, green, blue)",
+                    at + 1
+                ))
+            })
+            })
             .collect();
         Self::new(coefficients?)
     }
@@ -180,17 +187,15 @@ mod tests {
 
     #[test]
     fn wrong_text_names_its_line_or_the_count() {
-        let text = "1 2 3\n1 2\n";
-        assert_eq!(text.parse::<ShLight>(), Err(LightError::Line { line: 2 }));
-        assert_eq!(
-            "1 2 inf".parse::<ShLight>(),
-            Err(LightError::Line { line: 1 })
-        );
-        assert_eq!(
-            "1 2 3\n".repeat(8).parse::<ShLight>(),
-            Err(LightError::Count(8))
-        );
-        assert_eq!("".parse::<ShLight>(), Err(LightError::Count(0)));
+        for (text, named) in [
+            ("1 2 3\n1 2\n".to_owned(), "line 2"),
+            ("1 2 inf".to_owned(), "line 1"),
+            ("1 2 3\n".repeat(8), "8 coefficients"),
+            (String::new(), "0 coefficients"),
+        ] {
+            let fault = text.parse::<ShLight>().unwrap_err().to_string();
+            assert!(fault.contains(named), "{fault}");
+        }
     }
 
     #[test]

@@ -20,8 +20,8 @@ mod quadrature;
 mod rotation;
 mod wigner;
 
-pub use basis::basis;
-pub use basis::{basis_into, legendre_step, polar_functions};
+pub use basis::{basis, basis_into};
+pub(crate) use basis::{legendre_step, polar_functions};
 pub use coefficients::ShLight;
 pub use direction::Direction;
 pub use error::{LightError, LightFileError};
@@ -29,6 +29,6 @@ pub use least_squares::NormalEquations;
 pub use normals::{Normals, NormalsFrame, YAxis, YDown, YUp};
 pub use order::Order;
 pub use panorama::{DrawnLight, LightSampler, Panorama, PanoramaError};
-pub use quadrature::Quadrature;
+pub(crate) use quadrature::Quadrature;
 pub use rotation::Rotation;
 pub use wigner::ShRotation;

@@ -4,14 +4,13 @@ use std::f32::consts::FRAC_PI_2;
 use std::fmt::Debug;
 use std::marker::PhantomData;
 
-use crate::image::{Extent, ImageError, Planes};
-use crate::sealed::OwnMarker;
+use crate::image::{Extent, ImageError, Planes, check_extent};
 
 /// Vectors shorter than this stand for no surface: a map's background, however it was encoded.
 const SHORTEST: f32 = 0.1;
 
-/// Which way y points in a normal map. Implemented by [`YUp`] and [`YDown`] only.
-pub trait YAxis: OwnMarker + Copy + Debug + Send + Sync + 'static {
+/// Which way y points in a normal map. [`YUp`] or [`YDown`].
+pub trait YAxis: Copy + Debug + Send + Sync + 'static {
     /// The other way.
     type Opposite: YAxis<Opposite = Self>;
 }
@@ -23,9 +22,6 @@ pub enum YUp {}
 /// x to the right, y down, z to the viewer: the paper's colour figure and its released data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum YDown {}
-
-impl OwnMarker for YUp {}
-impl OwnMarker for YDown {}
 
 impl YAxis for YUp {
     type Opposite = YDown;
@@ -127,13 +123,7 @@ impl<Y: YAxis> Normals<Y> {
     /// # Errors
     /// Where the mask has another size.
     pub fn masked(mut self, mask: &Planes<1>) -> Result<Self, ImageError> {
-        if mask.extent() != self.extent() {
-            return Err(ImageError::Extent {
-                what: "mask",
-                found: mask.extent(),
-                expected: self.extent(),
-            });
-        }
+        check_extent("mask", mask.extent(), self.extent())?;
         for plane in self.planes.planes_mut() {
             for (value, mask) in plane.iter_mut().zip(mask.plane(0)) {
                 *value = if *mask < 0.5 { 0.0 } else { *value };

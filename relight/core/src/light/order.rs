@@ -46,10 +46,10 @@ impl Order {
     pub fn new(highest: usize) -> Result<Self, LightError> {
         match u8::try_from(highest) {
             Ok(order) if highest <= Self::MAX => Ok(Self(order)),
-            _ => Err(LightError::Order {
-                asked: highest,
-                highest: Self::MAX,
-            }),
+            _ => Err(LightError::Coefficients(format!(
+                "spherical harmonics of order {highest} were asked for, and {} is the highest",
+                Self::MAX
+            ))),
         }
     }
 
@@ -69,7 +69,9 @@ impl Order {
     pub(super) fn of_coefficients(count: usize) -> Result<Self, LightError> {
         let side = count.isqrt();
         if count == 0 || side * side != count {
-            return Err(LightError::Count(count));
+            return Err(LightError::Coefficients(format!(
+                "{count} coefficients were given where 1, 4, 9, 16, ... make an order"
+            )));
         }
         Self::new(side - 1)
     }

@@ -4,14 +4,14 @@ use std::f64::consts::PI;
 
 /// Points and weights of a quadrature over an interval.
 #[derive(Debug, Clone)]
-pub struct Quadrature {
+pub(crate) struct Quadrature {
     /// Pairs for the interval -1 to 1.
     nodes: Vec<[f64; 2]>,
 }
 
 impl Quadrature {
     /// `count` points: exact for polynomials of degree `2 count - 1`.
-    pub fn new(count: usize) -> Self {
+    pub(crate) fn new(count: usize) -> Self {
         Self {
             nodes: (0..count).map(|at| node(count, at)).collect(),
         }
@@ -19,12 +19,12 @@ impl Quadrature {
 
     /// Enough points to integrate sines and cosines of up to `frequency` over an interval of `length`
     /// (radians) to the last bits.
-    pub fn for_waves(frequency: usize, length: f64) -> Self {
+    pub(crate) fn for_waves(frequency: usize, length: f64) -> Self {
         Self::new(12 + (frequency as f64 * length / 2.0).ceil() as usize)
     }
 
     /// Points from `from` to `to` and their weights.
-    pub fn over(&self, from: f64, to: f64) -> impl Iterator<Item = [f64; 2]> {
+    pub(crate) fn over(&self, from: f64, to: f64) -> impl Iterator<Item = [f64; 2]> {
         let (middle, half) = (from.midpoint(to), (to - from) / 2.0);
         self.nodes
             .iter()

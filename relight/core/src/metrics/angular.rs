@@ -25,7 +25,7 @@ impl AngularError {
 /// vectors need not be of length 1.
 ///
 /// # Errors
-/// As [`Comparison::new`]; [`MetricError::ZeroNormal`] where a vector under the mask has no length.
+/// As [`Comparison::new`]; [`MetricError::Incomparable`] where a vector under the mask has no length.
 pub fn angular_error(
     extent: Extent,
     truth: [&[f32]; 3],
@@ -39,7 +39,9 @@ pub fn angular_error(
             let vector = planes.map(|plane| f64::from(plane[at]));
             let (x, y) = (at % extent.width, at / extent.width);
             if vector == [0.0; 3] {
-                return Err(MetricError::ZeroNormal { what, x, y });
+                return Err(MetricError::Incomparable(format!(
+                    "{what} has a normal of length zero at pixel ({x}, {y})"
+                )));
             }
             Ok(vector)
         };

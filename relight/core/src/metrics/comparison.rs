@@ -24,8 +24,8 @@ impl<'a> Comparison<'a> {
     /// size, at the pixels where `mask` is true.
     ///
     /// # Errors
-    /// [`MetricError::Length`], [`MetricError::Channels`], [`MetricError::EmptyMask`] or
-    /// [`MetricError::NotFinite`].
+    /// [`MetricError::EmptyMask`], or [`MetricError::Incomparable`] where sizes or channels differ or a value under the mask
+    /// is not finite.
     pub fn new(
         extent: Extent,
         truth: &[&'a [f32]],
@@ -36,10 +36,11 @@ impl<'a> Comparison<'a> {
         check_plane("the ground truth", truth, extent, mask)?;
         check_plane("the estimate", estimate, extent, mask)?;
         if truth.len() != estimate.len() || truth.is_empty() {
-            return Err(MetricError::Channels {
-                truth: truth.len(),
-                estimate: estimate.len(),
-            });
+            return Err(MetricError::Incomparable(format!(
+                "the ground truth has {} channels and the estimate {}: they cannot be compared",
+                truth.len(),
+                estimate.len()
+            )));
         }
         if !mask.contains(&true) {
             return Err(MetricError::EmptyMask);
@@ -82,11 +83,15 @@ pub(super) fn check_length(
     if found == expected {
         return Ok(());
     }
-    Err(MetricError::Length {
-        what,
-        found,
-        expected,
-    })
+    Err(MetricError::Incomparable(format!(
+        "{what} has {found} values where {expected} pixels are compared: the images are not of one size"
+    )))
+}
+
+pub(super) fn not_finite(what: &str, value: f32, [x, y]: [usize; 2]) -> MetricError {
+    MetricError::Incomparable(format!(
+        "{what} has the value {value} at pixel ({x}, {y}): only finite values can be compared"
+    ))
 }
 
 fn check_plane(
@@ -102,12 +107,11 @@ fn check_plane(
             .zip(mask)
             .position(|(value, &counts)| counts && !value.is_finite());
         if let Some(at) = odd {
-            return Err(MetricError::NotFinite {
+            return Err(not_finite(
                 what,
-                value: plane[at],
-                x: at % extent.width,
-                y: at / extent.width,
-            });
+                plane[at],
+                [at % extent.width, at / extent.width],
+            ));
         }
     }
     Ok(())
@@ -133,7 +137,7 @@ mod tests {
         }
         for truth in [&[][..], &[&values[..], &values]] {
             let error = Comparison::new(EXTENT, truth, &[&values], &mask).unwrap_err();
-            assert!(matches!(error, MetricError::Channels { .. }), "{error}");
+            assert!(error.to_string().contains("channels"), "{error}");
         }
     }
 

@@ -10,7 +10,6 @@
 //! | MSE, scale-invariant MSE (SMSE) | [`Comparison::mse`] | Grosse et al. 2009, "Ground truth dataset and baseline evaluations for intrinsic image algorithms" |
 //! | local MSE (LMSE) | [`Comparison::lmse`] | the same |
 //! | SMSE and LMSE by convention | [`intrinsic_error`] | the same; [`Convention`] |
-//! | PSNR | [`Comparison::psnr`] | |
 //! | SSIM, DSSIM | [`Comparison::ssim`] | Wang et al. 2004, "Image quality assessment: from error visibility to structural similarity" |
 //! | angle between normals | [`angular_error`] | |
 //! | WHDR | [`whdr`] | Bell et al. 2014, "Intrinsic images in the wild" |
@@ -43,4 +42,4 @@ pub use error::MetricError;
 pub use intrinsic::{Convention, IntrinsicError, intrinsic_error};
 pub use ordinal::{Darker, Judgement, whdr};
 pub use scaled::{ScaleFit, Windows};
-pub use structural::{Ssim, dssim};
+pub use structural::{SSIM_WINDOW, dssim};

@@ -1,7 +1,7 @@
 //! WHDR: how often an estimated reflectance contradicts what people judged.
 
 use super::MetricError;
-use super::comparison::check_length;
+use super::comparison::{check_length, not_finite};
 use crate::image::Extent;
 
 /// What people judged of two points.
@@ -35,9 +35,8 @@ pub struct Judgement {
 /// is the mean of a pixel's channels, linear, at least 1e-10.
 ///
 /// # Errors
-/// [`MetricError::Length`], [`MetricError::EmptyMask`] for an image without values,
-/// [`MetricError::NotFinite`], [`MetricError::OutsidePoint`];
-/// [`MetricError::NoJudgements`] where none has a weight.
+/// [`MetricError::EmptyMask`] for an image without values; [`MetricError::Incomparable`] where a plane has another length, a
+/// value is not finite, a point lies outside, or no judgement has a weight.
 pub fn whdr(
     extent: Extent,
     reflectance: &[&[f32]],
@@ -69,7 +68,9 @@ pub fn whdr(
     if all > 0.0 {
         Ok(wrong / all)
     } else {
-        Err(MetricError::NoJudgements)
+        Err(MetricError::Incomparable(
+            "no judgement has a positive weight: there is nothing to agree with".to_owned(),
+        ))
     }
 }
 
@@ -79,7 +80,9 @@ fn brightness(
     [x, y]: [f64; 2],
 ) -> Result<f64, MetricError> {
     if !((0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y)) {
-        return Err(MetricError::OutsidePoint { x, y });
+        return Err(MetricError::Incomparable(format!(
+            "a judgement names the point ({x}, {y}), which is outside an image of 1x1"
+        )));
     }
     let place = |at: f64, length: usize| ((at * length as f64) as usize).min(length - 1);
     let (x, y) = (place(x, extent.width), place(y, extent.height));
@@ -87,8 +90,7 @@ fn brightness(
     for plane in reflectance {
         let value = plane[y * extent.width + x];
         if !value.is_finite() {
-            let what = "the estimate";
-            return Err(MetricError::NotFinite { what, value, x, y });
+            return Err(not_finite("the estimate", value, [x, y]));
         }
         sum += f64::from(value);
     }
@@ -130,9 +132,9 @@ mod tests {
     fn points_outside_and_empty_lists_are_errors() {
         let outside = [judged(0.1, 1.1, Darker::First, 1.0)];
         let error = whdr(EXTENT, STEPS, &outside, 0.1).unwrap_err();
-        assert!(matches!(error, MetricError::OutsidePoint { .. }));
+        assert!(error.to_string().contains("outside"), "{error}");
         let error = whdr(EXTENT, STEPS, &[], 0.1).unwrap_err();
-        assert_eq!(error, MetricError::NoJudgements);
+        assert!(error.to_string().contains("no judgement"), "{error}");
         let edge = [judged(1.0, 0.0, Darker::Second, 1.0)];
         assert!(whdr(EXTENT, STEPS, &edge, 0.1).unwrap() < 1e-12);
     }

@@ -99,12 +99,6 @@ impl Comparison<'_> {
         sum / (self.count() * self.channels.len()) as f64
     }
 
-    /// Peak signal-to-noise ratio, `10 log10(peak^2 / MSE)`, decibels; infinite for equal images.
-    #[must_use]
-    pub fn psnr(&self, peak: f64) -> f64 {
-        10.0 * (peak * peak / self.mse(ScaleFit::None)).log10()
-    }
-
     /// The local error of Grosse et al. (2009): squared error after the best scale of each window,
     /// summed over all windows, in relation to the energy of the ground truth, summed over the same
     /// windows. 0 for an estimate that is right up to a scale in each window, 1 for one that is 0
@@ -116,8 +110,7 @@ impl Comparison<'_> {
     /// estimate's units.
     ///
     /// # Errors
-    /// [`MetricError::Setting`] where `windows` has a zero, [`MetricError::TooSmall`] where no
-    /// window fits, [`MetricError::DarkGroundTruth`] where the ground truth is 0 in all windows.
+    /// [`MetricError::Incomparable`] where no window fits, [`MetricError::DarkGroundTruth`] where the ground truth is 0 in all windows.
     pub fn lmse(&self, fit: ScaleFit, windows: Windows) -> Result<f64, MetricError> {
         windows.check(self.extent)?;
         let mut totals = vec![Total::default(); self.channels.len()];
@@ -178,23 +171,8 @@ impl Comparison<'_> {
 
 impl Windows {
     fn check(self, Extent { width, height }: Extent) -> Result<(), MetricError> {
-        let lengths = [
-            ("the side of a window", self.side),
-            ("the step of windows", self.step),
-        ];
-        if let Some((what, _)) = lengths.into_iter().find(|&(_, length)| length == 0) {
-            return Err(MetricError::Setting {
-                what,
-                value: 0.0,
-                must: "at least 1",
-            });
-        }
         if self.side > width.min(height) {
-            return Err(MetricError::TooSmall {
-                width,
-                height,
-                window: self.side,
-            });
+            return Err(too_small(width, height, self.side));
         }
         Ok(())
     }
@@ -204,6 +182,13 @@ impl Windows {
         let starts = move |length: usize| (0..=length - self.side).step_by(self.step);
         starts(extent.height).flat_map(move |y| starts(extent.width).map(move |x| (x, y)))
     }
+}
+
+/// Why no window of this side fits.
+pub(super) fn too_small(width: usize, height: usize, window: usize) -> MetricError {
+    MetricError::Incomparable(format!(
+        "an image of {width}x{height} pixels holds no window of {window}x{window}"
+    ))
 }
 
 /// Squared error and energy of the ground truth, over windows.

@@ -1,51 +1,24 @@
 //! Structural similarity.
 
 use super::comparison::Channel;
+use super::scaled::too_small;
 use super::{Comparison, MetricError};
 use crate::image::Extent;
 
 const K1: f64 = 0.01;
 const K2: f64 = 0.03;
 
-/// The windows over which SSIM takes its means and variances.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ssim {
-    /// A Gaussian of sigma 1.5 on 11 x 11 pixels, variances over the population: the publication,
-    /// and scikit-image with `gaussian_weights=True, sigma=1.5, use_sample_covariance=False`.
-    Gaussian,
-    /// 7 x 7 pixels of equal weight, variances of a sample: scikit-image's default.
-    Uniform,
-}
+/// The windows over which SSIM takes its means and variances, as a table names them: those of the publication, and of
+/// scikit-image with `gaussian_weights=True, sigma=1.5, use_sample_covariance=False`.
+pub const SSIM_WINDOW: &str = "gaussian 11x11, sigma 1.5";
 
-impl Ssim {
-    /// How a table names it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Gaussian => "gaussian 11x11, sigma 1.5",
-            Self::Uniform => "uniform 7x7",
-        }
-    }
-
-    /// The weights along one side; their sum is 1.
-    fn weights(self) -> Vec<f64> {
-        let raw: Vec<f64> = match self {
-            Self::Gaussian => (-5..=5)
-                .map(|x: i32| (-0.5 * (f64::from(x) / 1.5).powi(2)).exp())
-                .collect(),
-            Self::Uniform => vec![1.0; 7],
-        };
-        let sum: f64 = raw.iter().sum();
-        raw.into_iter().map(|weight| weight / sum).collect()
-    }
-
-    /// What the variances are multiplied by.
-    fn correction(self) -> f64 {
-        match self {
-            Self::Gaussian => 1.0,
-            Self::Uniform => 49.0 / 48.0,
-        }
-    }
+/// The weights along one side of a window; their sum is 1.
+fn weights() -> Vec<f64> {
+    let raw: Vec<f64> = (-5..=5)
+        .map(|x: i32| (-0.5 * (f64::from(x) / 1.5).powi(2)).exp())
+        .collect();
+    let sum: f64 = raw.iter().sum();
+    raw.into_iter().map(|weight| weight / sum).collect()
 }
 
 /// The dissimilarity that belongs to an SSIM: (1 - SSIM) / 2, 0..=1.
@@ -56,41 +29,33 @@ pub fn dssim(ssim: f64) -> f64 {
 
 impl Comparison<'_> {
     /// The mean structural similarity, -1..=1, 1 for equal images; of several channels their mean.
-    /// `range` is the difference of the largest and the smallest value there can be (1 for values
-    /// in 0..=1).
+    /// Values are of 0..=1.
     ///
     /// Pixels outside the mask are 0 in both images; the mean goes over the windows that lie wholly
     /// inside the image and have their middle under the mask.
     ///
     /// # Errors
-    /// [`MetricError::TooSmall`] where no window fits, [`MetricError::NoWindow`] where none has its
-    /// middle under the mask, [`MetricError::Setting`] where `range` is not positive.
-    pub fn ssim(&self, windows: Ssim, range: f64) -> Result<f64, MetricError> {
-        if !(range > 0.0 && range.is_finite()) {
-            return Err(MetricError::Setting {
-                what: "the range of values",
-                value: range,
-                must: "positive",
-            });
-        }
-        let weights = windows.weights();
+    /// [`MetricError::Incomparable`] where no window fits, or none has its middle under the mask.
+    pub fn ssim(&self) -> Result<f64, MetricError> {
+        let weights = weights();
         let window = weights.len();
         let Extent { width, height } = self.extent;
         if window > width.min(height) {
-            return Err(MetricError::TooSmall {
-                width,
-                height,
-                window,
-            });
+            return Err(too_small(width, height, window));
         }
         let middles = self.middles(window);
         if middles.is_empty() {
-            return Err(MetricError::NoWindow { window });
+            return Err(MetricError::Incomparable(format!(
+                "no window of {window}x{window} pixels has its middle under the mask"
+            )));
         }
         let similarity = |channel: &Channel<'_>| {
             let moments = self.local_moments(*channel, &weights);
-            let at = |&middle: &usize| moments.similarity(middle, windows.correction(), range);
-            middles.iter().map(at).sum::<f64>() / middles.len() as f64
+            middles
+                .iter()
+                .map(|&at| moments.similarity(at))
+                .sum::<f64>()
+                / middles.len() as f64
         };
         let sum: f64 = self.channels.iter().map(similarity).sum();
         Ok(sum / self.channels.len() as f64)
@@ -140,12 +105,12 @@ struct LocalMoments {
 }
 
 impl LocalMoments {
-    fn similarity(&self, at: usize, correction: f64, range: f64) -> f64 {
+    fn similarity(&self, at: usize) -> f64 {
         let (a, b) = (self.truth[at], self.estimate[at]);
-        let variance_a = correction * (self.truth_truth[at] - a * a);
-        let variance_b = correction * (self.estimate_estimate[at] - b * b);
-        let covariance = correction * (self.truth_estimate[at] - a * b);
-        let (c1, c2) = ((K1 * range).powi(2), (K2 * range).powi(2));
+        let variance_a = self.truth_truth[at] - a * a;
+        let variance_b = self.estimate_estimate[at] - b * b;
+        let covariance = self.truth_estimate[at] - a * b;
+        let (c1, c2) = (K1.powi(2), K2.powi(2));
         ((2.0 * a * b + c1) * (2.0 * covariance + c2))
             / ((a * a + b * b + c1) * (variance_a + variance_b + c2))
     }

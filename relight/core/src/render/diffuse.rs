@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::lanes::{self, Kernel, Lanes, Number};
 use super::series::HarmonicSeries;
 use crate::image::{Linear, Planes, Rgb};
-use crate::light::{Normals, Order, ShLight, YUp, basis_into};
+use crate::light::{Normals, Order, ShLight, YUp};
 
 /// How the shading of a Lambertian surface follows from the light's coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,8 +61,6 @@ pub struct DiffuseLayer {
     form: DiffuseForm,
     /// As given, but with |L00| in the released form.
     coefficients: [[f64; 3]; 9],
-    /// What becomes of an increase of L00, -1 or 1.
-    sign: [f64; 3],
     /// The order of the light that counts.
     order: Order,
     /// What the bands beyond 2 add, where there are any.
@@ -88,9 +86,7 @@ impl DiffuseLayer {
         for (to, from) in coefficients.iter_mut().zip(light.coefficients()) {
             *to = *from;
         }
-        let mut sign = [1.0; 3];
         if form == DiffuseForm::Released {
-            sign = coefficients[0].map(f64::signum);
             coefficients[0] = coefficients[0].map(f64::abs);
         }
         let (order, higher) = match form {
@@ -100,15 +96,9 @@ impl DiffuseLayer {
         Self {
             form,
             coefficients,
-            sign,
             order,
             higher,
         }
-    }
-
-    /// The order of the light that counts, at least 2.
-    pub(super) const fn order(&self) -> Order {
-        self.order
     }
 
     /// The shading S, 0 where there is no surface.
@@ -137,58 +127,6 @@ impl DiffuseLayer {
         })
     }
 
-    /// What the shading of one normal passes back of `upstream`, the derivative by that shading: the
-    /// derivative by the normal's components, as the polynomial has it, returned; that by the light's
-    /// coefficients, added to those of `light`, which has as many as [`DiffuseLayer::order`].
-    pub(super) fn backward(
-        &self,
-        normal: [f64; 3],
-        upstream: [f64; 3],
-        light: &mut [[f64; 3]],
-    ) -> [f64; 3] {
-        let terms = terms(normal);
-        let gradients = gradients(normal);
-        let sums = self.irradiance(&terms, normal);
-        let upstream = [0, 1, 2].map(|c| if sums[c] > 0.0 { upstream[c] } else { 0.0 });
-        let mut by_normal = self.pass_higher(normal, upstream, light);
-        for channel in 0..3 {
-            for (at, (term, gradient)) in terms.iter().zip(gradients).enumerate() {
-                let sign = if at == 0 { self.sign[channel] } else { 1.0 };
-                light[at][channel] += upstream[channel] * term * sign;
-                for (sum, gradient) in by_normal.iter_mut().zip(gradient) {
-                    *sum += upstream[channel] * self.coefficients[at][channel] * gradient;
-                }
-            }
-        }
-        by_normal
-    }
-
-    /// The part of the bands beyond 2 in [`DiffuseLayer::backward`].
-    fn pass_higher(
-        &self,
-        normal: [f64; 3],
-        upstream: [f64; 3],
-        light: &mut [[f64; 3]],
-    ) -> [f64; 3] {
-        let Some(bands) = &self.higher else {
-            return [0.0; 3];
-        };
-        let mut values = vec![0.0; self.order.coefficients()];
-        basis_into(self.order, normal, &mut values);
-        for l in (4..=self.order.get()).step_by(2) {
-            let lobe = cosine_lobe(l);
-            for at in l * l..(l + 1) * (l + 1) {
-                for (sum, upstream) in light[at].iter_mut().zip(upstream) {
-                    *sum += lobe * values[at] * upstream;
-                }
-            }
-        }
-        let weights = vec![1.0; self.order.get() + 1];
-        bands.exact.gradient(&weights, normal).map(|by_channel| {
-            by_channel[0] * upstream[0] + by_channel[1] * upstream[1] + by_channel[2] * upstream[2]
-        })
-    }
-
     fn ambient(&self) -> f64 {
         match self.form {
             DiffuseForm::Irradiance => 0.0,
@@ -212,22 +150,6 @@ pub(super) fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
         c3 * z * z - c5,
         two * c1 * x * z,
         c1 * (x * x - y * y),
-    ]
-}
-
-/// The derivatives of [`terms`] by x, y and z.
-fn gradients([x, y, z]: [f64; 3]) -> [[f64; 3]; 9] {
-    let [c1, c2, c3, ..] = C.map(|c| 2.0 * c);
-    [
-        [0.0, 0.0, 0.0],
-        [0.0, c2, 0.0],
-        [0.0, 0.0, c2],
-        [c2, 0.0, 0.0],
-        [c1 * y, c1 * x, 0.0],
-        [0.0, c1 * z, c1 * y],
-        [0.0, 0.0, c3 * z],
-        [c1 * z, 0.0, c1 * x],
-        [c1 * x, -c1 * y, 0.0],
     ]
 }
 

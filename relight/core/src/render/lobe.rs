@@ -2,12 +2,11 @@
 
 use std::f64::consts::PI;
 
-use super::Specular;
 use super::lanes::{Kernel, Lanes, Number};
 use super::series::HarmonicSeries;
 use super::surface::Gloss;
 use crate::image::{ImageError, Linear, Rgb};
-use crate::light::{Normals, Order, Quadrature, ShLight, YUp, basis_into, polar_functions};
+use crate::light::{Normals, Order, Quadrature, ShLight, YUp, polar_functions};
 
 /// A specular layer for one light, of any order: H(n) = s_p ∫ L(ω) max(0, n·b)^α dω, where b is half way
 /// between ω and the viewer.
@@ -38,8 +37,6 @@ use crate::light::{Normals, Order, Quadrature, ShLight, YUp, basis_into, polar_f
 #[derive(Debug, Clone)]
 pub struct LobeLayer {
     order: Order,
-    light_order: Order,
-    transfer: Transfer,
     series: HarmonicSeries,
 }
 
@@ -58,12 +55,10 @@ impl LobeLayer {
     /// The layer whose G ends at band `order`.
     #[must_use]
     pub fn with_order(light: &ShLight, order: Order) -> Self {
-        let transfer = Transfer::new(light.order(), order);
+        let half = Transfer::new(light.order(), order).apply(light);
         Self {
             order,
-            light_order: light.order(),
-            series: HarmonicSeries::new(order, &transfer.apply(light)),
-            transfer,
+            series: HarmonicSeries::new(order, &half),
         }
     }
 
@@ -77,61 +72,6 @@ impl LobeLayer {
         gloss: &Gloss,
     ) -> Result<Rgb<Linear>, ImageError> {
         super::highlight(self, normals, gloss)
-    }
-}
-
-impl Specular for LobeLayer {
-    fn light_order(&self) -> Order {
-        self.light_order
-    }
-
-    fn at(&self, normal: [f64; 3], smoothness: f64) -> [f64; 3] {
-        let mut lobe = vec![0.0; self.order.get() + 1];
-        zonal(smoothness, &mut lobe);
-        self.series.at(&lobe, normal).map(|sum| sum.max(0.0))
-    }
-
-    fn backward(
-        &self,
-        normal: [f64; 3],
-        smoothness: f64,
-        upstream: [f64; 3],
-        light: &mut [[f64; 3]],
-    ) -> ([f64; 3], f64) {
-        let mut lobe = vec![0.0; self.order.get() + 1];
-        zonal(smoothness, &mut lobe);
-        let sums = self.series.at(&lobe, normal);
-        let upstream = [0, 1, 2].map(|c| if sums[c] > 0.0 { upstream[c] } else { 0.0 });
-        let weigh = |v: [f64; 3]| v[0] * upstream[0] + v[1] * upstream[1] + v[2] * upstream[2];
-
-        let by_lobe = self
-            .series
-            .at(&zonal_derivatives(smoothness, &lobe), normal);
-        self.pass_to_light(normal, &lobe, upstream, light);
-        (
-            self.series.gradient(&lobe, normal).map(weigh),
-            weigh(by_lobe),
-        )
-    }
-}
-
-impl LobeLayer {
-    /// Adds the derivatives by the light's coefficients.
-    fn pass_to_light(
-        &self,
-        normal: [f64; 3],
-        lobe: &[f64],
-        upstream: [f64; 3],
-        light: &mut [[f64; 3]],
-    ) {
-        let mut values = vec![0.0; self.order.coefficients()];
-        basis_into(self.order, normal, &mut values);
-        for (to, from, factor) in self.transfer.cells() {
-            let weight = factor * values[to] * lobe[to.isqrt()];
-            for (sum, upstream) in light[from].iter_mut().zip(upstream) {
-                *sum += weight * upstream;
-            }
-        }
     }
 }
 
@@ -170,22 +110,6 @@ fn zonal<T: Number>(smoothness: T, lobe: &mut [T]) {
             lobe[l - 2] * (smoothness + T::of(2.0 - degree)) / (smoothness + T::of(degree + 1.0))
         };
     }
-}
-
-/// The derivatives of the zonal coefficients by α.
-fn zonal_derivatives(smoothness: f64, lobe: &[f64]) -> Vec<f64> {
-    let mut gradients = vec![0.0; lobe.len()];
-    for l in 0..lobe.len() {
-        let degree = l as f64;
-        let below = smoothness + degree + 1.0;
-        gradients[l] = if l < 2 {
-            -lobe[l] / below
-        } else {
-            let above = smoothness + 2.0 - degree;
-            (gradients[l - 2] * above + lobe[l - 2] - lobe[l]) / below
-        };
-    }
-    gradients
 }
 
 /// From the coefficients of light to those of G: a matrix for each |m|.
@@ -258,6 +182,15 @@ impl Transfer {
 mod tests {
     use super::*;
     use crate::light::{Direction, basis};
+
+    impl LobeLayer {
+        /// The highlight of one unit normal, for s_p = 1.
+        fn at(&self, normal: [f64; 3], smoothness: f64) -> [f64; 3] {
+            let mut lobe = vec![0.0; self.order.get() + 1];
+            zonal(smoothness, &mut lobe);
+            self.series.at(&lobe, normal).map(|sum| sum.max(0.0))
+        }
+    }
 
     fn some_light(order: usize) -> ShLight {
         let count = Order::new(order).unwrap().coefficients();

@@ -1,5 +1,5 @@
 //! Light on surfaces that are given by their normals: the paper's render layers, a specular layer that is
-//! closer to the ground truth, their derivatives, and the reference by Monte Carlo. Knows light and images only.
+//! closer to the ground truth, and the reference by Monte Carlo. Knows light and images only.
 //!
 //! All of it is in the paper's units: I = A S + H, where S is the irradiance and H the integral of
 //! radiance times the specular lobe, without a factor 1/π. Under even light of radiance 1 a white diffuse
@@ -19,7 +19,7 @@ mod surface;
 pub use diffuse::{DiffuseForm, DiffuseLayer};
 pub use diffuse::{RELEASED_AMBIENT, cosine_lobe, diffuse_constants};
 pub use fit::{fit_light, fit_light_near};
-pub use layers::{EXPOSURE, Gradients, Layers, Rendering, SpecularForm};
+pub use layers::{EXPOSURE, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;
 pub use power::PowerLayer;
 pub use power::power_constants;
@@ -27,37 +27,17 @@ pub use reference::{Estimate, Horizon, MonteCarlo};
 pub use shots::{Look, exposure_for, mirror_reflectance};
 pub use surface::{Gloss, Surface};
 
-use crate::image::{ImageError, Linear, Planes, Rgb};
-use crate::light::{Normals, Order, YUp};
+use crate::image::{ImageError, Linear, Planes, Rgb, check_extent};
+use crate::light::{Normals, YUp};
 use lanes::Kernel;
-
-/// What both specular layers are: H = s_p h(n, α), where h depends on the light.
-trait Specular: Kernel<7, 3> {
-    /// The order of the light that the layer was made for.
-    fn light_order(&self) -> Order;
-
-    /// h of one unit normal.
-    fn at(&self, normal: [f64; 3], smoothness: f64) -> [f64; 3];
-
-    /// What h passes back of `upstream`, the derivative by h: the derivatives by the normal's
-    /// components, as the polynomial has it, and by α; those by the light are added to `light`, which has
-    /// as many coefficients as the layer's light.
-    fn backward(
-        &self,
-        normal: [f64; 3],
-        smoothness: f64,
-        upstream: [f64; 3],
-        light: &mut [[f64; 3]],
-    ) -> ([f64; 3], f64);
-}
 
 /// The highlight H of a whole image.
 fn highlight(
-    layer: &impl Specular,
+    layer: &impl Kernel<7, 3>,
     normals: &Normals<YUp>,
     gloss: &Gloss,
 ) -> Result<Rgb<Linear>, ImageError> {
-    surface::check("map of gloss", gloss.extent(), normals.extent())?;
+    check_extent("map of gloss", gloss.extent(), normals.extent())?;
     let mut highlight = Planes::zeros(normals.extent());
     let [x, y, z] = normals.planes().planes();
     let [red, green, blue] = gloss.reflectance().planes();

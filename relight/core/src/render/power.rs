@@ -1,11 +1,10 @@
 //! The specular layer as the paper writes it.
 
-use super::Specular;
 use super::diffuse::COSINE_LOBE;
 use super::lanes::{Kernel, Lanes, Number};
 use super::surface::Gloss;
 use crate::image::{ImageError, Linear, Rgb};
-use crate::light::{Normals, Order, ShLight, YUp};
+use crate::light::{Normals, ShLight, YUp};
 
 /// The specular layer of the paper's section 4.2.2 for one light:
 /// H(n) = s_p Σ C_lm (Â_l Ŷ_lm(n))^α, where Ŷ is Y at twice the polar angle.
@@ -58,48 +57,6 @@ impl PowerLayer {
     }
 }
 
-impl Specular for PowerLayer {
-    fn light_order(&self) -> Order {
-        Order::TWO
-    }
-
-    fn at(&self, normal: [f64; 3], smoothness: f64) -> [f64; 3] {
-        let powers = terms(normal).map(|v| v.abs().powf(smoothness).copysign(v));
-        [0, 1, 2].map(|channel| {
-            let products = powers.iter().zip(&self.coefficients);
-            products.map(|(power, c)| power * c[channel]).sum()
-        })
-    }
-
-    fn backward(
-        &self,
-        normal: [f64; 3],
-        smoothness: f64,
-        upstream: [f64; 3],
-        light: &mut [[f64; 3]],
-    ) -> ([f64; 3], f64) {
-        let (mut by_normal, mut by_smoothness) = ([0.0; 3], 0.0);
-        let gradients = gradients(normal);
-        for (at, v) in terms(normal).into_iter().enumerate() {
-            let power = v.abs().powf(smoothness).copysign(v);
-            for (sum, upstream) in light[at].iter_mut().zip(upstream) {
-                *sum += power * upstream;
-            }
-            if v == 0.0 {
-                continue;
-            }
-            let c = self.coefficients[at];
-            let weight = c[0] * upstream[0] + c[1] * upstream[1] + c[2] * upstream[2];
-            by_smoothness += weight * power * v.abs().ln();
-            let by_term = weight * smoothness * v.abs().powf(smoothness - 1.0);
-            for (sum, gradient) in by_normal.iter_mut().zip(gradients[at]) {
-                *sum += by_term * gradient;
-            }
-        }
-        (by_normal, by_smoothness)
-    }
-}
-
 impl Kernel<7, 3> for PowerLayer {
     type Scratch = ();
 
@@ -128,15 +85,10 @@ const C: [f64; 5] = [
     0.546_274_215_296_039_6,
 ];
 
-/// The constants of the paper's polynomials, each times Â_l of its band.
-pub fn power_constants() -> [f64; 5] {
-    constants()
-}
-
 /// Â_l Ŷ_lm(n): the paper's polynomials times the coefficients of the cosine lobe.
 #[inline(always)]
 fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
-    let [c0, c1, c2, c3, c4] = constants().map(T::of);
+    let [c0, c1, c2, c3, c4] = power_constants().map(T::of);
     let [one, two, three, four] = [1.0, 2.0, 3.0, 4.0].map(T::of);
     let square = z * z;
     let odd = four * square * z - two * z;
@@ -153,35 +105,10 @@ fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
     ]
 }
 
-/// The derivatives of [`terms`] by x, y and z.
-fn gradients([x, y, z]: [f64; 3]) -> [[f64; 3]; 9] {
-    let [_, c1, c2, c3, c4] = constants();
-    let square = z * z;
-    let (odd, odd_gradient) = (4.0 * square * z - 2.0 * z, 12.0 * square - 2.0);
-    [
-        [0.0, 0.0, 0.0],
-        [0.0, 2.0 * c1 * z, 2.0 * c1 * y],
-        [0.0, 0.0, 4.0 * c1 * z],
-        [2.0 * c1 * z, 0.0, 2.0 * c1 * x],
-        [
-            4.0 * c2 * y * square,
-            4.0 * c2 * x * square,
-            8.0 * c2 * x * y * z,
-        ],
-        [0.0, c2 * odd, c2 * y * odd_gradient],
-        [0.0, 0.0, 24.0 * c3 * z * (2.0 * square - 1.0)],
-        [c2 * odd, 0.0, c2 * x * odd_gradient],
-        [
-            8.0 * c4 * x * square,
-            -8.0 * c4 * y * square,
-            8.0 * c4 * (x * x - y * y) * z,
-        ],
-    ]
-}
-
-/// The constants, each times Â_l of its band.
+/// The constants of the paper's polynomials, each times Â_l of its band.
 #[inline(always)]
-const fn constants() -> [f64; 5] {
+#[must_use]
+pub const fn power_constants() -> [f64; 5] {
     let [a0, a1, a2] = COSINE_LOBE;
     [a0 * C[0], a1 * C[1], a2 * C[2], a2 * C[3], a2 * C[4]]
 }
@@ -189,7 +116,18 @@ const fn constants() -> [f64; 5] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::{Direction, basis};
+    use crate::light::{Direction, Order, basis};
+
+    impl PowerLayer {
+        /// The highlight of one unit normal, for s_p = 1.
+        fn at(&self, normal: [f64; 3], smoothness: f64) -> [f64; 3] {
+            let powers = terms(normal).map(|v| v.abs().powf(smoothness).copysign(v));
+            [0, 1, 2].map(|channel| {
+                let products = powers.iter().zip(&self.coefficients);
+                products.map(|(power, c)| power * c[channel]).sum()
+            })
+        }
+    }
 
     fn some_light() -> ShLight {
         let value = |i: usize| ((i * i + 1) as f64).sin();

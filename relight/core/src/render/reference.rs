@@ -7,8 +7,8 @@ use std::f64::consts::PI;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use super::surface::{Gloss, check};
-use crate::image::{Extent, ImageError, Linear, Planes, Rgb};
+use super::surface::Gloss;
+use crate::image::{Extent, ImageError, Linear, Planes, Rgb, check_extent};
 use crate::light::{Direction, LightSampler, Normals, Panorama, YUp};
 use crate::parallel;
 
@@ -140,7 +140,7 @@ impl<'a> MonteCarlo<'a> {
         gloss: &Gloss,
         seed: u64,
     ) -> Result<[Rgb<Linear>; 2], ImageError> {
-        check("map of gloss", gloss.extent(), normals.extent())?;
+        check_extent("map of gloss", gloss.extent(), normals.extent())?;
         let smoothness = gloss.smoothness().plane(0);
         let reflectance = gloss.reflectance().planes();
         Ok(self.image(normals, |at, normal| {

@@ -1,5 +1,5 @@
-//! Series of spherical harmonics with a weight a band, at a normal: Σ w_l G_lm Y_lm(n), and its derivatives. Both
-//! layers are such series; this knows nothing of what their coefficients mean.
+//! Series of spherical harmonics with a weight a band, at a normal: Σ w_l G_lm Y_lm(n). Both layers are such
+//! series; this knows nothing of what their coefficients mean.
 
 use std::f64::consts::PI;
 
@@ -51,31 +51,6 @@ impl HarmonicSeries {
     pub(super) fn at_lanes(&self, weights: &[Lanes], normal: [Lanes; 3]) -> [Lanes; 3] {
         sum(self.order, &self.fast, weights, normal)
     }
-
-    /// The derivatives of the three sums by x, y and z of the normal, as the polynomial has them.
-    pub(super) fn gradient(&self, weights: &[f64], [x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
-        let mut gradients = [[0.0; 3]; 3];
-        let (mut cos, mut sin) = ([0.0, 1.0], [0.0, 0.0]);
-        let mut terms = self.exact.as_slice();
-        for m in 0..=self.order.get() {
-            if m > 0 {
-                let power = |re: [f64; 2], im: [f64; 2]| re[1] * x - im[1] * y;
-                (cos, sin) = ([cos[1], power(cos, sin)], [sin[1], sin[1] * x + cos[1] * y]);
-            }
-            let (band, rest) = terms.split_at(self.order.get() + 1 - m);
-            terms = rest;
-            let [plus, minus] = sum_of_m(band, &weights[m..], diagonal(m), z);
-            let [plus_z, minus_z] = gradient_of_m(band, &weights[m..], diagonal(m), z);
-            // The derivatives of (x + iy)^m are m (x + iy)^(m - 1) and i times that.
-            let [cos_before, sin_before] = [cos[0], sin[0]].map(|v| v * m as f64);
-            for c in 0..3 {
-                gradients[0][c] += cos_before * plus[c] + sin_before * minus[c];
-                gradients[1][c] += cos_before * minus[c] - sin_before * plus[c];
-                gradients[2][c] += cos[1] * plus_z[c] + sin[1] * minus_z[c];
-            }
-        }
-        gradients
-    }
 }
 
 /// Σ w_l G_lm Y_lm(n)
@@ -88,7 +63,7 @@ fn sum<T: Number>(
 ) -> [T; 3] {
     let mut total = [T::of(0.0); 3];
     let (mut cos, mut sin) = (T::of(1.0), T::of(0.0));
-    let mut first = diagonal(0);
+    let mut first = (1.0 / (4.0 * PI)).sqrt();
     for m in 0..=order.get() {
         if m > 0 {
             (cos, sin) = (cos * x - sin * y, cos * y + sin * x);
@@ -124,32 +99,7 @@ fn sum_of_m<T: Number>(band: &[Term<T::Constant>], weights: &[T], first: f64, z:
     [plus, minus]
 }
 
-/// The derivative of [`sum_of_m`] by z.
-fn gradient_of_m(band: &[Term<f64>], weights: &[f64], first: f64, z: f64) -> [[f64; 3]; 2] {
-    let [mut plus, mut minus] = [[0.0; 3]; 2];
-    let (mut before, mut now) = ([0.0, 0.0], [first, 0.0]);
-    for (term, factor) in band.iter().zip(weights) {
-        for c in 0..3 {
-            plus[c] += factor * now[1] * term.plus[c];
-            minus[c] += factor * now[1] * term.minus[c];
-        }
-        let [a, b] = term.step;
-        let next = [
-            a * z * now[0] - b * before[0],
-            a * (now[0] + z * now[1]) - b * before[1],
-        ];
-        (before, now) = (now, next);
-    }
-    [plus, minus]
-}
-
-/// Q_m^m, with the √2 of m > 0.
-fn diagonal(m: usize) -> f64 {
-    (1..=m).fold((1.0 / (4.0 * PI)).sqrt(), |value, m| {
-        value * diagonal_step(m)
-    })
-}
-
+/// By what Q_m^m, with the √2 of m > 0, is larger than that of m - 1.
 fn diagonal_step(m: usize) -> f64 {
     let root = if m == 1 { 2.0_f64 } else { 1.0 };
     (root * (1.0 + 0.5 / m as f64)).sqrt()

@@ -1,6 +1,6 @@
 //! What is lit: the maps of an object.
 
-use crate::image::{Extent, ImageError, Linear, Planes, Rgb};
+use crate::image::{Extent, ImageError, Linear, Planes, Rgb, check_extent};
 use crate::light::{Normals, YUp};
 
 /// How a surface shines: specular reflectance s_p, one a channel, and smoothness α, the exponent of
@@ -20,7 +20,7 @@ impl Gloss {
     /// # Errors
     /// Where they differ in size.
     pub fn new(reflectance: Planes<3>, smoothness: Planes<1>) -> Result<Self, ImageError> {
-        check(
+        check_extent(
             "map of smoothness",
             smoothness.extent(),
             reflectance.extent(),
@@ -77,9 +77,9 @@ impl Surface {
         albedo: Rgb<Linear>,
         gloss: Option<Gloss>,
     ) -> Result<Self, ImageError> {
-        check("map of albedo", albedo.planes().extent(), normals.extent())?;
+        check_extent("map of albedo", albedo.planes().extent(), normals.extent())?;
         if let Some(gloss) = &gloss {
-            check("map of gloss", gloss.extent(), normals.extent())?;
+            check_extent("map of gloss", gloss.extent(), normals.extent())?;
         }
         Ok(Self {
             normals,
@@ -118,19 +118,6 @@ impl Surface {
     #[must_use]
     pub const fn extent(&self) -> Extent {
         self.normals.extent()
-    }
-}
-
-/// Whether an image has the size that it needs.
-pub(super) fn check(what: &'static str, found: Extent, expected: Extent) -> Result<(), ImageError> {
-    if found == expected {
-        Ok(())
-    } else {
-        Err(ImageError::Extent {
-            what,
-            found,
-            expected,
-        })
     }
 }
 

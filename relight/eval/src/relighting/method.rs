@@ -212,7 +212,7 @@ impl Relight<'_> {
                 subject,
             } => {
                 let new = &set.lights()[light];
-                let exposure = mean_irradiance(subject.light()) / mean_irradiance(new);
+                let exposure = mean_irradiance(&subject.light) / mean_irradiance(new);
                 let new = new.clone().tinted([f64::from(exposure); 3]);
                 let colours = subject.relit(&new, &MaterialChange::default());
                 let colours = colours.map_err(EvalError::sample(&object.name, NOT_RELIT))?;

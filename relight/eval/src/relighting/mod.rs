@@ -13,7 +13,7 @@ pub use set::RelightingSet;
 use super::run::{NOT_MEASURED, Scored, add_lines, each};
 use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
 use relight_core::image::Planes;
-use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
+use relight_core::metrics::{Comparison, SSIM_WINDOW, ScaleFit, dssim};
 use set::{Object, Part, object_folder};
 
 /// MSE and DSSIM of relit images, for each method: the mean over all objects and target lights.
@@ -30,7 +30,7 @@ pub fn evaluate_relighting(
         set.about(),
         "one image in; out the images under all other lights; images: how many were compared"
             .to_owned(),
-        format!("SSIM by {}", Ssim::Gaussian.name()),
+        format!("SSIM by {}", SSIM_WINDOW),
     ];
     let mut table = ScoreTable::new("relighting", notes);
     let steps = methods.len() * set.objects();
@@ -93,6 +93,6 @@ fn compare(
     let pair = Comparison::new(truth.extent(), &truth_planes, &found_planes, mask);
     let failed = || EvalError::sample(&object.name, NOT_MEASURED);
     let pair = pair.map_err(failed())?;
-    let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed())?;
+    let ssim = pair.ssim().map_err(failed())?;
     Ok((pair.mse(ScaleFit::None), dssim(ssim)))
 }

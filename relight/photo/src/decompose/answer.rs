@@ -1,14 +1,14 @@
-//! Maps of a picture by a network: at two scales, with the mirror image, and for large pictures by tiles.
+//! Maps of a picture by a network: at two scales, and with the mirror image.
 
 use std::ops::Range;
 
-use super::crop::{CropSquare, cut_out, enlarged, inside, reduced};
+use super::crop::{enlarged, inside, reduced};
 use super::encoding::{AnsweredMaps, EncodedPicture, LEAST_FACING};
 use super::light::PredictedLight;
+use crate::nets::{Inference, NetError};
 use relight_core::image::{Extent, ImageError, Part, Planes};
 use relight_core::light::{Normals, YUp};
 use relight_core::parallel;
-use relight_nets::{Inference, NetError};
 
 /// What answers an encoded picture of `side` x `side` pixels.
 pub(super) trait MapsNet: Send + Sync {
@@ -53,7 +53,7 @@ impl MapsNet for Engine {
     }
 }
 
-/// All maps of a picture as one image, in values that can be averaged and blended: normals, log albedo,
+/// All maps of a picture as one image, in values that can be averaged: normals, log albedo,
 /// log shading, highlight, paint.
 pub(super) type Fields = Planes<9>;
 
@@ -82,9 +82,6 @@ const SHAPE_OF_LAYERS: f32 = 0.8;
 
 /// Keeps logarithms of dark values finite.
 const DARKEST: f32 = 1e-4;
-
-/// Pixels by which tiles overlap, a part of their side.
-const OVERLAP: f64 = 0.25;
 
 /// What is said of a picture of the network's size; with `mirror`, the mean of that and of what is said of its mirror image.
 pub(super) fn look(
@@ -152,7 +149,7 @@ pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<AnsweredMaps,
         let mask = &mask[y * extent.width..][..extent.width];
         for (channel, values) in row.into_iter().enumerate() {
             let change: fn(f32) -> f32 = match channel {
-                // Details can turn a normal away: what is seen faces the viewer.
+                // Two scales together can turn a normal away: what is seen faces the viewer.
                 2 => |z| z.max(LEAST_FACING),
                 3..7 => f32::exp,
                 7 => |value| value.max(0.0),
@@ -202,117 +199,6 @@ fn mean(mut a: Fields, b: Fields) -> Fields {
         }
     }
     a
-}
-
-/// What tiles of the picture at its own size show beyond its fields at the network's size, to be added
-/// to those: 0 where no tile sees the object.
-///
-/// Each tile is answered as if it were a picture of its own. Of its answer only what is finer than the
-/// network's pixels of the whole picture is taken: a tile knows neither how bright the object is as a whole
-/// nor how it is shaped. Where tiles overlap, their details are blended by weights that fall to 0 at
-/// their edges, so that no seam is seen.
-pub(super) fn details(
-    net: &dyn MapsNet,
-    picture: &Planes<3>,
-    mask: &Planes<1>,
-    mirror: bool,
-) -> Result<Fields, NetError> {
-    let extent = picture.extent();
-    let side = net.side();
-    let coarse = (side * side).div_ceil(extent.width).max(1);
-    let window = window(side);
-    let mut sums = Fields::zeros(extent);
-    let mut weights = Planes::<1>::zeros(extent);
-    let columns = starts(extent.width, side);
-    let tiles: Vec<[usize; 2]> = starts(extent.height, side)
-        .into_iter()
-        .flat_map(|y| columns.iter().map(move |&x| [x, y]))
-        .collect();
-    // As many at once as there are threads: each waits in memory until it is added.
-    for some in tiles.chunks(parallel::threads().max(1)) {
-        let details = parallel::map(some.len(), |at| {
-            let [x, y] = some[at].map(|at| at as i64);
-            let tile = CropSquare { x, y, side };
-            tile_detail(net, &tile, (picture, mask), coarse, mirror)
-        });
-        for (&at, detail) in some.iter().zip(details) {
-            if let Some(detail) = detail? {
-                add_weighted(&mut sums, &detail, &window, at);
-                let ones = Planes::filled(detail.extent(), [1.0]);
-                add_weighted(&mut weights, &ones, &window, at);
-            }
-        }
-    }
-    for plane in sums.planes_mut() {
-        for (value, &weight) in plane.iter_mut().zip(weights.plane(0)) {
-            *value /= weight.max(f32::MIN_POSITIVE);
-        }
-    }
-    Ok(sums)
-}
-
-/// What a tile shows beyond its own mean over `coarse` x `coarse` areas; none where it does not see
-/// the object.
-fn tile_detail(
-    net: &dyn MapsNet,
-    tile: &CropSquare,
-    (picture, mask): (&Planes<3>, &Planes<1>),
-    coarse: usize,
-    mirror: bool,
-) -> Result<Option<Fields>, NetError> {
-    let (picture, mask) = (tile.cut(picture), tile.cut(mask));
-    let known = inside(&mask);
-    if !known.contains(&true) {
-        return Ok(None);
-    }
-    let seen = look(net, &cut_out(picture, &mask), &mask, mirror)?;
-    let mut fine = enlarged(&seen.fields, &known, &Part::all(tile.extent()));
-    let low = fine
-        .resized(Extent::new(coarse, coarse))
-        .resized(tile.extent());
-    for (fine, low) in fine.planes_mut().into_iter().zip(low.planes()) {
-        for (fine, low) in fine.iter_mut().zip(low) {
-            *fine -= low;
-        }
-    }
-    Ok(Some(fine))
-}
-
-/// Where tiles begin that cover a line and overlap by a quarter at least.
-fn starts(length: usize, side: usize) -> Vec<usize> {
-    let last = length.saturating_sub(side);
-    let step = (side as f64 * (1.0 - OVERLAP)).max(1.0);
-    let count = (last as f64 / step).ceil() as usize;
-    (0..=count).map(|at| last * at / count.max(1)).collect()
-}
-
-/// A tile's weights along one side: 1 in the middle, falling to nearly 0 at the ends.
-fn window(side: usize) -> Vec<f32> {
-    let ramp = (side as f64 * OVERLAP).max(1.0);
-    let weight = |at: usize| {
-        let distance = (at.min(side - 1 - at) as f64 + 0.5) / ramp;
-        let angle = distance.min(1.0) * std::f64::consts::FRAC_PI_2;
-        angle.sin().powi(2) as f32
-    };
-    (0..side).map(weight).collect()
-}
-
-fn add_weighted<const C: usize>(
-    sums: &mut Planes<C>,
-    tile: &Planes<C>,
-    window: &[f32],
-    [x, y]: [usize; 2],
-) {
-    let (width, side) = (sums.extent().width, tile.extent().width);
-    for (to, from) in sums.planes_mut().into_iter().zip(tile.planes()) {
-        for (row, down) in window.iter().enumerate() {
-            let to = &mut to[(y + row) * width + x..][..side];
-            let from = &from[row * side..][..side];
-            for ((to, from), across) in to.iter_mut().zip(from).zip(window) {
-                *to += down * across * from;
-            }
-        }
-    }
 }
 
 /// The picture and its mask at the network's size, and their fields.

@@ -1,8 +1,8 @@
 //! What the pictures and vectors of other networks for normals mean: told by the names of what goes in and comes out.
 
+use crate::nets::{OnnxElement, OnnxSignature, OnnxValue};
 use relight_core::image::Extent;
 use relight_core::light::NormalsFrame;
-use relight_nets::{GivenNumber, OnnxElement, OnnxSignature, OnnxValue};
 
 /// Tokens that MoGe-2 divides a picture into: the middle of those that it was trained on.
 const TOKENS: i64 = 1800;
@@ -18,8 +18,8 @@ pub(super) struct Convention {
     pub(super) extent: Extent,
     /// What the numbers of its pictures are.
     pub(super) values: Values,
-    /// Its other inputs.
-    pub(super) given: Vec<GivenNumber>,
+    /// The numbers that its other inputs get, by their names.
+    pub(super) given: Vec<(String, i64)>,
     /// Which of its outputs the normals are.
     pub(super) output: usize,
     /// Where a vector's components stand.
@@ -125,10 +125,7 @@ impl Convention {
             name: "MoGe-2: sRGB values from 0 to 1, normals in OpenCV's axes",
             extent: fixed_extent(picture).unwrap_or(Extent::new(side, side)),
             values: Values::Unit,
-            given: vec![GivenNumber {
-                name: tokens.name.clone(),
-                value: TOKENS,
-            }],
+            given: vec![(tokens.name.clone(), TOKENS)],
             output,
             channels: Channels::Last,
             axes: Axes::Camera,
@@ -207,7 +204,7 @@ mod tests {
         assert!(found.name.starts_with("MoGe-2"));
         assert_eq!((found.output, found.axes), (1, Axes::Camera));
         assert_eq!(found.extent, Extent::new(256, 256));
-        assert_eq!(found.given[0].name, "num_tokens");
+        assert_eq!(found.given[0].0, "num_tokens");
 
         let metric3d = OnnxSignature {
             inputs: vec![picture("pixel_values", Some(616), Some(1064))],

@@ -36,22 +36,9 @@ impl CropSquare {
         Extent::new(self.side, self.side)
     }
 
-    /// All of it.
-    pub(super) fn window(&self) -> Window {
-        Window {
-            at: [self.x, self.y],
-            extent: self.extent(),
-        }
-    }
-
-    /// What the image shows there; 0 beyond its edges.
-    pub(super) fn cut<const C: usize>(&self, image: &Planes<C>) -> Planes<C> {
-        self.window().cut(image)
-    }
-
     /// A window of the photograph as a part of the square.
     pub(super) fn part(&self, window: &Window) -> Part {
-        let [x, y] = window.at;
+        let [x, y] = window.at.map(|place| place as i64);
         Part {
             whole: self.extent(),
             at: [x - self.x, y - self.y],
@@ -69,11 +56,11 @@ impl CropSquare {
     }
 }
 
-/// A rectangle of a photograph in which its layers are computed; it may reach beyond the photograph's edges.
+/// A rectangle of a photograph in which its layers are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Window {
     /// Column and row of its first pixel.
-    pub(super) at: [i64; 2],
+    pub(super) at: [usize; 2],
     /// Width and height.
     pub(super) extent: Extent,
 }
@@ -83,14 +70,13 @@ impl Window {
     pub(super) fn around(mask: &Planes<1>) -> Option<Self> {
         let [columns, rows] = bounds(mask)?;
         Some(Self {
-            at: [columns.start as i64, rows.start as i64],
+            at: [columns.start, rows.start],
             extent: Extent::new(columns.len(), rows.len()),
         })
     }
 
-    /// What the image shows there; 0 beyond its edges.
     pub(super) fn cut<const C: usize>(&self, image: &Planes<C>) -> Planes<C> {
-        shifted(image, self.at, self.extent)
+        image.cut(self.at, self.extent)
     }
 }
 
@@ -107,40 +93,6 @@ fn bounds(mask: &Planes<1>) -> Option<[Range<usize>; 2]> {
         }
     }
     (high != [0; 2]).then(|| [low[0]..high[0], low[1]..high[1]])
-}
-
-/// The image whose first pixel is the one of `image` at `from`, 0 where there is none.
-fn shifted<const C: usize>(image: &Planes<C>, from: [i64; 2], extent: Extent) -> Planes<C> {
-    let source = image.extent();
-    let mut result = Planes::zeros(extent);
-    let columns = overlap(from[0], source.width, extent.width);
-    let rows = overlap(from[1], source.height, extent.height);
-    let Some(((x, to_x, width), (y, to_y, height))) = columns.zip(rows) else {
-        return result;
-    };
-    for (to, from) in result.planes_mut().into_iter().zip(image.planes()) {
-        for row in 0..height {
-            to[(to_y + row) * extent.width + to_x..][..width]
-                .copy_from_slice(&from[(y + row) * source.width + x..][..width]);
-        }
-    }
-    result
-}
-
-/// Where a line of `source` pixels and one of `length` that begins at `from` meet: the first place in
-/// each, and how many there are.
-fn overlap(from: i64, source: usize, length: usize) -> Option<(usize, usize, usize)> {
-    let (source, length) = (i64::try_from(source).ok()?, i64::try_from(length).ok()?);
-    let start = from.max(0);
-    let end = (from + length).min(source);
-    let count = usize::try_from(end - start)
-        .ok()
-        .filter(|&count| count > 0)?;
-    Some((
-        usize::try_from(start).ok()?,
-        usize::try_from(start - from).ok()?,
-        count,
-    ))
 }
 
 /// A picture, 0 outside its mask, and the mask, 0 or 1, in another size: each pixel is the mean of what the mask covers
@@ -215,26 +167,6 @@ mod tests {
         assert_eq!(region.side, 54);
         assert_eq!((region.x, region.y), (-9, 3));
         assert_eq!(CropSquare::around(&Planes::zeros(Extent::new(9, 9))), None);
-    }
-
-    #[test]
-    fn what_is_cut_out_is_what_the_image_shows_there_and_0_beyond_it() {
-        let extent = Extent::new(20, 30);
-        let image = Planes::from_fn(extent, |x, y| [x as f32, y as f32]);
-        for (x, y) in [(-5, -5), (3, 4), (12, 25), (-40, 0)] {
-            let window = CropSquare { x, y, side: 15 }.window();
-            let cut = window.cut(&image);
-            for row in 0..15 {
-                for column in 0..15 {
-                    let at = [column as i64 + x, row as i64 + y].map(usize::try_from);
-                    let expected = match at {
-                        [Ok(x), Ok(y)] if x < 20 && y < 30 => image.pixel(x, y),
-                        _ => [0.0; 2],
-                    };
-                    assert_eq!(cut.pixel(column, row), expected);
-                }
-            }
-        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::answer::{Engine, Fields, MapsNet, Scales, Whole, details, to_maps};
+use super::answer::{Engine, MapsNet, Scales, Whole, to_maps};
 use super::compose::{normalised, possible_highlight};
 use super::crop::{CropSquare, Window, cut_out, inside};
 use super::error::DecomposeError;
@@ -10,34 +10,21 @@ use super::gloss::{FittedGloss, fit_gloss};
 use super::light::light_of_shading;
 use super::other::OtherNormals;
 use super::strips::{Enlargement, LayerPlan};
-use relight_core::image::{ColourSpace, Extent, Linear, Part, Planes, Rgb, Srgb};
-use relight_core::light::NormalsFrame;
-use relight_core::light::{Normals, ShLight, YUp};
+use crate::nets::{Inference, InferenceEngine, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
+use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
+use relight_core::light::{Normals, NormalsFrame, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer};
-use relight_nets::{
-    Inference, InferenceEngine, LIGHT_PARAMETERS, NetError, Weights, decomposer_of,
-};
 use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
+use relit_data::mask::size_hint;
 
-/// Most pixels of a photograph, and with [`WorkingSize::Native`] of the square around the object: 16 million take 1.3 GB of
-/// memory, so these more than 5 GB.
+/// Most pixels of a photograph: 16 million take 1.3 GB of memory, so these more than 5 GB.
 pub const MOST_PIXELS: usize = 64_000_000;
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;
 /// By how much normals are tilted further before light is fitted to them: the network's are a little flatter than the true ones.
 /// Measured on synthetic objects (docs/results/decomposition.md).
 const TILT: f32 = 1.1;
-
-/// At which size a picture is decomposed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum WorkingSize {
-    /// At the network's: its maps are enlarged to the picture's size.
-    #[default]
-    Network,
-    /// At the network's, and what is finer by tiles of the picture at its own size.
-    Native,
-}
 
 /// Whether highlights are separated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -54,10 +41,8 @@ pub enum SpecularGate {
 /// How a picture is decomposed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecomposeOptions {
-    /// At which size.
-    pub size: WorkingSize,
-    /// Whether the network sees the mirror image too, and the mean of both answers is taken: at the coarse scale, and of
-    /// tiles.
+    /// Whether the network sees the mirror image too, and the mean of both answers is taken, at the coarse
+    /// scale.
     pub mirror: bool,
     /// Whether highlights are separated.
     pub specular: SpecularGate,
@@ -73,7 +58,6 @@ pub struct DecomposeOptions {
 impl Default for DecomposeOptions {
     fn default() -> Self {
         Self {
-            size: WorkingSize::default(),
             mirror: true,
             specular: SpecularGate::default(),
             saturated_from: Srgb::to_linear(SATURATED_VALUE),
@@ -125,7 +109,7 @@ pub struct Decomposition {
 /// ```
 /// use relight_photo::decompose::{DecomposeOptions, Decomposer};
 /// use relight_core::image::{Extent, Planes, Rgb};
-/// use relight_nets::{Weights, decomposer};
+/// use relight_photo::nets::{Weights, decomposer};
 ///
 /// let weights = Weights::initial(&decomposer(), 1); // not trained
 /// let decomposer = Decomposer::with_side(&weights, 32)?;
@@ -264,14 +248,9 @@ impl Decomposer {
         mask: &Planes<1>,
         options: &DecomposeOptions,
     ) -> Result<Decomposition, DecomposeError> {
-        let (extent, expected) = (mask.extent(), picture.planes().extent());
-        if extent != expected {
-            return Err(DecomposeError::MaskSize {
-                found: extent,
-                expected,
-            });
-        }
-        let object = CutObject::new(picture, mask, options.size)?;
+        let extent = picture.planes().extent();
+        check_mask_size(mask.extent(), extent)?;
+        let object = CutObject::new(picture, mask)?;
         let saturated_fraction = options
             .saturated_fraction
             .unwrap_or_else(|| object.saturated(options.saturated_from));
@@ -291,9 +270,7 @@ impl Decomposer {
         )?;
         let fitted = self.fit(&whole, is_glossy)?;
         let others = self.normals.as_ref().map(|_| fitted.normals.planes());
-        let maps = Enlargement::new(&whole.fields, &whole.mask, part)
-            .with_normals(others, &whole.mask)
-            .with_details(self.details(&object, &part, options)?);
+        let maps = Enlargement::new(&whole.fields, others, &whole.mask, part);
         let CutObject {
             picture,
             inside,
@@ -327,21 +304,6 @@ impl Decomposer {
             residual: layers.residual,
             light_residual: fitted.light_residual,
         })
-    }
-
-    /// What tiles show beyond the network's size, where that is wanted and the picture is larger.
-    fn details(
-        &self,
-        object: &CutObject,
-        part: &Part,
-        options: &DecomposeOptions,
-    ) -> Result<Option<Fields>, DecomposeError> {
-        if options.size != WorkingSize::Native || part.extent.width <= self.side() {
-            return Ok(None);
-        }
-        let net = self.scales.fine.as_ref();
-        let found = details(net, &object.picture, &object.mask, options.mirror)?;
-        Ok(Some(found))
     }
 
     /// Fits light and gloss to the maps at the network's size.
@@ -394,19 +356,10 @@ struct CutObject {
 }
 
 impl CutObject {
-    fn new(
-        picture: &Rgb<Linear>,
-        mask: &Planes<1>,
-        size: WorkingSize,
-    ) -> Result<Self, DecomposeError> {
+    fn new(picture: &Rgb<Linear>, mask: &Planes<1>) -> Result<Self, DecomposeError> {
         let region = CropSquare::around(mask).ok_or(DecomposeError::EmptyMask)?;
-        let window = match size {
-            WorkingSize::Network => Window::around(mask).ok_or(DecomposeError::EmptyMask)?,
-            // Tiles cover a square.
-            WorkingSize::Native => region.window(),
-        };
-        check_size("photograph", mask.extent())?;
-        check_size("square around the object", window.extent)?;
+        let window = Window::around(mask).ok_or(DecomposeError::EmptyMask)?;
+        check_size(mask.extent())?;
         let mask = window.cut(mask).map(|m| f32::from(u8::from(m >= 0.5)));
         let picture = cut_out(window.cut(picture.planes()).map(usable), &mask);
         if !picture.planes().into_iter().flatten().any(|&v| v > 0.0) {
@@ -434,15 +387,28 @@ impl CutObject {
 }
 
 /// Whether there is memory for the layers of so many pixels.
-pub(super) fn check_size(what: &'static str, extent: Extent) -> Result<(), DecomposeError> {
+pub(super) fn check_size(extent: Extent) -> Result<(), DecomposeError> {
     if extent.width.saturating_mul(extent.height) > MOST_PIXELS {
-        return Err(DecomposeError::TooLarge {
-            what,
-            extent,
-            most: MOST_PIXELS,
-        });
+        return Err(DecomposeError::Photo(format!(
+            "the photograph has {} x {} pixels, and at most {MOST_PIXELS} are decomposed: make the photograph smaller",
+            extent.width, extent.height
+        )));
     }
     Ok(())
+}
+
+/// Whether a mask has the size of its photograph.
+pub(super) fn check_mask_size(found: Extent, expected: Extent) -> Result<(), DecomposeError> {
+    if found == expected {
+        return Ok(());
+    }
+    let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
+    let [mask, photo] = [found, expected].map(|extent| (side(extent.width), side(extent.height)));
+    let hint = size_hint(mask, photo).map_or_else(String::new, |hint| format!(": {hint}"));
+    Err(DecomposeError::Photo(format!(
+        "the mask has {} x {} pixels, and the photograph {} x {}{hint}",
+        found.width, found.height, expected.width, expected.height
+    )))
 }
 
 /// Normals, light and gloss at the network's size.

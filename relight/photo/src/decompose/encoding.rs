@@ -1,10 +1,10 @@
 //! What the decomposing network sees of a picture, and what its answer means: the same for training
 //! and for use.
 
+use crate::nets::{INPUTS, OUTPUTS};
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, YUp};
-use relight_core::statistics::ranked;
-use relight_nets::{INPUTS, OUTPUTS};
+use relight_core::statistics::above_part;
 
 /// Part of the pixels that are darker than the encoded picture's white.
 const WHITE_PERCENTILE: f64 = 0.99;
@@ -146,17 +146,10 @@ fn encode_pixel(light: [f32; 3]) -> [f32; INPUTS] {
 
 /// The light below which 99 of 100 pixels' brightest channels lie.
 fn white(picture: &Planes<3>, inside: &[bool]) -> f32 {
-    let [red, green, blue] = picture.planes();
-    let mut brightest: Vec<f32> = (0..inside.len())
-        .filter(|&at| inside[at])
-        .map(|at| red[at].max(green[at]).max(blue[at]))
-        .filter(|value| value.is_finite())
-        .collect();
-    let place = (brightest.len() as f64 * WHITE_PERCENTILE) as usize;
-    let Some(found) = ranked(&mut brightest, place) else {
-        return 1.0;
-    };
-    found.max(1e-6)
+    let pixels = picture.brightest().zip(inside);
+    let values =
+        pixels.filter_map(|(value, &inside)| (inside && value.is_finite()).then_some(value));
+    above_part(values, WHITE_PERCENTILE).map_or(1.0, |white| white.max(1e-6))
 }
 
 fn normal([x, y, z]: [f32; 3]) -> [f32; 3] {

@@ -1,9 +1,9 @@
 //! The light of a photograph: what the network says of it, and the fit to the shading that begins there.
 
+use crate::nets::LIGHT_OUTPUTS;
 use relight_core::image::{Linear, Rgb};
 use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
 use relight_core::render::{cosine_lobe, fit_light_near};
-use relight_nets::LIGHT_OUTPUTS;
 
 /// Keeps the light from behind, which normals hardly show, small: see [`fit_light_near`].
 const STIFFNESS: f64 = 1e-3;

@@ -24,7 +24,6 @@ pub use crop::CropSquare;
 pub(crate) use decomposer::in_colour;
 pub use decomposer::{
     DecomposeOptions, Decomposer, Decomposition, MOST_PIXELS, SpecularGate, WORKING_SIDE,
-    WorkingSize,
 };
 pub use encoding::{AnsweredMaps, EncodedPicture};
 pub use encoding::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING, MASK};

@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use super::convention::{Axes, Channels, Convention};
+use crate::nets::{Inference, InferenceEngine, NetError, OnnxSignature};
 use relight_core::image::{ColourSpace, Extent, Part, Planes, Srgb};
-use relight_core::light::NormalsFrame;
-use relight_core::light::{Normals, YDown, YUp};
-use relight_nets::{Inference, InferenceEngine, NetError, OnnxSignature};
+use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
 
 /// A network for normals, and what its pictures and vectors mean.
 #[derive(Debug)]
@@ -27,7 +26,7 @@ impl OtherNormals {
         frame: Option<NormalsFrame>,
         engine: &InferenceEngine,
     ) -> Result<Self, NetError> {
-        let fault = |fault| NetError::Onnx {
+        let fault = |fault| NetError::File {
             path: path.to_owned(),
             fault,
         };
@@ -35,7 +34,7 @@ impl OtherNormals {
         let convention = Convention::of(&signature, side).map_err(fault)?;
         let Extent { width, height } = convention.extent;
         let size = (width, height);
-        let net = Inference::from_onnx_with(path, onnx, 3, size, &convention.given, engine)?;
+        let net = Inference::from_onnx(path, onnx, 3, size, &convention.given, engine)?;
         let other = Self {
             net,
             side,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::decomposer::{DecomposeOptions, check_size};
+use super::decomposer::{DecomposeOptions, check_mask_size, check_size};
 use super::error::DecomposeError;
 use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty};
 use relight_core::image::{
@@ -52,7 +52,7 @@ impl Photo {
         hints: &PhotoHints<'_>,
     ) -> Result<Self, DecomposeError> {
         if let Some(extent) = stated_extent(bytes) {
-            check_size("photograph", extent)?;
+            check_size(extent)?;
         }
         let image = ColourImage::from_bytes(path, bytes, hints.transfer)?;
         let extent = image.stored().planes.extent();
@@ -161,42 +161,38 @@ fn check_extent(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), Dec
     let orientation =
         relit_data::still::orientation(bytes).map(relit_data::still::Orientation::to_exif);
     if is_turned && orientation.is_some_and(|number| number >= 5) {
-        return Err(DecomposeError::MaskStored { found, expected });
+        return Err(DecomposeError::Photo(format!(
+            "the mask has {} x {} pixels as the photograph is stored, which is displayed turned to {} x {}: make the mask again \
+             with this version's relit-mask, or turn it",
+            found.width, found.height, expected.width, expected.height
+        )));
     }
-    match found == expected {
-        true => Ok(()),
-        false => Err(DecomposeError::MaskSize { found, expected }),
-    }
+    check_mask_size(found, expected)
 }
 
 fn check_mask(mask: &Planes<1>, rectangle: Option<Rectangle>) -> Result<(), DecomposeError> {
-    match rectangle {
-        _ if !is_empty(mask) => Ok(()),
-        None => Err(DecomposeError::EmptyMask),
-        Some(
-            rectangle @ Rectangle {
-                x,
-                y,
-                width,
-                height,
-            },
-        ) if rectangle.touches(mask.extent()) => Err(DecomposeError::EmptyRectangle {
-            x,
-            y,
-            width,
-            height,
-        }),
-        Some(Rectangle {
-            x,
-            y,
-            width,
-            height,
-        }) => Err(DecomposeError::Rectangle {
-            x,
-            y,
-            width,
-            height,
-            photo: mask.extent(),
-        }),
+    if !is_empty(mask) {
+        return Ok(());
     }
+    let Some(rectangle) = rectangle else {
+        return Err(DecomposeError::EmptyMask);
+    };
+    let Rectangle {
+        x,
+        y,
+        width,
+        height,
+    } = rectangle;
+    let photo = mask.extent();
+    Err(DecomposeError::Photo(if rectangle.touches(photo) {
+        format!(
+            "in the rectangle {x},{y},{width},{height} there is nothing of the object: by the photograph's alpha or black \
+             background it lies elsewhere"
+        )
+    } else {
+        format!(
+            "the rectangle {x},{y},{width},{height} does not touch the photograph of {} x {} pixels",
+            photo.width, photo.height
+        )
+    }))
 }

@@ -19,45 +19,28 @@ pub(super) struct Enlargement {
     fields: Fields,
     /// Of another network, in place of the own ones.
     normals: Option<Planes<3>>,
-    /// What is added to the fields.
-    details: Option<Fields>,
     /// Which part of the other size is wanted.
     part: Part,
 }
 
 impl Enlargement {
-    /// Of fields that are known inside a mask, for a part of the square around the object.
-    pub(super) fn new(fields: &Fields, mask: &Planes<1>, part: Part) -> Self {
+    /// Of fields that are known inside a mask, and another network's normals, for a part of the square around the object.
+    pub(super) fn new(
+        fields: &Fields,
+        normals: Option<&Planes<3>>,
+        mask: &Planes<1>,
+        part: Part,
+    ) -> Self {
         Self {
             fields: everywhere(fields, mask),
-            normals: None,
-            details: None,
+            normals: normals.map(|normals| everywhere(normals, mask)),
             part,
         }
     }
 
-    pub(super) fn with_normals(self, normals: Option<&Planes<3>>, mask: &Planes<1>) -> Self {
-        let normals = normals.map(|normals| everywhere(normals, mask));
-        Self { normals, ..self }
-    }
-
-    pub(super) fn with_details(self, details: Option<Fields>) -> Self {
-        Self { details, ..self }
-    }
-
     /// The maps of some rows, 0 outside the mask.
     fn maps(&self, rows: &Range<usize>, mask: &[bool]) -> Result<AnsweredMaps, ImageError> {
-        let mut fields = self.rows_of(&self.fields, rows);
-        if let Some(details) = &self.details {
-            let width = self.part.extent.width;
-            let range = rows.start * width..rows.end * width;
-            for (to, from) in fields.planes_mut().into_iter().zip(details.planes()) {
-                for (to, from) in to.iter_mut().zip(&from[range.clone()]) {
-                    *to += from;
-                }
-            }
-        }
-        let mut maps = to_maps(fields, mask)?;
+        let mut maps = to_maps(self.rows_of(&self.fields, rows), mask)?;
         if let Some(normals) = &self.normals {
             let mut vectors = self.rows_of(normals, rows);
             for plane in vectors.planes_mut() {
@@ -100,13 +83,8 @@ fn everywhere<const C: usize>(image: &Planes<C>, mask: &Planes<1>) -> Planes<C> 
 }
 
 fn cut_rows<const C: usize>(image: &Planes<C>, rows: Range<usize>) -> Planes<C> {
-    let width = image.extent().width;
-    let extent = Extent::new(width, rows.len());
-    let mut cut = Planes::zeros(extent);
-    for (to, from) in cut.planes_mut().into_iter().zip(image.planes()) {
-        to.copy_from_slice(&from[rows.start * width..rows.end * width]);
-    }
-    cut
+    let extent = Extent::new(image.extent().width, rows.len());
+    image.cut([0, rows.start], extent)
 }
 
 /// The layers of a photograph, as large as it is.
@@ -203,26 +181,13 @@ impl LayerPlan<'_> {
         Ok((picture, mask, maps))
     }
 
-    /// Puts a strip where it belongs in the photograph, as far as it lies in it.
+    /// Puts a strip where it belongs in the photograph.
     fn put<const C: usize>(&self, strip: &Planes<C>, first: usize, to: &mut Planes<C>) {
-        let Extent { width, height } = strip.extent();
-        let whole = self.photograph;
+        let (width, whole) = (strip.extent().width, self.photograph.width);
         let [x, y] = self.window.at;
-        let left = usize::try_from(-x).unwrap_or(0);
-        let column = usize::try_from(x).unwrap_or(0);
-        let count = width
-            .saturating_sub(left)
-            .min(whole.width.saturating_sub(column));
-        for row in 0..height {
-            let Ok(line) = usize::try_from(y + (first + row) as i64) else {
-                continue;
-            };
-            if line >= whole.height {
-                return;
-            }
-            for (to, from) in to.planes_mut().into_iter().zip(strip.planes()) {
-                to[line * whole.width + column..][..count]
-                    .copy_from_slice(&from[row * width + left..][..count]);
+        for (to, from) in to.planes_mut().into_iter().zip(strip.planes()) {
+            for (row, from) in from.chunks_exact(width).enumerate() {
+                to[(y + first + row) * whole + x..][..width].copy_from_slice(from);
             }
         }
     }

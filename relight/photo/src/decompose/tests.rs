@@ -1,20 +1,20 @@
 //! The decomposer as a whole, on networks that are not trained and on stubs.
 
-use super::answer::{Fields, MapsNet, NetAnswer, details, look, to_maps};
+use super::answer::{MapsNet, NetAnswer, look, to_maps};
 use super::*;
-use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
-use relight_core::light::{Normals, YUp};
-use relight_nets::{
+use crate::nets::{
     INPUTS, LIGHT_PARAMETERS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_heads,
 };
+use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
+use relight_core::light::{Normals, YUp};
 
-/// Answers pixel by pixel, from the encoded values of the pixel and the mean of all log luminances.
+/// Answers pixel by pixel, from the encoded values of the pixel.
 struct PixelNet<F> {
     side: usize,
     pixel: F,
 }
 
-impl<F: Fn([f32; INPUTS], f32) -> [f32; OUTPUTS] + Send + Sync> MapsNet for PixelNet<F> {
+impl<F: Fn([f32; INPUTS]) -> [f32; OUTPUTS] + Send + Sync> MapsNet for PixelNet<F> {
     fn side(&self) -> usize {
         self.side
     }
@@ -22,11 +22,10 @@ impl<F: Fn([f32; INPUTS], f32) -> [f32; OUTPUTS] + Send + Sync> MapsNet for Pixe
     fn answer(&self, encoded: &[f32]) -> Result<NetAnswer, NetError> {
         let pixels = self.side * self.side;
         assert_eq!(encoded.len(), INPUTS * pixels);
-        let mean = encoded[4 * pixels..5 * pixels].iter().sum::<f32>() / pixels as f32;
         let mut answer = vec![0.0; OUTPUTS * pixels];
         for at in 0..pixels {
             let input = std::array::from_fn(|channel| encoded[channel * pixels + at]);
-            for (channel, value) in (self.pixel)(input, mean).into_iter().enumerate() {
+            for (channel, value) in (self.pixel)(input).into_iter().enumerate() {
                 answer[channel * pixels + at] = value;
             }
         }
@@ -38,16 +37,9 @@ impl<F: Fn([f32; INPUTS], f32) -> [f32; OUTPUTS] + Send + Sync> MapsNet for Pixe
 }
 
 /// Normals that lean by the colour, the albedo is the colour, the shading the luminance.
-fn by_colour(input: [f32; INPUTS], _: f32) -> [f32; OUTPUTS] {
+fn by_colour(input: [f32; INPUTS]) -> [f32; OUTPUTS] {
     let [red, green, blue, _, _, of_red, of_green] = input;
     [of_red, of_green, 1.0, red, green, blue, 0.0, 0.0, 50.0]
-}
-
-/// The same, and an offset and a lean that depend on all of the picture: each tile has others.
-fn by_colour_and_tile(input: [f32; INPUTS], mean: f32) -> [f32; OUTPUTS] {
-    let mut answer = by_colour(input, mean);
-    answer[7] = 3.0 * mean;
-    answer
 }
 
 fn smooth(extent: Extent) -> Planes<3> {
@@ -138,11 +130,11 @@ fn the_coarse_scale_decides_the_shape_and_the_fine_one_what_is_finer() {
     let extent = Extent::new(64, 64);
     let (picture, mask) = (smooth(extent), disc(extent, 30.0));
     // Stripes of 2 pixels in all answers of the fine scale; the coarse one leans to the left.
-    let striped = |input: [f32; INPUTS], _: f32| {
+    let striped = |input: [f32; INPUTS]| {
         let stripe = input[0].signum() * 0.3;
         [0.5 + stripe, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, stripe, -50.0]
     };
-    let leaning = |_: [f32; INPUTS], _: f32| [-0.5, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -50.0];
+    let leaning = |_: [f32; INPUTS]| [-0.5, 0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -50.0];
     let fine = || {
         Box::new(PixelNet {
             side: 64,
@@ -190,8 +182,8 @@ fn the_gate_opens_where_more_than_five_percent_are_saturated() {
     let net = Decomposer::of(
         Box::new(PixelNet {
             side: 32,
-            pixel: |input: [f32; INPUTS], _: f32| {
-                let mut answer = by_colour(input, 0.0);
+            pixel: |input: [f32; INPUTS]| {
+                let mut answer = by_colour(input);
                 answer[6] = 9.0;
                 answer
             },
@@ -239,64 +231,6 @@ fn light_that_is_nearly_white_in_eight_bits_is_saturated() {
 }
 
 #[test]
-fn tiles_add_what_the_whole_is_too_coarse_for_and_show_no_seams() {
-    let extent = Extent::new(300, 300);
-    let mask = Planes::filled(extent, [1.0]);
-    // Fine stripes on a smooth picture: the whole, at 64 pixels, does not see them.
-    let smooth = smooth(extent);
-    let picture = Planes::from_fn(extent, |x, y| {
-        let stripe = if x / 2 % 2 == 0 { 1.1 } else { 0.9 };
-        smooth.pixel(x, y).map(|v| v * stripe)
-    });
-    let at = |size, pixel: fn([f32; INPUTS], f32) -> [f32; OUTPUTS]| {
-        let net = Decomposer::of(Box::new(PixelNet { side: 64, pixel }), None);
-        let options = DecomposeOptions {
-            size,
-            ..DecomposeOptions::default()
-        };
-        let picture = Rgb::new(picture.clone());
-        net.decompose(&picture, &mask, &options).unwrap()
-    };
-    let whole = Decomposer::of(
-        Box::new(PixelNet {
-            // As large as the square around the object, so that nothing is resized.
-            side: 312,
-            pixel: by_colour,
-        }),
-        None,
-    );
-    let options = DecomposeOptions::default();
-    let wanted = whole
-        .decompose(&Rgb::new(picture.clone()), &mask, &options)
-        .unwrap();
-    let coarse = at(WorkingSize::Network, by_colour);
-    let fine = at(WorkingSize::Native, by_colour);
-    let error = |found: &Decomposition| {
-        let pairs = found.shading.plane(0).iter().zip(wanted.shading.plane(0));
-        let squares: f32 = pairs.map(|(a, b)| (a / b - 1.0).powi(2)).sum();
-        (squares / extent.pixels() as f32).sqrt()
-    };
-    assert!(error(&coarse) > 0.08, "{}", error(&coarse));
-    assert!(error(&fine) < 0.02, "{}", error(&fine));
-    let offset = at(WorkingSize::Native, by_colour_and_tile);
-    let apart = most_apart(offset.shading.plane(0), fine.shading.plane(0));
-    assert!(apart < 1e-4, "{apart}");
-}
-
-#[test]
-fn tiles_beside_the_object_and_an_empty_one_add_nothing() {
-    let extent = Extent::new(120, 120);
-    let mask = Planes::from_fn(extent, |x, _| [f32::from(u8::from(x < 20))]);
-    let net = PixelNet {
-        side: 32,
-        pixel: by_colour,
-    };
-    let found: Fields = details(&net, &smooth(extent), &mask, false).unwrap();
-    assert!(found.planes().into_iter().flatten().all(|v| v.is_finite()));
-    assert_eq!(found.pixel(100, 60), [0.0; 9]);
-}
-
-#[test]
 fn what_lies_behind_the_object_does_not_matter() {
     let extent = Extent::new(80, 80);
     let mask = disc(extent, 30.0);
@@ -335,7 +269,7 @@ fn fields_and_maps_are_the_same_but_for_the_mask() {
 }
 
 #[test]
-fn what_is_too_large_is_refused_before_anything_is_computed() {
+fn a_square_that_is_far_larger_than_the_photograph_takes_no_memory() {
     let net = Decomposer::of(
         Box::new(PixelNet {
             side: 32,
@@ -343,25 +277,14 @@ fn what_is_too_large_is_refused_before_anything_is_computed() {
         }),
         None,
     );
-    // The square around this line has far more pixels than the photograph.
     let extent = Extent::new(8400, 1);
     let picture = Rgb::new(Planes::filled(extent, [0.5; 3]));
     let mask = Planes::filled(extent, [1.0]);
-    let decompose = |size| {
-        let options = DecomposeOptions {
-            size,
-            ..DecomposeOptions::default()
-        };
-        net.decompose(&picture, &mask, &options)
-    };
-    let found = decompose(WorkingSize::Network).unwrap();
+    let found = net
+        .decompose(&picture, &mask, &DecomposeOptions::default())
+        .unwrap();
     assert_eq!(found.region.side, 8736);
     assert!(found.residual < 0.5);
-    let text = decompose(WorkingSize::Native).unwrap_err().to_string();
-    assert!(
-        text.contains("the square around the object has 8736 x 8736 pixels"),
-        "{text}"
-    );
 }
 
 #[test]

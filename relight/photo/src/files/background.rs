@@ -3,13 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::{ColourImage, Extent, ImageError, Linear, Rgb};
 use relight_core::light::Panorama;
 use relit_data::file_names::{VIDEO_EXTENSIONS, has_extension};
 use relit_data::still::Format;
 
-use super::InsertionError;
+use super::{FrameTiming, InsertionError, MovieReader};
 use crate::decompose::stated_extent;
 use crate::insert::{PanoramaView, SceneDescription};
 
@@ -43,10 +42,7 @@ impl BackgroundFile {
             let movie = MovieReader::open(path, FrameTiming::Even)?;
             return Ok(Self::Movie(Box::new(movie)));
         }
-        let bytes = fs::read(path).map_err(|source| ImageError::Open {
-            path: path.to_owned(),
-            source,
-        })?;
+        let bytes = fs::read(path).map_err(ImageError::open(path))?;
         if is_panorama(&bytes) {
             let view = PanoramaView::new(scene.panorama_extent(), scene.field, scene.down);
             let panorama = Panorama::from_bytes(path, &bytes)?;
@@ -55,9 +51,10 @@ impl BackgroundFile {
         let picture = ColourImage::from_bytes(path, &bytes, None)?.into_light();
         let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
         if !picture.planes().planes().into_iter().all(is_light) {
-            return Err(InsertionError::NotLight {
-                path: path.to_owned(),
-            });
+            return Err(InsertionError::Input(format!(
+                "{} has a value that is negative, infinite or not a number",
+                path.display()
+            )));
         }
         Ok(Self::Photo(picture))
     }

@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use relight_core::image::{Extent, ImageError, Planes, Rgb, StoredImage, Transfer};
-use relight_reader::{Encoding, SampleId, Source, Turns};
+use relight_core::reader::{Encoding, SampleId, Source, Turns};
 use relit_data::file_names::{alike_beside, folded, has_extension, is_hidden};
 use relit_data::shard::Dataset;
 use relit_data::still::{Format, Orientation, is_named};
@@ -60,34 +60,12 @@ pub struct FoundPhotos {
 }
 
 /// A file of a folder of photographs that is none of those that are read.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum UnusedFile {
-    /// It is in a format that is not read.
-    #[error("{} is {}, which is not read: {}", path.display(), name, advice)]
-    NotRead {
-        /// The file.
-        path: PathBuf,
-        /// What a file of its format is called.
-        name: &'static str,
-        /// What to do with it.
-        advice: &'static str,
-    },
-    /// It is no picture.
-    #[error("{} is not used: it is not a picture", path.display())]
-    NoPicture {
-        /// The file.
-        path: PathBuf,
-    },
-}
-
-impl UnusedFile {
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnusedFile {
     /// The file.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        match self {
-            Self::NotRead { path, .. } | Self::NoPicture { path } => path,
-        }
-    }
+    pub path: PathBuf,
+    /// Why, as a sentence that names it.
+    pub message: String,
 }
 
 impl PhotoInput {
@@ -131,14 +109,16 @@ impl PhotoInput {
     /// are, also where a file system ignores case.
     ///
     /// # Errors
-    /// [`DecomposeError::NameAlike`], or where the folder cannot be listed.
+    /// [`DecomposeError::Names`], or where the folder cannot be listed.
     pub fn check_result(path: &Path) -> Result<(), DecomposeError> {
         match alike_beside(path).map_err(DecomposeError::read(path))? {
             None => Ok(()),
-            Some(other) => Err(DecomposeError::NameAlike {
-                path: path.to_owned(),
-                other: path.with_file_name(other),
-            }),
+            Some(other) => Err(DecomposeError::Names(format!(
+                "{} would replace {} where a file system ignores case: rename the photograph, or give another folder by \
+                 --output",
+                path.display(),
+                path.with_file_name(other).display()
+            ))),
         }
     }
 
@@ -195,10 +175,14 @@ fn add_folder(
         }
     }
     if found.len() == before && !has_frames {
-        return Err(DecomposeError::NoPhotos {
-            path: folder.to_owned(),
-            other: unused.get(unused_before).map(ToString::to_string),
-        });
+        let other = unused.get(unused_before);
+        let other = other.map_or_else(String::new, |other| format!("; {}", other.message));
+        return Err(DecomposeError::file(
+            folder,
+            format!(
+                "holds no photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR) and no shards (.tar){other}"
+            ),
+        ));
     }
     if has_frames {
         add_turns(found, folder, most)?;
@@ -213,14 +197,16 @@ fn use_of(path: PathBuf) -> Option<UnusedFile> {
     let file = fs::File::open(&path);
     // What cannot be read is known by its name alone.
     let _ = file.and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    let unused = |what: String| UnusedFile {
+        message: format!("{} {what}", path.display()),
+        path: path.clone(),
+    };
     match Format::of(&head) {
-        Some(format) => {
-            format
-                .unread()
-                .map(|(name, advice)| UnusedFile::NotRead { path, name, advice })
-        }
+        Some(format) => format
+            .unread()
+            .map(|(name, advice)| unused(format!("is {name}, which is not read: {advice}"))),
         None if is_named(&path) => None,
-        None => Some(UnusedFile::NoPicture { path }),
+        None => Some(unused("is not used: it is not a picture".to_owned())),
     }
 }
 
@@ -252,11 +238,12 @@ fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
         };
         let Some(name) = name else { continue };
         if let Some(first) = names.insert(folded(&name), path) {
-            return Err(DecomposeError::SameName {
-                first: first.clone(),
-                second: path.clone(),
-                name,
-            });
+            return Err(DecomposeError::Names(format!(
+                "{} and {} would both be written to {name}, at least where a file system ignores case: rename one, or give \
+                 them different folders by --output, one after the other",
+                first.display(),
+                path.display()
+            )));
         }
     }
     Ok(())
@@ -274,10 +261,7 @@ fn session_of(turns: &Turns, turn: u32) -> Option<String> {
 }
 
 fn read_file(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeError> {
-    let bytes = fs::read(path).map_err(|source| ImageError::Open {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = fs::read(path).map_err(ImageError::open(path))?;
     let mask = match &reading.mask {
         Some(file) => {
             let file = mask_file(file, &stem(path))?;
@@ -301,7 +285,10 @@ fn mask_file(given: &Path, name: &str) -> Result<PathBuf, DecomposeError> {
     if !given.is_dir() || path.is_file() {
         Ok(path)
     } else {
-        Err(DecomposeError::MaskMissing { path })
+        Err(DecomposeError::Photo(format!(
+            "there is no mask {}, which belongs to the photograph",
+            path.display()
+        )))
     }
 }
 

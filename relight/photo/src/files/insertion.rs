@@ -3,10 +3,13 @@
 use std::path::Path;
 
 use relight_core::captured_object::CapturedObject;
-use relight_core::files::{MovieFormat, MovieReader, MovieWriter, OutputKind, write_picture};
-use relight_core::image::{Depth, Linear, Planes, Rgb, StoredImage};
+use relight_core::image::{Linear, Planes, Rgb, StoredImage};
+use relit_data::causes::with_causes;
 
-use super::{BackgroundFile, InsertionError, PhotoInput, PhotoReading};
+use super::{
+    BackgroundFile, InsertionError, MovieFormat, MovieReader, MovieWriter, OutputKind, PhotoInput,
+    PhotoReading, write_picture,
+};
 use crate::decompose::{DecomposeOptions, Decomposer, Photo};
 use crate::insert::{
     InsertScene, LightSource, ObjectDescription, SceneBackground, SceneDescription, SceneSetting,
@@ -43,8 +46,6 @@ pub struct Insertion<'a> {
 pub struct InsertionOutput<'a> {
     /// A picture, or a video.
     pub path: &'a Path,
-    /// Of a PNG.
-    pub depth: Depth,
     /// By how many degrees a panorama turns in a video.
     pub turn: f64,
     /// How long that takes.
@@ -62,7 +63,10 @@ impl InsertSource {
         let path = folder.join(&object.photo);
         if CapturedObject::is_named(&path) {
             if object.mask.is_some() {
-                return Err(InsertionError::OwnMask { path });
+                return Err(InsertionError::Input(format!(
+                    "{}: it has its own mask, give none",
+                    path.display()
+                )));
             }
             return Ok(Self::Captured(Box::new(CapturedObject::read(&path)?)));
         }
@@ -97,7 +101,7 @@ impl<'a> Insertion<'a> {
             (BackgroundFile::Photo(picture), _) | (BackgroundFile::Movie(_), Some(picture)) => {
                 SceneBackground::Picture(picture)
             }
-            (BackgroundFile::Movie(_), None) => return Err(InsertionError::NoFrame),
+            (BackgroundFile::Movie(_), None) => return Err(no_frame()),
         };
         let given = given_light(scene, folder, still, (decomposer, &options))?;
         let setting = SceneSetting::new(scene, still, given)?;
@@ -163,7 +167,7 @@ impl<'a> Insertion<'a> {
             _ => {
                 let picture =
                     scene.compose(&self.still(self.turned), &scene.layers(self.turned)?, 0);
-                write_picture(output.path, &picture, output.depth)?;
+                write_picture(output.path, &picture)?;
                 Ok(1)
             }
         }
@@ -192,7 +196,7 @@ impl<'a> Insertion<'a> {
         let layers = scene.layers(self.turned)?;
         let mut next = Some(self.still(0.0));
         let BackgroundFile::Movie(movie) = &mut self.background else {
-            return Err(InsertionError::NoFrame);
+            return Err(no_frame());
         };
         let rate = movie.frame_rate();
         let mut film = MovieWriter::create(path, format, self.setting.extent, rate)?;
@@ -238,8 +242,12 @@ impl InsertionOutput<'_> {
     }
 }
 
+fn no_frame() -> InsertionError {
+    InsertionError::Input("the video has no frame".to_owned())
+}
+
 fn first_frame(movie: &mut MovieReader) -> Result<Rgb<Linear>, InsertionError> {
-    let frame = movie.frame()?.ok_or(InsertionError::NoFrame)?;
+    let frame = movie.frame()?.ok_or_else(no_frame)?;
     Ok(frame.to_linear())
 }
 
@@ -261,15 +269,15 @@ fn given_light(
         return Ok(None);
     };
     let SceneBackground::Picture(picture) = background else {
-        return Err(InsertionError::LightInPanorama);
+        return Err(InsertionError::Input(
+            "light.object: a panorama shows its light itself; give a photograph or a video"
+                .to_owned(),
+        ));
     };
     let path = folder.join(mask);
     let (mask, _) = StoredImage::read(&path)?.object_mask(&path)?;
     let subject = Subject::new(picture, &mask, None, decomposer, options).map_err(|source| {
-        InsertionError::LightObject {
-            path,
-            source: Box::new(source),
-        }
+        InsertionError::Input(format!("{}: {}", path.display(), with_causes(&source)))
     })?;
-    Ok(Some(LightSource::Coefficients(subject.light().clone())))
+    Ok(Some(LightSource::Coefficients(subject.light.clone())))
 }

@@ -46,10 +46,11 @@ pub(super) fn check_turned(
         ..
     } = record.source;
     if record.schema == SCHEMA && is_of_photo && made != orientation {
-        return Err(DecomposeError::MaskNotTurned {
-            mask: mask.to_owned(),
-            photo: photo.to_owned(),
-        });
+        return Err(DecomposeError::Photo(format!(
+            "{} was made of {} before it was turned as its Exif orientation says: make it again with this version's relit-mask",
+            mask.display(),
+            photo.display()
+        )));
     }
     Ok(())
 }

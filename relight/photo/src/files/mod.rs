@@ -1,5 +1,5 @@
 //! Photographs, decompositions and scenes in files: inputs from files, folders and shards, networks, light, folders of
-//! results, and objects put into pictures and videos.
+//! results, objects put into pictures and videos, and videos by the program `ffmpeg`.
 
 mod background;
 mod input;
@@ -7,11 +7,17 @@ mod insertion;
 mod insertion_error;
 mod light;
 mod mask_record;
+mod movie;
+mod movie_reader;
 mod networks;
+mod output;
 mod results;
 
 pub use background::BackgroundFile;
 pub use input::{FoundPhotos, PhotoInput, PhotoReading, UnusedFile};
 pub use insertion::{InsertSource, Insertion, InsertionOutput};
 pub use insertion_error::InsertionError;
+pub use movie::{FrameRate, MovieError, MovieFormat, MovieWriter};
+pub use movie_reader::{FrameTiming, MovieReader};
+pub use output::{OutputKind, write_picture};
 pub use results::{DecompositionFigures, DecompositionFiles, bright, write_light};

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use crate::nets::read_onnx;
 use relight_core::light::NormalsFrame;
-use relight_nets::read_onnx;
 
 use crate::decompose::{DecomposeError, Decomposer};
 

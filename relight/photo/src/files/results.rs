@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::decompose::{
     CropSquare, DecomposeError, DecomposeOptions, Decomposition, MaskSource, Photo, SpecularGate,
-    WorkingSize, in_colour,
+    in_colour,
 };
 use relight_core::files::ResultFolder;
 use relight_core::files::{write_png, write_png_of};
@@ -15,7 +15,7 @@ use relight_core::image::{ColourSpace, Depth, Extent, ImageError, Linear, Planes
 use relight_core::light::{Normals, Panorama};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
-use relight_core::statistics::ranked;
+use relight_core::statistics::above_part;
 
 /// The file of figures.
 const FIGURES: &str = "decomposition.json";
@@ -126,7 +126,7 @@ impl DecompositionFiles<'_> {
     /// earlier decomposition and nothing else.
     ///
     /// # Errors
-    /// [`DecomposeError::Foreign`] or [`DecomposeError::NoFolder`], or where the folder cannot be read.
+    /// Where it holds something else or is no folder, or cannot be read.
     pub fn check(out: &Path) -> Result<(), DecomposeError> {
         Ok(RESULTS.check(out)?)
     }
@@ -203,10 +203,7 @@ impl DecompositionFiles<'_> {
             weights: weights.to_owned(),
             size: [width, height],
             region: found.region,
-            working_size: match options.size {
-                WorkingSize::Network => "network",
-                WorkingSize::Native => "native",
-            },
+            working_size: "network",
             mirrored: options.mirror,
             mask: FigureMask {
                 source: photo.mask_source,
@@ -309,19 +306,8 @@ fn white_of<const C: usize>(light: &Planes<C>) -> f32 {
 
 /// The value that one in two hundred under the mask exceeds; 1 where all is dark.
 pub fn bright<const C: usize>(planes: &Planes<C>, mask: &Planes<1>) -> f32 {
-    let channels = planes.planes();
-    let brightest = |at: usize| {
-        channels
-            .iter()
-            .fold(0.0_f32, |most, plane| most.max(plane[at]))
-    };
-    let mut values: Vec<f32> = (0..mask.extent().pixels())
-        .filter(|&at| mask.plane(0)[at] >= 0.5)
-        .map(brightest)
-        .collect();
-    let place = (values.len() as f64 * (1.0 - BEYOND_WHITE)) as usize;
-    let Some(value) = ranked(&mut values, place) else {
-        return 1.0;
-    };
-    if value > 0.0 { value } else { 1.0 }
+    let pixels = planes.brightest().zip(mask.plane(0));
+    let values = pixels.filter_map(|(value, &mask)| (mask >= 0.5).then_some(value));
+    let value = above_part(values, 1.0 - BEYOND_WHITE);
+    value.filter(|value| *value > 0.0).unwrap_or(1.0)
 }

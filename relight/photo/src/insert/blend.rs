@@ -11,11 +11,6 @@ impl Subject {
     /// Where the photograph or the colours have another size.
     #[must_use]
     pub fn in_place(&self, photo: &Rgb<Linear>, colours: &Planes<3>) -> Rgb<Linear> {
-        assert_eq!(
-            photo.planes().extent(),
-            self.photo_extent(),
-            "size of the photograph"
-        );
         self.blended(
             photo.clone(),
             |alpha, old, own, new| (old + alpha * (new - own)).max(0.0),
@@ -29,11 +24,6 @@ impl Subject {
     /// Where the background or the colours have another size.
     #[must_use]
     pub fn before(&self, background: &Rgb<Linear>, colours: &Planes<3>) -> Rgb<Linear> {
-        assert_eq!(
-            background.planes().extent(),
-            self.photo_extent(),
-            "size of the background"
-        );
         self.blended(
             background.clone(),
             |alpha, old, _, new| old + alpha * (new - old),
@@ -47,22 +37,14 @@ impl Subject {
     /// Where the background or the photograph has another size.
     #[must_use]
     pub fn pasted(&self, photo: &Rgb<Linear>, background: &Rgb<Linear>) -> Rgb<Linear> {
-        assert_eq!(
-            photo.planes().extent(),
-            self.photo_extent(),
-            "size of the photograph"
-        );
-        assert_eq!(
-            background.planes().extent(),
-            self.photo_extent(),
-            "size of the background"
-        );
+        self.check_size(photo);
+        self.check_size(background);
         let mut picture = background.clone();
         let Extent { width, height } = self.extent();
-        let [left, top] = self.place();
+        let [left, top] = self.place;
         for y in 0..height {
             for x in 0..width {
-                if self.mask().pixel(x, y)[0] >= 0.5 {
+                if self.mask.pixel(x, y)[0] >= 0.5 {
                     let (x, y) = (left + x, top + y);
                     let pixel = photo.planes().pixel(x, y);
                     picture.planes_mut().set_pixel(x, y, pixel);
@@ -72,25 +54,27 @@ impl Subject {
         picture
     }
 
+    fn check_size(&self, picture: &Rgb<Linear>) {
+        let found = picture.planes().extent();
+        assert_eq!(found, self.photo, "size of the picture");
+    }
+
     fn blended(
         &self,
         mut picture: Rgb<Linear>,
         blend: impl Fn(f32, f32, f32, f32) -> f32,
         colours: &Planes<3>,
     ) -> Rgb<Linear> {
+        self.check_size(&picture);
         let Extent { width, height } = self.extent();
         assert_eq!(colours.extent(), self.extent(), "size of the colours");
-        let alpha = self.matte().alpha.plane(0);
+        let alpha = self.matte.alpha.plane(0);
+        let [left, top] = self.place;
         let planes = picture.planes_mut().planes_mut();
         for (channel, plane) in planes.into_iter().enumerate() {
-            let (own, new) = (
-                self.matte().foreground.plane(channel),
-                colours.plane(channel),
-            );
+            let (own, new) = (self.matte.foreground.plane(channel), colours.plane(channel));
             for y in 0..height {
-                let line = &mut plane
-                    [(self.place()[1] + y) * self.photo_extent().width + self.place()[0]..]
-                    [..width];
+                let line = &mut plane[(top + y) * self.photo.width + left..][..width];
                 for (x, value) in line.iter_mut().enumerate() {
                     let at = y * width + x;
                     if alpha[at] > 0.0 {

@@ -1,6 +1,6 @@
 //! The part of a photograph around an object.
 
-use relight_core::image::{Extent, Linear, Planes, Rgb};
+use relight_core::image::{Extent, Linear, Planes, Rgb, check_extent};
 
 use super::InsertError;
 use super::matte::Matte;
@@ -35,23 +35,19 @@ impl Cut {
     ) -> Result<Self, InsertError> {
         let expected = photo.planes().extent();
         for (what, image) in [("mask", Some(mask)), ("alpha", alpha)] {
-            if let Some(found) = image.map(Planes::extent).filter(|&found| found != expected) {
-                return Err(InsertError::Size {
-                    what,
-                    found,
-                    expected,
-                });
-            }
+            check_extent(what, image.map_or(expected, Planes::extent), expected)?;
         }
         check_light(photo)?;
         let region = CropSquare::around(mask).ok_or(DecomposeError::EmptyMask)?;
         let edge = Matte::edge_for(region.extent());
         let margin = 4 * edge + 4;
         let (place, extent) = window(&region, margin, expected);
-        let picture = cropped(photo.planes(), place, extent);
-        let mask = cropped(mask, place, extent).map(|m| f32::from(u8::from(m >= 0.5)));
+        let picture = photo.planes().cut(place, extent);
+        let mask = mask
+            .cut(place, extent)
+            .map(|m| f32::from(u8::from(m >= 0.5)));
         let mut matte = match alpha {
-            Some(alpha) => Matte::of_cut_out(&picture, &cropped(alpha, place, extent)),
+            Some(alpha) => Matte::of_cut_out(&picture, &alpha.cut(place, extent)),
             None => Matte::estimate(&picture, &mask, edge),
         };
         if edges == EdgeColours::Photographed {
@@ -96,15 +92,4 @@ fn window(region: &CropSquare, margin: usize, image: Extent) -> ([usize; 2], Ext
     let ((left, right), (top, bottom)) =
         (line(region.x, image.width), line(region.y, image.height));
     ([left, top], Extent::new(right - left, bottom - top))
-}
-
-fn cropped<const C: usize>(image: &Planes<C>, place: [usize; 2], extent: Extent) -> Planes<C> {
-    let width = image.extent().width;
-    let mut part = Planes::zeros(extent);
-    for (to, from) in part.planes_mut().into_iter().zip(image.planes()) {
-        for (y, line) in to.chunks_exact_mut(extent.width.max(1)).enumerate() {
-            line.copy_from_slice(&from[(place[1] + y) * width + place[0]..][..extent.width]);
-        }
-    }
-    part
 }

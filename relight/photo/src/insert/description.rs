@@ -4,9 +4,9 @@ use std::iter;
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{Extent, Transfer};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
-use super::{DiscLamp, LampFault, MaterialChange, ObjectGloss, Placement, WhiteBalance};
+use super::{DiscLamp, MaterialChange, ObjectGloss, Placement, WhiteBalance};
 
 /// The largest picture, pixels a side.
 const LARGEST_SIDE: u32 = 16_384;
@@ -96,12 +96,7 @@ pub struct ObjectDescription {
     #[serde(default)]
     pub mask: Option<PathBuf>,
     /// How its integers are encoded, where the file is not to be asked.
-    #[serde(
-        default,
-        deserialize_with = "transfer",
-        serialize_with = "transfer_name",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transfer: Option<Transfer>,
     /// The middle of its lower edge in the picture, in parts of its width and height from the upper left corner.
     #[serde(default = "default_at")]
@@ -130,28 +125,9 @@ pub struct ObjectDescription {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneFault {
-    /// It is no TOML, or has fields that a scene has not.
-    #[error("it is no scene: {}", .0.to_string().trim_end())]
-    Text(#[from] toml::de::Error),
-    /// It has a path that a text cannot hold.
-    #[error("it cannot be written: {0}")]
-    Unwritten(#[from] toml::ser::Error),
-    /// A number is out of its range.
-    #[error("{what} is {value}, it has to be {allowed}")]
-    Number {
-        /// Which number.
-        what: String,
-        /// Its value.
-        value: f64,
-        /// What it may be.
-        allowed: &'static str,
-    },
-    /// There is more than one light.
-    #[error("light has both {0} and {1}: give one")]
-    Lights(&'static str, &'static str),
-    /// The lamp is none.
-    #[error("light.lamp: {0}")]
-    Lamp(LampFault),
+    /// It is no TOML, has fields that a scene has not, or says what cannot be.
+    #[error("{0}")]
+    Content(String),
     /// There is a number of objects that cannot be.
     #[error("there are {0} objects: give [[object]] 1 to {MOST_OBJECTS} times")]
     Objects(usize),
@@ -163,7 +139,9 @@ impl SceneDescription {
     /// # Errors
     /// Where the text is no TOML, or says what a scene cannot be.
     pub fn parse(text: &str) -> Result<Self, SceneFault> {
-        let scene: Self = toml::from_str(text)?;
+        let scene: Self = toml::from_str(text).map_err(|fault| {
+            SceneFault::Content(format!("it is no scene: {}", fault.to_string().trim_end()))
+        })?;
         scene.check()?;
         Ok(scene)
     }
@@ -173,7 +151,8 @@ impl SceneDescription {
     /// # Errors
     /// Where a path is no Unicode.
     pub fn to_toml(&self) -> Result<String, SceneFault> {
-        Ok(toml::to_string(self)?)
+        toml::to_string(self)
+            .map_err(|fault| SceneFault::Content(format!("it cannot be written: {fault}")))
     }
 
     /// The files that it names: background, light, photographs and masks.
@@ -245,7 +224,9 @@ impl LightDescription {
         let Some(text) = &self.lamp else {
             return Ok(None);
         };
-        let lamp: DiscLamp = text.parse().map_err(SceneFault::Lamp)?;
+        let lamp: DiscLamp = text
+            .parse()
+            .map_err(|fault| SceneFault::Content(format!("light.lamp: {fault}")))?;
         let ambient = self.ambient.unwrap_or(lamp.ambient);
         Ok(Some(DiscLamp { ambient, ..lamp }))
     }
@@ -261,7 +242,9 @@ impl LightDescription {
         .filter_map(|(name, is_given)| is_given.then_some(name))
         .collect();
         if let [first, second, ..] = given.as_slice() {
-            return Err(SceneFault::Lights(first, second));
+            return Err(SceneFault::Content(format!(
+                "light has both {first} and {second}: give one"
+            )));
         }
         within(
             "light.turn",
@@ -357,37 +340,9 @@ fn within(
     if (least..=most).contains(&value) {
         return Ok(());
     }
-    Err(SceneFault::Number {
-        what: what.to_owned(),
-        value,
-        allowed,
-    })
-}
-
-/// How integers are encoded, as the command line names it.
-#[derive(Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
-enum TransferName {
-    Srgb,
-    Gamma22,
-    Linear,
-}
-
-fn transfer<'de, D: Deserializer<'de>>(text: D) -> Result<Option<Transfer>, D::Error> {
-    Ok(Some(match TransferName::deserialize(text)? {
-        TransferName::Srgb => Transfer::Srgb,
-        TransferName::Gamma22 => Transfer::Gamma22,
-        TransferName::Linear => Transfer::Linear,
-    }))
-}
-
-fn transfer_name<S: Serializer>(transfer: &Option<Transfer>, to: S) -> Result<S::Ok, S::Error> {
-    let name = transfer.map(|transfer| match transfer {
-        Transfer::Srgb => TransferName::Srgb,
-        Transfer::Gamma22 => TransferName::Gamma22,
-        Transfer::Linear => TransferName::Linear,
-    });
-    name.serialize(to)
+    Err(SceneFault::Content(format!(
+        "{what} is {value}, it has to be {allowed}"
+    )))
 }
 
 fn default_size() -> [u32; 2] {

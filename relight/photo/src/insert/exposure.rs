@@ -1,9 +1,9 @@
 //! How bright a panorama and the objects in it are shown: one exposure for both, as a camera has it.
 
-use relight_core::image::{Extent, Linear, Planes, Rgb};
+use relight_core::image::{Extent, Linear, Rgb};
 use relight_core::light::{Normals, ShLight};
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
-use relight_core::statistics::ranked;
+use relight_core::statistics::above_part;
 
 /// The value that one pixel in [`BRIGHTEST_PART`] exceeds in its brightest channel.
 const BRIGHT: f32 = 0.8;
@@ -28,9 +28,8 @@ impl PanoramaExposure {
     /// The exposure in which one pixel in twenty of what is `seen` is brighter than 0.8, as far as objects in this light, where
     /// it is the same, are neither black nor bleached.
     pub(super) fn of(seen: &Rgb<Linear>, light: Option<&ShLight>) -> Self {
-        let mut values = brightest(seen.planes());
-        let place = (values.len() as f64 * (1.0 - BRIGHTEST_PART)) as usize;
-        let wanted = match ranked(&mut values, place) {
+        let bright = above_part(seen.planes().brightest(), 1.0 - BRIGHTEST_PART);
+        let wanted = match bright {
             Some(value) if value > 0.0 => BRIGHT / value,
             _ => 1.0,
         };
@@ -46,11 +45,12 @@ impl PanoramaExposure {
 
     /// An exposure that is given.
     pub(super) fn fixed(seen: &Rgb<Linear>, stops: f32) -> Self {
-        let values = brightest(seen.planes());
-        let clipped = values.iter().filter(|value| **value * stops.exp2() >= 1.0);
+        let values = seen.planes().brightest();
+        let clipped = values.filter(|value| *value * stops.exp2() >= 1.0);
+        let pixels = seen.planes().extent().pixels();
         Self {
             stops,
-            clipped: clipped.count() as f32 / values.len().max(1) as f32,
+            clipped: clipped.count() as f32 / pixels.max(1) as f32,
             for_objects: false,
         }
     }
@@ -62,13 +62,6 @@ impl PanoramaExposure {
             ..Self::fixed(seen, self.stops + stops)
         }
     }
-}
-
-/// The brightest channel of each pixel.
-fn brightest(planes: &Planes<3>) -> Vec<f32> {
-    let [red, green, blue] = planes.planes();
-    let pixels = red.iter().zip(green).zip(blue);
-    pixels.map(|((r, g), b)| r.max(*g).max(*b)).collect()
 }
 
 /// The mean irradiance on what is seen of a ball, as a part of the strongest.
@@ -90,6 +83,7 @@ fn facing(light: &ShLight) -> f32 {
 mod tests {
     use super::*;
     use crate::insert::DiscLamp;
+    use relight_core::image::Planes;
     use relight_core::light::Order;
 
     fn lamp(azimuth: f64) -> ShLight {

@@ -113,31 +113,16 @@ impl DiscLamp {
     }
 }
 
-/// Why a text is no lamp.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum LampFault {
-    /// It does not begin with two angles.
-    #[error("give AZIMUTH,ELEVATION[,COLOUR][,SIZE], such as 60,30 or -45,40,3200K,10")]
-    Angles,
-    /// The lamp is too small or too large.
-    #[error("a lamp is 1 to 180 degrees large")]
-    Size,
-    /// A part is neither a colour nor a size.
-    #[error("{0:?} is no colour: give #rrggbb, or 1667K to 25000K")]
-    Colour(String),
-}
-
 impl FromStr for DiscLamp {
-    type Err = LampFault;
+    type Err = String;
 
     /// Reads `AZIMUTH,ELEVATION[,COLOUR][,SIZE]`, the colour as `#rrggbb` (sRGB) or as a temperature such as `3200K`.
-    fn from_str(text: &str) -> Result<Self, LampFault> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let mut parts = text.split(',').map(str::trim);
         let mut angle = |least: f64, most: f64| {
             let angle = parts.next().and_then(|part| part.parse::<f64>().ok());
             let angle = angle.filter(|angle| (least..=most).contains(angle));
-            angle.ok_or(LampFault::Angles)
+            angle.ok_or("give AZIMUTH,ELEVATION[,COLOUR][,SIZE], such as 60,30 or -45,40,3200K,10")
         };
         let mut lamp = Self {
             azimuth: angle(-36_000.0, 36_000.0)?,
@@ -147,9 +132,11 @@ impl FromStr for DiscLamp {
         for part in parts {
             match part.parse::<f64>() {
                 Ok(size) if (1.0..=180.0).contains(&size) => lamp.size = size,
-                Ok(_) => return Err(LampFault::Size),
+                Ok(_) => return Err("a lamp is 1 to 180 degrees large".to_owned()),
                 Err(_) => {
-                    lamp.colour = colour(part).ok_or_else(|| LampFault::Colour(part.to_owned()))?
+                    lamp.colour = colour(part).ok_or_else(|| {
+                        format!("{part:?} is no colour: give #rrggbb, or 1667K to 25000K")
+                    })?;
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! What of a background an inserted object has to follow: brightness, white balance, grain. Knows pictures only.
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
-use relight_core::statistics::ranked;
+use relight_core::statistics::above_part;
 
 /// The light that bright places of a picture have that was exposed well.
 const BRIGHT: f32 = 0.8;
@@ -63,17 +63,8 @@ impl Matching {
 
 /// The light that one value in twenty exceeds.
 fn bright(picture: &Rgb<Linear>) -> f32 {
-    let [red, green, blue] = picture.planes().planes();
-    let pixels = red.iter().zip(green).zip(blue);
-    let mut values: Vec<f32> = pixels
-        .map(|((r, g), b)| r.max(*g).max(*b))
-        .filter(|v| v.is_finite())
-        .collect();
-    let place = (values.len() as f64 * (1.0 - BRIGHTEST_PART)) as usize;
-    let Some(value) = ranked(&mut values, place) else {
-        return BRIGHT;
-    };
-    value
+    let values = picture.planes().brightest().filter(|v| v.is_finite());
+    above_part(values, 1.0 - BRIGHTEST_PART).unwrap_or(BRIGHT)
 }
 
 fn balance(picture: &Rgb<Linear>) -> [f32; 3] {
@@ -123,8 +114,7 @@ pub(super) fn grain(picture: &Planes<3>, alpha: Option<&Planes<1>>) -> f32 {
     if (deviations.len() as f64) < LEAST_PART * squares as f64 {
         return 0.0;
     }
-    let place = (deviations.len() as f64 * SMOOTHEST_PART) as usize;
-    ranked(&mut deviations, place)
+    above_part(deviations, SMOOTHEST_PART)
         .unwrap_or(0.0)
         .min(MOST_GRAIN)
 }

@@ -27,11 +27,11 @@ const EDGE_PART: f64 = 1.0 / 160.0;
 /// The picture is `alpha x foreground + (1 - alpha) x background`. Pixels at the edge show both; pasted as they are, they
 /// bring a rim of the old background along.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Matte {
+pub(super) struct Matte {
     /// The part of each pixel that the object covers, 0 to 1.
-    pub alpha: Planes<1>,
+    pub(super) alpha: Planes<1>,
     /// The object's colours, linear, also where it covers little or nothing of a pixel: those of its edge go on there.
-    pub foreground: Planes<3>,
+    pub(super) foreground: Planes<3>,
 }
 
 impl Matte {
@@ -48,7 +48,7 @@ impl Matte {
     /// # Panics
     /// Where the mask has another size.
     #[must_use]
-    pub fn estimate(picture: &Planes<3>, mask: &Planes<1>, edge: usize) -> Self {
+    pub(super) fn estimate(picture: &Planes<3>, mask: &Planes<1>, edge: usize) -> Self {
         assert_eq!(picture.extent(), mask.extent(), "size of the mask");
         let edge = edge.max(1);
         let share = blurred(mask, edge);
@@ -90,7 +90,7 @@ impl Matte {
     /// # Panics
     /// Where alpha has another size.
     #[must_use]
-    pub fn of_cut_out(picture: &Planes<3>, alpha: &Planes<1>) -> Self {
+    pub(super) fn of_cut_out(picture: &Planes<3>, alpha: &Planes<1>) -> Self {
         assert_eq!(picture.extent(), alpha.extent(), "size of alpha");
         let matte = Self {
             alpha: alpha.clone().map(|a| a.clamp(0.0, 1.0)),
@@ -101,7 +101,7 @@ impl Matte {
 
     /// How many pixels wide the soft edge of an object of this size is taken to be, where nothing is known of the lens.
     #[must_use]
-    pub fn edge_for(extent: Extent) -> usize {
+    pub(super) fn edge_for(extent: Extent) -> usize {
         let side = extent.width.max(extent.height) as f64;
         ((side * EDGE_PART).round() as usize).clamp(2, 12)
     }

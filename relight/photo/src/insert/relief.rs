@@ -55,7 +55,12 @@ impl Relief {
             return None;
         }
         let vectors = Normals::<YUp>::new(normals.planes().resized(extent)).completed(&inside);
-        let heights = integrated(&vectors, &inside);
+        let solver = HeightSolver {
+            least_facing: LEAST_FACING,
+            relaxation: RELAXATION,
+            rounds: ROUNDS,
+        };
+        let heights = solver.heights(&vectors, &inside);
         let rim = rim_height(&heights, &inside, extent);
         let half = heights.iter().zip(&inside).map(|(&height, &inside)| {
             if inside {
@@ -140,31 +145,44 @@ impl Cell {
     }
 }
 
-/// Heights of the cells inside, up to a constant.
-fn integrated(normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
-    let extent = normals.extent();
-    let [x, y, z] = normals.planes().planes();
-    let slope = |at: usize| {
-        let facing = z[at].max(LEAST_FACING);
-        // Rows go down, y goes up.
-        [-x[at] / facing, y[at] / facing]
-    };
-    let slopes: Vec<[f32; 2]> = (0..inside.len()).map(slope).collect();
-    let cells: Vec<Cell> = (0..inside.len())
-        .filter(|&at| inside[at])
-        .filter_map(|at| Cell::of(at, extent, inside, &slopes))
-        .collect();
-    let mut heights = vec![0.0_f32; inside.len()];
-    for _ in 0..ROUNDS {
-        for cell in &cells {
-            let sum: f32 = cell.around.iter().map(|&at| heights[at as usize]).sum();
-            // A side without a neighbour counts the cell itself, which is taken out again.
-            let height = &mut heights[cell.at as usize];
-            let mean = (sum - cell.missing * *height) * cell.share + cell.step;
-            *height += RELAXATION * (mean - *height);
+/// Heights out of normals, by successive over-relaxation.
+pub(crate) struct HeightSolver {
+    /// Normals that face the viewer less count as if they did so much: the rim is as steep as can be seen.
+    pub(crate) least_facing: f32,
+    /// The factor of the over-relaxation.
+    pub(crate) relaxation: f32,
+    /// How often all cells are gone through.
+    pub(crate) rounds: usize,
+}
+
+impl HeightSolver {
+    /// Heights of the cells inside, in cells, up to a constant; 0 elsewhere. Their differences from cell to cell are nearest to
+    /// the slopes of the normals, by least squares.
+    pub(crate) fn heights(&self, normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
+        let extent = normals.extent();
+        let [x, y, z] = normals.planes().planes();
+        let slope = |at: usize| {
+            let facing = z[at].max(self.least_facing);
+            // Rows go down, y goes up.
+            [-x[at] / facing, y[at] / facing]
+        };
+        let slopes: Vec<[f32; 2]> = (0..inside.len()).map(slope).collect();
+        let cells: Vec<Cell> = (0..inside.len())
+            .filter(|&at| inside[at])
+            .filter_map(|at| Cell::of(at, extent, inside, &slopes))
+            .collect();
+        let mut heights = vec![0.0_f32; inside.len()];
+        for _ in 0..self.rounds {
+            for cell in &cells {
+                let sum: f32 = cell.around.iter().map(|&at| heights[at as usize]).sum();
+                // A side without a neighbour counts the cell itself, which is taken out again.
+                let height = &mut heights[cell.at as usize];
+                let mean = (sum - cell.missing * *height) * cell.share + cell.step;
+                *height += self.relaxation * (mean - *height);
+            }
         }
+        heights
     }
-    heights
 }
 
 /// The mean height of the cells that have one outside beside them.

@@ -122,7 +122,7 @@ impl<'a> InsertScene<'a> {
         let colours = if object.relit {
             // The background's brightness is no guess: it is not hedged as the light's shape is.
             gain *= self.matching.level;
-            let scale = exposure_between(subject.light(), &self.light);
+            let scale = exposure_between(&subject.light, &self.light);
             // The object is turned back, and the light with it.
             let turned = if angle == 0.0 {
                 light.clone()
@@ -131,10 +131,10 @@ impl<'a> InsertScene<'a> {
             };
             subject.relit(&turned.tinted([f64::from(scale); 3]), &object.change)?
         } else {
-            subject.matte().foreground.clone()
+            subject.matte.foreground.clone()
         };
         let standing = subject.standing(Fit::new(
-            &subject.matte().alpha,
+            &subject.matte.alpha,
             object.placement,
             self.extent,
         ));
@@ -142,7 +142,7 @@ impl<'a> InsertScene<'a> {
         for plane in premultiplied.planes_mut() {
             plane
                 .iter_mut()
-                .zip(subject.matte().alpha.plane(0))
+                .zip(subject.matte.alpha.plane(0))
                 .for_each(|(v, a)| *v *= a);
         }
         let alpha = standing.alpha.clone();
@@ -182,7 +182,7 @@ impl<'a> InsertScene<'a> {
         standing: &Standing,
         panorama: &Panorama,
     ) -> Option<([i64; 2], Planes<3>)> {
-        let relief = standing.relief(object.subject.normals())?;
+        let relief = standing.relief(&object.subject.normals)?;
         let shadow = Shadow::cast(relief, self.tilt, panorama);
         let pixels = |cells: f64| cells / relief.scale;
         let extent = shadow.arriving.extent();
@@ -204,8 +204,8 @@ mod tests {
     use super::*;
     use crate::decompose::{DecomposeOptions, Decomposer};
     use crate::insert::{DiscLamp, MaterialChange, Placement, Subject};
+    use crate::nets::{Weights, decomposer};
     use relight_core::image::{ColourSpace, Srgb};
-    use relight_nets::{Weights, decomposer};
 
     const PHOTO: Extent = Extent::new(60, 50);
 

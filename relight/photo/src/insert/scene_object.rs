@@ -41,6 +41,7 @@ impl<'a> SceneObject<'a> {
 
     /// Refuses what cannot stand in a picture of this size.
     pub(super) fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
+        let wrong = |fault| InsertError::Object { number, fault };
         let Placement {
             at,
             height,
@@ -56,25 +57,24 @@ impl<'a> SceneObject<'a> {
         ];
         for (what, value, range) in bounds {
             if !range.contains(&value) {
-                return Err(InsertError::Placement {
-                    object: number,
-                    what,
-                    value,
-                    least: *range.start(),
-                    most: *range.end(),
-                });
+                let (least, most) = (range.start(), range.end());
+                return Err(wrong(format!(
+                    "cannot stand so: its {what} is {value}, it has to be from {least} to {most}"
+                )));
             }
         }
-        let alpha = &self.subject.matte().alpha;
+        let alpha = &self.subject.matte.alpha;
         if !self.placement.is_seen(alpha, extent) {
-            return Err(InsertError::Outside { object: number, at });
+            return Err(wrong(format!(
+                "would lie wholly outside the picture: its place is {},{}, in parts of the picture's sides",
+                at[0], at[1]
+            )));
         }
         let growth = height * extent.height as f64 / rows(alpha).len().max(1) as f64;
         if growth > MOST_GROWTH {
-            return Err(InsertError::Growth {
-                object: number,
-                growth,
-            });
+            return Err(wrong(format!(
+                "would be enlarged {growth:.0} times: give a larger photograph or a smaller height"
+            )));
         }
         Ok(())
     }

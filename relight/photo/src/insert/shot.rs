@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use super::{InsertError, MaterialChange, PanoramaView, Subject, exposure_between};
-use relight_core::image::{Linear, Planes, Rgb};
+use relight_core::image::{Linear, Planes, Rgb, check_extent};
 use relight_core::light::{Direction, Panorama, Rotation, ShLight};
 
 /// What stands behind a relit object.
@@ -15,18 +15,6 @@ pub enum Backdrop {
     Even([f32; 3]),
     /// The panorama that lights it, seen by a camera that does not turn with the light.
     Panorama(PanoramaView, Panorama),
-}
-
-/// What stands beside a relit object, to compare it with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum ShotCompanions {
-    /// Nothing.
-    #[default]
-    None,
-    /// Its photograph.
-    Photo,
-    /// Its photograph and naive insertion.
-    PhotoAndNaive,
 }
 
 /// An object of a photograph, and the light in which it is to be shown. All that does not depend on the light's angle is
@@ -56,15 +44,8 @@ impl<'a> Shot<'a> {
         backdrop: Backdrop,
         exposure: f32,
     ) -> Result<Self, InsertError> {
-        let (found, expected) = (photo.planes().extent(), subject.photo_extent());
-        if found != expected {
-            return Err(InsertError::Size {
-                what: "photograph",
-                found,
-                expected,
-            });
-        }
-        let scale = exposure_between(subject.light(), light);
+        check_extent("photograph", photo.planes().extent(), subject.photo)?;
+        let scale = exposure_between(&subject.light, light);
         Ok(Self {
             photo,
             subject,
@@ -98,30 +79,20 @@ impl<'a> Shot<'a> {
     }
 
     /// The same by naive insertion: the photograph's pixels under the mask, whatever the light.
-    #[must_use]
-    pub fn naive(&self, turn: f64) -> Rgb<Linear> {
+    fn naive(&self, turn: f64) -> Rgb<Linear> {
         match self.background(turn) {
             None => self.photo.clone(),
             Some(background) => self.subject.pasted(self.photo, &background),
         }
     }
 
-    /// The picture, and to its left what it is compared with.
+    /// The photograph, the picture by naive insertion, and the picture, side by side.
     ///
     /// # Errors
     /// As [`Subject::relit`].
-    pub fn sheet(&self, turn: f64, beside: ShotCompanions) -> Result<Rgb<Linear>, InsertError> {
-        let relit = self.picture(turn)?;
-        let mut tiles = match beside {
-            ShotCompanions::None => return Ok(relit),
-            ShotCompanions::Photo | ShotCompanions::PhotoAndNaive => {
-                vec![self.photo.planes().clone()]
-            }
-        };
-        if beside == ShotCompanions::PhotoAndNaive {
-            tiles.push(self.naive(turn).into_planes());
-        }
-        tiles.push(relit.into_planes());
+    pub fn compared(&self, turn: f64) -> Result<Rgb<Linear>, InsertError> {
+        let pictures = [self.photo.clone(), self.naive(turn), self.picture(turn)?];
+        let tiles = pictures.map(Rgb::into_planes);
         Ok(Rgb::new(Planes::sheet(&tiles, tiles.len())?))
     }
 

@@ -29,14 +29,14 @@ const REST_GROWTH: f32 = 3.0;
 /// use relight_photo::decompose::{DecomposeOptions, Decomposer};
 /// use relight_core::image::{Extent, Planes, Rgb};
 /// use relight_photo::insert::{MaterialChange, Subject};
-/// use relight_nets::{Weights, decomposer};
+/// use relight_photo::nets::{Weights, decomposer};
 ///
 /// let weights = Weights::initial(&decomposer(), 1); // not trained
 /// let decomposer = Decomposer::with_side(&weights, 32)?;
 /// let photo = Rgb::new(Planes::filled(Extent::new(60, 40), [0.5, 0.4, 0.3]));
 /// let mask = Planes::from_fn(Extent::new(60, 40), |x, _| [f32::from(u8::from((10..50).contains(&x)))]);
 /// let subject = Subject::new(&photo, &mask, None, &decomposer, &DecomposeOptions::default())?;
-/// let same = subject.relit(subject.light(), &MaterialChange::default())?;
+/// let same = subject.relit(&subject.light, &MaterialChange::default())?;
 /// let shown = subject.in_place(&photo, &same);
 /// assert!((shown.planes().pixel(30, 20)[0] - 0.5).abs() < 1e-3);
 /// # Ok::<(), relight_photo::insert::InsertError>(())
@@ -44,11 +44,16 @@ const REST_GROWTH: f32 = 3.0;
 #[derive(Debug, Clone)]
 pub struct Subject {
     /// Column and row of the maps' first pixel in the photograph.
-    place: [usize; 2],
-    photo: Extent,
-    mask: Planes<1>,
-    matte: Matte,
-    normals: Normals<YUp>,
+    pub(super) place: [usize; 2],
+    /// Width and height of the photograph.
+    pub(super) photo: Extent,
+    /// 1 on the object, else 0.
+    pub(super) mask: Planes<1>,
+    /// What the object covers of each pixel, and its colours.
+    pub(super) matte: Matte,
+    /// Also under the soft edge.
+    pub(super) normals: Normals<YUp>,
+    /// In units in which the mean shading is 1.
     albedo: Planes<3>,
     shading: Shading,
     /// What the highlight has that gloss in the own light has not.
@@ -56,7 +61,8 @@ pub struct Subject {
     gloss: Option<ObjectGloss>,
     /// Foreground less diffuse part and highlight.
     rest: Planes<3>,
-    light: ShLight,
+    /// The light in which the object was, grey, of order 2, in units in which the mean shading is 1.
+    pub light: ShLight,
     last_standing: LastStanding,
 }
 
@@ -228,46 +234,10 @@ impl Subject {
         self
     }
 
-    /// The light in which the object was, grey, of order 2, in units in which the mean shading is 1.
-    #[must_use]
-    pub const fn light(&self) -> &ShLight {
-        &self.light
-    }
-
     /// Width and height of the part of the photograph that holds the object.
     #[must_use]
     pub const fn extent(&self) -> Extent {
         self.albedo.extent()
-    }
-
-    /// Column and row of that part's first pixel in the photograph.
-    #[must_use]
-    pub const fn place(&self) -> [usize; 2] {
-        self.place
-    }
-
-    /// Width and height of the photograph.
-    #[must_use]
-    pub const fn photo_extent(&self) -> Extent {
-        self.photo
-    }
-
-    /// 1 on the object, else 0.
-    #[must_use]
-    pub const fn mask(&self) -> &Planes<1> {
-        &self.mask
-    }
-
-    /// What the object covers of each pixel, and its colours.
-    #[must_use]
-    pub const fn matte(&self) -> &Matte {
-        &self.matte
-    }
-
-    /// The object's normals, also under its soft edge.
-    #[must_use]
-    pub const fn normals(&self) -> &Normals<YUp> {
-        &self.normals
     }
 
     /// Where it stood in its photograph.
@@ -279,18 +249,6 @@ impl Subject {
     /// The object as it stands by this fit.
     pub(super) fn standing(&self, fit: Fit) -> Arc<Standing> {
         self.last_standing.by(fit, &self.matte.alpha)
-    }
-
-    /// The object's albedo, in units in which the mean shading is 1.
-    #[must_use]
-    pub const fn albedo(&self) -> &Planes<3> {
-        &self.albedo
-    }
-
-    /// The gloss that was found.
-    #[must_use]
-    pub const fn gloss(&self) -> Option<ObjectGloss> {
-        self.gloss
     }
 
     /// The object's colours in another light, in the units of [`Subject::light`] (see

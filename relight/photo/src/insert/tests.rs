@@ -4,11 +4,11 @@ use crate::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 use crate::insert::{
     DiscLamp, InsertError, LightSource, MaterialChange, ObjectGloss, Subject, exposure_between,
 };
+use crate::nets::{Weights, decomposer};
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Direction, Normals, Rotation};
 use relight_core::render::Surface;
-use relight_nets::{Weights, decomposer};
 
 const EXTENT: Extent = Extent::new(90, 70);
 
@@ -60,12 +60,12 @@ fn most_apart(a: &Rgb<Linear>, b: &Rgb<Linear>) -> f32 {
 fn the_own_light_gives_the_photograph_back() {
     for specular in [SpecularGate::Off, SpecularGate::On] {
         let subject = subject(specular);
-        let light = LightSource::Coefficients(subject.light().clone())
+        let light = LightSource::Coefficients(subject.light.clone())
             .light()
             .unwrap();
         let light = light
             .clone()
-            .tinted([f64::from(exposure_between(subject.light(), &light)); 3]);
+            .tinted([f64::from(exposure_between(&subject.light, &light)); 3]);
         let same = subject.relit(&light, &MaterialChange::default()).unwrap();
         let shown = subject.in_place(&photo(), &same);
         let apart = most_apart(&shown, &photo());
@@ -85,8 +85,8 @@ fn other_light_changes_the_object_and_nothing_else() {
         .unwrap();
     let shown = subject.in_place(&photo(), &relit);
     assert!(most_apart(&shown, &photo()) > 0.1);
-    let alpha = &subject.matte().alpha;
-    let [left, top] = subject.place();
+    let alpha = &subject.matte.alpha;
+    let [left, top] = subject.place;
     for y in 0..EXTENT.height {
         for x in 0..EXTENT.width {
             let inside = x.checked_sub(left).zip(y.checked_sub(top));
@@ -150,7 +150,7 @@ fn pasted_edges_do_not_show_the_old_background() {
     let subject = subject(SpecularGate::Off);
     let black = Rgb::new(Planes::zeros(EXTENT));
     let own = subject
-        .relit(subject.light(), &MaterialChange::default())
+        .relit(&subject.light, &MaterialChange::default())
         .unwrap();
     let pasted = subject.before(&black, &own);
     let planes = pasted.planes().planes();
@@ -207,7 +207,7 @@ fn captured_ball() -> CapturedObject {
 fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_where_a_lamp_is() {
     let subject = Subject::of_captured(&captured_ball()).unwrap();
     let none = MaterialChange::default();
-    let even = subject.relit(subject.light(), &none).unwrap();
+    let even = subject.relit(&subject.light, &none).unwrap();
     for (found, wanted) in even.pixel(12, 20).into_iter().zip([0.6, 0.3, 0.1]) {
         assert!((found - wanted).abs() < 1e-3, "{found} {wanted}");
     }
@@ -216,7 +216,7 @@ fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_w
         ..DiscLamp::default()
     });
     let light = lamp.light().unwrap();
-    let scale = f64::from(exposure_between(subject.light(), &light));
+    let scale = f64::from(exposure_between(&subject.light, &light));
     let lit = subject.relit(&light.tinted([scale; 3]), &none).unwrap();
     let (right, left) = (lit.pixel(28, 16)[0], lit.pixel(4, 16)[0]);
     assert!(right > 2.0 * left, "{right} {left}");

@@ -2,8 +2,8 @@
 
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::statistics::median;
-use relight_nets::Weights;
 use relight_photo::decompose::{DecomposeOptions, Decomposer, SpecularGate};
+use relight_photo::nets::Weights;
 
 use crate::error::TurnError;
 use crate::observe::curves::TurnCurves;

@@ -6,7 +6,7 @@
 
 use std::f32::consts::TAU;
 
-use relight_nets::{LOG_MEANS, TURN_INPUTS};
+use relight_photo::nets::{LOG_MEANS, TURN_INPUTS};
 use serde::Serialize;
 
 /// Harmonics of which the network sees all channels.

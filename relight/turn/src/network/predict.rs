@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{Normals, YUp};
-use relight_nets::{Inference, NetError, Weights, turn_network};
+use relight_photo::nets::{Inference, NetError, Weights, turn_network};
 use serde::Serialize;
 
 use crate::model::frame::Elevation;

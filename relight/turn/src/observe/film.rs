@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
 use relight_core::statistics::median;
+use relight_photo::files::{FrameTiming, MovieReader};
 use relit_data::geometry::Rect;
 use relit_data::session::Recording;
 

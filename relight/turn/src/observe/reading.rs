@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::thread::available_parallelism;
 
 use relight_core::image::{Extent, Linear, Planes, Rgb};
-use relight_reader::{
+use relight_core::reader::{
     Cursor, Draw, DrawPlan, Encoding, Rank, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
 };
 use relit_data::causes::with_causes;

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use relight_core::files::{MovieWriter, ResultFolder, write_png};
+use relight_core::files::{ResultFolder, write_png};
 use relight_core::image::{Depth, Extent};
+use relight_photo::files::MovieWriter;
 use relight_photo::files::{bright, write_light};
 use relit_data::durable::write_whole;
 use serde_json::{Value, json};

@@ -3,9 +3,9 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
 
-use relight_core::files::{MovieFormat, MovieWriter};
 use relight_core::light::{Direction, Order, ShLight, basis};
 use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_for};
+use relight_photo::files::{MovieFormat, MovieWriter};
 
 use crate::error::TurnError;
 

@@ -5,18 +5,15 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
 use relight_core::captured_object::CapturedObject;
-use relight_core::files::OutputKind;
-use relight_core::image::{Depth, Transfer};
-use relight_photo::files::{InsertionOutput, PhotoReading};
+use relight_core::image::Transfer;
+use relight_photo::files::{InsertionOutput, OutputKind, PhotoReading};
 use relight_photo::insert::{
     LightDescription, LightSource, ObjectDescription, SceneDescription, WhiteBalance,
 };
-
 use relit_data::text;
 
-use crate::commands::relight::{degrees, gloss_numbers, tint};
-use crate::photos::{BITS, NetworkArguments, bits_fault};
-use crate::values::{TRANSFERS, WHITE_BALANCES, one_of};
+use crate::photos::NetworkArguments;
+use crate::values::{TRANSFERS, WHITE_BALANCES, degrees, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -84,7 +81,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DEGREES", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
     turned: Option<f64>,
     /// Turn a panorama and its light by so many degrees about the vertical, in a video.
-    #[arg(long, value_name = "DEGREES", value_parser = degrees, allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEGREES", value_parser = degrees(), allow_hyphen_values = true)]
     pub(super) turn: Option<f64>,
     /// How long the turn takes, seconds.
     #[arg(long, value_name = "SECONDS", value_parser = number, default_value_t = 10.0, requires = "turn")]
@@ -92,9 +89,6 @@ pub(crate) struct Arguments {
     /// Frames a second of a turn.
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
     fps: u32,
-    /// Bits a channel of a PNG.
-    #[arg(long, value_parser = one_of(BITS), default_value = "8")]
-    bits: Depth,
     #[command(flatten)]
     pub(super) network: NetworkArguments,
 }
@@ -115,18 +109,6 @@ struct ObjectArguments {
     /// The object's height in parts of the picture's.
     #[arg(long, value_name = "PART", value_parser = number, action = ArgAction::Append, conflicts_with = "scene")]
     height: Vec<f64>,
-    /// Turn the object in the plane, counter-clockwise.
-    #[arg(long, value_name = "DEGREES", value_parser = number, allow_hyphen_values = true, action = ArgAction::Append, conflicts_with = "scene")]
-    rotate: Vec<f64>,
-    /// Multiply the object's albedo with a colour, linear.
-    #[arg(long, value_name = "R,G,B", value_parser = tint, action = ArgAction::Append, conflicts_with = "scene")]
-    tint: Vec<[f32; 3]>,
-    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is diffuse.
-    #[arg(long, value_name = "PART,SMOOTHNESS", value_parser = gloss_numbers, action = ArgAction::Append, conflicts_with = "scene")]
-    gloss: Vec<[f32; 2]>,
-    /// The object's brightness in stops.
-    #[arg(long, value_name = "STOPS", value_parser = number, allow_hyphen_values = true, action = ArgAction::Append, conflicts_with = "scene")]
-    brighter: Vec<f64>,
     /// How much of the object's shadow is seen, 0 to 1.
     #[arg(long, value_name = "PART", value_parser = number, action = ArgAction::Append, conflicts_with = "scene")]
     shadow: Vec<f64>,
@@ -162,10 +144,6 @@ impl Arguments {
             ("--transfer", object.transfer.len()),
             ("--at", object.at.len()),
             ("--height", object.height.len()),
-            ("--rotate", object.rotate.len()),
-            ("--tint", object.tint.len()),
-            ("--gloss", object.gloss.len()),
-            ("--brighter", object.brighter.len()),
             ("--shadow", object.shadow.len()),
         ];
         let odd = lists
@@ -191,9 +169,6 @@ impl Arguments {
                 self.output.display()
             ));
         }
-        if let Some(fault) = bits_fault(self.bits, &self.output) {
-            return Some(fault);
-        }
         let is_movie = matches!(OutputKind::of(&self.output), Some(OutputKind::Movie(_)));
         (self.turn.is_some() && !is_movie).then(|| {
             format!(
@@ -207,7 +182,6 @@ impl Arguments {
     pub(super) fn written(&self) -> InsertionOutput<'_> {
         InsertionOutput {
             path: &self.output,
-            depth: self.bits,
             turn: self.turn.unwrap_or(360.0),
             seconds: self.seconds,
             frames_per_second: self.fps,
@@ -271,10 +245,10 @@ impl ObjectArguments {
             transfer: of(&self.transfer, number),
             at: of(&self.at, number).unwrap_or([across, 0.9]),
             height: of(&self.height, number).unwrap_or(0.4),
-            rotation: of(&self.rotate, number).unwrap_or(0.0),
-            tint: of(&self.tint, number).unwrap_or([1.0; 3]),
-            gloss: of(&self.gloss, number),
-            exposure: of(&self.brighter, number).unwrap_or(0.0) as f32,
+            rotation: 0.0,
+            tint: [1.0; 3],
+            gloss: None,
+            exposure: 0.0,
             shadow: of(&self.shadow, number).unwrap_or(1.0) as f32,
             photo,
         }

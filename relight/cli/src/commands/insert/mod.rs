@@ -4,8 +4,7 @@ mod arguments;
 
 use std::path::{Path, PathBuf};
 
-use relight_core::files::OutputKind;
-use relight_photo::files::{BackgroundFile, InsertSource, Insertion};
+use relight_photo::files::{BackgroundFile, InsertSource, Insertion, OutputKind};
 use relight_photo::insert::{
     LightDescription, PanoramaExposure, SceneDescription, SceneObject, SceneSetting, SeenSun,
 };

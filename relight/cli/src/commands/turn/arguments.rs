@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
-use relight_nets::Weights;
+use relight_photo::nets::Weights;
 use relight_turn::{
     Elevation, MaterialKind, ProbeBall, ProbePlace, TurnLight, TurnNetwork, TurnNetworks,
     TurnOptions, read_given_light,

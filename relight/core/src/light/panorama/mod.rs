@@ -41,27 +41,13 @@ pub enum PanoramaError {
     /// The file is no image that can be read.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The file holds no light.
-    #[error("{} holds 8- or 16-bit integers; a panorama is an HDR or EXR file of linear radiance", path.display())]
-    NotRadiance {
+    /// The file holds no panorama.
+    #[error("{} {fault}", path.display())]
+    Form {
         /// The file.
         path: PathBuf,
-    },
-    /// The picture does not show all directions.
-    #[error("{} has {} x {} pixels; a panorama is twice as wide as high, and at least 4 pixels high", path.display(), extent.width, extent.height)]
-    Shape {
-        /// The file.
-        path: PathBuf,
-        /// Its size.
-        extent: Extent,
-    },
-    /// What it holds is no light.
-    #[error("{} is no panorama", path.display())]
-    Light {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: LightError,
+        /// What it is.
+        fault: String,
     },
 }
 
@@ -88,22 +74,22 @@ impl Panorama {
     /// Where it is no image, is of integers, is not twice as wide as high, or has values that are not finite.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, PanoramaError> {
         let image = ColourImage::from_bytes(path, bytes, None)?;
-        if image.stored().samples == Samples::Integer {
-            return Err(PanoramaError::NotRadiance {
-                path: path.to_owned(),
-            });
-        }
-        let extent = image.stored().planes.extent();
-        if extent.width != 2 * extent.height || extent.height < LEAST_HEIGHT {
-            return Err(PanoramaError::Shape {
-                path: path.to_owned(),
-                extent,
-            });
-        }
-        Self::new(image.into_light()).map_err(|source| PanoramaError::Light {
+        let wrong = |fault| PanoramaError::Form {
             path: path.to_owned(),
-            source,
-        })
+            fault,
+        };
+        if image.stored().samples == Samples::Integer {
+            let fault =
+                "holds 8- or 16-bit integers; a panorama is an HDR or EXR file of linear radiance";
+            return Err(wrong(fault.to_owned()));
+        }
+        let Extent { width, height } = image.stored().planes.extent();
+        if width != 2 * height || height < LEAST_HEIGHT {
+            return Err(wrong(format!(
+                "has {width} x {height} pixels; a panorama is twice as wide as high, and at least {LEAST_HEIGHT} pixels high"
+            )));
+        }
+        Self::new(image.into_light()).map_err(|error| wrong(format!("is no panorama: {error}")))
     }
 
     /// The light as it is seen in the middle of each pixel.

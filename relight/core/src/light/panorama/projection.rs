@@ -1,13 +1,12 @@
-//! From a panorama to coefficients: exactly, and as the paper does it.
+//! From a panorama to coefficients.
 
 use std::f64::consts::{PI, SQRT_2};
 
 use super::Panorama;
 use crate::image::Extent;
-use crate::light::basis::{basis, polar_functions};
-use crate::light::least_squares::NormalEquations;
+use crate::light::basis::polar_functions;
 use crate::light::quadrature::Quadrature;
-use crate::light::{LightError, Order, Rotation, ShLight};
+use crate::light::{Order, Rotation, ShLight};
 use crate::parallel;
 
 /// Takes the panorama's own axes (pole at the zenith) to the viewer's.
@@ -15,9 +14,6 @@ const FROM_ZENITH: Rotation =
     Rotation::from_known([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]);
 
 impl Panorama {
-    /// The size to which the paper's released code brings a panorama before it fits coefficients to it.
-    pub const FITTED: Extent = Extent::new(200, 100);
-
     /// The coefficients of the light that the panorama shows: the integrals of each pixel's radiance
     /// times the spherical harmonics over the pixel's solid angle, exact to rounding whatever the
     /// panorama's size.
@@ -46,25 +42,6 @@ impl Panorama {
             }
         }
         light.rotated(&FROM_ZENITH)
-    }
-
-    /// The coefficients whose spherical harmonics, taken in the middle of each pixel, come closest to the
-    /// panorama: the least squares of the paper's released code, which brings the panorama to
-    /// [`Panorama::FITTED`] first. All pixels count the same there, also those near the poles, which
-    /// cover little of the sphere: [`Panorama::project`] is what light is.
-    ///
-    /// # Errors
-    /// Where there are too few pixels to tell the coefficients from each other.
-    pub fn fit(&self, order: Order) -> Result<ShLight, LightError> {
-        let mut equations = NormalEquations::new(order.coefficients());
-        for y in 0..self.extent().height {
-            for x in 0..self.extent().width {
-                let values = basis(order, self.direction(x as f64 + 0.5, y as f64 + 0.5));
-                let radiance = self.image.planes().pixel(x, y).map(f64::from);
-                equations.add(&values, radiance);
-            }
-        }
-        ShLight::new(equations.solve().ok_or(LightError::TooFewPixels)?)
     }
 
     /// The integrals over the azimuth of a row's radiance times cos mφ (at m) and sin mφ (at -m), with
@@ -143,7 +120,7 @@ fn spread(order: Order, sums: &[[f64; 3]], polar: &[f64]) -> Vec<[f64; 3]> {
 mod tests {
     use super::*;
     use crate::image::{Planes, Rgb};
-    use crate::light::Direction;
+    use crate::light::{Direction, basis};
 
     fn speckles(extent: Extent) -> Panorama {
         let value = |i: usize| ((i * 2_654_435_761) % 1000) as f32 / 250.0;
@@ -229,20 +206,6 @@ mod tests {
         let projected = panorama.project(Order::new(5).unwrap());
         let sum: f64 = projected.coefficients().iter().map(|c| c[0] * c[0]).sum();
         assert!((sum / energy - 1.0).abs() < 3e-4, "{sum} {energy}");
-    }
-
-    #[test]
-    fn light_of_the_order_is_fitted_back_to_itself() {
-        let light = ShLight::new((0..9).map(|i| [(i as f64).sin(), 1.0, 0.1]).collect()).unwrap();
-        let panorama = Panorama::of_light(&light, Extent::new(20, 10));
-        let difference = largest_difference(&panorama.fit(Order::TWO).unwrap(), &light);
-        assert!(difference < 1e-6, "{difference}");
-    }
-
-    #[test]
-    fn too_few_pixels_are_no_fit() {
-        let panorama = speckles(Extent::new(2, 2));
-        assert_eq!(panorama.fit(Order::TWO), Err(LightError::TooFewPixels));
     }
 
     #[test]

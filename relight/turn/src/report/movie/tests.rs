@@ -1,5 +1,5 @@
-use relight_core::files::{FrameTiming, MovieReader};
 use relight_core::image::Planes;
+use relight_photo::files::{FrameTiming, MovieReader};
 
 use crate::test_turns::{SIDE, SOLVED, ball, elevation, environment, metal_ball, read, solved};
 use crate::{MaterialKind, ReadTurn, SolvedTurn, TurnFiles, solve_in_light};

@@ -1,0 +1,126 @@
+//! Why a data set, or one sample of it, cannot be given.
+
+use std::fmt::Display;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use relit_data::causes::with_causes;
+
+use crate::image::ImageError;
+use crate::parallel::JobPanic;
+
+/// Why a data set cannot be opened.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OpenError {
+    /// The operating system refused.
+    #[error("{} cannot be read", path.display())]
+    Read {
+        /// The file or folder.
+        path: PathBuf,
+        /// The operating system's reason.
+        source: io::Error,
+    },
+    /// A shard or the description of a data set cannot be used.
+    #[error("{} cannot be used", path.display())]
+    Dataset {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong.
+        source: relit_data::shard::ShardError,
+    },
+    /// There are no samples in it, or its files do not belong together.
+    #[error("{} {fault}", path.display())]
+    Content {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong, and what should be there.
+        fault: String,
+    },
+    /// A thread cannot be started.
+    #[error("a thread for decoding cannot be started")]
+    Thread(#[source] io::Error),
+}
+
+impl OpenError {
+    /// That a folder has none of what is `expected` in it.
+    pub(super) fn empty(path: &Path, expected: &str) -> Self {
+        Self::Content {
+            path: path.to_owned(),
+            fault: format!("holds no samples: {expected} were expected in it"),
+        }
+    }
+}
+
+/// Why a sample cannot be given.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SampleFault {
+    /// The operating system refused.
+    #[error("{} cannot be read", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's reason.
+        source: io::Error,
+    },
+    /// The shard is damaged there, or the image does not decode.
+    #[error(transparent)]
+    Shard(#[from] relit_data::shard::ShardError),
+    /// Reading it panicked.
+    #[error(transparent)]
+    Panic(#[from] JobPanic),
+    /// An image does not decode, or has another size than those that it belongs to.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// A part is missing, lost or of no use.
+    #[error("{0}")]
+    Part(String),
+}
+
+impl SampleFault {
+    /// Puts the path to an operating system's reason.
+    pub(super) fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        |source| Self::Read { path, source }
+    }
+
+    /// Puts the path to what is wrong with numbers in a file.
+    pub(super) fn numbers<E: Display>(path: &Path) -> impl FnOnce(E) -> Self {
+        let path = path.to_owned();
+        move |fault| Self::Part(format!("{} does not parse: {fault}", path.display()))
+    }
+
+    /// That the sample lacks a part, a suffix or a file's name.
+    #[must_use]
+    pub fn missing(part: &str) -> Self {
+        Self::Part(format!("its {part} is missing"))
+    }
+}
+
+/// A sample that cannot be given, by its name.
+#[derive(Debug, thiserror::Error)]
+#[error("{sample}")]
+pub struct DamagedSample {
+    /// Which sample: file and place in it.
+    pub sample: String,
+    /// Why.
+    #[source]
+    pub fault: SampleFault,
+}
+
+/// A batch of which samples are damaged. What is whole of it is there as well: who wants to go on
+/// without the rest takes it, and has seen that something is missing.
+#[derive(Debug, thiserror::Error)]
+#[error("{} samples of a batch are damaged: {}", damage.len(), listed(damage))]
+pub struct DamagedBatch<B> {
+    /// The batch with the samples that are whole.
+    pub rest: B,
+    /// The samples that are not, at least one.
+    pub damage: Vec<DamagedSample>,
+}
+
+fn listed(damage: &[DamagedSample]) -> String {
+    let texts: Vec<String> = damage.iter().map(|one| with_causes(one)).collect();
+    texts.join("; ")
+}

@@ -1,0 +1,264 @@
+//! Reading the files of a sample.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::entry::{Entry, Part, Role};
+use super::layout::{NormalFile, TruthLayout};
+use super::npy;
+use super::sample::TruthSample;
+use crate::files::read_planes;
+use crate::image::{Extent, ImageError, Linear, Planes, Rgb, check_extent};
+use crate::light::{Normals, ShLight, YDown, YUp};
+use crate::reader::SampleFault;
+use relit_data::text;
+
+pub(super) fn sample(entry: &Entry, layout: TruthLayout) -> Result<TruthSample, SampleFault> {
+    let parts = Parts { entry, layout };
+    let whites = parts.whites()?;
+    let image = parts.colour(Role::Image, 1.0)?;
+    let albedo = parts.colour(Role::Albedo, 1.0)?;
+    let mut shading = parts.colour(Role::Shading, whites.shading)?;
+    let mut mask = parts.binary(Role::Mask)?;
+    if layout == TruthLayout::Arap
+        && let (Some(image), Some(albedo)) = (&image, &albedo)
+    {
+        check_extent("albedo", albedo.planes().extent(), image.planes().extent())?;
+        mask.get_or_insert_with(|| known(albedo.planes()));
+        shading.get_or_insert_with(|| quotient(image.planes(), albedo.planes()));
+    }
+    let mask = mask.ok_or_else(|| SampleFault::missing("mask"))?;
+    let diffuse = match parts.colour(Role::Diffuse, 1.0)? {
+        Some(diffuse) => Some(diffuse),
+        None if layout.has_one_picture() => image.clone(),
+        None => product(albedo.as_ref(), shading.as_ref())?,
+    };
+    let sample = TruthSample {
+        name: entry.name.clone(),
+        image,
+        diffuse,
+        normals: parts.normals()?,
+        albedo,
+        shading,
+        highlight: parts.colour(Role::Highlight, whites.highlight)?,
+        light: parts.light()?,
+        mask,
+    };
+    check_extents(&sample)?;
+    Ok(sample)
+}
+
+/// What the largest values of files stand for.
+#[derive(Deserialize)]
+struct Whites {
+    shading: f32,
+    highlight: f32,
+}
+
+struct Parts<'a> {
+    entry: &'a Entry,
+    layout: TruthLayout,
+}
+
+impl Parts<'_> {
+    /// The image in a file of which the largest value stands for `white`.
+    fn colour(&self, role: Role, white: f32) -> Result<Option<Rgb<Linear>>, SampleFault> {
+        let transfer = self.layout.transfer(role);
+        if let Some(planes) = self.array(role)? {
+            return Ok(Some(Rgb::new(self.measured(planes))));
+        }
+        let image = self.read(role, |path| Rgb::<Linear>::read(path, transfer))?;
+        let scaled = |image: Rgb<Linear>| image.into_planes().map(|value| value * white);
+        Ok(image.map(|image| Rgb::new(self.measured(scaled(image)))))
+    }
+
+    /// The numbers in a file of NumPy, where the part is one.
+    fn array(&self, role: Role) -> Result<Option<Planes<3>>, SampleFault> {
+        let path = self.path(role);
+        let Some(path) = path.filter(|path| path.extension().is_some_and(|e| e == "npy")) else {
+            return Ok(None);
+        };
+        let bytes = fs::read(path).map_err(SampleFault::read(path))?;
+        let planes = npy::planes(&bytes);
+        planes.map(Some).map_err(SampleFault::numbers(path))
+    }
+
+    /// The picture at the size at which the data set is measured.
+    fn measured<const C: usize>(&self, planes: Planes<C>) -> Planes<C> {
+        match self.layout.measured_side() {
+            Some(side) if planes.extent().width > side && planes.extent().height > side => {
+                planes.resized(Extent::new(side, side))
+            }
+            _ => planes,
+        }
+    }
+
+    fn whites(&self) -> Result<Whites, SampleFault> {
+        #[derive(Deserialize)]
+        struct Description {
+            white: Whites,
+        }
+        let Some(path) = self.path(Role::Whites) else {
+            return Ok(Whites {
+                shading: 1.0,
+                highlight: 1.0,
+            });
+        };
+        let bytes = fs::read(path).map_err(SampleFault::read(path))?;
+        let parsed: Result<Description, _> = serde_json::from_slice(text::unmarked(&bytes));
+        Ok(parsed.map_err(SampleFault::numbers(path))?.white)
+    }
+
+    fn light(&self) -> Result<Option<ShLight>, SampleFault> {
+        let Some(path) = self.path(Role::Light) else {
+            return Ok(None);
+        };
+        let text = text::read(path).map_err(SampleFault::read(path))?;
+        text.parse().map(Some).map_err(SampleFault::numbers(path))
+    }
+
+    fn path(&self, role: Role) -> Option<&Path> {
+        let part = self.entry.parts.iter().find(|part| part.role == role);
+        part.map(|part| part.path.as_path())
+    }
+
+    fn normals(&self) -> Result<Option<Normals<YUp>>, SampleFault> {
+        let file = self.layout.normal_file();
+        if let Some(planes) = self.array(Role::Normals)? {
+            // Where a mesh is not seen, some files hold no numbers.
+            let finite = planes.map(|value| if value.is_finite() { value } else { 0.0 });
+            return Ok(Some(Normals::new(self.measured(finite))));
+        }
+        let normals = self.read(Role::Normals, |path| read_normals(path, file))?;
+        match (normals, self.binary(Role::NormalsValid)?) {
+            (Some(normals), Some(valid)) => only_where(&normals, &valid).map(Some),
+            (normals, _) => Ok(normals),
+        }
+    }
+
+    /// 1 where the file is at least half white.
+    fn binary(&self, role: Role) -> Result<Option<Planes<1>>, SampleFault> {
+        self.read(role, |path| {
+            let (planes, _) = read_planes(path)?;
+            let extent = planes.extent();
+            let [plane, _, _] = planes.into_planes();
+            let plane = self.measured(Planes::from_planes(extent, [plane])?);
+            Ok(plane.map(|value| f32::from(u8::from(value >= 0.5))))
+        })
+    }
+
+    /// What `read` makes of the file of this role; none where the sample may lack it and does.
+    fn read<T>(
+        &self,
+        role: Role,
+        read: impl Fn(&Path) -> Result<T, ImageError>,
+    ) -> Result<Option<T>, SampleFault> {
+        let Some(Part { path, required, .. }) =
+            self.entry.parts.iter().find(|part| part.role == role)
+        else {
+            return Ok(None);
+        };
+        match read(path) {
+            Ok(found) => Ok(Some(found)),
+            Err(ImageError::Open { source, .. })
+                if !required && source.kind() == io::ErrorKind::NotFound =>
+            {
+                Ok(None)
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+/// 1 where albedo is known: where it is not black.
+fn known(albedo: &Planes<3>) -> Planes<1> {
+    let extent = albedo.extent();
+    Planes::from_fn(extent, |x, y| {
+        let pixel = albedo.pixel(x, y);
+        let is_known = pixel.iter().all(|v| v.is_finite()) && pixel.iter().any(|&v| v > 0.0);
+        [f32::from(u8::from(is_known))]
+    })
+}
+
+/// Least albedo by which a picture is divided, in parts of the brightest.
+const LEAST_ALBEDO: f32 = 1e-3;
+
+/// A picture over its albedo.
+fn quotient(image: &Planes<3>, albedo: &Planes<3>) -> Rgb<Linear> {
+    let values = albedo.planes().into_iter().flatten();
+    let brightest = values.fold(0.0_f32, |a, &b| a.max(b));
+    let least = (LEAST_ALBEDO * brightest).max(f32::MIN_POSITIVE);
+    Rgb::new(Planes::from_fn(image.extent(), |x, y| {
+        let (light, albedo) = (image.pixel(x, y), albedo.pixel(x, y));
+        [0, 1, 2].map(|c| light[c] / albedo[c].max(least))
+    }))
+}
+
+/// Albedo times shading.
+fn product(
+    albedo: Option<&Rgb<Linear>>,
+    shading: Option<&Rgb<Linear>>,
+) -> Result<Option<Rgb<Linear>>, SampleFault> {
+    let (Some(albedo), Some(shading)) = (albedo, shading) else {
+        return Ok(None);
+    };
+    let mut planes = albedo.planes().clone();
+    check_extent("shading", shading.planes().extent(), planes.extent())?;
+    for (plane, shading) in planes
+        .planes_mut()
+        .into_iter()
+        .zip(shading.planes().planes())
+    {
+        for (value, shading) in plane.iter_mut().zip(shading) {
+            *value *= shading;
+        }
+    }
+    Ok(Some(Rgb::new(planes)))
+}
+
+fn read_normals(path: &Path, file: NormalFile) -> Result<Normals<YUp>, ImageError> {
+    Ok(match file {
+        NormalFile::YUp => Normals::<YUp>::read(path)?,
+        NormalFile::YDown => Normals::<YDown>::read(path)?.flipped(),
+        NormalFile::RedDownGreenRight => {
+            let (colours, _) = read_planes(path)?;
+            let extent = colours.extent();
+            let [down, right, viewer] = colours.into_planes();
+            let colours = Planes::from_planes(extent, [right, down, viewer])?;
+            Normals::<YDown>::from_colours(colours).flipped()
+        }
+    })
+}
+
+/// The normals without those where `valid` is 0.
+fn only_where(normals: &Normals<YUp>, valid: &Planes<1>) -> Result<Normals<YUp>, SampleFault> {
+    check_extent("map of valid normals", valid.extent(), normals.extent())?;
+    let mut planes = normals.planes().clone();
+    for plane in planes.planes_mut() {
+        for (value, valid) in plane.iter_mut().zip(valid.plane(0)) {
+            *value *= valid;
+        }
+    }
+    Ok(Normals::new(planes))
+}
+
+fn check_extents(sample: &TruthSample) -> Result<(), SampleFault> {
+    let size = |image: &Option<Rgb<Linear>>| image.as_ref().map(|rgb| rgb.planes().extent());
+    let parts = [
+        ("image", size(&sample.image)),
+        ("image without highlights", size(&sample.diffuse)),
+        ("albedo", size(&sample.albedo)),
+        ("shading", size(&sample.shading)),
+        ("highlight", size(&sample.highlight)),
+        ("normal map", sample.normals.as_ref().map(Normals::extent)),
+    ];
+    for (part, extent) in parts {
+        if let Some(extent) = extent {
+            check_extent(part, extent, sample.extent())?;
+        }
+    }
+    Ok(())
+}

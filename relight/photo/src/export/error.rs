@@ -1,0 +1,32 @@
+//! What can be wrong with an export.
+
+use std::path::PathBuf;
+
+use relight_core::captured_object::CapturedObjectError;
+use relight_core::image::ImageError;
+
+/// Why something is not exported.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// The input holds no object, or its figures cannot be read.
+    #[error("{} {fault}", path.display())]
+    Source {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        fault: String,
+    },
+    /// The object covers no pixel.
+    #[error("the object covers no pixel by half or more: there is nothing to export")]
+    Empty,
+    /// A map cannot be encoded, or the file would be too large.
+    #[error("the object cannot be encoded: {0}")]
+    Encode(String),
+    /// A picture.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// A captured object.
+    #[error(transparent)]
+    Object(#[from] CapturedObjectError),
+}

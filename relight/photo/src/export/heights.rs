@@ -1,0 +1,120 @@
+//! Heights out of normals, by least squares. Knows nothing of meshes and files.
+
+use std::f32::consts::{PI, SQRT_2};
+
+use relight_core::image::{Extent, beside};
+use relight_core::light::{Normals, YUp};
+
+use crate::insert::HeightSolver;
+
+/// Normals that face the viewer less than this count as if they did so much: the rim is as steep as can be seen.
+const LEAST_FACING: f32 = 0.12;
+/// Rounds of the solver for each pixel of the longer side: what is left of the residual is e^-17.
+const ROUNDS: usize = 4;
+
+/// The heights towards the viewer, in pixels, of the pixels inside; 0 elsewhere. Differences from pixel to pixel are
+/// nearest to the slopes of the normals, by least squares. The rim of each part that hangs together is at 0 in the mean.
+///
+/// # Panics
+/// Where `inside` is not as long as the map has pixels.
+#[must_use]
+pub(super) fn integrated(normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
+    let extent = normals.extent();
+    assert_eq!(inside.len(), extent.pixels());
+    let longest = extent.width.max(extent.height);
+    let solver = HeightSolver {
+        least_facing: LEAST_FACING,
+        // The best for waves as long as the grid, whose ends are free.
+        relaxation: 2.0 / (1.0 + PI / (SQRT_2 * longest as f32)),
+        rounds: ROUNDS * longest,
+    };
+    let mut heights = solver.heights(normals, inside);
+    Grid { extent, inside }.settle(&mut heights);
+    heights
+}
+
+/// Pixels and those of them that belong to the object.
+struct Grid<'a> {
+    extent: Extent,
+    inside: &'a [bool],
+}
+
+impl Grid<'_> {
+    /// The neighbours of a pixel inside that are inside too.
+    fn neighbours(&self, at: usize) -> impl Iterator<Item = usize> + '_ {
+        let around = beside(self.extent, at).into_iter().flatten();
+        around.filter(|&other| self.inside[other])
+    }
+
+    /// Brings the rim of each part that hangs together to 0 in the mean.
+    fn settle(&self, heights: &mut [f32]) {
+        let mut is_seen: Vec<bool> = self.inside.iter().map(|inside| !inside).collect();
+        for first in 0..heights.len() {
+            if is_seen[first] {
+                continue;
+            }
+            is_seen[first] = true;
+            let mut part = vec![first];
+            let mut next = 0;
+            while next < part.len() {
+                for other in self.neighbours(part[next]) {
+                    if !is_seen[other] {
+                        is_seen[other] = true;
+                        part.push(other);
+                    }
+                }
+                next += 1;
+            }
+            let is_rim = |at: usize| self.neighbours(at).count() < 4;
+            let rim: Vec<f32> = part
+                .iter()
+                .filter(|&&at| is_rim(at))
+                .map(|&at| heights[at])
+                .collect();
+            let level = rim.iter().sum::<f32>() / rim.len().max(1) as f32;
+            for at in part {
+                heights[at] -= level;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relight_core::image::Planes;
+
+    #[test]
+    fn a_ball_is_as_high_as_its_radius() {
+        let side = 200;
+        let normals = Normals::sphere(side);
+        let inside: Vec<bool> = normals.planes().plane(2).iter().map(|&z| z > 0.0).collect();
+        let heights = integrated(&normals, &inside);
+        let at = |x: usize, y: usize| heights[y * side + x];
+        let radius = side as f32 / 2.0;
+        // The ground is the rim's mean: half a pixel to one pixel inside, a ball of this radius is 10 to 14 pixels high.
+        let top = at(100, 100);
+        assert!((86.0..=92.0).contains(&top), "{top}");
+        // Half a radius from the middle a ball is lower by 1 - sqrt(3) / 2.
+        let fall = at(100, 100) - at(150, 100);
+        assert!((fall / radius - 0.134).abs() < 0.01, "{fall}");
+        assert!((at(100, 50) - at(100, 150)).abs() < 1.0);
+    }
+
+    #[test]
+    fn parts_that_do_not_touch_stand_on_the_same_ground() {
+        let extent = Extent::new(21, 8);
+        let normals = Normals::<YUp>::new(Planes::from_fn(extent, |x, _| {
+            if x < 10 {
+                [0.6, 0.0, 0.8]
+            } else {
+                [0.0, 0.0, 1.0]
+            }
+        }));
+        let inside: Vec<bool> = (0..extent.pixels()).map(|at| at % 21 != 10).collect();
+        let heights = integrated(&normals, &inside);
+        // A slope falls to the right by 3/4 of a pixel a pixel.
+        assert!((heights[0] - heights[8] - 6.0).abs() < 1e-2);
+        assert!(heights[12].abs() < 1e-6);
+    }
+}

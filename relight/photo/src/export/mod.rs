@@ -1,0 +1,27 @@
+//! Captured objects, decompositions and turns as files that other programs read.
+//!
+//! | module | concern |
+//! | --- | --- |
+//! | `source` | an object out of `object.relit`, or a folder of `relight turn` or `relight decompose` |
+//! | `heights` | heights out of normals, by least squares |
+//! | `mesh` | a relief with the object's outline |
+//! | `glb` | the mesh with its material as one binary glTF file |
+//! | `layers` | all maps as layers of one EXR file |
+//! | `blender` | a script that sets up object, light and camera in Blender |
+//!
+//! Axes are those of all of relight, which are glTF's too: x to the right, y up, z to the viewer.
+
+mod blender;
+mod error;
+mod glb;
+mod heights;
+mod layers;
+mod mesh;
+mod source;
+
+pub use blender::script;
+pub use error::ExportError;
+pub use glb::to_glb;
+pub use layers::to_layers;
+pub use mesh::ObjectMesh;
+pub use source::read_object;

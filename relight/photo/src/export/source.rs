@@ -1,0 +1,97 @@
+//! An object out of `object.relit`, or a folder of `relight turn` or `relight decompose`.
+
+use std::fs;
+use std::path::Path;
+
+use relight_core::captured_object::CapturedObject;
+use relight_core::files::read_planes;
+use relight_core::image::{Planes, Rgb, Transfer};
+use relight_core::light::{Normals, YUp};
+use relight_core::render::{Gloss, Surface};
+use serde::Deserialize;
+
+use super::ExportError;
+
+/// A captured object in the folder of `relight turn`.
+const OBJECT: &str = "object.relit";
+/// The figures of a decomposition, and those of a turn.
+const FIGURES: [&str; 2] = ["decomposition.json", "turn.json"];
+
+/// What the figures say that the maps do not.
+#[derive(Deserialize)]
+struct MapFigures {
+    white: MapWhites,
+    #[serde(default)]
+    specular: Option<EvenGloss>,
+    #[serde(default)]
+    gloss: Option<EvenGloss>,
+}
+
+#[derive(Deserialize)]
+struct MapWhites {
+    albedo: f32,
+}
+
+/// The gloss of a whole object.
+#[derive(Deserialize)]
+struct EvenGloss {
+    reflectance: Option<f32>,
+    smoothness: Option<f32>,
+}
+
+/// Reads an object: a file `*.relit`, or a folder with `object.relit` or with the maps of a decomposition or a turn.
+///
+/// # Errors
+/// Where it holds no object, or where a file cannot be read.
+pub fn read_object(path: &Path) -> Result<CapturedObject, ExportError> {
+    if path.is_file() {
+        return Ok(CapturedObject::read(path)?);
+    }
+    if path.join(OBJECT).is_file() {
+        return Ok(CapturedObject::read(&path.join(OBJECT))?);
+    }
+    let is_there = |name: &&str| path.join(name).is_file();
+    let Some(figures) = FIGURES.into_iter().find(is_there) else {
+        return Err(ExportError::Source {
+            path: path.to_owned(),
+            fault: "holds no object: give object.relit, or a folder that relight turn or relight decompose has written"
+                .to_owned(),
+        });
+    };
+    read_maps(path, figures)
+}
+
+fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ExportError> {
+    let file = folder.join(figures);
+    let wrong = |reason: String| ExportError::Source {
+        path: file.clone(),
+        fault: format!("cannot be read: {reason}"),
+    };
+    let json = fs::read(&file).map_err(|error| wrong(error.to_string()))?;
+    let figures: MapFigures =
+        serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
+    let white = figures.white.albedo;
+    if !(white.is_finite() && white >= 0.0) {
+        return Err(wrong("white.albedo is no number from 0 up".to_owned()));
+    }
+    let (mask, _) = read_planes(&folder.join("mask.png"))?;
+    let alpha = Planes::from_planes(mask.extent(), [mask.plane(0).to_vec()])?;
+    let normals = Normals::<YUp>::read(&folder.join("normal.png"))?;
+    let albedo = Rgb::read(&folder.join("albedo.png"), Transfer::Srgb)?;
+    let albedo = Rgb::new(albedo.into_planes().map(|value| value * white));
+    let extent = normals.extent();
+    let gloss = figures
+        .gloss
+        .or(figures.specular)
+        .and_then(|gloss| Some((gloss.reflectance?, gloss.smoothness?)))
+        .map(|(reflectance, smoothness)| Gloss::even(extent, [reflectance; 3], smoothness));
+    let confidence = match read_planes(&folder.join("confidence.png")) {
+        Ok((map, _)) => Planes::from_planes(map.extent(), [map.plane(0).to_vec()])?,
+        Err(_) => Planes::filled(extent, [1.0]),
+    };
+    let name = folder
+        .file_name()
+        .map_or_else(|| "object".to_owned(), |n| n.to_string_lossy().into_owned());
+    let surface = Surface::new(normals, albedo, gloss)?;
+    Ok(CapturedObject::new(name, surface, alpha, confidence)?)
+}

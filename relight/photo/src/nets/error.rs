@@ -1,0 +1,53 @@
+//! What can go wrong with weights and inference.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Why weights could not be read, written or used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NetError {
+    /// Weights that are not the network's, or that it or a file cannot hold.
+    #[error("{0}")]
+    Weights(String),
+    /// A file that cannot be read or written.
+    #[error("{path} could not be {doing}", path = .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was tried, as a participle: "read".
+        doing: &'static str,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// A file that holds no weights, no network or no library that can be used.
+    #[error("{path} cannot be used: {fault}", path = .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        fault: String,
+    },
+    /// A library of an engine that is not installed.
+    #[error(
+        "there is no ONNX Runtime at {path}: install it and set ORT_DYLIB_PATH to its library, or use --engine tract",
+        path = .path.display()
+    )]
+    NoLibrary {
+        /// Where it should be.
+        path: PathBuf,
+    },
+    /// A network that cannot be run, or cannot take such a picture.
+    #[error("{0}")]
+    Run(String),
+}
+
+impl NetError {
+    /// That weights lack a parameter.
+    #[must_use]
+    pub fn missing(net: &str, name: &str) -> Self {
+        Self::Weights(format!(
+            "the weights have no {name}, which {net} needs: are they another network's?"
+        ))
+    }
+}
