@@ -663,8 +663,8 @@ fn a_mask_of_another_session_lowers_the_verdict_and_exits_with_3() {
 #[test]
 fn what_a_session_knows_of_its_rig_stands_in_the_data_set() {
     let bench = Bench::new();
-    let fixture = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../fixtures/20261120T101500Z-cow-short");
+    let fixture =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/20261120T101500Z-cow-short");
     let session = bench.path("20261120T101500Z-cow-short");
     fs::create_dir(&session).unwrap();
     for name in names_in(&fixture) {

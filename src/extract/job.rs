@@ -247,7 +247,11 @@ impl Job {
             selection: plan.selection.basis(),
             samples,
             covered_deg: part_of_turn(&plan),
-            rig: self.recording.manifest.as_ref().and_then(|manifest| manifest.rig),
+            rig: self
+                .recording
+                .manifest
+                .as_ref()
+                .and_then(|manifest| manifest.rig),
             duplicates: collected.count(|r| r.duplicate),
             spec_net: collected.count(|r| r.spec_net),
             lossy,

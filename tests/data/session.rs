@@ -6,11 +6,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
-use relit_data::session::{
-    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, ManifestFault, Notice, Recording, SessionError,
-    SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
-};
 use relit_data::rig::{RigFacts, RotationDirection};
+use relit_data::session::{
+    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, ManifestFault, Notice, Recording,
+    SessionError, SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of,
+    recordings,
+};
 use tempfile::TempDir;
 
 const ID: &str = "20261120T093015Z-mug";
