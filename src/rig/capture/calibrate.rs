@@ -11,7 +11,7 @@ use relit_data::rig::{RigFacts, RotationDirection};
 use relit_video::LiveDecoder;
 
 use super::equipment::Equipment;
-use super::error::{CaptureError, MeterFault, Refusal};
+use super::error::{CaptureError, Refusal};
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::preflight;
 use super::stop::StopRequest;
@@ -91,7 +91,11 @@ pub fn measure_rotation(
     };
     let decoder = LiveDecoder::new(stream.format, stream.width, stream.height);
     let mut background = Background {
-        decoder: decoder.map_err(MeterFault::NoPicture)?,
+        decoder: decoder.map_err(|error| {
+            Refusal::Other(format!(
+                "the camera's pictures cannot be decoded ({error}): ask for another format"
+            ))
+        })?,
         last: None,
         shifts: Vec::new(),
     };
@@ -142,11 +146,9 @@ impl Background {
     }
 
     fn moves_to_the_right(&self) -> Result<bool, Refusal> {
-        let moving = self
-            .shifts
-            .iter()
-            .filter(|shift| shift.abs() >= LEAST_SHIFT);
-        let (right, left): (Vec<f64>, Vec<f64>) = moving.partition(|shift| **shift > 0.0);
+        let shifts = self.shifts.iter().copied();
+        let moving = shifts.filter(|shift| shift.abs() >= LEAST_SHIFT);
+        let (right, left): (Vec<f64>, Vec<f64>) = moving.partition(|shift| *shift > 0.0);
         let all = right.len() + left.len();
         let most = right.len().max(left.len());
         if all < FEWEST || (most as f64) < AGREED * all as f64 {
