@@ -17,7 +17,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use relit_data::session::FrameClock;
-use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues, MissingControl};
+use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues};
 use relit_rig::camera::{
     self, Camera, CameraError, ControlFault, ControlId, ControlKind, Frame, GrantedMode, Rates,
 };
@@ -260,7 +260,8 @@ fn a_camera_is_made_to_hold_still() {
         Aspect::Focus,
         Aspect::PowerLine,
     ];
-    assert_eq!(plan.missing, missing.map(MissingControl::NoControl));
+    let missing = missing.map(|aspect| format!("the camera has no control of its {aspect}"));
+    assert_eq!(plan.missing, missing);
     set(&mut *camera, "gain", 34);
     let moved = plan.check(&camera.controls().unwrap());
     assert_eq!(moved[0].to_string(), "gain is 34 where 33 was set");

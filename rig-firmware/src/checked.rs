@@ -7,15 +7,12 @@ use crate::error::Error;
 use crate::line::{Checksum, Line};
 use crate::number;
 
-/// The highest sequence number.
-pub const MAX_SEQUENCE: u32 = 9_999_999;
-
 /// How a line was answered; 0 is `ok`.
-pub type Answer = u8;
+pub(crate) type Answer = u8;
 
 /// A checked session with the host, once it has opened one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Session {
+pub(crate) enum Session {
     /// Lines are plain.
     #[default]
     Closed,
@@ -30,7 +27,7 @@ pub enum Session {
 
 /// What to do with a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CheckedLine<'a> {
+pub(crate) enum CheckedLine<'a> {
     /// Do what it says. Its answer names the sequence number, if there is one.
     Execute {
         /// The sequence number, in a session.
@@ -49,12 +46,12 @@ pub enum CheckedLine<'a> {
 
 impl Session {
     /// Whether a session is open, in which every line that is sent carries a checksum.
-    pub fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         matches!(self, Session::Open { .. })
     }
 
     /// Judges a line; opens the session where the line asks for it.
-    pub fn judge<'a>(&mut self, line: &Line<'a>) -> CheckedLine<'a> {
+    pub(crate) fn judge<'a>(&mut self, line: &Line<'a>) -> CheckedLine<'a> {
         let refuse = |sequence, error: Error| CheckedLine::Answer {
             sequence,
             answer: error.code(),
@@ -102,7 +99,7 @@ impl Session {
     }
 
     /// Keeps the answer to a line that was executed.
-    pub fn remember(&mut self, sequence: Option<u32>, answer: Answer) {
+    pub(crate) fn remember(&mut self, sequence: Option<u32>, answer: Answer) {
         if let (Session::Open { .. }, Some(last)) = (&self, sequence) {
             *self = Session::Open { last, answer };
         }
@@ -120,6 +117,9 @@ fn split(text: &[u8]) -> Option<(u32, &[u8])> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The highest sequence number: it has seven digits.
+    const MAX_SEQUENCE: u32 = 9_999_999;
 
     fn line(text: &str, checksum: Checksum) -> Line<'_> {
         Line {

@@ -9,7 +9,7 @@ use crate::settings::Key;
 
 /// A `$` command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dollar {
+pub(crate) enum Dollar {
     /// `$`: name the commands.
     Help,
     /// `$$`: tell the settings.
@@ -44,7 +44,7 @@ pub enum Dollar {
 /// # Errors
 /// [`Error::InvalidStatement`] for what is no command of this table, [`Error::InvalidJog`] for `$J`
 /// without `=`, [`Error::BadNumber`] for a value that is none, and what a jog gives.
-pub fn parse(text: &[u8], modal: &Modal) -> Result<Dollar, Error> {
+pub(crate) fn parse(text: &[u8], modal: &Modal) -> Result<Dollar, Error> {
     match text {
         [] => Ok(Dollar::Help),
         [b'J'] => Err(Error::InvalidJog),

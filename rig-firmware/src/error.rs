@@ -5,7 +5,7 @@
 /// Why a line was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Error {
+pub(crate) enum Error {
     /// A word does not begin with a letter.
     ExpectedLetter = 1,
     /// A number is missing, malformed or out of range.
@@ -70,7 +70,7 @@ pub enum Error {
 
 impl Error {
     /// The number that goes over the wire.
-    pub fn code(self) -> u8 {
+    pub(crate) fn code(self) -> u8 {
         self as u8
     }
 }

@@ -21,7 +21,7 @@ const MOVE_OFF: i32 = 45_000;
 
 /// Where homing is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum HomingPhase {
+pub(crate) enum HomingPhase {
     /// Leaving the index that was active at the start.
     MoveOff,
     /// Looking for the index, fast.
@@ -36,7 +36,7 @@ pub enum HomingPhase {
 
 /// What the table has to do next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Leg {
+pub(crate) struct Leg {
     /// The phase this is.
     pub phase: HomingPhase,
     /// From which step the way counts: from where the index changed, or from where the table
@@ -52,7 +52,7 @@ pub struct Leg {
 
 /// How a leg ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum HomingOutcome {
+pub(crate) enum HomingOutcome {
     /// Another leg follows.
     Go(Leg),
     /// This step is zero; another leg follows, counted from the new zero.
@@ -66,7 +66,7 @@ pub enum HomingOutcome {
 }
 
 /// The first leg; `active`: the table stands on the index.
-pub fn start(settings: &GrblSettings, active: bool) -> Leg {
+pub(crate) fn start(settings: &GrblSettings, active: bool) -> Leg {
     let feed = settings.amount(Key::HomingSeek);
     let (phase, way) = if active {
         (HomingPhase::MoveOff, -MOVE_OFF)
@@ -84,7 +84,7 @@ pub fn start(settings: &GrblSettings, active: bool) -> Leg {
 
 /// What follows a leg. `found`: the step at which the index changed as the leg asked; `active`: the
 /// table now stands on the index.
-pub fn next(
+pub(crate) fn next(
     settings: &GrblSettings,
     phase: HomingPhase,
     found: Option<i32>,

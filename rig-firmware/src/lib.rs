@@ -8,36 +8,36 @@
 //!
 //! | module | what it is for | knows |
 //! | --- | --- | --- |
-//! | [`crc`], [`number`], [`error`], [`realtime`] | checksum, decimals, error numbers, commands of one byte | nobody |
-//! | [`mod@line`] | bytes to lines | `crc` |
-//! | [`checked`] | sequence numbers: what to do with a line | `line`, `error` |
-//! | [`ramp`] | speed as a number of steps from standstill | nobody |
-//! | [`search`] | the index, found to one step | nobody |
+//! | [`crc`], `number`, `error`, [`realtime`] | checksum, decimals, error numbers, commands of one byte | nobody |
+//! | `line` | bytes to lines | `crc` |
+//! | `checked` | sequence numbers: what to do with a line | `line`, `error` |
+//! | `ramp` | speed as a number of steps from standstill | nobody |
+//! | `search` | the index, found to one step | nobody |
 //! | [`stepper`] | moves to step intervals, in the interrupt | `ramp`, `search`, `realtime` |
 //! | [`board`] | what the core needs of a chip | `stepper` |
-//! | [`settings`], [`store`] | the `$` settings; keeping them in the EEPROM | `board`, `ramp`, `number`, `crc` |
-//! | [`gcode`], [`dollar`] | text to typed commands | `number`, `settings`, `error` |
-//! | [`homing`] | the way to the index, as a state machine | `settings` |
-//! | [`report`] | text and numbers to the line | `board`, `crc`, `settings` |
+//! | `settings`, `store` | the `$` settings; keeping them in the EEPROM | `board`, `ramp`, `number`, `crc` |
+//! | `gcode`, `dollar` | text to typed commands | `number`, `settings`, `error` |
+//! | `homing` | the way to the index, as a state machine | `settings` |
+//! | `report` | text and numbers to the line | `board`, `crc`, `settings` |
 //! | [`controller`] | states, plans, answers: the main loop | all of them |
 //!
 //! What interrupts do is in `stepper` and `realtime` alone; all else runs in the main loop.
 #![no_std]
 
 pub mod board;
-pub mod checked;
+mod checked;
 pub mod controller;
 pub mod crc;
-pub mod dollar;
-pub mod error;
-pub mod gcode;
-pub mod homing;
-pub mod line;
-pub mod number;
-pub mod ramp;
+mod dollar;
+mod error;
+mod gcode;
+mod homing;
+mod line;
+mod number;
+mod ramp;
 pub mod realtime;
-pub mod report;
-pub mod search;
-pub mod settings;
+mod report;
+mod search;
+mod settings;
 pub mod stepper;
-pub mod store;
+mod store;

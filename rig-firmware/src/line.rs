@@ -5,11 +5,11 @@
 use crate::crc::Crc;
 
 /// Characters that a line may have without spaces and comments.
-pub const CAPACITY: usize = 96;
+pub(crate) const CAPACITY: usize = 96;
 
 /// What the end of a line says about the rest of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Checksum {
+pub(crate) enum Checksum {
     /// There is none.
     Absent,
     /// It is right.
@@ -20,7 +20,7 @@ pub enum Checksum {
 
 /// A line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Line<'a> {
+pub(crate) struct Line<'a> {
     /// Upper case, without spaces, comments and checksum.
     pub text: &'a [u8],
     /// How its checksum was.
@@ -59,7 +59,7 @@ enum Loss {
 /// Gathers a line. The text comes last: small fields are cheap to reach near the start.
 #[derive(Debug)]
 #[repr(C)]
-pub struct LineReader {
+pub(crate) struct LineReader {
     length: u8,
     part: Part,
     crc: Crc,
@@ -72,7 +72,7 @@ pub struct LineReader {
 
 impl LineReader {
     /// A reader with nothing read.
-    pub const fn new() -> LineReader {
+    pub(crate) const fn new() -> LineReader {
         LineReader {
             text: [0; CAPACITY],
             length: 0,
@@ -86,13 +86,13 @@ impl LineReader {
     }
 
     /// Forgets everything that was read.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         *self = LineReader::new();
     }
 
     /// Takes in a byte. True: the line is complete; [`LineReader::line`] tells it until the next
     /// byte comes.
-    pub fn push(&mut self, byte: u8) -> bool {
+    pub(crate) fn push(&mut self, byte: u8) -> bool {
         if core::mem::take(&mut self.complete) {
             self.begin();
         }
@@ -157,7 +157,7 @@ impl LineReader {
     }
 
     /// The line that [`LineReader::push`] completed.
-    pub fn line(&self) -> Line<'_> {
+    pub(crate) fn line(&self) -> Line<'_> {
         Line {
             text: self.text.get(..usize::from(self.length)).unwrap_or(&[]),
             checksum: match self.part {
@@ -171,12 +171,12 @@ impl LineReader {
     }
 
     /// Bytes were lost on the way.
-    pub fn lose(&mut self) {
+    pub(crate) fn lose(&mut self) {
         self.loss = Loss::Ahead;
     }
 
     /// All bytes that had come were read.
-    pub fn drained(&mut self) {
+    pub(crate) fn drained(&mut self) {
         if self.loss == Loss::Ahead {
             if core::mem::take(&mut self.complete) {
                 self.begin();

@@ -5,7 +5,7 @@
 
 /// A decimal number of up to nine digits before the point and six behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Decimal {
+pub(crate) struct Decimal {
     negative: bool,
     /// Up to 999 999 999.
     whole: u32,
@@ -15,39 +15,39 @@ pub struct Decimal {
 
 impl Decimal {
     /// Below zero.
-    pub fn is_negative(self) -> bool {
+    pub(crate) fn is_negative(self) -> bool {
         self.negative
     }
 
     /// Nothing stands behind the point.
-    pub fn is_whole(self) -> bool {
+    pub(crate) fn is_whole(self) -> bool {
         self.millionths == 0
     }
 
     /// What stands before the point, without the sign.
-    pub fn whole(self) -> u32 {
+    pub(crate) fn whole(self) -> u32 {
         self.whole
     }
 
     /// Whether it is this number.
-    pub fn is(self, number: u32) -> bool {
+    pub(crate) fn is(self, number: u32) -> bool {
         !self.negative && self.whole == number && self.is_whole()
     }
 
     /// Thousandths, to the nearest, halves away from zero.
     ///
     /// `None` where the result is beyond an `i32`.
-    pub fn thousandths(self) -> Option<i32> {
+    pub(crate) fn thousandths(self) -> Option<i32> {
         self.scaled(1000, 2_147_483, (self.millionths + 500) / 1000)
     }
 
     /// Inches to thousandths of a millimetre, as [`Decimal::thousandths`].
-    pub fn inches(self) -> Option<i32> {
+    pub(crate) fn inches(self) -> Option<i32> {
         self.scaled(25_400, 84_546, (self.millionths * 254 + 5000) / 10_000)
     }
 
     /// Seconds to microseconds; `None` for less than none or more than 4293 s.
-    pub fn micros(self) -> Option<u32> {
+    pub(crate) fn micros(self) -> Option<u32> {
         let fits = !self.negative && self.whole < 4294;
         fits.then(|| self.whole * 1_000_000 + self.millionths)
     }
@@ -66,7 +66,7 @@ impl Decimal {
 /// after the sixth decimal are dropped.
 ///
 /// `None` where no digit stands, or with more than nine digits before the point.
-pub fn parse(text: &[u8]) -> Option<(Decimal, &[u8])> {
+pub(crate) fn parse(text: &[u8]) -> Option<(Decimal, &[u8])> {
     let (negative, mut rest) = match text.split_first() {
         Some((b'-', rest)) => (true, rest),
         Some((b'+', rest)) => (false, rest),
@@ -106,7 +106,7 @@ pub fn parse(text: &[u8]) -> Option<(Decimal, &[u8])> {
 /// Reads a number of at most `most` digits (nine at most) and nothing else, and tells the rest.
 ///
 /// `None` where no digit stands, or more.
-pub fn digits(text: &[u8], most: u8) -> Option<(u32, &[u8])> {
+pub(crate) fn digits(text: &[u8], most: u8) -> Option<(u32, &[u8])> {
     let (mut value, mut count, mut rest) = (0, 0, text);
     while let Some((&byte @ b'0'..=b'9', after)) = rest.split_first() {
         if count == most {
@@ -122,7 +122,7 @@ pub fn digits(text: &[u8], most: u8) -> Option<(u32, &[u8])> {
 /// `value * times / divisor` to the nearest, halves away from zero.
 ///
 /// `None` where the result is beyond an `i32`, and for zero as divisor.
-pub fn scaled(value: i32, times: u32, divisor: u32) -> Option<i32> {
+pub(crate) fn scaled(value: i32, times: u32, divisor: u32) -> Option<i32> {
     let product = u64::from(value.unsigned_abs()) * u64::from(times) + u64::from(divisor / 2);
     let magnitude = product.checked_div(u64::from(divisor))?;
     let magnitude = i32::try_from(magnitude).ok()?;
@@ -130,7 +130,7 @@ pub fn scaled(value: i32, times: u32, divisor: u32) -> Option<i32> {
 }
 
 /// The end of what an `i32` can tell, on the side of `value`.
-pub fn end_towards(value: i32) -> i32 {
+pub(crate) fn end_towards(value: i32) -> i32 {
     if value < 0 { i32::MIN } else { i32::MAX }
 }
 

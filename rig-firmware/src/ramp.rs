@@ -12,9 +12,9 @@
 //! Intervals are in 256ths of a timer tick; a tick is half a microsecond. Knows nobody.
 
 /// Timer ticks a second.
-pub const TICKS_PER_SECOND: u32 = 2_000_000;
+pub(crate) const TICKS_PER_SECOND: u32 = 2_000_000;
 /// Most steps a second.
-pub const MAX_STEP_RATE: u32 = 10_000;
+pub(crate) const MAX_STEP_RATE: u32 = 10_000;
 /// Parts of a tick in a minute, times a million.
 const PARTS_PER_MINUTE: u64 = TICKS_PER_SECOND as u64 * 256 * 60 * 1_000_000;
 /// 0.676 f sqrt(2 / a) in 256ths of a tick, where a is a thousandth of a step/s^2.
@@ -30,7 +30,7 @@ const MAX_FIRST: u32 = 1 << 30;
 
 /// A steady speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cruise {
+pub(crate) struct Cruise {
     /// Interval between steps, in 256ths of a tick.
     pub interval: u32,
     /// The ramp index just below this speed.
@@ -39,7 +39,7 @@ pub struct Cruise {
 
 /// The motion limits of the table, in steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Profile {
+pub(crate) struct Profile {
     /// Steps a degree, in thousandths.
     steps_per_degree: u32,
     /// Acceleration in thousandths of a step/s^2.
@@ -50,7 +50,7 @@ pub struct Profile {
 
 impl Profile {
     /// From thousandths of steps/degree and of degrees/s^2; both are positive.
-    pub fn new(steps_per_degree: u32, acceleration: u32) -> Profile {
+    pub(crate) fn new(steps_per_degree: u32, acceleration: u32) -> Profile {
         let product = u64::from(steps_per_degree) * u64::from(acceleration);
         let acceleration = u32::try_from(product / 1000).unwrap_or(u32::MAX).max(1);
         // Scaled by fours, so that its root has sixteen digits in base two.
@@ -71,7 +71,7 @@ impl Profile {
 
     /// The interval and the ramp index of a speed in thousandths of a degree/min. A speed below
     /// one step in 8 s counts as that.
-    pub fn cruise(&self, feed: u32) -> Cruise {
+    pub(crate) fn cruise(&self, feed: u32) -> Cruise {
         // Thousandths times thousandths: millionths of a step/min.
         let rate = u64::from(feed.max(1)) * u64::from(self.steps_per_degree.max(1));
         let interval = (PARTS_PER_MINUTE + rate / 2) / rate;
@@ -87,13 +87,13 @@ impl Profile {
     }
 
     /// The speed at which steps come at `interval`, in thousandths of a degree/min.
-    pub fn feed(&self, interval: u32) -> u32 {
+    pub(crate) fn feed(&self, interval: u32) -> u32 {
         let rate = u64::from(interval) * u64::from(self.steps_per_degree);
         u32::try_from(PARTS_PER_MINUTE.checked_div(rate).unwrap_or(0)).unwrap_or(u32::MAX)
     }
 
     /// The first interval from rest, in 256ths of a tick.
-    pub fn first_interval(&self) -> u32 {
+    pub(crate) fn first_interval(&self) -> u32 {
         self.first
     }
 }
@@ -117,7 +117,7 @@ fn root(square: u32) -> u32 {
 
 /// Where on the ramp the table is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Ramp {
+pub(crate) struct Ramp {
     first: u32,
     index: u32,
     /// c(index)
@@ -130,7 +130,7 @@ pub struct Ramp {
 
 impl Ramp {
     /// At standstill, with the first interval of the acceleration.
-    pub const fn at_rest(first: u32) -> Ramp {
+    pub(crate) const fn at_rest(first: u32) -> Ramp {
         Ramp {
             first,
             index: 0,
@@ -141,22 +141,22 @@ impl Ramp {
     }
 
     /// Back to standstill.
-    pub fn rest(&mut self) {
+    pub(crate) fn rest(&mut self) {
         *self = Ramp::at_rest(self.first);
     }
 
     /// Steps since standstill, and to it.
-    pub fn index(&self) -> u32 {
+    pub(crate) fn index(&self) -> u32 {
         self.index
     }
 
     /// The interval of the step from this index to the next.
-    pub fn interval(&self) -> u32 {
+    pub(crate) fn interval(&self) -> u32 {
         self.interval
     }
 
     /// Goes one step up the ramp, and gives that step's interval.
-    pub fn up(&mut self) -> u32 {
+    pub(crate) fn up(&mut self) -> u32 {
         let interval = self.interval;
         self.index = self.index.saturating_add(1);
         let change = self.change(false, self.index.saturating_mul(4).saturating_add(1));
@@ -165,7 +165,7 @@ impl Ramp {
     }
 
     /// Goes one step down the ramp, and gives that step's interval.
-    pub fn down(&mut self) -> u32 {
+    pub(crate) fn down(&mut self) -> u32 {
         let divisor = self.index.saturating_mul(4).saturating_sub(1).max(1);
         self.index = self.index.saturating_sub(1);
         if self.index == 0 {

@@ -9,14 +9,14 @@ use crate::number;
 use crate::settings::{GrblSettings, Key, Kind};
 
 /// One line on its way out; [`Reply::end`] ends it.
-pub struct Reply<'a, B: Board> {
+pub(crate) struct Reply<'a, B: Board> {
     board: &'a mut B,
     crc: Option<Crc>,
 }
 
 impl<'a, B: Board> Reply<'a, B> {
     /// Begins a line; `checked`: it ends with `*` and its checksum.
-    pub fn new(board: &'a mut B, checked: bool) -> Reply<'a, B> {
+    pub(crate) fn new(board: &'a mut B, checked: bool) -> Reply<'a, B> {
         Reply {
             board,
             crc: checked.then(Crc::new),
@@ -24,7 +24,7 @@ impl<'a, B: Board> Reply<'a, B> {
     }
 
     /// Sends a byte.
-    pub fn byte(&mut self, byte: u8) {
+    pub(crate) fn byte(&mut self, byte: u8) {
         if let Some(crc) = &mut self.crc {
             crc.update(byte);
         }
@@ -32,18 +32,18 @@ impl<'a, B: Board> Reply<'a, B> {
     }
 
     /// Sends a text.
-    pub fn text(&mut self, text: &str) -> &mut Self {
+    pub(crate) fn text(&mut self, text: &str) -> &mut Self {
         text.bytes().for_each(|byte| self.byte(byte));
         self
     }
 
     /// Sends a whole number.
-    pub fn whole(&mut self, number: u32) -> &mut Self {
+    pub(crate) fn whole(&mut self, number: u32) -> &mut Self {
         self.digits(number, 0)
     }
 
     /// Sends a number of 10^-`decimals`.
-    pub fn decimal(&mut self, number: i32, decimals: u8) -> &mut Self {
+    pub(crate) fn decimal(&mut self, number: i32, decimals: u8) -> &mut Self {
         if number < 0 {
             self.byte(b'-');
         }
@@ -72,7 +72,7 @@ impl<'a, B: Board> Reply<'a, B> {
     }
 
     /// Sends a position on three axes, of which the table has one; thousandths of a degree.
-    pub fn position(&mut self, position: i32, inches: bool) -> &mut Self {
+    pub(crate) fn position(&mut self, position: i32, inches: bool) -> &mut Self {
         if inches {
             let tenths = number::scaled(position, 100, 254).unwrap_or(0);
             self.decimal(tenths, 4).text(",0.0000,0.0000")
@@ -82,13 +82,13 @@ impl<'a, B: Board> Reply<'a, B> {
     }
 
     /// Sends a speed in thousandths of a degree/min, as whole units/min.
-    pub fn speed(&mut self, feed: u32, inches: bool) -> &mut Self {
+    pub(crate) fn speed(&mut self, feed: u32, inches: bool) -> &mut Self {
         let unit = if inches { 25_400 } else { 1000 };
         self.whole(feed.saturating_add(unit / 2) / unit)
     }
 
     /// Ends the line.
-    pub fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         if let Some(crc) = self.crc.take() {
             self.board.send(b'*');
             for shift in [12, 8, 4, 0] {
@@ -104,7 +104,7 @@ impl<'a, B: Board> Reply<'a, B> {
 }
 
 /// Answers a line: `ok`, `error:5`, `ok N17`.
-pub fn answer<B: Board>(board: &mut B, checked: bool, sequence: Option<u32>, answer: u8) {
+pub(crate) fn answer<B: Board>(board: &mut B, checked: bool, sequence: Option<u32>, answer: u8) {
     let mut reply = Reply::new(board, checked);
     if answer == 0 {
         reply.text("ok");
@@ -118,7 +118,7 @@ pub fn answer<B: Board>(board: &mut B, checked: bool, sequence: Option<u32>, ans
 }
 
 /// Tells one setting: `$100=88.889`.
-pub fn setting<B: Board>(board: &mut B, checked: bool, settings: &GrblSettings, key: Key) {
+pub(crate) fn setting<B: Board>(board: &mut B, checked: bool, settings: &GrblSettings, key: Key) {
     let mut reply = Reply::new(board, checked);
     reply.text("$").whole(u32::from(key.number())).text("=");
     let decimals = match key.kind() {

@@ -5,7 +5,7 @@
 /// What is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Search {
+pub(crate) enum Search {
     /// Nothing.
     Off,
     /// The level is not there yet.
@@ -26,7 +26,7 @@ pub enum Search {
 impl Search {
     /// Takes in the level at a position, `ticks` after the look before. A level counts from where
     /// it first came, if it stays for `debounce` ticks. True: found just now.
-    pub fn look(&mut self, active: bool, here: i32, ticks: u32, debounce: u32) -> bool {
+    pub(crate) fn look(&mut self, active: bool, here: i32, ticks: u32, debounce: u32) -> bool {
         let (level, position, stayed) = match *self {
             Search::Off | Search::Found(_) => return false,
             Search::For(level) => (level, here, 0),

@@ -10,12 +10,12 @@ use crate::ramp::{MAX_STEP_RATE, Profile, TICKS_PER_SECOND};
 use crate::stepper::StepperSettings;
 
 /// How many settings there are.
-pub const COUNT: usize = 22;
+pub(crate) const COUNT: usize = 22;
 
 /// A setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Key {
+pub(crate) enum Key {
     /// `$0`: length of a step pulse, us.
     StepPulse,
     /// `$1`: rest after which the driver is released, ms; 255: never.
@@ -64,7 +64,7 @@ pub enum Key {
 
 /// What a setting's value is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// A whole number.
     Whole,
     /// Thousandths.
@@ -106,7 +106,7 @@ const fn decimal(number: u8, default: i32, least: i32, most: i32) -> Spec {
 
 impl Key {
     /// All settings in the order of their numbers.
-    pub const ALL: [Key; COUNT] = [
+    pub(crate) const ALL: [Key; COUNT] = [
         Key::StepPulse,
         Key::ReleaseDelay,
         Key::InvertStep,
@@ -132,17 +132,17 @@ impl Key {
     ];
 
     /// The number after `$`.
-    pub fn number(self) -> u8 {
+    pub(crate) fn number(self) -> u8 {
         self.spec().number
     }
 
     /// What the value is.
-    pub fn kind(self) -> Kind {
+    pub(crate) fn kind(self) -> Kind {
         self.spec().kind
     }
 
     /// The setting of a number.
-    pub fn of(number: u32) -> Option<Key> {
+    pub(crate) fn of(number: u32) -> Option<Key> {
         Key::ALL
             .into_iter()
             .find(|key| u32::from(key.number()) == number)
@@ -179,20 +179,20 @@ impl Key {
 
 /// The values of all settings, each within its bounds and all fit for one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct GrblSettings {
+pub(crate) struct GrblSettings {
     values: [i32; COUNT],
 }
 
 impl GrblSettings {
     /// The values of a new table.
-    pub fn defaults() -> GrblSettings {
+    pub(crate) fn defaults() -> GrblSettings {
         GrblSettings {
             values: Key::ALL.map(|key| key.spec().default),
         }
     }
 
     /// From stored values; `None` where one is not allowed.
-    pub fn from_values(values: [i32; COUNT]) -> Option<GrblSettings> {
+    pub(crate) fn from_values(values: [i32; COUNT]) -> Option<GrblSettings> {
         let settings = GrblSettings { values };
         let allowed = Key::ALL.into_iter().all(|key| {
             let spec = key.spec();
@@ -202,22 +202,22 @@ impl GrblSettings {
     }
 
     /// All values, in the order of [`Key::ALL`].
-    pub fn values(&self) -> &[i32; COUNT] {
+    pub(crate) fn values(&self) -> &[i32; COUNT] {
         &self.values
     }
 
     /// A value: decimals in thousandths.
-    pub fn get(&self, key: Key) -> i32 {
+    pub(crate) fn get(&self, key: Key) -> i32 {
         self.values.get(key as usize).copied().unwrap_or(0)
     }
 
     /// A value that is not negative by its bounds.
-    pub fn amount(&self, key: Key) -> u32 {
+    pub(crate) fn amount(&self, key: Key) -> u32 {
         self.get(key).unsigned_abs()
     }
 
     /// A flag.
-    pub fn flag(&self, key: Key) -> bool {
+    pub(crate) fn flag(&self, key: Key) -> bool {
         self.get(key) != 0
     }
 
@@ -228,7 +228,7 @@ impl GrblSettings {
     /// for any other value out of bounds or a fraction where a whole number belongs;
     /// [`Error::StepRate`] where the highest speed would be more than 10 000 steps/s. Nothing
     /// changes then.
-    pub fn set(&mut self, key: Key, value: Decimal) -> Result<(), Error> {
+    pub(crate) fn set(&mut self, key: Key, value: Decimal) -> Result<(), Error> {
         let spec = key.spec();
         if value.is_negative() {
             return Err(Error::Negative);
@@ -270,7 +270,7 @@ impl GrblSettings {
     }
 
     /// The motion limits.
-    pub fn profile(&self) -> Profile {
+    pub(crate) fn profile(&self) -> Profile {
         Profile::new(
             self.amount(Key::StepsPerDegree),
             self.amount(Key::Acceleration),
@@ -278,7 +278,7 @@ impl GrblSettings {
     }
 
     /// What the board has to know.
-    pub fn outputs(&self) -> Outputs {
+    pub(crate) fn outputs(&self) -> Outputs {
         Outputs {
             pulse_us: self.amount(Key::StepPulse) as u8,
             invert_step: self.flag(Key::InvertStep),
@@ -288,7 +288,7 @@ impl GrblSettings {
     }
 
     /// What the stepper has to know.
-    pub fn stepper(&self, profile: &Profile) -> StepperSettings {
+    pub(crate) fn stepper(&self, profile: &Profile) -> StepperSettings {
         StepperSettings {
             first_interval: profile.first_interval(),
             invert_index: self.flag(Key::InvertIndex),

@@ -28,7 +28,7 @@ pub struct Fire {
 
 /// A stretch in one direction at one speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Move {
+pub(crate) struct Move {
     /// Steps that are not yet under way.
     pub steps: u32,
     /// The direction.
@@ -39,11 +39,11 @@ pub struct Move {
 
 /// Why a move was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Full;
+pub(crate) struct Full;
 
 /// What the stepper has to know of the settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StepperSettings {
+pub(crate) struct StepperSettings {
     /// The first interval of a ramp, in 256ths of a tick.
     pub first_interval: u32,
     /// The index input is active when open.
@@ -125,7 +125,7 @@ impl Stepper {
     }
 
     /// Takes over settings; at rest only, for the ramp starts anew.
-    pub fn configure(&mut self, settings: StepperSettings) {
+    pub(crate) fn configure(&mut self, settings: StepperSettings) {
         self.settings = settings;
         self.ramp = Ramp::at_rest(settings.first_interval);
     }
@@ -203,7 +203,7 @@ impl Stepper {
     ///
     /// # Errors
     /// [`Full`] where the queue has no place, or after a halt that nobody cleared yet.
-    pub fn push(&mut self, plan: Move) -> Result<(), Full> {
+    pub(crate) fn push(&mut self, plan: Move) -> Result<(), Full> {
         if self.halted || usize::from(self.length) >= QUEUE {
             return Err(Full);
         }

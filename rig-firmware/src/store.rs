@@ -20,7 +20,7 @@ const BLANK: u8 = 0xFF;
 
 /// What outlives a reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stored {
+pub(crate) struct Stored {
     /// The settings.
     pub settings: GrblSettings,
     /// Offset of the work zero (`G54`) from machine zero, thousandths of a degree.
@@ -38,7 +38,7 @@ impl Stored {
 
 /// How the EEPROM was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Health {
+pub(crate) enum Health {
     /// Whole, or never written.
     Good,
     /// A slot was damaged: what the other one holds is in use, or the defaults.
@@ -47,7 +47,7 @@ pub enum Health {
 
 /// Which slot holds the present values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Store {
+pub(crate) struct Store {
     second: bool,
     generation: u8,
 }
@@ -63,7 +63,7 @@ enum Slot {
 
 impl Store {
     /// Reads what is stored. Damage is mended: the next call finds both slots good.
-    pub fn open(board: &mut impl Board) -> (Store, Stored, Health) {
+    pub(crate) fn open(board: &mut impl Board) -> (Store, Stored, Health) {
         let slots = [examine(board, false), examine(board, true)];
         let mut store = Store::newest(slots);
         let mut found = store.and_then(|store| read(board, store.second));
@@ -107,7 +107,7 @@ impl Store {
     }
 
     /// Writes what has changed. Takes 3.4 ms for every byte that differs from what stands there.
-    pub fn write(&mut self, board: &mut impl Board, stored: &Stored) {
+    pub(crate) fn write(&mut self, board: &mut impl Board, stored: &Stored) {
         self.second = !self.second;
         self.generation = self.generation.wrapping_add(1);
         let start = start(self.second);

@@ -55,6 +55,10 @@ pub enum Event {
     Ended {
         counts: Value,
     },
+    Calibrated {
+        rotation: Option<String>,
+        camera_elevation_deg: Option<f64>,
+    },
     Status(Value),
     Homed(Value),
     Jogged(Value),
@@ -168,4 +172,25 @@ pub enum Done {
         left_out: u64,
         failed: u64,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
+
+    use super::*;
+    use crate::json_of;
+
+    #[test]
+    fn the_manuals_lines_are_read_and_printed_as_they_stand_there() {
+        let manual = include_str!("../../docs/json-lines.md");
+        let lines = manual.lines().filter_map(|line| line.strip_prefix("    {"));
+        let mut count = 0;
+        for line in lines.map(|rest| format!("{{{rest}")) {
+            let event: Event = serde_json::from_str(&line).unwrap();
+            assert_eq!(json_of(&event), line);
+            count += 1;
+        }
+        assert_eq!(count, 31);
+    }
 }

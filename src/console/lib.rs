@@ -24,18 +24,17 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 use relit_data::causes::with_causes;
 use serde::Serialize;
 use serde_json::Value;
 
 mod event;
-mod lines;
 mod manual;
 mod progress;
 
 pub use event::{Check, Done, Event};
-use lines::{lost_line, print_error_line, print_line};
 pub use manual::written_manual;
 pub use progress::ProgressBar;
 
@@ -202,4 +201,25 @@ pub(crate) fn json_of(event: &impl Serialize) -> String {
     // Plain values of text and numbers: nothing in them that JSON lacks.
     let value: Value = serde_json::to_value(event).unwrap_or_default();
     value.to_string()
+}
+
+/// What first kept a line from being printed, other than that nobody reads any more.
+static LOST_LINE: OnceLock<io::Error> = OnceLock::new();
+
+/// What kept a line from being printed, if anything did.
+fn lost_line() -> Option<&'static io::Error> {
+    LOST_LINE.get()
+}
+
+/// Prints a line. If the output is closed, the work goes on without it.
+pub(crate) fn print_line(text: &str) {
+    if let Err(fault) = writeln!(io::stdout(), "{text}")
+        && fault.kind() != io::ErrorKind::BrokenPipe
+    {
+        let _ = LOST_LINE.set(fault);
+    }
+}
+
+fn print_error_line(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
 }

@@ -5,8 +5,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::ProgressStyle;
 
-use super::lines::print_line;
-use super::{Event, json_of};
+use super::{Event, json_of, print_line};
 
 /// Shortest time between two lines.
 const BETWEEN_LINES: Duration = Duration::from_millis(500);

@@ -168,7 +168,8 @@ impl PreviewEncoder {
     }
 }
 
-fn whole(picture: &Picture) -> Option<RgbImage> {
+/// A picture as it is.
+pub(crate) fn whole(picture: &Picture) -> Option<RgbImage> {
     let (width, height) = picture.size();
     picture.rgb(Rect::new(0, 0, width, height)).ok()
 }

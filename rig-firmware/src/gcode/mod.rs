@@ -5,14 +5,14 @@
 
 mod words;
 
-pub use self::words::Motion;
+pub(crate) use self::words::Motion;
 use self::words::{OneShot, Words};
 use crate::error::Error;
 use crate::number::Decimal;
 
 /// What one line leaves for the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Modal {
+pub(crate) struct Modal {
     /// `G0` or `G1`.
     pub motion: Motion,
     /// `G20` instead of `G21`.
@@ -25,7 +25,7 @@ pub struct Modal {
 
 impl Modal {
     /// As after a reset.
-    pub const fn new() -> Modal {
+    pub(crate) const fn new() -> Modal {
         Modal {
             motion: Motion::Rapid,
             inches: false,
@@ -43,7 +43,7 @@ impl Default for Modal {
 
 /// A place to go to, thousandths of a degree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Target {
+pub(crate) enum Target {
     /// From machine zero.
     Machine(i32),
     /// From work zero.
@@ -54,7 +54,7 @@ pub enum Target {
 
 /// What a line asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
+pub(crate) enum Action {
     /// Nothing beyond the modal state.
     Nothing,
     /// `G0`, `G1`: go there.
@@ -71,7 +71,7 @@ pub enum Action {
 
 /// A line of G-code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Block {
+pub(crate) struct Block {
     /// The modal state from this line on.
     pub modal: Modal,
     /// What to do under it.
@@ -80,7 +80,7 @@ pub struct Block {
 
 /// A jog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Jog {
+pub(crate) struct Jog {
     /// Where to.
     pub target: Target,
     /// Thousandths of a degree/min.
@@ -190,7 +190,7 @@ fn degrees(value: Decimal, inches: bool) -> Option<i32> {
 ///
 /// # Errors
 /// Grbl's number for what is wrong first.
-pub fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
+pub(crate) fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
     let mut words = Words::default();
     words.read(text)?;
     let modal = words.modal(before)?;
@@ -216,7 +216,7 @@ pub fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
 /// # Errors
 /// [`Error::InvalidJog`] for commands and words that a jog has no use for, [`Error::NoAxisWords`],
 /// [`Error::UndefinedFeed`], and what reading words gives.
-pub fn parse_jog(text: &[u8], modal: &Modal) -> Result<Jog, Error> {
+pub(crate) fn parse_jog(text: &[u8], modal: &Modal) -> Result<Jog, Error> {
     let mut words = Words::default();
     words.read(text)?;
     let allowed = matches!(words.one_shot, None | Some(OneShot::Machine));

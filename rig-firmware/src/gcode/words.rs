@@ -5,7 +5,7 @@ use crate::number::{self, Decimal};
 
 /// At which speed to move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
+pub(crate) enum Motion {
     /// `G0`: as fast as the table goes.
     Rapid,
     /// `G1`: at the feed.

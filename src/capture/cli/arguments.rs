@@ -51,6 +51,11 @@ pub(crate) enum Verb {
         after_help = "Example:\n  relit-capture record --object mug --turntable serial: --meter"
     )]
     Record(Box<RecordArguments>),
+    /// Measure once which way the table turns, and note how high the camera looks down; sessions carry both.
+    #[command(
+        after_help = "Example:\n  relit-capture calibrate --turntable serial: --elevation 18"
+    )]
+    Calibrate(Box<CalibrateArguments>),
     /// Serve the rig: a page for a phone or a browser, and an interface for scripts.
     #[command(
         after_help = "Example:\n  relit-capture serve --turntable serial: --listen 0.0.0.0:8420"
@@ -72,6 +77,18 @@ pub(crate) struct RecordArguments {
     /// Find the exposure on a slow metering turn first.
     #[arg(long)]
     pub(crate) meter: bool,
+    /// Do not ask before the table turns.
+    #[arg(long)]
+    pub(crate) yes: bool,
+    #[command(flatten)]
+    pub(crate) rig: RigArguments,
+}
+
+#[derive(Args)]
+pub(crate) struct CalibrateArguments {
+    /// How high the camera looks down on the table, degrees: 0 from the side [default: as noted before].
+    #[arg(long, value_name = "DEGREES", value_parser = elevation)]
+    pub(crate) elevation: Option<f64>,
     /// Do not ask before the table turns.
     #[arg(long)]
     pub(crate) yes: bool,
@@ -200,6 +217,10 @@ fn speed(text: &str) -> Result<f64, String> {
 
 fn rate(text: &str) -> Result<f64, String> {
     figure(text, 1.0, 1000.0, "frames a second")
+}
+
+fn elevation(text: &str) -> Result<f64, String> {
+    figure(text, 0.0, 89.0, "degrees")
 }
 
 fn volts(text: &str) -> Result<f64, String> {

@@ -2,6 +2,7 @@
 //! turntable.
 
 mod arguments;
+mod calibrating;
 mod devices;
 mod environment;
 mod recording;
@@ -25,6 +26,7 @@ fn main() -> ExitCode {
     match line.verb {
         Verb::Devices => devices::run(console),
         Verb::Record(record) => console.finish(recording::run(console, *record)),
+        Verb::Calibrate(asked) => console.finish(calibrating::run(console, *asked)),
         Verb::Serve(serve) => console.finish(serving::run(console, *serve)),
         Verb::Turntable(asked) => console.finish(turntable::run(console, &asked)),
         Verb::Simulate(asked) => console.finish(simulate::run(console, &asked)),

@@ -30,8 +30,7 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
     } = record;
     let settings: Settings = rig.into();
     let _made = make_root(&settings)?;
-    if !yes && matches!(settings.turntable, TurntableAddress::Serial(_)) && !agreed(console)? {
-        console.warn("the table was not turned: nobody agreed; --yes agrees beforehand");
+    if !yes && !agreed(console, &settings)? {
         return Ok(Outcome::Wrong);
     }
     let _camera = settings.lock_camera()?;
@@ -56,23 +55,29 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
 }
 
 /// Makes the folder of sessions; one that stays empty is removed at the end.
-fn make_root(settings: &Settings) -> Result<MadeFolder, CaptureError> {
+pub(crate) fn make_root(settings: &Settings) -> Result<MadeFolder, CaptureError> {
     let root = settings.root.display().to_string();
     MadeFolder::make(&settings.root).map_err(CaptureError::system(root, "made"))
 }
 
-/// Asks the person at the terminal; where there is none, nobody agrees.
-fn agreed(console: Console) -> Result<bool, CaptureError> {
-    if !io::stdin().is_terminal() {
-        return Ok(false);
+/// Asks the person at the terminal whether a real table may turn; where there is none, nobody agrees.
+pub(crate) fn agreed(console: Console, settings: &Settings) -> Result<bool, CaptureError> {
+    if !matches!(settings.turntable, TurntableAddress::Serial(_)) {
+        return Ok(true);
     }
-    console.ask(
-        "The table will look for its zero and turn once. Is its way and its cable free? [y/N] ",
-    );
     let mut answer = String::new();
-    let read = io::stdin().read_line(&mut answer);
-    read.map_err(CaptureError::system("the answer", "read"))?;
-    Ok(matches!(answer.trim(), "y" | "Y" | "yes"))
+    if io::stdin().is_terminal() {
+        console.ask(
+            "The table will look for its zero and turn. Is its way and its cable free? [y/N] ",
+        );
+        let read = io::stdin().read_line(&mut answer);
+        read.map_err(CaptureError::system("the answer", "read"))?;
+    }
+    let agreed = matches!(answer.trim(), "y" | "Y" | "yes");
+    if !agreed {
+        console.warn("the table was not turned: nobody agreed; --yes agrees beforehand");
+    }
+    Ok(agreed)
 }
 
 fn report_salvaged(console: Console, settings: &Settings) -> Result<(), CaptureError> {

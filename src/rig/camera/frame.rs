@@ -30,7 +30,7 @@ pub struct Frame {
 
 /// Counts a driver's 32-bit frame counter on where it wraps.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct SequenceUnwrapper {
+pub(crate) struct SequenceUnwrapper {
     /// The driver's last value, and the same without wraps.
     last: Option<(u32, u64)>,
 }
@@ -38,7 +38,7 @@ pub struct SequenceUnwrapper {
 impl SequenceUnwrapper {
     /// The next value. A step of less than half the range is forward, any other is backward: some
     /// drivers repeat a number, or deliver one late.
-    pub fn next(&mut self, raw: u32) -> u64 {
+    pub(crate) fn next(&mut self, raw: u32) -> u64 {
         let unwrapped = match self.last {
             None => u64::from(raw),
             Some((last_raw, last)) => {

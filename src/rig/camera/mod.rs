@@ -48,7 +48,9 @@ pub use backend::{Camera, DeviceInfo};
 pub use control::{Control, ControlFlags, ControlId, ControlKind, MenuItem, snake_case};
 pub use error::{CameraError, ControlFault};
 pub use format::{Fourcc, Mode, Rates, Sizes};
-pub use frame::{Frame, FrameFault, SequenceUnwrapper};
+#[cfg(target_os = "linux")]
+use frame::SequenceUnwrapper;
+pub use frame::{Frame, FrameFault};
 pub use rate::Rate;
 pub use request::{GrantedMode, ModeRequest};
 

@@ -72,8 +72,8 @@ impl LockedCamera {
         let controls = camera.controls()?;
         require_kept(plan.check(&controls))?;
         checks.push(settings_check(&plan));
-        let missing = plan.missing.iter();
-        let noted = missing.map(|missing| Check::noted("camera settings", missing.to_string()));
+        let missing = plan.missing.iter().cloned();
+        let noted = missing.map(|missing| Check::noted("camera settings", missing));
         checks.extend(noted);
         let device = camera.info().address.to_string();
         let fourcc = mode.fourcc;

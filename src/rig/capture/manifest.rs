@@ -10,6 +10,7 @@ use super::locked_camera::LockedCamera;
 use super::settings::Settings;
 use crate::camera::{Control, ControlKind};
 use crate::turntable::Table;
+use relit_data::rig::RigFacts;
 use relit_data::session::{
     CameraFacts, Fault, FrameClock, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts,
 };
@@ -20,6 +21,7 @@ pub(super) fn manifest(
     object: &str,
     now: Timestamp,
     locked: &LockedCamera,
+    rig: Option<RigFacts>,
 ) -> Manifest {
     let settings = equipment.settings();
     let camera = settings.camera.clone();
@@ -47,7 +49,7 @@ pub(super) fn manifest(
             .table
             .as_ref()
             .map(|table| facts_of(table, settings)),
-        rig: None,
+        rig,
         video: VideoFacts {
             file: String::new(),
             codec: String::new(),

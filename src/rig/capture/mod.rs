@@ -9,6 +9,7 @@
 //! turntables. What is under way shows in a [`Monitor`](crate::state::Monitor); who looks at that,
 //! and from where, the capture does not know.
 
+mod calibrate;
 mod context;
 mod equipment;
 mod error;
@@ -23,6 +24,7 @@ mod stop;
 mod take;
 pub(crate) mod turn;
 
+pub use calibrate::{measure_rotation, read_facts, write_facts};
 pub use context::{CaptureContext, CaptureRequest};
 pub use equipment::Equipment;
 pub use error::{CaptureError, MeterFault, Refusal, Stopped};

@@ -14,6 +14,7 @@ use jiff::Timestamp;
 use relit_data::causes::with_causes;
 use relit_data::turn_light::LEAST_MODULATION;
 
+use super::calibrate::read_facts;
 use super::context::{CaptureContext, CaptureRequest};
 use super::equipment::Equipment;
 use super::error::{CaptureError, Refusal};
@@ -81,7 +82,7 @@ fn run_take(
     context.begin_take(&request.object);
     context.note([preflight::check_clock(begun)?]);
     let (locked, turn) = prepare(equipment, request.meter, context)?;
-    let plan = plan_recording(equipment, request, begun, &locked, context);
+    let plan = plan_recording(equipment, request, begun, &locked, context)?;
     let clock = equipment.clock();
     let turn_us = equipment.settings().turn_us();
     let camera = equipment
@@ -157,14 +158,15 @@ fn plan_recording(
     begun: Timestamp,
     locked: &LockedCamera,
     context: CaptureContext<'_>,
-) -> RecordingPlan {
+) -> Result<RecordingPlan, CaptureError> {
     let settings = equipment.settings();
-    let manifest = manifest(equipment, &request.object, begun, locked);
+    let rig = read_facts(&settings.root)?;
+    let manifest = manifest(equipment, &request.object, begun, locked, rig);
     context.monitor.update(|state| {
         state.session = Some(manifest.id.clone());
         state.frames_wanted = settings.frames(locked.stream.fps);
     });
-    RecordingPlan {
+    Ok(RecordingPlan {
         manifest,
         root: settings.root.clone(),
         stream: locked.stream,
@@ -176,7 +178,7 @@ fn plan_recording(
         stall: NEXT_FRAME,
         clock: equipment.clock(),
         preview: context.preview.cloned(),
-    }
+    })
 }
 
 /// Opens, checks and locks what a take needs, before the table turns for it.

@@ -57,12 +57,12 @@ impl TurnRecording<'_> {
         let margin_us = preflight::margin_us(&plan);
         let mut turn = table.start_turn(plan)?;
         self.context.enter(Phase::Starting);
-        let part = turn.wait_constant()?;
-        let from_us = part.from_us.saturating_add(margin_us);
+        let (constant_us, _) = turn.wait_constant()?;
+        let from_us = constant_us.saturating_add(margin_us);
         self.recorder.begin_journal(turn.expected());
         let mut seen = 0;
         let recorded = self.record_from(from_us, || {
-            turn.state()?;
+            turn.check()?;
             seen = self.keep_journal(&turn, seen);
             // A table that does not answer ends the turn, as its state shows the next time.
             let _shown = show_table(self.context.monitor, table);

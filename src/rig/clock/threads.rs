@@ -60,7 +60,7 @@ impl<T> JoinHandle<T> {
 
 /// A scope for threads that end before [`Clock::scope`] returns.
 #[derive(Debug)]
-pub struct Scope<'scope, 'env: 'scope> {
+pub(crate) struct Scope<'scope, 'env: 'scope> {
     scope: &'scope thread::Scope<'scope, 'env>,
     clock: Clock,
     /// Number of threads that have not ended.
@@ -69,7 +69,7 @@ pub struct Scope<'scope, 'env: 'scope> {
 
 /// A thread started by [`Scope::spawn`].
 #[derive(Debug)]
-pub struct ScopedJoinHandle<'scope, T> {
+pub(crate) struct ScopedJoinHandle<'scope, T> {
     thread: thread::ScopedJoinHandle<'scope, T>,
     ended: Arc<Waitable<bool>>,
 }
@@ -80,13 +80,13 @@ impl<T> ScopedJoinHandle<'_, T> {
     /// # Errors
     /// The panic of the thread.
     #[track_caller]
-    pub fn join(self) -> thread::Result<T> {
+    pub(crate) fn join(self) -> thread::Result<T> {
         self.ended.wait(|ended| ended.then_some(()));
         self.thread.join()
     }
 
     /// Whether the thread has ended.
-    pub fn is_finished(&self) -> bool {
+    pub(crate) fn is_finished(&self) -> bool {
         *self.ended.lock()
     }
 }
@@ -124,7 +124,10 @@ impl Clock {
     }
 
     /// Runs `body`, which may start threads that borrow local values, and waits for their ends.
-    pub fn scope<'env, T>(&self, body: impl for<'scope> FnOnce(&Scope<'scope, 'env>) -> T) -> T {
+    pub(crate) fn scope<'env, T>(
+        &self,
+        body: impl for<'scope> FnOnce(&Scope<'scope, 'env>) -> T,
+    ) -> T {
         thread::scope(|scope| {
             let scope = Scope {
                 scope,
@@ -142,7 +145,7 @@ impl<'scope> Scope<'scope, '_> {
     ///
     /// # Errors
     /// The system cannot start a thread.
-    pub fn spawn<T: Send + 'scope>(
+    pub(crate) fn spawn<T: Send + 'scope>(
         &self,
         name: &str,
         work: impl FnOnce() -> T + Send + 'scope,

@@ -21,7 +21,7 @@ pub struct ProcessingPrograms {
 
 /// The same work for a terminal, to be copied.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct ProcessingCommands {
+pub(crate) struct ProcessingCommands {
     /// Makes the mask by the turn.
     pub mask: String,
     /// Extracts the session into the data set.
@@ -92,7 +92,7 @@ impl ProcessingPrograms {
 impl ProcessingCommands {
     /// The commands for a session's folder and a data set's.
     #[must_use]
-    pub fn of(session: &Path, dataset: &Path) -> Self {
+    pub(crate) fn of(session: &Path, dataset: &Path) -> Self {
         let (session, dataset) = (quoted(session), quoted(dataset));
         Self {
             mask: format!("relit-mask {session} --auto"),

@@ -25,7 +25,7 @@ const LOOK: Duration = Duration::from_millis(20);
 
 /// Where requests for the editor go.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct EditorTarget {
+pub(crate) struct EditorTarget {
     /// Its address, on this machine.
     pub address: SocketAddr,
     /// What it demands.

@@ -24,8 +24,9 @@ use std::time::{Duration, Instant};
 
 use relit_data::naming::is_session_name;
 
-pub use commands::{ProcessingCommands, ProcessingPrograms};
-pub use editor::EditorTarget;
+pub(crate) use commands::ProcessingCommands;
+pub use commands::ProcessingPrograms;
+pub(crate) use editor::EditorTarget;
 pub use shared::ProcessingOptions;
 
 use crate::command::Refused;
@@ -57,7 +58,7 @@ impl ProcessingError {
 /// What a request changes of the settings; what is left out stays.
 #[derive(Debug, Clone, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ProcessingChange {
+pub(crate) struct ProcessingChange {
     /// Whether each usable take is processed once the rig rests.
     pub when_done: Option<bool>,
     /// The data set's name: a folder beside that of the sessions.
@@ -171,7 +172,7 @@ impl Processing {
     ///
     /// # Errors
     /// [`Refused::Invalid`] where the data set cannot have that name.
-    pub fn configure(&self, change: ProcessingChange) -> Result<(), Refused> {
+    pub(crate) fn configure(&self, change: ProcessingChange) -> Result<(), Refused> {
         let names = change.dataset.as_deref();
         if names.is_some_and(|name| !is_session_name(name)) {
             let error = "the data set's name has letters, digits, '-', '_' and '.', and no dot at its beginning: it is a folder beside that of the sessions";
@@ -240,7 +241,7 @@ impl Processing {
     ///
     /// # Errors
     /// [`Refused`] where none is open, or it is held while the rig is busy.
-    pub fn editor(&self) -> Result<EditorTarget, Refused> {
+    pub(crate) fn editor(&self) -> Result<EditorTarget, Refused> {
         if is_busy(&self.shared.monitor) {
             return Err(Refused::Unavailable(HELD.to_owned()));
         }

@@ -1,8 +1,11 @@
-//! A bounded cache that many threads share.
+//! A bounded cache that many threads share, and what tells whether a file is still as it was cached.
 
+use std::fs;
 use std::hash::Hash;
 use std::num::NonZeroUsize;
+use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
 
 use lru::LruCache;
 
@@ -32,5 +35,23 @@ impl<K: Hash + Eq, V: Clone> Cache<K, V> {
 
     fn lock(&self) -> MutexGuard<'_, LruCache<K, V>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Length and time of the last change of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct FileVersion {
+    bytes: u64,
+    modified: Option<SystemTime>,
+}
+
+impl FileVersion {
+    /// `None` where there is no such file.
+    pub(super) fn of(path: &Path) -> Option<Self> {
+        let data = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
+        Some(Self {
+            bytes: data.len(),
+            modified: data.modified().ok(),
+        })
     }
 }

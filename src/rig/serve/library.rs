@@ -2,14 +2,13 @@
 
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
-use std::{fmt, fs, io};
+use std::{fs, io};
 
 use axum::http::StatusCode;
 use serde::Serialize;
 
-use super::cache::Cache;
+use super::cache::{Cache, FileVersion};
 use super::results::{CHECK_PAGE, ResultsReader, SessionResults};
-use super::version::FileVersion;
 use crate::processing::ProcessingCommands;
 use relit_data::causes::with_causes;
 use relit_data::naming::is_session_name;
@@ -106,13 +105,6 @@ pub(super) struct Library {
     /// Summaries by folder, and the version of the manifest that each was made from.
     summaries: Cache<(PathBuf, FileVersion), SessionSummary>,
     results: ResultsReader,
-}
-
-impl fmt::Debug for Library {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut library = f.debug_struct("Library");
-        library.field("root", &self.root).finish_non_exhaustive()
-    }
 }
 
 impl Library {

@@ -27,7 +27,6 @@ mod routes;
 mod sessions;
 mod snapshots;
 mod trash;
-mod version;
 
 #[cfg(test)]
 mod tests;

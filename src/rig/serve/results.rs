@@ -9,10 +9,10 @@ use std::sync::Arc;
 
 use relit_data::session::MASK_FILE;
 use relit_data::shard::{Dataset, QualityVerdict};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+use serde_json::Value;
 
-use super::cache::Cache;
-use super::version::FileVersion;
+use super::cache::{Cache, FileVersion};
 
 /// The record of a mask, and of its check, in a session's folder.
 const RECORD_FILE: &str = "mask.json";
@@ -100,43 +100,11 @@ pub(super) struct SessionResults {
     pub(super) extraction: Option<ExtractionState>,
 }
 
-/// The mask's record, as far as it is needed.
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct MaskRecordLine {
-    warnings: Vec<String>,
-    hints: HintsLine,
-    result: ResultLine,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct HintsLine {
-    rect: serde_json::Value,
-    seeds: serde_json::Value,
-    strokes: serde_json::Value,
-    turn_frames: Vec<u64>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct ResultLine {
-    mask_blake3: String,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct CheckLine {
-    verdict: String,
-    reasons: Vec<String>,
-    mask_blake3: String,
-}
-
 /// A session's entry, and the hash of the mask that it was made with.
 type Entry = (ExtractionState, String);
 
 /// What differs between one state of a session's results and another.
-#[derive(Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct ResultsKey {
     folder: PathBuf,
     files: [Option<FileVersion>; 3],
@@ -148,12 +116,6 @@ struct ResultsKey {
 pub(super) struct ResultsReader {
     results: Cache<ResultsKey, SessionResults>,
     datasets: Cache<(PathBuf, FileVersion), Arc<BTreeMap<String, Entry>>>,
-}
-
-impl std::fmt::Debug for ResultsKey {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_tuple("ResultsKey").field(&self.folder).finish()
-    }
 }
 
 impl ResultsReader {
@@ -214,13 +176,13 @@ fn read(folder: &Path, entry: Option<Entry>) -> SessionResults {
     let hash = png.map(|png| blake3::hash(&png).to_hex().to_string());
     let is_same = |made: &str| hash.as_deref() == Some(made);
     let mask = hash.as_ref().map(|_| {
-        let record: Option<MaskRecordLine> = json(&folder.join(RECORD_FILE));
-        mask_state(record.filter(|record| is_same(&record.result.mask_blake3)))
+        let record = json(&folder.join(RECORD_FILE));
+        mask_state(record.filter(|record| is_same(text(&record["result"]["mask_blake3"]))))
     });
-    let check = json(&folder.join(CHECK_FILE)).map(|check: CheckLine| CheckState {
-        is_current: is_same(&check.mask_blake3),
-        verdict: check.verdict,
-        reasons: check.reasons,
+    let check = json(&folder.join(CHECK_FILE)).map(|check| CheckState {
+        verdict: text(&check["verdict"]).to_owned(),
+        reasons: texts(&check["reasons"]),
+        is_current: is_same(text(&check["mask_blake3"])),
     });
     let extraction = entry.map(|(state, made_with)| ExtractionState {
         is_current: is_same(&made_with),
@@ -237,27 +199,35 @@ fn read(folder: &Path, entry: Option<Entry>) -> SessionResults {
     results
 }
 
-fn mask_state(record: Option<MaskRecordLine>) -> MaskState {
+fn mask_state(record: Option<Value>) -> MaskState {
     let Some(record) = record else {
         return MaskState {
             origin: MaskOrigin::Hand,
             warnings: Vec::new(),
         };
     };
-    let hints = &record.hints;
-    let given = |value: &serde_json::Value| match value {
-        serde_json::Value::Null => false,
-        serde_json::Value::Array(items) => !items.is_empty(),
+    let given = |name: &str| match &record["hints"][name] {
+        Value::Null => false,
+        Value::Array(items) => !items.is_empty(),
         _ => true,
     };
-    let is_hinted = given(&hints.rect) || given(&hints.seeds) || given(&hints.strokes);
+    let is_hinted = given("rect") || given("seeds") || given("strokes");
     MaskState {
-        origin: match is_hinted || hints.turn_frames.is_empty() {
+        origin: match is_hinted || !given("turn_frames") {
             true => MaskOrigin::Hints,
             false => MaskOrigin::Turn,
         },
-        warnings: record.warnings,
+        warnings: texts(&record["warnings"]),
     }
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap_or_default()
+}
+
+fn texts(value: &Value) -> Vec<String> {
+    let values = value.as_array().into_iter().flatten();
+    values.map(|value| text(value).to_owned()).collect()
 }
 
 /// How far the session has come, and whether a person has to look. What was made of an earlier mask does not count.
@@ -279,6 +249,6 @@ fn judged(results: &SessionResults) -> (SessionStage, Option<bool>) {
 }
 
 /// The content of a JSON file; `None` where there is none, or it is something else.
-fn json<T: for<'a> Deserialize<'a>>(path: &Path) -> Option<T> {
+fn json(path: &Path) -> Option<Value> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 use std::time::Duration;
 
-use super::error::SimulatorError;
+use super::SimulatorError;
 
 /// Faults of the wire and of the chip.
 ///
@@ -24,17 +24,8 @@ pub struct TableFaults {
     pub resets: Vec<Duration>,
     /// Time at which the chip stops for good.
     pub stall: Option<Duration>,
-    /// When the emergency stop is pressed.
-    pub emergency_stops: Vec<EmergencyStop>,
-}
-
-/// The emergency stop, pressed for a while.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct EmergencyStop {
-    /// Time at which it is pressed.
-    pub at: Duration,
-    /// How long it stays pressed; `None`: for good.
-    pub lasts: Option<Duration>,
+    /// When the emergency stop is pressed, and for how long; `None`: for good.
+    pub emergency_stops: Vec<(Duration, Option<Duration>)>,
 }
 
 /// Faults of one direction of the wire; fractions from 0 to 1.
@@ -131,13 +122,12 @@ fn share(text: &str) -> Result<f64, &'static str> {
 }
 
 /// `30s` or `30s:8s`.
-fn emergency_stop(text: &str) -> Result<EmergencyStop, &'static str> {
+fn emergency_stop(text: &str) -> Result<(Duration, Option<Duration>), &'static str> {
     let (at, lasts) = match text.split_once(':') {
         Some((at, lasts)) => (at, Some(duration(lasts)?)),
         None => (text, None),
     };
-    let at = duration(at)?;
-    Ok(EmergencyStop { at, lasts })
+    Ok((duration(at)?, lasts))
 }
 
 fn duration(text: &str) -> Result<Duration, &'static str> {
@@ -182,14 +172,8 @@ mod tests {
             resets: vec![Duration::from_millis(12_500), Duration::from_secs(20)],
             stall: Some(Duration::from_secs(30)),
             emergency_stops: vec![
-                EmergencyStop {
-                    at: Duration::from_secs(5),
-                    lasts: Some(Duration::from_millis(250)),
-                },
-                EmergencyStop {
-                    at: Duration::from_secs(9),
-                    lasts: None,
-                },
+                (Duration::from_secs(5), Some(Duration::from_millis(250))),
+                (Duration::from_secs(9), None),
             ],
         };
         assert_eq!(faults, expected);

@@ -31,7 +31,6 @@
 //! port.
 
 mod chip;
-mod error;
 mod faults;
 mod ground_truth;
 mod model;
@@ -48,8 +47,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::clock::{Clock, JoinHandle};
 
-pub use error::SimulatorError;
-pub use faults::{EmergencyStop, TableFaults, WireFaults};
+pub use faults::{TableFaults, WireFaults};
 pub use ground_truth::{STEPS_PER_TURN, StepEdge};
 pub use options::{SimulatorCounts, SimulatorOptions};
 pub use simulated_table::{SimulatedPort, SimulatedTable};
@@ -57,6 +55,23 @@ pub use wire::WireCounts;
 
 use simulated_table::LOOK;
 use terminal::Terminal;
+
+/// An error of the simulator.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulatorError {
+    /// A fault that does not exist.
+    #[error("the fault {item:?} is not understood: {why}")]
+    Fault {
+        /// The fault.
+        item: String,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// A pseudoterminal, its link or a thread could not be had; why, and what to do.
+    #[error("{0}")]
+    System(String),
+}
 
 /// A simulated table at a pseudoterminal, with a thread. Runs until it is stopped or dropped.
 ///

@@ -181,9 +181,9 @@ impl Model {
 fn events(faults: &TableFaults) -> impl Iterator<Item = (Duration, Event)> {
     let restarts = faults.resets.iter().map(|at| (*at, Event::Restart));
     let stall = faults.stall.iter().map(|at| (*at, Event::Stall));
-    let presses = faults.emergency_stops.iter().flat_map(|stop| {
-        let press = (stop.at, Event::EmergencyStop(true));
-        let release = stop.lasts.map(|lasts| stop.at.saturating_add(lasts));
+    let presses = faults.emergency_stops.iter().flat_map(|&(at, lasts)| {
+        let press = (at, Event::EmergencyStop(true));
+        let release = lasts.map(|lasts| at.saturating_add(lasts));
         let release = release.map(|at| (at, Event::EmergencyStop(false)));
         std::iter::once(press).chain(release)
     });

@@ -9,7 +9,7 @@ use rustix::io::{Errno, FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use super::error::SimulatorError;
+use super::SimulatorError;
 use super::openings::Openings;
 
 /// The chip's end of the serial line.

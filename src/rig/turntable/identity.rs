@@ -31,15 +31,6 @@ impl Extras {
     }
 }
 
-/// The range in which the table may turn, degrees from machine zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TravelLimits {
-    /// Lower end.
-    pub low_deg: f64,
-    /// Upper end.
-    pub high_deg: f64,
-}
-
 /// A controller, as it describes itself.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -56,8 +47,8 @@ pub struct Identity {
     pub max_degrees_per_second: f64,
     /// Acceleration, degrees/s^2.
     pub acceleration: f64,
-    /// The range in which it may turn.
-    pub limits: TravelLimits,
+    /// The range in which it may turn, degrees from machine zero.
+    pub limits: (f64, f64),
     /// Whether homing with an index sensor is enabled (`$22`).
     pub homing: bool,
     /// Its lease, seconds; 0 if it is off, `None` if the controller has none.
@@ -169,7 +160,7 @@ impl GrblSettings {
         self.get(number).is_some_and(|value| value != 0.0)
     }
 
-    fn limits(&self, extras: Extras, travel_deg: f64) -> Result<TravelLimits, TurntableError> {
+    fn limits(&self, extras: Extras, travel_deg: f64) -> Result<(f64, f64), TurntableError> {
         let reach_deg = match self.is_on(20) {
             true => self
                 .positive(130)
@@ -178,10 +169,7 @@ impl GrblSettings {
         };
         // Stock Grbl's soft limits reach from the far end of the axis to machine zero.
         let stock = self.is_on(20) && extras == Extras::default();
-        Ok(TravelLimits {
-            low_deg: -reach_deg,
-            high_deg: if stock { 0.0 } else { reach_deg },
-        })
+        Ok((-reach_deg, if stock { 0.0 } else { reach_deg }))
     }
 }
 
@@ -215,7 +203,7 @@ mod tests {
         assert!(rig.extras.stamps && rig.extras.checked_lines && rig.extras.lease);
         assert_eq!(rig.firmware, "1.1h.20261121 (relit)");
         assert_eq!(rig.lease_s, Some(0.0));
-        assert_eq!((rig.limits.low_deg, rig.limits.high_deg), (-400.0, 400.0));
+        assert_eq!(rig.limits, (-400.0, 400.0));
         assert!((rig.max_degrees_per_second - 36.0).abs() < 1e-9);
         let stock = identity(&STOCK, &[]).unwrap();
         assert!(stock.is_stock());
@@ -225,9 +213,8 @@ mod tests {
     #[test]
     fn a_stock_boards_soft_limits_lie_below_zero_and_without_them_the_given_travel_counts() {
         let limits = |settings: &[(u16, f64)]| identity(&STOCK, settings).unwrap().limits;
-        assert_eq!((limits(&[]).low_deg, limits(&[]).high_deg), (-400.0, 0.0));
-        let free = limits(&[(20, 0.0), (130, 200.0)]);
-        assert_eq!((free.low_deg, free.high_deg), (-400.0, 400.0));
+        assert_eq!(limits(&[]), (-400.0, 0.0));
+        assert_eq!(limits(&[(20, 0.0), (130, 200.0)]), (-400.0, 400.0));
     }
 
     #[test]

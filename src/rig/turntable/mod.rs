@@ -76,14 +76,14 @@ pub use error::{MotionFault, TurntableError};
 pub use family::Family;
 pub use grbl_client::Table;
 pub use homing::Homed;
-pub use identity::{Extras, Identity, TravelLimits};
+pub use identity::{Extras, Identity};
 pub use owner::Owner;
 pub use plan::{TurnDirection, TurnPlan, TurnRequest};
 pub use port::{Port, SerialPort};
 pub use status::TableStatus;
 pub use sync::{Track, TrackError};
 
-pub use turn::{ConstantPart, FinishedTurn, Turn, TurnPhase};
+pub use turn::{FinishedTurn, Turn};
 pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};
 
 /// How a table is opened.

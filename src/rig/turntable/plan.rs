@@ -152,9 +152,10 @@ impl Identity {
     /// free.
     pub(super) fn limits_from(&self, status: &TableStatus) -> (f64, f64) {
         let zero = status.machine_deg - status.angle_deg;
-        let reach = self.limits.high_deg.max(-self.limits.low_deg);
-        let low = (self.limits.low_deg - zero).max(-reach);
-        let high = (self.limits.high_deg - zero).min(reach);
+        let (low, high) = self.limits;
+        let reach = high.max(-low);
+        let low = (low - zero).max(-reach);
+        let high = (high - zero).min(reach);
         (low, high)
     }
 
@@ -228,7 +229,7 @@ mod tests {
 
     use super::*;
     use crate::turntable::family::Family;
-    use crate::turntable::identity::{Extras, TravelLimits};
+    use crate::turntable::identity::Extras;
     use crate::turntable::wire::ControllerState;
 
     fn identity(low_deg: f64, high_deg: f64) -> Identity {
@@ -239,7 +240,7 @@ mod tests {
             steps_per_degree: 88.889,
             max_degrees_per_second: 36.0,
             acceleration: 36.0,
-            limits: TravelLimits { low_deg, high_deg },
+            limits: (low_deg, high_deg),
             homing: false,
             lease_s: None,
             degrees_per_unit: 1.0,

@@ -19,28 +19,6 @@ const RAMP_SLACK: Duration = Duration::from_secs(3);
 /// The lease that a turn sets if the controller's is off, seconds.
 const LEASE_S: u32 = 3;
 
-/// When the table moves at constant speed, extrapolated from its first reports there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ConstantPart {
-    /// Start, microseconds of the host's clock.
-    pub from_us: i64,
-    /// End, microseconds of the host's clock.
-    pub to_us: i64,
-}
-
-/// The phase of a turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TurnPhase {
-    /// Accelerating.
-    Starting,
-    /// At constant speed.
-    Constant,
-    /// Decelerating.
-    Ending,
-    /// At rest at its end.
-    AtEnd,
-}
-
 impl Table {
     /// Moves back by the ramp and starts the turn. From then on the table moves by itself and is
     /// monitored until the [`Turn`] ends or is dropped.
@@ -114,38 +92,18 @@ impl<'table> Turn<'table> {
         &self.plan
     }
 
-    /// Its phase.
-    ///
-    /// # Errors
-    /// The fault that has ended it; the table has been stopped.
-    pub fn state(&mut self) -> Result<TurnPhase, TurntableError> {
-        self.check()?;
-        let supervisor = self.table.link().supervisor();
-        if supervisor
-            .motion()
-            .is_some_and(|motion| motion.is_at_target())
-        {
-            return Ok(TurnPhase::AtEnd);
-        }
-        let gone = supervisor.recorded().last().map(|report| self.gone(report));
-        Ok(match gone {
-            Some(gone) if gone > self.plan.constant_deg => TurnPhase::Ending,
-            Some(gone) if gone >= 0.0 => TurnPhase::Constant,
-            _ => TurnPhase::Starting,
-        })
-    }
-
     /// Degrees since the speed became constant; negative before.
     fn gone(&self, report: &PositionReport) -> f64 {
         let angle = report.machine_deg - self.zero_deg - self.plan.constant_from_deg();
         angle * self.plan.direction.sign()
     }
 
-    /// Waits until the speed is constant.
+    /// Waits until the speed is constant; start and end of the time in which it is, extrapolated from the first
+    /// reports there, microseconds of the host's clock.
     ///
     /// # Errors
     /// The fault that has ended the turn; the table has been stopped.
-    pub fn wait_constant(&mut self) -> Result<ConstantPart, TurntableError> {
+    pub fn wait_constant(&mut self) -> Result<(i64, i64), TurntableError> {
         let speed = self.plan.degrees_per_second;
         let ramp = self.table.travel_time(0.0, speed) + RAMP_SLACK;
         let found = self.table.link().wait(ramp, |supervisor| {
@@ -167,10 +125,8 @@ impl<'table> Turn<'table> {
             i64::midpoint(asked_us, report.came_us)
         });
         let micros = |degrees: f64| (degrees / speed * 1e6).round() as i64;
-        Ok(ConstantPart {
-            from_us: at_us - micros(gone),
-            to_us: at_us + micros(self.plan.constant_deg - gone),
-        })
+        let to_us = at_us + micros(self.plan.constant_deg - gone);
+        Ok((at_us - micros(gone), to_us))
     }
 
     /// Waits until the table rests at the turn's end, turns it back if the plan says so, and returns
@@ -248,7 +204,10 @@ impl<'table> Turn<'table> {
     }
 
     /// Ends the turn if a fault has occurred.
-    fn check(&mut self) -> Result<(), TurntableError> {
+    ///
+    /// # Errors
+    /// That fault; the table has been stopped.
+    pub fn check(&mut self) -> Result<(), TurntableError> {
         match self.table.end_by_fault() {
             Ok(None) => Ok(()),
             Ok(Some(error)) | Err(error) => {

@@ -159,41 +159,13 @@ pub struct ControlSetting {
     pub value: i64,
 }
 
-/// A property that cannot be held, because a control is missing.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MissingControl {
-    /// The camera has no control for it: it is fixed, or the camera alone decides.
-    #[error("the camera has no control of its {0}")]
-    NoControl(Aspect),
-    /// The automatic can be switched off, but there is no value to hold.
-    #[error("the camera's {0} can be switched to manual, but not set")]
-    NoValue(Aspect),
-    /// The automatic has no manual setting, or is read-only.
-    #[error("the camera's {aspect} cannot be switched to manual: {control} does not allow it")]
-    NoManual {
-        /// The property that it holds.
-        aspect: Aspect,
-        /// The switch's name.
-        control: String,
-    },
-    /// The value is read-only, or held by the stream or another program.
-    #[error("the camera's {aspect} cannot be set: {control} may not be written now")]
-    NotSettable {
-        /// The property that it holds.
-        aspect: Aspect,
-        /// The control's name.
-        control: String,
-    },
-}
-
 /// Which controls to set so that every [`Aspect`] is held, and which are missing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ManualPlan {
     /// In this order: first all automatics off, then the values, which automatics would refuse.
     pub steps: Vec<ControlSetting>,
-    /// What cannot be held.
-    pub missing: Vec<MissingControl>,
+    /// What cannot be held, a sentence each.
+    pub missing: Vec<String>,
 }
 
 /// A control whose value is not what it should be.
@@ -228,12 +200,12 @@ impl ManualPlan {
                 continue;
             }
             if plan.missing.len() == before && !held {
-                let missing = if switched.is_some() {
-                    MissingControl::NoValue
-                } else {
-                    MissingControl::NoControl
-                };
-                plan.missing.push(missing(aspect));
+                plan.missing.push(match switched {
+                    Some(_) => {
+                        format!("the camera's {aspect} can be switched to manual, but not set")
+                    }
+                    None => format!("the camera has no control of its {aspect}"),
+                });
             }
         }
         plan.steps.extend(values);
@@ -274,10 +246,9 @@ impl ManualPlan {
                     self.steps.push(step(aspect, control, value));
                     switched = Some(manual);
                 }
-                _ => self.missing.push(MissingControl::NoManual {
-                    aspect,
-                    control: control.name.clone(),
-                }),
+                _ => self.missing.push(format!(
+                    "the camera's {aspect} cannot be switched to manual: {name} does not allow it"
+                )),
             }
         }
         switched
@@ -297,10 +268,10 @@ impl ManualPlan {
                 continue;
             };
             if !may_be_set(control) {
-                self.missing.push(MissingControl::NotSettable {
-                    aspect,
-                    control: control.name.clone(),
-                });
+                self.missing.push(format!(
+                    "the camera's {aspect} cannot be set: {} may not be written now",
+                    control.name
+                ));
                 continue;
             }
             let value = match (aspect, wanted.of(&control.name, aspect)) {

@@ -6,7 +6,6 @@
 //! cameras have few or none.
 
 mod controls;
-mod formats;
 mod worker;
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -14,17 +13,17 @@ use std::time::Duration;
 
 use ::nokhwa::pixel_format::RgbFormat;
 use ::nokhwa::utils::{
-    CameraFormat, CameraIndex, RequestedFormat, RequestedFormatType, Resolution,
+    CameraFormat, CameraIndex, FrameFormat, RequestedFormat, RequestedFormatType, Resolution,
 };
 use ::nokhwa::{Camera as Library, NokhwaError, nokhwa_check, nokhwa_initialize};
 use relit_data::causes::with_causes;
+use relit_video::PixelFormat;
 
 use self::controls::ControlNumbers;
-use self::formats::{fourcc, library_format};
 use self::worker::{FrameResult, Worker};
 use super::{
-    Camera, CameraAddress, CameraError, Control, ControlFault, ControlId, DeviceInfo, Frame,
-    GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes,
+    Camera, CameraAddress, CameraError, Control, ControlFault, ControlId, DeviceInfo, Fourcc,
+    Frame, GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes,
 };
 
 /// Longest wait for the user's permission to use the camera.
@@ -227,6 +226,24 @@ fn gathered(formats: &[CameraFormat]) -> Vec<Mode> {
         }
     }
     modes
+}
+
+/// The code of what the library calls a format.
+fn fourcc(format: FrameFormat) -> Option<Fourcc> {
+    let mut formats = PixelFormat::ALL.into_iter();
+    let found = formats.find(|&known| library_format(known) == Some(format))?;
+    Some(Fourcc::of(found))
+}
+
+fn library_format(wanted: PixelFormat) -> Option<FrameFormat> {
+    match wanted {
+        PixelFormat::Mjpeg => Some(FrameFormat::MJPEG),
+        PixelFormat::Yuyv => Some(FrameFormat::YUYV),
+        PixelFormat::Nv12 => Some(FrameFormat::NV12),
+        PixelFormat::Grey => Some(FrameFormat::GRAY),
+        PixelFormat::Rgb24 => Some(FrameFormat::RAWRGB),
+        PixelFormat::H264 | PixelFormat::Bayer(_) => None,
+    }
 }
 
 #[cfg(test)]

@@ -314,7 +314,7 @@ fn modes_of_exposure_are_locked_and_values_held() {
         ("gain", 40),
     ];
     assert_eq!(steps, wanted);
-    let missing: Vec<String> = plan.missing.iter().map(ToString::to_string).collect();
+    let missing = plan.missing.clone();
     assert_eq!(missing.len(), 2, "focus and power line: {missing:?}");
     assert_eq!(plan.apply(&mut camera).unwrap(), []);
     let unknown = camera.set_control(ControlId(77), 1).unwrap_err();

@@ -14,7 +14,7 @@ use std::time::Duration;
 use ::nokhwa::utils::{CameraFormat, FrameFormat, RequestedFormat, RequestedFormatType};
 use ::nokhwa::{Camera as Library, NokhwaError};
 
-use super::formats::fourcc;
+use super::fourcc;
 use crate::camera::{CameraError, Fourcc, Frame};
 use crate::clock::Clock;
 use relit_data::session::FrameClock;

@@ -128,22 +128,22 @@ impl MeteringLoop<'_> {
     }
 
     fn search_in(&mut self, turn: &mut Turn<'_>) -> Result<i64, CaptureError> {
-        let part = turn.wait_constant()?;
+        let (from_us, to_us) = turn.wait_constant()?;
         let speed = turn.plan().degrees_per_second;
         loop {
             self.stop.check()?;
-            turn.state()?;
+            turn.check()?;
             let frame = self.camera.next_frame(NEXT_FRAME)?;
-            if frame.t_us >= part.to_us {
+            if frame.t_us >= to_us {
                 return Err(MeterFault::Unseen(self.search.unseen()).into());
             }
             let Some(clipped) = self.clipped(&frame) else {
                 continue;
             };
-            if frame.t_us < part.from_us {
+            if frame.t_us < from_us {
                 continue;
             }
-            let turned_deg = (frame.t_us - part.from_us) as f64 / 1e6 * speed;
+            let turned_deg = (frame.t_us - from_us) as f64 / 1e6 * speed;
             match self.search.add(turned_deg, clipped)? {
                 Advice::Continue => {}
                 Advice::Set => self.set_exposure()?,
@@ -173,14 +173,14 @@ fn plan(table: &Table, fps: f64, home_deg: f64) -> Result<TurnPlan, CaptureError
     let identity = table.identity();
     let speed = (DEGREES_A_FRAME * fps).min(identity.max_degrees_per_second);
     let ramp_deg = speed * speed / (2.0 * identity.acceleration) + MARGIN_DEG + 1.0;
-    let limits = identity.limits;
-    let free_deg = limits.high_deg - limits.low_deg - 2.0 * ramp_deg;
+    let (low_deg, high_deg) = identity.limits;
+    let free_deg = high_deg - low_deg - 2.0 * ramp_deg;
     let turn_deg = free_deg.clamp(360.0, MOST_TURN);
     // The limits are given in the controller's own coordinates.
     let status = table.status()?;
     let zero = status.machine_deg - status.angle_deg;
-    let latest = limits.high_deg - zero - ramp_deg - turn_deg;
-    let earliest = limits.low_deg - zero + ramp_deg;
+    let latest = high_deg - zero - ramp_deg - turn_deg;
+    let earliest = low_deg - zero + ramp_deg;
     let start_deg = home_deg.min(latest).max(earliest);
     if (start_deg - home_deg).abs() > identity.step_deg() {
         table.jog(start_deg - home_deg, None)?;

@@ -10,6 +10,7 @@ use crate::camera::{
     ControlFlags, ControlId, ControlKind, DeviceInfo, Fourcc, GrantedMode, MenuItem, Mode,
     ModeRequest, Rate, Rates, Sizes,
 };
+use crate::capture::Settings;
 use crate::capture::preflight::ready_table;
 use crate::clock::Clock;
 use crate::simulator::{SimulatedTable, SimulatorOptions};
@@ -179,7 +180,7 @@ fn metered(light: fn(f64) -> f64) -> (Result<i64, CaptureError>, f64, i64) {
     let mut locked = LockedCamera::lock(&mut scene, &settings, &stop).unwrap();
     ready_table(&table, &settings).unwrap();
     let before = table.status().unwrap().angle_deg;
-    let found = meter(&mut scene, &table, &mut locked, &settings, &stop);
+    let found = meter(&mut scene, &table, &mut locked, &stop);
     let off = table.status().unwrap().angle_deg - before;
     (found, off, scene.exposure)
 }

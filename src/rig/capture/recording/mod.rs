@@ -25,13 +25,11 @@ mod recorder;
 mod salvage;
 mod timing;
 mod verdict;
-mod window;
 mod writer_thread;
 
 pub use error::RecordingError;
 pub use outcome::End;
-pub use progress::Progress;
+pub use progress::{Progress, Window};
 pub use recorder::{Recorder, RecordingPlan};
 pub use salvage::{Salvaged, Saved, salvage, salvage_session};
 pub use verdict::Recorded;
-pub use window::Window;

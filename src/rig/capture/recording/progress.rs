@@ -1,6 +1,6 @@
-//! What a recording's owner and its two threads share: wishes one way, figures the other.
+//! What a recording's owner and its two threads share: wishes one way, such as the time of the turn, figures the
+//! other.
 
-use super::window::Window;
 use crate::clock::Waitable;
 
 /// How far a recording has come.
@@ -26,3 +26,35 @@ pub(super) struct State {
 
 /// Locked for moments only: the camera's thread looks at it between two frames.
 pub(super) type Shared = Waitable<State>;
+
+/// From the first instant of a turn up to, but not with, the last; microseconds of the clock that
+/// stamps the frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    from_us: i64,
+    to_us: i64,
+}
+
+impl Window {
+    /// A window of `us` microseconds, at least one, from `from_us` on.
+    #[must_use]
+    pub fn lasting(from_us: i64, us: i64) -> Self {
+        let from_us = from_us.min(i64::MAX - 1);
+        Self {
+            from_us,
+            to_us: from_us.saturating_add(us.max(1)),
+        }
+    }
+
+    /// When it begins, microseconds.
+    #[must_use]
+    pub fn from_us(self) -> i64 {
+        self.from_us
+    }
+
+    /// When it is over, microseconds.
+    #[must_use]
+    pub fn to_us(self) -> i64 {
+        self.to_us
+    }
+}

@@ -224,11 +224,11 @@ fn a_turn_has_the_angles_of_the_table_and_unwinds() {
         rig.table.home().unwrap();
         let mut turn = rig.turn(90.0);
         let constant = turn.wait_constant().unwrap();
-        assert_eq!(turn.state().unwrap(), TurnPhase::Constant);
+        turn.check().unwrap();
         let track = turn.wait_end().unwrap();
         let (from_us, to_us) = track.constant_us();
-        assert!((constant.from_us - from_us).abs() < 200_000);
-        assert!((constant.to_us - to_us).abs() < 200_000);
+        assert!((constant.0 - from_us).abs() < 200_000);
+        assert!((constant.1 - to_us).abs() < 200_000);
         assert!((track.degrees_per_second() - 7.2 * 1.004).abs() < 0.01);
 
         let fake_grbl = rig.fake_grbl.lock().unwrap();
@@ -323,7 +323,7 @@ fn a_controller_that_falls_silent_for_two_seconds_ends_the_turn() {
     );
     assert!((1_900_000..4_000_000).contains(&took_us), "{took_us} us");
     // Whether it stands is unknown.
-    assert!(matches!(turn.state(), Err(TurntableError::NotStopped)));
+    assert!(matches!(turn.check(), Err(TurntableError::NotStopped)));
     drop(turn);
     assert!(rig.table.link().supervisor().zero_deg().is_none());
 }

@@ -8,8 +8,8 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use super::progress::Window;
 use super::timing::{FrameStamp, FrameTiming, MissingFrames, TimingAnomaly, gaps};
-use super::window::Window;
 use crate::camera::Frame;
 
 /// How long a frame waits for a turn to be announced, microseconds.
