@@ -73,7 +73,7 @@ pub struct SolvedTurn {
     /// Normals, albedo and light.
     pub solution: TurnSolution,
     /// What the network of turns expects of its normals.
-    pub network: NetworkFigures,
+    pub(crate) network: NetworkFigures,
     /// The light by the ball, where there is one.
     pub ball: Option<ProbeLight>,
     /// How long the shard took to read.

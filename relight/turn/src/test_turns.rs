@@ -11,11 +11,14 @@ use relight_core::render::{DiffuseForm, DiffuseLayer, Surface};
 use crate::fit::residuals::lit;
 use crate::model::gloss::{GlossLight, MIRROR};
 use crate::model::harmonics::basis_at;
+use crate::model::lighting::TableLight;
 use crate::model::shading::ShadingModel;
+use crate::network::predict::NetworkFigures;
+use crate::network::predict::TurnPrediction;
+use crate::observe::curves::CurveBuilder;
 use crate::{
-    CurveBuilder, Elevation, FactSource, MaterialKind, NetworkFigures, ReadTurn, SolvedTurn,
-    TableFrame, TableLight, TableRotation, TurnCurves, TurnPrediction, TurnSolution,
-    solve_in_light,
+    Elevation, FactSource, MaterialKind, ReadTurn, SolvedTurn, TableFrame, TableRotation,
+    TurnCurves, TurnSolution, solve_in_light,
 };
 
 pub(crate) const SIDE: usize = 24;

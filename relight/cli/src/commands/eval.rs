@@ -89,9 +89,6 @@ struct TurnArguments {
     /// Turns with their ground truth, as relight synth --turn writes them.
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// What the table calls these turns [default: the folder's name].
-    #[arg(long, value_name = "TEXT")]
-    split: Option<String>,
     /// How turns are solved; may be given several times [default: all ways].
     #[arg(long, value_name = "HOW", value_parser = one_of(METHODS))]
     method: Vec<TurnMethod>,
@@ -108,9 +105,6 @@ struct CommonArguments {
     /// The folder of the ground truth.
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// What the table calls these images [default: the folder's name].
-    #[arg(long, value_name = "TEXT")]
-    split: Option<String>,
     /// A folder of estimates, with a folder for each image. May be given several times.
     #[arg(long, value_name = "DIR")]
     predictions: Vec<PathBuf>,
@@ -224,8 +218,7 @@ impl CommonArguments {
     /// What the table calls the images.
     fn split(&self, which: &str) -> String {
         let name = self.data.file_name().unwrap_or(self.data.as_os_str());
-        let named = || format!("{which} {}", name.to_string_lossy());
-        self.split.clone().unwrap_or_else(named)
+        format!("{which} {}", name.to_string_lossy())
     }
 
     fn predictions(&self) -> Vec<Predictions> {
@@ -365,8 +358,7 @@ fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
         .data
         .file_name()
         .unwrap_or(arguments.data.as_os_str());
-    let own = name.to_string_lossy().into_owned();
-    let split = arguments.split.clone().unwrap_or(own);
+    let split = name.to_string_lossy();
     let methods = match arguments.method.as_slice() {
         [] => &TurnMethod::ALL,
         methods => methods,

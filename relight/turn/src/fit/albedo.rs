@@ -81,7 +81,7 @@ fn chromaticity(light: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::CurveBuilder;
+    use crate::observe::curves::CurveBuilder;
     use relight_core::image::{Extent, Planes};
 
     const EXTENT: Extent = Extent {

@@ -49,8 +49,7 @@ impl TurnSolution {
     }
 
     /// The shading over the whole turn: the mean irradiance of each pixel, or what white metal would show.
-    #[must_use]
-    pub fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
+    pub(crate) fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| {
             let harmonics = self.model.harmonics(self.fits[pixel].normal);
             harmonics.base.map(|harmonics| harmonics[0].max(0.0) as f32)
@@ -82,14 +81,12 @@ impl TurnSolution {
     }
 
     /// The light.
-    #[must_use]
-    pub const fn light(&self) -> &TableLight {
+    pub(crate) const fn light(&self) -> &TableLight {
         &self.model.light
     }
 
     /// The camera over the table.
-    #[must_use]
-    pub const fn frame(&self) -> &TableFrame {
+    pub(crate) const fn frame(&self) -> &TableFrame {
         &self.model.frame
     }
 

@@ -6,7 +6,6 @@ use std::f64::consts::FRAC_PI_2;
 use relight_core::image::{Linear, Rgb};
 
 use crate::error::TurnError;
-use crate::fit::confidence::UNOBSERVABLE;
 use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts, all_statistics};
 use crate::fit::environment::fit_model;
 use crate::fit::photo_albedo::mean_albedo;
@@ -27,7 +26,7 @@ const CALIBRATION: f64 = 1.14;
 /// of what the network of photographs has `seen`.
 ///
 /// # Errors
-/// [`TurnError::NoLight`] where no light fits the curves.
+/// Where the exposure was wrong, or no light fits the curves.
 pub(crate) fn solve_by_network(
     curves: &TurnCurves,
     found: &TurnPrediction,
@@ -35,6 +34,10 @@ pub(crate) fn solve_by_network(
     elevation: Elevation,
     material: MaterialKind,
 ) -> Result<TurnSolution, TurnError> {
+    let conditioning = Conditioning::of(curves);
+    if let Some(advice) = conditioning.verdict.exposure_advice() {
+        return Err(TurnError::Frames(advice.to_owned()));
+    }
     let normals: Vec<[f64; 3]> = curves.pixels_of(found.normals.planes()).map(unit).collect();
     let mut albedo = mean_albedo(curves, &found.albedo, seen);
     let statistics = all_statistics(curves);
@@ -48,16 +51,9 @@ pub(crate) fn solve_by_network(
     let fits: Vec<PixelFit> = fits
         .map(|(&normal, statistics)| fit_of(&model, normal, statistics))
         .collect();
-    let conditioning = Conditioning::of(curves);
-    let unobservable = if conditioning.verdict.is_exposure() {
-        UNOBSERVABLE
-    } else {
-        0.0
-    };
     let expected_errors: Vec<f64> = curves
         .pixels_of(&found.expected_errors)
-        .map(|[degrees]| (CALIBRATION * degrees).to_radians())
-        .map(|expected| expected.hypot(unobservable).min(FRAC_PI_2))
+        .map(|[degrees]| (CALIBRATION * degrees).to_radians().min(FRAC_PI_2))
         .collect();
     let mut solution = TurnSolution {
         fits,
@@ -112,8 +108,9 @@ fn fit_of(model: &ShadingModel, normal: [f64; 3], statistics: &CurveStatistics) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::TurnVerdict;
+    use crate::observe::curves::CurveBuilder;
     use crate::test_turns::{TAKE, ball, elevation, environment, film, knowing, metal_ball, off};
-    use crate::{CurveBuilder, TurnVerdict};
     use relight_core::image::Extent;
 
     #[test]
@@ -162,16 +159,19 @@ mod tests {
     }
 
     #[test]
-    fn of_a_dark_turn_no_light_is_found() {
+    fn of_a_dark_turn_and_a_white_one_the_exposure_is_named() {
         let extent = Extent::new(24, 24);
-        let mut builder = CurveBuilder::new(extent, &[1.0; 576]).unwrap();
-        for k in 0..36 {
-            let angle = f64::from(k) * 10.0;
-            builder.push(angle, extent, [&[0.0; 576]; 3]).unwrap();
+        for (level, said) in [(0.0, "underexposed"), (1.0, "overexposed")] {
+            let mut builder = CurveBuilder::new(extent, &[1.0; 576]).unwrap();
+            for k in 0..36 {
+                let angle = f64::from(k) * 10.0;
+                builder.push(angle, extent, [&[level; 576]; 3]).unwrap();
+            }
+            let curves = builder.finish().unwrap();
+            let (answer, material) = (knowing(&ball(), 10.0), MaterialKind::Diffuse);
+            let found = solve_by_network(&curves, &answer, ball().albedo(), elevation(), material);
+            let refused = found.unwrap_err().to_string();
+            assert!(refused.contains(said), "{refused}");
         }
-        let curves = builder.finish().unwrap();
-        let (answer, material) = (knowing(&ball(), 10.0), MaterialKind::Diffuse);
-        let found = solve_by_network(&curves, &answer, ball().albedo(), elevation(), material);
-        assert!(matches!(found, Err(TurnError::NoLight)));
     }
 }

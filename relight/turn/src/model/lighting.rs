@@ -44,20 +44,18 @@ const OF_COEFFICIENTS: [(usize, f64); TERMS] = {
 ///
 /// The terms of each channel are e, f, g, Re a, Im a, Re b, Im b, Re d, Im d.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TableLight {
+pub(crate) struct TableLight {
     terms: [[f64; TERMS]; 3],
 }
 
 impl TableLight {
     /// The light of these terms, one list a channel.
-    #[must_use]
-    pub const fn new(terms: [[f64; TERMS]; 3]) -> Self {
+    pub(crate) const fn new(terms: [[f64; TERMS]; 3]) -> Self {
         Self { terms }
     }
 
     /// The first nine coefficients of a light in the viewer's frame at the table's angle 0.
-    #[must_use]
-    pub fn from_viewer(light: &ShLight, frame: &TableFrame) -> Self {
+    pub(crate) fn from_viewer(light: &ShLight, frame: &TableFrame) -> Self {
         let light = light.with_order(Order::TWO).rotated(&frame.rotation());
         let coefficients = light.coefficients();
         let terms = [0, 1, 2]
@@ -82,7 +80,7 @@ impl TableLight {
     ///
     /// # Errors
     /// Where a term is not finite.
-    pub fn coefficients(&self) -> Result<ShLight, LightError> {
+    pub(crate) fn coefficients(&self) -> Result<ShLight, LightError> {
         let mut coefficients = vec![[0.0; 3]; TERMS];
         for (term, (at, factor)) in OF_COEFFICIENTS.into_iter().enumerate() {
             coefficients[at] = [0, 1, 2].map(|channel| self.terms[channel][term] / factor);
@@ -94,19 +92,17 @@ impl TableLight {
     ///
     /// # Errors
     /// Where a term is not finite.
-    pub fn to_viewer(&self, frame: &TableFrame) -> Result<ShLight, LightError> {
+    pub(crate) fn to_viewer(&self, frame: &TableFrame) -> Result<ShLight, LightError> {
         Ok(self.coefficients()?.rotated(&frame.rotation().inverse()))
     }
 
     /// The terms of each channel.
-    #[must_use]
-    pub const fn terms(&self) -> &[[f64; TERMS]; 3] {
+    pub(crate) const fn terms(&self) -> &[[f64; TERMS]; 3] {
         &self.terms
     }
 
     /// The same light with each channel times a factor.
-    #[must_use]
-    pub fn times(mut self, factors: [f64; 3]) -> Self {
+    pub(crate) fn times(mut self, factors: [f64; 3]) -> Self {
         for (terms, factor) in self.terms.iter_mut().zip(factors) {
             terms.iter_mut().for_each(|term| *term *= factor);
         }

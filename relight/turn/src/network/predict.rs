@@ -19,24 +19,24 @@ pub struct TurnNetwork {
 
 /// What the network says of a turn.
 #[derive(Debug, Clone)]
-pub struct TurnPrediction {
+pub(crate) struct TurnPrediction {
     /// Unit normals under the mask.
-    pub normals: Normals<YUp>,
+    pub(crate) normals: Normals<YUp>,
     /// By how much each is expected to be off, degrees; 0 outside the mask.
-    pub expected_errors: Planes<1>,
+    pub(crate) expected_errors: Planes<1>,
     /// Albedo, each channel in a unit of its own.
-    pub albedo: Rgb<Linear>,
+    pub(crate) albedo: Rgb<Linear>,
     /// The means of these errors.
-    pub figures: NetworkFigures,
+    pub(crate) figures: NetworkFigures,
 }
 
 /// The mean errors that the network expects of a turn, degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct NetworkFigures {
+pub(crate) struct NetworkFigures {
     /// Of its answer.
-    pub expected_error_deg: f32,
+    pub(crate) expected_error_deg: f32,
     /// The least if the table turned the other way.
-    pub other_direction_deg: f32,
+    pub(crate) other_direction_deg: f32,
 }
 
 /// Largest part of one direction's expected error with which the other direction is taken to be right. Measured: on 40
@@ -110,7 +110,7 @@ impl TurnNetwork {
     ///
     /// # Errors
     /// [`NetError`] where the network fails.
-    pub fn predict(
+    pub(crate) fn predict(
         &self,
         curves: &TurnCurves,
         elevation: Elevation,

@@ -87,9 +87,7 @@ impl Conditioning {
     /// The same in a light that is not known, where the network of turns expects such an error of its normals, degrees, the
     /// median.
     pub(crate) fn by_network(self, expected_error_deg: f64) -> Self {
-        let verdict = if self.verdict.is_exposure() {
-            self.verdict
-        } else if self.coverage_deg < LEAST_COVERAGE_DEG {
+        let verdict = if self.coverage_deg < LEAST_COVERAGE_DEG {
             TurnVerdict::PartOfTurn
         } else if expected_error_deg > MOST_EXPECTED_DEG {
             TurnVerdict::Uncertain
@@ -97,6 +95,12 @@ impl Conditioning {
             TurnVerdict::Good
         };
         Self { verdict, ..self }
+    }
+
+    /// Whether a light was given that is too even while the turn is not.
+    pub(crate) fn is_given_at_odds(&self) -> bool {
+        let given = self.given_modulation;
+        given.is_some_and(|given| given < LEAST_MODULATION) && self.modulation >= LEAST_MODULATION
     }
 
     /// The same where the light was given, as an object shows it in this environment that blurs nothing: one that is

@@ -35,7 +35,7 @@ pub(crate) const NOTHING: &str = "no frame has a pixel under the mask";
 /// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Of each frame it keeps the light of a few pixels,
 /// about a kilobyte; beyond that its memory does not grow with the number of frames.
 #[derive(Debug)]
-pub struct CurveBuilder {
+pub(crate) struct CurveBuilder {
     extent: Extent,
     /// Which pixels are under the mask.
     places: Vec<usize>,
@@ -79,7 +79,7 @@ impl CurveBuilder {
     ///
     /// # Errors
     /// Where there are none.
-    pub fn new(extent: Extent, mask: &[f32]) -> Result<Self, TurnError> {
+    pub(crate) fn new(extent: Extent, mask: &[f32]) -> Result<Self, TurnError> {
         let places: Vec<usize> = (0..extent.pixels().min(mask.len()))
             .filter(|&at| mask[at] >= 0.5)
             .collect();
@@ -104,7 +104,7 @@ impl CurveBuilder {
     ///
     /// # Errors
     /// Where it has another size.
-    pub fn push(
+    pub(crate) fn push(
         &mut self,
         angle_deg: f64,
         extent: Extent,
@@ -142,7 +142,7 @@ impl CurveBuilder {
     ///
     /// # Errors
     /// Where the frames do not tell two harmonics.
-    pub fn finish(self) -> Result<TurnCurves, TurnError> {
+    pub(crate) fn finish(self) -> Result<TurnCurves, TurnError> {
         let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
         if seen.len() < LEAST_PARTS {
             return Err(TurnError::Frames(format!(
@@ -232,8 +232,7 @@ impl TurnCurves {
     }
 
     /// How many pixels are under the mask.
-    #[must_use]
-    pub fn pixels(&self) -> usize {
+    pub(crate) fn pixels(&self) -> usize {
         self.places.len()
     }
 
@@ -244,20 +243,17 @@ impl TurnCurves {
     }
 
     /// Where the exposure changed. The curves are as if it had not: they have the exposure of most frames.
-    #[must_use]
-    pub fn exposure_steps(&self) -> &[ExposureStep] {
+    pub(crate) fn exposure_steps(&self) -> &[ExposureStep] {
         &self.steps
     }
 
     /// In how many parts of the turn there are frames.
-    #[must_use]
-    pub fn parts(&self) -> usize {
+    pub(crate) fn parts(&self) -> usize {
         self.harmonics.len()
     }
 
     /// The part of the light, 0 to 1, that is left out because it is clipped in the same part of the turn.
-    #[must_use]
-    pub fn clipped(&self) -> f64 {
+    pub(crate) fn clipped(&self) -> f64 {
         let sum: f64 = self
             .weights
             .iter()

@@ -28,11 +28,11 @@ const CLOSURE: f64 = 0.02;
 
 /// A change of the exposure between two frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ExposureStep {
+pub(crate) struct ExposureStep {
     /// The table's angle of the first frame after it, degrees.
-    pub angle_deg: f64,
+    pub(crate) angle_deg: f64,
     /// The exposure after it over that before.
-    pub factor: f64,
+    pub(crate) factor: f64,
 }
 
 /// Which pixels are looked at, and what they showed in each frame: the sum of the channels, or nothing where one clips.

@@ -196,7 +196,7 @@ mod tests {
     use relit_data::session::Manifest;
 
     use super::*;
-    use crate::CurveBuilder;
+    use crate::observe::curves::CurveBuilder;
     use crate::observe::reading::TableRotation;
     use relight_core::image::Linear;
 

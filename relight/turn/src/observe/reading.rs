@@ -32,11 +32,11 @@ pub struct TableRotation {
 
 /// What the records of a shard say of the video that it was made from.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TurnOrigin {
+pub(crate) struct TurnOrigin {
     /// The session's id.
-    pub session: String,
+    pub(crate) session: String,
     /// The part of the video's frames that the shard's show, pixels.
-    pub crop: Rect,
+    pub(crate) crop: Rect,
 }
 
 /// A turn that was read.
@@ -51,9 +51,9 @@ pub struct ReadTurn {
     /// Its first twelve frames, which cover the whole turn.
     pub first: Vec<Rgb<Linear>>,
     /// Where the frames stand in the turn's video, from 0, and the table's angle of each, degrees.
-    pub sources: Vec<(u64, f64)>,
+    pub(crate) sources: Vec<(u64, f64)>,
     /// The video itself; none where the frames have no records.
-    pub origin: Option<TurnOrigin>,
+    pub(crate) origin: Option<TurnOrigin>,
     /// 1 on the object, else 0.
     pub mask: Planes<1>,
     /// Whether frames have their angles; else they are taken for evenly spread over one turn.

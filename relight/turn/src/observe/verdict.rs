@@ -29,10 +29,12 @@ impl TurnVerdict {
         matches!(self, Self::Good | Self::NotLambertian | Self::Uncertain)
     }
 
-    /// Whether the camera's exposure makes the turn worthless.
-    #[must_use]
-    pub const fn is_exposure(self) -> bool {
-        matches!(self, Self::Overexposed | Self::Underexposed)
+    /// What to do where the camera's exposure makes the turn worthless.
+    pub(crate) const fn exposure_advice(self) -> Option<&'static str> {
+        match self {
+            Self::Overexposed | Self::Underexposed => self.advice(),
+            _ => None,
+        }
     }
 
     /// What to do about it, in one sentence; none where all is well.

@@ -33,7 +33,11 @@ impl SolvedTurn {
         warnings.extend(self.solution.verdict().advice().map(str::to_owned));
         let residual = self.solution.residual();
         let is_bad = residual > MOST_RESIDUAL || residual.is_nan();
-        if self.solution.measured.is_some() && is_bad {
+        if self.solution.conditioning.is_given_at_odds() {
+            let odd = "the light that was given hardly changes over the turn, but what the object shows does: \
+                       it is not the light of this turn";
+            warnings.push(odd.to_owned());
+        } else if self.solution.measured.is_some() && is_bad {
             warnings.push(format!(
                 "the residual in the light that was given is {:.0} % of what varies over the turn: \
                  check that it is this turn's, in the viewer's frame at the table's angle 0",

@@ -3,12 +3,14 @@ use relight_core::image::Extent;
 use relight_core::light::{Direction, Order, Rotation, ShLight};
 
 use crate::model::gloss::GlossLight;
+use crate::model::lighting::TableLight;
 use crate::model::shading::ShadingModel;
+use crate::observe::curves::CurveBuilder;
 use crate::test_turns::{
     ELEVATION, SIDE, SOLVED, TAKE, Take, albedo_off, ball, elevation, environment, film, film_in,
     metal_ball, off, solve,
 };
-use crate::{CurveBuilder, MaterialKind, TableFrame, TableLight, TurnVerdict, solve_in_light};
+use crate::{MaterialKind, TableFrame, TurnVerdict, solve_in_light};
 
 #[test]
 fn a_lambertian_ball_in_known_light_is_found_as_it_is() {

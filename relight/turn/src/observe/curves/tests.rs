@@ -1,6 +1,7 @@
 use relight_core::image::Extent;
 
-use crate::{CurveBuilder, TurnError};
+use crate::TurnError;
+use crate::observe::curves::CurveBuilder;
 
 #[test]
 fn turns_without_frames_or_angles_are_refused_by_what_is_wrong() {

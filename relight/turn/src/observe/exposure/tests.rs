@@ -1,4 +1,4 @@
-use crate::CurveBuilder;
+use crate::observe::curves::CurveBuilder;
 use crate::test_turns::{SOLVED, albedo_off, ball, environment, frame, mask, off, solve};
 
 #[test]

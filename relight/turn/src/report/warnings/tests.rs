@@ -45,7 +45,7 @@ fn an_even_given_light_damage_and_missing_angles_are_told_in_order() {
         "the frames have no angles",
         "sample 3 is damaged",
         "the environment light is too even",
-        "the residual in the light that was given",
+        "the light that was given hardly changes",
     ];
     check(&solved, &expected);
     assert!(!solved.is_whole());
