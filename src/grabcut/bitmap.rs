@@ -296,39 +296,21 @@ impl Components {
     }
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Bounds {
-    left: usize,
-    top: usize,
-    right: usize,
-    bottom: usize,
-}
-
-impl Default for Bounds {
-    fn default() -> Self {
-        Self {
-            left: usize::MAX,
-            top: usize::MAX,
-            right: 0,
-            bottom: 0,
-        }
-    }
-}
+/// Left, top, and what is one past right and bottom of some pixels; none of no pixels.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bounds(Option<[usize; 4]>);
 
 impl Bounds {
     fn add(&mut self, x: usize, y: usize) {
-        self.left = self.left.min(x);
-        self.top = self.top.min(y);
-        self.right = self.right.max(x + 1);
-        self.bottom = self.bottom.max(y + 1);
+        let [left, top, right, bottom] = self.0.unwrap_or([x, y, x, y]);
+        let (right, bottom) = (right.max(x + 1), bottom.max(y + 1));
+        self.0 = Some([left.min(x), top.min(y), right, bottom]);
     }
 
     fn rect(self) -> Rect {
-        if self.right == 0 {
-            return Rect::new(0, 0, 0, 0);
-        }
-        let (w, h) = (self.right - self.left, self.bottom - self.top);
-        Rect::new(self.left as i32, self.top as i32, w as u32, h as u32)
+        let [left, top, right, bottom] = self.0.unwrap_or_default();
+        let (w, h) = (right - left, bottom - top);
+        Rect::new(left as i32, top as i32, w as u32, h as u32)
     }
 }
 

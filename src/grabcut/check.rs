@@ -175,14 +175,15 @@ impl<'a> MaskCheck<'a> {
         // Whatever the turn's own mask says of a hole, the picture in it decides.
         let filled = background(&in_hole.opened(wide), Some(false));
         let undisputed = leaks.count() + missing.count() + undecided.count() == 0;
+        let least = self.mask.count() as f64 * SMALL;
         Ok(Some(ShapeCheck {
             area_px: self.mask.count(),
             outline: self.turn.outline(&self.mask),
             outline_of_turn: self.turn.outline(&own),
             contradicted: witnessed && differing > 0 && undisputed,
-            leaks: self.regions(&leaks),
-            missing: self.regions(&missing),
-            holes: self.regions(&filled),
+            leaks: regions(&leaks, least),
+            missing: regions(&missing, least),
+            holes: regions(&filled, least),
         }))
     }
 
@@ -195,10 +196,6 @@ impl<'a> MaskCheck<'a> {
             let part = || self.turn.reduced(&part());
             component.area as f64 >= least && says(&self.turn.fine, &part(), &object)
         })
-    }
-
-    fn regions(&self, part: &Bitmap) -> Vec<DoubtfulRegion> {
-        regions(part, self.mask.count() as f64 * SMALL)
     }
 
     /// What the turn takes for background in the mask, without the parts at the frame's border that are the object:

@@ -22,25 +22,16 @@ pub(super) fn shift(
     let average = gradients(average, size);
     let frame = gradients(frame, size);
     let pixels = inner_pixels(object, size);
-    let best = best_shift(size.0, |step| fit(&average, &frame, &pixels, step));
-    match best {
-        Some(best) if best.fit >= best.unmoved * (1.0 + BETTER_BY) => best.shift.into(),
+    let fit = |step| fit(&average, &frame, &pixels, step);
+    match best_shift(size.0, fit) {
+        Some((shift, best)) if best >= fit(0) * (1.0 + BETTER_BY) => shift.into(),
         _ => (0.0, 0.0),
     }
 }
 
-/// Where something fits best.
-struct BestShift {
-    /// Right and down, pixels.
-    shift: [f32; 2],
-    fit: f32,
-    /// How well it fits without a shift.
-    unmoved: f32,
-}
-
-/// The shift at which it fits best, to a fraction of a pixel, where `fit` is told the step in row order; none where
-/// that is at the limit of what is looked for, or nothing fits.
-fn best_shift(width: usize, fit: impl Fn(isize) -> f32) -> Option<BestShift> {
+/// The shift (right, down) at which it fits best, to a fraction of a pixel, and how well it fits there, where `fit` is
+/// told the step in row order; none where that is at the limit of what is looked for, or nothing fits.
+fn best_shift(width: usize, fit: impl Fn(isize) -> f32) -> Option<([f32; 2], f32)> {
     let side = (2 * REACH + 1) as usize;
     let fit = |at: usize| {
         let (dx, dy) = ((at % side) as isize - REACH, (at / side) as isize - REACH);
@@ -54,11 +45,8 @@ fn best_shift(width: usize, fit: impl Fn(isize) -> f32) -> Option<BestShift> {
     }
     let dx = vertex(fits[best - 1], most, fits[best + 1]);
     let dy = vertex(fits[best - side], most, fits[best + side]);
-    Some(BestShift {
-        shift: [x as f32 - REACH as f32 + dx, y as f32 - REACH as f32 + dy],
-        fit: most,
-        unmoved: fits[side * side / 2],
-    })
+    let shift = [x as f32 - REACH as f32 + dx, y as f32 - REACH as f32 + dy];
+    Some((shift, most))
 }
 
 /// The labels moved by a shift (right, down): each pixel takes what was there before, between pixels the
@@ -172,14 +160,14 @@ impl Reference {
             .into_iter()
             .map(direction)
             .collect();
-        let best = best_shift(self.size.0, |step| {
+        let (shift, fit) = best_shift(self.size.0, |step| {
             let fit = |(at, [ax, ay]): &(usize, [f32; 2])| {
                 let [bx, by] = directions[at.saturating_add_signed(step)];
                 ax * bx + ay * by
             };
             self.pixels.iter().map(fit).sum()
         })?;
-        Some((best.shift, best.fit / self.pixels.len() as f32))
+        Some((shift, fit / self.pixels.len() as f32))
     }
 }
 

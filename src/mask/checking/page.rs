@@ -35,6 +35,7 @@ pub(super) fn page(
     mask: &GrayImage,
 ) -> Result<String, MaskingError> {
     let (class, word) = report.verdict.words();
+    let word = format!("{}{}", word[..1].to_uppercase(), &word[1..]);
     let id = escaped(id);
     let reasons: String = report
         .reasons

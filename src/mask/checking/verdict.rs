@@ -29,10 +29,10 @@ impl MaskVerdict {
     #[must_use]
     pub const fn words(self) -> (&'static str, &'static str) {
         match self {
-            Self::Fits => ("fits", "The mask fits"),
-            Self::Drifts => ("drifts", "The object moves beside the mask"),
-            Self::Wrong => ("wrong", "The mask is not that of the object"),
-            Self::Unknown => ("unknown", "Nothing can be said about the mask"),
+            Self::Fits => ("fits", "the mask fits"),
+            Self::Drifts => ("drifts", "the object moves beside the mask"),
+            Self::Wrong => ("wrong", "the mask is not that of the object"),
+            Self::Unknown => ("unknown", "nothing can be said about the mask"),
         }
     }
 }
