@@ -6,7 +6,7 @@ use image::GrayImage;
 use image::imageops::{FilterType, resize};
 
 use relit_data::geometry::Rect;
-use relit_data::mask::{MaskPicture, ObjectPixels};
+use relit_data::mask::MaskPicture;
 use relit_data::session::{MASK_FILE, Recording};
 use relit_data::shard::Digest;
 
@@ -67,8 +67,11 @@ impl ObjectMask {
             path: path.clone(),
             fault,
         };
-        let ObjectPixels { inside, basis } = picture.object().map_err(no_object)?;
-        let levels = inside.iter().map(|&inside| if inside { 255 } else { 0 });
+        let object = picture.object().map_err(no_object)?;
+        let levels = object
+            .inside
+            .iter()
+            .map(|&inside| if inside { 255 } else { 0 });
         let mut image = GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default();
         if size != frame {
             image = resize(&image, frame.0, frame.1, FilterType::Triangle);
@@ -77,8 +80,8 @@ impl ObjectMask {
             }
         }
         let blake3 = Digest::of(&bytes);
-        let note = basis
-            .note()
+        let note = object
+            .note(size.0)
             .map(|note| format!("the mask {} {note}", path.display()));
         Ok(Self {
             bounding_box: bounding_box(&image).unwrap_or_else(|| Rect::new(0, 0, frame.0, frame.1)),
