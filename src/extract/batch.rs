@@ -71,18 +71,13 @@ pub(super) fn find(
     };
     for input in inputs {
         let inside = recordings(input);
-        if options.task.is_none_or(|task| task.takes(0))
-            && inside
-                .as_ref()
-                .is_ok_and(|inside| inside != &[input.clone()])
-        {
+        let is_folder_of_sessions = inside
+            .as_ref()
+            .is_ok_and(|inside| inside != std::slice::from_ref(input));
+        if is_folder_of_sessions && options.task.is_none_or(|task| task.takes(0)) {
             for path in beside_sessions(input).unwrap_or_default() {
-                if !is_same(&path, out)
-                    && !options
-                        .mask
-                        .as_ref()
-                        .is_some_and(|mask| is_same(&path, mask))
-                {
+                let mask = options.mask.as_ref();
+                if !is_same(&path, out) && !mask.is_some_and(|mask| is_same(&path, mask)) {
                     report(&path, RecordingOutcome::LeftOut(ExtractError::NoRecording));
                 }
             }
