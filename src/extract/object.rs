@@ -7,7 +7,7 @@ use image::imageops::{FilterType, resize};
 
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use relit_data::mask::{MaskFault, MaskPicture, ObjectPixels, size_hint};
+use relit_data::mask::{MaskPicture, size_hint};
 use relit_data::session::{MASK_FILE, Recording};
 use relit_data::shard::Digest;
 use relit_data::still;
@@ -71,9 +71,13 @@ impl ObjectMask {
                 size.0, size.1, frame.0, frame.1
             )));
         }
-        let no_object = |fault: MaskFault| of_this_mask(fault.to_string());
-        let ObjectPixels { inside, basis } = picture.object().map_err(no_object)?;
-        let levels = inside.iter().map(|&inside| if inside { 255 } else { 0 });
+        let object = picture
+            .object()
+            .map_err(|fault| of_this_mask(fault.to_string()))?;
+        let levels = object
+            .inside
+            .iter()
+            .map(|&inside| if inside { 255 } else { 0 });
         let mut image = GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default();
         if size != frame {
             image = resize(&image, frame.0, frame.1, FilterType::Triangle);
@@ -82,8 +86,8 @@ impl ObjectMask {
             }
         }
         let blake3 = Digest::of(&bytes);
-        let note = basis
-            .note()
+        let note = object
+            .note(size.0)
             .map(|note| format!("the mask {} {note}", path.display()));
         Ok(Self {
             bounding_box: bounding_box(&image).unwrap_or_else(|| Rect::new(0, 0, frame.0, frame.1)),

@@ -94,7 +94,8 @@ def main():
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--boxes", type=lambda text: text.split(","), default=[])
     arguments = parser.parse_args()
-    images = [path for path in sorted(arguments.folder.iterdir()) if path.suffix.lower() in (".jpg", ".jpeg", ".png", ".bmp")]
+    shown = (path for path in sorted(arguments.folder.iterdir()) if not path.name.startswith("."))
+    images = [path for path in shown if path.suffix.lower() in (".jpg", ".jpeg", ".png", ".bmp")]
     images = [path for path in images if path.with_name(f"{path.stem}.gt.png").is_file()]
     if not images:
         raise SystemExit(f"{arguments.folder} holds no image with its ground truth, as in mug.jpg and mug.gt.png")

@@ -344,11 +344,9 @@ mod tests {
     fn other_files_among_panoramas_and_textures_are_left_out_and_named() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        std::fs::write(
-            at("room.hdr"),
-            b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x80\x80\x80\x80\x80",
-        )
-        .unwrap();
+        let header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n";
+        let room = [&header[..], &[0x80; 4 * 4 * 8]].concat();
+        std::fs::write(at("room.hdr"), room).unwrap();
         let wood = image::RgbImage::from_pixel(2, 2, image::Rgb([90, 60, 30]));
         wood.save(at("wood.png")).unwrap();
         for name in ["sky.jpg.part", "notes.txt", ".DS_Store"] {

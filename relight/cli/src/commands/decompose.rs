@@ -22,7 +22,7 @@ use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
 use crate::commands::CommandResult;
-use crate::photos::{NetworkArguments, name_unused};
+use crate::photos::{NetworkArguments, is_at, name_unused};
 use crate::values::{NORMALS_Y, TRANSFERS, one_of};
 
 /// Each photograph takes its memory, gigabytes where it is large.
@@ -185,7 +185,8 @@ impl EngineName {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let FoundPhotos { inputs, unused } = PhotoInput::find(&arguments.photos, arguments.count)?;
+    let FoundPhotos { inputs, mut unused } = PhotoInput::find(&arguments.photos, arguments.count)?;
+    unused.retain(|file| !is_at(&file.path, arguments.mask.as_deref(), &arguments.output));
     name_unused(&unused, console);
     let own_folders = inputs.len() > 1 || arguments.has_set();
     let run = Run::new(arguments, own_folders, console)?;

@@ -24,7 +24,7 @@ use super::decompose::rectangle;
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::light::NewLightArguments;
-use crate::photos::{Network, NetworkArguments, name_unused, not_an_input};
+use crate::photos::{Network, NetworkArguments, is_at, name_unused, not_an_input};
 use crate::values::{TRANSFERS, WHITE_BALANCES, degrees, one_of, within};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -214,7 +214,8 @@ struct Run<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let FoundPhotos { inputs, unused } = PhotoInput::find(&arguments.photos, None)?;
+    let FoundPhotos { inputs, mut unused } = PhotoInput::find(&arguments.photos, None)?;
+    unused.retain(|file| !is_at(&file.path, arguments.mask.as_deref(), &arguments.output));
     name_unused(&unused, console);
     let run = Run {
         arguments,

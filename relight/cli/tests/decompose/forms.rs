@@ -90,6 +90,12 @@ fn every_file_of_a_folder_is_used_or_named() {
     for left_behind in ["._a.jpg", ".DS_Store", "Thumbs.db", "desktop.ini"] {
         write(left_behind, b"anything");
     }
+    for within in ["later", "empty", "done"] {
+        fs::create_dir(folder.path("photos").join(within)).unwrap();
+    }
+    write("later/k.jpg", &jpeg);
+    write("done/albedo.png", &jpeg);
+    write("done/decomposition.json", b"{}");
     let FoundPhotos { inputs, unused } = PhotoInput::find(&[folder.path("photos")], None).unwrap();
     let used: Vec<String> = inputs.iter().map(PhotoInput::place).collect();
     let name = |path: &str| {
@@ -106,8 +112,8 @@ fn every_file_of_a_folder_is_used_or_named() {
     );
     let path = |name: &str| folder.path("photos").join(name);
     let files: Vec<_> = unused.iter().map(|file| file.path.clone()).collect();
-    assert_eq!(files, [path("c.heic"), path("h.txt")]);
-    let message = &unused[0].message;
+    assert_eq!(files, [path("later"), path("c.heic"), path("h.txt")]);
+    let message = &unused[1].message;
     assert!(message.contains("HEIC"), "{message}");
 }
 

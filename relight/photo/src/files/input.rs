@@ -13,6 +13,7 @@ use relit_data::shard::Dataset;
 use relit_data::still::{Format, Orientation, is_named};
 
 use super::mask_record::check_turned;
+use super::results::FIGURES;
 use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
 
 /// Bytes of a file that show its format.
@@ -66,6 +67,13 @@ pub struct UnusedFile {
     pub path: PathBuf,
     /// Why, as a sentence that names it.
     pub message: String,
+}
+
+impl UnusedFile {
+    fn new(path: PathBuf, what: &str) -> Self {
+        let message = format!("{} {what}", path.display());
+        Self { path, message }
+    }
 }
 
 impl PhotoInput {
@@ -156,16 +164,25 @@ fn add_folder(
     folder: &Path,
     most: Option<u32>,
 ) -> Result<(), DecomposeError> {
+    let has_frames = PhotoInput::has_frames(folder);
+    let unused_before = unused.len();
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(DecomposeError::read(folder))? {
         let path = entry.map_err(DecomposeError::read(folder))?.path();
-        if !is_hidden(&path) && path.is_file() {
-            files.push(path);
+        match is_hidden(&path) {
+            true => {}
+            false if path.is_file() => files.push(path),
+            // A data set has folders of its own.
+            false if !has_frames && holds_pictures(&path) => {
+                let what = "is not used: it is a folder within; give it by its name";
+                unused.push(UnusedFile::new(path, what));
+            }
+            false => {}
         }
     }
     files.sort();
-    let has_frames = PhotoInput::has_frames(folder);
-    let (before, unused_before) = (found.len(), unused.len());
+    unused[unused_before..].sort_by(|one, other| one.path.cmp(&other.path));
+    let before = found.len();
     for path in files {
         match use_of(path.clone()) {
             None => found.push((path.clone(), PhotoInput::File(path))),
@@ -190,6 +207,13 @@ fn add_folder(
     Ok(())
 }
 
+/// Whether a folder within another holds pictures that a person may have meant; a result's are not.
+fn holds_pictures(folder: &Path) -> bool {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_picture = |path: PathBuf| !is_hidden(&path) && is_named(&path);
+    !folder.join(FIGURES).exists() && entries.map(|entry| entry.path()).any(is_picture)
+}
+
 /// Why a file of a folder is left out; none where it is taken for a photograph: by its content, or by a name that
 /// promises one, so that reading it says what is wrong.
 fn use_of(path: PathBuf) -> Option<UnusedFile> {
@@ -197,16 +221,14 @@ fn use_of(path: PathBuf) -> Option<UnusedFile> {
     let file = fs::File::open(&path);
     // What cannot be read is known by its name alone.
     let _ = file.and_then(|file| file.take(HEAD).read_to_end(&mut head));
-    let unused = |what: String| UnusedFile {
-        message: format!("{} {what}", path.display()),
-        path: path.clone(),
-    };
     match Format::of(&head) {
-        Some(format) => format
-            .unread()
-            .map(|(name, advice)| unused(format!("is {name}, which is not read: {advice}"))),
+        Some(format) => {
+            let (name, advice) = format.unread()?;
+            let what = format!("is {name}, which is not read: {advice}");
+            Some(UnusedFile::new(path, &what))
+        }
         None if is_named(&path) => None,
-        None => Some(unused("is not used: it is not a picture".to_owned())),
+        None => Some(UnusedFile::new(path, "is not used: it is not a picture")),
     }
 }
 
