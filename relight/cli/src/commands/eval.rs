@@ -325,44 +325,57 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 
 type Evaluated = Result<ScoreTable, Box<dyn Error>>;
 
-fn mit(arguments: &SetArguments, input: IntrinsicInput, console: Console) -> Evaluated {
+/// Hears of each step.
+type Progress<'a> = &'a (dyn Fn() + Sync);
+
+/// Scores the baselines and the folders of predictions on the images of a set.
+fn on_set<M, const N: usize>(
+    arguments: &SetArguments,
+    baselines: [M; N],
+    predicted: fn(Predictions) -> M,
+    evaluate: impl FnOnce(&TruthSet, &str, &[M], Progress<'_>) -> Result<ScoreTable, EvalError>,
+    console: Console,
+) -> Evaluated {
     let (set, split) = arguments.open()?;
-    let baselines = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
-    let methods = with_predictions(baselines, &arguments.common, IntrinsicMethod::Predictions);
+    let methods = with_predictions(baselines, &arguments.common, predicted);
     let steps = set.names().len() * methods.len();
     with_progress(steps, "evaluating", console, |progress| {
-        evaluate_intrinsic(&set, &split, input, &methods, progress)
+        evaluate(&set, &split, &methods, progress)
     })
+}
+
+fn mit(arguments: &SetArguments, input: IntrinsicInput, console: Console) -> Evaluated {
+    let baselines = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
+    let predicted = IntrinsicMethod::Predictions;
+    let evaluate = |set: &TruthSet, split: &str, methods: &[_], progress: Progress<'_>| {
+        evaluate_intrinsic(set, split, input, methods, progress)
+    };
+    on_set(arguments, baselines, predicted, evaluate, console)
 }
 
 fn normals(arguments: &SetArguments, console: Console) -> Evaluated {
-    let (set, split) = arguments.open()?;
-    let baselines = [NormalMethod::Viewer];
-    let methods = with_predictions(baselines, &arguments.common, NormalMethod::Predictions);
-    let steps = set.names().len() * methods.len();
-    with_progress(steps, "evaluating", console, |progress| {
-        evaluate_normals(&set, &split, &methods, progress)
-    })
+    let (baselines, predicted) = ([NormalMethod::Viewer], NormalMethod::Predictions);
+    on_set(arguments, baselines, predicted, evaluate_normals, console)
 }
 
 fn light(arguments: &SetArguments, form: DiffuseForm, console: Console) -> Evaluated {
-    let (set, split) = arguments.open()?;
     let baselines = [LightMethod::Even, LightMethod::Oracle];
-    let methods = with_predictions(baselines, &arguments.common, LightMethod::Predictions);
-    let steps = set.names().len() * methods.len();
-    with_progress(steps, "evaluating", console, |progress| {
-        evaluate_light(&set, &split, form, &methods, progress)
-    })
+    let predicted = LightMethod::Predictions;
+    let evaluate = |set: &TruthSet, split: &str, methods: &[_], progress: Progress<'_>| {
+        evaluate_light(set, split, form, methods, progress)
+    };
+    on_set(arguments, baselines, predicted, evaluate, console)
 }
 
 fn highlight(arguments: &SetArguments, console: Console) -> Evaluated {
-    let (set, split) = arguments.open()?;
-    let baselines = [HighlightMethod::Nothing];
-    let methods = with_predictions(baselines, &arguments.common, HighlightMethod::Predictions);
-    let steps = set.names().len() * methods.len();
-    with_progress(steps, "evaluating", console, |progress| {
-        evaluate_highlights(&set, &split, &methods, progress)
-    })
+    let (baselines, predicted) = ([HighlightMethod::Nothing], HighlightMethod::Predictions);
+    on_set(
+        arguments,
+        baselines,
+        predicted,
+        evaluate_highlights,
+        console,
+    )
 }
 
 fn relighting(
@@ -522,7 +535,7 @@ fn with_progress<T, E: Error + 'static>(
     steps: usize,
     label: &'static str,
     console: Console,
-    work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, E>,
+    work: impl FnOnce(Progress<'_>) -> Result<T, E>,
 ) -> Result<T, Box<dyn Error>> {
     let bar = console.progress(steps as u64, label);
     let result = work(&|| bar.inc(1));
