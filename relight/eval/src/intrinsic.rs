@@ -1,7 +1,7 @@
 //! Albedo and shading of single images: the table on MIT Intrinsic Images.
 
 use super::retinex::{IntrinsicImages, Retinex, divided};
-use super::run::{Scored, add_method, grey, measured, need, object, of_grey};
+use super::run::{Scored, add_method, grey, measured, need, object, of_grey, unlit};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Rgb};
 use relight_core::metrics::{Convention, IntrinsicError, Windows, intrinsic_error};
@@ -97,10 +97,7 @@ impl IntrinsicBaseline {
 fn fitted_shading(sample: &TruthSample, mask: &[bool]) -> Result<Vec<f32>, EvalError> {
     let normals = need(sample, "normals", &sample.normals)?.completed(mask);
     let shading = need(sample, "shading", &sample.shading)?;
-    let light = fit_light(&normals, shading, mask, 0.0).map_err(|source| EvalError::Unlit {
-        sample: sample.name.clone(),
-        source,
-    })?;
+    let light = fit_light(&normals, shading, mask, 0.0).map_err(unlit(&sample.name))?;
     let mut found = grey(&DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals));
     let (count, sum) = found
         .iter()

@@ -1,7 +1,7 @@
 //! Light of single images: the table on Light-Net.
 
 use super::normals::known;
-use super::run::{Scored, add_method, largest, measured, need};
+use super::run::{Scored, add_method, largest, measured, need, unlit};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Rgb};
 use relight_core::light::{Direction, Order, ShLight};
@@ -42,10 +42,7 @@ impl LightMethod {
 fn fitted(sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
     let normals = need(sample, "normals", &sample.normals)?;
     let shading = need(sample, "shading", &sample.shading)?;
-    fit_light(normals, shading, known, 0.0).map_err(|source| EvalError::Unlit {
-        sample: sample.name.clone(),
-        source,
-    })
+    fit_light(normals, shading, known, 0.0).map_err(unlit(&sample.name))
 }
 
 /// MSE, SMSE and SSIM of the shading that light makes on the true normals, and the angle between its direction and that

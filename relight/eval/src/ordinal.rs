@@ -75,10 +75,7 @@ fn score(images: &JudgedImages, index: usize, method: &OrdinalMethod) -> Result<
     let judgements = images.judgements(index)?;
     let planes = albedo.planes();
     let rate = whdr(planes.extent(), &planes.planes(), &judgements, DELTA);
-    let rate = rate.map_err(|source| EvalError::Metric {
-        sample: images.name(index),
-        source,
-    })?;
+    let rate = rate.map_err(EvalError::unmeasured(&images.name(index)))?;
     Ok(Scored {
         part: "albedo",
         measures: vec![("WHDR", rate)],

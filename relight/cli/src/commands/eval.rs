@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use relight_core::files::write_png;
 use relight_core::image::{Depth, Planes, Transfer};
 use relight_core::light::NormalsFrame;
@@ -101,8 +101,8 @@ struct TurnArguments {
     #[arg(long, value_name = "TEXT")]
     split: Option<String>,
     /// How turns are solved; may be given several times [default: all ways].
-    #[arg(long, value_enum, value_name = "HOW")]
-    method: Vec<TurnMethodName>,
+    #[arg(long, value_name = "HOW", value_parser = one_of(TURN_METHODS))]
+    method: Vec<TurnMethod>,
     /// Weights of the network of turns [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     turn_network: Option<PathBuf>,
@@ -178,9 +178,6 @@ struct RelightingArguments {
     /// What objects, materials and lights are drawn from.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Make objects that cast no shadows on themselves.
-    #[arg(long, requires = "make")]
-    no_shadows: bool,
     /// The network's weights [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
@@ -223,22 +220,14 @@ struct InsertionArguments {
     output: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum TurnMethodName {
-    /// In a light that is not known.
-    Turn,
-    /// In the true light.
-    Light,
-}
-
-impl From<TurnMethodName> for TurnMethod {
-    fn from(name: TurnMethodName) -> Self {
-        match name {
-            TurnMethodName::Turn => Self::UnknownLight,
-            TurnMethodName::Light => Self::KnownLight,
-        }
-    }
-}
+const TURN_METHODS: Choices<TurnMethod> = &[
+    (
+        "turn",
+        "In a light that is not known",
+        TurnMethod::UnknownLight,
+    ),
+    ("light", "In the true light", TurnMethod::KnownLight),
+];
 
 const INPUTS: Choices<IntrinsicInput> = &[
     ("diffuse", "Without highlights", IntrinsicInput::Diffuse),
@@ -413,7 +402,6 @@ fn make(arguments: &RelightingArguments, console: Console) -> CommandResult {
         lights: arguments.lights.into(),
         size: arguments.size,
         seed: arguments.seed,
-        shadows: !arguments.no_shadows,
     };
     let folders = Folders {
         meshes: arguments.meshes.clone(),
@@ -487,7 +475,7 @@ fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
     let methods: Vec<TurnMethod> = if arguments.method.is_empty() {
         TurnMethod::ALL.to_vec()
     } else {
-        arguments.method.iter().map(|&name| name.into()).collect()
+        arguments.method.clone()
     };
     let table = with_progress(set.len() * methods.len(), "solving", console, |progress| {
         evaluate_turns(&set, &split, &methods, &networks, progress)

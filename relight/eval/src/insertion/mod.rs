@@ -3,7 +3,7 @@
 
 mod stage;
 
-use super::run::{Scored, add_lines};
+use super::run::{Scored, add_lines, unlit, unshown};
 use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
 use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
@@ -194,22 +194,16 @@ pub fn evaluate_insertion(
             size: recipe.size,
             black_paint: recipe.black_paint,
         };
-        let stage = Stage::make(library, made, number).map_err(|source| EvalError::Unlit {
-            sample: format!("{number:03}"),
-            source,
-        })?;
+        let stage = Stage::make(library, made, number).map_err(unlit(&format!("{number:03}")))?;
         let places = Places::of(&stage);
-        let failed = |source| EvalError::Insertion {
-            sample: stage.name.clone(),
-            source: Box::new(source),
-        };
-        let subjects = Subjects::of(&stage, decomposer).map_err(failed)?;
+        let failed = unshown(&stage.name);
+        let subjects = Subjects::of(&stage, decomposer).map_err(&failed)?;
         let truths = [shown(&stage.truth), shown(&stage.bright[1])];
         let truth = truths[0].clone();
         let mut tiles = vec![shown(&stage.photo), shown(&stage.background), truth.clone()];
         let mut bright = vec![shown(&stage.bright[0]), truths[1].clone()];
         for (method, scored) in InsertionMethod::ALL.into_iter().zip(&mut scored) {
-            let found = method.insert(&stage, &subjects).map_err(failed)?;
+            let found = method.insert(&stage, &subjects).map_err(&failed)?;
             let found = found.map(|picture| shown(&picture));
             scored.push((
                 stage.name.clone(),
@@ -243,17 +237,14 @@ fn score(
         ("edge, bright", 1, &places.edge, MaskRule::Known),
         ("ground", 0, &places.ground, MaskRule::Known),
     ];
-    let failed = |source| EvalError::Metric {
-        sample: name.to_owned(),
-        source,
-    };
+    let failed = EvalError::unmeasured(name);
     let mut lines = Vec::new();
     for (part, picture, mask, rule) in parts {
         let (truth, found) = (&truths[picture], &found[picture]);
         let (truth_planes, found_planes) = (truth.planes(), found.planes());
         let pair =
-            Comparison::new(truth.extent(), &truth_planes, &found_planes, mask).map_err(failed)?;
-        let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed)?;
+            Comparison::new(truth.extent(), &truth_planes, &found_planes, mask).map_err(&failed)?;
+        let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(&failed)?;
         lines.push(Scored {
             part,
             measures: vec![("MSE", pair.mse(ScaleFit::None)), ("DSSIM", dssim(ssim))],

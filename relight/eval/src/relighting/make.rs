@@ -38,8 +38,6 @@ pub struct RelightingRecipe {
     pub size: u32,
     /// What all is drawn from.
     pub seed: u64,
-    /// Whether objects cast shadows on themselves.
-    pub shadows: bool,
 }
 
 impl Default for RelightingRecipe {
@@ -49,7 +47,6 @@ impl Default for RelightingRecipe {
             lights: 30,
             size: 128,
             seed: 0,
-            shadows: true,
         }
     }
 }
@@ -59,7 +56,6 @@ impl RelightingRecipe {
         Recipe {
             seed: self.seed,
             size: self.size,
-            shadows: self.shadows,
             views: 1,
             lightings: 1,
             ..Recipe::default()
@@ -74,7 +70,7 @@ impl RelightingRecipe {
             let panorama = number % library.panoramas.len();
             let turn = TAU * unit(&mut random);
             let name = library.panoramas.name(panorama).unwrap_or_default();
-            let lighting = Lighting::of_panorama(panorama, turn, IRRADIANCE, self.shadows);
+            let lighting = Lighting::of_panorama(panorama, turn, IRRADIANCE, true);
             (name.to_owned(), lighting)
         };
         (0..self.lights).map(lighting).collect()
@@ -83,13 +79,12 @@ impl RelightingRecipe {
     fn about(&self, library: &Library) -> String {
         format!(
             "made by relight {}: {} objects of {} meshes and procedural shapes, {} lights of {} \
-             panoramas, Blinn-Phong by Monte Carlo, {}cast shadows, {}x{} pixels, seed {}",
+             panoramas, Blinn-Phong by Monte Carlo, cast shadows, {}x{} pixels, seed {}",
             env!("CARGO_PKG_VERSION"),
             self.objects,
             library.meshes.len(),
             self.lights,
             library.panoramas.len(),
-            if self.shadows { "" } else { "no " },
             self.size,
             self.size,
             self.seed
@@ -103,7 +98,6 @@ struct Origin {
     lights: usize,
     size: u32,
     seed: u64,
-    shadows: bool,
     meshes: Vec<String>,
     panoramas: Vec<String>,
 }
@@ -119,7 +113,6 @@ impl Origin {
             lights: recipe.lights,
             size: recipe.size,
             seed: recipe.seed,
-            shadows: recipe.shadows,
             meshes: library
                 .meshes
                 .iter()
@@ -142,9 +135,10 @@ impl Origin {
             {
                 write_json(&path, self)
             }
-            _ => Err(EvalError::OtherSettings {
-                path: out.to_owned(),
-            }),
+            _ => Err(EvalError::fault(format!(
+                "{} holds objects that were made with other settings: give the same ones, or another folder",
+                out.display()
+            ))),
         }
     }
 }
@@ -191,10 +185,7 @@ pub fn make_relighting(
 }
 
 fn write_json(path: &Path, content: &impl Serialize) -> Result<(), EvalError> {
-    let bytes = serde_json::to_vec_pretty(content).map_err(|source| EvalError::Description {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = serde_json::to_vec_pretty(content).map_err(EvalError::description(path))?;
     write_whole(path, &bytes).map_err(EvalError::write(path))
 }
 

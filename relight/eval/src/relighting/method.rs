@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::set::{Object, Part, RelightingSet, read_image};
-use crate::run::cut_out;
+use crate::run::{cut_out, unshown};
 use crate::{EvalError, Predictions};
 use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Order, ShLight};
@@ -81,10 +81,7 @@ impl RelightMethod<'_> {
                 let mask = &photo.mask;
                 let subject =
                     Subject::new(&photo.picture, mask, Some(mask), decomposer, &photo.options);
-                let subject = Box::new(subject.map_err(|source| EvalError::Insertion {
-                    sample: object.name.clone(),
-                    source: Box::new(source),
-                })?);
+                let subject = Box::new(subject.map_err(unshown(&object.name))?);
                 Ok(Relight::Subject {
                     set,
                     object,
@@ -99,10 +96,7 @@ impl RelightMethod<'_> {
                     options,
                 } = Photographed::of(set, object, part)?;
                 let found = decomposer.decompose(&picture, &mask, &options);
-                let found = found.map_err(|source| EvalError::Insertion {
-                    sample: object.name.clone(),
-                    source: Box::new(source.into()),
-                })?;
+                let found = found.map_err(|source| unshown(&object.name)(source.into()))?;
                 let white = mean_irradiance(&set.lights()[object.input]);
                 rendered(surface_of(found, white)?, SpecularForm::Lobe)
             }
@@ -204,7 +198,7 @@ impl Relight<'_> {
                 part,
             } => {
                 let path = predictions.file(&object.name, &part.file(light));
-                let image = read_image(path, object.surface.extent())?;
+                let image = read_image(&path, object.surface.extent())?;
                 Ok(cut_out(&image, &object.mask))
             }
             Self::Subject {
@@ -217,10 +211,7 @@ impl Relight<'_> {
                 let exposure = mean_irradiance(subject.light()) / mean_irradiance(new);
                 let new = new.clone().tinted([f64::from(exposure); 3]);
                 let colours = subject.relit(&new, &MaterialChange::default());
-                let colours = colours.map_err(|source| EvalError::Insertion {
-                    sample: object.name.clone(),
-                    source: Box::new(source),
-                })?;
+                let colours = colours.map_err(unshown(&object.name))?;
                 let image = shown(subject.in_place(&photo.picture, &colours));
                 Ok(cut_out(&image, &object.mask))
             }

@@ -91,13 +91,10 @@ fn compare(
     found: &Planes<3>,
     mask: &[bool],
 ) -> Result<(f64, f64), EvalError> {
-    let failed = |source| EvalError::Metric {
-        sample: object.name.clone(),
-        source,
-    };
+    let failed = EvalError::unmeasured(&object.name);
     let (truth_planes, found_planes) = (truth.planes(), found.planes());
     let pair = Comparison::new(truth.extent(), &truth_planes, &found_planes, mask);
-    let pair = pair.map_err(failed)?;
+    let pair = pair.map_err(&failed)?;
     let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed)?;
     Ok((pair.mse(ScaleFit::None), dssim(ssim)))
 }
