@@ -147,7 +147,7 @@ fn a_prediction_that_is_the_truth_up_to_scale_has_no_error() {
         ["albedo", "shading", "mean", "albedo", "shading", "mean"]
     );
     for line in &table.lines {
-        assert_eq!((line.method.as_str(), line.terms.images), ("net", 2));
+        assert_eq!((line.method.as_str(), line.images), ("net", 2));
         assert!(
             value(line, "SMSE") < 1e-8 && value(line, "LMSE") < 1e-7,
             "{line:?}"
@@ -161,14 +161,14 @@ fn a_prediction_that_is_the_truth_up_to_scale_has_no_error() {
 fn the_mean_is_that_of_albedo_and_shading_and_each_line_says_how_it_was_measured() {
     let dir = tempfile::tempdir().unwrap();
     write_set(dir.path());
-    for baseline in IntrinsicBaseline::all() {
+    for baseline in IntrinsicBaseline::ALL {
         let table = intrinsic(dir.path(), IntrinsicMethod::Baseline(baseline)).unwrap();
         for three in table.lines.chunks(3) {
             for name in ["SMSE", "LMSE"] {
                 let [albedo, shading, mean] = [0, 1, 2].map(|at| value(&three[at], name));
                 assert!((f64::midpoint(albedo, shading) - mean).abs() < 1e-12);
             }
-            let terms = &three[0].terms;
+            let terms = &three[0];
             assert_eq!(
                 (terms.mask, terms.images, terms.split.as_str()),
                 (MaskRule::Object, 2, "both")
@@ -269,7 +269,7 @@ fn predicted_normals_are_read_in_the_axes_that_are_told() {
         let predictions = Predictions::new(found.clone(), None, frame);
         let method = NormalMethod::Predictions(predictions);
         let table = evaluate_normals(&set(&truth), "both", &[method], &|| {}).unwrap();
-        assert_eq!(table.lines[0].terms.mask, MaskRule::Known);
+        assert_eq!(table.lines[0].mask, MaskRule::Known);
         value(&table.lines[0], "mean angle")
     };
     assert!(mean_angle(NormalsFrame::YDown) < 0.01);
@@ -418,16 +418,14 @@ fn relighting_compares_with_all_lights_but_the_input_s() {
     let table = evaluate_relighting(&set, "one", &methods, &|| {}).unwrap();
     let (naive, oracle) = table.lines.split_at(4);
     for (naive, oracle) in naive.iter().zip(oracle) {
-        assert_eq!((naive.terms.images, oracle.terms.images), (2, 2));
+        assert_eq!((naive.images, oracle.images), (2, 2));
         assert!(value(naive, "MSE") > 1e-3, "{naive:?}");
         assert!(
             value(oracle, "MSE") < 1e-7 && value(oracle, "DSSIM") < 1e-4,
             "{oracle:?}"
         );
     }
-    let whole = naive
-        .iter()
-        .find(|line| line.terms.mask == MaskRule::WholeImage);
+    let whole = naive.iter().find(|line| line.mask == MaskRule::WholeImage);
     assert!(value(whole.unwrap(), "MSE") < value(&naive[0], "MSE"));
 }
 
@@ -485,8 +483,7 @@ fn predicted_maps_are_rendered_and_predicted_images_are_taken() {
         }
     }
     let set = RelightingSet::open(&truth).unwrap();
-    let methods = [&maps, &images]
-        .map(|folder| RelightMethod::Predictions(predictions(folder), SpecularForm::Lobe));
+    let methods = [&maps, &images].map(|folder| RelightMethod::Predictions(predictions(folder)));
     let table = evaluate_relighting(&set, "one", &methods, &|| {}).unwrap();
     for line in &table.lines {
         assert!(value(line, "MSE") < 1e-7, "{line:?}");
@@ -515,7 +512,7 @@ fn a_made_set_goes_on_with_more_objects_but_not_with_other_settings() {
         objects: 1,
         lights: 2,
         size: 16,
-        ..RelightingRecipe::default()
+        seed: 0,
     };
     let make = |recipe: &RelightingRecipe| make_relighting(recipe, &library, dir.path(), &|| {});
     make(&recipe).unwrap();

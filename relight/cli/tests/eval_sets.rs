@@ -155,7 +155,7 @@ fn pictures_of_arap_are_found_with_the_albedo_of_their_scene() {
     let yard = set.load(2).unwrap();
     let pixel = yard.albedo.unwrap().planes().pixel(1, 1);
     assert!((pixel[0] - albedo().pixel(1, 1)[0]).abs() < 0.01, "sRGB");
-    let all = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
+    let all = IntrinsicBaseline::ALL.map(IntrinsicMethod::Baseline);
     let table = evaluate_intrinsic(&set, "all", IntrinsicInput::Diffuse, &all, &|| {}).unwrap();
     assert!(
         table

@@ -43,17 +43,15 @@ pub fn evaluate_highlights(
     methods: &[HighlightMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "highlights".to_owned(),
-        notes: vec![
+    let mut table = ScoreTable::new(
+        "highlights",
+        vec![
             "highlight: against the true one; diffuse: the image less the highlight, not below 0, \
              against the image less the true one"
                 .to_owned(),
             format!("SSIM by {}", Ssim::Gaussian.name()),
         ],
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
+    );
     for method in methods {
         add_method(
             &mut table,

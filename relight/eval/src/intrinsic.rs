@@ -1,6 +1,6 @@
 //! Albedo and shading of single images: the table on MIT Intrinsic Images.
 
-use super::retinex::{IntrinsicImages, Retinex, divided};
+use super::retinex::{self, divided};
 use super::run::{Scored, add_method, grey, measured, need, object, of_grey, unlit};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Rgb};
@@ -18,7 +18,7 @@ pub enum IntrinsicInput {
 }
 
 /// A decomposition that needs no learning, or that looks at the ground truth.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IntrinsicBaseline {
     /// Albedo 1; the shading is the mean of the image's channels.
     ConstantAlbedo,
@@ -29,35 +29,31 @@ pub enum IntrinsicBaseline {
     /// The shading is the square root of that mean.
     RootShading,
     /// Colour Retinex.
-    Retinex(Retinex),
+    Retinex,
     /// Not a baseline but a bound: the true normals under the light of order 2 that fits the true
     /// shading best. The shading is at least a fifth of its mean.
     Oracle,
 }
 
 impl IntrinsicBaseline {
-    /// All of them, with their usual settings.
-    #[must_use]
-    pub fn all() -> [Self; 6] {
-        [
-            Self::ConstantAlbedo,
-            Self::ConstantShading,
-            Self::LuminanceShading,
-            Self::RootShading,
-            Self::Retinex(Retinex::default()),
-            Self::Oracle,
-        ]
-    }
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::ConstantAlbedo,
+        Self::ConstantShading,
+        Self::LuminanceShading,
+        Self::RootShading,
+        Self::Retinex,
+        Self::Oracle,
+    ];
 
     /// How a table names it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::ConstantAlbedo => "constant albedo",
             Self::ConstantShading => "constant shading",
             Self::LuminanceShading => "shading = luminance",
             Self::RootShading => "shading = root of luminance",
-            Self::Retinex(_) => "colour Retinex",
+            Self::Retinex => "colour Retinex",
             Self::Oracle => "oracle: true normals, fitted light",
         }
     }
@@ -67,27 +63,27 @@ impl IntrinsicBaseline {
         sample: &TruthSample,
         image: &Rgb<Linear>,
         mask: &[bool],
-    ) -> Result<IntrinsicImages, EvalError> {
+    ) -> Result<FoundImages, EvalError> {
         let extent = image.planes().extent();
         let ones = || of_grey(extent, vec![1.0; extent.pixels()]);
         let shaded_by = |shading: Vec<f32>| {
-            Ok(IntrinsicImages {
+            Ok(FoundImages {
                 albedo: divided(image, &shading),
-                shading: of_grey(extent, shading)?,
+                shading: Some(of_grey(extent, shading)?),
             })
         };
         match self {
-            Self::ConstantAlbedo => Ok(IntrinsicImages {
+            Self::ConstantAlbedo => Ok(FoundImages {
                 albedo: ones()?,
-                shading: of_grey(extent, grey(image))?,
+                shading: Some(of_grey(extent, grey(image))?),
             }),
-            Self::ConstantShading => Ok(IntrinsicImages {
+            Self::ConstantShading => Ok(FoundImages {
                 albedo: image.clone(),
-                shading: ones()?,
+                shading: Some(ones()?),
             }),
             Self::LuminanceShading => shaded_by(grey(image)),
             Self::RootShading => shaded_by(grey(image).into_iter().map(f32::sqrt).collect()),
-            Self::Retinex(settings) => settings.decompose(image, mask),
+            Self::Retinex => retinex::decompose(image, mask),
             Self::Oracle => shaded_by(fitted_shading(sample, mask)?),
         }
     }
@@ -147,7 +143,7 @@ impl IntrinsicMethod {
                     }
                     IntrinsicInput::Original => need(sample, "image", &sample.image),
                 };
-                Ok(baseline.decompose(sample, image?, mask)?.into())
+                baseline.decompose(sample, image?, mask)
             }
             Self::Predictions(predictions) => {
                 let read = |part| predictions.colour(&sample.name, part, sample.extent());
@@ -163,18 +159,9 @@ impl IntrinsicMethod {
 }
 
 /// What is compared with the ground truth.
-struct FoundImages {
-    albedo: Rgb<Linear>,
-    shading: Option<Rgb<Linear>>,
-}
-
-impl From<IntrinsicImages> for FoundImages {
-    fn from(found: IntrinsicImages) -> Self {
-        Self {
-            albedo: found.albedo,
-            shading: Some(found.shading),
-        }
-    }
+pub(super) struct FoundImages {
+    pub(super) albedo: Rgb<Linear>,
+    pub(super) shading: Option<Rgb<Linear>>,
 }
 
 /// SMSE and LMSE of albedo and shading, and their means, by both conventions, for each method. Of a set that does not
@@ -189,12 +176,7 @@ pub fn evaluate_intrinsic(
     methods: &[IntrinsicMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "intrinsic images".to_owned(),
-        notes: notes(input),
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
+    let mut table = ScoreTable::new("intrinsic images", notes(input));
     let first = (set.names().len() > 0).then(|| set.load(0)).transpose()?;
     let has_oracle = first.is_none_or(|one| one.shading.is_some() && one.normals.is_some());
     for method in methods {

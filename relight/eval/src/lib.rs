@@ -42,9 +42,8 @@ pub use reliability::ReliabilityBin;
 pub use relighting::{
     RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
 };
-pub use retinex::{IntrinsicImages, Retinex};
 pub use run::EvalProgress;
-pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
+pub use scores::{ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
 pub use turns::{TurnLine, TurnMethod, TurnScore, TurnSet, TurnTable, evaluate_turns};
 
 /// The examples of the README, so that they are built.

@@ -57,9 +57,7 @@ pub fn evaluate_light(
     methods: &[LightMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "light".to_owned(),
-        notes: vec![
+    let mut table = ScoreTable::new("light", vec![
             "the shading that the light makes on the true normals, against the true shading"
                 .to_owned(),
             format!(
@@ -69,10 +67,7 @@ pub fn evaluate_light(
             "direction: degrees between the bands 1 of the light and of the true light (where the set has none, of that \
              fitted to the true shading), 90 where one of them has no direction"
                 .to_owned(),
-        ],
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
+        ]);
     for method in methods {
         add_method(
             &mut table,

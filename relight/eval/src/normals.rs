@@ -43,9 +43,9 @@ pub fn evaluate_normals(
     methods: &[NormalMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "normals".to_owned(),
-        notes: vec![
+    let mut table = ScoreTable::new(
+        "normals",
+        vec![
             format!(
                 "MSE and DSSIM: of the colours (n + 1) / 2, SSIM by {}",
                 Ssim::Gaussian.name()
@@ -53,9 +53,7 @@ pub fn evaluate_normals(
             "angles: degrees; within: the fraction of pixels with an angle of at most so much"
                 .to_owned(),
         ],
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
+    );
     for method in methods {
         add_method(
             &mut table,

@@ -52,14 +52,12 @@ pub fn evaluate_ordinal(
     methods: &[OrdinalMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "ordinal albedo".to_owned(),
-        notes: vec![format!(
+    let mut table = ScoreTable::new(
+        "ordinal albedo",
+        vec![format!(
             "WHDR: weighted human disagreement rate, delta {DELTA}"
         )],
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
+    );
     for method in methods {
         let name = |index| images.name(index);
         let scored = each(images.len(), progress, name, |index| {

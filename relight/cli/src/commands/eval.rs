@@ -334,7 +334,7 @@ fn on_set<M, const N: usize>(
 }
 
 fn mit(arguments: &SetArguments, input: IntrinsicInput, console: Console) -> Evaluated {
-    let baselines = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
+    let baselines = IntrinsicBaseline::ALL.map(IntrinsicMethod::Baseline);
     let predicted = IntrinsicMethod::Predictions;
     let evaluate = |set: &TruthSet, split: &str, methods: &[_], progress: Progress<'_>| {
         evaluate_intrinsic(set, split, input, methods, progress)
@@ -386,9 +386,7 @@ fn relighting(
         RelightMethod::Oracle(SpecularForm::Power),
         RelightMethod::Oracle(SpecularForm::Lobe),
     ];
-    let methods = with_predictions(baselines, common, |folder| {
-        RelightMethod::Predictions(folder, SpecularForm::Lobe)
-    });
+    let methods = with_predictions(baselines, common, RelightMethod::Predictions);
     let steps = set.objects() * methods.len();
     let table = with_progress(steps, "evaluating", console, |progress| {
         evaluate_relighting(&set, &common.split("all of"), &methods, progress)

@@ -13,7 +13,7 @@ use relight_photo::insert::{
     Subject,
 };
 use relight_synth::Library;
-use stage::{Stage, StageRecipe};
+use stage::Stage;
 
 /// What an evaluation of insertion consists of. The same recipe and library make the same pictures.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -164,9 +164,9 @@ pub fn evaluate_insertion(
     show: SheetWriter<'_>,
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "insertion".to_owned(),
-        notes: vec![
+    let mut table = ScoreTable::new(
+        "insertion",
+        vec![
             format!(
                 "made by relight {}: {} objects, {} x {} pixels, seed {}, {} panoramas, Monte Carlo with cast shadows, on a table",
                 env!("CARGO_PKG_VERSION"),
@@ -180,21 +180,14 @@ pub fn evaluate_insertion(
                 .to_owned(),
             format!("SSIM by {}", Ssim::Gaussian.name()),
         ],
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
+    );
     if recipe.black_paint {
         let note = "about half of each object is painted black, with an albedo of 0.04 at most";
         table.notes.push(note.to_owned());
     }
     let mut scored: [Vec<(String, Vec<Scored>)>; InsertionMethod::ALL.len()] = Default::default();
     for number in 0..recipe.objects {
-        let made = StageRecipe {
-            seed: recipe.seed,
-            size: recipe.size,
-            black_paint: recipe.black_paint,
-        };
-        let stage = Stage::make(library, made, number).map_err(unlit(&format!("{number:03}")))?;
+        let stage = Stage::make(library, recipe, number).map_err(unlit(&format!("{number:03}")))?;
         let places = Places::of(&stage);
         let failed = unshown(&stage.name);
         let subjects = Subjects::of(&stage, decomposer).map_err(&failed)?;

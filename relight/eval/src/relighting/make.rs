@@ -40,17 +40,6 @@ pub struct RelightingRecipe {
     pub seed: u64,
 }
 
-impl Default for RelightingRecipe {
-    fn default() -> Self {
-        Self {
-            objects: 100,
-            lights: 30,
-            size: 128,
-            seed: 0,
-        }
-    }
-}
-
 impl RelightingRecipe {
     fn synth(&self) -> Recipe {
         Recipe {

@@ -26,17 +26,15 @@ pub fn evaluate_relighting(
     methods: &[RelightMethod<'_>],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable {
-        protocol: "relighting".to_owned(),
-        notes: vec![
+    let mut table = ScoreTable::new(
+        "relighting",
+        vec![
             set.about(),
             "one image in; out the images under all other lights; images: how many were compared"
                 .to_owned(),
             format!("SSIM by {}", Ssim::Gaussian.name()),
         ],
-        lines: Vec::new(),
-        images: Vec::new(),
-    };
+    );
     let targets = set.lights().len().saturating_sub(1);
     for method in methods {
         let scored = each(set.objects(), progress, object_folder, |number| {
@@ -64,7 +62,7 @@ fn score(
         let relight = method.prepare(set, object, part)?;
         for light in object.targets(set) {
             let truth = set.image(object, light, part)?;
-            let found = relight.image(light)?;
+            let found = relight(light)?;
             for ((mask, _), sum) in rules.iter().zip(&mut sums) {
                 let (mse, dssim) = compare(object, &truth, &found, mask)?;
                 sum.0 += mse;
