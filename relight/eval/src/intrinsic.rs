@@ -18,8 +18,8 @@ pub enum IntrinsicInput {
 }
 
 /// A decomposition that needs no learning, or that looks at the ground truth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum IntrinsicBaseline {
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum IntrinsicBaseline {
     /// Albedo 1; the shading is the mean of the image's channels.
     ConstantAlbedo,
     /// Shading 1; the albedo is the image.
@@ -36,8 +36,7 @@ pub enum IntrinsicBaseline {
 }
 
 impl IntrinsicBaseline {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
+    const ALL: [Self; 6] = [
         Self::ConstantAlbedo,
         Self::ConstantShading,
         Self::LuminanceShading,
@@ -61,9 +60,13 @@ impl IntrinsicBaseline {
     fn decompose(
         self,
         sample: &TruthSample,
-        image: &Rgb<Linear>,
+        input: IntrinsicInput,
         mask: &[bool],
     ) -> Result<FoundImages, EvalError> {
+        let image = match input {
+            IntrinsicInput::Diffuse => need(sample, "image without highlights", &sample.diffuse),
+            IntrinsicInput::Original => need(sample, "image", &sample.image),
+        }?;
         let extent = image.planes().extent();
         let ones = || of_grey(extent, vec![1.0; extent.pixels()]);
         let shaded_by = |shading: Vec<f32>| {
@@ -112,60 +115,27 @@ fn fitted_shading(sample: &TruthSample, mask: &[bool]) -> Result<Vec<f32>, EvalE
 /// The least shading of the oracle, as a fraction of the mean.
 const LEAST_SHADING: f64 = 0.2;
 
-/// Where a decomposition comes from.
-#[derive(Debug, Clone)]
-pub enum IntrinsicMethod {
-    /// It is made here.
-    Baseline(IntrinsicBaseline),
-    /// It was made elsewhere: parts `albedo` and `shading`.
-    Predictions(Predictions),
-}
-
-impl IntrinsicMethod {
-    fn name(&self) -> String {
-        match self {
-            Self::Baseline(baseline) => baseline.name().to_owned(),
-            Self::Predictions(predictions) => predictions.name(),
-        }
-    }
-
-    fn decompose(
-        &self,
-        sample: &TruthSample,
-        input: IntrinsicInput,
-        mask: &[bool],
-    ) -> Result<FoundImages, EvalError> {
-        match self {
-            Self::Baseline(baseline) => {
-                let image = match input {
-                    IntrinsicInput::Diffuse => {
-                        need(sample, "image without highlights", &sample.diffuse)
-                    }
-                    IntrinsicInput::Original => need(sample, "image", &sample.image),
-                };
-                baseline.decompose(sample, image?, mask)
-            }
-            Self::Predictions(predictions) => {
-                let read = |part| predictions.colour(&sample.name, part, sample.extent());
-                // What has no ground truth need not be there.
-                let shading = sample.shading.as_ref().map(|_| read("shading"));
-                Ok(FoundImages {
-                    albedo: read("albedo")?,
-                    shading: shading.transpose()?,
-                })
-            }
-        }
-    }
-}
-
 /// What is compared with the ground truth.
 pub(super) struct FoundImages {
     pub(super) albedo: Rgb<Linear>,
     pub(super) shading: Option<Rgb<Linear>>,
 }
 
-/// SMSE and LMSE of albedo and shading, and their means, by both conventions, for each method. Of a set that does not
-/// know its shading, of albedo alone.
+/// The parts `albedo` and `shading` of a folder of predictions; what has no ground truth need not be there.
+fn predicted(predictions: &Predictions, sample: &TruthSample) -> Result<FoundImages, EvalError> {
+    let read = |part| predictions.colour(&sample.name, part, sample.extent());
+    let shading = sample.shading.as_ref().map(|_| read("shading"));
+    Ok(FoundImages {
+        albedo: read("albedo")?,
+        shading: shading.transpose()?,
+    })
+}
+
+/// Decomposes a sample under its mask.
+type Finder<'a> = &'a (dyn Fn(&TruthSample, &[bool]) -> Result<FoundImages, EvalError> + Sync);
+
+/// SMSE and LMSE of albedo and shading, and their means, by both conventions, for six baselines and the predictions. Of a
+/// set that does not know its shading, of albedo alone.
 ///
 /// # Errors
 /// Where the ground truth or a prediction cannot be read or measured.
@@ -173,29 +143,31 @@ pub fn evaluate_intrinsic(
     set: &TruthSet,
     split: &str,
     input: IntrinsicInput,
-    methods: &[IntrinsicMethod],
+    predictions: &[Predictions],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
     let mut table = ScoreTable::new("intrinsic images", notes(input));
     let first = (set.names().len() > 0).then(|| set.load(0)).transpose()?;
     let has_oracle = first.is_none_or(|one| one.shading.is_some() && one.normals.is_some());
-    for method in methods {
-        if !has_oracle && matches!(method, IntrinsicMethod::Baseline(IntrinsicBaseline::Oracle)) {
-            let note = "the oracle is left out: the set does not know both normals and shading";
-            table.notes.push(note.to_owned());
-            continue;
+    if !has_oracle {
+        let note = "the oracle is left out: the set does not know both normals and shading";
+        table.notes.push(note.to_owned());
+    }
+    let mut add = |name: &str, find: Finder<'_>| {
+        add_method(&mut table, (set, split), name, progress, |sample| {
+            let mask = object(sample);
+            score(sample, &find(sample, &mask)?, &mask)
+        })
+    };
+    for baseline in IntrinsicBaseline::ALL {
+        if has_oracle || baseline != IntrinsicBaseline::Oracle {
+            add(baseline.name(), &|sample, mask| {
+                baseline.decompose(sample, input, mask)
+            })?;
         }
-        add_method(
-            &mut table,
-            (set, split),
-            &method.name(),
-            progress,
-            |sample| {
-                let mask = object(sample);
-                let found = method.decompose(sample, input, &mask)?;
-                score(sample, &found, &mask)
-            },
-        )?;
+    }
+    for one in predictions {
+        add(&one.name(), &|sample, _| predicted(one, sample))?;
     }
     Ok(table)
 }

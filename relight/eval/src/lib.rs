@@ -31,12 +31,12 @@ mod scores;
 mod turns;
 
 pub use error::EvalError;
-pub use highlights::{HighlightMethod, evaluate_highlights};
+pub use highlights::evaluate_highlights;
 pub use insertion::{InsertionMethod, InsertionRecipe, SheetWriter, evaluate_insertion};
-pub use intrinsic::{IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, evaluate_intrinsic};
-pub use light::{LightMethod, evaluate_light};
-pub use normals::{NormalMethod, evaluate_normals};
-pub use ordinal::{OrdinalMethod, evaluate_ordinal};
+pub use intrinsic::{IntrinsicInput, evaluate_intrinsic};
+pub use light::evaluate_light;
+pub use normals::evaluate_normals;
+pub use ordinal::evaluate_ordinal;
 pub use predictions::Predictions;
 pub use reliability::ReliabilityBin;
 pub use relighting::{

@@ -9,47 +9,18 @@ use relight_reader::JudgedImages;
 /// By how much a surface must be brighter for the other to be called darker.
 const DELTA: f64 = 0.1;
 
-/// Where albedo comes from.
-#[derive(Debug, Clone)]
-pub enum OrdinalMethod {
-    /// It is the same everywhere.
-    ConstantAlbedo,
-    /// It is the image.
-    ConstantShading,
-    /// It was predicted: part `albedo`.
-    Predictions(Predictions),
-}
+/// Finds the albedo of a numbered image.
+type Finder<'a> = &'a (dyn Fn(usize, Rgb<Linear>) -> Result<Rgb<Linear>, EvalError> + Sync);
 
-impl OrdinalMethod {
-    fn name(&self) -> String {
-        match self {
-            Self::ConstantAlbedo => "constant albedo".to_owned(),
-            Self::ConstantShading => "constant shading".to_owned(),
-            Self::Predictions(predictions) => predictions.name(),
-        }
-    }
-
-    fn albedo(&self, images: &JudgedImages, index: usize) -> Result<Rgb<Linear>, EvalError> {
-        let image = Rgb::<Linear>::read(&images.image(index), Transfer::Srgb)?;
-        let extent = image.planes().extent();
-        match self {
-            Self::ConstantAlbedo => Ok(Rgb::new(Planes::filled(extent, [0.5; 3]))),
-            Self::ConstantShading => Ok(image),
-            Self::Predictions(predictions) => {
-                predictions.colour(&images.name(index), "albedo", extent)
-            }
-        }
-    }
-}
-
-/// WHDR at delta 0.1, for each method: the mean over images.
+/// WHDR at delta 0.1, for an albedo that is the same everywhere, for one that is the image, and for the predictions
+/// (`albedo`): the mean over images.
 ///
 /// # Errors
 /// Where an image, its judgements or a prediction cannot be read or measured.
 pub fn evaluate_ordinal(
     images: &JudgedImages,
     split: &str,
-    methods: &[OrdinalMethod],
+    predictions: &[Predictions],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
     let mut table = ScoreTable::new(
@@ -58,18 +29,28 @@ pub fn evaluate_ordinal(
             "WHDR: weighted human disagreement rate, delta {DELTA}"
         )],
     );
-    for method in methods {
+    let mut add = |method: &str, find: Finder<'_>| {
         let name = |index| images.name(index);
         let scored = each(images.len(), progress, name, |index| {
-            Ok(vec![score(images, index, method)?])
+            let image = Rgb::<Linear>::read(&images.image(index), Transfer::Srgb)?;
+            Ok(vec![score(images, index, &find(index, image)?)?])
         })?;
-        add_lines(&mut table, &method.name(), split, 1, scored);
+        add_lines(&mut table, method, split, 1, scored);
+        Ok::<(), EvalError>(())
+    };
+    add("constant albedo", &|_, image| {
+        Ok(Rgb::new(Planes::filled(image.planes().extent(), [0.5; 3])))
+    })?;
+    add("constant shading", &|_, image| Ok(image))?;
+    for one in predictions {
+        add(&one.name(), &|index, image| {
+            one.colour(&images.name(index), "albedo", image.planes().extent())
+        })?;
     }
     Ok(table)
 }
 
-fn score(images: &JudgedImages, index: usize, method: &OrdinalMethod) -> Result<Scored, EvalError> {
-    let albedo = method.albedo(images, index)?;
+fn score(images: &JudgedImages, index: usize, albedo: &Rgb<Linear>) -> Result<Scored, EvalError> {
     let judgements = images.judgements(index)?;
     let planes = albedo.planes();
     let rate = whdr(planes.extent(), &planes.planes(), &judgements, DELTA);

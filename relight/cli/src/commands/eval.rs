@@ -10,11 +10,10 @@ use relight_core::image::{Depth, Planes, Transfer};
 use relight_core::light::NormalsFrame;
 use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
-    EvalError, HighlightMethod, InsertionRecipe, IntrinsicBaseline, IntrinsicInput,
-    IntrinsicMethod, LightMethod, NormalMethod, OrdinalMethod, Predictions, RelightMethod,
-    RelightingRecipe, RelightingSet, ScoreTable, TurnMethod, TurnSet, evaluate_highlights,
-    evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal,
-    evaluate_relighting, evaluate_turns, make_relighting,
+    EvalError, InsertionRecipe, IntrinsicInput, Predictions, RelightMethod, RelightingRecipe,
+    RelightingSet, ScoreTable, TurnMethod, TurnSet, evaluate_highlights, evaluate_insertion,
+    evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal, evaluate_relighting,
+    evaluate_turns, make_relighting,
 };
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
@@ -275,9 +274,9 @@ impl CommonArguments {
         self.split.clone().unwrap_or_else(named)
     }
 
-    fn predictions(&self) -> impl Iterator<Item = Predictions> {
+    fn predictions(&self) -> Vec<Predictions> {
         let folder = |path: &PathBuf| Predictions::new(path.clone(), self.transfer, self.normals_y);
-        self.predictions.iter().map(folder)
+        self.predictions.iter().map(folder).collect()
     }
 }
 
@@ -299,10 +298,18 @@ impl SetArguments {
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let whole = |table: ScoreTable| (table, Outcome::Whole);
     let (table, outcome) = match &arguments.protocol {
-        Protocol::Mit { set, input } => mit(set, *input, console).map(whole),
-        Protocol::Normals { set } => normals(set, console).map(whole),
-        Protocol::Light { set, diffuse } => light(set, *diffuse, console).map(whole),
-        Protocol::Highlight { set } => highlight(set, console).map(whole),
+        Protocol::Mit { set, input } => on_set(set, 6, console, |set, split, found, progress| {
+            evaluate_intrinsic(set, split, *input, found, progress)
+        })
+        .map(whole),
+        Protocol::Normals { set } => on_set(set, 1, console, evaluate_normals).map(whole),
+        Protocol::Light { set, diffuse } => {
+            on_set(set, 2, console, |set, split, found, progress| {
+                evaluate_light(set, split, *diffuse, found, progress)
+            })
+            .map(whole)
+        }
+        Protocol::Highlight { set } => on_set(set, 1, console, evaluate_highlights).map(whole),
         Protocol::Relighting(arguments) => relighting(arguments, console),
         Protocol::Whdr(common) => ordinal(common, console).map(whole),
         Protocol::Insertion(arguments) => insertion(arguments, console),
@@ -317,54 +324,24 @@ type Evaluated = Result<ScoreTable, Box<dyn Error>>;
 /// Hears of each step.
 type Progress<'a> = &'a (dyn Fn() + Sync);
 
-/// Scores the baselines and the folders of predictions on the images of a set.
-fn on_set<M, const N: usize>(
+/// Scores so many baselines and the folders of predictions on the images of a set.
+fn on_set(
     arguments: &SetArguments,
-    baselines: [M; N],
-    predicted: fn(Predictions) -> M,
-    evaluate: impl FnOnce(&TruthSet, &str, &[M], Progress<'_>) -> Result<ScoreTable, EvalError>,
+    baselines: usize,
     console: Console,
+    evaluate: impl FnOnce(
+        &TruthSet,
+        &str,
+        &[Predictions],
+        Progress<'_>,
+    ) -> Result<ScoreTable, EvalError>,
 ) -> Evaluated {
     let (set, split) = arguments.open()?;
-    let methods = with_predictions(baselines, &arguments.common, predicted);
-    let steps = set.names().len() * methods.len();
+    let predictions = arguments.common.predictions();
+    let steps = set.names().len() * (baselines + predictions.len());
     with_progress(steps, "evaluating", console, |progress| {
-        evaluate(&set, &split, &methods, progress)
+        evaluate(&set, &split, &predictions, progress)
     })
-}
-
-fn mit(arguments: &SetArguments, input: IntrinsicInput, console: Console) -> Evaluated {
-    let baselines = IntrinsicBaseline::ALL.map(IntrinsicMethod::Baseline);
-    let predicted = IntrinsicMethod::Predictions;
-    let evaluate = |set: &TruthSet, split: &str, methods: &[_], progress: Progress<'_>| {
-        evaluate_intrinsic(set, split, input, methods, progress)
-    };
-    on_set(arguments, baselines, predicted, evaluate, console)
-}
-
-fn normals(arguments: &SetArguments, console: Console) -> Evaluated {
-    let (baselines, predicted) = ([NormalMethod::Viewer], NormalMethod::Predictions);
-    on_set(arguments, baselines, predicted, evaluate_normals, console)
-}
-
-fn light(arguments: &SetArguments, form: DiffuseForm, console: Console) -> Evaluated {
-    let baselines = [LightMethod::Even, LightMethod::Oracle];
-    let predicted = LightMethod::Predictions;
-    let evaluate = |set: &TruthSet, split: &str, methods: &[_], progress: Progress<'_>| {
-        evaluate_light(set, split, form, methods, progress)
-    };
-    on_set(arguments, baselines, predicted, evaluate, console)
-}
-
-fn highlight(arguments: &SetArguments, console: Console) -> Evaluated {
-    let (baselines, predicted) = ([HighlightMethod::Nothing], HighlightMethod::Predictions);
-    on_set(
-        arguments,
-        baselines,
-        predicted,
-        evaluate_highlights,
-        console,
-    )
 }
 
 fn relighting(
@@ -379,14 +356,15 @@ fn relighting(
     let common = &arguments.common;
     let set = RelightingSet::open(&common.data)?;
     let network = network(arguments.weights.as_deref())?;
-    let baselines = [
+    let mut methods = vec![
         RelightMethod::Naive,
         RelightMethod::Photograph(&network),
         RelightMethod::Maps(&network),
         RelightMethod::Oracle(SpecularForm::Power),
         RelightMethod::Oracle(SpecularForm::Lobe),
     ];
-    let methods = with_predictions(baselines, common, RelightMethod::Predictions);
+    let predictions = common.predictions().into_iter();
+    methods.extend(predictions.map(RelightMethod::Predictions));
     let steps = set.objects() * methods.len();
     let table = with_progress(steps, "evaluating", console, |progress| {
         evaluate_relighting(&set, &common.split("all of"), &methods, progress)
@@ -496,25 +474,12 @@ fn network(weights: Option<&Path>) -> Result<Decomposer, Box<dyn Error>> {
 
 fn ordinal(common: &CommonArguments, console: Console) -> Evaluated {
     let images = JudgedImages::open(&common.data)?;
-    let baselines = [
-        OrdinalMethod::ConstantAlbedo,
-        OrdinalMethod::ConstantShading,
-    ];
-    let methods = with_predictions(baselines, common, OrdinalMethod::Predictions);
-    let steps = images.len() * methods.len();
+    let predictions = common.predictions();
+    // Two baselines.
+    let steps = images.len() * (2 + predictions.len());
     with_progress(steps, "evaluating", console, |progress| {
-        evaluate_ordinal(&images, &common.split("all of"), &methods, progress)
+        evaluate_ordinal(&images, &common.split("all of"), &predictions, progress)
     })
-}
-
-/// The baselines, and the folders of predictions as methods.
-fn with_predictions<M, const N: usize>(
-    baselines: [M; N],
-    common: &CommonArguments,
-    method: impl Fn(Predictions) -> M,
-) -> Vec<M> {
-    let predicted = common.predictions().map(method);
-    baselines.into_iter().chain(predicted).collect()
 }
 
 fn with_progress<T, E: Error + 'static>(
