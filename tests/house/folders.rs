@@ -39,7 +39,7 @@ impl Source {
                 folder.push(own);
             }
             for (name, path) in declared(&code) {
-                let inner = [module.as_slice(), &[name.clone()]].concat();
+                let inner = [module.as_slice(), std::slice::from_ref(&name)].concat();
                 let file = match path {
                     Some(path) => file.with_file_name(path),
                     None => {
