@@ -29,8 +29,8 @@ pub struct InsertionRecipe {
 }
 
 /// Ways to put an object into a picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum InsertionMethod {
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum InsertionMethod {
     /// All of [`relight_photo::insert`].
     Whole,
     /// The same without the shadow on the ground.
@@ -46,8 +46,7 @@ pub enum InsertionMethod {
 }
 
 impl InsertionMethod {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
+    const ALL: [Self; 6] = [
         Self::Whole,
         Self::WithoutShadow,
         Self::WithoutEdgeColours,
@@ -57,8 +56,7 @@ impl InsertionMethod {
     ];
 
     /// How a table names it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::Whole => "relight insert",
             Self::WithoutShadow => "without shadow",
