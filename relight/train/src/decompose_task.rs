@@ -46,10 +46,7 @@ impl DecomposeTask {
         composition.recipe.check()?;
         let validation = HeldOutSamples::new(&composition, settings.data.validation);
         let graph = decomposer_with_heads();
-        let initial = || Weights::initial(&graph, settings.run.seed);
-        let weights = weights.cloned().unwrap_or_else(initial);
-        let learner = settings.run.learner(resources.device);
-        let learner = Learner::new(graph, &weights, learner)?;
+        let learner = Learner::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
             composed: ComposedBatches::new(
                 composition,
@@ -83,8 +80,8 @@ impl TrainingTask for DecomposeTask {
         self.composed.left_out()
     }
 
-    fn learners(&mut self) -> Vec<&mut Learner> {
-        vec![&mut self.learner]
+    fn learner(&mut self) -> &mut Learner {
+        &mut self.learner
     }
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {

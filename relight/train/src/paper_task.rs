@@ -17,7 +17,6 @@ use super::process_group::{ProcessGroup, indivisible};
 use super::settings::{PaperSettings, first_difference};
 use super::task::{Resources, StepLosses, TrainingTask, Validation};
 use super::turn_reader::{TurnGroup, TurnReader};
-use relight_nets::Weights;
 use relight_reader::Rank;
 use relight_synth::{LeftOut, stream};
 
@@ -65,10 +64,8 @@ impl PaperTask {
             )));
         }
         let graph = learned(phase);
-        let initial = || Weights::initial(&graph, settings.run.seed);
-        let weights = inputs.weights.clone().unwrap_or_else(initial);
-        let learner = settings.run.learner(resources.device);
-        let kind = learner.precision.kind();
+        let weights = inputs.weights.as_ref();
+        let kind = settings.run.precision.kind();
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
         let held_out = |path: &PathBuf| HeldOutTurns::read(path, kind, resources.device);
@@ -83,7 +80,7 @@ impl PaperTask {
             held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),
-            learner: Learner::new(graph, &weights, learner)?,
+            learner: Learner::new(graph, weights, &settings.run, resources.device)?,
             composed: ComposedBatches::new(
                 composition,
                 buffer_settings(&settings.data, &settings.run),
@@ -162,8 +159,8 @@ impl TrainingTask for PaperTask {
         self.composed.left_out()
     }
 
-    fn learners(&mut self) -> Vec<&mut Learner> {
-        vec![&mut self.learner]
+    fn learner(&mut self) -> &mut Learner {
+        &mut self.learner
     }
 
     fn inputs(&self) -> Result<String, TrainError> {

@@ -21,7 +21,7 @@ use super::journal::Journal;
 use super::process_group::ProcessGroup;
 use super::settings::RunSettings;
 use super::task::{StepLosses, TrainingTask, Validation};
-use relight_nets::{WeightPrecision, Weights};
+use relight_nets::WeightPrecision;
 
 /// How long a process waits for process 0 to write its checkpoint and end, where the run ends early. No longer, as process 0 can
 /// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.
@@ -51,8 +51,8 @@ pub struct RunOutcome {
     pub damaged: bool,
     /// Figures of the last validation; none in other processes than the first.
     pub figures: BTreeMap<String, f64>,
-    /// The files of weights, which the first process writes.
-    pub weights: Vec<PathBuf>,
+    /// The file of weights, which the first process writes.
+    pub weights: Option<PathBuf>,
 }
 
 /// A run in its folder.
@@ -147,10 +147,10 @@ impl<'a> Run<'a> {
             }
             Err(fault) => return Err(fault),
         };
-        let mut weights = Vec::new();
+        let mut weights = None;
         if self.journal.is_some() {
             self.save(observer)?;
-            weights = self.write_weights()?;
+            weights = Some(self.write_weights()?);
         }
         // Only now: launchers end all processes as soon as one has ended with another code than 0.
         if let Some(group) = self.group.take() {
@@ -247,24 +247,15 @@ impl<'a> Run<'a> {
         reduced: &AllReducedLosses,
         learning_rate: f64,
     ) -> Result<f64, TrainError> {
+        let learner = self.task.learner();
         match reduced.part(losses)? {
             Some(part) => part.f_backward()?,
-            None => {
-                for learner in self.task.learners() {
-                    learner.model.add_zero_gradients()?;
-                }
-            }
+            None => learner.model.add_zero_gradients()?,
         }
         if let Some(group) = &self.group {
-            for learner in self.task.learners() {
-                group.sum_gradients(learner.model.parameters())?;
-            }
+            group.sum_gradients(learner.model.parameters())?;
         }
-        let mut norm = 0.0_f64;
-        for learner in self.task.learners() {
-            norm = norm.hypot(learner.learn(learning_rate, self.settings.max_grad_norm)?);
-        }
-        Ok(norm)
+        learner.learn(learning_rate, self.settings.max_grad_norm)
     }
 
     fn log(
@@ -359,10 +350,7 @@ impl<'a> Run<'a> {
     }
 
     fn save(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
-        let mut state = Weights::default();
-        for learner in self.task.learners() {
-            state.extend(learner.state()?);
-        }
+        let state = self.task.learner().state()?;
         Checkpoint {
             task: self.task.name().to_owned(),
             step: self.step,
@@ -376,28 +364,19 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// The averaged weights, half precision, a file a network.
-    fn write_weights(&mut self) -> Result<Vec<PathBuf>, TrainError> {
-        let folder = self.folder;
-        self.task
-            .learners()
-            .into_iter()
-            .map(|learner| {
-                let path = folder.join(format!("{}.safetensors", learner.name()));
-                learner.averaged()?.write(&path, WeightPrecision::Half)?;
-                Ok(path)
-            })
-            .collect()
+    /// The averaged weights, half precision.
+    fn write_weights(&mut self) -> Result<PathBuf, TrainError> {
+        let learner = self.task.learner();
+        let path = self.folder.join(format!("{}.safetensors", learner.name()));
+        learner.averaged()?.write(&path, WeightPrecision::Half)?;
+        Ok(path)
     }
 }
 
 /// What has to be the same in all processes.
 fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
     let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
-    let mut weights = String::new();
-    for learner in task.learners() {
-        weights += &fingerprint(learner.model.parameters())?;
-    }
+    let weights = fingerprint(task.learner().model.parameters())?;
     Ok(vec![
         ("version and task", version),
         ("the settings", task.settings()),
@@ -437,8 +416,6 @@ fn recall(
         return Err(other(fault.to_owned()));
     }
     task.go_to(&checkpoint.cursor).map_err(other)?;
-    for learner in task.learners() {
-        learner.recall(&checkpoint.state)?;
-    }
+    task.learner().recall(&checkpoint.state)?;
     Ok(checkpoint.step)
 }
