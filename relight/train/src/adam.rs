@@ -88,13 +88,13 @@ impl Adam {
     /// Goes on from a memory that was saved.
     ///
     /// # Errors
-    /// [`TrainError::Memory`] where it is another network's.
+    /// [`TrainError::Refused`] where it is another network's.
     pub fn recall(&mut self, memory: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.first, &memory.under("first."))?;
         copy_into(&mut self.second, &memory.under("second."))?;
         let steps = memory.get(STEPS).map(relight_nets::Tensor::values);
         let Some(&[thousands, rest]) = steps else {
-            return Err(TrainError::Memory(STEPS.to_owned()));
+            return Err(TrainError::no_memory(STEPS));
         };
         self.steps = thousands as u64 * STEPS_PART + rest as u64;
         Ok(())
@@ -134,7 +134,7 @@ impl Adam {
             let mut gradient = parameter.f_grad()?;
             let (Some(first), Some(second)) = (self.first.get_mut(name), self.second.get_mut(name))
             else {
-                return Err(TrainError::Memory(name.clone()));
+                return Err(TrainError::no_memory(name));
             };
             if !gradient.defined() {
                 continue;

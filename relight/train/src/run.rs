@@ -78,8 +78,8 @@ impl<'a> Run<'a> {
     /// which open it with the same arguments.
     ///
     /// # Errors
-    /// [`TrainError::Occupied`], [`TrainError::Checkpoint`] where it is another run's, [`TrainError::Io`];
-    /// [`TrainError::Refused`], [`TrainError::ProcessLost`].
+    /// [`TrainError::Refused`] where there is one without `resume`, or another one; [`TrainError::Io`],
+    /// [`TrainError::ProcessLost`].
     pub fn open(
         task: &'a mut dyn TrainingTask,
         settings: &'a RunSettings,
@@ -88,18 +88,15 @@ impl<'a> Run<'a> {
         group: Option<ProcessGroup>,
     ) -> Result<Self, TrainError> {
         settings.check()?;
-        fs::create_dir_all(folder).map_err(|source| TrainError::Io {
-            path: folder.to_owned(),
-            doing: "made",
-            source,
-        })?;
+        fs::create_dir_all(folder).map_err(TrainError::io(folder, "made"))?;
         let inputs = task.inputs()?;
         let step = match Checkpoint::read(folder)? {
             None => 0,
             Some(_) if !resume => {
-                return Err(TrainError::Occupied {
-                    path: folder.to_owned(),
-                });
+                return Err(TrainError::Refused(format!(
+                    "{} holds a run already: go on with --resume, or give another folder",
+                    folder.display()
+                )));
             }
             Some(checkpoint) => recall(task, &inputs, &checkpoint, folder)?,
         };
@@ -132,7 +129,7 @@ impl<'a> Run<'a> {
     /// weights at the end.
     ///
     /// # Errors
-    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Ended`] where another process is lost:
+    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Refused`] where another process is lost:
     /// the run is
     /// saved.
     pub fn finish(
@@ -290,7 +287,7 @@ impl<'a> Run<'a> {
             Err(fault) => format!("it could not be saved: {}", with_causes(&fault)),
         };
         let step = self.step;
-        TrainError::Ended(format!(
+        TrainError::Refused(format!(
             "{lost}; the run ends after {step} steps, and {saved}"
         ))
     }
@@ -339,11 +336,8 @@ impl<'a> Run<'a> {
         journal.scalars(self.step, &named)?;
         if let Some(png) = sheet {
             let path = self.folder.join("validation.png");
-            relit_data::durable::write_whole(&path, &png).map_err(|source| TrainError::Io {
-                path,
-                doing: "written",
-                source,
-            })?;
+            relit_data::durable::write_whole(&path, &png)
+                .map_err(TrainError::io(&path, "written"))?;
         }
         observer.validated(self.step, &figures);
         Ok(figures)
@@ -396,10 +390,7 @@ fn recall(
     checkpoint: &Checkpoint,
     folder: &Path,
 ) -> Result<u64, TrainError> {
-    let other = |fault: String| TrainError::Checkpoint {
-        path: Checkpoint::path(folder),
-        fault,
-    };
+    let other = |fault: String| TrainError::checkpoint(&Checkpoint::path(folder), &fault);
     if checkpoint.task != task.name() {
         return Err(other(format!(
             "it trains {}, not {}",
