@@ -32,7 +32,7 @@ mod turns;
 
 pub use error::EvalError;
 pub use highlights::evaluate_highlights;
-pub use insertion::{InsertionRecipe, SheetWriter, evaluate_insertion};
+pub use insertion::{InsertionRecipe, evaluate_insertion};
 pub use intrinsic::{IntrinsicInput, evaluate_intrinsic};
 pub use light::evaluate_light;
 pub use normals::evaluate_normals;

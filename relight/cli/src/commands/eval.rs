@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
-use relight_core::files::write_png;
-use relight_core::image::{Depth, Planes, Transfer};
+use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
@@ -18,7 +17,7 @@ use relight_eval::{
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
 use relight_reader::{JudgedImages, TruthLayout, TruthSet};
-use relight_synth::Folders;
+use relight_synth::{Folders, Library, SynthError};
 use relight_turn::{TurnNetwork, TurnNetworks};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
@@ -379,12 +378,7 @@ fn make(arguments: &RelightingArguments, console: Console) -> CommandResult {
         size: arguments.size,
         seed: arguments.seed,
     };
-    let folders = Folders {
-        meshes: arguments.meshes.clone(),
-        textures: None,
-        panoramas: arguments.panoramas.clone(),
-    };
-    let (library, outcome) = read_library(&folders, console)?;
+    let (library, outcome) = library(&arguments.meshes, &arguments.panoramas, console)?;
     with_progress(recipe.objects, "making objects", console, |progress| {
         make_relighting(&recipe, &library, &arguments.common.data, progress)
     })?;
@@ -401,32 +395,30 @@ fn insertion(
         seed: arguments.seed,
         black_paint: arguments.black_paint,
     };
-    let folders = Folders {
-        meshes: arguments.meshes.clone(),
-        textures: None,
-        panoramas: arguments.panoramas.clone(),
-    };
-    let (library, outcome) = read_library(&folders, console)?;
+    let (library, outcome) = library(&arguments.meshes, &arguments.panoramas, console)?;
     let network = network(arguments.weights.as_deref())?;
     if let Some(folder) = &arguments.sheets {
         make_folder(folder)?;
     }
-    let mut show = |name: &str, tiles: &[Planes<3>]| match &arguments.sheets {
-        None => Ok(()),
-        Some(folder) => {
-            let sheet = Planes::sheet(tiles, tiles.len().div_ceil(2))?;
-            Ok::<(), EvalError>(write_png(
-                &folder.join(format!("{name}.png")),
-                &sheet,
-                Depth::Eight,
-            )?)
-        }
-    };
     let objects = arguments.objects as usize;
+    let sheets = arguments.sheets.as_deref();
     let table = with_progress(objects, "inserting", console, |progress| {
-        evaluate_insertion(&recipe, &library, &network, &mut show, progress)
+        evaluate_insertion(&recipe, &library, &network, sheets, progress)
     })?;
     Ok((table, outcome))
+}
+
+fn library(
+    meshes: &Option<PathBuf>,
+    panoramas: &Option<PathBuf>,
+    console: Console,
+) -> Result<(Library, Outcome), SynthError> {
+    let folders = Folders {
+        meshes: meshes.clone(),
+        textures: None,
+        panoramas: panoramas.clone(),
+    };
+    read_library(&folders, console)
 }
 
 fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {

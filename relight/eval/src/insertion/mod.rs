@@ -3,9 +3,12 @@
 
 mod stage;
 
+use std::path::Path;
+
 use super::run::{Scored, add_lines, unlit, unshown};
 use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
-use relight_core::image::{Linear, Planes, Rgb, Srgb};
+use relight_core::files::write_png;
+use relight_core::image::{Depth, Linear, Planes, Rgb, Srgb};
 use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
 use relight_photo::decompose::{DecomposeOptions, Decomposer};
 use relight_photo::insert::{
@@ -146,12 +149,10 @@ impl Places {
     }
 }
 
-/// Is given each object's name and its pictures in sRGB: photograph, new picture, ground truth, and the result of each method;
-/// then the same but the photograph before a nearly white table.
-pub type SheetWriter<'a> = &'a mut dyn FnMut(&str, &[Planes<3>]) -> Result<(), EvalError>;
-
 /// MSE and DSSIM of objects that were put into new pictures, for each method: of the whole picture, and of object,
-/// edge and ground alone, and of the edge before a nearly white table.
+/// edge and ground alone, and of the edge before a nearly white table. In the folder `sheets` comes a sheet for each object:
+/// photograph, new picture, ground truth, and the result of each method; then the same but the photograph before a nearly
+/// white table.
 ///
 /// # Errors
 /// Where a picture cannot be made or measured, or the network fails.
@@ -159,7 +160,7 @@ pub fn evaluate_insertion(
     recipe: &InsertionRecipe,
     library: &Library,
     decomposer: &Decomposer,
-    show: SheetWriter<'_>,
+    sheets: Option<&Path>,
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
     let mut table = ScoreTable::new(
@@ -205,7 +206,11 @@ pub fn evaluate_insertion(
             bright.push(before_bright);
         }
         tiles.extend(bright);
-        show(&stage.name, &tiles)?;
+        if let Some(folder) = sheets {
+            let sheet = Planes::sheet(&tiles, tiles.len().div_ceil(2))?;
+            let path = folder.join(format!("{}.png", stage.name));
+            write_png(&path, &sheet, Depth::Eight)?;
+        }
         progress();
     }
     for (method, scored) in InsertionMethod::ALL.into_iter().zip(scored) {
@@ -268,18 +273,16 @@ mod tests {
             seed: 5,
             black_paint: false,
         };
-        let mut sheets = Vec::new();
-        let mut evaluate = || {
-            let mut show = |name: &str, tiles: &[Planes<3>]| {
-                sheets.push((name.to_owned(), tiles.len()));
-                Ok(())
-            };
-            evaluate_insertion(&recipe, &library, &net, &mut show, &|| ()).unwrap()
-        };
+        let folder = tempfile::tempdir().unwrap();
+        let sheets = Some(folder.path());
+        let evaluate = || evaluate_insertion(&recipe, &library, &net, sheets, &|| ()).unwrap();
         let table = evaluate();
         assert_eq!(table, evaluate());
         assert_eq!(table.lines.len(), 5 * InsertionMethod::ALL.len());
-        assert_eq!(sheets[0].1, 5 + 2 * InsertionMethod::ALL.len());
+        let sheet = std::fs::read_dir(folder.path()).unwrap().next().unwrap();
+        let sheet = image::image_dimensions(sheet.unwrap().path()).unwrap();
+        // Five pictures, and two of each of the six methods, in two rows.
+        assert_eq!(sheet, (9 * 48, 2 * 48));
         // On the table's top, shadows are what counts.
         let ground = |method: InsertionMethod| {
             let line = table
