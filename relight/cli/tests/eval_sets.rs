@@ -15,7 +15,8 @@ use relight_core::files::{write_exr, write_png};
 use relight_core::image::{ColourSpace, Depth, Extent, Planes, Srgb, Transfer};
 use relight_core::light::{Normals, NormalsFrame, YUp};
 use relight_eval::{
-    EvalError, IntrinsicInput, Predictions, ScoreTable, evaluate_intrinsic, evaluate_normals,
+    EvalError, IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, NormalMethod, Predictions,
+    ScoreTable, evaluate_intrinsic, evaluate_normals,
 };
 use relight_reader::{TruthLayout, TruthSet};
 use relit_data::causes::with_causes;
@@ -70,10 +71,8 @@ fn evaluated(
     transfer: Option<Transfer>,
 ) -> Result<ScoreTable, EvalError> {
     let predictions = Predictions::new(found.to_owned(), transfer, NormalsFrame::YUp);
-    let input = IntrinsicInput::Diffuse;
-    let mut table = evaluate_intrinsic(set, "all", input, &[predictions], &|| {})?;
-    table.lines.retain(|line| line.method == "net");
-    Ok(table)
+    let method = IntrinsicMethod::Predictions(predictions);
+    evaluate_intrinsic(set, "all", IntrinsicInput::Diffuse, &[method], &|| {})
 }
 
 fn worst(table: &ScoreTable) -> f64 {
@@ -156,7 +155,8 @@ fn pictures_of_arap_are_found_with_the_albedo_of_their_scene() {
     let yard = set.load(2).unwrap();
     let pixel = yard.albedo.unwrap().planes().pixel(1, 1);
     assert!((pixel[0] - albedo().pixel(1, 1)[0]).abs() < 0.01, "sRGB");
-    let table = evaluate_intrinsic(&set, "all", IntrinsicInput::Diffuse, &[], &|| {}).unwrap();
+    let all = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
+    let table = evaluate_intrinsic(&set, "all", IntrinsicInput::Diffuse, &all, &|| {}).unwrap();
     assert!(
         table
             .notes
@@ -236,10 +236,11 @@ fn single_images_of_stanford_orb_are_measured_at_their_benchmark_s_size() {
     assert_eq!(parts, ["albedo", "albedo"]);
     assert!(worst(&table) < 1e-3, "{table:?}");
     let predictions = Predictions::new(found, None, NormalsFrame::YUp);
-    let table = evaluate_normals(&set, "all", &[predictions], &|| {}).unwrap();
-    let lines = table.lines.iter().filter(|line| line.method == "net");
-    let angle = lines
-        .flat_map(|line| &line.measures)
+    let method = [NormalMethod::Predictions(predictions)];
+    let table = evaluate_normals(&set, "all", &method, &|| {}).unwrap();
+    let angle = table.lines[0]
+        .measures
+        .iter()
         .find(|one| one.name == "mean angle");
     assert!(angle.unwrap().value < 0.1, "{table:?}");
 }

@@ -6,38 +6,62 @@ use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
 use relight_reader::{TruthSample, TruthSet};
 
-/// MSE and DSSIM of the highlight, and of the image without it, for none and for the predictions (`highlight`, in the image's
-/// units). Images are brought to a maximum of 1 and encoded as sRGB, in which highlights are seen.
+/// Where highlights come from.
+#[derive(Debug, Clone)]
+pub enum HighlightMethod {
+    /// There are none.
+    Nothing,
+    /// They were predicted: part `highlight`, in the image's units.
+    Predictions(Predictions),
+}
+
+impl HighlightMethod {
+    fn name(&self) -> String {
+        match self {
+            Self::Nothing => "no highlight".to_owned(),
+            Self::Predictions(predictions) => predictions.name(),
+        }
+    }
+
+    fn highlight(&self, sample: &TruthSample) -> Result<Rgb<Linear>, EvalError> {
+        let extent = sample.extent();
+        match self {
+            Self::Nothing => Ok(Rgb::new(Planes::zeros(extent))),
+            Self::Predictions(predictions) => predictions.colour(&sample.name, "highlight", extent),
+        }
+    }
+}
+
+/// MSE and DSSIM of the highlight, and of the image without it, for each method. Images are brought
+/// to a maximum of 1 and encoded as sRGB, in which highlights are seen.
 ///
 /// # Errors
 /// Where the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_highlights(
     set: &TruthSet,
     split: &str,
-    predictions: &[Predictions],
+    methods: &[HighlightMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable::new(
-        "highlights",
-        vec![
+    let mut table = ScoreTable {
+        protocol: "highlights".to_owned(),
+        notes: vec![
             "highlight: against the true one; diffuse: the image less the highlight, not below 0, \
              against the image less the true one"
                 .to_owned(),
             format!("SSIM by {}", Ssim::Gaussian.name()),
         ],
-    );
-    add_method(
-        &mut table,
-        (set, split),
-        "no highlight",
-        progress,
-        |sample| score(sample, &Rgb::new(Planes::zeros(sample.extent()))),
-    )?;
-    for one in predictions {
-        add_method(&mut table, (set, split), &one.name(), progress, |sample| {
-            let found = one.colour(&sample.name, "highlight", sample.extent())?;
-            score(sample, &found)
-        })?;
+        lines: Vec::new(),
+        images: Vec::new(),
+    };
+    for method in methods {
+        add_method(
+            &mut table,
+            (set, split),
+            &method.name(),
+            progress,
+            |sample| score(sample, &method.highlight(sample)?),
+        )?;
     }
     Ok(table)
 }

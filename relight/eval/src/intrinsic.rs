@@ -1,7 +1,7 @@
 //! Albedo and shading of single images: the table on MIT Intrinsic Images.
 
-use super::retinex::{self, divided};
-use super::run::{Scored, add_method, grey, measured, need, object, of_grey, unlit};
+use super::retinex::{IntrinsicImages, Retinex, divided};
+use super::run::{Scored, add_method, grey, measured, need, object, of_grey};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Rgb};
 use relight_core::metrics::{Convention, IntrinsicError, Windows, intrinsic_error};
@@ -18,8 +18,8 @@ pub enum IntrinsicInput {
 }
 
 /// A decomposition that needs no learning, or that looks at the ground truth.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum IntrinsicBaseline {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum IntrinsicBaseline {
     /// Albedo 1; the shading is the mean of the image's channels.
     ConstantAlbedo,
     /// Shading 1; the albedo is the image.
@@ -29,30 +29,35 @@ enum IntrinsicBaseline {
     /// The shading is the square root of that mean.
     RootShading,
     /// Colour Retinex.
-    Retinex,
+    Retinex(Retinex),
     /// Not a baseline but a bound: the true normals under the light of order 2 that fits the true
     /// shading best. The shading is at least a fifth of its mean.
     Oracle,
 }
 
 impl IntrinsicBaseline {
-    const ALL: [Self; 6] = [
-        Self::ConstantAlbedo,
-        Self::ConstantShading,
-        Self::LuminanceShading,
-        Self::RootShading,
-        Self::Retinex,
-        Self::Oracle,
-    ];
+    /// All of them, with their usual settings.
+    #[must_use]
+    pub fn all() -> [Self; 6] {
+        [
+            Self::ConstantAlbedo,
+            Self::ConstantShading,
+            Self::LuminanceShading,
+            Self::RootShading,
+            Self::Retinex(Retinex::default()),
+            Self::Oracle,
+        ]
+    }
 
     /// How a table names it.
-    const fn name(self) -> &'static str {
+    #[must_use]
+    pub const fn name(self) -> &'static str {
         match self {
             Self::ConstantAlbedo => "constant albedo",
             Self::ConstantShading => "constant shading",
             Self::LuminanceShading => "shading = luminance",
             Self::RootShading => "shading = root of luminance",
-            Self::Retinex => "colour Retinex",
+            Self::Retinex(_) => "colour Retinex",
             Self::Oracle => "oracle: true normals, fitted light",
         }
     }
@@ -60,33 +65,29 @@ impl IntrinsicBaseline {
     fn decompose(
         self,
         sample: &TruthSample,
-        input: IntrinsicInput,
+        image: &Rgb<Linear>,
         mask: &[bool],
-    ) -> Result<FoundImages, EvalError> {
-        let image = match input {
-            IntrinsicInput::Diffuse => need(sample, "image without highlights", &sample.diffuse),
-            IntrinsicInput::Original => need(sample, "image", &sample.image),
-        }?;
+    ) -> Result<IntrinsicImages, EvalError> {
         let extent = image.planes().extent();
         let ones = || of_grey(extent, vec![1.0; extent.pixels()]);
         let shaded_by = |shading: Vec<f32>| {
-            Ok(FoundImages {
+            Ok(IntrinsicImages {
                 albedo: divided(image, &shading),
-                shading: Some(of_grey(extent, shading)?),
+                shading: of_grey(extent, shading)?,
             })
         };
         match self {
-            Self::ConstantAlbedo => Ok(FoundImages {
+            Self::ConstantAlbedo => Ok(IntrinsicImages {
                 albedo: ones()?,
-                shading: Some(of_grey(extent, grey(image))?),
+                shading: of_grey(extent, grey(image))?,
             }),
-            Self::ConstantShading => Ok(FoundImages {
+            Self::ConstantShading => Ok(IntrinsicImages {
                 albedo: image.clone(),
-                shading: Some(ones()?),
+                shading: ones()?,
             }),
             Self::LuminanceShading => shaded_by(grey(image)),
             Self::RootShading => shaded_by(grey(image).into_iter().map(f32::sqrt).collect()),
-            Self::Retinex => retinex::decompose(image, mask),
+            Self::Retinex(settings) => settings.decompose(image, mask),
             Self::Oracle => shaded_by(fitted_shading(sample, mask)?),
         }
     }
@@ -96,7 +97,10 @@ impl IntrinsicBaseline {
 fn fitted_shading(sample: &TruthSample, mask: &[bool]) -> Result<Vec<f32>, EvalError> {
     let normals = need(sample, "normals", &sample.normals)?.completed(mask);
     let shading = need(sample, "shading", &sample.shading)?;
-    let light = fit_light(&normals, shading, mask, 0.0).map_err(unlit(&sample.name))?;
+    let light = fit_light(&normals, shading, mask, 0.0).map_err(|source| EvalError::Unlit {
+        sample: sample.name.clone(),
+        source,
+    })?;
     let mut found = grey(&DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&normals));
     let (count, sum) = found
         .iter()
@@ -115,27 +119,69 @@ fn fitted_shading(sample: &TruthSample, mask: &[bool]) -> Result<Vec<f32>, EvalE
 /// The least shading of the oracle, as a fraction of the mean.
 const LEAST_SHADING: f64 = 0.2;
 
+/// Where a decomposition comes from.
+#[derive(Debug, Clone)]
+pub enum IntrinsicMethod {
+    /// It is made here.
+    Baseline(IntrinsicBaseline),
+    /// It was made elsewhere: parts `albedo` and `shading`.
+    Predictions(Predictions),
+}
+
+impl IntrinsicMethod {
+    fn name(&self) -> String {
+        match self {
+            Self::Baseline(baseline) => baseline.name().to_owned(),
+            Self::Predictions(predictions) => predictions.name(),
+        }
+    }
+
+    fn decompose(
+        &self,
+        sample: &TruthSample,
+        input: IntrinsicInput,
+        mask: &[bool],
+    ) -> Result<FoundImages, EvalError> {
+        match self {
+            Self::Baseline(baseline) => {
+                let image = match input {
+                    IntrinsicInput::Diffuse => {
+                        need(sample, "image without highlights", &sample.diffuse)
+                    }
+                    IntrinsicInput::Original => need(sample, "image", &sample.image),
+                };
+                Ok(baseline.decompose(sample, image?, mask)?.into())
+            }
+            Self::Predictions(predictions) => {
+                let read = |part| predictions.colour(&sample.name, part, sample.extent());
+                // What has no ground truth need not be there.
+                let shading = sample.shading.as_ref().map(|_| read("shading"));
+                Ok(FoundImages {
+                    albedo: read("albedo")?,
+                    shading: shading.transpose()?,
+                })
+            }
+        }
+    }
+}
+
 /// What is compared with the ground truth.
-pub(super) struct FoundImages {
-    pub(super) albedo: Rgb<Linear>,
-    pub(super) shading: Option<Rgb<Linear>>,
+struct FoundImages {
+    albedo: Rgb<Linear>,
+    shading: Option<Rgb<Linear>>,
 }
 
-/// The parts `albedo` and `shading` of a folder of predictions; what has no ground truth need not be there.
-fn predicted(predictions: &Predictions, sample: &TruthSample) -> Result<FoundImages, EvalError> {
-    let read = |part| predictions.colour(&sample.name, part, sample.extent());
-    let shading = sample.shading.as_ref().map(|_| read("shading"));
-    Ok(FoundImages {
-        albedo: read("albedo")?,
-        shading: shading.transpose()?,
-    })
+impl From<IntrinsicImages> for FoundImages {
+    fn from(found: IntrinsicImages) -> Self {
+        Self {
+            albedo: found.albedo,
+            shading: Some(found.shading),
+        }
+    }
 }
 
-/// Decomposes a sample under its mask.
-type Finder<'a> = &'a (dyn Fn(&TruthSample, &[bool]) -> Result<FoundImages, EvalError> + Sync);
-
-/// SMSE and LMSE of albedo and shading, and their means, by both conventions, for six baselines and the predictions. Of a
-/// set that does not know its shading, of albedo alone.
+/// SMSE and LMSE of albedo and shading, and their means, by both conventions, for each method. Of a set that does not
+/// know its shading, of albedo alone.
 ///
 /// # Errors
 /// Where the ground truth or a prediction cannot be read or measured.
@@ -143,31 +189,34 @@ pub fn evaluate_intrinsic(
     set: &TruthSet,
     split: &str,
     input: IntrinsicInput,
-    predictions: &[Predictions],
+    methods: &[IntrinsicMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable::new("intrinsic images", notes(input));
+    let mut table = ScoreTable {
+        protocol: "intrinsic images".to_owned(),
+        notes: notes(input),
+        lines: Vec::new(),
+        images: Vec::new(),
+    };
     let first = (set.names().len() > 0).then(|| set.load(0)).transpose()?;
     let has_oracle = first.is_none_or(|one| one.shading.is_some() && one.normals.is_some());
-    if !has_oracle {
-        let note = "the oracle is left out: the set does not know both normals and shading";
-        table.notes.push(note.to_owned());
-    }
-    let mut add = |name: &str, find: Finder<'_>| {
-        add_method(&mut table, (set, split), name, progress, |sample| {
-            let mask = object(sample);
-            score(sample, &find(sample, &mask)?, &mask)
-        })
-    };
-    for baseline in IntrinsicBaseline::ALL {
-        if has_oracle || baseline != IntrinsicBaseline::Oracle {
-            add(baseline.name(), &|sample, mask| {
-                baseline.decompose(sample, input, mask)
-            })?;
+    for method in methods {
+        if !has_oracle && matches!(method, IntrinsicMethod::Baseline(IntrinsicBaseline::Oracle)) {
+            let note = "the oracle is left out: the set does not know both normals and shading";
+            table.notes.push(note.to_owned());
+            continue;
         }
-    }
-    for one in predictions {
-        add(&one.name(), &|sample, _| predicted(one, sample))?;
+        add_method(
+            &mut table,
+            (set, split),
+            &method.name(),
+            progress,
+            |sample| {
+                let mask = object(sample);
+                let found = method.decompose(sample, input, &mask)?;
+                score(sample, &found, &mask)
+            },
+        )?;
     }
     Ok(table)
 }

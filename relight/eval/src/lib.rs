@@ -31,19 +31,20 @@ mod scores;
 mod turns;
 
 pub use error::EvalError;
-pub use highlights::evaluate_highlights;
-pub use insertion::{InsertionRecipe, evaluate_insertion};
-pub use intrinsic::{IntrinsicInput, evaluate_intrinsic};
-pub use light::evaluate_light;
-pub use normals::evaluate_normals;
-pub use ordinal::evaluate_ordinal;
+pub use highlights::{HighlightMethod, evaluate_highlights};
+pub use insertion::{InsertionMethod, InsertionRecipe, SheetWriter, evaluate_insertion};
+pub use intrinsic::{IntrinsicBaseline, IntrinsicInput, IntrinsicMethod, evaluate_intrinsic};
+pub use light::{LightMethod, evaluate_light};
+pub use normals::{NormalMethod, evaluate_normals};
+pub use ordinal::{OrdinalMethod, evaluate_ordinal};
 pub use predictions::Predictions;
 pub use reliability::ReliabilityBin;
 pub use relighting::{
     RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
 };
+pub use retinex::{IntrinsicImages, Retinex};
 pub use run::EvalProgress;
-pub use scores::{ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
+pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
 pub use turns::{TurnLine, TurnMethod, TurnScore, TurnSet, TurnTable, evaluate_turns};
 
 /// The examples of the README, so that they are built.

@@ -1,7 +1,7 @@
 //! Light of single images: the table on Light-Net.
 
 use super::normals::known;
-use super::run::{Scored, add_method, largest, measured, need, unlit};
+use super::run::{Scored, add_method, largest, measured, need};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
 use relight_core::image::{Linear, Rgb};
 use relight_core::light::{Direction, Order, ShLight};
@@ -9,19 +9,47 @@ use relight_core::metrics::{Comparison, ScaleFit, Ssim};
 use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
 use relight_reader::{TruthSample, TruthSet};
 
+/// Where light comes from.
+#[derive(Debug, Clone)]
+pub enum LightMethod {
+    /// The same from everywhere.
+    Even,
+    /// Fitted to the true shading on the true normals: the best that light of order 2 can do.
+    Oracle,
+    /// It was predicted: `light.txt`.
+    Predictions(Predictions),
+}
+
+impl LightMethod {
+    fn name(&self) -> String {
+        match self {
+            Self::Even => "even light".to_owned(),
+            Self::Oracle => "oracle: fitted to the ground truth".to_owned(),
+            Self::Predictions(predictions) => predictions.name(),
+        }
+    }
+
+    fn light(&self, sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
+        match self {
+            Self::Even => Ok(ShLight::even(Order::TWO, [1.0; 3])),
+            Self::Oracle => fitted(sample, known),
+            Self::Predictions(predictions) => predictions.light(&sample.name),
+        }
+    }
+}
+
 /// The light of order 2 that is nearest to the true shading on the true normals.
 fn fitted(sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
     let normals = need(sample, "normals", &sample.normals)?;
     let shading = need(sample, "shading", &sample.shading)?;
-    fit_light(normals, shading, known, 0.0).map_err(unlit(&sample.name))
+    fit_light(normals, shading, known, 0.0).map_err(|source| EvalError::Unlit {
+        sample: sample.name.clone(),
+        source,
+    })
 }
 
-/// Finds the light of a sample; its true normals are known at these pixels.
-type Finder<'a> = &'a (dyn Fn(&TruthSample, &[bool]) -> Result<ShLight, EvalError> + Sync);
-
 /// MSE, SMSE and SSIM of the shading that light makes on the true normals, and the angle between its direction and that
-/// of the true light: for even light, for light that is fitted to the true shading, which is the best that light of order 2
-/// can do, and for the predictions (`light.txt`). `form` says how shading follows from the coefficients.
+/// of the true light, for each method. `form` says how shading follows from the coefficients.
 ///
 /// # Errors
 /// Where the ground truth or a prediction cannot be read or measured.
@@ -29,10 +57,12 @@ pub fn evaluate_light(
     set: &TruthSet,
     split: &str,
     form: DiffuseForm,
-    predictions: &[Predictions],
+    methods: &[LightMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable::new("light", vec![
+    let mut table = ScoreTable {
+        protocol: "light".to_owned(),
+        notes: vec![
             "the shading that the light makes on the true normals, against the true shading"
                 .to_owned(),
             format!(
@@ -42,24 +72,26 @@ pub fn evaluate_light(
             "direction: degrees between the bands 1 of the light and of the true light (where the set has none, of that \
              fitted to the true shading), 90 where one of them has no direction"
                 .to_owned(),
-        ]);
-    let mut add = |name: &str, find: Finder<'_>| {
-        add_method(&mut table, (set, split), name, progress, |sample| {
-            let normals = need(sample, "normals", &sample.normals)?;
-            let known = known(sample, normals);
-            let light = find(sample, &known)?;
-            let found = DiffuseLayer::new(&light, form).shading(normals);
-            let mut lines = score(sample, &found, &known)?;
-            lines.push(direction_score(sample, &light, &known)?);
-            Ok(lines)
-        })
+        ],
+        lines: Vec::new(),
+        images: Vec::new(),
     };
-    add("even light", &|_, _| {
-        Ok(ShLight::even(Order::TWO, [1.0; 3]))
-    })?;
-    add("oracle: fitted to the ground truth", &fitted)?;
-    for one in predictions {
-        add(&one.name(), &|sample, _| one.light(&sample.name))?;
+    for method in methods {
+        add_method(
+            &mut table,
+            (set, split),
+            &method.name(),
+            progress,
+            |sample| {
+                let normals = need(sample, "normals", &sample.normals)?;
+                let known = known(sample, normals);
+                let light = method.light(sample, &known)?;
+                let found = DiffuseLayer::new(&light, form).shading(normals);
+                let mut lines = score(sample, &found, &known)?;
+                lines.push(direction_score(sample, &light, &known)?);
+                Ok(lines)
+            },
+        )?;
     }
     Ok(table)
 }

@@ -7,20 +7,45 @@ use relight_core::light::{Normals, YUp};
 use relight_core::metrics::{AngularError, Comparison, ScaleFit, Ssim, angular_error, dssim};
 use relight_reader::{TruthSample, TruthSet};
 
-/// MSE and DSSIM of normal maps, and the angles between normals, for normals that all point to the viewer
-/// and for the predictions (`normal`).
+/// Where normals come from.
+#[derive(Debug, Clone)]
+pub enum NormalMethod {
+    /// All of them point to the viewer.
+    Viewer,
+    /// They were predicted: part `normal`.
+    Predictions(Predictions),
+}
+
+impl NormalMethod {
+    fn name(&self) -> String {
+        match self {
+            Self::Viewer => "all towards the viewer".to_owned(),
+            Self::Predictions(predictions) => predictions.name(),
+        }
+    }
+
+    fn normals(&self, sample: &TruthSample) -> Result<Normals<YUp>, EvalError> {
+        let extent = sample.extent();
+        match self {
+            Self::Viewer => Ok(Normals::new(Planes::filled(extent, [0.0, 0.0, 1.0]))),
+            Self::Predictions(predictions) => predictions.normals(&sample.name, extent),
+        }
+    }
+}
+
+/// MSE and DSSIM of normal maps, and the angles between normals, for each method.
 ///
 /// # Errors
 /// Where the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_normals(
     set: &TruthSet,
     split: &str,
-    predictions: &[Predictions],
+    methods: &[NormalMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable::new(
-        "normals",
-        vec![
+    let mut table = ScoreTable {
+        protocol: "normals".to_owned(),
+        notes: vec![
             format!(
                 "MSE and DSSIM: of the colours (n + 1) / 2, SSIM by {}",
                 Ssim::Gaussian.name()
@@ -28,21 +53,17 @@ pub fn evaluate_normals(
             "angles: degrees; within: the fraction of pixels with an angle of at most so much"
                 .to_owned(),
         ],
-    );
-    add_method(
-        &mut table,
-        (set, split),
-        "all towards the viewer",
-        progress,
-        |sample| {
-            let normals = Planes::filled(sample.extent(), [0.0, 0.0, 1.0]);
-            score(sample, &Normals::new(normals))
-        },
-    )?;
-    for one in predictions {
-        add_method(&mut table, (set, split), &one.name(), progress, |sample| {
-            score(sample, &one.normals(&sample.name, sample.extent())?)
-        })?;
+        lines: Vec::new(),
+        images: Vec::new(),
+    };
+    for method in methods {
+        add_method(
+            &mut table,
+            (set, split),
+            &method.name(),
+            progress,
+            |sample| score(sample, &method.normals(sample)?),
+        )?;
     }
     Ok(table)
 }

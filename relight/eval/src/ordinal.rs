@@ -9,52 +9,76 @@ use relight_reader::JudgedImages;
 /// By how much a surface must be brighter for the other to be called darker.
 const DELTA: f64 = 0.1;
 
-/// Finds the albedo of a numbered image.
-type Finder<'a> = &'a (dyn Fn(usize, Rgb<Linear>) -> Result<Rgb<Linear>, EvalError> + Sync);
+/// Where albedo comes from.
+#[derive(Debug, Clone)]
+pub enum OrdinalMethod {
+    /// It is the same everywhere.
+    ConstantAlbedo,
+    /// It is the image.
+    ConstantShading,
+    /// It was predicted: part `albedo`.
+    Predictions(Predictions),
+}
 
-/// WHDR at delta 0.1, for an albedo that is the same everywhere, for one that is the image, and for the predictions
-/// (`albedo`): the mean over images.
+impl OrdinalMethod {
+    fn name(&self) -> String {
+        match self {
+            Self::ConstantAlbedo => "constant albedo".to_owned(),
+            Self::ConstantShading => "constant shading".to_owned(),
+            Self::Predictions(predictions) => predictions.name(),
+        }
+    }
+
+    fn albedo(&self, images: &JudgedImages, index: usize) -> Result<Rgb<Linear>, EvalError> {
+        let image = Rgb::<Linear>::read(&images.image(index), Transfer::Srgb)?;
+        let extent = image.planes().extent();
+        match self {
+            Self::ConstantAlbedo => Ok(Rgb::new(Planes::filled(extent, [0.5; 3]))),
+            Self::ConstantShading => Ok(image),
+            Self::Predictions(predictions) => {
+                predictions.colour(&images.name(index), "albedo", extent)
+            }
+        }
+    }
+}
+
+/// WHDR at delta 0.1, for each method: the mean over images.
 ///
 /// # Errors
 /// Where an image, its judgements or a prediction cannot be read or measured.
 pub fn evaluate_ordinal(
     images: &JudgedImages,
     split: &str,
-    predictions: &[Predictions],
+    methods: &[OrdinalMethod],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable::new(
-        "ordinal albedo",
-        vec![format!(
+    let mut table = ScoreTable {
+        protocol: "ordinal albedo".to_owned(),
+        notes: vec![format!(
             "WHDR: weighted human disagreement rate, delta {DELTA}"
         )],
-    );
-    let mut add = |method: &str, find: Finder<'_>| {
+        lines: Vec::new(),
+        images: Vec::new(),
+    };
+    for method in methods {
         let name = |index| images.name(index);
         let scored = each(images.len(), progress, name, |index| {
-            let image = Rgb::<Linear>::read(&images.image(index), Transfer::Srgb)?;
-            Ok(vec![score(images, index, &find(index, image)?)?])
+            Ok(vec![score(images, index, method)?])
         })?;
-        add_lines(&mut table, method, split, 1, scored);
-        Ok::<(), EvalError>(())
-    };
-    add("constant albedo", &|_, image| {
-        Ok(Rgb::new(Planes::filled(image.planes().extent(), [0.5; 3])))
-    })?;
-    add("constant shading", &|_, image| Ok(image))?;
-    for one in predictions {
-        add(&one.name(), &|index, image| {
-            one.colour(&images.name(index), "albedo", image.planes().extent())
-        })?;
+        add_lines(&mut table, &method.name(), split, 1, scored);
     }
     Ok(table)
 }
 
-fn score(images: &JudgedImages, index: usize, albedo: &Rgb<Linear>) -> Result<Scored, EvalError> {
+fn score(images: &JudgedImages, index: usize, method: &OrdinalMethod) -> Result<Scored, EvalError> {
+    let albedo = method.albedo(images, index)?;
     let judgements = images.judgements(index)?;
     let planes = albedo.planes();
     let rate = whdr(planes.extent(), &planes.planes(), &judgements, DELTA);
-    let rate = rate.map_err(EvalError::unmeasured(&images.name(index)))?;
+    let rate = rate.map_err(|source| EvalError::Metric {
+        sample: images.name(index),
+        source,
+    })?;
     Ok(Scored {
         part: "albedo",
         measures: vec![("WHDR", rate)],

@@ -65,19 +65,18 @@ impl Predictions {
     ) -> Result<Rgb<Linear>, EvalError> {
         let path = self.find(name, part)?;
         let image = Rgb::read(&path, self.transfer(name)?)?;
-        Ok(Rgb::new(brought_to(&path, image.into_planes(), extent)?))
+        Ok(Rgb::new(brought_to(path, image.into_planes(), extent)?))
     }
 
     /// How PNGs of the sample `name` hold colours.
     fn transfer(&self, name: &str) -> Result<Transfer, EvalError> {
         let written = self.written_transfer(name)?;
         match (self.transfer, written) {
-            (Some(said), Some(written)) if said != written => Err(EvalError::fault(format!(
-                "{} says that its files are {}, and --transfer that they are {}: leave --transfer out",
-                self.file(name, DESCRIPTION).display(),
-                transfer_name(written),
-                transfer_name(said)
-            ))),
+            (Some(said), Some(written)) if said != written => Err(EvalError::Encoding {
+                path: self.file(name, DESCRIPTION),
+                written: transfer_name(written),
+                said: transfer_name(said),
+            }),
             (said, written) => Ok(said.or(written).unwrap_or(Transfer::Linear)),
         }
     }
@@ -88,20 +87,28 @@ impl Predictions {
         let bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
             Err(source) if source.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(source) => return Err(EvalError::read(&path)(source)),
+            Err(source) => return Err(EvalError::Read { path, source }),
         };
-        let encoding: Encoding = serde_json::from_slice(text::unmarked(&bytes))
-            .map_err(EvalError::description(&path))?;
+        let parsed: Result<Encoding, _> = serde_json::from_slice(text::unmarked(&bytes));
+        let encoding = match parsed {
+            Ok(encoding) => encoding,
+            Err(source) => return Err(EvalError::Description { path, source }),
+        };
         if encoding.schema != SCHEMA {
-            return Err(other_schema(&path, &encoding.schema, SCHEMA));
+            return Err(EvalError::Schema {
+                path,
+                found: encoding.schema,
+                expected: SCHEMA,
+            });
         }
         match encoding.transfer.as_deref() {
             None | Some("srgb") => Ok(Some(Transfer::Srgb)),
             Some("linear") => Ok(Some(Transfer::Linear)),
-            Some(other) => {
-                let found = format!("transfer {other}");
-                Err(other_schema(&path, &found, "transfer srgb or linear"))
-            }
+            Some(other) => Err(EvalError::Schema {
+                path,
+                found: format!("transfer {other}"),
+                expected: "transfer srgb or linear",
+            }),
         }
     }
 
@@ -113,7 +120,7 @@ impl Predictions {
             NormalsFrame::YDown => Normals::<YDown>::read(&path)?.flipped(),
         };
         Ok(Normals::new(brought_to(
-            &path,
+            path,
             normals.into_planes(),
             extent,
         )?))
@@ -146,7 +153,7 @@ impl Predictions {
     fn smoothness(&self, name: &str, extent: Extent) -> Result<Planes<1>, EvalError> {
         let path = self.find(name, "smoothness")?;
         let (planes, samples) = read_planes(&path)?;
-        check_size(&path, planes.extent(), extent)?;
+        check_size(path, planes.extent(), extent)?;
         let scale = match samples {
             Samples::Integer => 255.0,
             Samples::Float => 1.0,
@@ -169,12 +176,7 @@ impl Predictions {
                 .or_else(|| self.existing(name, "specular")),
             _ => self.existing(name, part),
         };
-        found.ok_or_else(|| {
-            EvalError::fault(format!(
-                "there is no prediction {part}.exr or {part}.png in {}: all images of the ground truth are compared, or none",
-                folder.display()
-            ))
-        })
+        found.ok_or(EvalError::Unpredicted { folder, part })
     }
 
     fn existing(&self, name: &str, part: &str) -> Option<PathBuf> {
@@ -187,7 +189,7 @@ impl Predictions {
 }
 
 /// An estimate at the size of the ground truth: as it is, or the means over blocks where it is so many times larger.
-fn brought_to(path: &Path, planes: Planes<3>, extent: Extent) -> Result<Planes<3>, EvalError> {
+fn brought_to(path: PathBuf, planes: Planes<3>, extent: Extent) -> Result<Planes<3>, EvalError> {
     let found = planes.extent();
     let times = found.width / extent.width.max(1);
     if times > 1 && found == Extent::new(times * extent.width, times * extent.height) {
@@ -205,34 +207,25 @@ fn transfer_name(transfer: Transfer) -> &'static str {
     }
 }
 
-/// The image must have the size of its ground truth.
-pub(crate) fn check_size(path: &Path, found: Extent, expected: Extent) -> Result<(), EvalError> {
+fn check_size(path: PathBuf, found: Extent, expected: Extent) -> Result<(), EvalError> {
     if found == expected {
         return Ok(());
     }
-    Err(EvalError::fault(format!(
-        "{} has {}x{} pixels, its ground truth {}x{}",
-        path.display(),
-        found.width,
-        found.height,
-        expected.width,
-        expected.height
-    )))
-}
-
-/// A description is of another version.
-pub(crate) fn other_schema(path: &Path, found: &str, expected: &str) -> EvalError {
-    let path = path.display();
-    EvalError::fault(format!(
-        "{path} says {found:?}, this version reads {expected:?}"
-    ))
+    Err(EvalError::Size {
+        path,
+        found,
+        expected,
+    })
 }
 
 /// A light in a file of coefficients.
 pub(crate) fn read_light(path: &Path) -> Result<ShLight, EvalError> {
-    let text = text::read(path).map_err(EvalError::read(path))?;
-    text.parse::<ShLight>().map_err(EvalError::of(format!(
-        "{} does not hold light",
-        path.display()
-    )))
+    let text = text::read(path).map_err(|source| EvalError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    text.parse().map_err(|source| EvalError::Light {
+        path: path.to_owned(),
+        source,
+    })
 }

@@ -1,13 +1,43 @@
 //! Colour Retinex: a decomposition that assumes that albedo changes in colour and shading does not.
 
 use super::EvalError;
-use super::intrinsic::FoundImages;
 use super::run::{grey, of_grey};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 
-/// Smallest change in chromaticity that is the albedo's: the best of 0.01, 0.02 and 0.04 on the ten objects of MIT
-/// Intrinsic Images that SIRFS trains on.
-const CHROMATICITY: f32 = 0.02;
+/// An image as albedo times shading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntrinsicImages {
+    /// The albedo.
+    pub albedo: Rgb<Linear>,
+    /// The shading, without colour.
+    pub shading: Rgb<Linear>,
+}
+
+/// Colour Retinex after Grosse et al. (2009), on the chromaticity of linear images.
+///
+/// Of two neighbouring pixels the change in log brightness (the mean of the channels) is the
+/// albedo's where their chromaticities, `rgb / (r + g + b)`, differ by more than `chromaticity` in
+/// the sum of absolute differences or their log brightness by more than `brightness`, else the
+/// shading's. The log albedo is the field whose differences fit these best, by least squares.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Retinex {
+    /// Smallest change in chromaticity that is the albedo's.
+    pub chromaticity: f32,
+    /// Smallest change in log brightness that is; infinite where only colour decides.
+    pub brightness: f32,
+}
+
+impl Default for Retinex {
+    /// Colour alone decides, from 0.02 on: the best of 0.01, 0.02 and 0.04 on the ten objects of
+    /// MIT Intrinsic Images that SIRFS trains on.
+    fn default() -> Self {
+        Self {
+            chromaticity: 0.02,
+            brightness: f32::INFINITY,
+        }
+    }
+}
+
 /// Values of less than this are taken as this before a logarithm.
 const DARKEST: f32 = 1e-4;
 /// Pulls the log albedo of parts without a known difference towards 0.
@@ -17,69 +47,65 @@ const RESIDUAL: f64 = 1e-6;
 /// ... or after so many steps.
 const MOST_STEPS: usize = 3000;
 
-/// Decomposes the pixels where `mask` is true; the others become 0. Colour Retinex after Grosse et al. (2009), on the
-/// chromaticity of linear images.
-///
-/// Of two neighbouring pixels the change in log brightness (the mean of the channels) is the albedo's where their
-/// chromaticities, `rgb / (r + g + b)`, differ by more than 0.02 in the sum of absolute differences, else the
-/// shading's. The log albedo is the field whose differences fit these best, by least squares.
-pub(super) fn decompose(image: &Rgb<Linear>, mask: &[bool]) -> Result<FoundImages, EvalError> {
-    let extent = image.planes().extent();
-    let brightness = grey(image);
-    let log_albedo = edges(image, &brightness, mask).solve();
-    let mut shading = vec![0.0; extent.pixels()];
-    for ((at, log_albedo), brightness) in
-        indices(mask).zip(log_albedo).zip(under(&brightness, mask))
-    {
-        shading[at] = brightness / (log_albedo.exp() as f32).max(f32::MIN_POSITIVE);
+impl Retinex {
+    /// Decomposes the pixels where `mask` is true; the others become 0.
+    pub(super) fn decompose(
+        self,
+        image: &Rgb<Linear>,
+        mask: &[bool],
+    ) -> Result<IntrinsicImages, EvalError> {
+        let extent = image.planes().extent();
+        let brightness = grey(image);
+        let log_albedo = self.edges(image, &brightness, mask).solve();
+        let mut shading = vec![0.0; extent.pixels()];
+        for ((at, log_albedo), brightness) in
+            indices(mask).zip(log_albedo).zip(under(&brightness, mask))
+        {
+            shading[at] = brightness / (log_albedo.exp() as f32).max(f32::MIN_POSITIVE);
+        }
+        Ok(IntrinsicImages {
+            albedo: divided(image, &shading),
+            shading: of_grey(extent, shading)?,
+        })
     }
-    Ok(FoundImages {
-        albedo: divided(image, &shading),
-        shading: Some(of_grey(extent, shading)?),
-    })
-}
 
-/// The differences of log albedo between neighbours under the mask.
-fn edges(image: &Rgb<Linear>, brightness: &[f32], mask: &[bool]) -> Field {
-    let Extent { width, height } = image.planes().extent();
-    let mut number = vec![None; mask.len()];
-    for (count, at) in indices(mask).enumerate() {
-        number[at] = Some(count);
-    }
-    let mut field = Field {
-        unknowns: indices(mask).count(),
-        edges: Vec::new(),
-    };
-    for y in 0..height {
-        for x in 0..width {
-            let at = y * width + x;
-            let right = (x + 1 < width).then_some(at + 1);
-            let below = (y + 1 < height).then_some(at + width);
-            for other in right.into_iter().chain(below) {
-                if let (Some(a), Some(b)) = (number[at], number[other]) {
-                    let step = albedo_step(image, brightness, (at, other));
-                    field.edges.push((a, b, step));
+    /// The differences of log albedo between neighbours under the mask.
+    fn edges(self, image: &Rgb<Linear>, brightness: &[f32], mask: &[bool]) -> Field {
+        let Extent { width, height } = image.planes().extent();
+        let mut number = vec![None; mask.len()];
+        for (count, at) in indices(mask).enumerate() {
+            number[at] = Some(count);
+        }
+        let mut field = Field::new(indices(mask).count());
+        for y in 0..height {
+            for x in 0..width {
+                let at = y * width + x;
+                let right = (x + 1 < width).then_some(at + 1);
+                let below = (y + 1 < height).then_some(at + width);
+                for other in right.into_iter().chain(below) {
+                    if let (Some(a), Some(b)) = (number[at], number[other]) {
+                        let step = self.albedo_step(image, brightness, (at, other));
+                        field.edges.push((a, b, step));
+                    }
                 }
             }
         }
+        field
     }
-    field
-}
 
-/// The change of log albedo from one pixel to its neighbour.
-fn albedo_step(image: &Rgb<Linear>, brightness: &[f32], (a, b): (usize, usize)) -> f64 {
-    let log = |at: usize| brightness[at].max(DARKEST).ln();
-    let planes = image.planes().planes();
-    let chromaticity = |at: usize| {
-        let sum = (3.0 * brightness[at]).max(DARKEST);
-        planes.map(|plane| plane[at] / sum)
-    };
-    let colours = chromaticity(a).into_iter().zip(chromaticity(b));
-    let turn: f32 = colours.map(|(a, b)| (a - b).abs()).sum();
-    if turn > CHROMATICITY {
-        f64::from(log(b) - log(a))
-    } else {
-        0.0
+    /// The change of log albedo from one pixel to its neighbour.
+    fn albedo_step(self, image: &Rgb<Linear>, brightness: &[f32], (a, b): (usize, usize)) -> f64 {
+        let log = |at: usize| brightness[at].max(DARKEST).ln();
+        let change = log(b) - log(a);
+        let planes = image.planes().planes();
+        let chromaticity = |at: usize| {
+            let sum = (3.0 * brightness[at]).max(DARKEST);
+            planes.map(|plane| plane[at] / sum)
+        };
+        let colours = chromaticity(a).into_iter().zip(chromaticity(b));
+        let turn: f32 = colours.map(|(a, b)| (a - b).abs()).sum();
+        let is_albedo = turn > self.chromaticity || change.abs() > self.brightness;
+        if is_albedo { f64::from(change) } else { 0.0 }
     }
 }
 
@@ -91,6 +117,13 @@ struct Field {
 }
 
 impl Field {
+    const fn new(unknowns: usize) -> Self {
+        Self {
+            unknowns,
+            edges: Vec::new(),
+        }
+    }
+
     /// The values that fit best, by conjugate gradients on the normal equations with the diagonal as
     /// preconditioner.
     fn solve(&self) -> Vec<f64> {
@@ -197,9 +230,8 @@ mod tests {
             paint(y).map(|c| c * shade(x))
         }));
         let mask = vec![true; extent.pixels()];
-        let found = decompose(&image, &mask).unwrap();
-        let shading = found.shading.unwrap();
-        let shading = shading.planes();
+        let found = Retinex::default().decompose(&image, &mask).unwrap();
+        let shading = found.shading.planes();
         let albedo = found.albedo.planes();
         let gain = shading.pixel(0, 0)[0] / shade(0);
         for y in 0..16 {
@@ -220,11 +252,10 @@ mod tests {
             [0.1 + 0.1 * x as f32, 0.5, 0.1 * y as f32]
         }));
         let mask: Vec<bool> = (0..81).map(|at| at % 9 != 4).collect();
-        let found = decompose(&image, &mask).unwrap();
-        let shading = found.shading.unwrap();
+        let found = Retinex::default().decompose(&image, &mask).unwrap();
         for (at, &inside) in mask.iter().enumerate() {
             let (x, y) = (at % 9, at / 9);
-            let (a, s) = (found.albedo.planes(), shading.planes());
+            let (a, s) = (found.albedo.planes(), found.shading.planes());
             let product = a.pixel(x, y)[0] * s.pixel(x, y)[0];
             let expected = if inside {
                 image.planes().pixel(x, y)[0]
@@ -238,9 +269,8 @@ mod tests {
     #[test]
     fn a_black_image_stays_black() {
         let image = Rgb::new(Planes::zeros(Extent::new(5, 5)));
-        let found = decompose(&image, &[true; 25]).unwrap();
-        let shading = found.shading.unwrap();
-        let planes = [found.albedo.planes(), shading.planes()];
+        let found = Retinex::default().decompose(&image, &[true; 25]).unwrap();
+        let planes = [found.albedo.planes(), found.shading.planes()];
         assert!(planes.iter().all(|p| p.plane(0).iter().all(|&v| v == 0.0)));
     }
 }

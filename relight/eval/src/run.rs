@@ -2,12 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::{EvalError, ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
+use super::{EvalError, ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
-use relight_core::light::LightError;
 use relight_core::metrics::MetricError;
 use relight_core::parallel;
-use relight_photo::insert::InsertError;
 use relight_reader::{TruthSample, TruthSet};
 
 /// Told after each image, from many threads.
@@ -58,7 +56,7 @@ pub(super) fn each<R: Send>(
                     progress();
                     Ok((sample, found?))
                 }
-                Err(panic) => Err(EvalError::of(sample)(panic)),
+                Err(panic) => Err(EvalError::Panic { sample, panic }),
             }
         })
         .collect()
@@ -106,11 +104,13 @@ fn lines(
                 value: mean(at, measure),
             })
             .collect(),
-        colour: scored.colour.to_owned(),
-        scale: scored.scale.to_owned(),
-        mask: scored.mask,
-        images: samples.len() * each,
-        split: split.to_owned(),
+        terms: MeasureTerms {
+            colour: scored.colour.to_owned(),
+            scale: scored.scale.to_owned(),
+            mask: scored.mask,
+            images: samples.len() * each,
+            split: split.to_owned(),
+        },
     };
     first.iter().enumerate().map(line).collect()
 }
@@ -128,11 +128,9 @@ pub(super) fn need<'a, T>(
     part: &'static str,
     found: &'a Option<T>,
 ) -> Result<&'a T, EvalError> {
-    found.as_ref().ok_or_else(|| {
-        let name = &sample.name;
-        EvalError::fault(format!(
-            "the ground truth has no {part} of {name}: this protocol cannot be run on it"
-        ))
+    found.as_ref().ok_or_else(|| EvalError::Lacks {
+        sample: sample.name.clone(),
+        part,
     })
 }
 
@@ -141,21 +139,10 @@ pub(super) fn measured<T>(
     sample: &TruthSample,
     result: Result<T, MetricError>,
 ) -> Result<T, EvalError> {
-    result.map_err(EvalError::unmeasured(&sample.name))
-}
-
-/// Puts the sample to why no light can be fitted to it.
-pub(super) fn unlit(sample: &str) -> impl FnOnce(LightError) -> EvalError {
-    EvalError::of(format!("no light can be fitted to {sample}"))
-}
-
-/// Puts the sample to why it cannot be decomposed, relit or inserted.
-pub(super) fn unshown(sample: &str) -> impl Fn(InsertError) -> EvalError + use<'_> {
-    move |source| {
-        EvalError::of(format!(
-            "{sample} cannot be decomposed or shown in other light"
-        ))(source)
-    }
+    result.map_err(|source| EvalError::Metric {
+        sample: sample.name.clone(),
+        source,
+    })
 }
 
 /// Where the mask is 1.

@@ -30,6 +30,22 @@ impl fmt::Display for MaskRule {
     }
 }
 
+/// How the numbers of a line were taken.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct MeasureTerms {
+    /// Colour space and units of the values that were compared.
+    pub colour: String,
+    /// Which scales were fitted to the estimate.
+    pub scale: String,
+    /// Which pixels count.
+    pub mask: MaskRule,
+    /// How many images there were.
+    pub images: usize,
+    /// Which part of which data they are.
+    pub split: String,
+}
+
 /// A measure, the mean over all images.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Measured {
@@ -49,16 +65,9 @@ pub struct ScoreLine {
     pub part: String,
     /// The means over all images.
     pub measures: Vec<Measured>,
-    /// Colour space and units of the values that were compared.
-    pub colour: String,
-    /// Which scales were fitted to the estimate.
-    pub scale: String,
-    /// Which pixels count.
-    pub mask: MaskRule,
-    /// How many images there were.
-    pub images: usize,
-    /// Which part of which data they are.
-    pub split: String,
+    /// How they were taken.
+    #[serde(flatten)]
+    pub terms: MeasureTerms,
 }
 
 /// What a method scored on one image.
@@ -89,15 +98,6 @@ pub struct ScoreTable {
 }
 
 impl ScoreTable {
-    pub(super) fn new(protocol: &str, notes: Vec<String>) -> Self {
-        Self {
-            protocol: protocol.to_owned(),
-            notes,
-            lines: Vec::new(),
-            images: Vec::new(),
-        }
-    }
-
     /// The columns of measures, in the order in which lines name them.
     fn measures(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
@@ -120,9 +120,15 @@ impl ScoreTable {
                 let found = line.measures.iter().find(|one| one.name == *name);
                 found.map_or_else(String::new, |one| number(one.value))
             }));
-            row.extend([line.colour.clone(), line.scale.clone()]);
-            row.extend([line.mask.to_string(), line.images.to_string()]);
-            row.push(line.split.clone());
+            let MeasureTerms {
+                colour,
+                scale,
+                mask,
+                images,
+                split,
+            } = &line.terms;
+            row.extend([colour.clone(), scale.clone(), mask.to_string()]);
+            row.extend([images.to_string(), split.clone()]);
             rows.push(row);
         }
         rows
@@ -175,11 +181,13 @@ mod tests {
                 name: name.to_owned(),
                 value,
             }],
-            colour: "linear grey".to_owned(),
-            scale: "one an image".to_owned(),
-            mask: MaskRule::Object,
-            images: 10,
-            split: "all".to_owned(),
+            terms: MeasureTerms {
+                colour: "linear grey".to_owned(),
+                scale: "one an image".to_owned(),
+                mask: MaskRule::Object,
+                images: 10,
+                split: "all".to_owned(),
+            },
         }
     }
 

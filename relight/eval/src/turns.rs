@@ -114,12 +114,12 @@ impl TurnSet {
     /// Opens a data set of `relight synth --turn`.
     ///
     /// # Errors
-    /// Where it is none.
+    /// [`EvalError::Turns`] where it is none.
     pub fn open(folder: &Path) -> Result<Self, EvalError> {
-        let dataset = Dataset::read(folder).map_err(EvalError::of(format!(
-            "{} holds no turns of relight synth --turn",
-            folder.display()
-        )))?;
+        let dataset = Dataset::read(folder).map_err(|source| EvalError::Turns {
+            path: folder.to_owned(),
+            source: Box::new(source),
+        })?;
         let shard = |id: &str| {
             dataset
                 .shards_of(id)
@@ -151,10 +151,9 @@ impl TurnSet {
     fn read(&self, number: usize) -> Result<TrueTurn, EvalError> {
         let (id, shard) = &self.turns[number];
         let truth = self.folder.join("truth").join(id);
-        let path = truth.join("turn.json");
-        let bytes = std::fs::read(&path).map_err(EvalError::read(&path))?;
-        let description: TurnDescription =
-            serde_json::from_slice(&bytes).map_err(EvalError::description(&path))?;
+        let description: TurnDescription = parse(&truth.join("turn.json"), |bytes| {
+            serde_json::from_slice(bytes)
+        })?;
         let [_, up, out] = description.axis;
         Ok(TrueTurn {
             shard: shard.clone(),
@@ -174,7 +173,10 @@ impl TurnSet {
         for (id, shard) in &self.turns {
             let turn = read_curves(shard, TableRotation::default(), &|_, _| {})?;
             let folder = out.join(format!("{id}.data"));
-            std::fs::create_dir_all(&folder).map_err(EvalError::write(&folder))?;
+            std::fs::create_dir_all(&folder).map_err(|source| EvalError::Write {
+                path: folder.clone(),
+                source,
+            })?;
             for (frame, picture) in (1..).zip(&turn.first) {
                 let path = folder.join(format!("L ({frame:03}).png"));
                 write_png(&path, &as_seen(picture), Depth::Eight)?;
@@ -193,6 +195,20 @@ fn as_seen(frame: &Rgb<Linear>) -> Planes<3> {
         .planes()
         .clone()
         .map(|value| Srgb::from_linear(value.clamp(0.0, 1.0)))
+}
+
+fn parse<T>(
+    path: &Path,
+    parse: impl FnOnce(&[u8]) -> Result<T, serde_json::Error>,
+) -> Result<T, EvalError> {
+    let bytes = std::fs::read(path).map_err(|source| EvalError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    parse(&bytes).map_err(|source| EvalError::Description {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 /// Solves every turn by every method. `progress` is told each turn and method.

@@ -4,20 +4,22 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Subcommand};
-use relight_core::image::Transfer;
+use clap::{Args, Subcommand, ValueEnum};
+use relight_core::files::write_png;
+use relight_core::image::{Depth, Planes, Transfer};
 use relight_core::light::NormalsFrame;
 use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
-    EvalError, InsertionRecipe, IntrinsicInput, Predictions, RelightMethod, RelightingRecipe,
-    RelightingSet, ScoreTable, TurnMethod, TurnSet, evaluate_highlights, evaluate_insertion,
-    evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal, evaluate_relighting,
-    evaluate_turns, make_relighting,
+    EvalError, HighlightMethod, InsertionRecipe, IntrinsicBaseline, IntrinsicInput,
+    IntrinsicMethod, LightMethod, NormalMethod, OrdinalMethod, Predictions, RelightMethod,
+    RelightingRecipe, RelightingSet, ScoreTable, TurnMethod, TurnSet, evaluate_highlights,
+    evaluate_insertion, evaluate_intrinsic, evaluate_light, evaluate_normals, evaluate_ordinal,
+    evaluate_relighting, evaluate_turns, make_relighting,
 };
 use relight_nets::Weights;
 use relight_photo::decompose::Decomposer;
 use relight_reader::{JudgedImages, TruthLayout, TruthSet};
-use relight_synth::{Folders, Library, SynthError};
+use relight_synth::Folders;
 use relight_turn::{TurnNetwork, TurnNetworks};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
@@ -99,8 +101,8 @@ struct TurnArguments {
     #[arg(long, value_name = "TEXT")]
     split: Option<String>,
     /// How turns are solved; may be given several times [default: all ways].
-    #[arg(long, value_name = "HOW", value_parser = one_of(TURN_METHODS))]
-    method: Vec<TurnMethod>,
+    #[arg(long, value_enum, value_name = "HOW")]
+    method: Vec<TurnMethodName>,
     /// Weights of the network of turns [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     turn_network: Option<PathBuf>,
@@ -176,6 +178,9 @@ struct RelightingArguments {
     /// What objects, materials and lights are drawn from.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Make objects that cast no shadows on themselves.
+    #[arg(long, requires = "make")]
+    no_shadows: bool,
     /// The network's weights [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
@@ -218,14 +223,22 @@ struct InsertionArguments {
     output: Option<PathBuf>,
 }
 
-const TURN_METHODS: Choices<TurnMethod> = &[
-    (
-        "turn",
-        "In a light that is not known",
-        TurnMethod::UnknownLight,
-    ),
-    ("light", "In the true light", TurnMethod::KnownLight),
-];
+#[derive(Clone, Copy, ValueEnum)]
+enum TurnMethodName {
+    /// In a light that is not known.
+    Turn,
+    /// In the true light.
+    Light,
+}
+
+impl From<TurnMethodName> for TurnMethod {
+    fn from(name: TurnMethodName) -> Self {
+        match name {
+            TurnMethodName::Turn => Self::UnknownLight,
+            TurnMethodName::Light => Self::KnownLight,
+        }
+    }
+}
 
 const INPUTS: Choices<IntrinsicInput> = &[
     ("diffuse", "Without highlights", IntrinsicInput::Diffuse),
@@ -273,9 +286,9 @@ impl CommonArguments {
         self.split.clone().unwrap_or_else(named)
     }
 
-    fn predictions(&self) -> Vec<Predictions> {
+    fn predictions(&self) -> impl Iterator<Item = Predictions> {
         let folder = |path: &PathBuf| Predictions::new(path.clone(), self.transfer, self.normals_y);
-        self.predictions.iter().map(folder).collect()
+        self.predictions.iter().map(folder)
     }
 }
 
@@ -297,18 +310,10 @@ impl SetArguments {
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let whole = |table: ScoreTable| (table, Outcome::Whole);
     let (table, outcome) = match &arguments.protocol {
-        Protocol::Mit { set, input } => on_set(set, 6, console, |set, split, found, progress| {
-            evaluate_intrinsic(set, split, *input, found, progress)
-        })
-        .map(whole),
-        Protocol::Normals { set } => on_set(set, 1, console, evaluate_normals).map(whole),
-        Protocol::Light { set, diffuse } => {
-            on_set(set, 2, console, |set, split, found, progress| {
-                evaluate_light(set, split, *diffuse, found, progress)
-            })
-            .map(whole)
-        }
-        Protocol::Highlight { set } => on_set(set, 1, console, evaluate_highlights).map(whole),
+        Protocol::Mit { set, input } => mit(set, *input, console).map(whole),
+        Protocol::Normals { set } => normals(set, console).map(whole),
+        Protocol::Light { set, diffuse } => light(set, *diffuse, console).map(whole),
+        Protocol::Highlight { set } => highlight(set, console).map(whole),
         Protocol::Relighting(arguments) => relighting(arguments, console),
         Protocol::Whdr(common) => ordinal(common, console).map(whole),
         Protocol::Insertion(arguments) => insertion(arguments, console),
@@ -320,26 +325,43 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 
 type Evaluated = Result<ScoreTable, Box<dyn Error>>;
 
-/// Hears of each step.
-type Progress<'a> = &'a (dyn Fn() + Sync);
-
-/// Scores so many baselines and the folders of predictions on the images of a set.
-fn on_set(
-    arguments: &SetArguments,
-    baselines: usize,
-    console: Console,
-    evaluate: impl FnOnce(
-        &TruthSet,
-        &str,
-        &[Predictions],
-        Progress<'_>,
-    ) -> Result<ScoreTable, EvalError>,
-) -> Evaluated {
+fn mit(arguments: &SetArguments, input: IntrinsicInput, console: Console) -> Evaluated {
     let (set, split) = arguments.open()?;
-    let predictions = arguments.common.predictions();
-    let steps = set.names().len() * (baselines + predictions.len());
+    let baselines = IntrinsicBaseline::all().map(IntrinsicMethod::Baseline);
+    let methods = with_predictions(baselines, &arguments.common, IntrinsicMethod::Predictions);
+    let steps = set.names().len() * methods.len();
     with_progress(steps, "evaluating", console, |progress| {
-        evaluate(&set, &split, &predictions, progress)
+        evaluate_intrinsic(&set, &split, input, &methods, progress)
+    })
+}
+
+fn normals(arguments: &SetArguments, console: Console) -> Evaluated {
+    let (set, split) = arguments.open()?;
+    let baselines = [NormalMethod::Viewer];
+    let methods = with_predictions(baselines, &arguments.common, NormalMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_normals(&set, &split, &methods, progress)
+    })
+}
+
+fn light(arguments: &SetArguments, form: DiffuseForm, console: Console) -> Evaluated {
+    let (set, split) = arguments.open()?;
+    let baselines = [LightMethod::Even, LightMethod::Oracle];
+    let methods = with_predictions(baselines, &arguments.common, LightMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_light(&set, &split, form, &methods, progress)
+    })
+}
+
+fn highlight(arguments: &SetArguments, console: Console) -> Evaluated {
+    let (set, split) = arguments.open()?;
+    let baselines = [HighlightMethod::Nothing];
+    let methods = with_predictions(baselines, &arguments.common, HighlightMethod::Predictions);
+    let steps = set.names().len() * methods.len();
+    with_progress(steps, "evaluating", console, |progress| {
+        evaluate_highlights(&set, &split, &methods, progress)
     })
 }
 
@@ -355,15 +377,16 @@ fn relighting(
     let common = &arguments.common;
     let set = RelightingSet::open(&common.data)?;
     let network = network(arguments.weights.as_deref())?;
-    let mut methods = vec![
+    let baselines = [
         RelightMethod::Naive,
         RelightMethod::Photograph(&network),
         RelightMethod::Maps(&network),
         RelightMethod::Oracle(SpecularForm::Power),
         RelightMethod::Oracle(SpecularForm::Lobe),
     ];
-    let predictions = common.predictions().into_iter();
-    methods.extend(predictions.map(RelightMethod::Predictions));
+    let methods = with_predictions(baselines, common, |folder| {
+        RelightMethod::Predictions(folder, SpecularForm::Lobe)
+    });
     let steps = set.objects() * methods.len();
     let table = with_progress(steps, "evaluating", console, |progress| {
         evaluate_relighting(&set, &common.split("all of"), &methods, progress)
@@ -377,8 +400,14 @@ fn make(arguments: &RelightingArguments, console: Console) -> CommandResult {
         lights: arguments.lights.into(),
         size: arguments.size,
         seed: arguments.seed,
+        shadows: !arguments.no_shadows,
     };
-    let (library, outcome) = library(&arguments.meshes, &arguments.panoramas, console)?;
+    let folders = Folders {
+        meshes: arguments.meshes.clone(),
+        textures: None,
+        panoramas: arguments.panoramas.clone(),
+    };
+    let (library, outcome) = read_library(&folders, console)?;
     with_progress(recipe.objects, "making objects", console, |progress| {
         make_relighting(&recipe, &library, &arguments.common.data, progress)
     })?;
@@ -395,30 +424,32 @@ fn insertion(
         seed: arguments.seed,
         black_paint: arguments.black_paint,
     };
-    let (library, outcome) = library(&arguments.meshes, &arguments.panoramas, console)?;
+    let folders = Folders {
+        meshes: arguments.meshes.clone(),
+        textures: None,
+        panoramas: arguments.panoramas.clone(),
+    };
+    let (library, outcome) = read_library(&folders, console)?;
     let network = network(arguments.weights.as_deref())?;
     if let Some(folder) = &arguments.sheets {
         make_folder(folder)?;
     }
+    let mut show = |name: &str, tiles: &[Planes<3>]| match &arguments.sheets {
+        None => Ok(()),
+        Some(folder) => {
+            let sheet = Planes::sheet(tiles, tiles.len().div_ceil(2))?;
+            Ok::<(), EvalError>(write_png(
+                &folder.join(format!("{name}.png")),
+                &sheet,
+                Depth::Eight,
+            )?)
+        }
+    };
     let objects = arguments.objects as usize;
-    let sheets = arguments.sheets.as_deref();
     let table = with_progress(objects, "inserting", console, |progress| {
-        evaluate_insertion(&recipe, &library, &network, sheets, progress)
+        evaluate_insertion(&recipe, &library, &network, &mut show, progress)
     })?;
     Ok((table, outcome))
-}
-
-fn library(
-    meshes: &Option<PathBuf>,
-    panoramas: &Option<PathBuf>,
-    console: Console,
-) -> Result<(Library, Outcome), SynthError> {
-    let folders = Folders {
-        meshes: meshes.clone(),
-        textures: None,
-        panoramas: panoramas.clone(),
-    };
-    read_library(&folders, console)
 }
 
 fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
@@ -443,7 +474,7 @@ fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
     let methods: Vec<TurnMethod> = if arguments.method.is_empty() {
         TurnMethod::ALL.to_vec()
     } else {
-        arguments.method.clone()
+        arguments.method.iter().map(|&name| name.into()).collect()
     };
     let table = with_progress(set.len() * methods.len(), "solving", console, |progress| {
         evaluate_turns(&set, &split, &methods, &networks, progress)
@@ -466,19 +497,32 @@ fn network(weights: Option<&Path>) -> Result<Decomposer, Box<dyn Error>> {
 
 fn ordinal(common: &CommonArguments, console: Console) -> Evaluated {
     let images = JudgedImages::open(&common.data)?;
-    let predictions = common.predictions();
-    // Two baselines.
-    let steps = images.len() * (2 + predictions.len());
+    let baselines = [
+        OrdinalMethod::ConstantAlbedo,
+        OrdinalMethod::ConstantShading,
+    ];
+    let methods = with_predictions(baselines, common, OrdinalMethod::Predictions);
+    let steps = images.len() * methods.len();
     with_progress(steps, "evaluating", console, |progress| {
-        evaluate_ordinal(&images, &common.split("all of"), &predictions, progress)
+        evaluate_ordinal(&images, &common.split("all of"), &methods, progress)
     })
+}
+
+/// The baselines, and the folders of predictions as methods.
+fn with_predictions<M, const N: usize>(
+    baselines: [M; N],
+    common: &CommonArguments,
+    method: impl Fn(Predictions) -> M,
+) -> Vec<M> {
+    let predicted = common.predictions().map(method);
+    baselines.into_iter().chain(predicted).collect()
 }
 
 fn with_progress<T, E: Error + 'static>(
     steps: usize,
     label: &'static str,
     console: Console,
-    work: impl FnOnce(Progress<'_>) -> Result<T, E>,
+    work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, E>,
 ) -> Result<T, Box<dyn Error>> {
     let bar = console.progress(steps as u64, label);
     let result = work(&|| bar.inc(1));

@@ -3,12 +3,9 @@
 
 mod stage;
 
-use std::path::Path;
-
-use super::run::{Scored, add_lines, unlit, unshown};
+use super::run::{Scored, add_lines};
 use super::{EvalError, EvalProgress, MaskRule, ScoreTable};
-use relight_core::files::write_png;
-use relight_core::image::{Depth, Linear, Planes, Rgb, Srgb};
+use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::metrics::{Comparison, ScaleFit, Ssim, dssim};
 use relight_photo::decompose::{DecomposeOptions, Decomposer};
 use relight_photo::insert::{
@@ -16,7 +13,7 @@ use relight_photo::insert::{
     Subject,
 };
 use relight_synth::Library;
-use stage::Stage;
+use stage::{Stage, StageRecipe};
 
 /// What an evaluation of insertion consists of. The same recipe and library make the same pictures.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,8 +29,8 @@ pub struct InsertionRecipe {
 }
 
 /// Ways to put an object into a picture.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum InsertionMethod {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InsertionMethod {
     /// All of [`relight_photo::insert`].
     Whole,
     /// The same without the shadow on the ground.
@@ -49,7 +46,8 @@ enum InsertionMethod {
 }
 
 impl InsertionMethod {
-    const ALL: [Self; 6] = [
+    /// All of them.
+    pub const ALL: [Self; 6] = [
         Self::Whole,
         Self::WithoutShadow,
         Self::WithoutEdgeColours,
@@ -59,7 +57,8 @@ impl InsertionMethod {
     ];
 
     /// How a table names it.
-    const fn name(self) -> &'static str {
+    #[must_use]
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Whole => "relight insert",
             Self::WithoutShadow => "without shadow",
@@ -149,10 +148,12 @@ impl Places {
     }
 }
 
+/// Is given each object's name and its pictures in sRGB: photograph, new picture, ground truth, and the result of each method;
+/// then the same but the photograph before a nearly white table.
+pub type SheetWriter<'a> = &'a mut dyn FnMut(&str, &[Planes<3>]) -> Result<(), EvalError>;
+
 /// MSE and DSSIM of objects that were put into new pictures, for each method: of the whole picture, and of object,
-/// edge and ground alone, and of the edge before a nearly white table. In the folder `sheets` comes a sheet for each object:
-/// photograph, new picture, ground truth, and the result of each method; then the same but the photograph before a nearly
-/// white table.
+/// edge and ground alone, and of the edge before a nearly white table.
 ///
 /// # Errors
 /// Where a picture cannot be made or measured, or the network fails.
@@ -160,12 +161,12 @@ pub fn evaluate_insertion(
     recipe: &InsertionRecipe,
     library: &Library,
     decomposer: &Decomposer,
-    sheets: Option<&Path>,
+    show: SheetWriter<'_>,
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable::new(
-        "insertion",
-        vec![
+    let mut table = ScoreTable {
+        protocol: "insertion".to_owned(),
+        notes: vec![
             format!(
                 "made by relight {}: {} objects, {} x {} pixels, seed {}, {} panoramas, Monte Carlo with cast shadows, on a table",
                 env!("CARGO_PKG_VERSION"),
@@ -179,23 +180,36 @@ pub fn evaluate_insertion(
                 .to_owned(),
             format!("SSIM by {}", Ssim::Gaussian.name()),
         ],
-    );
+        lines: Vec::new(),
+        images: Vec::new(),
+    };
     if recipe.black_paint {
         let note = "about half of each object is painted black, with an albedo of 0.04 at most";
         table.notes.push(note.to_owned());
     }
     let mut scored: [Vec<(String, Vec<Scored>)>; InsertionMethod::ALL.len()] = Default::default();
     for number in 0..recipe.objects {
-        let stage = Stage::make(library, recipe, number).map_err(unlit(&format!("{number:03}")))?;
+        let made = StageRecipe {
+            seed: recipe.seed,
+            size: recipe.size,
+            black_paint: recipe.black_paint,
+        };
+        let stage = Stage::make(library, made, number).map_err(|source| EvalError::Unlit {
+            sample: format!("{number:03}"),
+            source,
+        })?;
         let places = Places::of(&stage);
-        let failed = unshown(&stage.name);
-        let subjects = Subjects::of(&stage, decomposer).map_err(&failed)?;
+        let failed = |source| EvalError::Insertion {
+            sample: stage.name.clone(),
+            source: Box::new(source),
+        };
+        let subjects = Subjects::of(&stage, decomposer).map_err(failed)?;
         let truths = [shown(&stage.truth), shown(&stage.bright[1])];
         let truth = truths[0].clone();
         let mut tiles = vec![shown(&stage.photo), shown(&stage.background), truth.clone()];
         let mut bright = vec![shown(&stage.bright[0]), truths[1].clone()];
         for (method, scored) in InsertionMethod::ALL.into_iter().zip(&mut scored) {
-            let found = method.insert(&stage, &subjects).map_err(&failed)?;
+            let found = method.insert(&stage, &subjects).map_err(failed)?;
             let found = found.map(|picture| shown(&picture));
             scored.push((
                 stage.name.clone(),
@@ -206,11 +220,7 @@ pub fn evaluate_insertion(
             bright.push(before_bright);
         }
         tiles.extend(bright);
-        if let Some(folder) = sheets {
-            let sheet = Planes::sheet(&tiles, tiles.len().div_ceil(2))?;
-            let path = folder.join(format!("{}.png", stage.name));
-            write_png(&path, &sheet, Depth::Eight)?;
-        }
+        show(&stage.name, &tiles)?;
         progress();
     }
     for (method, scored) in InsertionMethod::ALL.into_iter().zip(scored) {
@@ -233,14 +243,17 @@ fn score(
         ("edge, bright", 1, &places.edge, MaskRule::Known),
         ("ground", 0, &places.ground, MaskRule::Known),
     ];
-    let failed = EvalError::unmeasured(name);
+    let failed = |source| EvalError::Metric {
+        sample: name.to_owned(),
+        source,
+    };
     let mut lines = Vec::new();
     for (part, picture, mask, rule) in parts {
         let (truth, found) = (&truths[picture], &found[picture]);
         let (truth_planes, found_planes) = (truth.planes(), found.planes());
         let pair =
-            Comparison::new(truth.extent(), &truth_planes, &found_planes, mask).map_err(&failed)?;
-        let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(&failed)?;
+            Comparison::new(truth.extent(), &truth_planes, &found_planes, mask).map_err(failed)?;
+        let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed)?;
         lines.push(Scored {
             part,
             measures: vec![("MSE", pair.mse(ScaleFit::None)), ("DSSIM", dssim(ssim))],
@@ -273,16 +286,18 @@ mod tests {
             seed: 5,
             black_paint: false,
         };
-        let folder = tempfile::tempdir().unwrap();
-        let sheets = Some(folder.path());
-        let evaluate = || evaluate_insertion(&recipe, &library, &net, sheets, &|| ()).unwrap();
+        let mut sheets = Vec::new();
+        let mut evaluate = || {
+            let mut show = |name: &str, tiles: &[Planes<3>]| {
+                sheets.push((name.to_owned(), tiles.len()));
+                Ok(())
+            };
+            evaluate_insertion(&recipe, &library, &net, &mut show, &|| ()).unwrap()
+        };
         let table = evaluate();
         assert_eq!(table, evaluate());
         assert_eq!(table.lines.len(), 5 * InsertionMethod::ALL.len());
-        let sheet = std::fs::read_dir(folder.path()).unwrap().next().unwrap();
-        let sheet = image::image_dimensions(sheet.unwrap().path()).unwrap();
-        // Five pictures, and two of each of the six methods, in two rows.
-        assert_eq!(sheet, (9 * 48, 2 * 48));
+        assert_eq!(sheets[0].1, 5 + 2 * InsertionMethod::ALL.len());
         // On the table's top, shadows are what counts.
         let ground = |method: InsertionMethod| {
             let line = table

@@ -8,7 +8,6 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
-use super::InsertionRecipe;
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{LightError, LightSampler, Order, Panorama};
 use relight_synth::{
@@ -53,6 +52,15 @@ pub(super) struct Stage {
     pub(super) bright: [Rgb<Linear>; 2],
 }
 
+/// What is made beside the objects of a recipe.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StageRecipe {
+    pub(super) seed: u64,
+    pub(super) size: u32,
+    /// Whether a part of each object is painted black.
+    pub(super) black_paint: bool,
+}
+
 /// The table of a picture, and what stands on it.
 struct Table<'a> {
     up: Vec3,
@@ -84,10 +92,10 @@ impl Stage {
     /// The stage of a number. The same seed and library make the same stages.
     pub(super) fn make(
         library: &Library,
-        stage: &InsertionRecipe,
+        stage: StageRecipe,
         number: u64,
     ) -> Result<Self, LightError> {
-        let &InsertionRecipe { seed, size, .. } = stage;
+        let StageRecipe { seed, size, .. } = stage;
         let recipe = Recipe {
             seed,
             size: size * SUPERSAMPLES,

@@ -38,6 +38,20 @@ pub struct RelightingRecipe {
     pub size: u32,
     /// What all is drawn from.
     pub seed: u64,
+    /// Whether objects cast shadows on themselves.
+    pub shadows: bool,
+}
+
+impl Default for RelightingRecipe {
+    fn default() -> Self {
+        Self {
+            objects: 100,
+            lights: 30,
+            size: 128,
+            seed: 0,
+            shadows: true,
+        }
+    }
 }
 
 impl RelightingRecipe {
@@ -45,6 +59,7 @@ impl RelightingRecipe {
         Recipe {
             seed: self.seed,
             size: self.size,
+            shadows: self.shadows,
             views: 1,
             lightings: 1,
             ..Recipe::default()
@@ -59,7 +74,7 @@ impl RelightingRecipe {
             let panorama = number % library.panoramas.len();
             let turn = TAU * unit(&mut random);
             let name = library.panoramas.name(panorama).unwrap_or_default();
-            let lighting = Lighting::of_panorama(panorama, turn, IRRADIANCE, true);
+            let lighting = Lighting::of_panorama(panorama, turn, IRRADIANCE, self.shadows);
             (name.to_owned(), lighting)
         };
         (0..self.lights).map(lighting).collect()
@@ -68,12 +83,13 @@ impl RelightingRecipe {
     fn about(&self, library: &Library) -> String {
         format!(
             "made by relight {}: {} objects of {} meshes and procedural shapes, {} lights of {} \
-             panoramas, Blinn-Phong by Monte Carlo, cast shadows, {}x{} pixels, seed {}",
+             panoramas, Blinn-Phong by Monte Carlo, {}cast shadows, {}x{} pixels, seed {}",
             env!("CARGO_PKG_VERSION"),
             self.objects,
             library.meshes.len(),
             self.lights,
             library.panoramas.len(),
+            if self.shadows { "" } else { "no " },
             self.size,
             self.size,
             self.seed
@@ -87,6 +103,7 @@ struct Origin {
     lights: usize,
     size: u32,
     seed: u64,
+    shadows: bool,
     meshes: Vec<String>,
     panoramas: Vec<String>,
 }
@@ -102,6 +119,7 @@ impl Origin {
             lights: recipe.lights,
             size: recipe.size,
             seed: recipe.seed,
+            shadows: recipe.shadows,
             meshes: library
                 .meshes
                 .iter()
@@ -124,10 +142,9 @@ impl Origin {
             {
                 write_json(&path, self)
             }
-            _ => Err(EvalError::fault(format!(
-                "{} holds objects that were made with other settings: give the same ones, or another folder",
-                out.display()
-            ))),
+            _ => Err(EvalError::OtherSettings {
+                path: out.to_owned(),
+            }),
         }
     }
 }
@@ -174,7 +191,10 @@ pub fn make_relighting(
 }
 
 fn write_json(path: &Path, content: &impl Serialize) -> Result<(), EvalError> {
-    let bytes = serde_json::to_vec_pretty(content).map_err(EvalError::description(path))?;
+    let bytes = serde_json::to_vec_pretty(content).map_err(|source| EvalError::Description {
+        path: path.to_owned(),
+        source,
+    })?;
     write_whole(path, &bytes).map_err(EvalError::write(path))
 }
 

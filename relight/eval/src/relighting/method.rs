@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::set::{Object, Part, RelightingSet, read_image};
-use crate::run::{cut_out, unshown};
+use crate::run::cut_out;
 use crate::{EvalError, Predictions};
 use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Order, ShLight};
@@ -20,9 +20,10 @@ pub enum RelightMethod<'d> {
     /// paper's layer under its nine coefficients, which tells what the paper's representation costs; with the lobe under
     /// all bands.
     Oracle(SpecularForm),
-    /// What was predicted from the image: maps of the object, which are rendered by the lobe layer (`normal`, `albedo`, and `reflectance` with `smoothness` for highlights, in a folder
+    /// What was predicted from the image: maps of the object, which are rendered as those of the
+    /// oracle (`normal`, `albedo`, and `reflectance` with `smoothness` for highlights, in a folder
     /// for each object), or else the relit images under the names that the set has.
-    Predictions(Predictions),
+    Predictions(Predictions, SpecularForm),
     /// What `relight relight` makes of the image: layers, light and hedge. Of the image's light the mean irradiance is given,
     /// as all lights of a set have the same: how bright the new light is beside it cannot be seen.
     Photograph(&'d Decomposer),
@@ -31,16 +32,13 @@ pub enum RelightMethod<'d> {
     Maps(&'d Decomposer),
 }
 
-/// A method for one object: the object under a light, by its number, as sRGB that is 0 outside the object.
-pub(super) type Relight<'a> = Box<dyn Fn(usize) -> Result<Planes<3>, EvalError> + 'a>;
-
 impl RelightMethod<'_> {
     pub(super) fn name(&self) -> String {
         match self {
             Self::Naive => "naive insertion".to_owned(),
             Self::Oracle(SpecularForm::Power) => "oracle, the paper's specular layer".to_owned(),
             Self::Oracle(SpecularForm::Lobe) => "oracle, lobe layer".to_owned(),
-            Self::Predictions(predictions) => predictions.name(),
+            Self::Predictions(predictions, _) => predictions.name(),
             Self::Photograph(_) => "relight relight".to_owned(),
             Self::Maps(_) => "relight decompose, its maps rendered".to_owned(),
         }
@@ -58,26 +56,24 @@ impl RelightMethod<'_> {
                 Part::Full => surface,
                 Part::Diffuse => surface.with_gloss(None)?,
             };
-            let image = move |light: usize| {
-                let image = render(&surface, &set.lights()[light], form)?;
-                Ok(cut_out(&image, &object.mask))
-            };
-            Ok(Box::new(image) as Relight<'a>)
+            Ok(Relight::Rendered {
+                set,
+                object,
+                surface: Box::new(surface),
+                form,
+            })
         };
         match self {
-            Self::Naive => {
-                let image = set.image(object, object.input, part)?;
-                Ok(Box::new(move |_| Ok(image.clone())))
-            }
+            Self::Naive => Ok(Relight::Same(set.image(object, object.input, part)?)),
             Self::Oracle(form) => rendered(object.surface.clone(), *form),
-            Self::Predictions(predictions) => {
-                let extent = object.surface.extent();
-                match predictions.surface(&object.name, extent)? {
-                    Some(surface) => rendered(surface, SpecularForm::Lobe),
-                    None => Ok(Box::new(move |light| {
-                        let path = predictions.file(&object.name, &part.file(light));
-                        Ok(cut_out(&read_image(&path, extent)?, &object.mask))
-                    })),
+            Self::Predictions(predictions, form) => {
+                match predictions.surface(&object.name, object.surface.extent())? {
+                    Some(surface) => rendered(surface, *form),
+                    None => Ok(Relight::Files {
+                        predictions,
+                        object,
+                        part,
+                    }),
                 }
             }
             Self::Photograph(decomposer) => {
@@ -85,16 +81,16 @@ impl RelightMethod<'_> {
                 let mask = &photo.mask;
                 let subject =
                     Subject::new(&photo.picture, mask, Some(mask), decomposer, &photo.options);
-                let subject = subject.map_err(unshown(&object.name))?;
-                Ok(Box::new(move |light| {
-                    let new = &set.lights()[light];
-                    let exposure = mean_irradiance(subject.light()) / mean_irradiance(new);
-                    let new = new.clone().tinted([f64::from(exposure); 3]);
-                    let colours = subject.relit(&new, &MaterialChange::default());
-                    let colours = colours.map_err(unshown(&object.name))?;
-                    let image = shown(subject.in_place(&photo.picture, &colours));
-                    Ok(cut_out(&image, &object.mask))
-                }))
+                let subject = Box::new(subject.map_err(|source| EvalError::Insertion {
+                    sample: object.name.clone(),
+                    source: Box::new(source),
+                })?);
+                Ok(Relight::Subject {
+                    set,
+                    object,
+                    photo,
+                    subject,
+                })
             }
             Self::Maps(decomposer) => {
                 let Photographed {
@@ -103,7 +99,10 @@ impl RelightMethod<'_> {
                     options,
                 } = Photographed::of(set, object, part)?;
                 let found = decomposer.decompose(&picture, &mask, &options);
-                let found = found.map_err(|source| unshown(&object.name)(source.into()))?;
+                let found = found.map_err(|source| EvalError::Insertion {
+                    sample: object.name.clone(),
+                    source: Box::new(source.into()),
+                })?;
                 let white = mean_irradiance(&set.lights()[object.input]);
                 rendered(surface_of(found, white)?, SpecularForm::Lobe)
             }
@@ -112,7 +111,7 @@ impl RelightMethod<'_> {
 }
 
 /// The image that is relit, as a photograph.
-struct Photographed {
+pub(super) struct Photographed {
     picture: Rgb<Linear>,
     mask: Planes<1>,
     options: DecomposeOptions,
@@ -157,6 +156,76 @@ fn surface_of(found: Decomposition, irradiance: f32) -> Result<Surface, EvalErro
 fn mean_irradiance(light: &ShLight) -> f32 {
     let first = light.coefficients()[0].iter().sum::<f64>() / 3.0;
     (first * PI.sqrt() / 2.0) as f32
+}
+
+/// A method for one object.
+pub(super) enum Relight<'a> {
+    /// One image for all lights.
+    Same(Planes<3>),
+    /// Maps, rendered.
+    Rendered {
+        set: &'a RelightingSet,
+        object: &'a Object,
+        surface: Box<Surface>,
+        form: SpecularForm,
+    },
+    /// Images that were predicted.
+    Files {
+        predictions: &'a Predictions,
+        object: &'a Object,
+        part: Part,
+    },
+    /// A photograph's object.
+    Subject {
+        set: &'a RelightingSet,
+        object: &'a Object,
+        photo: Photographed,
+        subject: Box<Subject>,
+    },
+}
+
+impl Relight<'_> {
+    /// The object under a light, sRGB, 0 outside the object.
+    pub(super) fn image(&self, light: usize) -> Result<Planes<3>, EvalError> {
+        match self {
+            Self::Same(image) => Ok(image.clone()),
+            Self::Rendered {
+                set,
+                object,
+                surface,
+                form,
+            } => {
+                let image = render(surface, &set.lights()[light], *form)?;
+                Ok(cut_out(&image, &object.mask))
+            }
+            Self::Files {
+                predictions,
+                object,
+                part,
+            } => {
+                let path = predictions.file(&object.name, &part.file(light));
+                let image = read_image(path, object.surface.extent())?;
+                Ok(cut_out(&image, &object.mask))
+            }
+            Self::Subject {
+                set,
+                object,
+                photo,
+                subject,
+            } => {
+                let new = &set.lights()[light];
+                let exposure = mean_irradiance(subject.light()) / mean_irradiance(new);
+                let new = new.clone().tinted([f64::from(exposure); 3]);
+                let colours = subject.relit(&new, &MaterialChange::default());
+                let colours = colours.map_err(|source| EvalError::Insertion {
+                    sample: object.name.clone(),
+                    source: Box::new(source),
+                })?;
+                let image = shown(subject.in_place(&photo.picture, &colours));
+                Ok(cut_out(&image, &object.mask))
+            }
+        }
+    }
 }
 
 fn render(surface: &Surface, light: &ShLight, form: SpecularForm) -> Result<Planes<3>, EvalError> {

@@ -26,15 +26,17 @@ pub fn evaluate_relighting(
     methods: &[RelightMethod<'_>],
     progress: EvalProgress<'_>,
 ) -> Result<ScoreTable, EvalError> {
-    let mut table = ScoreTable::new(
-        "relighting",
-        vec![
+    let mut table = ScoreTable {
+        protocol: "relighting".to_owned(),
+        notes: vec![
             set.about(),
             "one image in; out the images under all other lights; images: how many were compared"
                 .to_owned(),
             format!("SSIM by {}", Ssim::Gaussian.name()),
         ],
-    );
+        lines: Vec::new(),
+        images: Vec::new(),
+    };
     let targets = set.lights().len().saturating_sub(1);
     for method in methods {
         let scored = each(set.objects(), progress, object_folder, |number| {
@@ -62,7 +64,7 @@ fn score(
         let relight = method.prepare(set, object, part)?;
         for light in object.targets(set) {
             let truth = set.image(object, light, part)?;
-            let found = relight(light)?;
+            let found = relight.image(light)?;
             for ((mask, _), sum) in rules.iter().zip(&mut sums) {
                 let (mse, dssim) = compare(object, &truth, &found, mask)?;
                 sum.0 += mse;
@@ -89,10 +91,13 @@ fn compare(
     found: &Planes<3>,
     mask: &[bool],
 ) -> Result<(f64, f64), EvalError> {
-    let failed = EvalError::unmeasured(&object.name);
+    let failed = |source| EvalError::Metric {
+        sample: object.name.clone(),
+        source,
+    };
     let (truth_planes, found_planes) = (truth.planes(), found.planes());
     let pair = Comparison::new(truth.extent(), &truth_planes, &found_planes, mask);
-    let pair = pair.map_err(&failed)?;
+    let pair = pair.map_err(failed)?;
     let ssim = pair.ssim(Ssim::Gaussian, 1.0).map_err(failed)?;
     Ok((pair.mse(ScaleFit::None), dssim(ssim)))
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::EvalError;
-use crate::predictions::{check_size, other_schema, read_light};
+use crate::predictions::read_light;
 use relight_core::files::read_planes;
 use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, ShLight, YUp};
@@ -95,13 +95,24 @@ impl RelightingSet {
     /// Opens the set in the folder `root`.
     ///
     /// # Errors
-    /// Where there is none, or its description or one of its lights cannot be read.
+    /// [`EvalError::Read`], [`EvalError::Description`], [`EvalError::Light`].
     pub fn open(root: &Path) -> Result<Self, EvalError> {
         let path = root.join(FILE);
-        let bytes = fs::read(&path).map_err(EvalError::read(&path))?;
-        let index: Index = serde_json::from_slice(&bytes).map_err(EvalError::description(&path))?;
+        let bytes = fs::read(&path).map_err(|source| EvalError::Read {
+            path: path.clone(),
+            source,
+        })?;
+        let index: Index =
+            serde_json::from_slice(&bytes).map_err(|source| EvalError::Description {
+                path: path.clone(),
+                source,
+            })?;
         if index.schema != SCHEMA {
-            return Err(other_schema(&path, &index.schema, SCHEMA));
+            return Err(EvalError::Schema {
+                path,
+                found: index.schema,
+                expected: SCHEMA,
+            });
         }
         let lights = (0..index.lights.len())
             .map(|number| read_light(&light_file(root, number)))
@@ -154,7 +165,7 @@ impl RelightingSet {
         part: Part,
     ) -> Result<Planes<3>, EvalError> {
         let path = self.root.join(&object.name).join(part.file(light));
-        read_image(&path, object.surface.extent())
+        read_image(path, object.surface.extent())
     }
 }
 
@@ -167,10 +178,16 @@ impl Object {
 }
 
 /// The values of an image file, of which the size must be this.
-pub(super) fn read_image(path: &Path, expected: Extent) -> Result<Planes<3>, EvalError> {
-    let (planes, _) = read_planes(path)?;
-    check_size(path, planes.extent(), expected)?;
-    Ok(planes)
+pub(super) fn read_image(path: PathBuf, expected: Extent) -> Result<Planes<3>, EvalError> {
+    let (planes, _) = read_planes(&path)?;
+    if planes.extent() == expected {
+        return Ok(planes);
+    }
+    Err(EvalError::Size {
+        path,
+        found: planes.extent(),
+        expected,
+    })
 }
 
 pub(super) fn object_folder(number: usize) -> String {
