@@ -1,12 +1,11 @@
 //! The runs of the paper's phases.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use tch::{Kind, Tensor};
 
 use super::agreement::fingerprint;
-use super::composed::{ComposedBatches, buffer_settings, composition};
+use super::composed::ComposedBatches;
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, HeldOutTurns};
 use super::learner::Learner;
@@ -69,24 +68,19 @@ impl PaperTask {
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
         let held_out = |path: &PathBuf| HeldOutTurns::read(path, kind, resources.device);
-        let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
+        let composed = ComposedBatches::new(&settings.data, &settings.run, resources.clone())?;
         // On them, nothing is known of the paper's smoothness.
         let samples = match phase {
             PaperPhase::Specular => 0,
             _ => settings.data.validation,
         };
         Ok(Self {
-            held_out_samples: HeldOutSamples::new(&composition, samples),
+            held_out_samples: HeldOutSamples::new(composed.composition(), samples),
             held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),
             learner: Learner::new(graph, weights, &settings.run, resources.device)?,
-            composed: ComposedBatches::new(
-                composition,
-                buffer_settings(&settings.data, &settings.run),
-                kind,
-                resources.clone(),
-            ),
+            composed,
             turns: inputs.turns.as_ref().map(open).transpose()?,
             rank: Rank::ONLY,
             settings,
