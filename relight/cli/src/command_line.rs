@@ -71,8 +71,7 @@ impl Verb {
             Self::Insert(arguments) => arguments.fault(),
             Self::Render(arguments) => arguments.fault(),
             Self::Eval(arguments) => arguments.fault(),
-            Self::Synth(arguments) => arguments.fault(),
-            Self::Train(_) | Self::Turn(_) | Self::Serve(_) => None,
+            Self::Synth(_) | Self::Train(_) | Self::Turn(_) | Self::Serve(_) => None,
             Self::Export(arguments) => arguments.fault(),
             Self::Weights(arguments) => arguments.fault(),
         }

@@ -133,7 +133,11 @@ impl CameraModel {
     /// The values that the camera gives for light that already has its gain, with its noise. One value
     /// a channel for each colour; `seed` draws the noise.
     pub(super) fn values(&self, image: &[Vec3], seed: u64) -> Vec<[u8; 3]> {
-        let table = ResponseTable::new(self.response);
+        let table = response_table(self.response);
+        let encoded = |light: f32| {
+            let root = light.clamp(0.0, 1.0).sqrt();
+            table[(root * (ENTRIES - 1) as f32 + 0.5) as usize]
+        };
         let is_noisy = self.read_noise > 0.0 || self.shot_noise > 0.0;
         let value = |(pixel, colour): (usize, &Vec3)| {
             let mut channels = colour.to_array();
@@ -143,7 +147,7 @@ impl CameraModel {
                     *light += deviation * normal_of(mix(seed ^ (3 * pixel + channel) as u64));
                 }
             }
-            channels.map(|light| table.value(light))
+            channels.map(encoded)
         };
         image.iter().enumerate().map(value).collect()
     }
@@ -165,26 +169,13 @@ impl CameraModel {
 /// Entries of a response's table.
 const ENTRIES: usize = 1 << 12;
 
-/// A response for many pixels: by the root of light, in which every response is smooth enough.
-struct ResponseTable {
-    values: Vec<u8>,
-}
-
-impl ResponseTable {
-    fn new(response: Response) -> Self {
-        let value = |entry: usize| {
-            let root = entry as f32 / (ENTRIES - 1) as f32;
-            (response.encode(root * root) * 255.0).round() as u8
-        };
-        Self {
-            values: (0..ENTRIES).map(value).collect(),
-        }
-    }
-
-    fn value(&self, light: f32) -> u8 {
-        let root = light.clamp(0.0, 1.0).sqrt();
-        self.values[(root * (ENTRIES - 1) as f32 + 0.5) as usize]
-    }
+/// The values of a response for many pixels: by the root of light, in which every response is smooth enough.
+fn response_table(response: Response) -> Vec<u8> {
+    let value = |entry: usize| {
+        let root = entry as f32 / (ENTRIES - 1) as f32;
+        (response.encode(root * root) * 255.0).round() as u8
+    };
+    (0..ENTRIES).map(value).collect()
 }
 
 /// Nearly normally distributed, mean 0, standard deviation 1: the sum of four even numbers.

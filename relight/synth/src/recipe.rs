@@ -24,6 +24,8 @@ pub(super) const AMBIENT_RAYS: u32 = 16;
 const MESHES: f32 = 0.25;
 /// Least part of the picture that an object covers, where another view of it covers more.
 const LEAST_COVER: f32 = 0.12;
+/// Views that are drawn at most until one covers as much.
+const DRAWS: usize = 4;
 
 /// How samples are made. The same recipe and library give the same samples.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -115,32 +117,24 @@ impl Recipe {
             ObjectSource::Shape { kind, .. } => Some(*kind),
         };
         let least = (LEAST_COVER * (self.size * self.size) as f32) as usize;
-        let mut best: Option<(Pose, Projection, GBuffer)> = None;
-        for _ in 0..4 {
+        let mut draw = || {
             let pose = Pose::draw(&mut random, kind);
             let projection = Projection::draw(&mut random);
             let placement = pose.place(mesh, projection);
             let buffer = GBuffer::render(mesh, placement, projection, self.size);
-            let covers = buffer.len();
-            if best
-                .as_ref()
-                .is_none_or(|(_, _, other)| covers > other.len())
-            {
-                best = Some((pose, projection, buffer));
-            }
-            if covers >= least {
+            (pose, projection, buffer)
+        };
+        let mut best = draw();
+        for _ in 1..DRAWS {
+            if best.2.len() >= least {
                 break;
             }
+            let other = draw();
+            if other.2.len() > best.2.len() {
+                best = other;
+            }
         }
-        let (pose, projection, buffer) = best.unwrap_or_else(|| {
-            let (pose, projection) = (Pose::upright(0.3, 0.0, 0.9), Projection::Orthographic);
-            let placement = pose.place(mesh, projection);
-            (
-                pose,
-                projection,
-                GBuffer::render(mesh, placement, projection, self.size),
-            )
-        });
+        let (pose, projection, buffer) = best;
         let scene = if self.shadows {
             let occluder = Occluder::new(mesh, pose.place(mesh, projection));
             SyntheticScene::shaded(buffer, occluder, AMBIENT_RAYS, random.seed())

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use relight_photo::nets::{INPUTS, Inference, Weights, decomposer};
 use relight_synth::{Folders, Library, Recipe};
-use relight_train::{Adam, AdamSettings, Composition, ComputePrecision, DataSettings, Model};
+use relight_train::{Adam, Composition, ComputePrecision, DataSettings, Model, RunSettings};
 use tch::{Device, Kind, Tensor, no_grad};
 
 /// The least processor time of the calls after the first, which is a warm-up.
@@ -75,7 +75,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let seconds = match what.as_str() {
         "train" => {
             let model = model()?;
-            let mut adam = Adam::new(AdamSettings::default(), model.parameters())?;
+            let mut adam = Adam::new(&RunSettings::default(), model.parameters())?;
             least(steps, || {
                 let answer = model.forward(&pictures)?;
                 answer[0].f_square()?.f_mean(None)?.f_backward()?;

@@ -10,6 +10,7 @@ use tch::{Kind, Tensor, no_grad};
 
 use super::error::TrainError;
 use super::model::{copy_into, to_weights};
+use super::settings::RunSettings;
 use relight_photo::nets::{self, Weights};
 
 /// The number of steps in a saved memory, in thousands and the rest: 32 bits hold both exactly. Steps of which nothing could
@@ -20,31 +21,12 @@ const STEPS_PART: u64 = 1000;
 /// Keeps the root of the second moment from being zero.
 const EPSILON: f64 = 1e-8;
 
-/// How fast it learns and forgets.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AdamSettings {
-    /// Part of the first moment that is kept at each step, 0..1.
-    pub beta1: f64,
-    /// Part of the second moment that is kept at each step, 0..1.
-    pub beta2: f64,
-    /// Part of each parameter that is taken off at each step, times the learning rate, 0 and above.
-    pub weight_decay: f64,
-}
-
-impl Default for AdamSettings {
-    fn default() -> Self {
-        Self {
-            beta1: 0.9,
-            beta2: 0.99,
-            weight_decay: 1e-3,
-        }
-    }
-}
-
 /// The optimiser with its memory.
 #[derive(Debug)]
 pub struct Adam {
-    settings: AdamSettings,
+    /// Parts of the moments that are kept at each step.
+    betas: [f64; 2],
+    weight_decay: f64,
     steps: u64,
     first: BTreeMap<String, Tensor>,
     second: BTreeMap<String, Tensor>,
@@ -56,7 +38,7 @@ impl Adam {
     /// # Errors
     /// [`TrainError::Torch`].
     pub fn new(
-        settings: AdamSettings,
+        run: &RunSettings,
         parameters: &BTreeMap<String, Tensor>,
     ) -> Result<Self, TrainError> {
         let zeros = || {
@@ -66,7 +48,8 @@ impl Adam {
                 .collect::<Result<BTreeMap<_, _>, TrainError>>()
         };
         Ok(Self {
-            settings,
+            betas: [run.beta1, run.beta2],
+            weight_decay: run.weight_decay,
             steps: 0,
             first: zeros()?,
             second: zeros()?,
@@ -105,13 +88,13 @@ impl Adam {
     /// Goes on from a memory that was saved.
     ///
     /// # Errors
-    /// [`TrainError::Memory`] where it is another network's.
+    /// [`TrainError::Refused`] where it is another network's.
     pub fn recall(&mut self, memory: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.first, &memory.under("first."))?;
         copy_into(&mut self.second, &memory.under("second."))?;
         let steps = memory.get(STEPS).map(relight_photo::nets::Tensor::values);
         let Some(&[thousands, rest]) = steps else {
-            return Err(TrainError::Memory(STEPS.to_owned()));
+            return Err(TrainError::no_memory(STEPS));
         };
         self.steps = thousands as u64 * STEPS_PART + rest as u64;
         Ok(())
@@ -144,18 +127,14 @@ impl Adam {
             1.0
         };
         self.steps += 1;
-        let AdamSettings {
-            beta1,
-            beta2,
-            weight_decay,
-        } = self.settings;
+        let ([beta1, beta2], weight_decay) = (self.betas, self.weight_decay);
         let steps = self.steps.min(i32::MAX as u64) as i32;
         let (bias1, bias2) = (1.0 - beta1.powi(steps), 1.0 - beta2.powi(steps));
         for (name, parameter) in parameters {
             let mut gradient = parameter.f_grad()?;
             let (Some(first), Some(second)) = (self.first.get_mut(name), self.second.get_mut(name))
             else {
-                return Err(TrainError::Memory(name.clone()));
+                return Err(TrainError::no_memory(name));
             };
             if !gradient.defined() {
                 continue;

@@ -55,38 +55,25 @@ impl Checkpoint {
         let bytes = self
             .state
             .to_safetensors(relight_photo::nets::WeightPrecision::Single, Some(facts))
-            .map_err(|fault| TrainError::Checkpoint {
-                path: path.clone(),
-                fault,
-            })?;
-        durable::write_whole(&path, &bytes).map_err(|source| TrainError::Io {
-            path,
-            doing: "written",
-            source,
-        })
+            .map_err(|fault| TrainError::checkpoint(&path, &fault))?;
+        durable::write_whole(&path, &bytes).map_err(TrainError::io(&path, "written"))
     }
 
     /// Reads the one in a run's folder; none where there is none.
     ///
     /// # Errors
-    /// [`TrainError::Io`] or [`TrainError::Checkpoint`].
+    /// [`TrainError::Io`] or [`TrainError::Refused`].
     pub fn read(folder: &Path) -> Result<Option<Self>, TrainError> {
         let path = Self::path(folder);
         let bytes = match fs::read(&path) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(source) => {
-                return Err(TrainError::Io {
-                    path,
-                    doing: "read",
-                    source,
-                });
-            }
+            Err(source) => return Err(TrainError::io(&path, "read")(source)),
         };
         let found = Self::from_bytes(&bytes);
         found
             .map(Some)
-            .map_err(|fault| TrainError::Checkpoint { path, fault })
+            .map_err(|fault| TrainError::checkpoint(&path, &fault))
     }
 
     fn from_bytes(bytes: &[u8]) -> Result<Self, String> {

@@ -13,28 +13,6 @@ use super::task::Resources;
 use relight_core::reader::Rank;
 use relight_synth::{Folders, LeftOut, Library, Recipe, stream};
 
-/// What samples are composed of, with the files that are named read.
-///
-/// # Errors
-/// [`TrainError::Synth`].
-pub(super) fn composition(data: &DataSettings, seed: u64) -> Result<Composition, TrainError> {
-    let library = Library::read(&Folders {
-        meshes: data.meshes.clone(),
-        textures: data.textures.clone(),
-        panoramas: data.panoramas.clone(),
-    })?;
-    Ok(Composition {
-        recipe: Recipe {
-            seed: stream(seed, 21),
-            size: data.size,
-            views: data.views,
-            lightings: data.lightings,
-            ..Recipe::default()
-        },
-        library,
-    })
-}
-
 /// The batches of a run, composed while it trains.
 #[derive(Debug)]
 pub(super) struct ComposedBatches {
@@ -53,21 +31,47 @@ impl ComposedBatches {
         &self.composition.library.left_out
     }
 
-    /// The batches of a composition, in 32 or 64 bits.
+    /// What they are composed of.
+    pub(super) fn composition(&self) -> &Composition {
+        &self.composition
+    }
+
+    /// Reads the files that are named.
+    ///
+    /// # Errors
+    /// [`TrainError::Synth`].
     pub(super) fn new(
-        composition: Arc<Composition>,
-        settings: ShuffleBufferSettings,
-        kind: Kind,
+        data: &DataSettings,
+        run: &RunSettings,
         resources: Resources,
-    ) -> Self {
-        Self {
-            composition,
-            settings,
+    ) -> Result<Self, TrainError> {
+        let library = Library::read(&Folders {
+            meshes: data.meshes.clone(),
+            textures: data.textures.clone(),
+            panoramas: data.panoramas.clone(),
+        })?;
+        let recipe = Recipe {
+            seed: stream(run.seed, 21),
+            size: data.size,
+            views: data.views,
+            lightings: data.lightings,
+            ..Recipe::default()
+        };
+        recipe.check()?;
+        Ok(Self {
+            composition: Arc::new(Composition { recipe, library }),
+            settings: ShuffleBufferSettings {
+                capacity: data.shuffle_buffer,
+                lightings: u64::from(data.lightings).max(1),
+                reuse: data.reuse,
+                batch: run.batch,
+                seed: stream(run.seed, 22),
+            },
             rank: Rank::ONLY,
-            kind,
+            kind: run.precision.kind(),
             resources,
             buffer: None,
-        }
+        })
     }
 
     /// Leaves the rest of each batch to other processes. Called before the first batch.
@@ -94,16 +98,5 @@ impl ComposedBatches {
         };
         let buffer = self.buffer.insert(buffer);
         TruthBatch::new(&buffer.batch(step)?, self.kind, self.resources.device)
-    }
-}
-
-/// How samples are drawn.
-pub(super) fn buffer_settings(data: &DataSettings, run: &RunSettings) -> ShuffleBufferSettings {
-    ShuffleBufferSettings {
-        capacity: data.shuffle_buffer,
-        lightings: u64::from(data.lightings).max(1),
-        reuse: data.reuse,
-        batch: run.batch,
-        seed: stream(run.seed, 22),
     }
 }

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::panic::{self, AssertUnwindSafe};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
@@ -88,11 +89,10 @@ impl DataLoader {
                         }
                     }
                 })
-                .map_err(|source| TrainError::Io {
-                    path: "the data-loader workers".into(),
-                    doing: "started",
-                    source,
-                })
+                .map_err(TrainError::io(
+                    Path::new("the data-loader workers"),
+                    "started",
+                ))
         };
         let threads = (0..threads).map(spawn).collect::<Result<_, _>>()?;
         Ok(Self {

@@ -1,10 +1,8 @@
 //! The run that trains the decomposing network on composed samples.
 
-use std::sync::Arc;
-
 use tch::Tensor;
 
-use super::composed::{ComposedBatches, buffer_settings, composition};
+use super::composed::ComposedBatches;
 use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, highlight_figures};
@@ -42,21 +40,12 @@ impl DecomposeTask {
         weights: Option<&Weights>,
     ) -> Result<Self, TrainError> {
         settings.check()?;
-        let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
-        composition.recipe.check()?;
-        let validation = HeldOutSamples::new(&composition, settings.data.validation);
+        let composed = ComposedBatches::new(&settings.data, &settings.run, resources.clone())?;
+        let validation = HeldOutSamples::new(composed.composition(), settings.data.validation);
         let graph = decomposer_with_heads();
-        let initial = || Weights::initial(&graph, settings.run.seed);
-        let weights = weights.cloned().unwrap_or_else(initial);
-        let learner = settings.run.learner(resources.device);
-        let learner = Learner::new(graph, &weights, learner)?;
+        let learner = Learner::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
-            composed: ComposedBatches::new(
-                composition,
-                buffer_settings(&settings.data, &settings.run),
-                settings.run.precision.kind(),
-                resources.clone(),
-            ),
+            composed,
             settings,
             resources,
             learner,
@@ -83,8 +72,8 @@ impl TrainingTask for DecomposeTask {
         self.composed.left_out()
     }
 
-    fn learners(&mut self) -> Vec<&mut Learner> {
-        vec![&mut self.learner]
+    fn learner(&mut self) -> &mut Learner {
+        &mut self.learner
     }
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {

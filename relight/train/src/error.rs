@@ -1,7 +1,7 @@
 //! What can go wrong while training.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why training could not begin or go on.
 #[derive(Debug, thiserror::Error)]
@@ -13,9 +13,6 @@ pub enum TrainError {
     /// Weights do not fit, or cannot be read or written.
     #[error(transparent)]
     Weights(#[from] relight_photo::nets::NetError),
-    /// An optimiser's memory that is another network's.
-    #[error("the saved optimiser has no {0} of the right shape: it is another network's")]
-    Memory(String),
     /// Samples could not be made.
     #[error(transparent)]
     Synth(#[from] relight_synth::SynthError),
@@ -25,7 +22,8 @@ pub enum TrainError {
     /// A sheet of answers could not be encoded.
     #[error(transparent)]
     Encode(#[from] relit_data::shard::ShardError),
-    /// Something that was given cannot be used: a setting, an option, a launcher's variable, a GPU.
+    /// What is wrong, and what to do: with something that was given, as a setting, an option, a checkpoint or a GPU, or
+    /// with the run itself.
     #[error("{0}")]
     Refused(String),
     /// A file cannot be read or written.
@@ -38,38 +36,38 @@ pub enum TrainError {
         /// Why.
         source: io::Error,
     },
-    /// A checkpoint that is none, or another run's.
-    #[error("{path} is no checkpoint of this run: {fault}")]
-    Checkpoint {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        fault: String,
-    },
-    /// A folder that holds a run already.
-    #[error("{path} holds a run already: go on with --resume, or give another folder")]
-    Occupied {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A folder whose run goes on in another program.
-    #[error(
-        "the run in {path} is being made by another program: wait for its end, or give another folder"
-    )]
-    Running {
-        /// The folder.
-        path: PathBuf,
-    },
     /// A run that was asked to stop while its first samples were being composed.
     #[error("the run was asked to stop while its first samples were being composed")]
     Stopped,
     /// Another process of the run has ended, or cannot be reached.
     #[error("another process of this run has ended or cannot be reached any more ({0})")]
     ProcessLost(String),
-    /// A run that has gone wrong, or that another process leaves unfinished.
-    #[error("{0}")]
-    Ended(String),
     /// A fault of the program.
     #[error("{0}: this is a fault of the program")]
     Fault(&'static str),
+}
+
+impl TrainError {
+    /// Puts what could not be done to a file to the reason.
+    pub(super) fn io(path: &Path, doing: &'static str) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io {
+            path,
+            doing,
+            source,
+        }
+    }
+
+    /// That a saved optimiser lacks a tensor, or has one of another shape.
+    pub(super) fn no_memory(name: &str) -> Self {
+        Self::Refused(format!(
+            "the saved optimiser has no {name} of the right shape: it is another network's"
+        ))
+    }
+
+    /// That a file is no checkpoint of this run.
+    pub(super) fn checkpoint(path: &Path, fault: &str) -> Self {
+        let path = path.display();
+        Self::Refused(format!("{path} is no checkpoint of this run: {fault}"))
+    }
 }

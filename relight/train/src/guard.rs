@@ -25,7 +25,7 @@ impl Guard {
     /// Looks at the losses and spreads of a step.
     ///
     /// # Errors
-    /// [`TrainError::Ended`].
+    /// [`TrainError::Refused`].
     pub(crate) fn check(
         &mut self,
         step: u64,
@@ -55,7 +55,7 @@ impl Guard {
         }
         match collapsed {
             None => Ok(()),
-            Some((head, spread)) => Err(TrainError::Ended(format!(
+            Some((head, spread)) => Err(TrainError::Refused(format!(
                 "at step {step} the answers for {head} have hardly any variation left ({spread:.2e} of the ground truth's): \
                  the head has collapsed, and the run ends"
             ))),
@@ -73,7 +73,7 @@ fn bad_loss(step: u64, loss: &str, value: f64) -> TrainError {
         "loss" => "sum of all losses",
         part => part,
     };
-    TrainError::Ended(format!(
+    TrainError::Refused(format!(
         "at step {step} the {loss} is {value}: the run ends before this step is made"
     ))
 }

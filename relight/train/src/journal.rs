@@ -21,16 +21,20 @@ impl Journal {
     /// The journal in a run's folder; a resumed run goes on behind the line of its last step.
     ///
     /// # Errors
-    /// [`TrainError::Io`], [`TrainError::Running`] where another program has it open.
+    /// [`TrainError::Io`], [`TrainError::Refused`] where another program has it open.
     pub fn open(folder: &Path, from_step: u64) -> Result<Self, TrainError> {
-        let running = || TrainError::Running {
-            path: folder.to_owned(),
+        let running = || {
+            TrainError::Refused(format!(
+                "the run in {} is being made by another program: wait for its end, or give another folder",
+                folder.display()
+            ))
         };
         if Self::is_open(folder) {
             return Err(running());
         }
         let table_path = folder.join(TABLE);
-        let table = open_table(&table_path, from_step).map_err(written(&table_path))?;
+        let table =
+            open_table(&table_path, from_step).map_err(TrainError::io(&table_path, "written"))?;
         // Some file systems have no locks.
         if matches!(table.try_lock(), Err(TryLockError::WouldBlock)) {
             return Err(running());
@@ -56,7 +60,7 @@ impl Journal {
             .collect();
         self.table
             .write_all(lines.as_bytes())
-            .map_err(written(&self.table_path))
+            .map_err(TrainError::io(&self.table_path, "written"))
     }
 }
 
@@ -81,15 +85,6 @@ fn open_table(path: &Path, from_step: u64) -> io::Result<File> {
     };
     relit_data::durable::write_whole(path, format!("step,series,value\n{kept}").as_bytes())?;
     OpenOptions::new().append(true).open(path)
-}
-
-fn written(path: &Path) -> impl FnOnce(io::Error) -> TrainError {
-    let path = path.to_owned();
-    move |source| TrainError::Io {
-        path,
-        doing: "written",
-        source,
-    }
 }
 
 #[cfg(test)]

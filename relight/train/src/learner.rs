@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 use tch::{Device, Tensor, no_grad};
 
-use super::adam::{Adam, AdamSettings};
+use super::adam::Adam;
 use super::error::TrainError;
-use super::model::{ComputePrecision, Model, copy_into, to_weights};
+use super::model::{Model, copy_into, to_weights};
+use super::settings::RunSettings;
 use relight_photo::nets::{Graph, Weights};
 
 /// A network in training.
@@ -20,35 +21,25 @@ pub struct Learner {
     average: WeightAverage,
 }
 
-/// How a network learns.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LearnerSettings {
-    /// Of the optimiser.
-    pub adam: AdamSettings,
-    /// Part of the average that is kept at each step, 0..1.
-    pub ema_decay: f64,
-    /// In which precision its layers are computed.
-    pub precision: ComputePrecision,
-    /// Where it is computed.
-    pub device: Device,
-}
-
 impl Learner {
-    /// A network that begins with these weights.
+    /// A network that begins with these weights, or with random ones, and learns as a run does.
     ///
     /// # Errors
     /// Those of [`Model::new`].
     pub fn new(
         graph: Graph,
-        weights: &Weights,
-        settings: LearnerSettings,
+        weights: Option<&Weights>,
+        run: &RunSettings,
+        device: Device,
     ) -> Result<Self, TrainError> {
         let name = graph.name();
-        let model = Model::new(graph, weights, settings.device, settings.precision)?;
+        let initial = || Weights::initial(&graph, run.seed);
+        let weights = weights.cloned().unwrap_or_else(initial);
+        let model = Model::new(graph, &weights, device, run.precision)?;
         Ok(Self {
             name,
-            adam: Adam::new(settings.adam, model.parameters())?,
-            average: WeightAverage::new(model.parameters(), settings.ema_decay)?,
+            adam: Adam::new(run, model.parameters())?,
+            average: WeightAverage::new(model.parameters(), run.ema_decay)?,
             model,
         })
     }
@@ -115,7 +106,7 @@ impl Learner {
     /// Goes on from a state that was saved.
     ///
     /// # Errors
-    /// [`TrainError::Memory`] where it is another network's.
+    /// [`TrainError::Refused`] where it is another network's.
     pub fn recall(&mut self, state: &Weights) -> Result<(), TrainError> {
         let own = state.under(&format!("{}.", self.name));
         self.model.recall(&own.under("model."))?;

@@ -54,7 +54,7 @@ mod turn_reader;
 mod turn_samples;
 mod turn_task;
 
-pub use adam::{Adam, AdamSettings};
+pub use adam::Adam;
 pub use checkpoint::{CHECKPOINT, Checkpoint};
 pub use cuda::cuda_device;
 pub use data_loader::{Composition, DataLoader};
@@ -63,7 +63,7 @@ pub use decompose_task::DecomposeTask;
 pub use error::TrainError;
 pub use journal::{Journal, TABLE};
 pub use launch::Launch;
-pub use learner::{Learner, LearnerSettings};
+pub use learner::Learner;
 pub use model::{ComputePrecision, Model};
 pub use paper_networks::PaperInputs;
 pub use paper_phases::PaperPhase;

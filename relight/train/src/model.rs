@@ -121,7 +121,7 @@ impl Model {
     /// Takes over weights.
     ///
     /// # Errors
-    /// [`TrainError::Memory`] where they are another network's.
+    /// [`TrainError::Refused`] where they are another network's.
     pub fn recall(&mut self, weights: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.parameters, weights)
     }
@@ -244,14 +244,14 @@ fn channels_last(tensor: &Tensor) -> Result<Tensor, tch::TchError> {
 /// Copies saved numbers into tensors of the same names and shapes.
 ///
 /// # Errors
-/// [`TrainError::Memory`] where one is missing or has another shape.
+/// [`TrainError::Refused`] where one is missing or has another shape.
 pub(super) fn copy_into(
     tensors: &mut BTreeMap<String, Tensor>,
     saved: &Weights,
 ) -> Result<(), TrainError> {
     no_grad(|| {
         for (name, tensor) in tensors {
-            let missing = || TrainError::Memory(name.clone());
+            let missing = || TrainError::no_memory(name);
             let saved = saved.get(name).ok_or_else(missing)?;
             let shape: Vec<i64> = saved.shape().iter().map(|&side| side as i64).collect();
             if shape != tensor.size() {

@@ -1,12 +1,11 @@
 //! The runs of the paper's phases.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use tch::{Kind, Tensor};
 
 use super::agreement::fingerprint;
-use super::composed::{ComposedBatches, buffer_settings, composition};
+use super::composed::ComposedBatches;
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, HeldOutTurns};
 use super::learner::Learner;
@@ -18,7 +17,6 @@ use super::settings::{PaperSettings, first_difference};
 use super::task::{Resources, StepLosses, TrainingTask, Validation};
 use super::turn_reader::{TurnGroup, TurnReader};
 use relight_core::reader::Rank;
-use relight_photo::nets::Weights;
 use relight_synth::{LeftOut, stream};
 
 /// Training of one of the paper's networks.
@@ -65,31 +63,24 @@ impl PaperTask {
             )));
         }
         let graph = learned(phase);
-        let initial = || Weights::initial(&graph, settings.run.seed);
-        let weights = inputs.weights.clone().unwrap_or_else(initial);
-        let learner = settings.run.learner(resources.device);
-        let kind = learner.precision.kind();
+        let weights = inputs.weights.as_ref();
+        let kind = settings.run.precision.kind();
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
         let held_out = |path: &PathBuf| HeldOutTurns::read(path, kind, resources.device);
-        let composition = Arc::new(composition(&settings.data, settings.run.seed)?);
+        let composed = ComposedBatches::new(&settings.data, &settings.run, resources.clone())?;
         // On them, nothing is known of the paper's smoothness.
         let samples = match phase {
             PaperPhase::Specular => 0,
             _ => settings.data.validation,
         };
         Ok(Self {
-            held_out_samples: HeldOutSamples::new(&composition, samples),
+            held_out_samples: HeldOutSamples::new(composed.composition(), samples),
             held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),
-            learner: Learner::new(graph, &weights, learner)?,
-            composed: ComposedBatches::new(
-                composition,
-                buffer_settings(&settings.data, &settings.run),
-                kind,
-                resources.clone(),
-            ),
+            learner: Learner::new(graph, weights, &settings.run, resources.device)?,
+            composed,
             turns: inputs.turns.as_ref().map(open).transpose()?,
             rank: Rank::ONLY,
             settings,
@@ -162,8 +153,8 @@ impl TrainingTask for PaperTask {
         self.composed.left_out()
     }
 
-    fn learners(&mut self) -> Vec<&mut Learner> {
-        vec![&mut self.learner]
+    fn learner(&mut self) -> &mut Learner {
+        &mut self.learner
     }
 
     fn inputs(&self) -> Result<String, TrainError> {

@@ -21,7 +21,7 @@ use super::journal::Journal;
 use super::process_group::ProcessGroup;
 use super::settings::RunSettings;
 use super::task::{StepLosses, TrainingTask, Validation};
-use relight_photo::nets::{WeightPrecision, Weights};
+use relight_photo::nets::WeightPrecision;
 
 /// How long a process waits for process 0 to write its checkpoint and end, where the run ends early. No longer, as process 0 can
 /// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.
@@ -51,8 +51,8 @@ pub struct RunOutcome {
     pub damaged: bool,
     /// Figures of the last validation; none in other processes than the first.
     pub figures: BTreeMap<String, f64>,
-    /// The files of weights, which the first process writes.
-    pub weights: Vec<PathBuf>,
+    /// The file of weights, which the first process writes.
+    pub weights: Option<PathBuf>,
 }
 
 /// A run in its folder.
@@ -78,8 +78,8 @@ impl<'a> Run<'a> {
     /// which open it with the same arguments.
     ///
     /// # Errors
-    /// [`TrainError::Occupied`], [`TrainError::Checkpoint`] where it is another run's, [`TrainError::Io`];
-    /// [`TrainError::Refused`], [`TrainError::ProcessLost`].
+    /// [`TrainError::Refused`] where there is one without `resume`, or another one; [`TrainError::Io`],
+    /// [`TrainError::ProcessLost`].
     pub fn open(
         task: &'a mut dyn TrainingTask,
         settings: &'a RunSettings,
@@ -88,18 +88,15 @@ impl<'a> Run<'a> {
         group: Option<ProcessGroup>,
     ) -> Result<Self, TrainError> {
         settings.check()?;
-        fs::create_dir_all(folder).map_err(|source| TrainError::Io {
-            path: folder.to_owned(),
-            doing: "made",
-            source,
-        })?;
+        fs::create_dir_all(folder).map_err(TrainError::io(folder, "made"))?;
         let inputs = task.inputs()?;
         let step = match Checkpoint::read(folder)? {
             None => 0,
             Some(_) if !resume => {
-                return Err(TrainError::Occupied {
-                    path: folder.to_owned(),
-                });
+                return Err(TrainError::Refused(format!(
+                    "{} holds a run already: go on with --resume, or give another folder",
+                    folder.display()
+                )));
             }
             Some(checkpoint) => recall(task, &inputs, &checkpoint, folder)?,
         };
@@ -132,7 +129,7 @@ impl<'a> Run<'a> {
     /// weights at the end.
     ///
     /// # Errors
-    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Ended`] where another process is lost:
+    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Refused`] where another process is lost:
     /// the run is
     /// saved.
     pub fn finish(
@@ -147,10 +144,10 @@ impl<'a> Run<'a> {
             }
             Err(fault) => return Err(fault),
         };
-        let mut weights = Vec::new();
+        let mut weights = None;
         if self.journal.is_some() {
             self.save(observer)?;
-            weights = self.write_weights()?;
+            weights = Some(self.write_weights()?);
         }
         // Only now: launchers end all processes as soon as one has ended with another code than 0.
         if let Some(group) = self.group.take() {
@@ -247,24 +244,15 @@ impl<'a> Run<'a> {
         reduced: &AllReducedLosses,
         learning_rate: f64,
     ) -> Result<f64, TrainError> {
+        let learner = self.task.learner();
         match reduced.part(losses)? {
             Some(part) => part.f_backward()?,
-            None => {
-                for learner in self.task.learners() {
-                    learner.model.add_zero_gradients()?;
-                }
-            }
+            None => learner.model.add_zero_gradients()?,
         }
         if let Some(group) = &self.group {
-            for learner in self.task.learners() {
-                group.sum_gradients(learner.model.parameters())?;
-            }
+            group.sum_gradients(learner.model.parameters())?;
         }
-        let mut norm = 0.0_f64;
-        for learner in self.task.learners() {
-            norm = norm.hypot(learner.learn(learning_rate, self.settings.max_grad_norm)?);
-        }
-        Ok(norm)
+        learner.learn(learning_rate, self.settings.max_grad_norm)
     }
 
     fn log(
@@ -299,7 +287,7 @@ impl<'a> Run<'a> {
             Err(fault) => format!("it could not be saved: {}", with_causes(&fault)),
         };
         let step = self.step;
-        TrainError::Ended(format!(
+        TrainError::Refused(format!(
             "{lost}; the run ends after {step} steps, and {saved}"
         ))
     }
@@ -348,21 +336,15 @@ impl<'a> Run<'a> {
         journal.scalars(self.step, &named)?;
         if let Some(png) = sheet {
             let path = self.folder.join("validation.png");
-            relit_data::durable::write_whole(&path, &png).map_err(|source| TrainError::Io {
-                path,
-                doing: "written",
-                source,
-            })?;
+            relit_data::durable::write_whole(&path, &png)
+                .map_err(TrainError::io(&path, "written"))?;
         }
         observer.validated(self.step, &figures);
         Ok(figures)
     }
 
     fn save(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
-        let mut state = Weights::default();
-        for learner in self.task.learners() {
-            state.extend(learner.state()?);
-        }
+        let state = self.task.learner().state()?;
         Checkpoint {
             task: self.task.name().to_owned(),
             step: self.step,
@@ -376,28 +358,19 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// The averaged weights, half precision, a file a network.
-    fn write_weights(&mut self) -> Result<Vec<PathBuf>, TrainError> {
-        let folder = self.folder;
-        self.task
-            .learners()
-            .into_iter()
-            .map(|learner| {
-                let path = folder.join(format!("{}.safetensors", learner.name()));
-                learner.averaged()?.write(&path, WeightPrecision::Half)?;
-                Ok(path)
-            })
-            .collect()
+    /// The averaged weights, half precision.
+    fn write_weights(&mut self) -> Result<PathBuf, TrainError> {
+        let learner = self.task.learner();
+        let path = self.folder.join(format!("{}.safetensors", learner.name()));
+        learner.averaged()?.write(&path, WeightPrecision::Half)?;
+        Ok(path)
     }
 }
 
 /// What has to be the same in all processes.
 fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
     let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
-    let mut weights = String::new();
-    for learner in task.learners() {
-        weights += &fingerprint(learner.model.parameters())?;
-    }
+    let weights = fingerprint(task.learner().model.parameters())?;
     Ok(vec![
         ("version and task", version),
         ("the settings", task.settings()),
@@ -417,10 +390,7 @@ fn recall(
     checkpoint: &Checkpoint,
     folder: &Path,
 ) -> Result<u64, TrainError> {
-    let other = |fault: String| TrainError::Checkpoint {
-        path: Checkpoint::path(folder),
-        fault,
-    };
+    let other = |fault: String| TrainError::checkpoint(&Checkpoint::path(folder), &fault);
     if checkpoint.task != task.name() {
         return Err(other(format!(
             "it trains {}, not {}",
@@ -437,8 +407,6 @@ fn recall(
         return Err(other(fault.to_owned()));
     }
     task.go_to(&checkpoint.cursor).map_err(other)?;
-    for learner in task.learners() {
-        learner.recall(&checkpoint.state)?;
-    }
+    task.learner().recall(&checkpoint.state)?;
     Ok(checkpoint.step)
 }

@@ -53,8 +53,8 @@ pub trait TrainingTask {
         &[]
     }
 
-    /// The networks that learn.
-    fn learners(&mut self) -> Vec<&mut Learner>;
+    /// The network that learns.
+    fn learner(&mut self) -> &mut Learner;
 
     /// The losses of a step, from 0, on this process's part of its batch; always the same ones, in the same order. Steps
     /// are asked for one after the other.

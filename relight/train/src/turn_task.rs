@@ -51,10 +51,7 @@ impl TurnNetworkTask {
     ) -> Result<Self, TrainError> {
         settings.check()?;
         let graph = turn_network();
-        let initial = || Weights::initial(&graph, settings.run.seed);
-        let weights = weights.cloned().unwrap_or_else(initial);
-        let learner = settings.run.learner(resources.device);
-        let learner = Learner::new(graph, &weights, learner)?;
+        let learner = Learner::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
             training: TurnViews::for_training(&settings.data, views, settings.run.seed)?,
             validation: TurnViews::for_validation(&settings.data, views)?,
@@ -163,8 +160,8 @@ impl TrainingTask for TurnNetworkTask {
         self.training.left_out()
     }
 
-    fn learners(&mut self) -> Vec<&mut Learner> {
-        vec![&mut self.learner]
+    fn learner(&mut self) -> &mut Learner {
+        &mut self.learner
     }
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {

@@ -19,12 +19,11 @@ use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
 use relight_photo::nets::{Graph, Inference, Weights, decomposer, decomposer_with_heads};
 use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight_train::{
-    Adam, AdamSettings, AnsweredTensors, Checkpoint, Composition, ComputePrecision, DataLoader,
-    DataSettings, DecomposeSettings, DecomposeTask, Journal, Learner, LearnerSettings, Model,
-    PaperInputs, PaperLossCoefficients, PaperPhase, PaperSettings, PaperTask, ProcessGroup,
-    Resources, Run, RunOutcome, RunSettings, StepLosses, TABLE, TrainError, TrainObserver,
-    TrainingTask, TransferSettings, TruthArrays, TurnNetworkSettings, TurnNetworkTask, Validation,
-    read_settings,
+    Adam, AnsweredTensors, Checkpoint, Composition, ComputePrecision, DataLoader, DataSettings,
+    DecomposeSettings, DecomposeTask, Journal, Learner, Model, PaperInputs, PaperLossCoefficients,
+    PaperPhase, PaperSettings, PaperTask, ProcessGroup, Resources, Run, RunOutcome, RunSettings,
+    StepLosses, TABLE, TrainError, TrainObserver, TrainingTask, TransferSettings, TruthArrays,
+    TurnNetworkSettings, TurnNetworkTask, Validation, read_settings,
 };
 use tch::{Device, Kind, Tensor};
 
@@ -91,7 +90,7 @@ fn descend(model: &Model, adam: &mut Adam, steps: usize) -> Vec<f64> {
 fn steps_lower_the_loss_in_both_precisions() {
     for precision in [ComputePrecision::Single, ComputePrecision::Mixed] {
         let model = model(decomposer(), precision);
-        let mut adam = Adam::new(AdamSettings::default(), model.parameters()).unwrap();
+        let mut adam = Adam::new(&RunSettings::default(), model.parameters()).unwrap();
         let losses = descend(&model, &mut adam, 6);
         assert!(losses[5] < 0.8 * losses[0], "{losses:?}");
     }
@@ -101,14 +100,14 @@ fn steps_lower_the_loss_in_both_precisions() {
 fn a_run_that_was_saved_goes_on_to_the_same_losses() {
     tch::set_num_threads(1);
     let first = model(light_net(Head::Pooled), ComputePrecision::Single);
-    let mut adam = Adam::new(AdamSettings::default(), first.parameters()).unwrap();
+    let mut adam = Adam::new(&RunSettings::default(), first.parameters()).unwrap();
     descend(&first, &mut adam, 3);
     let (weights, memory) = (first.weights().unwrap(), adam.memory().unwrap());
     let undisturbed = descend(&first, &mut adam, 3);
 
     let graph = light_net(Head::Pooled);
     let second = Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap();
-    let mut adam = Adam::new(AdamSettings::default(), second.parameters()).unwrap();
+    let mut adam = Adam::new(&RunSettings::default(), second.parameters()).unwrap();
     adam.recall(&memory).unwrap();
     assert_eq!(descend(&second, &mut adam, 3), undisturbed);
 }
@@ -116,12 +115,12 @@ fn a_run_that_was_saved_goes_on_to_the_same_losses() {
 #[test]
 fn the_memory_of_another_network_is_refused() {
     let light = model(light_net(Head::Pooled), ComputePrecision::Single);
-    let memory = Adam::new(AdamSettings::default(), light.parameters())
+    let memory = Adam::new(&RunSettings::default(), light.parameters())
         .unwrap()
         .memory()
         .unwrap();
     let other = model(decomposer(), ComputePrecision::Single);
-    let mut adam = Adam::new(AdamSettings::default(), other.parameters()).unwrap();
+    let mut adam = Adam::new(&RunSettings::default(), other.parameters()).unwrap();
     assert!(adam.recall(&memory).is_err());
 }
 
@@ -281,10 +280,8 @@ fn a_folder_with_a_run_is_not_overwritten_and_another_runs_checkpoint_is_refused
     let (mut task, settings) = decompose_task(1);
     make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap();
     let again = make_run(&mut task, &settings, folder.path(), (false, u64::MAX));
-    assert!(
-        matches!(again, Err(TrainError::Occupied { .. })),
-        "{again:?}"
-    );
+    let text = again.unwrap_err().to_string();
+    assert!(text.contains("holds a run already"), "{text}");
     let (mut other, settings) = decompose_task(2);
     let error = make_run(&mut other, &settings, folder.path(), (true, u64::MAX)).unwrap_err();
     assert!(
@@ -406,7 +403,7 @@ fn every_phase_of_the_paper_makes_its_steps_and_goes_on_where_it_was_stopped() {
         let run = paper_settings(3).run;
         let (whole, parted) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let outcome = make_run(&mut task(), &run, whole.path(), (false, u64::MAX)).unwrap();
-        assert_eq!((outcome.steps, outcome.weights.len()), (3, 1), "{phase:?}");
+        assert!(outcome.steps == 3 && outcome.weights.is_some(), "{phase:?}");
         make_run(&mut task(), &run, parted.path(), (false, 1)).unwrap();
         make_run(&mut task(), &run, parted.path(), (true, u64::MAX)).unwrap();
         assert_eq!(table(parted.path()), table(whole.path()), "{phase:?}");
@@ -524,16 +521,14 @@ struct EverySecondStep {
 
 impl EverySecondStep {
     fn new() -> Self {
-        let settings = LearnerSettings {
-            adam: AdamSettings::default(),
+        let run = RunSettings {
             ema_decay: 0.9,
-            precision: ComputePrecision::Single,
-            device: Device::Cpu,
+            ..RunSettings::default()
         };
         let graph = light_net(Head::Pooled);
         let weights = Weights::initial(&graph, 5);
         Self {
-            learner: Learner::new(graph, &weights, settings).unwrap(),
+            learner: Learner::new(graph, Some(&weights), &run, Device::Cpu).unwrap(),
         }
     }
 }
@@ -551,8 +546,8 @@ impl TrainingTask for EverySecondStep {
     fn join(&mut self, _: &ProcessGroup) -> Result<(), TrainError> {
         Ok(())
     }
-    fn learners(&mut self) -> Vec<&mut Learner> {
-        vec![&mut self.learner]
+    fn learner(&mut self) -> &mut Learner {
+        &mut self.learner
     }
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let mut losses = StepLosses::default();
@@ -668,7 +663,8 @@ fn a_run_that_another_program_makes_is_left_alone() {
     let (mut task, settings) = decompose_task(1);
     let open = Journal::open(folder.path(), 0).unwrap();
     let error = make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap_err();
-    assert!(matches!(error, TrainError::Running { .. }), "{error}");
+    let text = error.to_string();
+    assert!(text.contains("is being made by another program"), "{text}");
     drop(open);
     make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap();
 }

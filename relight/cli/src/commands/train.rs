@@ -20,6 +20,7 @@ use relight_train::{
 };
 use relit_console::{Console, Outcome, ProgressBar};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -184,69 +185,68 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 }
 
 fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
-    let file = arguments.settings.as_deref();
-    let settings = file.map_or_else(|| Ok(DecomposeSettings::default()), read_settings)?;
-    if arguments.print_settings {
-        return print_settings(&settings, console);
-    }
-    let processes = arguments.join(console)?;
+    let settings: DecomposeSettings = arguments.settings()?;
     let run = settings.run.clone();
-    let weights = read_weights(arguments.weights.as_deref())?;
-    let resources = processes.resources.clone();
-    let mut task = DecomposeTask::new(settings, resources, weights.as_ref())?;
-    train(&mut task, &run, (arguments, processes), console)
+    train(
+        (settings, run),
+        arguments,
+        console,
+        |settings, resources| {
+            let weights = read_weights(arguments.weights.as_deref())?;
+            Ok(DecomposeTask::new(settings, resources, weights.as_ref())?)
+        },
+    )
 }
 
 fn turn(arguments: &TurnArguments, console: Console) -> CommandResult {
-    let file = arguments.run.settings.as_deref();
-    let settings = file.map_or_else(|| Ok(TurnNetworkSettings::default()), read_settings)?;
-    if arguments.run.print_settings {
-        return print_settings(&settings, console);
-    }
-    let processes = arguments.run.join(console)?;
+    let TurnArguments { run: own, views } = arguments;
+    let settings: TurnNetworkSettings = own.settings()?;
     let run = settings.run.clone();
-    let weights = read_weights(arguments.run.weights.as_deref())?;
-    let own = arguments.run.folder()?.join("views");
-    let views = arguments.views.as_deref().unwrap_or(&own);
-    let resources = processes.resources.clone();
-    let mut task = TurnNetworkTask::new(settings, views, resources, weights.as_ref())?;
-    train(&mut task, &run, (&arguments.run, processes), console)
+    train((settings, run), own, console, |settings, resources| {
+        let weights = read_weights(own.weights.as_deref())?;
+        let beside = own.folder()?.join("views");
+        let views = views.as_deref().unwrap_or(&beside);
+        Ok(TurnNetworkTask::new(
+            settings,
+            views,
+            resources,
+            weights.as_ref(),
+        )?)
+    })
 }
 
 fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
-    let settings = PaperSettings::of_phase(phase, arguments.run.settings.as_deref())?;
-    if arguments.run.print_settings {
-        return print_settings(&settings, console);
-    }
-    let processes = arguments.run.join(console)?;
+    let own = &arguments.run;
+    let settings = PaperSettings::of_phase(phase, own.settings.as_deref())?;
     let run = settings.run.clone();
-    let inputs = PaperInputs {
-        turns: arguments.turns.clone(),
-        held_out: arguments.held_out.clone(),
-        weights: read_weights(arguments.run.weights.as_deref())?,
-        spec: read_weights(arguments.spec.as_deref())?,
-        normal: read_weights(arguments.normal.as_deref())?,
-        light: read_weights(arguments.light.as_deref())?,
-    };
-    let mut task = PaperTask::new(phase, settings, processes.resources.clone(), &inputs)?;
-    train(&mut task, &run, (&arguments.run, processes), console)
-}
-
-/// The processes of the run, and what this one has.
-struct Processes {
-    resources: Resources,
-    group: Option<ProcessGroup>,
+    train((settings, run), own, console, |settings, resources| {
+        let inputs = PaperInputs {
+            turns: arguments.turns.clone(),
+            held_out: arguments.held_out.clone(),
+            weights: read_weights(own.weights.as_deref())?,
+            spec: read_weights(arguments.spec.as_deref())?,
+            normal: read_weights(arguments.normal.as_deref())?,
+            light: read_weights(arguments.light.as_deref())?,
+        };
+        Ok(PaperTask::new(phase, settings, resources, &inputs)?)
+    })
 }
 
 impl RunArguments {
+    fn settings<S: Default + DeserializeOwned>(&self) -> Result<S, TrainError> {
+        let file = self.settings.as_deref();
+        file.map_or_else(|| Ok(S::default()), read_settings)
+    }
+
     fn folder(&self) -> Result<&Path, &'static str> {
         self.output
             .as_deref()
             .ok_or("--output RUN is missing: where the run is kept")
     }
 
-    /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads.
-    fn join(&self, console: Console) -> Result<Processes, Box<dyn Error>> {
+    /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads. What
+    /// this process has, and the group of all.
+    fn join(&self, console: Console) -> Result<(Resources, Option<ProcessGroup>), Box<dyn Error>> {
         let launch = Launch::from_variables(|name| env::var(name).ok())?;
         if let Some(threads) = self.threads {
             tch::set_num_threads(threads as i32);
@@ -262,7 +262,7 @@ impl RunArguments {
             // While processes wait for each other, signals end them: there is nothing to save.
             stop: stop_at_signals(group.is_some())?,
         };
-        Ok(Processes { resources, group })
+        Ok((resources, group))
     }
 }
 
@@ -284,28 +284,28 @@ fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
     path.map(Weights::read).transpose()
 }
 
-fn print_settings(settings: &impl Serialize, console: Console) -> CommandResult {
-    let event = json!({ "event": "settings", "settings": settings });
-    console.say(toml::to_string(settings)?.trim_end(), &event);
-    Ok(Outcome::Whole)
-}
-
-/// Makes the run, and tells how it came out.
-fn train(
-    task: &mut dyn TrainingTask,
-    settings: &RunSettings,
-    (arguments, processes): (&RunArguments, Processes),
+/// Makes the run of a task, and tells how it came out; or prints the settings.
+fn train<S: Serialize, T: TrainingTask>(
+    (settings, run): (S, RunSettings),
+    arguments: &RunArguments,
     console: Console,
+    task: impl FnOnce(S, Resources) -> Result<T, Box<dyn Error>>,
 ) -> CommandResult {
-    let stop = processes.resources.stop;
-    let group = processes.group;
+    if arguments.print_settings {
+        let event = json!({ "event": "settings", "settings": settings });
+        console.say(toml::to_string(&settings)?.trim_end(), &event);
+        return Ok(Outcome::Whole);
+    }
+    let (resources, group) = arguments.join(console)?;
+    let stop = Arc::clone(&resources.stop);
+    let mut task = task(settings, resources)?;
     let process = group.as_ref().map_or(0, |group| group.rank().index());
     let folder = arguments.folder()?;
-    let run = Run::open(task, settings, folder, arguments.resume, group)?;
-    let made = run.steps_made();
-    let bar = (process == 0).then(|| console.progress(settings.steps, "train"));
+    let steps = run.steps;
+    let run = Run::open(&mut task, &run, folder, arguments.resume, group)?;
+    let bar = (process == 0).then(|| console.progress(steps, "train"));
     if let Some(bar) = &bar {
-        bar.set_position(made);
+        bar.set_position(run.steps_made());
         bar.reset_eta();
     }
     let mut progress = RunProgress {

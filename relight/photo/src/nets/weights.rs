@@ -56,12 +56,6 @@ impl FromIterator<(String, Tensor)> for Weights {
     }
 }
 
-impl Extend<(String, Tensor)> for Weights {
-    fn extend<I: IntoIterator<Item = (String, Tensor)>>(&mut self, tensors: I) {
-        self.tensors.extend(tensors);
-    }
-}
-
 impl IntoIterator for Weights {
     type Item = (String, Tensor);
     type IntoIter = std::collections::btree_map::IntoIter<String, Tensor>;

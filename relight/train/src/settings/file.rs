@@ -16,11 +16,7 @@ const HOW_OFTEN: [&str; 2] = ["run.log_every", "run.checkpoint_minutes"];
 /// # Errors
 /// [`TrainError::Io`], [`TrainError::Refused`].
 pub fn read_settings<S: DeserializeOwned>(path: &Path) -> Result<S, TrainError> {
-    let text = text::read(path).map_err(|source| TrainError::Io {
-        path: path.to_owned(),
-        doing: "read",
-        source,
-    })?;
+    let text = text::read(path).map_err(TrainError::io(path, "read"))?;
     toml::from_str(&text).map_err(|fault| {
         TrainError::Refused(format!(
             "{} is no file of settings: {fault}",

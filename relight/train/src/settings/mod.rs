@@ -158,7 +158,9 @@ fn check_coefficients(coefficients: &[(&'static str, f64)]) -> Result<(), TrainE
     let is_nothing = coefficients
         .iter()
         .all(|&(_, coefficient)| coefficient == 0.0);
-    ensure(!is_nothing, "[loss]", 0, "above 0 for one of all others")
+    let first = coefficients.first().map_or("[loss]", |(name, _)| name);
+    let value = "0, as all others of [loss] are";
+    ensure(!is_nothing, first, value, "above 0 for one of them")
 }
 
 fn check_coefficient(name: &str, value: f64) -> Result<(), TrainError> {

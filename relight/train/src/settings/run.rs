@@ -1,12 +1,9 @@
 //! How long and how fast a network learns.
 
 use serde::{Deserialize, Serialize};
-use tch::Device;
 
 use super::{positive, within};
-use crate::adam::AdamSettings;
 use crate::error::TrainError;
-use crate::learner::LearnerSettings;
 use crate::model::ComputePrecision;
 
 // Nobody trains more: these keep a slip of the pen from filling the memory.
@@ -105,19 +102,5 @@ impl RunSettings {
         self.learning_rate
             * warm.min(1.0)
             * (self.min_lr_ratio + (1.0 - self.min_lr_ratio) * cosine)
-    }
-
-    /// How a network learns on a device.
-    pub(crate) fn learner(&self, device: Device) -> LearnerSettings {
-        LearnerSettings {
-            adam: AdamSettings {
-                beta1: self.beta1,
-                beta2: self.beta2,
-                weight_decay: self.weight_decay,
-            },
-            ema_decay: self.ema_decay,
-            precision: self.precision,
-            device,
-        }
     }
 }
