@@ -14,7 +14,7 @@
 //!
 //! - [`Clock::sleep`] and [`Clock::sleep_until`] replace `thread::sleep`;
 //! - a [`Waitable`] replaces a mutex with a condition variable, and the timeouts of channels;
-//! - [`Clock::spawn`] and `Clock::scope` start participating threads and wait for their ends;
+//! - [`Clock::spawn`] and [`Clock::scope`] start participating threads and wait for their ends;
 //! - a thread never waits while it holds a lock that another participant may want.
 //!
 //! If all participants wait and none of them has a deadline, every wait panics with a report of the
@@ -64,7 +64,7 @@ use std::time::Duration;
 use rustix::time::{ClockId, clock_gettime};
 
 use scheduler::Scheduler;
-pub use threads::{JoinHandle, Participant};
+pub use threads::{JoinHandle, Participant, Scope, ScopedJoinHandle};
 pub use waitable::Waitable;
 
 /// A clock in microseconds, monotonic or virtual. Clones are the same clock.

@@ -60,7 +60,7 @@ impl<T> JoinHandle<T> {
 
 /// A scope for threads that end before [`Clock::scope`] returns.
 #[derive(Debug)]
-pub(crate) struct Scope<'scope, 'env: 'scope> {
+pub struct Scope<'scope, 'env: 'scope> {
     scope: &'scope thread::Scope<'scope, 'env>,
     clock: Clock,
     /// Number of threads that have not ended.
@@ -69,7 +69,7 @@ pub(crate) struct Scope<'scope, 'env: 'scope> {
 
 /// A thread started by [`Scope::spawn`].
 #[derive(Debug)]
-pub(crate) struct ScopedJoinHandle<'scope, T> {
+pub struct ScopedJoinHandle<'scope, T> {
     thread: thread::ScopedJoinHandle<'scope, T>,
     ended: Arc<Waitable<bool>>,
 }
@@ -80,13 +80,13 @@ impl<T> ScopedJoinHandle<'_, T> {
     /// # Errors
     /// The panic of the thread.
     #[track_caller]
-    pub(crate) fn join(self) -> thread::Result<T> {
+    pub fn join(self) -> thread::Result<T> {
         self.ended.wait(|ended| ended.then_some(()));
         self.thread.join()
     }
 
     /// Whether the thread has ended.
-    pub(crate) fn is_finished(&self) -> bool {
+    pub fn is_finished(&self) -> bool {
         *self.ended.lock()
     }
 }
@@ -124,7 +124,7 @@ impl Clock {
     }
 
     /// Runs `body`, which may start threads that borrow local values, and waits for their ends.
-    pub(crate) fn scope<'env, T>(
+    pub fn scope<'env, T>(
         &self,
         body: impl for<'scope> FnOnce(&Scope<'scope, 'env>) -> T,
     ) -> T {
@@ -145,7 +145,7 @@ impl<'scope> Scope<'scope, '_> {
     ///
     /// # Errors
     /// The system cannot start a thread.
-    pub(crate) fn spawn<T: Send + 'scope>(
+    pub fn spawn<T: Send + 'scope>(
         &self,
         name: &str,
         work: impl FnOnce() -> T + Send + 'scope,

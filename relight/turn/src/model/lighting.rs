@@ -92,7 +92,7 @@ impl TableLight {
     ///
     /// # Errors
     /// Where a term is not finite.
-    pub(crate) fn to_viewer(&self, frame: &TableFrame) -> Result<ShLight, LightError> {
+    pub(crate) fn to_viewer(self, frame: &TableFrame) -> Result<ShLight, LightError> {
         Ok(self.coefficients()?.rotated(&frame.rotation().inverse()))
     }
 
