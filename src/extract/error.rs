@@ -43,7 +43,7 @@ pub enum ExtractError {
     #[error(transparent)]
     Report(#[from] report::ReportError),
     /// A file on the local disk cannot be read or written.
-    #[error("{path} could not be {doing}")]
+    #[error("{path} could not be {doing}: {source}")]
     Io {
         /// What was attempted.
         doing: &'static str,

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 
 use relit_data::causes::with_causes;
 use relit_data::counts::count_of;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::MaskSpans;
 use relit_data::report::{self, Page, THUMBNAIL_SIDE, Thumbnail};
 use relit_data::session::{INDEX_FILE, Notice, Recording, Status};
 use relit_data::shard::{
@@ -176,7 +176,7 @@ impl Job {
                         steadiness.add(frame.number, alignment, frame.interpolated);
                     }
                     for &sample in assigned {
-                        let record = self.record(&stage, &plan, &frame, sample);
+                        let record = self.record(&stage, &plan, &frame, sample, options);
                         if is_thumbnail(record.index, samples) {
                             let (index, image) = (record.index, small(&frame.image));
                             thumbnails.push(Thumbnail { index, image });
@@ -310,6 +310,7 @@ impl Job {
             object: self.mask.bounding_box,
             spans: MaskSpans::of(&crop_mask),
             scaler: Scaler::new(crop_mask, side)?,
+            saturation_level: options.saturation_level,
             align: None,
         })
     }
@@ -356,6 +357,7 @@ impl Job {
         plan: &Plan,
         frame: &ProcessedFrame,
         sample: Assignment,
+        options: &ExtractOptions,
     ) -> FrameRecord {
         let candidate = plan.candidate(frame.number);
         let alignment = frame.alignment;
@@ -376,7 +378,7 @@ impl Job {
                 sample.index,
                 stage.crop,
                 &frame.measures,
-                SPEC_NET_GATE,
+                options.gate,
             )
         }
     }
@@ -454,8 +456,8 @@ impl Job {
             ],
             warnings: &texts(notices),
             quality: Some(quality),
-            gate: SPEC_NET_GATE,
-            saturation_level: SATURATION_LEVEL,
+            gate: options.gate,
+            saturation_level: options.saturation_level,
         })?)
     }
 }

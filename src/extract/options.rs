@@ -25,6 +25,10 @@ pub struct ExtractOptions {
     /// Margin around the object on each side, as a fraction of its longer side,
     /// 0..=[`MAX_MARGIN`].
     pub margin: f64,
+    /// The 8-bit value from which a channel is saturated.
+    pub saturation_level: u8,
+    /// The saturated fraction above which `spec_net` is set, 0..=1: [`SPEC_NET_GATE`] by default.
+    pub gate: f64,
     /// How samples are stored.
     pub layout: Layout,
     /// How shifts of the object against its mask are handled.
@@ -54,6 +58,8 @@ impl Default for ExtractOptions {
             frames: 1500,
             size: ImageSize::Pixels(256),
             margin: 0.05,
+            saturation_level: SATURATION_LEVEL,
+            gate: SPEC_NET_GATE,
             layout: Layout::Webdataset,
             align: Align::Correct,
             align_tolerance: 0.1,
@@ -75,8 +81,8 @@ impl ExtractOptions {
             frames: self.frames,
             size: self.size,
             margin: self.margin,
-            saturation_level: SATURATION_LEVEL,
-            gate: SPEC_NET_GATE,
+            saturation_level: self.saturation_level,
+            gate: self.gate,
             align: self.align,
             align_tolerance: (self.align == Align::Correct).then_some(self.align_tolerance),
             layout: self.layout,
@@ -97,6 +103,7 @@ impl ExtractOptions {
             ("frames", f64::from(self.frames), 1.0, f64::INFINITY),
             ("size", f64::from(side), 1.0, f64::from(MAX_SIDE)),
             ("margin", self.margin, 0.0, MAX_MARGIN),
+            ("gate", self.gate, 0.0, 1.0),
             ("align-tolerance", self.align_tolerance, 0.0, MAX_SHIFT),
             ("max-shift", self.max_shift, 1.0, MAX_SHIFT),
             ("threads", self.threads as f64, 1.0, f64::INFINITY),

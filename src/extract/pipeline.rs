@@ -13,7 +13,7 @@ use rayon::ThreadPool;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, Measures, Measuring, SATURATION_LEVEL};
+use relit_data::image_stats::{MaskSpans, Measures, Measuring};
 use relit_data::shard;
 use relit_video::{DecodeFault, Pending, Reader, Video};
 
@@ -34,6 +34,7 @@ pub(super) struct Stage<'a> {
     /// The mask under the crop.
     pub(super) spans: MaskSpans,
     pub(super) scaler: Scaler,
+    pub(super) saturation_level: u8,
     pub(super) align: Option<Align>,
 }
 
@@ -106,7 +107,8 @@ impl Early<'_, '_> {
         if rows.start == 0 {
             let scaling = stage.scaler.begin(crop, self.scale).ok();
             let scaling = scaling.filter(|_| !self.expect_moved);
-            self.scaled = scaling.map(|scaling| (scaling, stage.spans.measuring(SATURATION_LEVEL)));
+            self.scaled =
+                scaling.map(|scaling| (scaling, stage.spans.measuring(stage.saturation_level)));
         }
         let (_, height) = crop.dimensions();
         let of_crop = |row: u32| row.saturating_sub(border).min(height);
@@ -207,7 +209,7 @@ impl Stage<'_> {
         let (image, measures) = match (moved, scaled) {
             (None, Some((scaling, measuring))) => (scaling.into_image(), measuring.finish()),
             (None, None) => {
-                let mut measuring = self.spans.measuring(SATURATION_LEVEL);
+                let mut measuring = self.spans.measuring(self.saturation_level);
                 let image = self
                     .scaler
                     .scale(crop, &mut buffers.scale, &mut measuring)?;
@@ -215,7 +217,7 @@ impl Stage<'_> {
             }
             (Some(Moved { crop, whole, part }), _) => {
                 let spans = self.seen(whole);
-                let mut measuring = spans.measuring(SATURATION_LEVEL);
+                let mut measuring = spans.measuring(self.saturation_level);
                 let scale = &mut buffers.scale;
                 let image = self.scaler.scale_moved(crop, part, scale, &mut measuring)?;
                 (image, measuring.finish())

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
+use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{Align, ArrayTask, ImageSize, Layout, MAX_TASKS};
 use relit_extract::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
 use serde::de::DeserializeOwned;
@@ -101,6 +102,12 @@ pub(crate) struct ExtractArguments {
     /// Margin around the object, as a fraction of its longer side.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.05, value_parser = within(0.0, MAX_MARGIN))]
     margin: f64,
+    /// A channel is saturated from this 8-bit value on.
+    #[arg(long, value_name = "0-255", default_value_t = SATURATION_LEVEL)]
+    saturation_level: u8,
+    /// Spec-Net should run above this fraction of saturated pixels.
+    #[arg(long, value_name = "FRACTION", default_value_t = SPEC_NET_GATE, value_parser = within(0.0, 1.0))]
+    gate: f64,
     /// How samples are stored: one tar per session, as WebDataset reads it, or folders of images, as in the released
     /// data set.
     #[arg(long, default_value = "webdataset", value_parser = named::<Layout>(["webdataset", "relit"]))]
@@ -183,6 +190,8 @@ impl ExtractArguments {
             frames: self.frames,
             size: self.size,
             margin: self.margin,
+            saturation_level: self.saturation_level,
+            gate: self.gate,
             layout: self.layout,
             align: self.align,
             align_tolerance: self.align_tolerance,
