@@ -113,7 +113,7 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::quality::tests::record;
+    use super::super::quality::record;
     use super::*;
 
     /// The samples found to be blurred in a turn of 600 frames, whose sharpness and brightness are given

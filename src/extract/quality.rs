@@ -135,7 +135,10 @@ fn exposure_steps(frames: &[&FrameRecord]) -> Vec<Option<f64>> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(super) use tests::record;
+
+#[cfg(test)]
+mod tests {
     use super::*;
     use relit_data::geometry::Rect;
     use relit_data::image_stats::{Measures, SPEC_NET_GATE};

@@ -162,7 +162,7 @@ impl Colour {
         // Colour differences stay as they are; each counts for the pixels that share it.
         let halved = format.descriptor();
         let halved = halved.map(|format| (format.log2_chroma_w(), format.log2_chroma_h()));
-        let (deep, shift) = match halved {
+        let (deep, (across, down)) = match halved {
             Some((1, 1)) => (Pixel::YUV420P16LE, (1, 1)),
             Some((1, 0)) => (Pixel::YUV422P16LE, (1, 0)),
             _ => (Pixel::YUV444P16LE, (0, 0)),
@@ -171,9 +171,23 @@ impl Colour {
         // swscale expands no range, except of the formats that are full-range by name, which it makes limited.
         let full_range = self.full_range && !is_jpeg_format(format);
         let decoding = YuvDecoding::new(matrix_code(self.matrix), full_range).ok()?;
-        let at = [(0, (0, 0)), (1, shift), (2, shift)];
-        let at = at.map(|(plane, shift)| Samples { plane, shift });
-        pixels(&yuv, rect, at, |yuv| to_srgb.levels(decoding.rgb(yuv)))
+        let (left, top) = (usize::try_from(rect.x).ok()?, usize::try_from(rect.y).ok()?);
+        let mut rgb = RgbImage::new(rect.w, rect.h);
+        for (y, row) in rgb.rows_mut().enumerate() {
+            let (luma, _) = plane(&yuv, 0, 0, top + y)?;
+            let (blue, _) = plane(&yuv, 1, 0, (top + y) >> down)?;
+            let (red, _) = plane(&yuv, 2, 0, (top + y) >> down)?;
+            for (x, to) in row.enumerate() {
+                let (x, halved) = (left + x, (left + x) >> across);
+                let yuv = [
+                    sample(luma, x)?,
+                    sample(blue, halved)?,
+                    sample(red, halved)?,
+                ];
+                to.0 = to_srgb.levels(decoding.rgb(yuv));
+            }
+        }
+        Some(rgb)
     }
 
     /// Makes coded RGB sRGB.
@@ -198,37 +212,8 @@ fn matrix_code(matrix: YuvStandardMatrix) -> u32 {
     }
 }
 
-/// Where the samples of a channel stand.
-#[derive(Clone, Copy)]
-struct Samples {
-    plane: usize,
-    /// Halvings across and down.
-    shift: (usize, usize),
-}
-
-/// The pixels of `rect`, each by `pixel` of its three samples of 16 bits.
-fn pixels(
-    frame: &frame::Video,
-    rect: Rect,
-    at: [Samples; 3],
-    pixel: impl Fn([f32; 3]) -> [u8; 3],
-) -> Option<RgbImage> {
-    let (left, top) = (usize::try_from(rect.x).ok()?, usize::try_from(rect.y).ok()?);
-    let mut rgb = RgbImage::new(rect.w, rect.h);
-    for (y, row) in rgb.rows_mut().enumerate() {
-        let mut rows = [[].as_slice(); 3];
-        for (row, channel) in rows.iter_mut().zip(at) {
-            *row = plane(frame, channel.plane, 0, (top + y) >> channel.shift.1)?.0;
-        }
-        for (x, to) in row.enumerate() {
-            let mut values = [0.0; 3];
-            for ((value, row), channel) in values.iter_mut().zip(rows).zip(at) {
-                let sample = (left + x) >> channel.shift.0;
-                let bytes = row.get(2 * sample..2 * sample + 2)?;
-                *value = f32::from(u16::from_le_bytes(bytes.try_into().ok()?));
-            }
-            to.0 = pixel(values);
-        }
-    }
-    Some(rgb)
+/// A sample of 16 bits.
+fn sample(row: &[u8], at: usize) -> Option<f32> {
+    let bytes = row.get(2 * at..2 * at + 2)?;
+    Some(f32::from(u16::from_le_bytes(bytes.try_into().ok()?)))
 }

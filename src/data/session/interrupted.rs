@@ -107,7 +107,7 @@ mod tests {
     use std::io::Write;
 
     use super::super::writer::INDEX_AS_FOUND;
-    use super::super::writer::tests::{entry, writer};
+    use super::super::writer::{entry, writer};
     use super::*;
 
     #[test]

@@ -44,7 +44,7 @@ fn with_remarks(
 
 #[cfg(test)]
 mod tests {
-    use super::super::writer::tests::writer;
+    use super::super::writer::writer;
     use super::*;
 
     #[test]

@@ -309,7 +309,10 @@ fn write_manifest(folder: &Path, manifest: &Manifest) -> Result<(), SessionError
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(super) use tests::{entry, writer};
+
+#[cfg(test)]
+mod tests {
     use super::*;
 
     pub(in crate::session) fn writer(root: &Path) -> SessionWriter {

@@ -138,7 +138,7 @@ impl<R: Read + Seek> Iterator for SampleSpans<R> {
 mod tests {
     use super::*;
     use crate::shard::ShardReader;
-    use crate::shard::tarball::tests::tar_of;
+    use crate::shard::tarball::tar_of;
     use proptest::prelude::*;
     use std::io::Cursor;
 

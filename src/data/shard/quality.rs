@@ -248,7 +248,7 @@ fn rounded(value: f64, steps: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shard::record::tests::record;
+    use crate::shard::record::record;
 
     fn turn(samples: u32) -> Vec<FrameRecord> {
         (0..samples).map(record).collect()

@@ -135,7 +135,7 @@ pub(super) fn split(path: &str) -> Option<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shard::tarball::tests::tar_of;
+    use crate::shard::tarball::tar_of;
     use proptest::prelude::*;
 
     fn read(bytes: &[u8]) -> Vec<Result<ShardSample, ShardError>> {

@@ -117,7 +117,10 @@ impl FrameRecord {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(super) use tests::record;
+
+#[cfg(test)]
+mod tests {
     use super::*;
     use crate::image_stats::SPEC_NET_GATE;
 

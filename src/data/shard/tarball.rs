@@ -399,7 +399,10 @@ fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(super) use tests::tar_of;
+
+#[cfg(test)]
+mod tests {
     use super::*;
 
     fn read_all(bytes: &[u8]) -> Result<Vec<(String, Vec<u8>, bool)>, ShardError> {

@@ -1,8 +1,8 @@
 //! Colour profiles of the International Color Consortium, by the library moxcms.
 
 use moxcms::{
-    ColorProfile, DataColorSpace, Layout, LocalizableString, ProfileClass, ProfileText,
-    ToneReprCurve, TransferCharacteristics, TransformOptions,
+    ColorProfile, DataColorSpace, Layout, ProfileClass, ToneReprCurve, TransferCharacteristics,
+    TransformOptions,
 };
 
 use super::{Colour, Curve, Curves, Model};
@@ -35,14 +35,14 @@ pub(super) fn colour_of_profile(icc: &[u8], is_grey: bool) -> Result<Colour, Col
 /// What is wrong with a profile that the library does not read.
 fn unread(icc: &[u8]) -> ColourError {
     match icc.get(16..20) {
-        Some(b"CMYK") => other_space("without a name", INKS),
+        Some(b"CMYK") => other_space(INKS),
         _ => ColourError::profile(),
     }
 }
 
-/// Refuses by its name what is not converted.
+/// Refuses what is not converted.
 fn check(profile: &ColorProfile, is_grey: bool) -> Result<(), ColourError> {
-    let wrong = |space| Err(other_space(&name_of(profile), space));
+    let wrong = |space| Err(other_space(space));
     match profile.color_space {
         DataColorSpace::Rgb => {}
         DataColorSpace::Gray if is_grey => {}
@@ -62,15 +62,12 @@ fn check(profile: &ColorProfile, is_grey: bool) -> Result<(), ColourError> {
         _ => return Ok(()),
     };
     Err(ColourError(format!(
-        "has the colour profile {}, which is encoded by {transfer}",
-        name_of(profile)
+        "has a colour profile, which is encoded by {transfer}"
     )))
 }
 
-fn other_space(name: &str, space: &str) -> ColourError {
-    ColourError(format!(
-        "has the colour profile {name}, which is for {space}"
-    ))
+fn other_space(space: &str) -> ColourError {
+    ColourError(format!("has a colour profile, which is for {space}"))
 }
 
 fn of_matrix(profile: &ColorProfile) -> Result<Colour, ColourError> {
@@ -124,38 +121,4 @@ fn curve_of(curve: &ToneReprCurve) -> Result<Curve, ColourError> {
     } else {
         Curve::of_table(at)
     })
-}
-
-/// What a profile calls itself.
-fn name_of(profile: &ColorProfile) -> String {
-    let english = |texts: &[LocalizableString]| {
-        let mut texts = texts.iter();
-        let first = texts.clone().next();
-        texts
-            .find(|text| text.language == "en")
-            .or(first)
-            .map(|text| text.value.clone())
-    };
-    let name = match &profile.description {
-        Some(ProfileText::PlainString(name)) => Some(name.clone()),
-        Some(ProfileText::Localizable(texts)) => english(texts),
-        Some(ProfileText::Description(text)) if !text.ascii_string.is_empty() => {
-            Some(text.ascii_string.clone())
-        }
-        Some(ProfileText::Description(text)) => Some(text.unicode_string.clone()),
-        None => None,
-    };
-    let is_printed = |c: &char| !c.is_control();
-    let name: String = name
-        .unwrap_or_default()
-        .chars()
-        .filter(is_printed)
-        .take(80)
-        .collect();
-    let name = name.trim();
-    if name.is_empty() {
-        "without a name".to_owned()
-    } else {
-        format!("\"{name}\"")
-    }
 }
