@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use relight_core::captured_object::CapturedObjectError;
 use relight_core::files::FolderFault;
 use relight_core::image::{Extent, ImageError};
-use relight_core::light::{LightError, LightFileError, PanoramaError};
+use relight_core::light::LightError;
 use relight_core::reader::OpenError;
 use relight_photo::decompose::DecomposeError;
 use relight_photo::files::MovieError;
@@ -119,12 +119,6 @@ pub enum TurnError {
     /// Light cannot be used.
     #[error(transparent)]
     Light(#[from] LightError),
-    /// A panorama cannot be read.
-    #[error(transparent)]
-    Panorama(#[from] PanoramaError),
-    /// Light cannot be read or written.
-    #[error(transparent)]
-    LightFile(#[from] LightFileError),
     /// The folder for results holds something else.
     #[error("{} holds {name}, which is no result of a turn: give a folder that is new, empty, or holds an earlier result", path.display())]
     Foreign {

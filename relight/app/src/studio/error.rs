@@ -2,7 +2,7 @@
 
 use relight_core::captured_object::CapturedObjectError;
 use relight_core::image::ImageError;
-use relight_core::light::{LightError, PanoramaError};
+use relight_core::light::LightError;
 use relight_photo::decompose::DecomposeError;
 use relight_photo::insert::{InsertError, SceneFault};
 use relit_grabcut::{MaskError, StrokesFault};
@@ -108,9 +108,6 @@ pub enum StudioError {
     /// A picture cannot be read or written.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// A panorama cannot be read.
-    #[error(transparent)]
-    Panorama(#[from] PanoramaError),
     /// Light cannot be used.
     #[error(transparent)]
     Light(#[from] LightError),
