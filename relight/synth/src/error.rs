@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use relit_data::shard;
 
 use relight_core::image::ImageError;
-use relight_core::light::{LightError, PanoramaError};
+use relight_core::light::LightError;
 
 /// Why data could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -36,9 +36,6 @@ pub enum SynthError {
     /// A texture or an image cannot be read.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// A panorama cannot be read.
-    #[error(transparent)]
-    Panorama(#[from] PanoramaError),
     /// Numbers are no light.
     #[error(transparent)]
     Light(#[from] LightError),

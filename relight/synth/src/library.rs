@@ -96,7 +96,7 @@ impl Library {
         };
         let panoramas = match &folders.panoramas {
             Some(folder) => read_all(folder, &PANORAMAS, &mut unused, |path| {
-                Panorama::read(path).map_err(SynthError::Panorama)
+                Panorama::read(path).map_err(SynthError::Image)
             })?,
             None => made_panoramas()?,
         };

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use relight_core::captured_object::CapturedObjectError;
 use relight_core::files::FolderFault;
 use relight_core::image::ImageError;
-use relight_core::light::{LightError, LightFileError, PanoramaError};
+use relight_core::light::LightError;
 use relight_core::reader::OpenError;
 use relight_photo::decompose::DecomposeError;
 use relight_photo::files::MovieError;
@@ -56,18 +56,12 @@ pub enum TurnError {
     /// The network of photographs fails.
     #[error("the network of photographs cannot tell the albedo")]
     Decompose(#[from] DecomposeError),
-    /// An image cannot be read or written.
+    /// An image or a light cannot be read or written.
     #[error(transparent)]
     Image(#[from] ImageError),
     /// The object cannot be made a file.
     #[error("the object cannot be written as a file that can be lit")]
     Asset(#[source] Box<CapturedObjectError>),
-    /// The light of a file cannot be read, or its file not be written.
-    #[error(transparent)]
-    LightFile(#[from] LightFileError),
-    /// A panorama cannot be read.
-    #[error(transparent)]
-    Panorama(#[from] PanoramaError),
     /// The session whose video shows the ball cannot be read.
     #[error(transparent)]
     Session(#[from] SessionError),

@@ -124,10 +124,7 @@ impl Clock {
     }
 
     /// Runs `body`, which may start threads that borrow local values, and waits for their ends.
-    pub fn scope<'env, T>(
-        &self,
-        body: impl for<'scope> FnOnce(&Scope<'scope, 'env>) -> T,
-    ) -> T {
+    pub fn scope<'env, T>(&self, body: impl for<'scope> FnOnce(&Scope<'scope, 'env>) -> T) -> T {
         thread::scope(|scope| {
             let scope = Scope {
                 scope,

@@ -11,7 +11,7 @@ use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_core::parallel;
 use relight_photo::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, MaskSource, Rectangle, WORKING_SIDE,
+    DecomposeError, DecomposeOptions, Decomposer, MaskSource, WORKING_SIDE,
 };
 use relight_photo::files::{
     DecompositionFigures, DecompositionFiles, FoundPhotos, PhotoInput, PhotoReading,
@@ -19,6 +19,7 @@ use relight_photo::files::{
 use relight_photo::nets::{InferenceEngine, NetError, OnnxRuntime};
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
+use relit_data::geometry::Rect;
 use serde_json::{Value, json};
 
 use crate::commands::CommandResult;
@@ -52,8 +53,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE|DIR")]
     mask: Option<PathBuf>,
     /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
-    #[arg(long, value_name = "X,Y,W,H", value_parser = rectangle, conflicts_with = "mask")]
-    rect: Option<Rectangle>,
+    #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
+    rect: Option<Rect>,
     #[command(flatten)]
     network: NetworkArguments,
     /// Leave out the mirror image: faster, and a little worse.
@@ -311,20 +312,5 @@ impl Run {
             "figures": figures,
         });
         Ok(Decomposed { text, event })
-    }
-}
-
-pub(crate) fn rectangle(text: &str) -> Result<Rectangle, String> {
-    let numbers: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
-    match numbers.as_deref() {
-        Ok(&[x, y, width, height]) if width > 0 && height > 0 => Ok(Rectangle {
-            x,
-            y,
-            width,
-            height,
-        }),
-        _ => {
-            Err("give X,Y,W,H: column and row of a corner, width and height, in pixels".to_owned())
-        }
     }
 }

@@ -7,7 +7,6 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use relight_core::image::{Extent, Linear, Rgb, Transfer};
-use relight_photo::decompose::Rectangle;
 use relight_photo::files::{
     FoundPhotos, InsertionError, MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading,
     write_picture,
@@ -18,9 +17,9 @@ use relight_photo::insert::{
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
+use relit_data::geometry::Rect;
 use serde_json::json;
 
-use super::decompose::rectangle;
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::light::NewLightArguments;
@@ -55,8 +54,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE|DIR")]
     mask: Option<PathBuf>,
     /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
-    #[arg(long, value_name = "X,Y,W,H", value_parser = rectangle, conflicts_with = "mask")]
-    rect: Option<Rectangle>,
+    #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
+    rect: Option<Rect>,
     #[command(flatten)]
     light: NewLightArguments,
     /// Keep the photograph's own light, as it was estimated, to change its exposure or the material.

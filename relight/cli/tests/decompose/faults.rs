@@ -6,9 +6,10 @@ use std::io::BufWriter;
 use std::path::PathBuf;
 
 use image::{GrayImage, ImageBuffer, Rgb as Pixel, RgbImage};
-use relight_photo::decompose::{DecomposeError, DecomposeOptions, Rectangle};
+use relight_photo::decompose::{DecomposeError, DecomposeOptions};
 use relight_photo::files::{PhotoInput, PhotoReading};
 use relit_data::causes::with_causes;
+use relit_data::geometry::Rect;
 
 use crate::support::{Folder, HEIGHT, WIDTH, load, object, untrained, with_mask};
 
@@ -23,12 +24,7 @@ fn an_object_without_light_is_not_decomposed() {
         image::DynamicImage::ImageRgb32F(nan).save(path).unwrap();
     });
     let reading = PhotoReading {
-        rectangle: Some(Rectangle {
-            x: 5,
-            y: 5,
-            width: 30,
-            height: 30,
-        }),
+        rectangle: Some(Rect::new(5, 5, 30, 30)),
         ..PhotoReading::default()
     };
     for path in [black, numberless] {
@@ -61,21 +57,11 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
         .unwrap();
     let cup = folder.save("cup.png", |path| object(0).save(path).unwrap());
     let in_corner = PhotoReading {
-        rectangle: Some(Rectangle {
-            x: 0,
-            y: 0,
-            width: 2,
-            height: 2,
-        }),
+        rectangle: Some(Rect::new(0, 0, 2, 2)),
         ..PhotoReading::default()
     };
     let beside = PhotoReading {
-        rectangle: Some(Rectangle {
-            x: 100,
-            y: 0,
-            width: 5,
-            height: 5,
-        }),
+        rectangle: Some(Rect::new(100, 0, 5, 5)),
         ..PhotoReading::default()
     };
     let plain = PhotoReading::default();

@@ -7,8 +7,9 @@ use image::{
     DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma, Rgb as Pixel, RgbImage, Rgba,
 };
 use relight_core::image::ImageError;
-use relight_photo::decompose::{DecomposeError, MaskSource, Rectangle, SpecularGate};
+use relight_photo::decompose::{DecomposeError, MaskSource, SpecularGate};
 use relight_photo::files::PhotoReading;
+use relit_data::geometry::Rect;
 
 use crate::support::{Folder, HEIGHT, WIDTH, decomposed, is_inside, load, mask, object, with_mask};
 
@@ -155,12 +156,7 @@ fn a_rectangle_is_the_mask_where_nothing_else_is() {
     let folder = Folder::new();
     let path = folder.save("grey.png", |path| object(90).save(path).unwrap());
     let reading = PhotoReading {
-        rectangle: Some(Rectangle {
-            x: 10,
-            y: 4,
-            width: 40,
-            height: 40,
-        }),
+        rectangle: Some(Rect::new(10, 4, 40, 40)),
         ..PhotoReading::default()
     };
     let photo = load(&path, &reading).unwrap();

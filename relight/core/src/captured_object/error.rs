@@ -1,8 +1,12 @@
 //! Why a captured object cannot be read or written.
 
+#[cfg(feature = "files")]
 use std::error::Error;
-use std::path::{Path, PathBuf};
+#[cfg(feature = "files")]
+use std::path::Path;
+use std::path::PathBuf;
 
+#[cfg(feature = "files")]
 use relit_data::causes::with_causes;
 
 use crate::image::ImageError;

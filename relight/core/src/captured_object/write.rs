@@ -99,8 +99,7 @@ fn png<const C: usize>(
             (((value / white).clamp(0.0, 1.0) * 65535.0).round() as u16).to_ne_bytes()
         })
         .collect();
-    let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
-    let (width, height) = (side(planes.extent().width), side(planes.extent().height));
+    let [width, height] = planes.extent().sides();
     let mut content = Vec::new();
     PngEncoder::new_with_quality(&mut content, CompressionType::Fast, FilterType::Adaptive)
         .write_image(&raw, width, height, colour)

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::read_planes;
-use crate::image::{Extent, ImageError, Linear, Planes, Rgb, Samples, StoredImage, Transfer};
+use crate::image::{
+    Extent, ImageError, Linear, Planes, Rgb, Samples, StoredImage, Transfer, check_extent,
+};
 use crate::light::{Normals, NormalsFrame, YDown, YUp};
 use crate::render::{Gloss, Surface};
 
@@ -64,6 +66,7 @@ impl MapFiles {
             None => normals,
             Some(path) => {
                 let image = StoredImage::read(path)?;
+                check_extent("mask", image.planes.extent(), normals.extent())?;
                 normals.masked(&image.object_mask(path)?.0)?
             }
         };

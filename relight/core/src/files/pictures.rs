@@ -12,7 +12,7 @@ use crate::image::{
     ColourImage, Depth, Extent, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage,
     Transfer, encode_exr, encode_jpeg, encode_png, encode_png_of,
 };
-use crate::light::{LightError, LightFileError, Normals, Panorama, PanoramaError, ShLight, YAxis};
+use crate::light::{LightError, Normals, Panorama, ShLight, YAxis};
 
 /// Writes values of 0 to 1 as integers; others are clipped.
 ///
@@ -126,7 +126,7 @@ impl Panorama {
     ///
     /// # Errors
     /// Where it cannot be read, is of integers, is not twice as wide as high, or has values that are not finite.
-    pub fn read(path: &Path) -> Result<Self, PanoramaError> {
+    pub fn read(path: &Path) -> Result<Self, ImageError> {
         let bytes = fs::read(path).map_err(ImageError::open(path))?;
         Self::from_bytes(path, &bytes)
     }
@@ -161,24 +161,23 @@ impl ShLight {
     ///
     /// # Errors
     /// Where the file cannot be read or holds something else.
-    pub fn read(path: &Path) -> Result<Self, LightFileError> {
-        let wrong = |fault| LightFileError {
+    pub fn read(path: &Path) -> Result<Self, ImageError> {
+        let text = text::read(path).map_err(ImageError::open(path))?;
+        text.parse().map_err(|error: LightError| ImageError::Form {
             path: path.to_owned(),
-            fault,
-        };
-        let text = text::read(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
-        text.parse()
-            .map_err(|error: LightError| wrong(format!("holds no light: {error}")))
+            fault: format!("holds no light: {error}"),
+        })
     }
 
     /// Writes the text form.
     ///
     /// # Errors
     /// Where the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), LightFileError> {
-        write_whole(path, self.to_string().as_bytes()).map_err(|error| LightFileError {
+    pub fn write(&self, path: &Path) -> Result<(), ImageError> {
+        let written = write_whole(path, self.to_string().as_bytes());
+        written.map_err(|source| ImageError::Write {
             path: path.to_owned(),
-            fault: format!("cannot be written: {error}"),
+            source,
         })
     }
 }

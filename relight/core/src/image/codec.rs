@@ -5,6 +5,7 @@ use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ImageBuffer, ImageEncoder, ImageFormat, Pixel, Rgb};
+use relit_data::mask::MaskPicture;
 
 use super::{Extent, ImageError, Planes};
 
@@ -34,7 +35,7 @@ pub enum Samples {
 /// # Errors
 /// Where the picture, called `path`, cannot be encoded.
 pub fn encode_jpeg(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageError> {
-    let [width, height] = sides(planes.extent());
+    let [width, height] = planes.extent().sides();
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY)
         .write_image(
@@ -52,7 +53,7 @@ pub fn encode_jpeg(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageErro
 /// # Errors
 /// Where the picture, called `path`, cannot be encoded.
 pub fn encode_exr(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageError> {
-    let [width, height] = sides(planes.extent());
+    let [width, height] = planes.extent().sides();
     let values: Vec<f32> = interleaved(planes, |v| [v]);
     let mut bytes = Cursor::new(Vec::new());
     // An image of no pixels makes no buffer; it is refused by the encoder.
@@ -124,6 +125,26 @@ impl StoredImage {
             samples,
         })
     }
+
+    /// The mask that the picture shows, 1 on the object and 0 elsewhere, and a note on it for a person. Errors name it as `path`.
+    ///
+    /// # Errors
+    /// [`ImageError::NotAMask`].
+    pub fn object_mask(&self, path: &Path) -> Result<(Planes<1>, Option<String>), ImageError> {
+        let extent = self.planes.extent();
+        let alpha = self.alpha.as_ref().map(|alpha| alpha.plane(0));
+        let picture = MaskPicture::of_planes(extent.sides().into(), self.planes.planes(), alpha);
+        let object = picture.object().map_err(|fault| ImageError::NotAMask {
+            path: path.to_owned(),
+            fault,
+        })?;
+        let values = object
+            .inside
+            .iter()
+            .map(|&inside| f32::from(u8::from(inside)));
+        let mask = Planes::from_planes(extent, [values.collect()])?;
+        Ok((mask, object.note(extent.sides()[0])))
+    }
 }
 
 /// The picture as it is displayed.
@@ -158,9 +179,4 @@ fn interleaved<T: Copy, const N: usize>(
 /// The nearest integer of 0 to `most`; what is not a number becomes 0.
 pub(super) fn to_integer(value: f32, most: f32) -> f32 {
     (value.clamp(0.0, 1.0) * most).round()
-}
-
-pub(super) fn sides(extent: Extent) -> [u32; 2] {
-    let side = |pixels| u32::try_from(pixels).unwrap_or(u32::MAX);
-    [side(extent.width), side(extent.height)]
 }

@@ -5,7 +5,6 @@ mod colour;
 mod colour_image;
 mod error;
 mod extent;
-mod mask;
 mod planes;
 mod png_rows;
 mod reduced;

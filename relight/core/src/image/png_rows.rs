@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::codec::{sides, to_integer};
+use super::codec::to_integer;
 use super::{Depth, Extent, ImageError, Planes};
 use crate::parallel;
 
@@ -39,7 +39,7 @@ fn write_rows(
     pixel: impl Fn(usize) -> [f32; 3] + Sync,
 ) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
-    let [width, height] = sides(extent);
+    let [width, height] = extent.sides();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(match depth {

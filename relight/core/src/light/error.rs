@@ -1,6 +1,4 @@
-//! What can be wrong with light or its file.
-
-use std::path::PathBuf;
+//! What can be wrong with light.
 
 /// What is wrong with light.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -18,14 +16,4 @@ pub enum LightError {
     /// The panorama has no pixels.
     #[error("the panorama has no pixels")]
     Empty,
-}
-
-/// Why a file of coefficients is not read or written.
-#[derive(Debug, thiserror::Error)]
-#[error("{} {fault}", path.display())]
-pub struct LightFileError {
-    /// The file.
-    pub path: PathBuf,
-    /// What is wrong with it.
-    pub fault: String,
 }

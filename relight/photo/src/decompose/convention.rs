@@ -1,8 +1,9 @@
 //! What the pictures and vectors of other networks for normals mean: told by the names of what goes in and comes out.
 
-use crate::nets::{OnnxElement, OnnxSignature, OnnxValue};
+use crate::nets::{OnnxSignature, OnnxValue};
 use relight_core::image::Extent;
 use relight_core::light::NormalsFrame;
+use tract_onnx::pb::tensor_proto::DataType;
 
 /// Tokens that MoGe-2 divides a picture into: the middle of those that it was trained on.
 const TOKENS: i64 = 1800;
@@ -117,7 +118,7 @@ impl Convention {
                 named(&signature.outputs)
             )
         })?;
-        if tokens.element != OnnxElement::Integer {
+        if tokens.element != DataType::Int64 {
             return Err("its input num_tokens is no whole number".to_owned());
         }
         let picture = picture_of(signature, &tokens.name)?;
@@ -151,7 +152,7 @@ impl Convention {
 fn picture_of<'a>(signature: &'a OnnxSignature, other: &str) -> Result<&'a OnnxValue, String> {
     let mut rest = signature.inputs.iter().filter(|input| input.name != other);
     match (rest.next(), rest.next()) {
-        (Some(picture), None) if picture.element == OnnxElement::Float => Ok(picture),
+        (Some(picture), None) if picture.element == DataType::Float => Ok(picture),
         _ => Err(format!(
             "its inputs are {}: one of them has to be a picture of 32-bit numbers",
             named(&signature.inputs)
@@ -176,7 +177,7 @@ fn named(values: &[OnnxValue]) -> String {
 mod tests {
     use super::*;
 
-    fn value(name: &str, element: OnnxElement, sides: &[Option<usize>]) -> OnnxValue {
+    fn value(name: &str, element: DataType, sides: &[Option<usize>]) -> OnnxValue {
         OnnxValue {
             name: name.to_owned(),
             element,
@@ -185,17 +186,17 @@ mod tests {
     }
 
     fn picture(name: &str, height: Option<usize>, width: Option<usize>) -> OnnxValue {
-        value(name, OnnxElement::Float, &[Some(1), Some(3), height, width])
+        value(name, DataType::Float, &[Some(1), Some(3), height, width])
     }
 
     fn answers(names: &[&str]) -> Vec<OnnxValue> {
-        let answer = |name: &&str| value(name, OnnxElement::Float, &[]);
+        let answer = |name: &&str| value(name, DataType::Float, &[]);
         names.iter().map(answer).collect()
     }
 
     #[test]
     fn the_published_files_are_told_by_their_inputs_and_outputs() {
-        let tokens = value("num_tokens", OnnxElement::Integer, &[]);
+        let tokens = value("num_tokens", DataType::Int64, &[]);
         let moge = OnnxSignature {
             inputs: vec![picture("image", None, None), tokens.clone()],
             outputs: answers(&["points", "normal", "mask", "metric_scale"]),
@@ -232,7 +233,7 @@ mod tests {
         let flat = OnnxSignature {
             inputs: vec![
                 picture("image", None, None),
-                value("num_tokens", OnnxElement::Integer, &[]),
+                value("num_tokens", DataType::Int64, &[]),
             ],
             outputs: answers(&["points", "mask"]),
         };

@@ -402,9 +402,8 @@ pub(super) fn check_mask_size(found: Extent, expected: Extent) -> Result<(), Dec
     if found == expected {
         return Ok(());
     }
-    let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
-    let [mask, photo] = [found, expected].map(|extent| (side(extent.width), side(extent.height)));
-    let hint = size_hint(mask, photo).map_or_else(String::new, |hint| format!(": {hint}"));
+    let hint = size_hint(found.sides().into(), expected.sides().into());
+    let hint = hint.map_or_else(String::new, |hint| format!(": {hint}"));
     Err(DecomposeError::Photo(format!(
         "the mask has {} x {} pixels, and the photograph {} x {}{hint}",
         found.width, found.height, expected.width, expected.height

@@ -10,7 +10,7 @@ use crate::nets::NetError;
 #[cfg(feature = "files")]
 use relight_core::files::FolderFault;
 use relight_core::image::ImageError;
-use relight_core::light::{LightError, LightFileError};
+use relight_core::light::LightError;
 #[cfg(feature = "files")]
 use relight_core::reader::{DamagedSample, OpenError};
 use relit_data::still::ColourError;
@@ -72,9 +72,6 @@ pub enum DecomposeError {
     /// No light can be fitted.
     #[error("no light can be fitted")]
     Light(#[from] LightError),
-    /// The light cannot be written.
-    #[error(transparent)]
-    LightFile(#[from] LightFileError),
     /// A file or folder is not there, or cannot be used for what is asked.
     #[error("{} {fault}", path.display())]
     File {

@@ -2,6 +2,7 @@
 
 use super::crop::inside;
 use relight_core::image::{Extent, Planes, beside};
+use relit_data::geometry::Rect;
 
 /// Encoded values up to this count as nearly black: 12 of 255.
 pub(super) const NEARLY_BLACK: f32 = 12.5 / 255.0;
@@ -24,36 +25,6 @@ pub enum MaskSource {
     Shard,
 }
 
-/// A rectangle of a photograph, pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Rectangle {
-    /// Column of its left edge.
-    pub x: u32,
-    /// Row of its upper edge.
-    pub y: u32,
-    /// Its width.
-    pub width: u32,
-    /// Its height.
-    pub height: u32,
-}
-
-impl Rectangle {
-    /// Whether it has a pixel of a photograph of this size.
-    pub(super) fn touches(&self, extent: Extent) -> bool {
-        let within = |start: u32, length: u32, end: usize| length > 0 && (start as usize) < end;
-        within(self.x, self.width, extent.width) && within(self.y, self.height, extent.height)
-    }
-
-    /// Whether a pixel lies in it.
-    fn holds(&self, x: usize, y: usize) -> bool {
-        let within = |at: usize, start: u32, length: u32| {
-            let at = at as u64;
-            at >= start.into() && at < u64::from(start) + u64::from(length)
-        };
-        within(x, self.x, self.width) && within(y, self.y, self.height)
-    }
-}
-
 /// Why the colours of a photograph do not show where the object is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NoObject {
@@ -69,7 +40,7 @@ pub(super) enum NoObject {
 pub(super) fn find_mask(
     encoded: &Planes<3>,
     alpha: Option<&Planes<1>>,
-    rectangle: Option<Rectangle>,
+    rectangle: Option<Rect>,
 ) -> Result<(Planes<1>, MaskSource), NoObject> {
     let extent = encoded.extent();
     let found = match alpha {
@@ -82,8 +53,13 @@ pub(super) fn find_mask(
     let (mut mask, source) =
         found.unwrap_or_else(|_| (Planes::filled(extent, [1.0]), MaskSource::Rectangle));
     let Extent { width, .. } = extent;
+    let (columns, rows) = (
+        i64::from(rectangle.x)..rectangle.right(),
+        i64::from(rectangle.y)..rectangle.bottom(),
+    );
     for (at, value) in mask.planes_mut()[0].iter_mut().enumerate() {
-        if !rectangle.holds(at % width, at / width) {
+        let (x, y) = ((at % width) as i64, (at / width) as i64);
+        if !(columns.contains(&x) && rows.contains(&y)) {
             *value = 0.0;
         }
     }
@@ -199,12 +175,7 @@ mod tests {
     fn before_anything_else_only_a_rectangle_says_where_the_object_is() {
         let grey = ring(0.3);
         assert_eq!(find_mask(&grey, None, None), Err(NoObject::Background));
-        let rectangle = Rectangle {
-            x: 40,
-            y: 10,
-            width: 100,
-            height: 5,
-        };
+        let rectangle = Rect::new(40, 10, 100, 5);
         let (mask, source) = find_mask(&grey, None, Some(rectangle)).unwrap();
         assert_eq!(source, MaskSource::Rectangle);
         assert_eq!(mask.plane(0).iter().sum::<f32>(), 8.0 * 5.0);
@@ -214,12 +185,7 @@ mod tests {
     #[test]
     fn a_rectangle_cuts_what_alpha_says() {
         let alpha = Planes::from_fn(Extent::new(48, 40), |x, _| [x as f32 / 47.0]);
-        let rectangle = Rectangle {
-            x: 0,
-            y: 0,
-            width: 30,
-            height: 40,
-        };
+        let rectangle = Rect::new(0, 0, 30, 40);
         let (mask, source) = find_mask(&ring(0.0), Some(&alpha), Some(rectangle)).unwrap();
         assert_eq!(source, MaskSource::Alpha);
         assert_eq!(mask.plane(0).iter().sum::<f32>(), 6.0 * 40.0);

@@ -31,7 +31,7 @@ pub use error::DecomposeError;
 pub use gloss::FittedGloss;
 pub use gloss::fit_gloss;
 pub use light::PredictedLight;
-pub use mask::{MaskSource, Rectangle};
+pub use mask::MaskSource;
 #[cfg(feature = "files")]
 pub(crate) use photo::stem;
 pub use photo::{Photo, PhotoHints, stated_extent};

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use super::decomposer::{DecomposeOptions, check_mask_size, check_size};
 use super::error::DecomposeError;
-use super::mask::{MaskSource, NoObject, Rectangle, find_mask, is_empty};
+use super::mask::{MaskSource, NoObject, find_mask, is_empty};
 use relight_core::image::{
     ColourImage, ColourSpace, Extent, Linear, Planes, Rgb, Srgb, StoredImage, Transfer,
 };
+use relit_data::geometry::Rect;
 use relit_data::image_stats::SATURATED_VALUE;
 
 /// A picture with its mask.
@@ -35,7 +36,7 @@ pub struct PhotoHints<'a> {
     /// A picture of the mask, and how errors name it.
     pub mask: Option<(&'a Path, &'a StoredImage)>,
     /// A rectangle around the object.
-    pub rectangle: Option<Rectangle>,
+    pub rectangle: Option<Rect>,
     /// How integers are encoded, where the file is not to be asked.
     pub transfer: Option<Transfer>,
 }
@@ -170,29 +171,24 @@ fn check_extent(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), Dec
     check_mask_size(found, expected)
 }
 
-fn check_mask(mask: &Planes<1>, rectangle: Option<Rectangle>) -> Result<(), DecomposeError> {
+fn check_mask(mask: &Planes<1>, rectangle: Option<Rect>) -> Result<(), DecomposeError> {
     if !is_empty(mask) {
         return Ok(());
     }
     let Some(rectangle) = rectangle else {
         return Err(DecomposeError::EmptyMask);
     };
-    let Rectangle {
-        x,
-        y,
-        width,
-        height,
-    } = rectangle;
-    let photo = mask.extent();
-    Err(DecomposeError::Photo(if rectangle.touches(photo) {
-        format!(
-            "in the rectangle {x},{y},{width},{height} there is nothing of the object: by the photograph's alpha or black \
+    let [width, height] = mask.extent().sides();
+    Err(DecomposeError::Photo(
+        if rectangle.clipped_to(width, height).is_some() {
+            format!(
+                "in the rectangle {rectangle} there is nothing of the object: by the photograph's alpha or black \
              background it lies elsewhere"
-        )
-    } else {
-        format!(
-            "the rectangle {x},{y},{width},{height} does not touch the photograph of {} x {} pixels",
-            photo.width, photo.height
-        )
-    }))
+            )
+        } else {
+            format!(
+                "the rectangle {rectangle} does not touch the photograph of {width} x {height} pixels"
+            )
+        },
+    ))
 }

@@ -9,12 +9,13 @@ use std::sync::Arc;
 use relight_core::image::{Extent, ImageError, Planes, Rgb, StoredImage, Transfer};
 use relight_core::reader::{Encoding, SampleId, Source, Turns};
 use relit_data::file_names::{alike_beside, folded, has_extension, is_hidden};
+use relit_data::geometry::Rect;
 use relit_data::shard::Dataset;
 use relit_data::still::{Format, Orientation, is_named};
 
 use super::mask_record::check_turned;
 use super::results::FIGURES;
-use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
+use crate::decompose::{DecomposeError, Photo, PhotoHints, stem};
 
 /// Bytes of a file that show its format.
 const HEAD: u64 = 4096;
@@ -25,7 +26,7 @@ pub struct PhotoReading {
     /// A file with the mask, or a folder with one of the photograph's name, `<name>.png`.
     pub mask: Option<PathBuf>,
     /// A rectangle around the object.
-    pub rectangle: Option<Rectangle>,
+    pub rectangle: Option<Rect>,
     /// How integers are encoded, where the file is not to be asked.
     pub transfer: Option<Transfer>,
 }

@@ -2,7 +2,6 @@
 
 use relight_core::captured_object::CapturedObjectError;
 use relight_core::image::ImageError;
-use relight_core::light::{LightFileError, PanoramaError};
 
 use super::MovieError;
 use crate::decompose::DecomposeError;
@@ -27,12 +26,6 @@ pub enum InsertionError {
     /// A captured object cannot be read.
     #[error(transparent)]
     Captured(#[from] CapturedObjectError),
-    /// A panorama cannot be read.
-    #[error(transparent)]
-    Panorama(#[from] PanoramaError),
-    /// Coefficients of light cannot be read.
-    #[error(transparent)]
-    LightFile(#[from] LightFileError),
     /// A video cannot be read or written.
     #[error(transparent)]
     Movie(#[from] MovieError),

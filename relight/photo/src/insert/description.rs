@@ -1,6 +1,7 @@
 //! A scene as a text in TOML. Names files and opens none.
 
 use std::iter;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{Extent, Transfer};
@@ -8,8 +9,14 @@ use serde::{Deserialize, Serialize};
 
 use super::{DiscLamp, MaterialChange, ObjectGloss, Placement, WhiteBalance};
 
-/// The largest picture, pixels a side.
-const LARGEST_SIDE: u32 = 16_384;
+/// Sides of a picture, pixels.
+const SIDES: RangeInclusive<f64> = 16.0..=16_384.0;
+/// Brightness, stops.
+const STOPS: RangeInclusive<f64> = -20.0..=20.0;
+/// Angles of which more than one turn is of use, degrees.
+const TURNS: RangeInclusive<f64> = -3600.0..=3600.0;
+/// What a channel is multiplied with.
+const TINTS: RangeInclusive<f64> = 0.0..=1000.0;
 /// The most objects of a scene.
 const MOST_OBJECTS: usize = 100;
 
@@ -179,31 +186,16 @@ impl SceneDescription {
     /// # Errors
     /// [`SceneFault`] names the first number that is out of its range; the number of objects comes last.
     pub fn check(&self) -> Result<(), SceneFault> {
-        for side in self.size {
-            within(
-                "size",
-                f64::from(side),
-                16.0,
-                f64::from(LARGEST_SIDE),
-                "16 to 16384 pixels",
-            )?;
-        }
-        within("field", self.field, 1.0, 150.0, "1 to 150 degrees")?;
-        within("down", self.down, -89.0, 89.0, "-89 to 89 degrees")?;
-        within(
-            "tilt",
-            self.tilt.unwrap_or(20.0),
-            0.0,
-            90.0,
-            "0 to 90 degrees",
-        )?;
-        within(
-            "exposure",
-            f64::from(self.exposure),
-            -20.0,
-            20.0,
-            "-20 to 20 stops",
-        )?;
+        let [width, height] = self.size.map(f64::from);
+        let tilt = self.tilt.unwrap_or(20.0);
+        check_all([
+            ("size", width, SIDES, "16 to 16384 pixels"),
+            ("size", height, SIDES, "16 to 16384 pixels"),
+            ("field", self.field, 1.0..=150.0, "1 to 150 degrees"),
+            ("down", self.down, -89.0..=89.0, "-89 to 89 degrees"),
+            ("tilt", tilt, 0.0..=90.0, "0 to 90 degrees"),
+            ("exposure", self.exposure.into(), STOPS, "-20 to 20 stops"),
+        ])?;
         self.light.check()?;
         for (number, object) in self.objects.iter().enumerate() {
             object.check(number + 1)?;
@@ -246,20 +238,11 @@ impl LightDescription {
                 "light has both {first} and {second}: give one"
             )));
         }
-        within(
-            "light.turn",
-            self.turn,
-            -3600.0,
-            3600.0,
-            "-3600 to 3600 degrees",
-        )?;
-        within(
-            "light.ambient",
-            self.ambient.unwrap_or(0.0),
-            0.0,
-            10.0,
-            "0 to 10",
-        )?;
+        let ambient = self.ambient.unwrap_or(0.0);
+        check_all([
+            ("light.turn", self.turn, TURNS, "-3600 to 3600 degrees"),
+            ("light.ambient", ambient, 0.0..=10.0, "0 to 10"),
+        ])?;
         self.lamp().map(|_| ())
     }
 }
@@ -287,62 +270,43 @@ impl ObjectDescription {
     }
 
     fn check(&self, number: usize) -> Result<(), SceneFault> {
-        let name = |what: &str| format!("object {number}: {what}");
-        within(&name("at"), self.at[0], -0.5, 1.5, "-0.5 to 1.5 across")?;
-        within(&name("at"), self.at[1], -0.5, 2.0, "-0.5 to 2 down")?;
-        within(&name("height"), self.height, 0.001, 4.0, "0.001 to 4")?;
-        within(
-            &name("rotation"),
-            self.rotation,
-            -3600.0,
-            3600.0,
-            "-3600 to 3600 degrees",
-        )?;
-        within(
-            &name("exposure"),
-            f64::from(self.exposure),
-            -20.0,
-            20.0,
-            "-20 to 20 stops",
-        )?;
-        within(&name("shadow"), f64::from(self.shadow), 0.0, 1.0, "0 to 1")?;
-        for tint in self.tint {
-            within(&name("tint"), f64::from(tint), 0.0, 1000.0, "0 to 1000")?;
-        }
-        if let Some([part, smoothness]) = self.gloss {
-            within(
-                &name("gloss"),
-                f64::from(part),
-                0.0,
-                1.0,
-                "a part from 0 to 1",
-            )?;
-            within(
-                &name("gloss"),
-                f64::from(smoothness),
-                0.01,
-                1000.0,
+        let [across, down] = self.at;
+        let [red, green, blue] = self.tint.map(f64::from);
+        let [part, smoothness] = self.gloss.unwrap_or([0.0, 1.0]).map(f64::from);
+        let checked = check_all([
+            ("at", across, -0.5..=1.5, "-0.5 to 1.5 across"),
+            ("at", down, -0.5..=2.0, "-0.5 to 2 down"),
+            ("height", self.height, 0.001..=4.0, "0.001 to 4"),
+            ("rotation", self.rotation, TURNS, "-3600 to 3600 degrees"),
+            ("exposure", self.exposure.into(), STOPS, "-20 to 20 stops"),
+            ("shadow", self.shadow.into(), 0.0..=1.0, "0 to 1"),
+            ("tint", red, TINTS, "0 to 1000"),
+            ("tint", green, TINTS, "0 to 1000"),
+            ("tint", blue, TINTS, "0 to 1000"),
+            ("gloss", part, 0.0..=1.0, "a part from 0 to 1"),
+            (
+                "gloss",
+                smoothness,
+                0.01..=1000.0,
                 "a smoothness from 0.01 to 1000",
-            )?;
-        }
-        Ok(())
+            ),
+        ]);
+        checked.map_err(|fault| SceneFault::Content(format!("object {number}: {fault}")))
     }
 }
 
-/// A number that is none lies in no range.
-fn within(
-    what: &str,
-    value: f64,
-    least: f64,
-    most: f64,
-    allowed: &'static str,
+/// Whether each number, with its name, lies in its range, which is told in words too. One that is none lies in no range.
+fn check_all<const N: usize>(
+    numbers: [(&str, f64, RangeInclusive<f64>, &str); N],
 ) -> Result<(), SceneFault> {
-    if (least..=most).contains(&value) {
-        return Ok(());
+    for (what, value, range, allowed) in numbers {
+        if !range.contains(&value) {
+            return Err(SceneFault::Content(format!(
+                "{what} is {value}, it has to be {allowed}"
+            )));
+        }
     }
-    Err(SceneFault::Content(format!(
-        "{what} is {value}, it has to be {allowed}"
-    )))
+    Ok(())
 }
 
 fn default_size() -> [u32; 2] {

@@ -433,21 +433,13 @@ mod tests {
                 .to_string()
         };
         let good = subject.own_placement();
-        assert_eq!(
-            refused(Placement {
-                height: 0.0,
-                ..good
-            }),
-            "object 2: its height is 0, it has to be from 0.001 to 4"
-        );
-        assert!(
-            refused(Placement {
-                at: [f64::NAN, 0.5],
-                ..good
-            })
-            .contains("its place is NaN")
-        );
-        for at in [[1.5, 0.9], [0.5, 1.9], [0.5, -0.1], [-0.4, 0.9]] {
+        for at in [
+            [1.5, 0.9],
+            [0.5, 1.9],
+            [0.5, -0.1],
+            [-0.4, 0.9],
+            [f64::NAN, 0.5],
+        ] {
             let found = refused(Placement {
                 at,
                 height: 0.4,

@@ -42,27 +42,7 @@ impl<'a> SceneObject<'a> {
     /// Refuses what cannot stand in a picture of this size.
     pub(super) fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
         let wrong = |fault| InsertError::Object { number, fault };
-        let Placement {
-            at,
-            height,
-            rotation,
-        } = self.placement;
-        let bounds = [
-            ("place", at[0], -0.5..=1.5),
-            ("place", at[1], -0.5..=2.0),
-            ("height", height, 1e-3..=4.0),
-            ("rotation", rotation, -3600.0..=3600.0),
-            ("shadow", f64::from(self.shadow), 0.0..=1.0),
-            ("exposure", f64::from(self.exposure), -20.0..=20.0),
-        ];
-        for (what, value, range) in bounds {
-            if !range.contains(&value) {
-                let (least, most) = (range.start(), range.end());
-                return Err(wrong(format!(
-                    "cannot stand so: its {what} is {value}, it has to be from {least} to {most}"
-                )));
-            }
-        }
+        let Placement { at, height, .. } = self.placement;
         let alpha = &self.subject.matte.alpha;
         if !self.placement.is_seen(alpha, extent) {
             return Err(wrong(format!(

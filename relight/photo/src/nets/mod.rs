@@ -52,7 +52,7 @@ pub use onnx::{INPUT, check_size, to_onnx};
 #[cfg(feature = "onnxruntime")]
 pub use onnxruntime::OnnxRuntime;
 pub use parameter::{Parameter, Role};
-pub use signature::{OnnxElement, OnnxSignature, OnnxValue};
+pub use signature::{OnnxSignature, OnnxValue};
 pub use turn_network::{
     ALBEDO_OUTPUTS, ALBEDO_PARAMETERS, LOG_MEANS, TURN_INPUTS, TURN_OUTPUTS, turn_network,
 };

@@ -20,20 +20,9 @@ pub struct OnnxValue {
     /// Its name.
     pub name: String,
     /// What its numbers are.
-    pub element: OnnxElement,
+    pub element: DataType,
     /// Its sides; none where a side is not fixed, and no sides where it is one number or the file does not say.
     pub sides: Vec<Option<usize>>,
-}
-
-/// What numbers are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OnnxElement {
-    /// Floating point, 32 bits.
-    Float,
-    /// Whole, 64 bits.
-    Integer,
-    /// Something else.
-    Other,
 }
 
 impl OnnxSignature {
@@ -74,11 +63,7 @@ impl OnnxValue {
         };
         Self {
             name: value.name.clone(),
-            element: match tensor.map(type_proto::Tensor::elem_type) {
-                Some(DataType::Float) => OnnxElement::Float,
-                Some(DataType::Int64) => OnnxElement::Integer,
-                _ => OnnxElement::Other,
-            },
+            element: tensor.map_or(DataType::Undefined, type_proto::Tensor::elem_type),
             sides: shape.map_or_else(Vec::new, |shape| shape.dim.iter().map(side).collect()),
         }
     }
@@ -98,7 +83,7 @@ mod tests {
         assert_eq!(names(&found.inputs), ["input"]);
         assert_eq!(names(&found.outputs), ["maps", "paint", "light"]);
         assert_eq!(found.inputs[0].sides, [1, 7, 32, 64].map(Some));
-        assert_eq!(found.inputs[0].element, OnnxElement::Float);
+        assert_eq!(found.inputs[0].element, DataType::Float);
         assert_eq!(found.output("paint"), Some(1));
         assert!(found.input("image").is_none());
     }

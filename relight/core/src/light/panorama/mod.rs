@@ -5,7 +5,7 @@ mod resample;
 mod sampler;
 
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::{Direction, LightError, ShLight};
 pub use sampler::{DrawnLight, LightSampler};
@@ -34,23 +34,6 @@ pub struct Panorama {
 /// Files of fewer rows are no panoramas.
 const LEAST_HEIGHT: usize = 4;
 
-/// Why a panorama is not read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PanoramaError {
-    /// The file is no image that can be read.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// The file holds no panorama.
-    #[error("{} {fault}", path.display())]
-    Form {
-        /// The file.
-        path: PathBuf,
-        /// What it is.
-        fault: String,
-    },
-}
-
 impl Panorama {
     /// The panorama that an image of radiance shows.
     ///
@@ -72,9 +55,9 @@ impl Panorama {
     ///
     /// # Errors
     /// Where it is no image, is of integers, is not twice as wide as high, or has values that are not finite.
-    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, PanoramaError> {
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ImageError> {
         let image = ColourImage::from_bytes(path, bytes, None)?;
-        let wrong = |fault| PanoramaError::Form {
+        let wrong = |fault| ImageError::Form {
             path: path.to_owned(),
             fault,
         };
