@@ -14,7 +14,6 @@ use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, Order, ShLight, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
-use relight_core::reader::{TruthLayout, TruthSet};
 use relight_core::render::Surface;
 use relight_synth::{
     Folders, FrameTruth, Library, LightKind, Recipe, TurnDescription, TurnRecipe, write_turns,

@@ -11,7 +11,7 @@ use tch::{Kind, Tensor, no_grad};
 use super::error::TrainError;
 use super::model::{copy_into, to_weights};
 use super::settings::RunSettings;
-use relight_photo::nets::{self, Weights};
+use relight_photo::nets::Weights;
 
 /// The number of steps in a saved memory, in thousands and the rest: 32 bits hold both exactly. Steps of which nothing could
 /// be learned do not count, so it is not that of the run.

@@ -8,7 +8,7 @@ use relit_data::durable;
 use safetensors::SafeTensors;
 
 use super::error::TrainError;
-use relight_photo::nets::{self, Weights};
+use relight_photo::nets::Weights;
 
 const SCHEMA: &str = "relight.checkpoint/1";
 /// The file in a run's folder.

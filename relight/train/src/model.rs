@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use tch::{Device, Kind, Tensor, no_grad};
 
 use super::error::TrainError;
-use relight_photo::nets::{self, EPSILON, Graph, Node, Operation, Weights, check_size};
+use relight_photo::nets::{EPSILON, Graph, Node, Operation, Weights, check_size};
 
 /// In which precision layers are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

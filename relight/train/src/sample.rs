@@ -8,8 +8,8 @@ use tch::{Device, Kind, Tensor};
 use super::error::TrainError;
 use super::symmetry::Symmetry;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
-use relight_core::reader::TruthSample;
 use relight_photo::decompose::{EncodedPicture, PredictedLight};
+use relight_photo::nets::{INPUTS, LIGHT_OUTPUTS};
 use relight_synth::SynthSample;
 
 /// Planes of a sample: the input, the linear picture, shading, albedo, normals, highlight.
