@@ -428,10 +428,7 @@ fn what_is_missing_or_does_not_fit_is_reported_in_one_line() {
             "clip.mkv --mask small.png -o out",
             "10 x 10 pixels and the frames are 96 x 72",
         ),
-        (
-            "clip.mkv --mask text.png -o out",
-            "cannot be read as an image",
-        ),
+        ("clip.mkv --mask text.png -o out", "is not a readable PNG"),
         ("nowhere --mask mask.png -o out", "there is no nowhere"),
         ("verify out/nothing", "out/nothing"),
     ] {

@@ -221,6 +221,40 @@ fn hidden_folders_beside_sessions_end_no_run() {
 }
 
 #[test]
+fn what_lies_beside_sessions_is_named_once() {
+    let inputs = Inputs::new();
+    inputs.video("sessions/mug/clip.mkv", 0, MJPEG);
+    fs::create_dir(inputs.path("sessions/cup")).unwrap();
+    fs::write(inputs.path("sessions/cup/clip.insv"), "of a camera").unwrap();
+    fs::write(inputs.path("sessions/notes.txt"), "text").unwrap();
+    fs::rename(inputs.path("mask.png"), inputs.path("sessions/mask.png")).unwrap();
+    let arguments = ["sessions", "--mask", "sessions/mask.png", "-o"];
+    let output = Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+        .args(arguments)
+        .args([
+            "sessions/set",
+            "--frames",
+            "4",
+            "--size",
+            "16",
+            "--align=off",
+        ])
+        .current_dir(inputs.0.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    for name in ["sessions/cup", "sessions/notes.txt"] {
+        assert_eq!(
+            said.matches(&format!("{name}: left out")).count(),
+            1,
+            "{said}"
+        );
+    }
+    assert!(said.contains("2 left out"), "{said}");
+}
+
+#[test]
 fn masks_of_other_programs_mark_the_object_or_are_refused() {
     let inputs = Inputs::new();
     inputs.video("clip.mkv", 0, MJPEG);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use relit_data::file_names::folded;
-use relit_data::session::{self, recording_name, recordings};
+use relit_data::session::{self, beside_sessions, recording_name, recordings};
 use relit_data::shard::OutputFolder;
 
 use super::catalog::Catalog;
@@ -55,20 +55,44 @@ pub(super) fn extract_recordings(
     Ok(tally)
 }
 
-/// All recordings in the inputs, in the order in which tasks share them; inputs without any are reported.
-pub(super) fn find(inputs: &[PathBuf], observer: &dyn Observer, tally: &mut Tally) -> Vec<PathBuf> {
+/// All recordings in the inputs, in the order in which tasks share them; inputs without any are reported, and so is, by one
+/// task, what lies beside sessions.
+pub(super) fn find(
+    inputs: &[PathBuf],
+    out: &Path,
+    options: &ExtractOptions,
+    observer: &dyn Observer,
+    tally: &mut Tally,
+) -> Vec<PathBuf> {
     let mut found = Vec::new();
+    let mut report = |path: &Path, outcome: RecordingOutcome| {
+        tally.count(&outcome);
+        observer.ended(path, &outcome);
+    };
     for input in inputs {
-        match recordings(input) {
-            Ok(inside) => found.extend(inside),
-            Err(error) => {
-                let outcome = RecordingOutcome::of(Err(error.into()));
-                tally.count(&outcome);
-                observer.ended(input, &outcome);
+        let inside = recordings(input);
+        let is_folder_of_sessions = inside
+            .as_ref()
+            .is_ok_and(|inside| inside != std::slice::from_ref(input));
+        if is_folder_of_sessions && options.task.is_none_or(|task| task.takes(0)) {
+            for path in beside_sessions(input).unwrap_or_default() {
+                let mask = options.mask.as_ref();
+                if !is_same(&path, out) && !mask.is_some_and(|mask| is_same(&path, mask)) {
+                    report(&path, RecordingOutcome::LeftOut(ExtractError::NoRecording));
+                }
             }
+        }
+        match inside {
+            Ok(inside) => found.extend(inside),
+            Err(error) => report(input, RecordingOutcome::of(Err(error.into()))),
         }
     }
     found
+}
+
+fn is_same(path: &Path, other: &Path) -> bool {
+    let [path, other] = [path, other].map(|path| path.canonicalize().ok());
+    path.is_some() && path == other
 }
 
 /// One extraction into one data set.

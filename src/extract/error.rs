@@ -70,16 +70,19 @@ pub enum ExtractError {
         /// Frames of the video.
         frames: u64,
     },
+    /// Something in a folder of sessions is none.
+    #[error("it is no session and holds no video")]
+    NoRecording,
     /// Extracting a recording panicked.
     #[error("a fault of the program, described above: please report it")]
     Panic,
     /// The mask cannot be read.
-    #[error("the mask {path} cannot be read as an image ({source}): give a PNG")]
+    #[error("the mask {path} {source}")]
     Mask {
         /// The mask's path.
         path: PathBuf,
-        /// The decoder's error.
-        source: image::ImageError,
+        /// What it is.
+        source: relit_still::StillError,
     },
     /// The mask cannot be held against the video.
     #[error(transparent)]

@@ -95,6 +95,6 @@ pub fn extract(
         return objects::extract(inputs, out, options, observer);
     }
     let mut tally = Tally::default();
-    let found = batch::find(inputs, observer, &mut tally);
+    let found = batch::find(inputs, out, options, observer, &mut tally);
     batch::extract_recordings(&found, out, options, observer, &LocalDisk, tally)
 }

@@ -1,14 +1,12 @@
 //! The mask of the object, read from a file.
 
-use std::io::Cursor;
 use std::path::Path;
 
+use image::GrayImage;
 use image::imageops::{FilterType, resize};
-use image::metadata::Orientation;
-use image::{DynamicImage, GrayImage, ImageDecoder, ImageReader, Limits};
 
 use relit_data::geometry::Rect;
-use relit_data::mask::{MaskPicture, ObjectPixels};
+use relit_data::mask::MaskPicture;
 use relit_data::session::{MASK_FILE, Recording};
 use relit_data::shard::Digest;
 
@@ -52,7 +50,7 @@ impl ObjectMask {
             path: path.clone(),
             source,
         })?;
-        let picture = decode(&bytes).map_err(|source| ExtractError::Mask {
+        let picture = relit_still::decode(&bytes).map_err(|source| ExtractError::Mask {
             path: path.clone(),
             source,
         })?;
@@ -69,8 +67,11 @@ impl ObjectMask {
             path: path.clone(),
             fault,
         };
-        let ObjectPixels { inside, basis } = picture.object().map_err(no_object)?;
-        let levels = inside.iter().map(|&inside| if inside { 255 } else { 0 });
+        let object = picture.object().map_err(no_object)?;
+        let levels = object
+            .inside
+            .iter()
+            .map(|&inside| if inside { 255 } else { 0 });
         let mut image = GrayImage::from_raw(size.0, size.1, levels.collect()).unwrap_or_default();
         if size != frame {
             image = resize(&image, frame.0, frame.1, FilterType::Triangle);
@@ -79,8 +80,8 @@ impl ObjectMask {
             }
         }
         let blake3 = Digest::of(&bytes);
-        let note = basis
-            .note()
+        let note = object
+            .note(size.0)
             .map(|note| format!("the mask {} {note}", path.display()));
         Ok(Self {
             bounding_box: bounding_box(&image).unwrap_or_else(|| Rect::new(0, 0, frame.0, frame.1)),
@@ -107,19 +108,6 @@ impl ObjectMask {
             )
         })
     }
-}
-
-/// The picture in a mask's file, as it is displayed.
-fn decode(bytes: &[u8]) -> image::ImageResult<DynamicImage> {
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
-    let mut decoder = reader.into_decoder()?;
-    // A file whose orientation cannot be read is shown as it is stored.
-    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let mut limits = Limits::default();
-    limits.reserve(decoder.total_bytes())?;
-    let mut image = DynamicImage::from_decoder(decoder)?;
-    image.apply_orientation(orientation);
-    Ok(image)
 }
 
 /// The frame on which a mask was made, by the record beside it (`mask.json` of `mask.png`). A record that is

@@ -13,6 +13,9 @@ const LEAST_OUTLINE: f32 = 0.85;
 const BETTER_OUTLINE: f32 = 1.05;
 /// A mask of which more is wrong, as a share of its area, is that of something else.
 const SOMETHING_ELSE: f64 = 0.2;
+/// Where its outline is that of what stands still, so much of it has to be background: what changes by itself, such as a
+/// display on the object, looks so too.
+const MOSTLY_BACKGROUND: f64 = 0.5;
 /// Regions that are named.
 const NAMED: usize = 3;
 
@@ -34,9 +37,20 @@ impl ShapeCheck {
     /// or much of the object is not in it: around it, or in its holes, as of one that is inverted.
     #[must_use]
     pub fn is_of_something_else(&self) -> bool {
-        let px = |regions: &[DoubtfulRegion]| regions.iter().map(|region| region.px).sum::<u64>();
-        let wrong = px(&self.leaks).max(px(&self.missing) + px(&self.holes));
-        wrong as f64 > SOMETHING_ELSE * self.area_px as f64
+        let share = |regions: &[DoubtfulRegion]| {
+            let px: u64 = regions.iter().map(|region| region.px).sum();
+            px as f64 / self.area_px as f64
+        };
+        let most_background = match self.follows_what_moves() {
+            true => MOSTLY_BACKGROUND,
+            false => SOMETHING_ELSE,
+        };
+        share(&self.leaks) > most_background
+            || share(&self.missing) + share(&self.holes) > SOMETHING_ELSE
+    }
+
+    fn follows_what_moves(&self) -> bool {
+        self.outline >= LEAST_OUTLINE * self.outline_of_turn
     }
 }
 
@@ -45,7 +59,7 @@ fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
         return Vec::new();
     }
     let mut faults = Vec::new();
-    if !shape.contradicted && shape.outline < LEAST_OUTLINE * shape.outline_of_turn {
+    if !shape.contradicted && !shape.follows_what_moves() {
         faults.push(format!(
             "the mask's outline does not follow what moves differently ({:.2}; the turn's own {:.2}): make it again, with --auto or --edit",
             shape.outline, shape.outline_of_turn
@@ -116,7 +130,15 @@ mod tests {
     #[test]
     fn a_mask_without_much_of_the_object_is_that_of_something_else() {
         assert!(!shape([150, 150, 40]).is_of_something_else());
-        assert!(shape([210, 0, 0]).is_of_something_else());
+        let beside = |leaks| ShapeCheck {
+            outline: 0.5,
+            ..shape([leaks, 0, 0])
+        };
+        assert!(!beside(190).is_of_something_else());
+        assert!(beside(210).is_of_something_else());
+        // A display on the object, whose outline is right, and a mask of the table.
+        assert!(!shape([400, 0, 0]).is_of_something_else());
+        assert!(shape([510, 0, 0]).is_of_something_else());
         assert!(shape([0, 210, 0]).is_of_something_else());
         assert!(shape([0, 0, 247]).is_of_something_else());
         assert!(shape([0, 120, 120]).is_of_something_else());

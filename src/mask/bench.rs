@@ -9,6 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::{GrayImage, Luma, RgbImage};
+use relit_data::file_names::is_hidden;
 use relit_data::geometry::Rect;
 use relit_data::text;
 use relit_grabcut::{
@@ -115,6 +116,7 @@ pub fn bench_images(folder: &Path) -> Result<Vec<BenchImage>, MaskingError> {
         let ending = path.extension().and_then(|ending| ending.to_str());
         if let (Some(name), Some(ending)) = (stem, ending)
             && IMAGES.contains(&ending.to_ascii_lowercase().as_str())
+            && !is_hidden(&path)
             && path.with_file_name(format!("{name}.gt.png")).is_file()
         {
             let name = name.to_owned();

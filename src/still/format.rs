@@ -171,9 +171,12 @@ fn of_brands(bytes: &[u8]) -> Option<Format> {
         Some(Format::Raw)
     } else if is_one_of(&[b"avif", b"avis"]) {
         Some(Format::Avif)
-    } else if is_one_of(&[
+    } else if [
         b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1",
-    ]) {
+    ]
+    .iter()
+    .any(|&known| known == major)
+    {
         Some(Format::Heic)
     } else {
         None
@@ -230,7 +233,7 @@ mod tests {
     fn a_format_is_known_by_its_content() {
         let heic = b"\0\0\0\x18ftypmif1\0\0\0\0mif1heic";
         let avif = b"\0\0\0\x1cftypmif1\0\0\0\0mif1avifmiaf";
-        let video = b"\0\0\0\x18ftypisom\0\0\0\0isomavc1";
+        let video = b"\0\0\0\x18ftypisom\0\0\0\0isomhevc";
         for (bytes, format) in [
             (&heic[..], Some(Format::Heic)),
             (avif, Some(Format::Avif)),

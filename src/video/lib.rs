@@ -78,6 +78,9 @@ use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::input_with_dictionary;
 use relit_data::colour::ColourFault;
 use relit_data::disk::DISK_FULL;
+use relit_still::Format;
+
+use photograph::{format_of, is_misread};
 
 pub use format::{BayerPattern, PixelFormat, StreamFormat};
 pub use live::LiveDecoder;
@@ -104,6 +107,14 @@ pub enum VideoError {
         path: PathBuf,
         /// FFmpeg's answer.
         why: ffmpeg_next::Error,
+    },
+    /// A still image in a format that is not read.
+    #[error("{path} is {}, which is not read: {}", format.name(), format.advice())]
+    Still {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: Format,
     },
     /// A name that FFmpeg cannot take.
     #[error("the name of {0} is not plain text: rename the file")]
@@ -265,10 +276,20 @@ fn open_input(path: &Path) -> Result<Input, VideoError> {
     initialise();
     let name = path.to_str().filter(|name| !name.contains('\0'));
     let name = name.ok_or_else(|| VideoError::Name(path.to_owned()))?;
-    let failed = |why| VideoError::Open {
-        path: path.to_owned(),
-        why,
+    let still = format_of(path);
+    let failed = |why| match still.filter(|format| !format.is_read()) {
+        Some(format) => VideoError::Still {
+            path: path.to_owned(),
+            format,
+        },
+        None => VideoError::Open {
+            path: path.to_owned(),
+            why,
+        },
     };
+    if still.is_some_and(is_misread) {
+        return Err(failed(ffmpeg_next::Error::InvalidData));
+    }
     let literally = Dictionary::from_iter([("pattern_type", "none")]);
     input_with_dictionary(&format!("file:{name}"), literally).map_err(failed)
 }

@@ -22,9 +22,21 @@ pub(super) fn exif_orientation(input: &Input, path: &Path) -> Option<Exif> {
 
 /// Whether a file is AVIF or HEIF, which FFmpeg reads as it reads MP4.
 fn is_photograph_in_boxes(path: &Path) -> bool {
+    matches!(format_of(path), Some(Format::Avif | Format::Heic))
+}
+
+/// The format of a still image; none of a video, and where it cannot be read.
+pub(super) fn format_of(path: &Path) -> Option<Format> {
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
-    read.is_ok() && matches!(Format::of(&head), Some(Format::Avif | Format::Heic))
+    read.ok().and_then(|_| Format::of(&head))
+}
+
+/// Whether FFmpeg would give another picture than the file shows, or none: of a raw file the small one for display, of a
+/// HEIC one of its tiles.
+pub(super) fn is_misread(format: Format) -> bool {
+    use Format::{Heic, Html, Pdf, Raw, Svg};
+    matches!(format, Raw | Heic | Svg | Pdf | Html)
 }
 
 /// Whether FFmpeg reads the file as one picture.

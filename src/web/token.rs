@@ -97,7 +97,9 @@ impl Token {
         file.take(LONGEST_FILE)
             .read_to_string(&mut text)
             .map_err(failed)?;
-        text.trim()
+        // Editors of Windows begin a file with a byte order mark.
+        text.trim_start_matches('\u{feff}')
+            .trim()
             .parse()
             .map_err(|source| TokenFileError::Invalid {
                 path: path.to_owned(),
@@ -232,6 +234,8 @@ mod tests {
             assert_eq!(read.is_ok(), is_taken, "{mode:o}: {read:?}");
         }
         fs::set_permissions(&path, Permissions::from_mode(0o600)).unwrap();
+        fs::write(&path, "\u{feff}0123456789abcdef\r\n").unwrap();
+        assert!(Token::from_file(&path).is_ok());
         fs::write(&path, "short").unwrap();
         let read = Token::from_file(&path);
         assert!(

@@ -97,8 +97,14 @@ fn a_webp_is_masked_as_a_jpeg_is() {
     assert_eq!(mask.get_pixel(WIDTH - 36, HEIGHT - 31).0, [255]);
 }
 
-/// Adds an orientation to a TIFF: another directory behind the file, of the same entries and that.
-fn tiff_with_orientation(mut bytes: Vec<u8>, orientation: u16) -> Vec<u8> {
+/// Adds an orientation to a TIFF.
+fn tiff_with_orientation(bytes: Vec<u8>, orientation: u16) -> Vec<u8> {
+    let [low, high] = orientation.to_le_bytes();
+    tiff_with([0x12, 1, 3, 0, 1, 0, 0, 0, low, high, 0, 0], bytes)
+}
+
+/// Adds an entry to a TIFF: another directory behind the file, of the same entries and that.
+fn tiff_with(entry: [u8; 12], mut bytes: Vec<u8>) -> Vec<u8> {
     assert_eq!(&bytes[..4], b"II*\0");
     let start = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
     let count = usize::from(u16::from_le_bytes(
@@ -106,8 +112,7 @@ fn tiff_with_orientation(mut bytes: Vec<u8>, orientation: u16) -> Vec<u8> {
     ));
     let entries = &bytes[start + 2..start + 2 + 12 * count];
     let mut entries: Vec<Vec<u8>> = entries.chunks_exact(12).map(<[u8]>::to_vec).collect();
-    let [low, high] = orientation.to_le_bytes();
-    entries.push(vec![0x12, 1, 3, 0, 1, 0, 0, 0, low, high, 0, 0]);
+    entries.push(entry.to_vec());
     entries.sort_by_key(|entry| u16::from_le_bytes([entry[0], entry[1]]));
     bytes.resize(bytes.len().next_multiple_of(2), 0);
     let place = bytes.len() as u32;
@@ -158,4 +163,50 @@ fn a_photograph_whose_colours_cannot_be_converted_is_refused() {
     );
     assert_eq!(code(&done), 1, "{}", said(&done));
     assert!(said(&done).contains("PQ"), "{}", said(&done));
+}
+
+#[test]
+fn a_photograph_in_a_format_that_is_not_read_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    // Of a raw file FFmpeg would take the small picture for display.
+    let small = image::RgbImage::from_pixel(32, 24, Rgb([90; 3]));
+    let mut nef = Cursor::new(Vec::new());
+    small.write_to(&mut nef, ImageFormat::Tiff).unwrap();
+    let nef = tiff_with([0xfe, 0, 4, 0, 1, 0, 0, 0, 1, 0, 0, 0], nef.into_inner());
+    let nef = tiff_with([0x0f, 1, 2, 0, 1, 0, 0, 0, 65, 0, 0, 0], nef);
+    let nef = tiff_with([0x4a, 1, 4, 0, 1, 0, 0, 0, 8, 0, 0, 0], nef);
+    for (name, content, called) in [
+        (
+            "phone.HEIC",
+            &b"\0\0\0\x18ftypheic\0\0\0\0mif1heic"[..],
+            "a HEIC image",
+        ),
+        (
+            "phone.jpg",
+            b"\0\0\0\x18ftypmif1\0\0\0\0mif1heic",
+            "a HEIC image",
+        ),
+        (
+            "canon.cr3",
+            b"\0\0\0\x18ftypcrx \0\0\0\0crx isom",
+            "raw file",
+        ),
+        ("nikon.nef", &nef, "raw file"),
+        (
+            "drawing.svg",
+            b"<svg xmlns=\"http://www.w3.org/2000/svg\"/>",
+            "an SVG",
+        ),
+        ("layers.xcf", b"gimp xcf v011\0", "a GIMP file"),
+    ] {
+        fs::write(folder.join(name), content).unwrap();
+        let done = relit_mask(folder, &[name, "--rect", "2,2,20,20", "-o", "mask.png"]);
+        assert_eq!(code(&done), 1, "{name}: {}", said(&done));
+        let said = said(&done);
+        assert!(
+            said.contains(name) && said.contains(called),
+            "{name}: {said}"
+        );
+    }
 }

@@ -80,6 +80,15 @@ impl From<Bits> for Depth {
     }
 }
 
+/// Whether a path is that of the masks or of what is written.
+pub(crate) fn is_at(path: &Path, masks: Option<&Path>, output: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().ok();
+    let known = masks.into_iter().chain([output]);
+    known
+        .filter_map(real)
+        .any(|known| Some(known) == real(path))
+}
+
 /// Names the files of folders that are not used.
 pub(crate) fn name_unused(unused: &[UnusedFile], console: Console) {
     for file in unused {

@@ -33,7 +33,7 @@ pub struct Library {
     pub pictures: Vec<TextureImage>,
     /// The panoramas, never none.
     pub panoramas: Panoramas,
-    /// What of the folders of meshes is not used.
+    /// What of the folders is not used.
     pub left_out: Vec<LeftOut>,
 }
 
@@ -63,6 +63,21 @@ pub struct Folders {
     pub panoramas: Option<PathBuf>,
 }
 
+impl Folders {
+    /// Whether a file that one folder is not read for may be of use because another one is the same.
+    fn use_elsewhere(&self, path: &Path) -> bool {
+        let is_in = |folder: &Option<PathBuf>| {
+            folder
+                .as_ref()
+                .is_some_and(|folder| path.starts_with(folder))
+        };
+        // Meshes have files of many kinds beside them.
+        is_in(&self.meshes)
+            || is_in(&self.textures) && TEXTURES.includes(path)
+            || is_in(&self.panoramas) && PANORAMAS.includes(path)
+    }
+}
+
 impl Library {
     /// Reads all files of the kinds in these folders, in the order of their names. Where no folder of
     /// panoramas is given, 13 are made. Meshes of other kinds are left out.
@@ -70,20 +85,25 @@ impl Library {
     /// # Errors
     /// [`SynthError::Nothing`] where a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
-        let (meshes, left_out) = match &folders.meshes {
+        let (meshes, mut left_out) = match &folders.meshes {
             Some(folder) => read_meshes(folder)?,
             None => (Vec::new(), Vec::new()),
         };
+        let mut unused = Vec::new();
         let textures = match &folders.textures {
-            Some(folder) => read_all(folder, &TEXTURES, TextureImage::read)?,
+            Some(folder) => read_all(folder, &TEXTURES, &mut unused, TextureImage::read)?,
             None => Vec::new(),
         };
         let panoramas = match &folders.panoramas {
-            Some(folder) => read_all(folder, &PANORAMAS, |path| {
+            Some(folder) => read_all(folder, &PANORAMAS, &mut unused, |path| {
                 Panorama::read(path).map_err(SynthError::Panorama)
             })?,
             None => made_panoramas()?,
         };
+        unused.retain(|one| !folders.use_elsewhere(&one.path));
+        unused.sort_by(|one: &LeftOut, other| one.path.cmp(&other.path));
+        unused.dedup_by(|one, other| one.path == other.path);
+        left_out.append(&mut unused);
         let mut pictures: Vec<TextureImage> =
             textures.into_iter().map(|(_, picture)| picture).collect();
         pictures.extend(panoramas.iter().map(|(_, panorama)| picture_of(panorama)));
@@ -267,18 +287,28 @@ impl Wanted {
     }
 }
 
-/// Every file of the wanted kind in a folder, by name.
+/// Every file of the wanted kind in a folder, by name; files of other kinds are `left_out`.
 fn read_all<T>(
     folder: &Path,
     wanted: &Wanted,
+    left_out: &mut Vec<LeftOut>,
     read: impl Fn(&Path) -> Result<T, SynthError>,
 ) -> Result<Vec<(String, T)>, SynthError> {
-    let mut paths = members(folder)?;
-    paths.retain(|path| wanted.includes(path));
-    paths.sort();
+    let mut files = members(folder)?;
+    files.sort();
+    let (paths, others): (Vec<PathBuf>, Vec<PathBuf>) =
+        files.into_iter().partition(|path| wanted.includes(path));
     if paths.is_empty() {
         return Err(wanted.missing(folder));
     }
+    left_out.extend(others.into_iter().map(|path| LeftOut {
+        path,
+        what: format!(
+            "{} are read from files that end in .{}",
+            wanted.what,
+            wanted.extensions.join(", .")
+        ),
+    }));
     let named = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default();
         Ok((name.to_string_lossy().into_owned(), read(path)?))
@@ -311,6 +341,29 @@ mod tests {
             error.contains("no panoramas") && error.contains("exr"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn other_files_among_panoramas_and_textures_are_left_out_and_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n";
+        let room = [&header[..], &[0x80; 4 * 4 * 8]].concat();
+        std::fs::write(at("room.hdr"), room).unwrap();
+        let wood = image::RgbImage::from_pixel(2, 2, image::Rgb([90, 60, 30]));
+        wood.save(at("wood.png")).unwrap();
+        for name in ["sky.jpg.part", "notes.txt", ".DS_Store"] {
+            std::fs::write(at(name), "").unwrap();
+        }
+        let library = Library::read(&Folders {
+            panoramas: Some(folder.path().to_owned()),
+            textures: Some(folder.path().to_owned()),
+            ..Folders::default()
+        })
+        .unwrap();
+        let of = |one: &LeftOut| one.path.strip_prefix(folder.path()).unwrap().to_owned();
+        let named: Vec<PathBuf> = library.left_out.iter().map(of).collect();
+        assert_eq!(named, ["notes.txt", "sky.jpg.part"].map(PathBuf::from));
     }
 
     #[test]

@@ -7,8 +7,8 @@
 //! 2. **brightness**: the object is at least half as bright as white. Edges may be soft, and a JPEG's may ring;
 //! 3. **a label**: one colour or level on black, whatever it is, such as 1 on 0.
 //!
-//! A photograph, a picture of several labels, and one that marks nothing are refused: [`MaskFault`]. What
-//! other mistakes look like, such as a mask that is inverted, cannot be seen here.
+//! A photograph, a picture of several labels, and one that marks nothing are refused: [`MaskFault`]. One that marks the
+//! whole border may be inverted: [`ObjectPixels::note`] says so.
 //!
 //! Knows pixels only: files are decoded by others.
 
@@ -34,8 +34,7 @@ pub enum MaskBasis {
 
 impl MaskBasis {
     /// What a person may want to know of it: nothing where the object is bright, as in most masks.
-    #[must_use]
-    pub fn note(&self) -> Option<String> {
+    fn note(&self) -> Option<String> {
         match self {
             Self::Brightness => None,
             Self::Alpha => Some("has colours and alpha: the object is what is opaque".to_owned()),
@@ -51,6 +50,29 @@ pub struct ObjectPixels {
     pub inside: Vec<bool>,
     /// What says so.
     pub basis: MaskBasis,
+}
+
+impl ObjectPixels {
+    /// What a person may want to know of a mask of this width, after "the mask": what it was taken for where that is not
+    /// plain, and whether it may be inverted.
+    #[must_use]
+    pub fn note(&self, width: u32) -> Option<String> {
+        let is_inverted = || {
+            self.marks_the_border(width as usize).then(|| {
+                "marks all of the picture's border: it is inverted if the object does not fill the picture".to_owned()
+            })
+        };
+        self.basis.note().or_else(is_inverted)
+    }
+
+    fn marks_the_border(&self, width: usize) -> bool {
+        let rows = || self.inside.chunks(width.max(1));
+        let is_whole =
+            |row: Option<&[bool]>| row.is_some_and(|row| row.iter().all(|&inside| inside));
+        is_whole(rows().next())
+            && is_whole(rows().next_back())
+            && rows().all(|row| row.first() == Some(&true) && row.last() == Some(&true))
+    }
 }
 
 /// Why a picture is no mask of an object. Each begins with a verb, after "the mask PATH".

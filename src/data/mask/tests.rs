@@ -372,3 +372,34 @@ fn a_mask_of_another_size_is_recognised_where_it_is_turned_or_scaled() {
         assert_eq!(size_hint(other, (80, 60)), None, "{other:?}");
     }
 }
+
+#[test]
+fn a_mask_that_marks_the_border_may_be_inverted() {
+    let note = |image: GrayImage| read(image).unwrap().note(WIDE);
+    let inverted = note(two(0, 255)).unwrap();
+    assert!(inverted.contains("inverted"), "{inverted}");
+    assert!(note(grey(|_, _| 255)).is_some());
+    // An object that the border cuts off, and one that the picture is full of but for a corner.
+    assert_eq!(note(grey(|x, _| if x < 50 { 255 } else { 0 })), None);
+    assert_eq!(note(grey(|x, y| if x + y > 0 { 255 } else { 0 })), None);
+    assert_eq!(note(two(255, 0)), None);
+    let label = note(two(1, 0)).unwrap();
+    assert!(label.contains("label"), "{label}");
+}
+
+#[test]
+fn one_mask_is_the_same_in_every_depth_and_with_an_alpha_that_says_nothing() {
+    let at = |x, y| u16::from(is_inside(x, y));
+    let deep = ImageBuffer::from_fn(WIDE, HIGH, |x, y| Luma([at(x, y) * u16::MAX]));
+    assert_disc(deep, &MaskBasis::Brightness);
+    for alpha in [0, 128, 255] {
+        let with_alpha = |x, y| LumaA([at(x, y) as u8 * 255, alpha]);
+        assert_disc(
+            ImageBuffer::from_fn(WIDE, HIGH, with_alpha),
+            &MaskBasis::Brightness,
+        );
+    }
+    let deep_label = ImageBuffer::from_fn(WIDE, HIGH, |x, y| Luma([at(x, y)]));
+    let found = read(deep_label).unwrap();
+    assert!(found.inside == disc() && matches!(found.basis, MaskBasis::Label(_)));
+}

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::text::unmarked;
+
 /// Largest plausible angle, degrees: some thousands of turns in either direction.
 const MOST_DEGREES: f64 = 1e6;
 
@@ -92,7 +94,7 @@ impl FrameIndex {
     /// [`IndexFault`] with the first line that is wrong.
     pub fn parse(bytes: &[u8]) -> Result<Self, IndexFault> {
         let mut index = Self::default();
-        let mut lines = bytes
+        let mut lines = unmarked(bytes)
             .split_inclusive(|&byte| byte == b'\n')
             .zip(1_u64..)
             .peekable();
@@ -290,6 +292,15 @@ mod tests {
         let index = FrameIndex::parse(&whole.as_bytes()[..whole.len() - 9]).unwrap();
         assert_eq!(index.entries().len(), 1);
         assert!(index.is_torn());
+    }
+
+    #[test]
+    fn an_index_that_an_editor_saved_is_the_same() {
+        let whole = text(&[entry(0), entry(1)]);
+        let saved = format!("\u{feff}{}", whole.replace('\n', "\r\n"));
+        let index = FrameIndex::parse(saved.as_bytes()).unwrap();
+        assert_eq!(index.entries().len(), 2);
+        assert!(!index.is_torn());
     }
 
     #[test]

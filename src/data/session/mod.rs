@@ -31,7 +31,7 @@ pub use manifest::{
     CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts,
     Status, TurntableFacts, VideoFacts, object_of,
 };
-pub use recording::{Notice, Recording, recording_name, recordings};
+pub use recording::{Notice, Recording, beside_sessions, recording_name, recordings};
 pub use remarks::remark;
 pub use writer::SessionWriter;
 

@@ -13,6 +13,9 @@ use crate::file_names::{composed, is_hidden, is_video};
 /// The longest name of a recording that is made from a file name, bytes.
 const LONGEST_ID: usize = 120;
 
+/// What a folder has that is a data set.
+const DATASET_FILE: &str = "dataset.json";
+
 /// Something about a recording that its user should know.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Notice {
@@ -193,6 +196,24 @@ pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
             video,
         }),
     }
+}
+
+/// What lies beside the sessions in a folder of sessions, sorted by name: neither what is hidden nor data sets.
+///
+/// # Errors
+/// [`SessionError::Io`].
+pub fn beside_sessions(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
+    let mut beside = Vec::new();
+    for entry in fs::read_dir(folder).map_err(SessionError::io(folder, "listed"))? {
+        let path = entry.map_err(SessionError::io(folder, "listed"))?.path();
+        let is_known = path.is_dir()
+            && (path.join(DATASET_FILE).exists() || is_session_folder(&path).unwrap_or(true));
+        if !is_known && !is_hidden(&path) {
+            beside.push(path);
+        }
+    }
+    beside.sort();
+    Ok(beside)
 }
 
 /// Whether a folder is a session, complete or not.

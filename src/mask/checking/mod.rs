@@ -88,9 +88,9 @@ fn check_recording(
 /// The picture of the mask, and its file.
 fn read_mask(path: &Path) -> Result<(MaskPicture, Vec<u8>), MaskingError> {
     let bytes = std::fs::read(path).map_err(MaskingError::io(path, "read"))?;
-    let image = image::load_from_memory(&bytes).map_err(|error| MaskingError::Check {
+    let image = relit_still::decode(&bytes).map_err(|error| MaskingError::Check {
         path: path.to_owned(),
-        why: error.to_string(),
+        why: format!("it {error}"),
     })?;
     Ok((MaskPicture::of_image(&image), bytes))
 }

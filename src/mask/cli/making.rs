@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use relit_console::{Console, Outcome};
-use relit_data::session::recordings;
+use relit_data::session::{beside_sessions, recordings};
 use relit_mask::{MaskingError, edit, make_mask};
 use relit_web::Announcement;
 
@@ -25,8 +25,30 @@ pub(crate) fn run(arguments: &MaskArguments) -> ExitCode {
     }
     match (arguments.edit, paths.first()) {
         (true, Some(path)) => console.finish(draw(path, arguments, console)),
-        _ => console.finish(make(&paths, arguments, console)),
+        _ => console.finish(
+            make(&paths, arguments, console).map(|outcome| match outcome {
+                Outcome::Whole if says_unused(&paths, &arguments.input, console) => {
+                    Outcome::Incomplete
+                }
+                outcome => outcome,
+            }),
+        ),
     }
+}
+
+/// Names what lies beside the recordings of a folder; whether there is anything.
+fn says_unused(paths: &[PathBuf], input: &Path, console: Console) -> bool {
+    if paths == [input] {
+        return false;
+    }
+    let unused = beside_sessions(input).unwrap_or_default();
+    for path in &unused {
+        console.warn(&format!(
+            "{} is left out: it is no session and holds no video",
+            path.display()
+        ));
+    }
+    !unused.is_empty()
 }
 
 /// Lets a person draw the hints in a browser.

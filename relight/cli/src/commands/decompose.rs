@@ -20,7 +20,7 @@ use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
 use crate::commands::CommandResult;
-use crate::photos::name_unused;
+use crate::photos::{is_at, name_unused};
 use crate::shipped;
 use crate::values::{GateName, TransferName, YName};
 
@@ -211,7 +211,8 @@ impl EngineName {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let FoundPhotos { inputs, unused } = PhotoInput::find(&arguments.photos, arguments.count)?;
+    let FoundPhotos { inputs, mut unused } = PhotoInput::find(&arguments.photos, arguments.count)?;
+    unused.retain(|file| !is_at(file.path(), arguments.mask.as_deref(), &arguments.output));
     name_unused(&unused, console);
     let own_folders = inputs.len() > 1 || arguments.has_set();
     let run = Run::new(arguments, own_folders, console)?;

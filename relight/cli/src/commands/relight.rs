@@ -21,7 +21,7 @@ use super::decompose::rectangle;
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::light::NewLightArguments;
-use crate::photos::{Bits, Network, NetworkArguments, globbed, name_unused, not_an_input};
+use crate::photos::{Bits, Network, NetworkArguments, globbed, is_at, name_unused, not_an_input};
 use crate::values::{TransferName, WhiteName};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -222,7 +222,8 @@ struct Run<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let FoundPhotos { inputs, unused } = PhotoInput::find(&globbed(&arguments.photos)?, None)?;
+    let FoundPhotos { inputs, mut unused } = PhotoInput::find(&globbed(&arguments.photos)?, None)?;
+    unused.retain(|file| !is_at(file.path(), arguments.mask.as_deref(), &arguments.output));
     name_unused(&unused, console);
     let run = Run {
         arguments,

@@ -92,6 +92,12 @@ fn every_file_of_a_folder_is_used_or_named() {
     for left_behind in ["._a.jpg", ".DS_Store", "Thumbs.db", "desktop.ini"] {
         write(left_behind, b"anything");
     }
+    for within in ["later", "empty", "done"] {
+        fs::create_dir(folder.path("photos").join(within)).unwrap();
+    }
+    write("later/k.jpg", &jpeg);
+    write("done/albedo.png", &jpeg);
+    write("done/decomposition.json", b"{}");
     let FoundPhotos { inputs, unused } = PhotoInput::find(&[folder.path("photos")], None).unwrap();
     let used: Vec<String> = inputs.iter().map(PhotoInput::place).collect();
     let name = |path: &str| {
@@ -110,6 +116,9 @@ fn every_file_of_a_folder_is_used_or_named() {
     assert_eq!(
         unused,
         [
+            UnusedFile::Folder {
+                path: path("later")
+            },
             UnusedFile::NotRead {
                 path: path("c.heic"),
                 format: Format::Heic

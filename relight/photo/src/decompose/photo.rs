@@ -21,7 +21,7 @@ pub struct Photo {
     pub mask: Planes<1>,
     /// What said so.
     pub mask_source: MaskSource,
-    /// What the mask's file was taken for, after "the mask", where that is not plain.
+    /// What a person may want to know of the mask's file, after "the mask".
     pub mask_note: Option<String>,
     /// The alpha that its file has, 0 to 1, as it stands there.
     pub alpha: Option<Planes<1>>,
@@ -61,8 +61,8 @@ impl Photo {
         let (mask, mask_source) = match hints.mask {
             Some((path, mask)) => {
                 check_extent(mask.planes.extent(), extent, bytes)?;
-                let (mask, basis) = mask.object_mask(path)?;
-                mask_note = basis.note();
+                let (mask, note) = mask.object_mask(path)?;
+                mask_note = note;
                 (mask, MaskSource::File)
             }
             None => {

@@ -13,6 +13,7 @@ use relit_data::shard::Dataset;
 use relit_still::{Format, Orientation, is_named};
 
 use super::mask_record::check_turned;
+use super::results::FIGURES;
 use crate::decompose::{DecomposeError, Photo, PhotoHints, Rectangle, stem};
 
 /// Bytes of a file that show its format.
@@ -76,6 +77,12 @@ pub enum UnusedFile {
         /// The file.
         path: PathBuf,
     },
+    /// It is a folder of pictures.
+    #[error("{} is not used: it is a folder within; give it by its name", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
 }
 
 impl UnusedFile {
@@ -83,7 +90,7 @@ impl UnusedFile {
     #[must_use]
     pub fn path(&self) -> &Path {
         match self {
-            Self::NotRead { path, .. } | Self::NoPicture { path } => path,
+            Self::NotRead { path, .. } | Self::NoPicture { path } | Self::Folder { path } => path,
         }
     }
 }
@@ -174,16 +181,24 @@ fn add_folder(
     folder: &Path,
     most: Option<u32>,
 ) -> Result<(), DecomposeError> {
+    let has_frames = PhotoInput::has_frames(folder);
+    let unused_before = unused.len();
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(DecomposeError::read(folder))? {
         let path = entry.map_err(DecomposeError::read(folder))?.path();
-        if !is_hidden(&path) && path.is_file() {
-            files.push(path);
+        match is_hidden(&path) {
+            true => {}
+            false if path.is_file() => files.push(path),
+            // A data set has folders of its own.
+            false if !has_frames && holds_pictures(&path) => {
+                unused.push(UnusedFile::Folder { path })
+            }
+            false => {}
         }
     }
     files.sort();
-    let has_frames = PhotoInput::has_frames(folder);
-    let (before, unused_before) = (found.len(), unused.len());
+    unused[unused_before..].sort_by(|one, other| one.path().cmp(other.path()));
+    let before = found.len();
     for path in files {
         match use_of(path.clone()) {
             None => found.push((path.clone(), PhotoInput::File(path))),
@@ -202,6 +217,13 @@ fn add_folder(
         add_turns(found, folder, most)?;
     }
     Ok(())
+}
+
+/// Whether a folder within another holds pictures that a person may have meant; a result's are not.
+fn holds_pictures(folder: &Path) -> bool {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_picture = |path: PathBuf| !is_hidden(&path) && is_named(&path);
+    !folder.join(FIGURES).exists() && entries.map(|entry| entry.path()).any(is_picture)
 }
 
 /// Why a file of a folder is left out; none where it is taken for a photograph: by its content, or by a name that

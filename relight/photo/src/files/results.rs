@@ -18,7 +18,7 @@ use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
 use relight_core::statistics::ranked;
 
 /// The file of figures.
-const FIGURES: &str = "decomposition.json";
+pub(super) const FIGURES: &str = "decomposition.json";
 /// All files of a decomposition.
 const FILES: [&str; 11] = [
     "normal.png",

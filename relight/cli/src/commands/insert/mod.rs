@@ -24,6 +24,13 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         .iter()
         .map(|object| InsertSource::read(object, &folder))
         .collect::<Result<Vec<_>, _>>()?;
+    for source in &sources {
+        if let InsertSource::Photo(photo) = source
+            && let Some(note) = &photo.mask_note
+        {
+            console.warn(&format!("{}: the mask {note}", photo.name));
+        }
+    }
     let background = BackgroundFile::read(&file(&scene.background), &scene)?;
     check_output(&background, arguments)?;
     if let Some(conversion) = background.colour_conversion() {

@@ -341,6 +341,11 @@ fn a_picture_is_scaled_turned_and_moved() {
             json!({"rotation": std::f32::consts::PI}),
             Vec3::new(0.5, 0.0, 0.0),
         ),
+        // The specification's example: the lower left quarter, turned.
+        (
+            json!({"offset": [0.0, 1.0], "rotation": std::f32::consts::FRAC_PI_2, "scale": [0.5, 0.5]}),
+            Vec3::new(0.5, 1.0, 0.0),
+        ),
         (json!({"texCoord": 0}), Vec3::new(0.5, 1.0, 0.0)),
     ] {
         document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] =
