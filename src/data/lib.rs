@@ -161,6 +161,7 @@
 //! ```
 
 pub mod causes;
+#[cfg(feature = "still")]
 pub mod colour;
 pub mod counts;
 pub mod disk;

@@ -25,6 +25,7 @@ pub fn is_session_name(name: &str) -> bool {
 }
 
 /// That a text cannot be a session's name, and what can.
+#[cfg(feature = "files")]
 pub(crate) fn not_a_name(name: &str) -> String {
     format!(
         "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most {LONGEST} bytes, neither starting nor ending with '.', and no device's name of Windows such as con"
