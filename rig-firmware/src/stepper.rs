@@ -2,7 +2,7 @@
 //!
 //! The timer's interrupt calls [`Stepper::fire`] once a step, and every interval is computed there:
 //! so a hold begins its ramp at the very next step, however much is queued. Speed is the ramp index
-//! (see [`ramp`](crate::ramp)), and looking ahead on one axis is linear in it: a move must be left
+//! (see `ramp`), and looking ahead on one axis is linear in it: a move must be left
 //! at an index from which what follows can still be stopped.
 //!
 //! Knows steps and ticks only; nothing of degrees, lines or states.
@@ -97,7 +97,7 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// A generator at rest at position zero, which waits for [`Stepper::configure`]. All of it is
+    /// A generator at rest at position zero, which waits for `Stepper::configure`. All of it is
     /// zero, so that it takes no flash.
     pub const fn new() -> Stepper {
         Stepper {

@@ -35,7 +35,7 @@ pub fn ffmpeg(folder: &Path, arguments: &[&str]) -> Vec<u8> {
 }
 
 /// Says that the test that runs is left out, for a test that shares its target with tests that need nothing: past the
-/// harness, which keeps what a test prints, so that `.ci/totals` finds it. Elsewhere [`trials`] says it better.
+/// harness, which keeps what a test prints, so that `.ci/totals` finds it. Elsewhere [`trials!`] says it better.
 pub fn say_skipped(reason: &str) {
     let thread = std::thread::current();
     let test = thread.name().unwrap_or("a test");

@@ -42,7 +42,7 @@ pub struct Recipe {
     pub views: u32,
     /// Materials and lightings of each view, 1 and above.
     pub lightings: u32,
-    /// Whether the camera is a random one; else it is [`CameraModel::plain`].
+    /// Whether the camera is a random one; else it is the plain one.
     pub random_camera: bool,
     /// Whether all objects whose file says how they look keep that; else half of them.
     pub own_albedo: bool,
