@@ -457,7 +457,7 @@ fn a_part_of_another_size_is_damage() {
         .unwrap();
     let set = TruthSet::open(dir.path(), TruthLayout::Mit).unwrap();
     let text = with_causes(&set.load(0).unwrap_err());
-    assert!(text.contains("has 9x7 pixels where 4x4"), "{text}");
+    assert!(text.contains("has 9 x 7 pixels where 4 x 4"), "{text}");
 }
 
 #[test]

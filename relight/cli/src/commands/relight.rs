@@ -92,7 +92,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_parser = one_of(WHITE_BALANCES), default_value = "light")]
     white_balance: WhiteBalance,
     /// Brightness in stops. With 0 the strongest light is as strong as in the photograph.
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = within(-20.0..=20.0, "stops"), allow_hyphen_values = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = within(-20.0_f32..=20.0, "stops"), allow_hyphen_values = true)]
     exposure: f32,
     /// Multiply the object's albedo with a colour, linear.
     #[arg(long, value_name = "R,G,B", value_parser = tint)]

@@ -81,9 +81,6 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
 
     fs::create_dir(folder.path("shards")).unwrap();
     write_shard(&folder.path("shards"));
-    Weights::initial(&relight_photo::nets::paper::normal_net(), 3)
-        .write(&folder.path("other.safetensors"), WeightPrecision::Single)
-        .unwrap();
     for (command, code, expected) in [
         (
             "decompose shards --rect 1,2,3,4 -o o",
@@ -140,11 +137,6 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
             "weights export w.safetensors --net normal-net -o w.onnx",
             1,
             "another network's",
-        ),
-        (
-            "weights export w.safetensors other.safetensors -o w.onnx",
-            1,
-            "other.safetensors: the weights have no",
         ),
         ("weights export -o w.onnx", 2, "<IN>"),
         (

@@ -179,7 +179,7 @@ fn what_is_no_photograph_is_refused() {
     );
     assert_eq!(
         refused(photo(), Planes::filled(Extent::new(70, 90), [1.0])),
-        "the mask has 70 x 90 pixels, and the photograph 90 x 70"
+        "the mask has 70 x 90 pixels where 90 x 70 are needed"
     );
     assert!(matches!(
         LightSource::Coefficients(relight_core::light::ShLight::dark(
