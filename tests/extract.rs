@@ -516,7 +516,7 @@ fn read(png: &[u8]) -> image::DynamicImage {
 fn what_a_killed_run_left_behind_is_removed_by_the_next() {
     let bench = Bench::new();
     fs::create_dir(bench.path("out")).unwrap();
-    for name in [".clip.tar.partial", ".clip.spool"] {
+    for name in [".clip.tar.7.0.partial", ".clip.spool"] {
         fs::write(bench.path("out").join(name), "half").unwrap();
     }
     bench.errors(0, "clip.mkv --mask mask.png --frames 30 --size 32 -o out");
