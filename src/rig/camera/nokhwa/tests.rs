@@ -360,7 +360,7 @@ fn a_number_that_is_no_camera_is_told() {
     let error = NokhwaCamera::open(4_000_000).err().unwrap();
     let text = with_causes(&error);
     assert!(
-        text.starts_with("nokhwa:4000000 failed when it was opened"),
+        text.starts_with("nokhwa:4000000 refused when it was opened"),
         "{text}"
     );
     assert!(text.contains("No such file"), "{text}");
