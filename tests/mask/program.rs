@@ -325,6 +325,22 @@ fn each_session_of_a_folder_gets_its_mask_and_a_failing_one_stops_no_other() {
 }
 
 #[test]
+fn what_lies_beside_sessions_is_named_whether_or_not_a_mask_fails() {
+    let root = tempfile::tempdir().unwrap();
+    session(root.path(), "20261120T093015Z-a");
+    let failing = session(root.path(), "20261120T093115Z-b");
+    fs::write(root.path().join("notes.txt"), "of the day").unwrap();
+    for painted in [false, true] {
+        if painted {
+            fs::write(failing.join("mask.png"), "painted").unwrap();
+        }
+        let output = relit_mask(root.path(), &[".", "--rect", AROUND]);
+        assert_eq!(code(&output), 3, "{}", said(&output));
+        assert!(said(&output).contains("notes.txt"), "{}", said(&output));
+    }
+}
+
+#[test]
 fn one_name_for_the_masks_of_several_sessions_is_a_usage_error() {
     let root = tempfile::tempdir().unwrap();
     session(root.path(), "20261120T093015Z-a");

@@ -25,14 +25,14 @@ pub(crate) fn run(arguments: &MaskArguments) -> ExitCode {
     }
     match (arguments.edit, paths.first()) {
         (true, Some(path)) => console.finish(draw(path, arguments, console)),
-        _ => console.finish(
-            make(&paths, arguments, console).map(|outcome| match outcome {
-                Outcome::Whole if says_unused(&paths, &arguments.input, console) => {
-                    Outcome::Incomplete
-                }
+        _ => {
+            let leaves_out = says_unused(&paths, &arguments.input, console);
+            let made = make(&paths, arguments, console);
+            console.finish(made.map(|outcome| match outcome {
+                Outcome::Whole if leaves_out => Outcome::Incomplete,
                 outcome => outcome,
-            }),
-        ),
+            }))
+        }
     }
 }
 
