@@ -9,6 +9,7 @@
 //! | `studio` | panoramas out of nothing but a seed |
 //! | `camera` | from light to 8-bit values |
 //! | `library`, `recipe` | what there is to draw from, and what is drawn |
+//! | `pack` | many objects and panoramas in one file |
 //! | `sample`, `folder` | one sample; a folder of them |
 //! | `turn` | whole turns as shards |
 //! | `transfer` | objects on the table, to be lit by any room over a whole turn without a ray |
@@ -39,6 +40,7 @@ mod lighting;
 mod mesh;
 mod noise;
 mod object;
+mod pack;
 mod paint;
 mod png;
 mod random;
@@ -59,6 +61,7 @@ pub use library::{Folders, LeftOut, Library, made_panoramas};
 pub use lighting::{BlinnPhong, LightKind, Lighting, Material, Panoramas, Shaded, SyntheticScene};
 pub use mesh::Mesh;
 pub use object::{ObjectSource, SyntheticView};
+pub use pack::{LIBRARY_EXTENSION, LibraryEntry, LibrarySources, LibrarySummary, build_library};
 pub use random::stream;
 pub use recipe::Recipe;
 pub use sample::SynthSample;

@@ -1,21 +1,24 @@
 //! What a user brings: meshes, textures and panoramas, read once.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::{fmt, fs};
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::SynthError;
 use super::lighting::Panoramas;
 use super::mesh::{Mesh, NOT_READ};
+use super::pack::{self, Contents, Wanted};
 use super::studio::Surroundings;
 use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
 use relight_core::statistics::ranked;
 use relit_data::file_names::is_hidden;
+use relit_data::shard::Digest;
 
 /// Size of the panoramas that are made here.
 pub(crate) const PANORAMA_EXTENT: Extent = Extent::new(256, 128);
@@ -35,6 +38,8 @@ pub struct Library {
     pub panoramas: Panoramas,
     /// What of the folders is not used.
     pub left_out: Vec<LeftOut>,
+    /// Of meshes and panoramas from packed libraries, by name: whether they are for validation only.
+    pub(crate) is_for_validation: BTreeMap<String, bool>,
 }
 
 /// Something of a user's own that is not used.
@@ -52,7 +57,7 @@ impl fmt::Display for LeftOut {
     }
 }
 
-/// Folders of a user's own files.
+/// Folders of a user's own files. In place of a folder of meshes or panoramas, a packed library (`.relib`) may be given.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Folders {
     /// `.obj`, `.gltf` and `.glb`, also in folders within it.
@@ -79,13 +84,15 @@ impl Folders {
 }
 
 impl Library {
-    /// Reads all files of the kinds in these folders, in the order of their names. Where no folder of
-    /// panoramas is given, 13 are made. Meshes of other kinds are left out.
+    /// Reads all files of the kinds in these folders, in the order of their names, and all of packed libraries: see
+    /// [`Self::training`]. Where no folder of panoramas is given, 13 are made. Meshes of other kinds are left out.
     ///
     /// # Errors
     /// Where a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
+        let packed = Contents::of(folders)?;
         let (meshes, mut left_out) = match &folders.meshes {
+            Some(path) if pack::is_packed(path) => (packed.meshes, Vec::new()),
             Some(folder) => read_meshes(folder)?,
             None => (Vec::new(), Vec::new()),
         };
@@ -95,6 +102,7 @@ impl Library {
             None => Vec::new(),
         };
         let panoramas = match &folders.panoramas {
+            Some(path) if pack::is_packed(path) => packed.panoramas,
             Some(folder) => read_all(folder, &PANORAMAS, &mut unused, |path| {
                 Panorama::read(path).map_err(SynthError::Image)
             })?,
@@ -107,17 +115,86 @@ impl Library {
         let mut pictures: Vec<TextureImage> =
             textures.into_iter().map(|(_, picture)| picture).collect();
         pictures.extend(panoramas.iter().map(|(_, panorama)| picture_of(panorama)));
-        let panoramas = Panoramas::new(panoramas);
-        if panoramas.is_empty() {
-            let fault = "all panoramas are black: give one with light";
-            return Err(SynthError::Refused(fault.to_owned()));
-        }
-        Ok(Self {
+        let library = Self {
             meshes,
             pictures,
-            panoramas,
+            panoramas: Panoramas::new(panoramas),
             left_out,
+            is_for_validation: packed.is_for_validation,
+        };
+        library.checked("all panoramas are black: give one with light")
+    }
+
+    /// A packed library from its bytes; errors name it as `path`.
+    ///
+    /// # Errors
+    /// [`SynthError::Unusable`] where it is damaged.
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, SynthError> {
+        let contents = pack::read(path, bytes, Wanted::ALL)?;
+        let pictures = contents.panoramas.iter();
+        Ok(Self {
+            pictures: pictures.map(|(_, panorama)| picture_of(panorama)).collect(),
+            meshes: contents.meshes,
+            panoramas: Panoramas::new(contents.panoramas),
+            left_out: Vec::new(),
+            is_for_validation: contents.is_for_validation,
         })
+    }
+
+    /// The part of packed libraries that may be learned from. What comes from folders is in both parts.
+    ///
+    /// # Errors
+    /// Where no panorama is left.
+    pub fn training(self) -> Result<Self, SynthError> {
+        self.part(false)
+    }
+
+    /// The part of packed libraries that is for validation only: a tenth of the objects and of the panoramas.
+    ///
+    /// # Errors
+    /// Where no panorama is left.
+    pub fn validation(self) -> Result<Self, SynthError> {
+        self.part(true)
+    }
+
+    fn part(mut self, is_validation: bool) -> Result<Self, SynthError> {
+        let marks = &self.is_for_validation;
+        let belongs = |name: &str| marks.get(name).is_none_or(|&own| own == is_validation);
+        self.meshes.retain(|(name, _)| belongs(name));
+        let textures = self.pictures.len().saturating_sub(self.panoramas.len());
+        let mut number = 0;
+        self.pictures.retain(|_| {
+            number += 1;
+            let panorama = (number - 1_usize).checked_sub(textures);
+            let name = panorama.and_then(|panorama| self.panoramas.name(panorama));
+            name.is_none_or(belongs)
+        });
+        self.panoramas.retain(belongs);
+        self.checked("this part of the library has no panorama: give another library, or a folder of panoramas")
+    }
+
+    /// The same where there is light.
+    fn checked(self, fault: &str) -> Result<Self, SynthError> {
+        if self.panoramas.is_empty() {
+            return Err(SynthError::Refused(fault.to_owned()));
+        }
+        Ok(self)
+    }
+
+    /// The digest of all that views and finishes are drawn from: meshes with their materials, and pictures.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        let meshes = self.meshes.par_iter();
+        let meshes: Vec<String> = meshes
+            .map(|(name, mesh)| format!("{name} {}\n", mesh.digest()))
+            .collect();
+        let pictures = self.pictures.par_iter().map(|picture| {
+            let mut bytes = Vec::new();
+            picture.write_to(&mut bytes);
+            format!("{}\n", Digest::of(&bytes))
+        });
+        let pictures: Vec<String> = pictures.collect();
+        Digest::of([meshes.concat(), pictures.concat()].join("\n").as_bytes())
     }
 
     /// The same without its meshes: all shapes are made.
@@ -128,7 +205,34 @@ impl Library {
             pictures: self.pictures.clone(),
             panoramas: self.panoramas.clone(),
             left_out: Vec::new(),
+            is_for_validation: self.is_for_validation.clone(),
         }
+    }
+}
+
+impl Contents {
+    /// What is wanted of packed libraries that stand in place of folders; each is read once.
+    fn of(folders: &Folders) -> Result<Self, SynthError> {
+        let packed = |path: &Option<PathBuf>| path.clone().filter(|path| pack::is_packed(path));
+        let (meshes, panoramas) = (packed(&folders.meshes), packed(&folders.panoramas));
+        let mut contents = Self::default();
+        let paths: BTreeSet<&PathBuf> = meshes.iter().chain(&panoramas).collect();
+        for path in paths {
+            let bytes = fs::read(path).map_err(SynthError::read(path))?;
+            let wanted = Wanted {
+                meshes: meshes.as_ref() == Some(path),
+                panoramas: panoramas.as_ref() == Some(path),
+            };
+            let read = pack::read(path, &bytes, wanted)?;
+            if wanted.meshes {
+                contents.meshes = read.meshes;
+            }
+            if wanted.panoramas {
+                contents.panoramas = read.panoramas;
+            }
+            contents.is_for_validation.extend(read.is_for_validation);
+        }
+        Ok(contents)
     }
 }
 
@@ -169,22 +273,22 @@ fn picture_of(panorama: &Panorama) -> TextureImage {
 }
 
 /// Files that are looked for in a folder.
-struct Wanted {
+pub(crate) struct FileKind {
     what: &'static str,
     extensions: &'static [&'static str],
 }
 
-const MESHES: Wanted = Wanted {
+pub(crate) const MESHES: FileKind = FileKind {
     what: "meshes",
     extensions: &["obj", "gltf", "glb"],
 };
-const TEXTURES: Wanted = Wanted {
+const TEXTURES: FileKind = FileKind {
     what: "textures",
     extensions: &[
         "png", "jpg", "jpeg", "jpe", "jfif", "webp", "tif", "tiff", "bmp",
     ],
 };
-const PANORAMAS: Wanted = Wanted {
+pub(crate) const PANORAMAS: FileKind = FileKind {
     what: "panoramas",
     extensions: &["hdr", "exr"],
 };
@@ -236,7 +340,7 @@ fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<LeftOut>), SynthError>
 }
 
 /// The files of a folder and of those within it, by their paths; each folder once, where links lead in a circle.
-fn files_below(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
+pub(crate) fn files_below(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
     let mut files = Vec::new();
     let mut seen = BTreeSet::new();
     let mut waiting = vec![folder.to_owned()];
@@ -272,12 +376,12 @@ fn extension(path: &Path) -> Option<String> {
     Some(path.extension()?.to_str()?.to_ascii_lowercase())
 }
 
-impl Wanted {
-    fn includes(&self, path: &Path) -> bool {
+impl FileKind {
+    pub(crate) fn includes(&self, path: &Path) -> bool {
         extension(path).is_some_and(|found| self.extensions.contains(&found.as_str()))
     }
 
-    fn missing(&self, folder: &Path) -> SynthError {
+    pub(crate) fn missing(&self, folder: &Path) -> SynthError {
         let (what, extensions) = (self.what, self.extensions.join(", ."));
         let fault = format!("holds no {what}: put files in it that end in .{extensions}");
         SynthError::unusable(folder, fault)
@@ -287,7 +391,7 @@ impl Wanted {
 /// Every file of the wanted kind in a folder, by name; files of other kinds are `left_out`.
 fn read_all<T>(
     folder: &Path,
-    wanted: &Wanted,
+    wanted: &FileKind,
     left_out: &mut Vec<LeftOut>,
     read: impl Fn(&Path) -> Result<T, SynthError>,
 ) -> Result<Vec<(String, T)>, SynthError> {

@@ -49,7 +49,8 @@ impl ComposedBatches {
             meshes: data.meshes.clone(),
             textures: data.textures.clone(),
             panoramas: data.panoramas.clone(),
-        })?;
+        })?
+        .training()?;
         let recipe = Recipe {
             seed: stream(run.seed, 21),
             size: data.size,

@@ -52,7 +52,8 @@ impl TurnViews {
             meshes: settings.meshes.clone(),
             textures: None,
             panoramas: settings.panoramas.clone(),
-        })?;
+        })?
+        .training()?;
         Self::new(settings, folder, library, stream(seed, TRAINING))
     }
 
@@ -64,7 +65,8 @@ impl TurnViews {
         let library = Library::read(&Folders {
             panoramas: settings.validation_panoramas.clone(),
             ..Folders::default()
-        })?;
+        })?
+        .validation()?;
         Self::new(settings, folder, library, VALIDATION)
     }
 

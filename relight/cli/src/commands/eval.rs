@@ -338,7 +338,7 @@ fn make(arguments: &RelightingArguments, console: Console) -> CommandResult {
         textures: None,
         panoramas: arguments.panoramas.clone(),
     };
-    let (library, outcome) = read_library(&folders, console)?;
+    let (library, outcome) = read_library(&folders, Library::validation, console)?;
     with_progress("making objects", console, |progress| {
         make_relighting(&recipe, &library, &arguments.common.data, progress)
     })?;

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use relight_synth::{
-    Folders, Library, LightKind, Recipe, SynthError, SynthTally, TurnRecipe, made_panoramas,
-    write_samples, write_turns,
+    Folders, LIBRARY_EXTENSION, Library, LibrarySources, LibrarySummary, LightKind, Recipe,
+    SynthError, SynthTally, TurnRecipe, build_library, made_panoramas, write_samples, write_turns,
 };
 use relit_console::{Console, Outcome};
 use serde_json::json;
@@ -24,10 +24,40 @@ Examples:
   relight synth --turn --count 20 --panoramas hdri -o turns
       whole turns as shards, with their truth beside them
   relight synth --write-panoramas -o panoramas
-      the panoramas that are used where none are given, as EXR";
+      the panoramas that are used where none are given, as EXR
+  relight synth library --meshes furniture meshes --panoramas hdri -o library.relib
+      objects and panoramas packed into one file, for --meshes and --panoramas";
 
 #[derive(Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct Arguments {
+    #[command(subcommand)]
+    mode: Option<Mode>,
+    #[command(flatten)]
+    samples: Option<SampleArguments>,
+}
+
+#[derive(Subcommand)]
+enum Mode {
+    /// Pack objects and panoramas into one file to learn from, with a table of their authors and licences.
+    Library(LibraryArguments),
+}
+
+#[derive(Args)]
+struct LibraryArguments {
+    /// The file to write, .relib; its table is written beside it as .csv and .md.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Folders of .obj, .gltf, .glb and archives of Sweet Home 3D (.sh3f), also in folders within them.
+    #[arg(long, value_name = "FOLDER", num_args = 1.., required_unless_present = "panoramas")]
+    meshes: Vec<PathBuf>,
+    /// Folders of .hdr and .exr, also in folders within them.
+    #[arg(long, value_name = "FOLDER", num_args = 1..)]
+    panoramas: Vec<PathBuf>,
+}
+
+#[derive(Args)]
+struct SampleArguments {
     /// The folder to write into; made where it is missing.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
@@ -58,15 +88,18 @@ pub(crate) struct Arguments {
     /// Materials and lightings of each view.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     lightings: u32,
-    /// Objects of one's own, also in folders within it: .obj, .gltf, .glb.
+    /// Objects of one's own, also in folders within it: .obj, .gltf, .glb; or a packed library, .relib.
     #[arg(long, value_name = "FOLDER")]
     meshes: Option<PathBuf>,
     /// Pictures to lay onto objects: .png, .jpg.
     #[arg(long, value_name = "FOLDER")]
     textures: Option<PathBuf>,
-    /// Light: .hdr, .exr [default: synthetic panoramas].
+    /// Light: .hdr, .exr; or a packed library, .relib [default: synthetic panoramas].
     #[arg(long, value_name = "FOLDER")]
     panoramas: Option<PathBuf>,
+    /// Take from packed libraries what is for validation only [default: what is for training].
+    #[arg(long)]
+    validation: bool,
     /// Write whole turns as shards, as relit-extract does: the object stands still, the light turns.
     #[arg(long, group = "mode")]
     turn: bool,
@@ -94,6 +127,80 @@ const LIGHTS: Choices<LightKind> = &[
 ];
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    match (&arguments.mode, &arguments.samples) {
+        (Some(Mode::Library(arguments)), _) => library(arguments, console),
+        (None, Some(arguments)) => synthesise(arguments, console),
+        (None, None) => Err("--output is missing".into()),
+    }
+}
+
+fn library(arguments: &LibraryArguments, console: Console) -> CommandResult {
+    let out = &arguments.output;
+    if out
+        .extension()
+        .is_none_or(|found| found != LIBRARY_EXTENSION)
+    {
+        let fault = format!("{} does not end in .{LIBRARY_EXTENSION}", out.display());
+        return Err(fault.into());
+    }
+    let sources = LibrarySources {
+        meshes: arguments.meshes.clone(),
+        panoramas: arguments.panoramas.clone(),
+    };
+    let bar = console.progress(0, "files");
+    let built = build_library(&sources, out, &|count| match count {
+        Some(count) => bar.set_length(count as u64),
+        None => bar.inc(1),
+    });
+    bar.finish_and_clear();
+    let summary = built?;
+    for fault in &summary.faults {
+        let event = json!({ "event": "left_out", "path": fault.path, "message": fault.what });
+        console.warn_with(&fault.to_string(), &event);
+    }
+    for origin in summary.without_licence() {
+        let text = format!(
+            "{origin}: no licence is known, so nobody can tell what may be learned from it: write an origin.toml there"
+        );
+        let event = json!({ "event": "no_licence", "origin": origin });
+        console.warn_with(&text, &event);
+    }
+    report_library(out, &summary, console);
+    Ok(match summary.faults.is_empty() {
+        true => Outcome::Whole,
+        false => Outcome::Incomplete,
+    })
+}
+
+fn report_library(out: &Path, summary: &LibrarySummary, console: Console) {
+    let (objects, panoramas) = (&summary.objects, &summary.panoramas);
+    let left_out: Vec<String> = summary
+        .left_out
+        .iter()
+        .map(|(reason, count)| format!("{count} {reason}"))
+        .collect();
+    let mut text = format!(
+        "{}: {} objects and {} panoramas, {:.1} MB",
+        out.display(),
+        objects.len(),
+        panoramas.len(),
+        summary.bytes as f64 / 1e6
+    );
+    if !left_out.is_empty() {
+        text = format!("{text}; left out: {}", left_out.join(", "));
+    }
+    let event = json!({
+        "event": "library",
+        "out": out,
+        "objects": objects.len(),
+        "panoramas": panoramas.len(),
+        "bytes": summary.bytes,
+        "left_out": summary.left_out,
+    });
+    console.say(&text, &event);
+}
+
+fn synthesise(arguments: &SampleArguments, console: Console) -> CommandResult {
     if arguments.write_panoramas {
         return panoramas(&arguments.output, console);
     }
@@ -102,7 +209,11 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         textures: arguments.textures.clone(),
         panoramas: arguments.panoramas.clone(),
     };
-    let (library, outcome) = read_library(&folders, console)?;
+    let part = match arguments.validation {
+        true => Library::validation,
+        false => Library::training,
+    };
+    let (library, outcome) = read_library(&folders, part, console)?;
     if arguments.albedo.is_some() {
         tell_of_plain_meshes(&library, console)?;
     }
@@ -139,7 +250,7 @@ fn tell_of_plain_meshes(library: &Library, console: Console) -> Result<(), &'sta
     Ok(())
 }
 
-fn recipe(arguments: &Arguments) -> Recipe {
+fn recipe(arguments: &SampleArguments) -> Recipe {
     Recipe {
         seed: arguments.seed,
         size: arguments.size,
@@ -152,7 +263,11 @@ fn recipe(arguments: &Arguments) -> Recipe {
     }
 }
 
-fn samples(arguments: &Arguments, library: &Library, console: Console) -> Result<(), SynthError> {
+fn samples(
+    arguments: &SampleArguments,
+    library: &Library,
+    console: Console,
+) -> Result<(), SynthError> {
     let count = arguments.count.unwrap_or(1000);
     let bar = console.progress(count, "samples");
     let recipe = recipe(arguments);
@@ -162,7 +277,11 @@ fn samples(arguments: &Arguments, library: &Library, console: Console) -> Result
     Ok(())
 }
 
-fn turns(arguments: &Arguments, library: &Library, console: Console) -> Result<(), SynthError> {
+fn turns(
+    arguments: &SampleArguments,
+    library: &Library,
+    console: Console,
+) -> Result<(), SynthError> {
     let count = arguments.count.unwrap_or(1);
     let bar = console.progress(count * u64::from(arguments.frames), "frames");
     let turns = TurnRecipe {
@@ -175,7 +294,7 @@ fn turns(arguments: &Arguments, library: &Library, console: Console) -> Result<(
     Ok(())
 }
 
-fn report(arguments: &Arguments, console: Console, what: &str, written: SynthTally) {
+fn report(arguments: &SampleArguments, console: Console, what: &str, written: SynthTally) {
     let SynthTally { new, kept, .. } = written;
     let out = &arguments.output;
     console.say(

@@ -88,6 +88,11 @@ impl Panoramas {
         }
     }
 
+    /// Keeps those of which the name is wanted.
+    pub(crate) fn retain(&mut self, wanted: impl Fn(&str) -> bool) {
+        self.entries.retain(|entry| wanted(&entry.name));
+    }
+
     /// How many there are.
     #[must_use]
     pub fn len(&self) -> usize {

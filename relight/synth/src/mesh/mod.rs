@@ -6,6 +6,7 @@ mod gltf;
 mod material;
 mod mtl;
 mod obj;
+mod orient;
 mod polygon;
 mod raw;
 mod text;
@@ -16,9 +17,9 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::SynthError;
-use material::MeshMaterials;
-pub(crate) use material::OwnSurface;
-pub(super) use raw::RawMesh;
+pub(crate) use material::{MeshMaterial, MeshMaterials, OwnSurface, PlacedPicture};
+pub(crate) use raw::{NO_TEXTURE, RawMesh};
+use relit_data::shard::Digest;
 
 /// Most triangles that a mesh may have.
 const MOST_TRIANGLES: usize = 20_000_000;
@@ -62,21 +63,14 @@ impl Mesh {
     /// [`SynthError::Unusable`] where the file is damaged, holds no surface or is of another kind, [`SynthError::Io`] where it
     /// cannot be read.
     pub fn read(path: &Path) -> Result<Self, SynthError> {
-        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let raw = match extension.to_str() {
-            Some("obj") => obj::read(path)?,
-            Some("gltf" | "glb") => gltf::read(path)?,
-            _ => return Err(SynthError::unusable(path, NOT_READ)),
-        };
-        Self::new(raw, CREASE).map_err(SynthError::mesh(path))
+        Self::new(RawMesh::read(path)?, CREASE).map_err(SynthError::mesh(path))
     }
 
     /// A mesh of these triangles, moved and scaled into the unit sphere; normals are blended
     /// between faces that meet at less than `crease` radians. Triangles without an area are left
     /// out, vertices at one place are joined.
     pub(super) fn new(raw: RawMesh, crease: f32) -> Result<Self, String> {
-        check(&raw)?;
-        let mut raw = weld(raw);
+        let mut raw = raw.welded()?;
         into_unit_sphere(&mut raw.positions);
         drop_flat(&mut raw);
         if raw.triangles.is_empty() {
@@ -114,6 +108,27 @@ impl Mesh {
             None => Vec3::ONE,
         };
         Some(materials.at(triangle, place, paint))
+    }
+
+    /// The digest of all that the mesh's pictures follow from.
+    pub(super) fn digest(&self) -> Digest {
+        let mut bytes = Vec::new();
+        let mut add = |values: &[f32]| bytes.extend(values.iter().flat_map(|x| x.to_le_bytes()));
+        self.positions.iter().for_each(|p| add(&p.to_array()));
+        self.colours
+            .iter()
+            .flatten()
+            .for_each(|c| add(&c.to_array()));
+        self.texture
+            .iter()
+            .flatten()
+            .for_each(|t| add(&t.to_array()));
+        let corners = self.triangles.as_flattened();
+        bytes.extend(corners.iter().flat_map(|vertex| vertex.to_le_bytes()));
+        if let Some(materials) = &self.materials {
+            materials.write_to(&mut bytes);
+        }
+        Digest::of(&bytes)
     }
 
     /// Texture coordinates for each corner of each triangle, where all of them have some.
@@ -155,29 +170,56 @@ fn too_large(triangles: usize) -> String {
     format!("it has {triangles} triangles, more than {MOST_TRIANGLES}")
 }
 
-/// Joins vertices at one place, so that faces know their neighbours, and leaves out those that no
-/// triangle uses.
-fn weld(raw: RawMesh) -> RawMesh {
-    let mut places: HashMap<[u32; 3], u32> = HashMap::with_capacity(raw.positions.len());
-    let mut positions = Vec::with_capacity(raw.positions.len());
-    let mut joined = |vertex: u32| {
-        // Adding 0 makes -0 and 0 one place.
-        let position = raw.positions[vertex as usize] + Vec3::ZERO;
-        let key = position.to_array().map(f32::to_bits);
-        *places.entry(key).or_insert_with(|| {
-            positions.push(position);
-            positions.len() as u32 - 1
+impl RawMesh {
+    /// What a file holds, by its extension.
+    ///
+    /// # Errors
+    /// As [`Mesh::read`].
+    pub(crate) fn read(path: &Path) -> Result<Self, SynthError> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        match extension.to_str() {
+            Some("obj") => obj::read(path),
+            Some("gltf" | "glb") => gltf::read(path),
+            _ => Err(SynthError::unusable(path, NOT_READ)),
+        }
+    }
+
+    /// The mesh with vertices at one place joined, so that faces know their neighbours, and without those that no
+    /// triangle uses.
+    ///
+    /// # Errors
+    /// Where it has no triangles, or their vertices are not there.
+    pub(crate) fn welded(self) -> Result<Self, String> {
+        check(&self)?;
+        let mut places: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.positions.len());
+        let mut positions = Vec::with_capacity(self.positions.len());
+        let mut joined = |vertex: u32| {
+            // Adding 0 makes -0 and 0 one place.
+            let position = self.positions[vertex as usize] + Vec3::ZERO;
+            let key = position.to_array().map(f32::to_bits);
+            *places.entry(key).or_insert_with(|| {
+                positions.push(position);
+                positions.len() as u32 - 1
+            })
+        };
+        let triangles = self
+            .triangles
+            .iter()
+            .map(|corners| corners.map(&mut joined))
+            .collect();
+        Ok(Self {
+            positions,
+            triangles,
+            ..self
         })
-    };
-    let triangles = raw
-        .triangles
-        .iter()
-        .map(|corners| corners.map(&mut joined))
-        .collect();
-    RawMesh {
-        positions,
-        triangles,
-        ..raw
+    }
+
+    /// Keeps the triangles that are marked.
+    pub(crate) fn keep(&mut self, marks: &[bool]) {
+        keep(&mut self.triangles, marks);
+        keep(&mut self.texture, marks);
+        keep(&mut self.colours, marks);
+        keep(&mut self.materials.of_triangle, marks);
     }
 }
 
@@ -213,10 +255,7 @@ fn drop_flat(raw: &mut RawMesh) {
             (b - a).cross(c - a).length_squared() > 1e-20
         })
         .collect();
-    keep(&mut raw.triangles, &has_area);
-    keep(&mut raw.texture, &has_area);
-    keep(&mut raw.colours, &has_area);
-    keep(&mut raw.materials.of_triangle, &has_area);
+    raw.keep(&has_area);
 }
 
 /// Keeps the items that are marked, and those beyond the marks.

@@ -17,7 +17,7 @@ use super::polygon::Triangulator;
 use super::raw::{RawMesh, RawTriangle};
 use super::text::{Statements, decoded, keyword, readings, without_comment};
 use crate::SynthError;
-use crate::texture::TextureImage;
+use crate::texture::{PictureKind, TextureImage};
 
 /// Names of materials by which programs say that there is none.
 const NO_MATERIAL: [&str; 3] = ["", "none", "(null)"];
@@ -445,7 +445,8 @@ fn picture(path: &Path, name: &str) -> Result<TextureImage, String> {
     let file = readings(name).find_map(|name| by_name(path, name));
     let file = file.ok_or_else(|| "is not there".to_owned())?;
     let bytes = std::fs::read(file).map_err(|fault| format!("cannot be read: {fault}"))?;
-    TextureImage::of_colours(&bytes).map_err(|fault| format!("cannot be used: {fault}"))
+    TextureImage::decoded(&bytes, PictureKind::Colours)
+        .map_err(|fault| format!("cannot be used: {fault}"))
 }
 
 #[cfg(test)]

@@ -53,7 +53,7 @@ impl TransferCache {
         Ok(Self {
             folder: folder.to_owned(),
             recipe,
-            library: digest_of(library),
+            library: library.digest(),
         })
     }
 
@@ -95,22 +95,6 @@ impl TransferCache {
         let hash = Digest::of(all.as_bytes()).to_string();
         self.folder.join(format!("{hash}.transfer"))
     }
-}
-
-/// What is drawn from a library: meshes and pictures.
-fn digest_of(library: &Library) -> Digest {
-    let mut bytes = Vec::new();
-    for (name, mesh) in &library.meshes {
-        bytes.extend(name.as_bytes());
-        for position in &mesh.positions {
-            position
-                .to_array()
-                .iter()
-                .for_each(|x| bytes.extend(x.to_le_bytes()));
-        }
-    }
-    bytes.extend(library.pictures.len().to_le_bytes());
-    Digest::of(&bytes)
 }
 
 fn encode(transfer: &RadianceTransfer) -> Vec<u8> {

@@ -25,13 +25,13 @@ pub struct DataSettings {
     pub shuffle_buffer: u64,
     /// How often each is seen, in the mean.
     pub reuse: f64,
-    /// A folder of meshes beside the procedural shapes.
+    /// A folder of meshes, or the training part of a packed library, beside the procedural shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub meshes: Option<PathBuf>,
     /// A folder of pictures to lay onto objects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub textures: Option<PathBuf>,
-    /// A folder of panoramas in place of the synthetic ones.
+    /// A folder of panoramas, or the training part of a packed library, in place of the synthetic ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub panoramas: Option<PathBuf>,
     /// Samples on which the network is validated, made from seeds that it does not train on.

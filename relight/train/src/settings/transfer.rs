@@ -27,13 +27,14 @@ pub struct TransferSettings {
     pub coarse_part: f64,
     /// Curves of brightness of each panorama.
     pub variants: u32,
-    /// A folder of meshes beside the procedural shapes.
+    /// A folder of meshes, or the training part of a packed library, beside the procedural shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub meshes: Option<PathBuf>,
-    /// A folder of panoramas in place of the synthetic ones.
+    /// A folder of panoramas, or the training part of a packed library, in place of the synthetic ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub panoramas: Option<PathBuf>,
-    /// A folder of panoramas to validate in; the synthetic ones where there is none.
+    /// A folder of panoramas, or the validation part of a packed library, to validate in; the synthetic ones where there is
+    /// none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation_panoramas: Option<PathBuf>,
     /// Turns on which the network is validated, of procedural shapes that it does not train on.

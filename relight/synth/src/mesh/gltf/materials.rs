@@ -8,7 +8,7 @@ use glam::{Affine2, Vec2, Vec3};
 use super::document::{Material, TextureInfo};
 use super::file::File;
 use crate::mesh::material::{MeshMaterial, PlacedPicture};
-use crate::texture::TextureImage;
+use crate::texture::{PictureKind, TextureImage};
 
 /// The materials that are used, and plain ones in place of the others, so that numbers stay as they are. Pictures that cannot
 /// be used are left out.
@@ -36,13 +36,6 @@ struct Pictures<'a> {
     /// By number and what its values are; none of those that cannot be used.
     read: HashMap<(usize, PictureKind), Option<Arc<TextureImage>>>,
     left_out: &'a mut Vec<String>,
-}
-
-/// What the values of a picture are.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum PictureKind {
-    Colours,
-    Numbers,
 }
 
 impl Pictures<'_> {
@@ -126,11 +119,8 @@ impl Pictures<'_> {
     fn image(&self, (number, kind): (usize, PictureKind)) -> Result<TextureImage, String> {
         let unusable = |why: &str| format!("its picture {} {why}", self.name(number));
         let bytes = self.file.picture(number).map_err(|why| unusable(&why))?;
-        let picture = match kind {
-            PictureKind::Colours => TextureImage::of_colours(&bytes),
-            PictureKind::Numbers => TextureImage::of_numbers(&bytes),
-        };
-        picture.map_err(|fault| unusable(&format!("cannot be used: {fault}")))
+        TextureImage::decoded(&bytes, kind)
+            .map_err(|fault| unusable(&format!("cannot be used: {fault}")))
     }
 
     /// How a picture is named to people.

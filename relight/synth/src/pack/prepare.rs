@@ -1,0 +1,219 @@
+//! One object of a library: repaired, judged by its catalogue and its shape, and made small.
+
+use std::fmt;
+
+use glam::{Vec2, Vec3};
+use relit_data::shard::Digest;
+
+use super::candidates::Candidate;
+use super::codec::{PackedMesh, encode_mesh, snap};
+use super::file::LONGEST_PICTURE;
+use crate::mesh::RawMesh;
+use crate::texture::PictureKind;
+
+/// Most triangles of an object: more are details that small pictures do not show.
+const MOST_TRIANGLES: usize = 30_000;
+/// Thinner than this part of its size, an object is flat.
+const FLAT: f32 = 0.02;
+/// A picture of which more is see-through is cut out, as those of leaves,
+const CUT_OUT: f32 = 0.1;
+/// and an object is left out where such pictures cover more of its surface than this.
+const MOST_CUT_OUT: f32 = 0.05;
+/// Directions in which an object's thickness is measured: the normals of its largest triangles.
+const DIRECTIONS: usize = 48;
+
+/// Words at the end of a title that say that an object belongs to a room.
+const OF_ROOMS: [&str; 10] = [
+    "wall", "walls", "window", "windows", "door", "doors", "floor", "ceiling", "roof", "plane",
+];
+
+/// Why an object or a panorama is not part of a library.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Reason {
+    /// A wall, a window or a door, by its catalogue or its title.
+    PartOfRoom,
+    Flat,
+    CutOut,
+    TooDense(usize),
+    /// The name of the one that stays.
+    Repeated(String),
+    /// What its folder says.
+    Excluded(String),
+    Unreadable(String),
+}
+
+impl Reason {
+    /// What all for the same reason have in common.
+    pub(super) fn kind(&self) -> &'static str {
+        match self {
+            Self::PartOfRoom => "walls, windows and doors",
+            Self::Flat => "flat",
+            Self::CutOut => "pictures that are cut out, as of leaves",
+            Self::TooDense(_) => "too many triangles",
+            Self::Repeated(_) => "the same as another one",
+            Self::Excluded(_) => "excluded by origin.toml",
+            Self::Unreadable(_) => "cannot be read",
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PartOfRoom => write!(f, "it is a wall, a window or a door"),
+            Self::Flat => write!(f, "it is flat"),
+            Self::CutOut => write!(f, "its pictures are cut out, which is not drawn"),
+            Self::TooDense(count) => {
+                write!(f, "it has {count} triangles, more than {MOST_TRIANGLES}")
+            }
+            Self::Repeated(name) => write!(f, "it is the same as {name}"),
+            Self::Excluded(why) => write!(f, "{why}"),
+            Self::Unreadable(why) => write!(f, "it cannot be read: {why}"),
+        }
+    }
+}
+
+/// An object that is part of a library.
+pub(super) struct Prepared {
+    pub(super) mesh: PackedMesh,
+    pub(super) bytes: Vec<u8>,
+    /// Its pictures as JPEG.
+    pub(super) pictures: Vec<(PictureKind, Vec<u8>)>,
+    /// Of its shape.
+    pub(super) digest: Digest,
+    /// What its file names and is not used.
+    pub(super) missing: Vec<String>,
+}
+
+impl Prepared {
+    /// Reads an object and makes it ready.
+    ///
+    /// # Errors
+    /// Why it is left out.
+    pub(super) fn read(candidate: &Candidate) -> Result<Self, Reason> {
+        if let Some(why) = &candidate.leave_out {
+            return Err(Reason::Excluded(why.clone()));
+        }
+        if is_part_of_room(candidate) {
+            return Err(Reason::PartOfRoom);
+        }
+        let raw = RawMesh::read(&candidate.path);
+        let mut raw = raw.map_err(|fault| Reason::Unreadable(fault.to_string()))?;
+        for position in &mut raw.positions {
+            *position = candidate.rotation * *position;
+        }
+        let raw = repaired(raw).map_err(Reason::Unreadable)?;
+        Self::judged(raw)
+    }
+
+    fn judged(mut raw: RawMesh) -> Result<Self, Reason> {
+        if raw.triangles.len() > MOST_TRIANGLES {
+            return Err(Reason::TooDense(raw.triangles.len()));
+        }
+        if is_flat(&raw) {
+            return Err(Reason::Flat);
+        }
+        if is_cut_out(&raw) {
+            return Err(Reason::CutOut);
+        }
+        raw.orient();
+        let missing = std::mem::take(&mut raw.left_out);
+        let (mesh, bytes, pictures) = encode_mesh(&raw).map_err(Reason::Unreadable)?;
+        let packed =
+            |(image, kind): (std::sync::Arc<crate::texture::TextureImage>, PictureKind)| {
+                let packed = image.packed(kind, LONGEST_PICTURE);
+                let unreadable = |fault| Reason::Unreadable(format!("a picture of it: {fault}"));
+                Ok((kind, packed.map_err(unreadable)?))
+            };
+        let positions = raw.positions.iter().flat_map(Vec3::to_array);
+        let shape: Vec<u8> = positions.flat_map(f32::to_le_bytes).collect();
+        Ok(Self {
+            mesh,
+            bytes,
+            pictures: pictures.into_iter().map(packed).collect::<Result<_, _>>()?,
+            digest: Digest::of(&shape),
+            missing,
+        })
+    }
+}
+
+fn is_part_of_room(candidate: &Candidate) -> bool {
+    let category = candidate.entry.category.to_lowercase();
+    let title = candidate.entry.title.to_lowercase();
+    let last = title.split_whitespace().next_back().unwrap_or_default();
+    candidate.is_door_or_window
+        || category.contains("door")
+        || category.contains("window")
+        || OF_ROOMS.contains(&last)
+}
+
+/// The mesh with vertices joined, without triangles that have no area, or that are there twice.
+fn repaired(mut raw: RawMesh) -> Result<RawMesh, String> {
+    let is_finite = |place: &Vec3| place.is_finite();
+    if raw.positions.iter().all(is_finite) {
+        snap(&mut raw.positions);
+    }
+    let mut raw = raw.welded()?;
+    let mut seen = std::collections::HashSet::new();
+    let marks: Vec<bool> = raw
+        .triangles
+        .iter()
+        .map(|&corners| {
+            let [a, b, c] = corners.map(|vertex| raw.positions[vertex as usize]);
+            let mut sorted = corners;
+            sorted.sort_unstable();
+            (b - a).cross(c - a) != Vec3::ZERO && seen.insert(sorted)
+        })
+        .collect();
+    raw.keep(&marks);
+    // Texture coordinates that are numbers of another kind than places: none.
+    for corners in &mut raw.texture {
+        if !corners.iter().all(|place| place.is_finite()) {
+            *corners = [Vec2::NAN; 3];
+        }
+    }
+    raw.welded()
+}
+
+fn normal(raw: &RawMesh, triangle: &[u32; 3]) -> Vec3 {
+    let [a, b, c] = triangle.map(|vertex| raw.positions[vertex as usize]);
+    (b - a).cross(c - a)
+}
+
+/// Whether an object is a plane, or nearly: thin along the normal of one of its largest triangles.
+fn is_flat(raw: &RawMesh) -> bool {
+    let mut normals: Vec<Vec3> = raw.triangles.iter().map(|t| normal(raw, t)).collect();
+    normals.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
+    normals.truncate(DIRECTIONS);
+    normals.extend(Vec3::AXES);
+    let extent = |along: Vec3| {
+        let heights = raw.positions.iter().map(|place| place.dot(along));
+        let (low, high) = heights.fold((f32::MAX, f32::MIN), |(low, high), height| {
+            (low.min(height), high.max(height))
+        });
+        high - low
+    };
+    let largest = Vec3::AXES.map(extent).into_iter().fold(0.0, f32::max);
+    let directions = normals.iter().filter_map(|normal| normal.try_normalize());
+    directions
+        .map(extent)
+        .any(|thickness| thickness < FLAT * largest)
+}
+
+/// Whether much of the surface is pictures of which much is see-through.
+fn is_cut_out(raw: &RawMesh) -> bool {
+    let is_cut_out = |number: &u32| {
+        let material = raw.materials.all.get(*number as usize);
+        let picture = material.and_then(|material| material.picture.as_ref());
+        picture.is_some_and(|picture| picture.image.see_through() > CUT_OUT)
+    };
+    let (mut all, mut cut_out) = (0.0, 0.0);
+    for (triangle, number) in raw.triangles.iter().zip(&raw.materials.of_triangle) {
+        let area = normal(raw, triangle).length();
+        all += area;
+        if is_cut_out(number) {
+            cut_out += area;
+        }
+    }
+    cut_out > MOST_CUT_OUT * all
+}
