@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-app setup-train train-turn test test-day test-rig test-slurm test-objects test-field packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-app setup-train training-data train-turn test test-day test-rig test-slurm test-objects test-field packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -52,6 +52,17 @@ setup-app:
 
 setup-train: ## Install libtorch, which relight's training is built with (544 MB, once)
 	@.ci/setup-train
+
+# Folders of one's own, beside what is downloaded: MESHES and PANORAMAS. What is left out (exit code 3) is named.
+LIBRARY ?= $(TARGET)/training-data/library.relib
+
+training-data: ## Download objects and panoramas (210 MB) and pack them into LIBRARY, for relight train and relight synth
+	cargo build --locked --release -p relight
+	@.ci/training-data $(TARGET)/training-data
+	$(TARGET)/release/relight synth library -o $(LIBRARY) \
+	    --meshes $(TARGET)/training-data/furniture $(MESHES) \
+	    --panoramas $(TARGET)/training-data/panoramas $(PANORAMAS) \
+	    || [[ $$? == 3 ]]
 
 # DATA holds the folders meshes, panoramas and held of what relight/cli/weights/README.md names; a run that was stopped goes on.
 RUNS ?= $(CURDIR)/$(TARGET)/train-turn

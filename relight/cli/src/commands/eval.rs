@@ -16,7 +16,7 @@ use relight_eval::{
 };
 use relight_photo::decompose::Decomposer;
 use relight_photo::nets::Weights;
-use relight_synth::Folders;
+use relight_synth::{Folders, Library};
 use relight_turn::{TurnNetwork, TurnNetworks};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;

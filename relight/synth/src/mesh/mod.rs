@@ -19,6 +19,7 @@ use glam::{Vec2, Vec3};
 use super::SynthError;
 pub(crate) use material::{MeshMaterial, MeshMaterials, OwnSurface, PlacedPicture};
 pub(crate) use raw::{NO_TEXTURE, RawMesh};
+use relit_data::file_names::has_extension;
 use relit_data::shard::Digest;
 
 /// Most triangles that a mesh may have.
@@ -63,7 +64,14 @@ impl Mesh {
     /// [`SynthError::Unusable`] where the file is damaged, holds no surface or is of another kind, [`SynthError::Io`] where it
     /// cannot be read.
     pub fn read(path: &Path) -> Result<Self, SynthError> {
-        Self::new(RawMesh::read(path)?, CREASE).map_err(SynthError::mesh(path))
+        let is_known = has_extension(path, &["obj", "gltf", "glb"]);
+        if !is_known {
+            return Err(SynthError::unusable(path, NOT_READ));
+        }
+        let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
+        let raw = RawMesh::parsed(path, &bytes);
+        raw.and_then(|raw| Self::new(raw, CREASE))
+            .map_err(SynthError::mesh(path))
     }
 
     /// A mesh of these triangles, moved and scaled into the unit sphere; normals are blended
@@ -171,16 +179,16 @@ fn too_large(triangles: usize) -> String {
 }
 
 impl RawMesh {
-    /// What a file holds, by its extension.
+    /// What the bytes of a file hold, by its extension.
     ///
     /// # Errors
-    /// As [`Mesh::read`].
-    pub(crate) fn read(path: &Path) -> Result<Self, SynthError> {
+    /// What is wrong with it, in words.
+    pub(crate) fn parsed(path: &Path, bytes: &[u8]) -> Result<Self, String> {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         match extension.to_str() {
-            Some("obj") => obj::read(path),
-            Some("gltf" | "glb") => gltf::read(path),
-            _ => Err(SynthError::unusable(path, NOT_READ)),
+            Some("obj") => obj::parsed(path, bytes),
+            Some("gltf" | "glb") => gltf::parsed(path, bytes),
+            _ => Err(NOT_READ.to_owned()),
         }
     }
 

@@ -26,12 +26,7 @@ const NO_MATERIAL: [&str; 3] = ["", "none", "(null)"];
 const MOST_LIBRARIES: usize = 32;
 
 /// All parts of the file as one surface, with the materials of the `.mtl` files that it names.
-pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
-    let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
-    parsed(path, &bytes).map_err(SynthError::mesh(path))
-}
-
-fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
+pub(super) fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
     let file = ObjFile::parsed(&decoded(bytes))?;
     let mut left_out = Vec::new();
     if file.has_free_form {

@@ -123,8 +123,9 @@ impl Candidate {
         let name = format!("{collection}/{within}");
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let known = |text: Option<String>| text.unwrap_or_else(|| UNKNOWN.to_owned());
+        let by_name = is_for_validation(&name);
         let entry = LibraryEntry {
-            is_for_validation: is_for_validation(&name),
+            is_for_validation: said.validation.unwrap_or(by_name),
             name,
             title: said.title.unwrap_or_else(|| stem.replace(['_', '-'], " ")),
             category: said.category.unwrap_or_default(),

@@ -20,6 +20,8 @@ pub(super) struct Origin {
     pub(super) author: Option<String>,
     pub(super) licence: Option<String>,
     pub(super) origin: Option<String>,
+    /// Whether it is for validation only, where a hash of its name is not to say.
+    pub(super) validation: Option<bool>,
     /// Why it is not to be learned from.
     pub(super) leave_out: Option<String>,
     /// By the path from the folder, with `/`.
@@ -79,6 +81,7 @@ impl Origin {
             author: all(own.author, &self.author),
             licence: all(own.licence, &self.licence),
             origin: all(own.origin, &self.origin),
+            validation: own.validation.or(self.validation),
             leave_out: all(own.leave_out, &self.leave_out),
             files: BTreeMap::new(),
         }

@@ -97,8 +97,10 @@ impl Prepared {
         if is_part_of_room(candidate) {
             return Err(Reason::PartOfRoom);
         }
-        let raw = RawMesh::read(&candidate.path);
-        let mut raw = raw.map_err(|fault| Reason::Unreadable(fault.to_string()))?;
+        let bytes = std::fs::read(&candidate.path);
+        let bytes = bytes.map_err(|fault| Reason::Unreadable(fault.to_string()))?;
+        let raw = RawMesh::parsed(&candidate.path, &bytes);
+        let mut raw = raw.map_err(Reason::Unreadable)?;
         for position in &mut raw.positions {
             *position = candidate.rotation * *position;
         }

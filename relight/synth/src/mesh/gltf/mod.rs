@@ -21,7 +21,6 @@ use self::file::{File, not_read};
 use self::nodes::Placements;
 use super::raw::{RawMesh, RawTriangle};
 use super::{MOST_TRIANGLES, too_large};
-use crate::SynthError;
 
 /// Kinds of primitives.
 const TRIANGLES: u32 = 4;
@@ -31,12 +30,7 @@ const TRIANGLE_FAN: u32 = 6;
 const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// All triangles of the default scene as one surface.
-pub(super) fn read(path: &Path) -> Result<RawMesh, SynthError> {
-    let bytes = std::fs::read(path).map_err(SynthError::read(path))?;
-    parsed(path, &bytes).map_err(SynthError::mesh(path))
-}
-
-fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
+pub(super) fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
     let file = File::parsed(path, bytes)?;
     let placements = Placements::of(&file.document)?;
     let mut reader = Reader {
