@@ -1,8 +1,11 @@
 //! A library out of folders and archives.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use glam::Vec3;
 use rayon::prelude::*;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
@@ -10,15 +13,15 @@ use relit_data::durable::write_whole;
 use relit_data::shard::Digest;
 
 use super::candidates::{Candidate, Candidates};
-use super::codec::{PackedPanorama, encode_panorama};
+use super::codec::{PackedPanorama, decode_mesh, encode_panorama};
 use super::file::{PackedEntry, Parts, encode};
 use super::prepare::{Prepared, Reason};
 use super::table::{Row, write_tables};
 use super::{LibraryEntry, UNKNOWN};
 use crate::SynthError;
 use crate::library::LeftOut;
-use crate::mesh::Mesh;
-use crate::texture::PictureKind;
+use crate::mesh::{CREASE, Mesh};
+use crate::texture::{PictureKind, TextureImage};
 
 /// Largest size of panoramas: larger ones are made smaller.
 const LARGEST_PANORAMA: Extent = Extent::new(512, 256);
@@ -106,7 +109,7 @@ struct Building {
 impl Building {
     fn add_objects(&mut self, all: &[Candidate], progress: &(dyn Fn(Option<usize>) + Sync)) {
         let read = all.par_iter().map(|candidate| {
-            let prepared = Prepared::read(candidate).and_then(|one| one.checked());
+            let prepared = Prepared::read(candidate).and_then(Prepared::checked);
             progress(None);
             prepared
         });
@@ -228,11 +231,11 @@ impl Prepared {
     /// The same where a surface is read from it again.
     fn checked(self) -> Result<Self, Reason> {
         let grey = |_, _| {
-            let grey = crate::texture::TextureImage::from_fn(1, 1, |_, _| glam::Vec3::splat(0.5));
-            Ok(std::sync::Arc::new(grey))
+            let grey = TextureImage::from_fn(1, 1, |_, _| Vec3::splat(0.5));
+            Ok(Arc::new(grey))
         };
-        super::codec::decode_mesh(&self.mesh, &self.bytes, grey)
-            .and_then(|raw| Mesh::new(raw, crate::mesh::CREASE))
+        decode_mesh(&self.mesh, &self.bytes, grey)
+            .and_then(|raw| Mesh::new(raw, CREASE))
             .map_err(Reason::Unreadable)?;
         Ok(self)
     }
@@ -247,7 +250,7 @@ fn small_panorama(candidate: &Candidate) -> Result<Panorama, Reason> {
         Panorama::read(&candidate.path).map_err(|fault| Reason::Unreadable(fault.to_string()))?;
     let rows = panorama.extent().height;
     let planes = panorama.image().planes();
-    let is_black = |rows: std::ops::Range<usize>| {
+    let is_black = |rows: Range<usize>| {
         let width = panorama.extent().width;
         let pixels = rows.flat_map(|y| (0..width).map(move |x| (x, y)));
         pixels

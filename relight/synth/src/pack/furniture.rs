@@ -94,7 +94,7 @@ impl Furniture {
 
     /// The models of the catalogue, in its order.
     pub(super) fn models(&self) -> Vec<Model> {
-        let numbers = (1..).take_while(|number| self.of(*number, "id").is_some());
+        let numbers = (1..).take_while(|number| self.of(*number, "name").is_some());
         numbers.filter_map(|number| self.model(number)).collect()
     }
 

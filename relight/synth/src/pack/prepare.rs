@@ -1,6 +1,8 @@
 //! One object of a library: repaired, judged by its catalogue and its shape, and made small.
 
+use std::collections::HashSet;
 use std::fmt;
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use relit_data::shard::Digest;
@@ -9,7 +11,7 @@ use super::candidates::Candidate;
 use super::codec::{PackedMesh, encode_mesh, snap};
 use super::file::LONGEST_PICTURE;
 use crate::mesh::RawMesh;
-use crate::texture::PictureKind;
+use crate::texture::{PictureKind, TextureImage};
 
 /// Most triangles of an object: more are details that small pictures do not show.
 const MOST_TRIANGLES: usize = 30_000;
@@ -125,7 +127,7 @@ impl Prepared {
             |(image, kind): (std::sync::Arc<crate::texture::TextureImage>, PictureKind)| {
                 let packed = image.packed(kind, LONGEST_PICTURE);
                 let unreadable = |fault| Reason::Unreadable(format!("a picture of it: {fault}"));
-                Ok((kind, packed.map_err(unreadable)?))
+                Ok::<_, Reason>((kind, packed.map_err(unreadable)?))
             };
         let positions = raw.positions.iter().flat_map(Vec3::to_array);
         let shape: Vec<u8> = positions.flat_map(f32::to_le_bytes).collect();
@@ -156,7 +158,7 @@ fn repaired(mut raw: RawMesh) -> Result<RawMesh, String> {
         snap(&mut raw.positions);
     }
     let mut raw = raw.welded()?;
-    let mut seen = std::collections::HashSet::new();
+    let mut seen = HashSet::new();
     let marks: Vec<bool> = raw
         .triangles
         .iter()
