@@ -6,7 +6,6 @@ mod gltf;
 mod material;
 mod mtl;
 mod obj;
-mod orient;
 mod polygon;
 mod raw;
 mod text;

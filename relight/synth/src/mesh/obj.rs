@@ -16,7 +16,6 @@ use super::mtl::{self, MtlMaterial, MtlPicture};
 use super::polygon::Triangulator;
 use super::raw::{RawMesh, RawTriangle};
 use super::text::{Statements, decoded, keyword, readings, without_comment};
-use crate::SynthError;
 use crate::texture::{PictureKind, TextureImage};
 
 /// Names of materials by which programs say that there is none.

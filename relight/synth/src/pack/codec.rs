@@ -187,7 +187,9 @@ pub(super) fn encode_mesh(raw: &RawMesh) -> Result<(PackedMesh, Vec<u8>, Picture
     if has_colours {
         for triangle in &order {
             let own = raw.colours.get(*triangle).copied();
-            let colours = own.unwrap_or([Vec3::ONE; 3]).map(Vec3::to_array);
+            let colours = own
+                .unwrap_or([Vec3::ONE; 3])
+                .map(|colour| colour.to_array());
             let level = |light: &f32| (Srgb::from_linear(*light).clamp(0.0, 1.0) * 255.0).round();
             bytes.extend(
                 colours

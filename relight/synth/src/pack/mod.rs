@@ -7,6 +7,7 @@
 //! | `furniture` | archives of Sweet Home 3D and their catalogues |
 //! | `origin` | `origin.toml`: who made the files of a folder |
 //! | `prepare` | one object, repaired, judged and made small |
+//! | `orient` | triangles that face one way |
 //! | `codec` | meshes and panoramas as bytes |
 //! | `file` | the file: a zip archive with a catalogue |
 //! | `table` | the table beside it |
@@ -16,6 +17,7 @@ mod candidates;
 mod codec;
 mod file;
 mod furniture;
+mod orient;
 mod origin;
 mod prepare;
 mod table;

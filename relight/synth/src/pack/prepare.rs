@@ -123,12 +123,11 @@ impl Prepared {
         raw.orient();
         let missing = std::mem::take(&mut raw.left_out);
         let (mesh, bytes, pictures) = encode_mesh(&raw).map_err(Reason::Unreadable)?;
-        let packed =
-            |(image, kind): (std::sync::Arc<crate::texture::TextureImage>, PictureKind)| {
-                let packed = image.packed(kind, LONGEST_PICTURE);
-                let unreadable = |fault| Reason::Unreadable(format!("a picture of it: {fault}"));
-                Ok::<_, Reason>((kind, packed.map_err(unreadable)?))
-            };
+        let packed = |(image, kind): (Arc<TextureImage>, PictureKind)| {
+            let packed = image.packed(kind, LONGEST_PICTURE);
+            let unreadable = |fault| Reason::Unreadable(format!("a picture of it: {fault}"));
+            Ok::<_, Reason>((kind, packed.map_err(unreadable)?))
+        };
         let positions = raw.positions.iter().flat_map(Vec3::to_array);
         let shape: Vec<u8> = positions.flat_map(f32::to_le_bytes).collect();
         Ok(Self {

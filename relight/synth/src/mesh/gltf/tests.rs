@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::*;
-use crate::Mesh;
+use crate::{Mesh, SynthError};
 
 const BYTES_OF_A_SQUARE: usize = 60;
 

@@ -7,8 +7,8 @@ use std::collections::{HashMap, VecDeque};
 
 use glam::Vec3;
 
-use super::{Mesh, RawMesh};
 use crate::geometry::Occluder;
+use crate::mesh::{CREASE, Mesh, RawMesh};
 use crate::random::Random;
 
 /// Triangles of a part from which rays are cast, and rays to each side of them.
@@ -30,7 +30,7 @@ impl RawMesh {
             ..Self::default()
         };
         // Without a triangle that has an area there is nothing to turn.
-        let Ok(shape) = Mesh::new(shape, super::CREASE) else {
+        let Ok(shape) = Mesh::new(shape, CREASE) else {
             return;
         };
         let occluder = Occluder::new(&shape, glam::Affine3A::IDENTITY);
