@@ -20,6 +20,8 @@ mod furniture;
 mod orient;
 mod origin;
 mod prepare;
+#[cfg(test)]
+mod real;
 mod table;
 #[cfg(test)]
 mod tests;

@@ -14,8 +14,8 @@ const COLUMNS: &str = "kind,name,title,category,author,licence,origin,part,trian
 /// An object or a panorama, and what came of it.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
-    kind: &'static str,
-    entry: LibraryEntry,
+    pub(super) kind: &'static str,
+    pub(super) entry: LibraryEntry,
     pub(super) is_left_out: bool,
     pub(super) triangles: usize,
     pub(super) note: String,
