@@ -172,6 +172,11 @@ impl Building {
     }
 
     fn leave_out(&mut self, what: &'static str, candidate: &Candidate, reason: &Reason) {
+        if let Reason::Repeated(name) = reason
+            && candidate.entry.is_for_validation
+        {
+            self.keep_apart(name);
+        }
         let kind = format!("{what}s: {}", reason.kind());
         *self.summary.left_out.entry(kind).or_default() += 1;
         if let Reason::Unreadable(why) = reason {
@@ -185,6 +190,17 @@ impl Building {
             note: reason.to_string(),
             ..Row::of(what, &candidate.entry)
         });
+    }
+
+    /// Nothing is learned from what is kept apart under another name.
+    fn keep_apart(&mut self, name: &str) {
+        let objects = self.objects.iter_mut().map(|(entry, _)| entry);
+        let panoramas = self.panoramas.iter_mut().map(|(entry, ..)| entry);
+        let rows = self.rows.iter_mut().map(|row| &mut row.entry);
+        let mut all = objects.chain(panoramas).chain(rows);
+        while let Some(entry) = all.find(|entry| entry.name == name) {
+            entry.is_for_validation = true;
+        }
     }
 
     /// Numbers the pictures, of which each is there once.

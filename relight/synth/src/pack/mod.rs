@@ -20,8 +20,6 @@ mod furniture;
 mod orient;
 mod origin;
 mod prepare;
-#[cfg(test)]
-mod real;
 mod table;
 #[cfg(test)]
 mod tests;

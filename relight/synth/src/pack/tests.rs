@@ -311,6 +311,26 @@ fn a_tenth_is_for_validation_by_its_name_alone() {
 }
 
 #[test]
+fn what_is_kept_apart_under_one_name_is_not_learned_from_under_another() {
+    let case = Case::new();
+    let origin = "licence = \"CC0-1.0\"\nvalidation = false\n";
+    let held = format!("{origin}[files.\"same.exr\"]\nvalidation = true\n");
+    fs::write(case.folder.path().join("light/origin.toml"), held).unwrap();
+    let summary = case.build();
+    let marks: Vec<bool> = summary
+        .panoramas
+        .iter()
+        .map(|one| one.is_for_validation)
+        .collect();
+    assert_eq!(marks, [true, false, false, false]);
+    let table = fs::read_to_string(case.out().with_extension("csv")).unwrap();
+    assert!(
+        table.contains("light/0.exr,0,,unknown,CC0-1.0,light,validation,"),
+        "{table}"
+    );
+}
+
+#[test]
 fn folders_that_hold_nothing_and_files_that_are_no_library_are_refused() {
     let case = Case::new();
     let empty = case.folder.path().join("empty");
