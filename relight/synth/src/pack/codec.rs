@@ -144,7 +144,11 @@ impl<T: Copy + Eq + Hash> Numbered<T> {
 /// # Errors
 /// Where a number is not finite.
 pub(super) fn encode_mesh(raw: &RawMesh) -> Result<(PackedMesh, Vec<u8>, Pictures), String> {
-    let (materials, pictures, numbers) = encode_materials(&raw.materials)?;
+    let EncodedMaterials {
+        materials,
+        pictures,
+        numbers,
+    } = encode_materials(&raw.materials)?;
     let own = |triangle: &usize| {
         let number = raw.materials.of_triangle.get(*triangle);
         number.and_then(|number| numbers.get(number).copied())
@@ -215,9 +219,13 @@ pub(super) fn encode_mesh(raw: &RawMesh) -> Result<(PackedMesh, Vec<u8>, Picture
 }
 
 /// The materials that are used, their pictures, and the numbers of theirs by those of all.
-fn encode_materials(
-    of: &MeshMaterials,
-) -> Result<(Vec<PackedMaterial>, Pictures, HashMap<u32, usize>), String> {
+struct EncodedMaterials {
+    materials: Vec<PackedMaterial>,
+    pictures: Pictures,
+    numbers: HashMap<u32, usize>,
+}
+
+fn encode_materials(of: &MeshMaterials) -> Result<EncodedMaterials, String> {
     let mut pictures: Pictures = Vec::new();
     let mut packed = Vec::new();
     let mut numbers = HashMap::new();
@@ -250,7 +258,11 @@ fn encode_materials(
             factors: picture(&material.factors, PictureKind::Numbers),
         });
     }
-    Ok((packed, pictures, numbers))
+    Ok(EncodedMaterials {
+        materials: packed,
+        pictures,
+        numbers,
+    })
 }
 
 /// Numbers column by column, each as its difference from the one before, the low bytes before the high ones.
