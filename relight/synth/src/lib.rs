@@ -63,7 +63,10 @@ pub use random::stream;
 pub use recipe::Recipe;
 pub use sample::SynthSample;
 pub use shape::ShapeKind;
-pub use transfer::{DrawnTurn, Rooms, TransferCache, TransferRecipe};
+pub use transfer::{
+    DrawnTurn, PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint, PhotoView,
+    PhotoViewRecipe, Rooms, TransferCache, TransferRecipe, ViewLamp,
+};
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
 pub use view::{Pose, Projection};
 

@@ -5,7 +5,8 @@
 //! | `model` | a [`relight_photo::nets::Graph`] on tensors: what is trained is what the ONNX file holds |
 //! | `adam`, `learner` | how a network learns; all of it can be saved |
 //! | `losses`, `low_rank`, `terms` | what is descended |
-//! | `sample`, `data_loader`, `shuffle_buffer`, `composed` | samples composed while training |
+//! | `photographs` | photographs lit on the device while a network learns from them |
+//! | `sample` | their arrays |
 //! | `decompose`, `decompose_task` | the decomposing network: maps, losses, run |
 //! | `held_out` | turns and samples that networks are judged by while they train |
 //! | `task`, `run`, `checkpoint`, `journal`, `guard` | a run: what is trained, its steps, what is saved, what is logged, what ends it |
@@ -22,10 +23,8 @@ mod adam;
 mod agreement;
 mod all_reduced;
 mod checkpoint;
-mod composed;
 mod cuda;
 mod darkness;
-mod data_loader;
 mod decompose;
 mod decompose_task;
 mod error;
@@ -41,12 +40,12 @@ mod paper_layers;
 mod paper_networks;
 mod paper_phases;
 mod paper_task;
+mod photographs;
 mod process_group;
 mod run;
 mod sample;
 mod settings;
 mod sheet;
-mod shuffle_buffer;
 mod symmetry;
 mod task;
 mod terms;
@@ -57,7 +56,6 @@ mod turn_task;
 pub use adam::Adam;
 pub use checkpoint::{CHECKPOINT, Checkpoint};
 pub use cuda::cuda_device;
-pub use data_loader::{Composition, DataLoader};
 pub use decompose::{AnsweredTensors, DecomposeLossCoefficients};
 pub use decompose_task::DecomposeTask;
 pub use error::TrainError;
@@ -68,9 +66,10 @@ pub use model::{ComputePrecision, Model};
 pub use paper_networks::PaperInputs;
 pub use paper_phases::PaperPhase;
 pub use paper_task::PaperTask;
+pub use photographs::Photographs;
 pub use process_group::ProcessGroup;
 pub use run::{Run, RunOutcome, TrainObserver};
-pub use sample::TruthArrays;
+pub use sample::TruthBatch;
 pub use settings::{
     DataSettings, DecomposeSettings, PaperLossCoefficients, PaperSettings, RunSettings,
     TransferSettings, TurnNetworkSettings, TurnSettings, read_settings,
