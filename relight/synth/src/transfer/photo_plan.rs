@@ -20,7 +20,9 @@ const GLOSSY: f32 = 0.35;
 const COLOURED_GLOSS: f32 = 0.2;
 /// Part of the surfaces of one colour.
 const PLAIN: f32 = 0.2;
-/// Part of the others with the colours of a second material printed on them.
+/// Part of the others whose hues are others than the material's.
+const OTHER_HUES: f32 = 0.2;
+/// Part of them with the colours of a second material printed on them.
 const PRINTED: f32 = 0.3;
 /// Part of the cameras without noise and compression, whose response is sRGB.
 const PLAIN_CAMERA: f32 = 0.5;
@@ -209,9 +211,9 @@ fn all_light(room: &[[f32; 3]], lit: &[PhotoLamp], lamps: &[ViewLamp]) -> [[f32;
 
 /// How the material's colours are changed: mixed and scaled, in another contrast, or made one.
 fn draw_colours(random: &mut Random) -> ([[f32; 3]; 3], f32, [f32; 3]) {
-    let tint = Vec3::from_array([(); 3].map(|()| (random.normal() * 0.25).exp()));
+    let tint = Vec3::from_array([(); 3].map(|()| (random.normal() * 0.15).exp()));
     let mut mix = Mat3::from_diagonal(tint);
-    if random.chance(0.4) {
+    if random.chance(OTHER_HUES) {
         // Turned about grey: other hues, as bright.
         let grey = Vec3::ONE.normalize();
         mix *= Mat3::from_axis_angle(grey, random.uniform(0.0..std::f32::consts::TAU));
