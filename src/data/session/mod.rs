@@ -28,7 +28,7 @@ pub use interrupted::InterruptedSession;
 pub use journal::{JOURNAL_FILE, JournaledReport, JournaledTurn, TurnJournal};
 use lock::SessionLock;
 pub use manifest::{
-    CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts,
+    CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, SoftwareFacts,
     Status, TurntableFacts, VideoFacts, object_of,
 };
 pub use recording::{Notice, Recording, beside_sessions, recording_name, recordings};
