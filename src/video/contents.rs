@@ -109,13 +109,10 @@ impl Inspector {
         };
         // The container's flag also means a recovery point, after which some pictures are incomplete.
         let key = packet.is_key()
-            && self
-                .h264
-                .as_ref()
-                .is_none_or(|h264| {
-                    let data = packet.data().unwrap_or_default();
-                    nal::is_key(&h264.byte_stream.convert(data, false))
-                });
+            && self.h264.as_ref().is_none_or(|h264| {
+                let data = packet.data().unwrap_or_default();
+                nal::is_key(&h264.byte_stream.convert(data, false))
+            });
         (contents, key)
     }
 }

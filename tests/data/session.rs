@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 use proptest::prelude::*;
 use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::session::{
-    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, Notice, Recording,
-    SessionError, SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of,
-    recordings,
+    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionError,
+    SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
 };
 use tempfile::TempDir;
 

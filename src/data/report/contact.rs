@@ -6,9 +6,9 @@ use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder as _, ImageError, RgbImage};
 
+use super::Page;
 use super::axis::{degrees, percent};
 use super::turn::Turn;
-use super::Page;
 use crate::shard::record::FrameRecord;
 
 /// Good enough to judge mask and light; a quarter of a PNG's size on a real frame.

@@ -190,9 +190,8 @@ impl Manifest {
         let file = &video.file;
         let is_path =
             file.is_empty() || file == "." || file == ".." || file.contains(['/', '\\', '\0']);
-        let is_hash = |hash: &String| {
-            hash.len() == 64 && hash.bytes().all(|byte| byte.is_ascii_hexdigit())
-        };
+        let is_hash =
+            |hash: &String| hash.len() == 64 && hash.bytes().all(|byte| byte.is_ascii_hexdigit());
         let missing = [
             ("frames", video.frames.is_none()),
             ("bytes", video.bytes.is_none()),

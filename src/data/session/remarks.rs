@@ -21,11 +21,7 @@ pub fn remark(folder: &Path, note: Option<&str>, rating: Option<u8>) -> Result<(
     durable::write_whole(&path, &bytes).map_err(SessionError::io(&path, "written"))
 }
 
-fn with_remarks(
-    bytes: &[u8],
-    note: Option<&str>,
-    rating: Option<u8>,
-) -> Result<Vec<u8>, String> {
+fn with_remarks(bytes: &[u8], note: Option<&str>, rating: Option<u8>) -> Result<Vec<u8>, String> {
     let fault = |error: serde_json::Error| error.to_string();
     let mut manifest: serde_json::Map<String, Value> =
         serde_json::from_slice(bytes).map_err(fault)?;

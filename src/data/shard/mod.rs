@@ -54,9 +54,7 @@ pub use names::{check_session, sample_key};
 pub use order::order;
 pub use output::OutputFolder;
 pub use parquet_table::{TableRow, read_table};
-pub use pieces::{
-    ArrayTask, MAX_TASKS, Merged, TaskOutcome, TaskPiece, described_so_far, merge,
-};
+pub use pieces::{ArrayTask, MAX_TASKS, Merged, TaskOutcome, TaskPiece, described_so_far, merge};
 pub use quality::{MaskMisfit, QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;

@@ -3,7 +3,8 @@
 use std::fs;
 
 use relit_data::shard::{
-    ArrayTask, Dataset, Layout, SessionQuality, ShardError, TaskOutcome, TaskPiece, described_so_far,
+    ArrayTask, Dataset, Layout, SessionQuality, ShardError, TaskOutcome, TaskPiece,
+    described_so_far,
 };
 
 use crate::sample_set::{self, SAMPLES, SESSION};
