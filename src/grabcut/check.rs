@@ -1,10 +1,7 @@
-//! Whether a mask fits a turn: how far the object lies beside it in each frame, and where its shape differs
-//! from what the turn shows.
+//! Whether a mask fits a turn: where its shape differs from what the turn shows.
 //!
-//! The object's place in a frame is found by the directions of the brightness's gradients inside the
-//! mask, compared with the average over the turn: paint and relief stay, light does not. The mask that the turn
-//! alone gives ([`segment_with`](crate::segment_with)) shows where to look; what the curves of brightness there show
-//! decides.
+//! The mask that the turn alone gives ([`segment_with`](crate::segment_with)) shows where to look; what the curves of
+//! brightness there show decides.
 
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
@@ -78,15 +75,12 @@ impl<'a> MaskCheck<'a> {
     /// Takes a mask (object from 128 on) and what the turn shows; both of frames of the same size.
     ///
     /// # Errors
-    /// [`MaskError::FewFrames`]; [`MaskError::SeedsSize`] if the sizes differ; [`MaskError::Empty`].
+    /// [`MaskError::FewFrames`]; [`MaskError::Hints`] if the sizes differ; [`MaskError::Empty`].
     pub fn new(mask: &GrayImage, turn: &'a TurnStatistics) -> Result<Self, MaskError> {
         let size = mask.dimensions();
         turn.check()?;
         if size != turn.full {
-            return Err(MaskError::SeedsSize {
-                seeds: size,
-                frame: turn.full,
-            });
+            return Err(MaskError::sizes(size, turn.full));
         }
         let mask = Bitmap::of_mask(mask);
         if mask.count() == 0 {
