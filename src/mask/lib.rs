@@ -56,6 +56,6 @@ pub use error::MaskingError;
 pub use files::MaskFiles;
 pub use making::{MaskOutput, make_mask};
 pub use record::{
-    MASK_SCHEMA, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult, SourceFrame,
+    MASK_SCHEMA, MaskRecord, MaskSoftware, RecordedHints, RecordedResult, SourceFrame,
 };
 pub use request::{MaskRequest, read_seeds};
