@@ -13,11 +13,16 @@ const HEAD: u64 = 4096;
 
 /// How a photograph is to be turned for display; nothing for a video, and for a picture that stands as it is stored.
 pub(super) fn exif_orientation(input: &Input, path: &Path) -> Option<Exif> {
-    if !is_photograph(input) {
+    if !is_photograph(input) && !is_photograph_in_boxes(path) {
         return None;
     }
     // A file whose orientation cannot be read is shown as it is stored.
     relit_data::still::orientation(&fs::read(path).ok()?)
+}
+
+/// Whether a file is AVIF or HEIF, which FFmpeg reads as it reads MP4.
+fn is_photograph_in_boxes(path: &Path) -> bool {
+    matches!(format_of(path), Some(Format::Avif | Format::Heic))
 }
 
 /// The format of a still image; none of a video, and where it cannot be read.
@@ -28,12 +33,11 @@ pub(super) fn format_of(path: &Path) -> Option<Format> {
 }
 
 /// Whether FFmpeg would give another picture than the file shows, or none: of a raw file the small one for display, of a
-/// HEIC one of its tiles, of an AVIF one that is not turned.
+/// HEIC one of its tiles.
 pub(super) fn is_misread(format: Format) -> bool {
     [
         Format::RAW,
-        Format::HEIC,
-        Format::AVIF,
+        Format::Heic,
         Format::SVG,
         Format::PDF,
         Format::HTML,

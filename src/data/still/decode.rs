@@ -5,7 +5,7 @@ use std::io::Cursor;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use crate::still::{Format, StillError, exr, jpeg, png_exif, radiance};
+use crate::still::{Format, StillError, exr, isobmff, jpeg, png_exif, radiance};
 
 /// Decodes the content of a file, turned as it is displayed. The numbers stay as they are stored; what they stand for
 /// says [`crate::still::Colour::of_file`].
@@ -44,11 +44,12 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     Ok(image)
 }
 
-/// How a picture is turned for display: by Exif or TIFF's tag. None where it stands as
+/// How a picture is turned for display: by Exif, TIFF's tag, or the properties of AVIF and HEIF. None where it stands as
 /// it is stored, or where its orientation cannot be read.
 #[must_use]
 pub fn orientation(bytes: &[u8]) -> Option<Orientation> {
     let stated = match Format::of(bytes)? {
+        Format::Avif | Format::Heic => isobmff::orientation(bytes)?,
         Format::Png => Orientation::from_exif_chunk(png_exif::find(bytes)?)?,
         Format::Jpeg | Format::WebP | Format::Tiff => {
             let reader = ImageReader::new(Cursor::new(bytes))

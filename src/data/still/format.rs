@@ -21,7 +21,11 @@ pub enum Format {
     Exr,
     /// Radiance.
     Radiance,
-    /// One that is not read: what a file of it is called, with its article, and what to do with it.
+    /// AVIF, which is not read.
+    Avif,
+    /// HEIF with HEVC, as telephones write it, which is not read.
+    Heic,
+    /// Another one that is not read: what a file of it is called, with its article, and what to do with it.
     Other(&'static str, &'static str),
 }
 
@@ -39,13 +43,6 @@ impl Format {
     pub const RAW: Self = Self::Other(
         "a camera's raw file",
         "develop it, and export it as PNG or TIFF of 16 bits",
-    );
-    /// AVIF.
-    pub const AVIF: Self = Self::Other("an AVIF image", SAVE);
-    /// HEIF with HEVC, as telephones write it.
-    pub const HEIC: Self = Self::Other(
-        "a HEIC image",
-        "save it as JPEG or PNG, or let the telephone write JPEG",
     );
     /// Portable document.
     pub const PDF: Self = Self::Other("a PDF", EXPORT);
@@ -104,6 +101,11 @@ impl Format {
     #[must_use]
     pub const fn unread(self) -> Option<(&'static str, &'static str)> {
         match self {
+            Self::Avif => Some(("an AVIF image", SAVE)),
+            Self::Heic => Some((
+                "a HEIC image",
+                "save it as JPEG or PNG, or let the telephone write JPEG",
+            )),
             Self::Other(name, advice) => Some((name, advice)),
             _ => None,
         }
@@ -124,14 +126,14 @@ fn of_brands(bytes: &[u8]) -> Option<Format> {
     if major == b"crx " {
         Some(Format::RAW)
     } else if is_one_of(&[b"avif", b"avis"]) {
-        Some(Format::AVIF)
+        Some(Format::Avif)
     } else if [
         b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1",
     ]
     .iter()
     .any(|&known| known == major)
     {
-        Some(Format::HEIC)
+        Some(Format::Heic)
     } else {
         None
     }
@@ -189,8 +191,8 @@ mod tests {
         let avif = b"\0\0\0\x1cftypmif1\0\0\0\0mif1avifmiaf";
         let video = b"\0\0\0\x18ftypisom\0\0\0\0isomhevc";
         for (bytes, format) in [
-            (&heic[..], Some(Format::HEIC)),
-            (avif, Some(Format::AVIF)),
+            (&heic[..], Some(Format::Heic)),
+            (avif, Some(Format::Avif)),
             (video, None),
             (b"\0\0\0\x18ftypcrx \0\0\0\0crx ", Some(Format::RAW)),
             (b"#?RGBE\n", Some(Format::Radiance)),
