@@ -16,7 +16,7 @@ use crate::durable;
 pub fn remark(folder: &Path, note: Option<&str>, rating: Option<u8>) -> Result<(), SessionError> {
     let path = folder.join(MANIFEST_FILE);
     let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
-    let fault = |fault| SessionError::manifest(&path, &fault);
+    let fault = |fault: String| SessionError::manifest(&path, &fault);
     let bytes = with_remarks(&bytes, note, rating).map_err(fault)?;
     durable::write_whole(&path, &bytes).map_err(SessionError::io(&path, "written"))
 }
