@@ -43,10 +43,7 @@ impl ProcessingPrograms {
         let (session, dataset) = (places.session.as_os_str(), places.dataset.as_os_str());
         let (program, mut arguments): (_, Vec<OsString>) = match step {
             ProcessingStep::Mask => (&self.mask, vec![session.into(), "--auto".into()]),
-            ProcessingStep::Check => (
-                &self.mask,
-                vec!["check".into(), session.into(), "--progress".into()],
-            ),
+            ProcessingStep::Check => (&self.mask, vec!["check".into(), session.into()]),
             ProcessingStep::Extract => (
                 &self.extract,
                 vec![

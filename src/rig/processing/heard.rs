@@ -175,8 +175,6 @@ fn checked(report: CheckReport) -> StepEnd {
     let why = report.reasons.join("; ");
     match &*report.verdict {
         "fits" => good("the mask fits"),
-        // Extraction aligns the frames.
-        "drifts" => doubtful(&why, true),
         verdict => doubtful(&format!("{verdict}: {why}"), false),
     }
 }
@@ -241,14 +239,6 @@ mod tests {
                 r#"{"event":"check","report":{"verdict":"fits","reasons":[]}}"#,
                 Good,
                 "fits",
-                true,
-            ),
-            (
-                Check,
-                1,
-                r#"{"event":"check","report":{"verdict":"drifts","reasons":["by 3 px"]}}"#,
-                Doubtful,
-                "by 3 px",
                 true,
             ),
             (

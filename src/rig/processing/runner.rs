@@ -4,7 +4,6 @@ use std::fs;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use relit_data::causes::with_causes;
 use relit_data::session::{MANIFEST_FILE, Manifest, Status};
 
 use super::child::Worker;
@@ -152,7 +151,7 @@ fn start(shared: &Shared, begun: &Begun) -> Result<Worker, String> {
 fn is_aborted(session: &std::path::Path) -> Result<bool, String> {
     let bytes = fs::read(session.join(MANIFEST_FILE))
         .map_err(|error| format!("the session is gone: {error}"))?;
-    let manifest = Manifest::from_json(&bytes).map_err(|error| with_causes(&error))?;
+    let manifest = Manifest::from_json(&bytes)?;
     Ok(matches!(manifest.status, Status::Aborted(_)))
 }
 

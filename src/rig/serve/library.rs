@@ -193,8 +193,8 @@ impl Library {
         let dataset = (self.dataset)();
         let mut summary = summarise(id, &manifest, index.as_ref());
         summary.results = Some(self.results_of(id, &dataset));
-        let json = manifest.to_json().map_err(|error| with_causes(&error));
-        let json = json
+        let json = manifest
+            .to_json()
             .and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));
         let index = index.unwrap_or_default();
         let entries = index.entries();
@@ -337,7 +337,7 @@ fn read_manifest(folder: &Path) -> Result<Manifest, String> {
     let bytes = fs::read(folder.join(MANIFEST_FILE))
         .map_err(|error| format!("its {MANIFEST_FILE} cannot be read: {error}"))?;
     Manifest::from_json(&bytes)
-        .map_err(|error| format!("its {MANIFEST_FILE} is not usable: {}", with_causes(&error)))
+        .map_err(|fault| format!("its {MANIFEST_FILE} is not usable: {fault}"))
 }
 
 /// The frame index of a session that has ended. A damaged one counts as none: the programs that need it

@@ -62,7 +62,7 @@ pub(super) struct MaskState {
 /// What `relit-mask check` found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(super) struct CheckState {
-    /// `fits`, `drifts`, `wrong`, `unknown`.
+    /// `fits`, `wrong`, `unknown`.
     pub(super) verdict: String,
     /// Why it does not fit.
     pub(super) reasons: Vec<String>,
@@ -236,7 +236,7 @@ fn judged(results: &SessionResults) -> (SessionStage, Option<bool>) {
         return (SessionStage::Recorded, None);
     };
     let check = results.check.as_ref().filter(|check| check.is_current);
-    let wrong = check.is_some_and(|check| !matches!(&*check.verdict, "fits" | "drifts"));
+    let wrong = check.is_some_and(|check| check.verdict != "fits");
     let extraction = results.extraction.as_ref();
     match (extraction.filter(|made| made.is_current), check) {
         (Some(made), _) => {

@@ -53,7 +53,7 @@ export function showSteps(detail, say) {
   const old = "of an earlier mask";
   if (!check) step("check", "not checked", "");
   else if (!check.is_current) step("check", old, "warn");
-  else step("check", { fits: "fits", drifts: "the object moves" }[check.verdict] ?? check.verdict, check.verdict === "fits" ? "good" : "warn", check.reasons);
+  else step("check", check.verdict, check.verdict === "fits" ? "good" : "warn", check.reasons);
   if (!extraction) step("extract", "not extracted", "");
   else if (!extraction.is_current) step("extract", old, "warn");
   else step("extract", `${extraction.samples} samples, ${extraction.verdict}`, extraction.verdict === "good" && !extraction.is_lossy ? "good" : "warn", extraction.reasons);

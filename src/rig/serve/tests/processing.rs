@@ -143,7 +143,7 @@ fn a_session_goes_through_mask_check_and_extraction_by_the_programs() {
     let dataset = root.with_file_name("dataset").display().to_string();
     let wanted = [
         format!("relit-mask {session} --auto --json"),
-        format!("relit-mask check {session} --progress --json"),
+        format!("relit-mask check {session} --json"),
         format!("relit-extract {session} -o {dataset} --resume --progress --json"),
     ];
     assert_eq!(log.lines().collect::<Vec<_>>(), wanted);
