@@ -15,8 +15,6 @@ pub enum MaskRule {
     Known,
     /// All of the image; both images are 0 outside the object.
     WholeImage,
-    /// Those that people were asked about.
-    Points,
 }
 
 impl fmt::Display for MaskRule {
@@ -25,7 +23,6 @@ impl fmt::Display for MaskRule {
             Self::Object => "object",
             Self::Known => "where known",
             Self::WholeImage => "whole image",
-            Self::Points => "judged points",
         })
     }
 }
