@@ -1,22 +1,20 @@
 //! `relight decompose`: photographs into normals, albedo, shading, highlight and light.
 
-use std::env;
 use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::builder::RangedU64ValueParser;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_core::parallel;
 use relight_photo::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, MaskSource, WORKING_SIDE,
+    DecomposeError, DecomposeOptions, Decomposer, MaskSource,
 };
 use relight_photo::files::{
     DecompositionFigures, DecompositionFiles, FoundPhotos, PhotoInput, PhotoReading,
 };
-use relight_photo::nets::{InferenceEngine, NetError, OnnxRuntime};
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
@@ -67,9 +65,6 @@ pub(crate) struct Arguments {
     /// Which way y points in that network's normals [default: as MoGe-2 and Metric3D have it, else up].
     #[arg(long, value_parser = one_of(NORMALS_Y), value_name = "WAY", requires = "normals")]
     normals_y: Option<NormalsFrame>,
-    /// What computes the network.
-    #[arg(long, value_enum, default_value_t = EngineName::Tract)]
-    engine: EngineName,
     /// How PNG, JPEG and WebP files are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
     #[arg(long, value_parser = one_of(TRANSFERS))]
     transfer: Option<Transfer>,
@@ -79,16 +74,6 @@ pub(crate) struct Arguments {
     /// How many photographs are decomposed side by side [default: as many as there are cores, at most 4].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum EngineName {
-    /// A part of this program.
-    Tract,
-    /// The library of ONNX Runtime at ORT_DYLIB_PATH, or where the system finds it: faster.
-    Onnxruntime,
-    /// ONNX Runtime where it is installed, else tract.
-    Auto,
 }
 
 impl Arguments {
@@ -148,8 +133,7 @@ impl Arguments {
     /// The network, and how its weights are named.
     fn decomposer(&self, console: Console) -> Result<(Decomposer, String), DecomposeError> {
         let (weights, name) = self.network.weights()?;
-        let engine = self.engine.engine(console)?;
-        let mut decomposer = Decomposer::with_engine(&weights, WORKING_SIDE, engine)?;
+        let mut decomposer = Decomposer::new(&weights)?;
         if let Some(path) = &self.normals {
             decomposer.read_normals(path, self.normals_y)?;
             let name = decomposer.normals_network().unwrap_or_default();
@@ -157,31 +141,6 @@ impl Arguments {
             console.say(&format!("{}: taken for {name}", path.display()), &event);
         }
         Ok((decomposer, name))
-    }
-}
-
-impl EngineName {
-    fn engine(self, console: Console) -> Result<InferenceEngine, NetError> {
-        let named = env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());
-        let load = || {
-            let path = named
-                .clone()
-                .unwrap_or_else(|| OnnxRuntime::library().into());
-            OnnxRuntime::load(path.as_ref()).map(InferenceEngine::OnnxRuntime)
-        };
-        match self {
-            Self::Tract => Ok(InferenceEngine::Tract),
-            Self::Onnxruntime => load(),
-            Self::Auto => Ok(load().unwrap_or_else(|fault| {
-                // Nobody asked for a library that is not installed.
-                if named.is_some() || !matches!(fault, NetError::NoLibrary { .. }) {
-                    let text = with_causes(&fault);
-                    let event = json!({ "event": "engine", "message": text });
-                    console.warn_with(&format!("tract is used: {text}"), &event);
-                }
-                InferenceEngine::Tract
-            })),
-        }
     }
 }
 
@@ -308,7 +267,6 @@ impl Run {
             "photo": input.place(),
             "output": out,
             "seconds": seconds,
-            "engine": self.decomposer.engine().name(),
             "figures": figures,
         });
         Ok(Decomposed { text, event })

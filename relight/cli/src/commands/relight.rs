@@ -6,14 +6,13 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use relight_core::image::{Extent, Linear, Rgb, Transfer};
+use relight_core::image::{Extent, Transfer};
 use relight_photo::files::{
     FoundPhotos, InsertionError, MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading,
     write_picture,
 };
 use relight_photo::insert::{
-    Backdrop, InsertError, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, Subject,
-    WhiteBalance, likeness,
+    Backdrop, LightSource, PanoramaView, Shot, Subject, WhiteBalance, likeness,
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
@@ -34,8 +33,8 @@ Examples:
       in the light of a warm lamp from the right, at its own place
   relight relight mug.jpg --mask mug-mask.png --light studio.hdr --turn 360 --seconds 10 -o turn.mp4
       a video in which the light turns once
-  relight relight photos --mask masks --lamp -45,40 --compare -o relit
-      many photographs: relit/<name>.png, each beside the photograph and naive insertion";
+  relight relight photos --mask masks --lamp -45,40 -o relit
+      many photographs: relit/<name>.png";
 
 /// The longest side of a video's frames where nothing is said.
 const MOVIE_SIDE: usize = 1080;
@@ -58,7 +57,7 @@ pub(crate) struct Arguments {
     rect: Option<Rect>,
     #[command(flatten)]
     light: NewLightArguments,
-    /// Keep the photograph's own light, as it was estimated, to change its exposure or the material.
+    /// Keep the photograph's own light, as it was estimated, to change its exposure or to turn it.
     #[arg(long, conflicts_with_all = ["light", "lamp"])]
     own_light: bool,
     /// Turn the light about the vertical first, from the viewer to the right.
@@ -82,24 +81,12 @@ pub(crate) struct Arguments {
     /// How many degrees of a panorama the picture's longer side shows.
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = within(1.0..=150.0, "degrees"))]
     field: f64,
-    /// How far the camera looks down into a panorama.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = within(-89.0..=89.0, "degrees"), allow_hyphen_values = true)]
-    down: f64,
-    /// Put the photograph and naive insertion beside the result.
-    #[arg(long)]
-    compare: bool,
     /// How the colour of the light is shown.
     #[arg(long, value_parser = one_of(WHITE_BALANCES), default_value = "light")]
     white_balance: WhiteBalance,
     /// Brightness in stops. With 0 the strongest light is as strong as in the photograph.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = within(-20.0_f32..=20.0, "stops"), allow_hyphen_values = true)]
     exposure: f32,
-    /// Multiply the object's albedo with a colour, linear.
-    #[arg(long, value_name = "R,G,B", value_parser = tint)]
-    tint: Option<[f32; 3]>,
-    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is diffuse.
-    #[arg(long, value_name = "PART,SMOOTHNESS", value_parser = gloss)]
-    gloss: Option<ObjectGloss>,
     /// The longest side of the result, pixels [default: the photograph's; of a video at most 1080].
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=16_384))]
     size: Option<u32>,
@@ -165,22 +152,6 @@ impl Arguments {
             mask: self.mask.clone(),
             rectangle: self.rect,
             transfer: self.transfer,
-        }
-    }
-
-    fn change(&self) -> MaterialChange {
-        MaterialChange {
-            tint: self.tint.unwrap_or([1.0; 3]),
-            gloss: self.gloss,
-        }
-    }
-
-    /// The picture after the light has turned by so many radians, as it is written.
-    fn shown(&self, shot: &Shot<'_>, turn: f64) -> Result<Rgb<Linear>, InsertError> {
-        if self.compare {
-            shot.compared(turn)
-        } else {
-            shot.picture(turn)
         }
     }
 
@@ -281,7 +252,6 @@ impl Run<'_> {
             &photo.picture,
             &subject,
             &light,
-            arguments.change(),
             backdrop,
             exposure,
         )?;
@@ -289,7 +259,7 @@ impl Run<'_> {
         let frames = match OutputKind::of(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
             _ => {
-                let picture = arguments.shown(&shot, arguments.turned.to_radians())?;
+                let picture = shot.picture(arguments.turned.to_radians())?;
                 write_picture(&output, &picture)?;
                 1
             }
@@ -342,7 +312,7 @@ impl Run<'_> {
         let grey = Backdrop::Even([0.18; 3]);
         let panorama = || match &self.light {
             Some(LightSource::Panorama(panorama)) => {
-                let view = PanoramaView::new(extent, arguments.field, arguments.down);
+                let view = PanoramaView::new(extent, arguments.field, 0.0);
                 Some(Backdrop::Panorama(view, panorama.clone()))
             }
             _ => None,
@@ -374,7 +344,7 @@ impl Run<'_> {
         let frame = |frame: u32| {
             let part = f64::from(frame) / f64::from(frames);
             let turn = (arguments.turned + all * part).to_radians();
-            Ok::<_, InsertionError>(arguments.shown(shot, turn)?.encode())
+            Ok::<_, InsertionError>(shot.picture(turn)?.encode())
         };
         let encoding = (format, arguments.fps);
         MovieWriter::write_frames(output, encoding, frames, frame, || bar.inc(1))?;
@@ -387,31 +357,5 @@ fn file_of(input: &PhotoInput) -> Option<PathBuf> {
     match input {
         PhotoInput::File(path) => Some(path.clone()),
         _ => None,
-    }
-}
-
-fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
-    let numbers: Vec<f32> = text
-        .split(',')
-        .map(|part| {
-            part.trim()
-                .parse()
-                .ok()
-                .filter(|value| (0.0..=1000.0).contains(value))
-        })
-        .collect::<Option<_>>()?;
-    numbers.try_into().ok()
-}
-
-fn tint(text: &str) -> Result<[f32; 3], String> {
-    numbers(text).ok_or_else(|| "give R,G,B: three factors that are not negative".to_owned())
-}
-
-fn gloss(text: &str) -> Result<ObjectGloss, String> {
-    match numbers(text) {
-        Some([part, smoothness]) if part <= 1.0 && smoothness > 0.0 => {
-            Ok(ObjectGloss::of_part(part, smoothness))
-        }
-        _ => Err("give PART,SMOOTHNESS: a part from 0 to 1, and α above 0".to_owned()),
     }
 }

@@ -1,4 +1,4 @@
-//! Photographs, decompositions and scenes in files: inputs from files, folders and shards, networks, light, folders of
+//! Photographs, decompositions and scenes in files: inputs from files, folders and shards, light, folders of
 //! results, objects put into pictures and videos, and videos by the program `ffmpeg`.
 
 mod background;
@@ -6,10 +6,8 @@ mod input;
 mod insertion;
 mod insertion_error;
 mod light;
-mod mask_record;
 mod movie;
 mod movie_reader;
-mod networks;
 mod output;
 mod results;
 

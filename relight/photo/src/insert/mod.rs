@@ -50,7 +50,6 @@ mod tests;
 mod view;
 mod white_balance;
 
-pub use cut::EdgeColours;
 pub use description::{LightDescription, ObjectDescription, SceneDescription, SceneFault};
 pub use error::InsertError;
 pub use exposure::PanoramaExposure;

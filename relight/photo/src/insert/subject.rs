@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::InsertError;
-use super::cut::{Cut, EdgeColours};
+use super::cut::Cut;
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
 use super::placement::{Fit, Placement};
@@ -80,13 +80,14 @@ impl Subject {
         decomposer: &Decomposer,
         options: &DecomposeOptions,
     ) -> Result<Self, InsertError> {
-        Self::with_edges(
-            photo,
-            (mask, alpha),
-            decomposer,
-            options,
-            EdgeColours::Freed,
-        )
+        let cut = Cut::new(photo, (mask, alpha))?;
+        let foreground = Rgb::new(cut.matte.foreground.clone());
+        let options = DecomposeOptions {
+            paint: true,
+            ..*options
+        };
+        let found = decomposer.decompose(&foreground, &cut.mask, &options)?;
+        Self::of_parts(cut, &found)
     }
 
     /// The object of a photograph with its mask.
@@ -106,27 +107,6 @@ impl Subject {
             decomposer,
             &options,
         )
-    }
-
-    /// As [`Subject::new`], with mask and alpha in one, and a choice of the colours of the edge.
-    ///
-    /// # Errors
-    /// As [`Subject::new`].
-    pub fn with_edges(
-        photo: &Rgb<Linear>,
-        (mask, alpha): (&Planes<1>, Option<&Planes<1>>),
-        decomposer: &Decomposer,
-        options: &DecomposeOptions,
-        edges: EdgeColours,
-    ) -> Result<Self, InsertError> {
-        let cut = Cut::new(photo, (mask, alpha), edges)?;
-        let foreground = Rgb::new(cut.matte.foreground.clone());
-        let options = DecomposeOptions {
-            paint: true,
-            ..*options
-        };
-        let found = decomposer.decompose(&foreground, &cut.mask, &options)?;
-        Self::of_parts(cut, &found)
     }
 
     /// A captured object, whose maps are known. It counts as photographed in even light of irradiance 1, in which it looks as
@@ -225,13 +205,6 @@ impl Subject {
             light: found.shading_light.clone(),
             last_standing: LastStanding::default(),
         })
-    }
-
-    /// The same, whose decomposition is taken for the truth: to see what the hedge is good for.
-    #[must_use]
-    pub fn without_hedge(mut self) -> Self {
-        self.shading.believe();
-        self
     }
 
     /// Width and height of the part of the photograph that holds the object.
