@@ -6,7 +6,7 @@ use super::InsertError;
 use super::cut::Cut;
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
-use super::placement::{Fit, Placement};
+use super::placement::Fit;
 use super::shading::{DARK, Shading};
 use super::smooth::weighted_mean;
 use super::source::likeness;
@@ -211,12 +211,6 @@ impl Subject {
     #[must_use]
     pub const fn extent(&self) -> Extent {
         self.albedo.extent()
-    }
-
-    /// Where it stood in its photograph.
-    #[must_use]
-    pub fn own_placement(&self) -> Placement {
-        Placement::in_photo(&self.matte.alpha, self.place, self.photo)
     }
 
     /// The object as it stands by this fit.
