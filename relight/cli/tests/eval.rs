@@ -152,7 +152,7 @@ fn a_prediction_that_is_the_truth_up_to_scale_has_no_error() {
         ["albedo", "shading", "mean", "albedo", "shading", "mean"]
     );
     for line in lines {
-        assert_eq!(line.terms.images, 2);
+        assert_eq!(line.images, 2);
         assert!(
             value(line, "SMSE") < 1e-8 && value(line, "LMSE") < 1e-7,
             "{line:?}"
@@ -174,7 +174,7 @@ fn the_mean_is_that_of_albedo_and_shading_and_each_line_says_how_it_was_measured
             let [albedo, shading, mean] = [0, 1, 2].map(|at| value(&three[at], name));
             assert!((f64::midpoint(albedo, shading) - mean).abs() < 1e-12);
         }
-        let terms = &three[0].terms;
+        let terms = &three[0];
         assert_eq!(
             (terms.mask, terms.images, terms.split.as_str()),
             (MaskRule::Object, 2, "both")
@@ -255,7 +255,7 @@ fn predicted_normals_are_read_in_the_axes_that_are_told() {
         let found = [Predictions::new(found.clone(), None, frame)];
         let table = evaluate_normals(&set(&truth), "both", &found, &|_| {}).unwrap();
         let line = lines_of(&table, "net")[0];
-        assert_eq!(line.terms.mask, MaskRule::Known);
+        assert_eq!(line.mask, MaskRule::Known);
         value(line, "mean angle")
     };
     assert!(mean_angle(NormalsFrame::YDown) < 0.01);
@@ -400,16 +400,14 @@ fn relighting_compares_with_all_lights_but_the_input_s() {
     let table = evaluate_relighting(&set, "one", &methods, &|_| {}).unwrap();
     let (naive, oracle) = table.lines.split_at(4);
     for (naive, oracle) in naive.iter().zip(oracle) {
-        assert_eq!((naive.terms.images, oracle.terms.images), (2, 2));
+        assert_eq!((naive.images, oracle.images), (2, 2));
         assert!(value(naive, "MSE") > 1e-3, "{naive:?}");
         assert!(
             value(oracle, "MSE") < 1e-7 && value(oracle, "DSSIM") < 1e-4,
             "{oracle:?}"
         );
     }
-    let whole = naive
-        .iter()
-        .find(|line| line.terms.mask == MaskRule::WholeImage);
+    let whole = naive.iter().find(|line| line.mask == MaskRule::WholeImage);
     assert!(value(whole.unwrap(), "MSE") < value(&naive[0], "MSE"));
 }
 

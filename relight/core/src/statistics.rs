@@ -13,7 +13,10 @@ pub fn ranked<T: Copy + Into<f64>>(samples: &mut [T], rank: usize) -> Option<T> 
 }
 
 /// The sample that this part of all, 0 to 1, lies below. None where there are no samples.
-pub fn above_part<T: Copy + Into<f64>>(samples: impl IntoIterator<Item = T>, part: f64) -> Option<T> {
+pub fn above_part<T: Copy + Into<f64>>(
+    samples: impl IntoIterator<Item = T>,
+    part: f64,
+) -> Option<T> {
     let mut samples: Vec<T> = samples.into_iter().collect();
     let rank = (samples.len() as f64 * part) as usize;
     ranked(&mut samples, rank)

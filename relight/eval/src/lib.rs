@@ -34,8 +34,8 @@ pub use relighting::{
     RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
 };
 pub use run::EvalProgress;
-pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
-pub use turns::{TurnMethod, TurnTable, evaluate_turns};
+pub use scores::{ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
+pub use turns::{TurnTable, evaluate_turns};
 
 /// The examples of the README, so that they are built.
 #[cfg(doctest)]

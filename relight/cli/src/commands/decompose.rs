@@ -4,14 +4,12 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::builder::RangedU64ValueParser;
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_core::parallel;
-use relight_photo::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, MaskSource,
-};
+use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, MaskSource};
 use relight_photo::files::{
     DecompositionFigures, DecompositionFiles, FoundPhotos, PhotoInput, PhotoReading,
 };

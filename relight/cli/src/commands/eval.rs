@@ -10,8 +10,8 @@ use relight_core::reader::{TruthLayout, TruthSet};
 use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
     EvalProgress, IntrinsicInput, Predictions, RelightMethod, RelightingRecipe, RelightingSet,
-    ScoreTable, TurnMethod, evaluate_highlights, evaluate_intrinsic, evaluate_light,
-    evaluate_normals, evaluate_relighting, evaluate_turns, make_relighting,
+    ScoreTable, evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals,
+    evaluate_relighting, evaluate_turns, make_relighting,
 };
 use relight_photo::decompose::Decomposer;
 use relight_photo::nets::Weights;
@@ -86,9 +86,6 @@ struct TurnArguments {
     /// Turns with their ground truth, as relight synth --turn writes them.
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// How turns are solved; may be given several times [default: all ways].
-    #[arg(long, value_name = "HOW", value_parser = one_of(METHODS))]
-    method: Vec<TurnMethod>,
     /// Weights of the network of turns [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     turn_network: Option<PathBuf>,
@@ -163,15 +160,6 @@ struct RelightingArguments {
     #[arg(long, value_name = "DIR", requires = "make")]
     panoramas: Option<PathBuf>,
 }
-
-const METHODS: Choices<TurnMethod> = &[
-    (
-        "turn",
-        "In a light that is not known",
-        TurnMethod::UnknownLight,
-    ),
-    ("light", "In the true light", TurnMethod::KnownLight),
-];
 
 const INPUTS: Choices<IntrinsicInput> = &[
     ("diffuse", "Without highlights", IntrinsicInput::Diffuse),
@@ -257,12 +245,8 @@ fn images(
 ) -> Result<ScoreTable, Box<dyn Error>> {
     let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
     with_progress("evaluating", console, |progress| match protocol {
-        Protocol::Mit { input, .. } => {
-            evaluate_intrinsic(&set, &split, *input, &found, progress)
-        }
-        Protocol::Light { diffuse, .. } => {
-            evaluate_light(&set, &split, *diffuse, &found, progress)
-        }
+        Protocol::Mit { input, .. } => evaluate_intrinsic(&set, &split, *input, &found, progress),
+        Protocol::Light { diffuse, .. } => evaluate_light(&set, &split, *diffuse, &found, progress),
         Protocol::Highlight { .. } => evaluate_highlights(&set, &split, &found, progress),
         _ => evaluate_normals(&set, &split, &found, progress),
     })
@@ -332,12 +316,8 @@ fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
         .file_name()
         .unwrap_or(arguments.data.as_os_str());
     let split = name.to_string_lossy();
-    let methods = match arguments.method.as_slice() {
-        [] => &TurnMethod::ALL,
-        methods => methods,
-    };
     let table = with_progress("solving", console, |progress| {
-        evaluate_turns(&arguments.data, &split, methods, &networks, progress)
+        evaluate_turns(&arguments.data, &split, &networks, progress)
     })?;
     write_json(&table, arguments.output.as_deref())?;
     let event = json!({ "event": "table", "table": table });

@@ -33,7 +33,9 @@ pub(crate) struct Arguments {
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
-        let is_known = ["glb", "exr"].iter().any(|ending| has_ending(&self.output, ending));
+        let is_known = ["glb", "exr"]
+            .iter()
+            .any(|ending| has_ending(&self.output, ending));
         (!is_known).then(|| format!("--output {}: give .glb or .exr", self.output.display()))
     }
 }

@@ -8,11 +8,11 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use relight_core::image::{Extent, Transfer};
 use relight_photo::files::{
-    FoundPhotos, InsertionError, MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading,
-    write_picture,
+    FoundPhotos, MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading, write_picture,
 };
 use relight_photo::insert::{
-    Backdrop, LightSource, PanoramaView, Shot, Subject, WhiteBalance, likeness,
+    Backdrop, DiscLamp, InsertError, LightSource, PanoramaView, Shot, Subject, WhiteBalance,
+    likeness,
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
@@ -21,7 +21,6 @@ use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
-use crate::light::NewLightArguments;
 use crate::photos::{Network, NetworkArguments, is_at, name_unused, not_an_input};
 use crate::values::{TRANSFERS, WHITE_BALANCES, degrees, one_of, within};
 
@@ -55,8 +54,21 @@ pub(crate) struct Arguments {
     /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
     #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
     rect: Option<Rect>,
-    #[command(flatten)]
-    light: NewLightArguments,
+    /// The light: an HDR or EXR panorama, whose middle is what the viewer sees behind the object, or a text file of
+    /// coefficients as relight writes them.
+    #[arg(long, value_name = "FILE", conflicts_with = "lamp")]
+    light: Option<PathBuf>,
+    /// The light: a lamp at so many degrees about the vertical (0 at the viewer's side, 90 on the right, 180 behind) and above
+    /// the horizon, in a colour (#ffd9b0 or 3200K), so many degrees large [default: white, 30].
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
+        allow_hyphen_values = true
+    )]
+    lamp: Option<DiscLamp>,
+    /// Even light beside a lamp, as a part of it.
+    #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = within(0.0..=10.0, "a part"), requires = "lamp")]
+    ambient: f64,
     /// Keep the photograph's own light, as it was estimated, to change its exposure or to turn it.
     #[arg(long, conflicts_with_all = ["light", "lamp"])]
     own_light: bool,
@@ -112,12 +124,12 @@ enum BackgroundName {
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
-        if self.light.light.is_none() && self.light.lamp.is_none() && !self.own_light {
+        if self.light.is_none() && self.lamp.is_none() && !self.own_light {
             return Some(
                 "give the new light by --light FILE or --lamp AZIMUTH,ELEVATION".to_owned(),
             );
         }
-        let has_panorama = self.light.light.is_some();
+        let has_panorama = self.light.is_some();
         if matches!(self.background, Some(BackgroundName::Light)) && !has_panorama {
             return Some(
                 "--background light: there is no panorama; give one by --light".to_owned(),
@@ -155,6 +167,15 @@ impl Arguments {
         }
     }
 
+    /// The light that is asked for, if any is.
+    fn new_light(&self) -> Result<Option<LightSource>, InsertError> {
+        if let Some(lamp) = self.lamp {
+            let ambient = self.ambient;
+            return Ok(Some(LightSource::Lamp(DiscLamp { ambient, ..lamp })));
+        }
+        self.light.as_deref().map(LightSource::read).transpose()
+    }
+
     fn longest(&self) -> Option<usize> {
         match (self.size, self.turn) {
             (Some(size), _) => Some(size as usize),
@@ -189,7 +210,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     name_unused(&unused, console);
     let run = Run {
         arguments,
-        light: match arguments.light.read()? {
+        light: match arguments.new_light()? {
             Some(light) => Some(arguments.white_balance.shown(light)?),
             None => None,
         },
@@ -248,13 +269,7 @@ impl Run<'_> {
         let light = source.light()?;
         let backdrop = self.backdrop(photo.picture.planes().extent());
         let exposure = arguments.exposure.exp2();
-        let shot = Shot::new(
-            &photo.picture,
-            &subject,
-            &light,
-            backdrop,
-            exposure,
-        )?;
+        let shot = Shot::new(&photo.picture, &subject, &light, backdrop, exposure)?;
         let start = Instant::now();
         let frames = match OutputKind::of(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
@@ -296,7 +311,7 @@ impl Run<'_> {
             .map(|mask| PhotoReading::mask_path(mask, name));
         let mut inputs: Vec<PathBuf> = mask.into_iter().collect();
         inputs.extend(self.photos.iter().cloned());
-        inputs.extend(arguments.light.light.clone());
+        inputs.extend(arguments.light.clone());
         not_an_input(output, &inputs)?;
         // What lies in the way of a folder is told before the work.
         if let Some(folder) = output.parent()
@@ -334,7 +349,7 @@ impl Run<'_> {
         output: &Path,
         format: MovieFormat,
         console: Console,
-    ) -> Result<u32, InsertionError> {
+    ) -> Result<u32, InsertError> {
         let arguments = self.arguments;
         let frames = (arguments.seconds * f64::from(arguments.fps))
             .round()
@@ -344,7 +359,7 @@ impl Run<'_> {
         let frame = |frame: u32| {
             let part = f64::from(frame) / f64::from(frames);
             let turn = (arguments.turned + all * part).to_radians();
-            Ok::<_, InsertionError>(shot.picture(turn)?.encode())
+            Ok::<_, InsertError>(shot.picture(turn)?.encode())
         };
         let encoding = (format, arguments.fps);
         MovieWriter::write_frames(output, encoding, frames, frame, || bar.inc(1))?;

@@ -10,7 +10,8 @@ use relight_core::files::{Map, MapFiles};
 use relight_core::image::{ImageError, Linear, Rgb, Srgb, Transfer};
 use relight_core::light::{Direction, NormalsFrame, Order, Panorama, Rotation, ShLight};
 use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_for};
-use relight_photo::files::{InsertionError, MovieWriter, OutputKind, write_picture};
+use relight_photo::files::{MovieWriter, OutputKind, write_picture};
+use relight_photo::insert::InsertError;
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
@@ -250,7 +251,7 @@ fn turn(
     arguments: &Arguments,
     frames: u32,
     console: Console,
-    frame: impl Fn(f64) -> Result<Rgb<Srgb>, InsertionError> + Sync,
+    frame: impl Fn(f64) -> Result<Rgb<Srgb>, InsertError> + Sync,
 ) -> Result<(), Box<dyn Error>> {
     let frame = |at: u32| frame(f64::from(at) / f64::from(frames));
     let path = &arguments.output;
@@ -263,7 +264,7 @@ fn turn(
         (0..frames).into_par_iter().try_for_each(|at| {
             frame(at)?.write_png(&path.join(format!("{at:0PLACES$}.png")))?;
             bar.inc(1);
-            Ok::<_, InsertionError>(())
+            Ok::<_, InsertError>(())
         })?;
     }
     bar.finish_and_clear();

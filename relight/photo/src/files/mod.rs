@@ -4,7 +4,6 @@
 mod background;
 mod input;
 mod insertion;
-mod insertion_error;
 mod light;
 mod movie;
 mod movie_reader;
@@ -14,7 +13,6 @@ mod results;
 pub use background::BackgroundFile;
 pub use input::{FoundPhotos, PhotoInput, PhotoReading, UnusedFile};
 pub use insertion::{InsertSource, Insertion, InsertionOutput};
-pub use insertion_error::InsertionError;
 pub use movie::{FrameRate, MovieError, MovieFormat, MovieWriter};
 pub use movie_reader::{FrameTiming, MovieReader};
 pub use output::{OutputKind, write_picture};

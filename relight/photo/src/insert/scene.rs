@@ -420,10 +420,7 @@ mod tests {
     fn what_cannot_stand_is_named() {
         let subject = subject();
         let refused = |placement| {
-            let objects = vec![
-                object(&subject, OWN_PLACE),
-                object(&subject, placement),
-            ];
+            let objects = vec![object(&subject, OWN_PLACE), object(&subject, placement)];
             InsertScene::new(PHOTO, lamp(), 25.0, Matching::default(), objects)
                 .unwrap_err()
                 .to_string()

@@ -92,9 +92,7 @@ impl SceneSetting {
         };
         let light = given.unwrap_or_else(|| match background {
             SceneBackground::Panorama(panorama) => LightSource::Panorama(panorama.clone()),
-            SceneBackground::Picture(picture) => {
-                LightSource::of_picture(picture, scene.field, sun)
-            }
+            SceneBackground::Picture(picture) => LightSource::of_picture(picture, scene.field, sun),
         });
         let coefficients = light.light()?;
         let tint = scene.white_balance.tint(&coefficients);

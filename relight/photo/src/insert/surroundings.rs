@@ -129,7 +129,9 @@ mod tests {
             let glow = 0.3 + 0.55 * (-(from - 3.0).max(0.0) / 5.0).exp();
             [if from < 3.0 { 1.0 } else { glow as f32 }; 3]
         }));
-        let LightSource::Panorama(panorama) = LightSource::of_picture(&picture, 60.0, SeenSun::find(picture.planes())) else {
+        let LightSource::Panorama(panorama) =
+            LightSource::of_picture(&picture, 60.0, SeenSun::find(picture.planes()))
+        else {
             panic!("a panorama")
         };
         // 70.5 of 90 columns is 17 degrees to the right, 10.5 of 60 rows 13 degrees up.

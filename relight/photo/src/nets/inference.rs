@@ -83,8 +83,8 @@ impl Inference {
                 input.len()
             )));
         }
-        self.plan.run(input).map_err(|fault| {
-            NetError::Run(format!("tract could not run {}: {fault}", self.name))
-        })
+        self.plan
+            .run(input)
+            .map_err(|fault| NetError::Run(format!("tract could not run {}: {fault}", self.name)))
     }
 }

@@ -272,8 +272,7 @@ fn summed(panorama: &Panorama, normal: Direction, exponent: f64) -> [f64; 2] {
     let mut sums = [0.0; 2];
     for row in 0..height * PARTS {
         let edge = |row: usize| (std::f64::consts::PI * row as f64 / (height * PARTS) as f64).cos();
-        let area =
-            (edge(row) - edge(row + 1)) * std::f64::consts::TAU / (width * PARTS) as f64;
+        let area = (edge(row) - edge(row + 1)) * std::f64::consts::TAU / (width * PARTS) as f64;
         for column in 0..width * PARTS {
             let place = [column, row].map(|at| (at as f64 + 0.5) / PARTS as f64);
             let towards = panorama.direction(place[0], place[1]);
