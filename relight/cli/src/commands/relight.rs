@@ -6,9 +6,9 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use relight_core::image::{Extent, Transfer};
+use relight_core::image::Extent;
 use relight_photo::files::{
-    FoundPhotos, MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading, write_picture,
+    MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading, write_picture,
 };
 use relight_photo::insert::{
     Backdrop, DiscLamp, InsertError, LightSource, PanoramaView, Shot, Subject, WhiteBalance,
@@ -16,13 +16,12 @@ use relight_photo::insert::{
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
-use relit_data::geometry::Rect;
 use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
-use crate::photos::{Network, NetworkArguments, is_at, name_unused, not_an_input};
-use crate::values::{TRANSFERS, WHITE_BALANCES, degrees, one_of, within};
+use crate::photos::{Network, NetworkArguments, PhotoArguments, name_lost, not_an_input, outcome};
+use crate::values::{WHITE_BALANCES, degrees, one_of, within};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -40,20 +39,12 @@ const MOVIE_SIDE: usize = 1080;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
-    #[arg(required = true, value_name = "PHOTO")]
-    photos: Vec<PathBuf>,
+    #[command(flatten)]
+    photos: PhotoArguments,
     /// The picture (.png, .jpg, .exr), or for --turn a video (.mp4, .webm); of several photographs a folder. It is made where
     /// there is none.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// A grey image as large as the photograph, white on the object; or a folder of such, <photo's name>.png
-    /// [default: the photograph's alpha, or what is not black before a black background].
-    #[arg(long, value_name = "FILE|DIR")]
-    mask: Option<PathBuf>,
-    /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
-    #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
-    rect: Option<Rect>,
     /// The light: an HDR or EXR panorama, whose middle is what the viewer sees behind the object, or a text file of
     /// coefficients as relight writes them.
     #[arg(long, value_name = "FILE", conflicts_with = "lamp")]
@@ -104,9 +95,6 @@ pub(crate) struct Arguments {
     size: Option<u32>,
     #[command(flatten)]
     network: NetworkArguments,
-    /// How PNG, JPEG and WebP photographs are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
-    #[arg(long, value_parser = one_of(TRANSFERS))]
-    transfer: Option<Transfer>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -154,17 +142,7 @@ impl Arguments {
 
     /// Whether results go into a folder.
     fn is_set(&self) -> bool {
-        let is_many =
-            |path: &PathBuf| path.is_dir() || path.extension().is_some_and(|e| e == "tar");
-        self.photos.len() > 1 || self.photos.iter().any(is_many)
-    }
-
-    fn reading(&self) -> PhotoReading {
-        PhotoReading {
-            mask: self.mask.clone(),
-            rectangle: self.rect,
-            transfer: self.transfer,
-        }
+        self.photos.photos.len() > 1 || self.photos.has_set()
     }
 
     /// The light that is asked for, if any is.
@@ -205,9 +183,8 @@ struct Run<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let FoundPhotos { inputs, mut unused } = PhotoInput::find(&arguments.photos, None)?;
-    unused.retain(|file| !is_at(&file.path, arguments.mask.as_deref(), &arguments.output));
-    name_unused(&unused, console);
+    let found = arguments.photos.find(None, &arguments.output, console)?;
+    let inputs = &found.inputs;
     let run = Run {
         arguments,
         light: match arguments.new_light()? {
@@ -215,7 +192,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             None => None,
         },
         network: OnceLock::new(),
-        reading: arguments.reading(),
+        reading: arguments.photos.reading(),
         photos: inputs.iter().filter_map(file_of).collect(),
     };
     if !arguments.is_set()
@@ -225,23 +202,13 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         return Ok(Outcome::Whole);
     }
     let mut lost = 0;
-    for input in &inputs {
+    for input in inputs {
         if let Err(error) = run.relight(input, console) {
             lost += 1;
-            let message = with_causes(error.as_ref());
-            let text = format!("{}: {message}", input.place());
-            console.warn_with(
-                &text,
-                &json!({ "event": "failed", "photo": input.place(), "message": message }),
-            );
+            name_lost(input, &with_causes(error.as_ref()), console);
         }
     }
-    match lost {
-        0 if unused.is_empty() => Ok(Outcome::Whole),
-        0 => Ok(Outcome::Incomplete),
-        _ if lost == inputs.len() => Err("no photograph could be relit".into()),
-        _ => Ok(Outcome::Incomplete),
-    }
+    outcome(&found, lost, "relit")
 }
 
 impl Run<'_> {
@@ -306,6 +273,7 @@ impl Run<'_> {
             PhotoInput::check_result(output)?;
         }
         let mask = arguments
+            .photos
             .mask
             .as_deref()
             .map(|mask| PhotoReading::mask_path(mask, name));

@@ -161,7 +161,7 @@ impl Step<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Direction;
+    use super::super::{Direction, Order};
     use super::*;
     use proptest::prelude::*;
 

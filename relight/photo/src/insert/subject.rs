@@ -47,8 +47,6 @@ pub struct Subject {
     pub(super) place: [usize; 2],
     /// Width and height of the photograph.
     pub(super) photo: Extent,
-    /// 1 on the object, else 0.
-    pub(super) mask: Planes<1>,
     /// What the object covers of each pixel, and its colours.
     pub(super) matte: Matte,
     /// Also under the soft edge.
@@ -132,7 +130,6 @@ impl Subject {
         Ok(Self {
             place: [0, 0],
             photo: extent,
-            mask,
             matte: Matte::of_cut_out(&albedo, asset.alpha()),
             normals: surface.normals().completed(&wanted),
             albedo,
@@ -194,7 +191,6 @@ impl Subject {
         Ok(Self {
             place: cut.place,
             photo: cut.photo,
-            mask: cut.mask,
             shading: Shading::new(&shading, own.planes(), &wanted).doubted(paint.as_ref(), &wanted),
             matte: cut.matte,
             normals,
