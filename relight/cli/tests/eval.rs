@@ -252,7 +252,7 @@ fn predicted_normals_are_read_in_the_axes_that_are_told() {
         down.write_png(&path, Depth::Sixteen).unwrap();
     }
     let mean_angle = |frame| {
-        let found = [Predictions::new(found.clone(), None, frame)];
+        let found = [Predictions::new(found.clone(), frame)];
         let table = evaluate_normals(&set(&truth), "both", &found, &|_| {}).unwrap();
         let line = lines_of(&table, "net")[0];
         assert_eq!(line.mask, MaskRule::Known);
