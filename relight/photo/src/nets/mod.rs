@@ -45,7 +45,5 @@ pub use graph::{EPSILON, Graph, Node, Operation, Output, Parameter, Role, Value}
 pub use inference::Inference;
 pub use onnx::{INPUT, check_size, to_onnx};
 pub use signature::{OnnxSignature, OnnxValue};
-pub use turn_network::{
-    ALBEDO_OUTPUTS, ALBEDO_PARAMETERS, LOG_MEANS, TURN_INPUTS, TURN_OUTPUTS, turn_network,
-};
+pub use turn_network::{ALBEDO_OUTPUTS, LOG_MEANS, TURN_INPUTS, TURN_OUTPUTS, turn_network};
 pub use weights::{Tensor, Weights};

@@ -15,8 +15,6 @@ pub const TURN_OUTPUTS: usize = 4;
 pub const ALBEDO_OUTPUTS: usize = 3;
 /// The first of the three channels of the input that have the logarithms of the curves' means.
 pub const LOG_MEANS: usize = 32;
-/// How the names of the parameters of the head for albedo begin.
-pub const ALBEDO_PARAMETERS: &str = "albedo.";
 
 /// Channels that every pixel has of its own.
 const STEM: usize = 24;
