@@ -118,11 +118,6 @@ impl Shading {
         self
     }
 
-    /// Takes what was found for the truth.
-    pub(super) fn believe(&mut self) {
-        self.doubt = None;
-    }
-
     /// The shading of a pixel in new irradiance, red, green and blue, where `kept` of the shadows are kept.
     pub(super) fn at(&self, at: usize, irradiance: [f32; 3], kept: f32) -> [f32; 3] {
         let ratio = (self.relief[at] + kept * self.shadow[at]).exp();

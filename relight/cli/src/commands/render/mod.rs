@@ -1,22 +1,24 @@
 //! `relight render`: from maps and light to an image, a turn, a sweep of materials.
 
+mod object;
+
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use rayon::prelude::*;
-use relight_core::captured_object::CapturedObject;
-use relight_core::files::{Map, MapFiles};
-use relight_core::image::{ImageError, Linear, Rgb, Srgb, Transfer};
-use relight_core::light::{Direction, NormalsFrame, Order, Panorama, Rotation, ShLight};
+use relight_core::image::{ImageError, Linear, Rgb, Srgb};
+use relight_core::light::{Direction, Order, Panorama, Rotation, ShLight};
 use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_for};
-use relight_photo::files::{InsertionError, MovieWriter, OutputKind, write_picture};
+use relight_photo::files::{MovieWriter, OutputKind, write_picture};
+use relight_photo::insert::InsertError;
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
+use self::object::{Map, ObjectArguments};
 use crate::commands::CommandResult;
 use crate::folder::make_empty_folder;
-use crate::values::{Choices, DIFFUSE_FORMS, NORMALS_Y, TRANSFERS, degrees, one_of, within};
+use crate::values::{Choices, DIFFUSE_FORMS, degrees, one_of, within};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -59,34 +61,6 @@ pub(crate) struct Arguments {
     /// The diffuse layer.
     #[arg(long, default_value = "irradiance", value_parser = one_of(DIFFUSE_FORMS))]
     diffuse: DiffuseForm,
-}
-
-#[derive(Args)]
-struct ObjectArguments {
-    /// A captured object, which relight turn has written (object.relit), in place of maps.
-    #[arg(value_name = "OBJECT.relit", conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
-    asset: Option<PathBuf>,
-    /// Normals: PNG of 8 or 16 bits, colours (n + 1) / 2, black outside; or EXR of vectors. x right, z to the viewer.
-    #[arg(long, value_name = "FILE", required_unless_present = "asset")]
-    normals: Option<PathBuf>,
-    /// Which way y points in the map of normals.
-    #[arg(long, value_name = "WAY", default_value = "up", value_parser = one_of(NORMALS_Y))]
-    normals_y: NormalsFrame,
-    /// A grey image; the object is where it is at least one half [default: where there are normals].
-    #[arg(long, value_name = "FILE")]
-    mask: Option<PathBuf>,
-    /// Albedo: a file, or a linear value or three (0.8, or 0.8,0.5,0.3).
-    #[arg(long, value_name = "FILE|VALUE", default_value = "0.8", value_parser = map)]
-    albedo: Map,
-    /// Specular reflectance s_p: a file, or a linear value or three; without it the object is diffuse.
-    #[arg(long, value_name = "FILE|VALUE", value_parser = map)]
-    reflectance: Option<Map>,
-    /// Smoothness α: a value, an EXR, or an 8-bit PNG of values 0 to 255.
-    #[arg(long, value_name = "FILE|VALUE", default_value = "50", value_parser = map)]
-    smoothness: Map,
-    /// How PNG and JPEG files of albedo and reflectance are encoded; EXR is linear.
-    #[arg(long, default_value = "srgb", value_parser = one_of(TRANSFERS))]
-    transfer: Transfer,
 }
 
 #[derive(Args)]
@@ -171,28 +145,6 @@ impl Arguments {
     }
 }
 
-impl ObjectArguments {
-    fn read(&self) -> Result<Surface, Box<dyn Error>> {
-        match (&self.asset, &self.normals) {
-            (Some(path), _) => Ok(CapturedObject::read(path)?.surface().clone()),
-            (None, Some(normals)) => Ok(self.files(normals).read()?),
-            (None, None) => Err("give an object (.relit), or --normals".into()),
-        }
-    }
-
-    fn files(&self, normals: &Path) -> MapFiles {
-        MapFiles {
-            normals: normals.to_owned(),
-            frame: self.normals_y,
-            mask: self.mask.clone(),
-            albedo: self.albedo.clone(),
-            reflectance: self.reflectance.clone(),
-            smoothness: self.smoothness.clone(),
-            transfer: self.transfer,
-        }
-    }
-}
-
 impl LightArguments {
     fn read(&self) -> Result<ShLight, Box<dyn Error>> {
         let light = match (&self.panorama, &self.light) {
@@ -250,7 +202,7 @@ fn turn(
     arguments: &Arguments,
     frames: u32,
     console: Console,
-    frame: impl Fn(f64) -> Result<Rgb<Srgb>, InsertionError> + Sync,
+    frame: impl Fn(f64) -> Result<Rgb<Srgb>, InsertError> + Sync,
 ) -> Result<(), Box<dyn Error>> {
     let frame = |at: u32| frame(f64::from(at) / f64::from(frames));
     let path = &arguments.output;
@@ -263,7 +215,7 @@ fn turn(
         (0..frames).into_par_iter().try_for_each(|at| {
             frame(at)?.write_png(&path.join(format!("{at:0PLACES$}.png")))?;
             bar.inc(1);
-            Ok::<_, InsertionError>(())
+            Ok::<_, InsertError>(())
         })?;
     }
     bar.finish_and_clear();
@@ -276,19 +228,4 @@ fn exposure(text: &str) -> Result<Exposure, String> {
     }
     let stops = within(-30.0..=30.0, "auto, or stops")(text)?;
     Ok(Exposure::Stops(stops))
-}
-
-/// One number, three numbers parted by commas, or else a file.
-fn map(text: &str) -> Result<Map, String> {
-    let numbers: Result<Vec<f32>, _> = text.split(',').map(str::parse).collect();
-    match numbers.as_deref() {
-        Err(_) => Ok(Map::File(text.into())),
-        Ok(&[value]) if is_value(value) => Ok(Map::Even([value; 3])),
-        Ok(&[r, g, b]) if [r, g, b].into_iter().all(is_value) => Ok(Map::Even([r, g, b])),
-        Ok(_) => Err("give a file, or one or three numbers that are not negative".to_owned()),
-    }
-}
-
-fn is_value(number: f32) -> bool {
-    number.is_finite() && number >= 0.0
 }

@@ -1,49 +1,66 @@
-//! The files that hold an object's maps.
+//! An object that is lit: its maps, from files or as one value each, or a captured object.
 
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use super::read_planes;
-use crate::image::{
+use clap::Args;
+use relight_core::captured_object::CapturedObject;
+use relight_core::files::read_planes;
+use relight_core::image::{
     Extent, ImageError, Linear, Planes, Rgb, Samples, StoredImage, Transfer, check_extent,
 };
-use crate::light::{Normals, NormalsFrame, YDown, YUp};
-use crate::render::{Gloss, Surface};
+use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
+use relight_core::render::{Gloss, Surface};
+
+use crate::values::{NORMALS_Y, TRANSFERS, one_of};
 
 /// A map from a file, or one value for all pixels.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Map {
+pub(super) enum Map {
     /// The file.
     File(PathBuf),
     /// Linear values.
     Even([f32; 3]),
 }
 
-/// Where an object's maps are, and how they are encoded.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MapFiles {
-    /// PNG of colours (n + 1) / 2, or EXR of vectors; black is no surface.
-    pub normals: PathBuf,
-    /// Which way y points in it.
-    pub frame: NormalsFrame,
-    /// A grey image; below one half there is no surface either.
-    pub mask: Option<PathBuf>,
-    /// The diffuse reflectance A.
-    pub albedo: Map,
-    /// The specular reflectance s_p; without it the object is diffuse.
-    pub reflectance: Option<Map>,
-    /// The smoothness α. The 8-bit values of a PNG are α itself (0 to 255), as are those of an EXR.
-    pub smoothness: Map,
-    /// How integers in the files of albedo and specular reflectance are encoded.
-    pub transfer: Transfer,
+#[derive(Args)]
+pub(super) struct ObjectArguments {
+    /// A captured object, which relight turn has written (object.relit), in place of maps.
+    #[arg(value_name = "OBJECT.relit", conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
+    asset: Option<PathBuf>,
+    /// Normals: PNG of 8 or 16 bits, colours (n + 1) / 2, black outside; or EXR of vectors. x right, z to the viewer.
+    #[arg(long, value_name = "FILE", required_unless_present = "asset")]
+    normals: Option<PathBuf>,
+    /// Which way y points in the map of normals.
+    #[arg(long, value_name = "WAY", default_value = "up", value_parser = one_of(NORMALS_Y))]
+    normals_y: NormalsFrame,
+    /// A grey image; the object is where it is at least one half [default: where there are normals].
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
+    /// Albedo: a file, or a linear value or three (0.8, or 0.8,0.5,0.3).
+    #[arg(long, value_name = "FILE|VALUE", default_value = "0.8", value_parser = map)]
+    albedo: Map,
+    /// Specular reflectance s_p: a file, or a linear value or three; without it the object is diffuse.
+    #[arg(long, value_name = "FILE|VALUE", value_parser = map)]
+    reflectance: Option<Map>,
+    /// Smoothness α: a value, an EXR, or an 8-bit PNG of values 0 to 255.
+    #[arg(long, value_name = "FILE|VALUE", default_value = "50", value_parser = map)]
+    pub(super) smoothness: Map,
+    /// How PNG and JPEG files of albedo and reflectance are encoded; EXR is linear.
+    #[arg(long, default_value = "srgb", value_parser = one_of(TRANSFERS))]
+    transfer: Transfer,
 }
 
-impl MapFiles {
+impl ObjectArguments {
     /// Reads the object.
     ///
     /// # Errors
     /// Where a file cannot be read, the maps differ in size, a map has a value that is negative or not
     /// finite, or there is no surface.
-    pub fn read(&self) -> Result<Surface, ImageError> {
+    pub(super) fn read(&self) -> Result<Surface, Box<dyn Error>> {
+        if let Some(path) = &self.asset {
+            return Ok(CapturedObject::read(path)?.surface().clone());
+        }
         let normals = self.read_normals()?;
         let extent = normals.extent();
         let albedo = self.read_colour("albedo", &self.albedo, extent)?;
@@ -54,13 +71,16 @@ impl MapFiles {
                 Some(Gloss::new(reflectance, self.read_smoothness(extent)?)?)
             }
         };
-        Surface::new(normals, albedo, gloss)
+        Ok(Surface::new(normals, albedo, gloss)?)
     }
 
-    fn read_normals(&self) -> Result<Normals<YUp>, ImageError> {
-        let normals = match self.frame {
-            NormalsFrame::YUp => Normals::<YUp>::read(&self.normals)?,
-            NormalsFrame::YDown => Normals::<YDown>::read(&self.normals)?.flipped(),
+    fn read_normals(&self) -> Result<Normals<YUp>, Box<dyn Error>> {
+        let Some(path) = &self.normals else {
+            return Err("give an object (.relit), or --normals".into());
+        };
+        let normals = match self.normals_y {
+            NormalsFrame::YUp => Normals::<YUp>::read(path)?,
+            NormalsFrame::YDown => Normals::<YDown>::read(path)?.flipped(),
         };
         let normals = match &self.mask {
             None => normals,
@@ -71,10 +91,11 @@ impl MapFiles {
             }
         };
         if normals.is_empty() {
-            return Err(ImageError::Form {
-                path: self.normals.clone(),
-                fault: "shows no surface: it has no normals, or none inside the mask".to_owned(),
-            });
+            let path = path.display();
+            return Err(format!(
+                "{path} shows no surface: it has no normals, or none inside the mask"
+            )
+            .into());
         }
         Ok(normals)
     }
@@ -105,7 +126,8 @@ impl MapFiles {
                     Samples::Integer => 255.0,
                     Samples::Float => 1.0,
                 };
-                Ok(first_channel(planes)?.map(|value| value * scale))
+                let [values, ..] = planes.into_planes();
+                Ok(Planes::from_planes(extent, [values])?.map(|value| value * scale))
             }
         }
     }
@@ -125,19 +147,28 @@ fn check_values(path: &Path, what: &'static str, planes: &Planes<3>) -> Result<(
     })
 }
 
-fn first_channel(planes: Planes<3>) -> Result<Planes<1>, ImageError> {
-    let extent = planes.extent();
-    let [values, ..] = planes.into_planes();
-    Planes::from_planes(extent, [values])
+/// One number, three numbers parted by commas, or else a file.
+fn map(text: &str) -> Result<Map, String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Err(_) => Ok(Map::File(text.into())),
+        Ok(&[value]) if is_value(value) => Ok(Map::Even([value; 3])),
+        Ok(&[r, g, b]) if [r, g, b].into_iter().all(is_value) => Ok(Map::Even([r, g, b])),
+        Ok(_) => Err("give a file, or one or three numbers that are not negative".to_owned()),
+    }
+}
+
+fn is_value(number: f32) -> bool {
+    number.is_finite() && number >= 0.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{write_exr, write_png};
-    use crate::image::Depth;
+    use relight_core::files::{write_exr, write_png};
+    use relight_core::image::Depth;
 
-    fn files(folder: &Path) -> MapFiles {
+    fn files(folder: &Path) -> ObjectArguments {
         let extent = Extent::new(4, 2);
         let write = |name: &str, value: [f32; 3]| {
             let path = folder.join(name);
@@ -147,9 +178,10 @@ mod tests {
         let normals = Normals::<YDown>::new(Planes::filled(extent, [0.0, 0.6, 0.8]));
         let path = folder.join("normal.png");
         normals.write_png(&path, Depth::Sixteen).unwrap();
-        MapFiles {
-            normals: path,
-            frame: NormalsFrame::YDown,
+        ObjectArguments {
+            asset: None,
+            normals: Some(path),
+            normals_y: NormalsFrame::YDown,
             mask: None,
             albedo: Map::File(write("albedo.png", [0.5; 3])),
             reflectance: Some(Map::Even([0.1, 0.2, 0.3])),
@@ -221,9 +253,9 @@ mod tests {
         let path = folder.path().join("mask.png");
         write_png(&path, &Planes::zeros(Extent::new(4, 2)), Depth::Eight).unwrap();
         files.mask = Some(path.clone());
-        let error = files.read().unwrap_err();
+        let error = files.read().unwrap_err().to_string();
         assert!(
-            matches!(&error, ImageError::NotAMask { path: named, .. } if *named == path),
+            error.starts_with("the mask ") && error.contains("mask.png"),
             "{error}"
         );
     }
