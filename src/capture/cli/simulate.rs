@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use relit_rig::clock::Clock;
 use relit_rig::simulator::{
@@ -25,9 +25,6 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
             factor => Clock::paced(factor),
         },
         faults: asked.fault.join(",").parse::<TableFaults>()?,
-        seed: asked.seed,
-        index_at: asked.index_at,
-        reset_on_open: !asked.no_reset,
         ..SimulatorOptions::default()
     };
     let simulator = Simulator::start(&options, asked.link.as_deref())?;
@@ -42,13 +39,13 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
             speed: asked.speed,
         },
     );
-    wait(console, asked.for_seconds);
+    wait(console);
     report(console, &simulator.stop());
     Ok(Outcome::Whole)
 }
 
-/// Waits until the given time is over or a signal arrives.
-fn wait(console: Console, for_seconds: Option<f64>) {
+/// Waits until a signal arrives.
+fn wait(console: Console) {
     let ended = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM, SIGHUP] {
         if let Err(error) = signal_hook::flag::register(signal, Arc::clone(&ended)) {
@@ -57,9 +54,7 @@ fn wait(console: Console, for_seconds: Option<f64>) {
             ));
         }
     }
-    let limit = for_seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    let began = Instant::now();
-    while !ended.load(Ordering::Relaxed) && limit.is_none_or(|limit| began.elapsed() < limit) {
+    while !ended.load(Ordering::Relaxed) {
         thread::sleep(LOOK);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::error::Refusal;
+use super::error::CaptureError;
 use crate::camera::{Fourcc, Mode, ModeRequest, Rate, Rates};
 
 /// Formats from the one that is preferred: what the camera compresses by frames comes first.
@@ -56,8 +56,8 @@ impl ModePreference {
     /// one whose frames take the least space.
     ///
     /// # Errors
-    /// [`Refusal::Other`] with what there is.
-    pub fn choose(&self, modes: &[Mode]) -> Result<ModeRequest, Refusal> {
+    /// [`CaptureError::Refused`] with what there is.
+    pub fn choose(&self, modes: &[Mode]) -> Result<ModeRequest, CaptureError> {
         let requests = modes.iter().filter_map(|mode| self.of(mode));
         let rank = |fourcc: Fourcc| PREFERRED.iter().position(|&known| known == fourcc);
         requests
@@ -68,7 +68,7 @@ impl ModePreference {
             })
             .ok_or_else(|| {
                 let offered: Vec<String> = modes.iter().map(Mode::to_string).collect();
-                Refusal::Other(format!(
+                CaptureError::Refused(format!(
                     "the camera does not offer {self}; it offers {}",
                     first_of(&offered)
                 ))

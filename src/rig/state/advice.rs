@@ -106,8 +106,6 @@ pub enum AdvisedAction {
     Start,
     /// Captures again what was aborted: command `start` with the object.
     Again,
-    /// Captures the next object of the queue: command `next`.
-    Next,
     /// Stops what is under way: command `stop`.
     Stop,
     /// Brings the table back after an alarm: command `reset`.
@@ -178,43 +176,29 @@ impl Advice {
     }
 
     fn of_ready(state: &RigState) -> Self {
-        let next = state.queue.first().map(String::as_str);
         if let Some(take) = state.last_take.as_ref().filter(|take| is_aborted(take)) {
-            return Self::after_an_abort(take, next);
+            return Self::after_an_abort(take);
         }
-        let (headline, text, action) = match next {
-            Some(object) => (
-                "Put the next object on the table".to_owned(),
-                format!("Capture {object}"),
-                AdvisedAction::Next,
-            ),
-            None => ("Ready".to_owned(), "Start".to_owned(), AdvisedAction::Start),
-        };
-        let object = next.map(str::to_owned);
         Self {
-            headline,
+            headline: "Ready".to_owned(),
             explanation: None,
             button: AdvisedButton {
-                text,
-                action: Some(action),
-                object,
+                text: "Start".to_owned(),
+                action: Some(AdvisedAction::Start),
+                object: None,
             },
         }
     }
 
     /// What failed still stands on the table: it comes again before anything else.
-    fn after_an_abort(take: &TakeSummary, next: Option<&str>) -> Self {
+    fn after_an_abort(take: &TakeSummary) -> Self {
         let object = object_of(&take.session);
-        let action = match next == Some(object) {
-            true => AdvisedAction::Next,
-            false => AdvisedAction::Again,
-        };
         Self {
             headline: format!("The take of {object} was aborted"),
             explanation: take.reason.as_deref().map(capitalised),
             button: AdvisedButton {
                 text: format!("Again: {object}"),
-                action: Some(action),
+                action: Some(AdvisedAction::Again),
                 object: Some(object.to_owned()),
             },
         }
@@ -225,7 +209,7 @@ impl RigState {
     /// Whether nothing is captured at the moment.
     #[must_use]
     pub fn rests(&self) -> bool {
-        matches!(self.phase, Phase::Idle | Phase::WaitingForObject)
+        self.phase == Phase::Idle
     }
 
     /// What keeps a take from beginning: of several obstacles the first that a person has to remove.
@@ -285,9 +269,7 @@ fn is_aborted(take: &TakeSummary) -> bool {
 fn doing(phase: Phase) -> &'static str {
     match phase {
         Phase::Idle => "Ready",
-        Phase::WaitingForObject => "Put the next object on the table",
         Phase::Preflight => "Checking camera, table and disk",
-        Phase::Metering => "Finding the exposure",
         Phase::MovingBack => "Moving back for the run-up",
         Phase::Starting => "Gathering speed",
         Phase::Recording => "Recording",

@@ -129,50 +129,30 @@ impl fmt::Display for Alarm {
     }
 }
 
-/// What an `error:` number means.
+/// What an `error:` number means, of those that the lines of this program can get.
 pub(super) fn meaning_of_error(code: u8) -> &'static str {
     match code {
-        1 => "a word has no letter",
-        2 => "a number is malformed",
-        3 => "an unknown `$` command",
-        4 => "a value is negative that may not be",
+        3 | 20 => "a command it does not know",
         5 => "homing is switched off ($22)",
-        6 => "the step pulse is too short",
         7 => "its stored settings were damaged and are the defaults again",
         8 => "that needs an idle table",
         9 => "the table is locked: unlock or home it",
         10 => "soft limits need homing",
-        11 | 14 => "the line is too long",
         12 => "that speed needs more steps a second than it can make",
         13 => "a door is open",
-        18 => "its reset pin is active, or homing is not set up",
         15 => "the jog goes beyond the soft limit",
-        16 => "the jog is malformed",
-        20 => "a command it does not know",
-        21 | 24 => "two commands of one line exclude each other",
-        22 => "a feed rate is missing",
-        23 => "a number has to be whole",
-        25 => "a word is repeated",
-        26 | 28 => "a value is missing",
-        27 => "a line number is out of range",
-        29 => "a coordinate system it does not have",
-        30 => "G53 needs G0 or G1",
-        31 | 36 => "words are left over",
-        32 | 34 | 35 => "an arc, which tables cannot drive",
-        33 => "the target is invalid",
-        37 => "a tool offset, which tables have none of",
-        38 => "a tool number too large",
+        18 => "its reset pin is active, or homing is not set up",
         40 => "a control pin is active",
         45 => "a limit switch is active",
         46 => "it has to be homed first",
         50 => "its emergency stop is pressed",
         51 => "the motor's driver reports a fault",
-        79 => "it has to be reset first, once its emergency stop is released",
-        152 => "its configuration is invalid: see what it prints at its start",
         70 => "the line came damaged",
         71 => "the line's number is out of order",
         72 => "no checked session is open",
-        _ => "a number this program does not know: see the firmware's manual",
+        79 => "it has to be reset first, once its emergency stop is released",
+        152 => "its configuration is invalid: see what it prints at its start",
+        _ => "see the firmware's manual",
     }
 }
 

@@ -4,18 +4,19 @@
 //! monitors a motion in progress, and brings the table to a standstill when something goes wrong.
 //! It knows nothing of turns.
 
+mod fault;
 mod motion;
 mod position_report;
 mod stop;
 #[cfg(test)]
 mod tests;
 
-use super::Alarm;
-use super::error::MotionFault;
+use super::codes::Alarm;
 use super::wire::{
-    ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ReplyTimeout, RestartCause,
-    SendError, WireEvent,
+    ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ReplyTimeout, SendError,
+    WireEvent,
 };
+pub use fault::MotionFault;
 pub(crate) use motion::{Motion, MotionGoal};
 pub(crate) use position_report::{ControllerTraits, PositionReport};
 pub(crate) use stop::{Stop, StopOutcome};
@@ -24,6 +25,8 @@ pub(crate) use stop::{Stop, StopOutcome};
 const STOPPING_POLL_US: i64 = 50_000;
 /// Interval of reports while somebody waits for one, microseconds.
 const WANTED_POLL_US: i64 = 100_000;
+/// What the rig's firmware calls a restart that the host asked for.
+const HOST_RESET: &str = "host";
 /// Limit of recorded reports: an hour at 15 per second.
 const MOST_RECORDED: usize = 54_000;
 
@@ -467,12 +470,12 @@ impl Supervisor {
         self.settled = true;
     }
 
-    fn on_reset(&mut self, now_us: i64, cause: Option<RestartCause>) {
+    fn on_reset(&mut self, now_us: i64, cause: Option<String>) {
         self.restarts += 1;
         self.alarm = None;
         self.emergency_stop = false;
         self.work_zero = None;
-        let asked_for = matches!(cause, None | Some(RestartCause::Host));
+        let asked_for = cause.as_deref().is_none_or(|cause| cause == HOST_RESET);
         let stop = self.stop.as_mut().filter(|stop| stop.outcome().is_none());
         let kept = stop.is_some_and(|stop| stop.on_reset(now_us)) && asked_for;
         if !kept {

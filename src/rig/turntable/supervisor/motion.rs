@@ -1,8 +1,7 @@
 //! Monitoring a motion: whether it goes on, and where it ends.
 
-use super::{ControllerTraits, PositionReport};
-use crate::turntable::Alarm;
-use crate::turntable::error::MotionFault;
+use super::{ControllerTraits, MotionFault, PositionReport};
+use crate::turntable::codes::Alarm;
 use crate::turntable::wire::ControllerState;
 
 /// Longest silence of a controller in motion, microseconds.

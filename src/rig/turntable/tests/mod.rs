@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
 pub(super) mod fake_grbl;
+mod owned_port;
 mod relatives;
 
 use std::sync::{Arc, Mutex};
@@ -56,12 +57,8 @@ impl Rig {
     }
 
     fn plan(&self, turn_deg: f64) -> TurnPlan {
-        let request = TurnRequest {
-            turn_deg,
-            ..TurnRequest::default()
-        };
         let status = self.table.status().unwrap();
-        TurnPlan::new(self.table.identity(), &status, &request).unwrap()
+        TurnPlan::new(self.table.identity(), &status, 7.2, turn_deg).unwrap()
     }
 
     fn turn(&self, turn_deg: f64) -> Turn<'_> {
@@ -282,7 +279,7 @@ fn broken(stock: bool, change: impl FnOnce(&mut Trouble, i64)) -> (Rig, MotionFa
 fn whatever_breaks_a_turn_ends_it_with_its_reason_and_stops_the_table() {
     for stock in [false, true] {
         let (rig, fault, _) = broken(stock, |trouble, now| trouble.reset_at_us = Some(now));
-        let cause = (!stock).then_some(RestartCause::Watchdog);
+        let cause = (!stock).then(|| "watchdog".to_owned());
         assert_eq!(fault, MotionFault::Restarted(cause));
         assert!(!rig.table.status().unwrap().homed);
 

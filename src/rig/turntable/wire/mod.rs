@@ -25,7 +25,7 @@ mod tests;
 
 pub use event::{Counts, LineFault, LineOutcome, SendError, WireEvent};
 pub use machine::Machine;
-pub use message::{Banner, Message, RestartCause, parse};
+pub use message::{Message, parse};
 pub use pending::ReplyTimeout;
 pub use polling::Poll;
 pub use status::{ControllerState, Pins, Position, StatusReport};

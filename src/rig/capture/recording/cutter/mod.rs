@@ -51,7 +51,7 @@ impl TurnCount {
         Self {
             expected,
             exposures: Vec::new(),
-            missing: gaps(&[], expected, &[]),
+            missing: gaps(&[], expected),
             anomalies: Vec::new(),
             counts: false,
         }
@@ -206,7 +206,7 @@ impl Cutter {
             .collect();
         let anomalies = timing.anomalies.iter();
         TurnCount {
-            missing: gaps(&exposures, expected, &timing.evidence[lead..]),
+            missing: gaps(&exposures, expected),
             anomalies: anomalies
                 .filter_map(|anomaly| anomaly.counted_from(lead, exposures.len()))
                 .collect(),

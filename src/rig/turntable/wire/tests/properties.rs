@@ -72,6 +72,11 @@ fn exchange(
 }
 
 proptest! {
+    #[test]
+    fn the_first_line_of_every_controller_is_a_restart(text in banner()) {
+        prop_assert_eq!(parse(&text), Some(Message::Banner(None)));
+    }
+
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
@@ -229,36 +234,23 @@ fn other_field() -> impl Strategy<Value = String> {
 }
 
 fn message() -> impl Strategy<Value = Message> {
-    let cause = [
-        RestartCause::PowerOn,
-        RestartCause::External,
-        RestartCause::BrownOut,
-        RestartCause::Watchdog,
-        RestartCause::Host,
-    ];
-    let cause = proptest::option::of(proptest::sample::select(cause.to_vec()));
+    let cause = proptest::option::of("power-on|external|brown-out|watchdog|host");
     prop_oneof![
         seq().prop_map(|seq| Message::Ok { seq }),
         (any::<u8>(), seq()).prop_map(|(code, seq)| Message::Error { code, seq }),
         any::<u8>().prop_map(Message::Alarm),
         report().prop_map(Message::Status),
-        (banner(), cause).prop_map(|(start, cause)| {
-            let reset = cause.map_or_else(String::new, |cause| format!(" [reset: {cause}]"));
-            let text = format!("{start}{reset}");
-            Message::Banner(Banner { text, cause })
-        }),
+        cause.prop_map(Message::Banner),
         ("[0-9.a-z]{0,12}", "[ a-z:]{0,12}")
             .prop_map(|(version, note)| Message::Version { version, note }),
-        ("[A-Za-z]{0,8}", "([0-9]{1,4}(,[0-9]{1,4}){0,3})?")
-            .prop_map(|(letters, sizes)| Message::Build { letters, sizes }),
-        "[ -~]{0,40}".prop_map(Message::Note),
+        "[A-Za-z]{0,8}".prop_map(|letters| Message::Build { letters }),
         (
-            "G[0-9]{2}(\\.1)?|GC|HLP|FIRMWARE|NVS STORAGE",
+            "G[0-9]{2}(\\.1)?|GC|HLP|MSG|FIRMWARE|NVS STORAGE",
             "[ -~]{0,40}"
         )
             .prop_map(|(tag, text)| Message::Info { tag, text }),
         (any::<u16>(), thousandths())
             .prop_map(|(number, value)| Message::Setting { number, value }),
-        "[ -~]{0,40}".prop_map(Message::Startup),
+        Just(Message::Other),
     ]
 }
