@@ -1,5 +1,4 @@
-//! A program that works on a session: it gives way to everything else, can be held and ended, and is heard line by
-//! line.
+//! A program that works on a session: it can be held and ended, and is heard line by line.
 
 use std::io::{self, BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
@@ -13,8 +12,6 @@ use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::heard::Heard;
 
-/// Longest line that is read; what is longer is passed over.
-const LONGEST_LINE: u64 = 1 << 20;
 /// Lines that wait to be heard.
 const LINES: usize = 64;
 /// What is kept of standard error, bytes: its end.
@@ -33,23 +30,20 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    /// Starts a program in a process group of its own; at a niceness of 19 it gives way to all others.
-    pub(super) fn start(mut command: Command, niceness: i32) -> io::Result<Self> {
+    /// Starts a program in a process group of its own.
+    pub(super) fn start(mut command: Command) -> io::Result<Self> {
         command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .process_group(0);
-        let mut child = spawn_nice(&mut command, niceness)?;
+        let mut child = command.spawn()?;
         let (sender, lines) = sync_channel(LINES);
         if let Some(output) = child.stdout.take() {
             spawn_reader("relit-heard", move || {
-                let mut reader = BufReader::new(output);
-                while let Some(line) = next_line(&mut reader) {
-                    if sender.send(line).is_err() {
-                        return;
-                    }
-                }
+                let mut lines = BufReader::new(output).split(b'\n').map_while(Result::ok);
+                // Nobody listens any more once this fails.
+                let _ = lines.try_for_each(|line| sender.send(line));
             })?;
         }
         let complaint = Arc::new(Mutex::new(Vec::new()));
@@ -139,51 +133,9 @@ impl Drop for Worker {
     }
 }
 
-/// Starts a program that gives way to others. Linux keeps a priority for each thread, and a program inherits that of the
-/// thread that starts it: one of its own, as whoever holds the program later must not wait.
-fn spawn_nice(command: &mut Command, niceness: i32) -> io::Result<Child> {
-    thread::scope(|scope| {
-        let starter = scope.spawn(|| {
-            // Where the system refuses, it runs as others do.
-            let _ = rustix::process::setpriority_process(None, niceness);
-            command.spawn()
-        });
-        let failed = |_| Err(io::Error::other("the thread that starts it failed"));
-        starter.join().unwrap_or_else(failed)
-    })
-}
-
 fn spawn_reader(name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
     let thread = thread::Builder::new().name(name.to_owned());
     thread.spawn(work).map(drop)
-}
-
-/// The next line without its end; an overlong one is empty.
-fn next_line(reader: &mut impl BufRead) -> Option<Vec<u8>> {
-    let mut line = Vec::new();
-    let read = reader.take(LONGEST_LINE).read_until(b'\n', &mut line);
-    match read {
-        Ok(0) | Err(_) => None,
-        Ok(_) if line.ends_with(b"\n") => Some(line),
-        // The last line may lack its end.
-        Ok(read) if (read as u64) < LONGEST_LINE => Some(line),
-        Ok(_) => {
-            skip_line(reader);
-            Some(Vec::new())
-        }
-    }
-}
-
-/// Passes over the rest of a line, however long.
-fn skip_line(reader: &mut impl BufRead) {
-    while let Ok(buffer) = reader.fill_buf() {
-        let end = buffer.iter().position(|&byte| byte == b'\n');
-        let used = end.map_or(buffer.len(), |at| at + 1);
-        reader.consume(used);
-        if end.is_some() || used == 0 {
-            return;
-        }
-    }
 }
 
 fn keep_end(mut from: impl Read, kept: &Mutex<Vec<u8>>) {
@@ -199,16 +151,6 @@ fn keep_end(mut from: impl Read, kept: &Mutex<Vec<u8>>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn an_overlong_line_is_passed_over_and_the_next_one_is_whole() {
-        let mut text = vec![b'x'; 3 << 20];
-        text.extend_from_slice(b"\nlast");
-        let mut reader = BufReader::new(&text[..]);
-        assert_eq!(next_line(&mut reader), Some(Vec::new()));
-        assert_eq!(next_line(&mut reader), Some(b"last".to_vec()));
-        assert_eq!(next_line(&mut reader), None);
-    }
 
     #[test]
     fn only_the_end_of_a_long_complaint_is_kept() {

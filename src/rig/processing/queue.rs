@@ -10,8 +10,6 @@
 
 use std::collections::VecDeque;
 
-use serde::{Deserialize, Serialize};
-
 use crate::command::Refused;
 use crate::state::{
     FinishedJob, ProcessingJob, ProcessingOutcome, ProcessingStatus, ProcessingStep,
@@ -22,8 +20,8 @@ const LONGEST: usize = 200;
 /// Ended jobs that are remembered.
 const REMEMBERED: usize = 30;
 
-/// A session and what is still to be done with it: what is kept when the program ends.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+/// A session and what is still to be done with it.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct PendingWork {
     /// `None`: the data set.
     pub(super) session: Option<String>,
@@ -223,14 +221,6 @@ impl ProcessingQueue {
         });
     }
 
-    /// All that is not done yet, in its order: a step under way begins anew after a restart.
-    pub(super) fn pending(&self) -> Vec<PendingWork> {
-        let current = self.current.iter().filter(|current| !current.is_cancelled);
-        let current = current.map(|current| &current.entry);
-        let all = current.chain(&self.waiting);
-        all.map(|entry| entry.work.clone()).collect()
-    }
-
     /// What is under way and what waits, as it is shown.
     pub(super) fn jobs(&self) -> Vec<ProcessingJob> {
         let waiting = self.waiting.iter().filter_map(|entry| {
@@ -371,7 +361,6 @@ mod tests {
         );
         assert_eq!(queue.jobs().len(), 1);
         assert_eq!(queue.jobs()[0].status, ProcessingStatus::Ending);
-        assert!(queue.pending().is_empty());
         queue.finish(end(ProcessingOutcome::Failed, false));
         assert!(queue.jobs().is_empty() && !queue.cancel(mug));
         let outcomes: Vec<_> = queue.finished().iter().map(|job| job.outcome).collect();
@@ -406,18 +395,6 @@ mod tests {
         assert!(matches!(nothing, Err(Refused::Invalid(_))), "{nothing:?}");
         queue.cancel_session("mug");
         assert!(queue.jobs().is_empty());
-    }
-
-    #[test]
-    fn what_waits_and_what_is_under_way_is_kept_with_the_steps_that_are_left() {
-        let mut queue = ProcessingQueue::default();
-        queue.submit(work("mug", &[Mask, Check])).unwrap();
-        queue.submit(work("cow", &[Extract])).unwrap();
-        begun(&mut queue).unwrap();
-        queue.finish(end(GOOD, true));
-        begun(&mut queue).unwrap();
-        let left = [work("mug", &[Check]), work("cow", &[Extract])];
-        assert_eq!(queue.pending(), left);
     }
 
     #[test]

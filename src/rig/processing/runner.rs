@@ -18,8 +18,6 @@ use crate::state::{Monitor, ProcessingOutcome, ProcessingStep, Verdict};
 const LOOK: Duration = Duration::from_millis(50);
 /// Time between two searches for the programs.
 const SEARCH: Duration = Duration::from_secs(5);
-/// Niceness of what nobody waits for.
-const LAST: i32 = 19;
 /// What is done with a usable take by itself.
 const ALL: [ProcessingStep; 3] = [
     ProcessingStep::Mask,
@@ -57,8 +55,6 @@ pub(super) fn run(shared: &Shared) {
         };
         shared.show();
     }
-    // What was under way is still pending on the disk, and begins anew with the next start.
-    drop(running);
 }
 
 fn look_after_editor(shared: &Shared, is_busy: bool) {
@@ -136,7 +132,7 @@ fn start(shared: &Shared, begun: &Begun) -> Result<Worker, String> {
     };
     let (programs, dataset) = {
         let plan = shared.plan();
-        (plan.programs.clone(), shared.dataset(&plan.settings))
+        (plan.programs.clone(), shared.dataset.clone())
     };
     let places = StepPlaces {
         session,
@@ -146,7 +142,7 @@ fn start(shared: &Shared, begun: &Begun) -> Result<Worker, String> {
     let command = programs.command(begun.step, &places);
     let command = command.ok_or("its program is not installed on this machine")?;
     let program = command.get_program().to_string_lossy().into_owned();
-    Worker::start(command, LAST).map_err(|error| format!("{program} could not be started: {error}"))
+    Worker::start(command).map_err(|error| format!("{program} could not be started: {error}"))
 }
 
 fn is_aborted(session: &std::path::Path) -> Result<bool, String> {

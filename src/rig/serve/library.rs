@@ -8,8 +8,7 @@ use axum::http::StatusCode;
 use serde::Serialize;
 
 use super::cache::{Cache, FileVersion};
-use super::results::{CHECK_PAGE, ResultsReader, SessionResults};
-use crate::processing::ProcessingCommands;
+use super::results::{CHECK_PAGE, DatasetEntries, SessionResults, entries_in, results_of};
 use relit_data::causes::with_causes;
 use relit_data::naming::is_session_name;
 use relit_data::session::{
@@ -77,8 +76,6 @@ pub(super) struct SessionDetail {
     pub(super) angles_deg: Vec<Option<f64>>,
     /// Where frames are missing.
     pub(super) gaps: Vec<DroppedFrames>,
-    /// Commands that make its mask and extract it, for a terminal.
-    pub(super) commands: ProcessingCommands,
 }
 
 /// Frames that are missing.
@@ -104,7 +101,6 @@ pub(super) struct Library {
     dataset: Box<dyn Fn() -> PathBuf + Send + Sync>,
     /// Summaries by folder, and the version of the manifest that each was made from.
     summaries: Cache<(PathBuf, FileVersion), SessionSummary>,
-    results: ResultsReader,
 }
 
 impl Library {
@@ -113,7 +109,6 @@ impl Library {
             root,
             dataset,
             summaries: Cache::new(SUMMARIES),
-            results: ResultsReader::new(),
         }
     }
 
@@ -128,17 +123,17 @@ impl Library {
         names.retain(|name| before.is_none_or(|before| name.as_str() < before));
         names.retain(|name| day.is_none_or(|day| name.starts_with(day)));
         names.truncate(most);
-        let dataset = (self.dataset)();
+        let made = entries_in(&(self.dataset)());
         let listed = names.iter().filter_map(|name| {
             let mut summary = self.summary(&self.root, name)?;
-            summary.results = Some(self.results_of(name, &dataset));
+            summary.results = Some(self.results_of(name, &made));
             Some(summary)
         });
         Ok(listed.collect())
     }
 
-    fn results_of(&self, name: &str, dataset: &Path) -> SessionResults {
-        self.results.of(name, &self.root.join(name), Some(dataset))
+    fn results_of(&self, name: &str, made: &DatasetEntries) -> SessionResults {
+        results_of(&self.root.join(name), made.get(name).cloned())
     }
 
     /// The objects of the newest sessions, each once.
@@ -190,9 +185,8 @@ impl Library {
         let folder = self.folder(id)?;
         let manifest = read_manifest(&folder).map_err(Failure::broken)?;
         let index = read_index(&folder, &manifest);
-        let dataset = (self.dataset)();
         let mut summary = summarise(id, &manifest, index.as_ref());
-        summary.results = Some(self.results_of(id, &dataset));
+        summary.results = Some(self.results_of(id, &entries_in(&(self.dataset)())));
         let json = manifest.to_json().map_err(|error| with_causes(&error));
         let json = json
             .and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));
@@ -213,7 +207,6 @@ impl Library {
                 .collect(),
             angles_deg: entries.iter().map(|entry| entry.angle_deg).collect(),
             gaps: gaps.collect(),
-            commands: ProcessingCommands::of(&absolute(&folder), &absolute(&dataset)),
         })
     }
 
@@ -242,25 +235,6 @@ impl Library {
             }
             // One that cannot be read can still be had as it is.
             _ => Ok(folder),
-        }
-    }
-
-    /// Names and folders of the sessions of a day (`20261120`) that are not being recorded.
-    pub(super) fn of_day(&self, day: &str) -> Result<Vec<(String, PathBuf)>, Failure> {
-        if day.len() != 8 || !day.bytes().all(|byte| byte.is_ascii_digit()) {
-            return Err(Failure::bad("give the day as 20261120"));
-        }
-        let names = self.names()?.into_iter().rev();
-        let of_day = names.filter(|name| name.starts_with(&format!("{day}T")));
-        let found: Vec<_> = of_day
-            .filter_map(|name| {
-                let folder = self.ended(&name).ok()?;
-                Some((name, folder))
-            })
-            .collect();
-        match found.is_empty() {
-            true => Err(Failure::not_found(format!("there is no session of {day}"))),
-            false => Ok(found),
         }
     }
 
@@ -326,11 +300,6 @@ pub(super) fn read_names(root: &Path) -> io::Result<Vec<String>> {
         }
     }
     Ok(names)
-}
-
-/// The path as it is understood in every folder.
-fn absolute(path: &Path) -> PathBuf {
-    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 fn read_manifest(folder: &Path) -> Result<Manifest, String> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
@@ -55,13 +55,12 @@ pub(super) async fn detail(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
-    headers: HeaderMap,
 ) -> Result<Response, Failure> {
     // One path for the router: a session's name may end in anything, also in `.tar`.
     if let Some(session) = id.strip_suffix(".tar")
         && library.has(session)
     {
-        return session_tar(library, permits, session.to_owned(), &headers).await;
+        return session_tar(library, permits, session.to_owned()).await;
     }
     let detail = permits.run(Work::Listing, move || library.detail(&id));
     Ok(Json(detail.await?).into_response())
@@ -131,12 +130,11 @@ pub(super) async fn remark(
 /// The first frame, small
 pub(super) async fn thumbnail(
     State(library): State<Arc<Library>>,
-    State(pictures): State<Arc<Pictures>>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
 ) -> Result<Response, Failure> {
     let jpeg = permits.run(Work::Decoding, move || {
-        pictures.thumbnail(library.video_file(&id)?)
+        Pictures::thumbnail(&library.video_file(&id)?)
     });
     Ok(picture(jpeg.await?))
 }

@@ -100,9 +100,7 @@ pub struct ProcessingState {
     pub has_extract_program: bool,
     /// Whether each usable take is masked, checked and extracted once the rig rests.
     pub when_done: bool,
-    /// The data set's name: a folder beside that of the sessions.
-    pub dataset: String,
-    /// The same as a path on the rig's machine.
+    /// The folder of the data set, on the rig's machine.
     pub dataset_folder: String,
     /// What is done and what waits, in that order.
     pub jobs: Vec<ProcessingJob>,

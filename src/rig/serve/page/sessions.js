@@ -130,9 +130,6 @@ async function play(session) {
   $("player-when").textContent = when(session);
   $("player-video").href = `${path(session.id)}/video`;
   $("player-tar").href = `${path(session.id)}.tar`;
-  const day = dayOf(session);
-  $("player-day").hidden = !day;
-  $("player-day").href = `/api/v1/sessions.tar?day=${day}`;
   showRemarks(session);
   outline.hidden = true;
   $("player-outline").textContent = "";

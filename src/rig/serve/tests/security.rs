@@ -18,7 +18,6 @@ const GUARDED: [&str; 9] = [
     "/api/v1/sessions",
     "/api/v1/sessions/x/video",
     "/api/v1/sessions/x.tar",
-    "/api/v1/sessions.tar?day=20261120",
     "/api/v1/sessions/x/mask.png",
     "/api/v1/objects",
 ];
