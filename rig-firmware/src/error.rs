@@ -48,10 +48,8 @@ pub(crate) enum Error {
     NoAxisWords = 26,
     /// A line number beyond 9999999.
     LineNumber = 27,
-    /// The command needs a `P` or `L` word.
+    /// The command needs a `P` word.
     ValueMissing = 28,
-    /// No such coordinate system.
-    CoordinateSystem = 29,
     /// `G53` without a motion.
     MachineMotion = 30,
     /// No command uses the axis word.

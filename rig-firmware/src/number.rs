@@ -29,11 +29,6 @@ impl Decimal {
         self.whole
     }
 
-    /// Whether it is this number.
-    pub(crate) fn is(self, number: u32) -> bool {
-        !self.negative && self.whole == number && self.is_whole()
-    }
-
     /// Thousandths, to the nearest, halves away from zero.
     ///
     /// `None` where the result is beyond an `i32`.

@@ -166,7 +166,7 @@ impl Controller {
         self.session = Session::Closed;
         self.reader.reset();
         self.modal = Modal::new();
-        self.shift = 0;
+        self.offset = 0;
         self.banner(board, "host");
     }
 

@@ -1,4 +1,4 @@
-//! Status reports, and what `$G` and `$#` tell.
+//! Status reports, and what `$G` tells.
 
 use super::{Controller, Job, Mode};
 use crate::board::Board;
@@ -42,7 +42,7 @@ impl Controller {
         if self.settings.get(Key::Report) & 1 != 0 {
             reply.text("|MPos:").position(machine, inches);
         } else {
-            let work = machine.saturating_sub(self.work_zero());
+            let work = machine.saturating_sub(self.offset);
             reply.text("|WPos:").position(work, inches);
         }
         let buffers = reply.text("|Bf:").whole(u32::from(now.free)).text(",");
@@ -60,7 +60,7 @@ impl Controller {
         }
         if self.reports_to_offset == 0 {
             self.reports_to_offset = OFFSET_EVERY;
-            reply.text("|WCO:").position(self.work_zero(), inches);
+            reply.text("|WCO:").position(self.offset, inches);
         }
         self.reports_to_offset -= 1;
         reply.text(">").end();
@@ -70,7 +70,6 @@ impl Controller {
         let moving = now.interval.is_some();
         match (self.mode, self.job) {
             (Mode::Alarm(_), _) => "Alarm",
-            (Mode::Check, _) => "Check",
             _ if self.hold && moving => "Hold:1",
             _ if self.hold => "Hold:0",
             (_, Job::Home(_)) => "Home",
@@ -78,10 +77,6 @@ impl Controller {
             (_, Job::None) if !moving && !now.planned => "Idle",
             _ => "Run",
         }
-    }
-
-    fn work_zero(&self) -> i32 {
-        self.offset.saturating_add(self.shift)
     }
 
     fn centivolts(&self, battery: u16) -> i32 {
@@ -104,14 +99,5 @@ impl Controller {
         reply.text(" G94 M5 M9 T0 F");
         let inches = self.settings.flag(Key::ReportInches);
         reply.speed(self.modal.feed, inches).text(" S0]").end();
-    }
-
-    /// `$#`.
-    pub(super) fn tell_offsets<B: Board>(&self, board: &mut B) {
-        let inches = self.settings.flag(Key::ReportInches);
-        for (name, value) in [("[G54:", self.offset), ("[G28:", 0), ("[G92:", self.shift)] {
-            let mut reply = Reply::new(board, self.session.is_open());
-            reply.text(name).position(value, inches).text("]").end();
-        }
     }
 }

@@ -61,10 +61,6 @@ pub(crate) enum Action {
     Move(Target),
     /// `G4`: wait so many microseconds at rest.
     Dwell(u32),
-    /// `G10 L20`: the present place has this work position, kept in the EEPROM.
-    SetOrigin(i32),
-    /// `G28`: go to machine zero at full speed, over a place if one is named.
-    GoHome(Option<Target>),
     /// `G92`: the present place has this work position, until the next reset.
     SetOffset(i32),
 }
@@ -124,42 +120,20 @@ impl Words {
         }))
     }
 
-    /// The one-shot commands that set work zero.
-    fn origin(&self, modal: &Modal) -> Result<i32, Error> {
-        self.axis(modal.inches)?.ok_or(Error::NoAxisWords)
-    }
-
-    /// That no word is left over which only `G4` and `G10` use.
+    /// That no word is left over which only `G4` uses.
     fn without_values(&self) -> Result<(), Error> {
-        match self.l.is_some() || self.p.is_some() {
+        match self.p.is_some() {
             true => Err(Error::UnusedWords),
             false => Ok(()),
         }
     }
 
     fn dwell(&self) -> Result<Action, Error> {
-        if self.l.is_some() {
-            return Err(Error::UnusedWords);
-        }
         if self.x.is_some() {
             return Err(Error::UnusedAxisWords);
         }
         let micros = self.p.ok_or(Error::ValueMissing)?.micros();
         micros.map(Action::Dwell).ok_or(Error::BadNumber)
-    }
-
-    fn set_origin(&self, modal: &Modal) -> Result<Action, Error> {
-        let x = self.origin(modal)?;
-        let (Some(l), Some(p)) = (self.l, self.p) else {
-            return Err(Error::ValueMissing);
-        };
-        if !l.is(20) {
-            return Err(Error::Unsupported);
-        }
-        if !p.is(0) && !p.is(1) {
-            return Err(Error::CoordinateSystem);
-        }
-        Ok(Action::SetOrigin(x))
     }
 
     fn go(&self, modal: &Modal) -> Result<Action, Error> {
@@ -196,14 +170,9 @@ pub(crate) fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
     let modal = words.modal(before)?;
     let action = match words.one_shot {
         Some(OneShot::Dwell) => words.dwell()?,
-        Some(OneShot::SetOrigin) => words.set_origin(&modal)?,
-        Some(OneShot::GoHome) => {
-            words.without_values()?;
-            Action::GoHome(words.target(&modal)?)
-        }
         Some(OneShot::SetOffset) => {
             words.without_values()?;
-            Action::SetOffset(words.origin(&modal)?)
+            Action::SetOffset(words.axis(modal.inches)?.ok_or(Error::NoAxisWords)?)
         }
         Some(OneShot::Machine) | None => words.go(&modal)?,
     };
@@ -220,7 +189,7 @@ pub(crate) fn parse_jog(text: &[u8], modal: &Modal) -> Result<Jog, Error> {
     let mut words = Words::default();
     words.read(text)?;
     let allowed = matches!(words.one_shot, None | Some(OneShot::Machine));
-    if !allowed || words.motion.is_some() || words.l.is_some() || words.p.is_some() {
+    if !allowed || words.motion.is_some() || words.p.is_some() {
         return Err(Error::InvalidJog);
     }
     let modal = words.modal(&Modal { feed: 0, ..*modal })?;
@@ -258,10 +227,6 @@ mod tests {
             ("G91G53X3", Action::Move(Target::Machine(3000))),
             ("G20X1", Action::Move(Target::Work(25_400))),
             ("G4P0.5", Action::Dwell(500_000)),
-            ("G10L20P1X0", Action::SetOrigin(0)),
-            ("G10L20P0X9", Action::SetOrigin(9000)),
-            ("G28", Action::GoHome(None)),
-            ("G28X4", Action::GoHome(Some(Target::Work(4000)))),
             ("G92X-1", Action::SetOffset(-1000)),
             ("G00001X1", Action::Move(Target::Work(1000))),
         ];
@@ -286,8 +251,8 @@ mod tests {
             ("M5", 20),
             ("Y1", 20),
             ("G92.1", 20),
-            ("G28.1", 20),
             ("G10L2P1X1", 20),
+            ("G28", 20),
             ("G54", 20),
             ("G-5", 20),
             ("G0G1X1", 21),
@@ -297,23 +262,18 @@ mod tests {
             ("G1.5X1", 23),
             ("G90.1", 23),
             ("G0G92X1", 24),
-            ("G28G1X1", 24),
             ("X1X2", 25),
             ("F1F2", 25),
             ("G92", 26),
-            ("G10L20P1", 26),
             ("N10000000", 27),
             ("G4", 28),
-            ("G10X1", 28),
-            ("G10L20X1", 28),
-            ("G10L20P2X1", 29),
             ("G53", 30),
             ("G4P1X1", 31),
             ("X3000000", 33),
             ("G20X100000", 33),
             ("F3000000", 33),
             ("G1X1P1", 36),
-            ("G1X1L1", 36),
+            ("G1X1L1", 20),
             ("P1", 36),
             ("G92X1P1", 36),
         ];

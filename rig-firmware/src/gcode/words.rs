@@ -16,8 +16,6 @@ pub(crate) enum Motion {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OneShot {
     Dwell,
-    SetOrigin,
-    GoHome,
     Machine,
     SetOffset,
 }
@@ -30,7 +28,6 @@ pub(super) struct Words {
     pub(super) inches: Option<bool>,
     pub(super) relative: Option<bool>,
     pub(super) f: Option<Decimal>,
-    pub(super) l: Option<Decimal>,
     pub(super) n: Option<Decimal>,
     pub(super) p: Option<Decimal>,
     pub(super) x: Option<Decimal>,
@@ -57,7 +54,6 @@ impl Words {
         let place = match letter {
             b'G' => return self.command(value),
             b'F' => &mut self.f,
-            b'L' => &mut self.l,
             b'N' => &mut self.n,
             b'P' => &mut self.p,
             b'X' => &mut self.x,
@@ -83,10 +79,8 @@ impl Words {
             0 => self.motion.replace(Motion::Rapid).is_some(),
             1 => self.motion.replace(Motion::Feed).is_some(),
             4 => self.one_shot.replace(OneShot::Dwell).is_some(),
-            10 => self.one_shot.replace(OneShot::SetOrigin).is_some(),
-            // G28.1, G92.1 and their kin are commands of their own, and none of this table's.
-            28 | 92 if !value.is_whole() => return Err(Error::Unsupported),
-            28 => self.one_shot.replace(OneShot::GoHome).is_some(),
+            // G92.1 and its kin are commands of their own, and none of this table's.
+            92 if !value.is_whole() => return Err(Error::Unsupported),
             53 => self.one_shot.replace(OneShot::Machine).is_some(),
             92 => self.one_shot.replace(OneShot::SetOffset).is_some(),
             20 => self.inches.replace(true).is_some(),
@@ -98,11 +92,7 @@ impl Words {
         if !value.is_whole() {
             return Err(Error::NotInteger);
         }
-        let wants_axis = matches!(
-            self.one_shot,
-            Some(OneShot::SetOrigin | OneShot::GoHome | OneShot::SetOffset)
-        );
-        if self.motion.is_some() && wants_axis {
+        if self.motion.is_some() && self.one_shot == Some(OneShot::SetOffset) {
             return Err(Error::AxisConflict);
         }
         if group_taken {
