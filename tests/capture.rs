@@ -21,7 +21,7 @@ use relit_data::session::{
 use relit_data::shard::{Dataset, ImageSize};
 use relit_extract::{ExtractOptions, extract};
 use relit_rig::camera::{
-    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
+    Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc, Frame, GrantedMode,
     Mode, ModeRequest, Rates, open,
 };
 use relit_rig::capture::{End, Recorder, RecordingPlan, Window, salvage, salvage_session};
@@ -78,7 +78,7 @@ impl Camera for Scripted {
         Ok(Vec::new())
     }
 
-    fn set_control(&mut self, _: ControlId, value: i64) -> Result<i64, CameraError> {
+    fn set_control(&mut self, _: u32, value: i64) -> Result<i64, CameraError> {
         Ok(value)
     }
 

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use relit_data::session::FrameClock;
 use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues};
 use relit_rig::camera::{
-    self, Camera, CameraError, ControlFault, ControlId, ControlKind, Frame, GrantedMode, Rates,
+    self, Camera, CameraError, ControlKind, Frame, GrantedMode, Rates,
 };
 use relit_rig::clock::Clock;
 
@@ -46,7 +46,7 @@ fn vivid() -> Box<dyn Camera> {
     camera
 }
 
-fn id(camera: &mut dyn Camera, name: &str) -> ControlId {
+fn id(camera: &mut dyn Camera, name: &str) -> u32 {
     let controls = camera.controls().unwrap();
     let control = controls.iter().find(|control| control.name == name);
     control.unwrap_or_else(|| panic!("no control {name}")).id
@@ -234,12 +234,12 @@ fn controls_are_set_and_read_back() {
             other => panic!("{other}"),
         };
     let locked = fault("read_only_integer_32_bits", 1);
-    assert!(matches!(locked, ControlFault::Locked), "{locked}");
+    assert!(locked.contains("read-only"), "{locked}");
     let hole = fault("menu", 9);
-    assert!(matches!(hole, ControlFault::NoItem(_)), "{hole}");
+    assert!(hole.contains("takes one of"), "{hole}");
     let too_wide = fault("brightness", 1 << 40);
-    assert!(matches!(too_wide, ControlFault::Range { .. }), "{too_wide}");
-    let unknown = camera.set_control(ControlId(0x0098_09ff), 1).unwrap_err();
+    assert!(too_wide.contains("takes values from"), "{too_wide}");
+    let unknown = camera.set_control(0x0098_09ff, 1).unwrap_err();
     assert!(unknown.to_string().contains("no such control"), "{unknown}");
 }
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use relit_data::causes::with_causes;
 use relit_data::session::{Status, recordings};
 use relit_rig::camera::{
-    self, Camera, CameraError, Control, ControlId, DeviceInfo, Frame, GrantedMode, Mode,
+    self, Camera, CameraError, Control, DeviceInfo, Frame, GrantedMode, Mode,
     ModeRequest,
 };
 use relit_rig::capture::{CaptureError, Settings, Stopped};
@@ -102,7 +102,7 @@ impl Camera for LosesOneFrame {
         self.camera.controls()
     }
 
-    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError> {
+    fn set_control(&mut self, id: u32, value: i64) -> Result<i64, CameraError> {
         self.camera.set_control(id, value)
     }
 

@@ -170,7 +170,6 @@ impl From<RigArguments> for Settings {
             gain: line.gain,
             white_balance: line.white_balance,
             focus: line.focus,
-            power_line: None,
         };
         settings.degrees_per_second = line.degrees_per_second;
         settings.max_dropped = line.max_dropped;

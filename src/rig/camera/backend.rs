@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::address::CameraAddress;
-use super::control::{Control, ControlId};
+use super::control::Control;
 use super::error::CameraError;
 use super::format::Mode;
 use super::frame::Frame;
@@ -31,7 +31,7 @@ pub trait Camera: Send {
     ///
     /// # Errors
     /// [`CameraError::Control`], [`CameraError::Unplugged`], or [`CameraError::Unsupported`].
-    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError>;
+    fn set_control(&mut self, id: u32, value: i64) -> Result<i64, CameraError>;
 
     /// Starts the stream and returns what was granted, which may differ from the request:
     /// [`GrantedMode::differences`]. A running stream is stopped first.

@@ -45,8 +45,8 @@ use std::path::Path;
 
 pub use address::{CameraAddress, ReplayAddress, ReplayFaults};
 pub use backend::{Camera, DeviceInfo};
-pub use control::{Control, ControlFlags, ControlId, ControlKind, MenuItem, snake_case};
-pub use error::{CameraError, ControlFault};
+pub use control::{Control, ControlFlags, ControlKind, MenuItem, snake_case};
+pub use error::CameraError;
 pub use format::{Fourcc, Mode, Rates, Sizes};
 #[cfg(target_os = "linux")]
 use frame::SequenceUnwrapper;

@@ -155,7 +155,7 @@ fn enter_without_reports(context: CaptureContext<'_>, phase: Phase) {
 /// What is wrong with the table, in a sentence.
 fn fault_of(status: &TableStatus) -> Option<String> {
     if status.emergency_stop {
-        return Some(Obstacle::EmergencyStop.to_string());
+        return Some(Obstacle::emergency_stop().to_string());
     }
     let restarted = || {
         status

@@ -74,17 +74,6 @@ pub(super) struct SessionDetail {
     pub(super) times_s: Vec<f64>,
     /// Each frame's angle, degrees; `null` where there was no table.
     pub(super) angles_deg: Vec<Option<f64>>,
-    /// Where frames are missing.
-    pub(super) gaps: Vec<DroppedFrames>,
-}
-
-/// Frames that are missing.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct DroppedFrames {
-    /// Number of the frame after the gap.
-    pub(super) before: u64,
-    /// How many are missing.
-    pub(super) missing: u64,
 }
 
 /// The video of a session that has ended.
@@ -136,21 +125,6 @@ impl Library {
         results_of(&self.root.join(name), made.get(name).cloned())
     }
 
-    /// The objects of the newest sessions, each once.
-    pub(super) fn objects(&self, most: usize) -> Result<Vec<String>, Failure> {
-        let mut objects: Vec<String> = Vec::new();
-        for name in self.names()? {
-            let object = object_of(&name);
-            if !objects.iter().any(|known| known == object) {
-                objects.push(object.to_owned());
-            }
-            if objects.len() == most {
-                break;
-            }
-        }
-        Ok(objects)
-    }
-
     /// Names of all session folders, newest first: they begin with the date.
     fn names(&self) -> Result<Vec<String>, Failure> {
         let mut names = read_names(&self.root).map_err(|error| {
@@ -193,10 +167,6 @@ impl Library {
         let index = index.unwrap_or_default();
         let entries = index.entries();
         let first = entries.first().map_or(0, |entry| entry.t_us);
-        let gaps = index.gaps().into_iter().map(|gap| DroppedFrames {
-            before: gap.before,
-            missing: gap.missing,
-        });
         Ok(SessionDetail {
             summary,
             manifest: json.map_err(Failure::broken)?,
@@ -206,7 +176,6 @@ impl Library {
                 .map(|entry| seconds(first, entry.t_us))
                 .collect(),
             angles_deg: entries.iter().map(|entry| entry.angle_deg).collect(),
-            gaps: gaps.collect(),
         })
     }
 

@@ -84,7 +84,6 @@ pub(super) fn router(app: &App) -> Router {
         .route("/api/v1/events", get(api::events))
         .route("/api/v1/command", post(api::command))
         .route("/api/v1/preview.jpg", get(preview::picture))
-        .route("/api/v1/objects", get(sessions::objects))
         .route("/api/v1/trash", get(sessions::trash))
         .route("/api/v1/sessions", get(sessions::list))
         .merge(of_a_session())

@@ -18,8 +18,6 @@ use relit_web::{Failure, JsonBody, QueryParams};
 /// Sessions in one answer, unless asked otherwise, and at most.
 const SESSIONS: usize = 100;
 const MOST_SESSIONS: usize = 1000;
-/// Names that are suggested.
-const OBJECTS: usize = 20;
 /// Width of a frame in the player, unless asked otherwise, and what can be asked for; pixels.
 const WIDTH: u32 = 960;
 const WIDTHS: std::ops::RangeInclusive<u32> = 64..=1920;
@@ -170,13 +168,4 @@ fn picture(jpeg: axum::body::Bytes) -> Response {
         (header::CACHE_CONTROL, KEEP),
     ];
     (headers, jpeg).into_response()
-}
-
-/// Names of objects captured last, newest first
-pub(super) async fn objects(
-    State(library): State<Arc<Library>>,
-    State(permits): State<Arc<Permits>>,
-) -> Result<Json<Vec<String>>, Failure> {
-    let objects = permits.run(Work::Listing, move || library.objects(OBJECTS));
-    Ok(Json(objects.await?))
 }

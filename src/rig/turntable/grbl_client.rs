@@ -15,7 +15,7 @@ use super::port::{self, Port, SerialPort};
 use super::status::TableStatus;
 use super::supervisor::{MotionFault, MotionGoal};
 use super::wire::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
-use crate::clock::{Clock, Waitable};
+use crate::clock::Clock;
 use crate::lockfile::LockFile;
 
 /// Added to the computed time of a motion.
@@ -34,8 +34,6 @@ pub struct Table {
     _lock: Option<LockFile>,
     identity: Identity,
     was_stopped: bool,
-    /// Whether a line waits for its answer.
-    line_open: Waitable<bool>,
 }
 
 impl Table {
@@ -94,7 +92,6 @@ impl Table {
             _lock: lock,
             identity,
             was_stopped,
-            line_open: Waitable::new(&options.clock, false),
         })
     }
 
@@ -354,8 +351,7 @@ impl Table {
 
     /// Opens a checked session if the controller offers one and none is open.
     pub(super) fn secure(&self) -> Result<(), TurntableError> {
-        let _turn = LineTurn::take(&self.line_open);
-        greeting::secure(&self.link, &self.identity.extras)
+        greeting::secure(&self.link, self.identity.extras)
     }
 
     pub(super) fn outcome(
@@ -364,7 +360,6 @@ impl Table {
         timeout: ReplyTimeout,
     ) -> Result<LineOutcome, TurntableError> {
         self.secure()?;
-        let _turn = LineTurn::take(&self.line_open);
         self.link.line(block, timeout)
     }
 
@@ -387,22 +382,6 @@ impl Table {
                 fault,
             },
         }
-    }
-}
-
-/// Permission to send a line and wait for its answer. One thread has it at a time.
-struct LineTurn<'a>(&'a Waitable<bool>);
-
-impl<'a> LineTurn<'a> {
-    fn take(open: &'a Waitable<bool>) -> Self {
-        open.wait(|open| (!std::mem::replace(open, true)).then_some(()));
-        Self(open)
-    }
-}
-
-impl Drop for LineTurn<'_> {
-    fn drop(&mut self) {
-        self.0.update(|open| *open = false);
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::TableOptions;
 use super::error::TurntableError;
 use super::family::Family;
-use super::identity::{Extras, GrblSettings, Identity};
+use super::identity::{GrblSettings, Identity, offers_extras};
 use super::link::Link;
 use super::supervisor::ControllerTraits;
 use super::wire::{ControllerState, Counts, LineFault, LineOutcome, Message, ReplyTimeout};
@@ -47,35 +47,28 @@ pub(super) fn greet(
 ) -> Result<(Identity, bool), TurntableError> {
     let moved = wake(link, resets)?;
     let about = about(link)?;
-    let build = |message: &Message| match message {
-        Message::Build { letters, .. } => Some(Extras::of(letters)),
-        _ => None,
-    };
-    let offered = about.iter().find_map(build).filter(|_| options.extras);
-    let extras = offered.unwrap_or_default();
-    secure(link, &extras)?;
+    let extras = options.extras && offers_extras(&about);
+    secure(link, extras)?;
     let settings = settings(link, Family::from_messages(&about), extras)?;
-    let mut identity = Identity::read(&about, &settings, options.travel_deg)?;
-    identity.extras = extras;
-    identity.lease_s = identity.lease_s.filter(|_| extras.lease);
+    let identity = Identity::read(&about, &settings, extras)?;
     link.supervisor().set_traits(ControllerTraits {
         family: identity.family,
         degrees_per_unit: identity.degrees_per_unit,
-        poll: if extras.stamps {
+        poll: if extras {
             POLL_STAMPED
         } else {
             POLL_STOCK
         },
-        stamps: extras.stamps,
-        reports_homing: !identity.is_stock(),
+        stamps: extras,
+        reports_homing: extras,
         step_deg: identity.step_deg(),
     });
     Ok((identity, moved))
 }
 
 /// Opens a checked session if the controller offers one and none is open.
-pub(super) fn secure(link: &Link, extras: &Extras) -> Result<(), TurntableError> {
-    if !extras.checked_lines || link.supervisor().is_checked() {
+pub(super) fn secure(link: &Link, extras: bool) -> Result<(), TurntableError> {
+    if !extras || link.supervisor().is_checked() {
         return Ok(());
     }
     done(link, "N0", link.open_session()?).map(|_| ())
@@ -206,13 +199,13 @@ fn lacks(about: &[Message]) -> Option<&'static str> {
 }
 
 /// The answer to `$$`, complete and twice the same: without checksums a digit could be wrong.
-fn settings(link: &Link, family: Family, extras: Extras) -> Result<GrblSettings, TurntableError> {
+fn settings(link: &Link, family: Family, extras: bool) -> Result<GrblSettings, TurntableError> {
     let mut last = None;
     let mut missing = Vec::new();
     for _ in 0..READINGS {
         let messages = match link.line("$$", ReplyTimeout::AtOnce)? {
             LineOutcome::Failed(fault) if recover(link, fault).is_ok() => {
-                secure(link, &extras)?;
+                secure(link, extras)?;
                 continue;
             }
             outcome => done(link, "$$", outcome)?,

@@ -75,7 +75,7 @@ pub use error::TurntableError;
 pub use family::Family;
 pub use grbl_client::Table;
 pub use homing::Homed;
-pub use identity::{Extras, Identity};
+pub use identity::Identity;
 pub(crate) use plan::MARGIN_DEG;
 pub use plan::TurnPlan;
 pub use port::{Port, SerialPort};
@@ -92,9 +92,6 @@ pub struct TableOptions {
     pub clock: Clock,
     /// Folder for the lock of a port's owner: one that every program on the machine agrees on, such as [`lockfile::standard_folder`].
     pub runtime_folder: PathBuf,
-    /// How far the table may turn from the angle 0 in either direction before its cable is wound
-    /// up, degrees. Applies if the controller has no limit of its own.
-    pub travel_deg: f64,
     /// Whether to use what the rig's firmware offers beyond Grbl. If false, it is treated as a stock
     /// board.
     pub extras: bool,
@@ -105,7 +102,6 @@ impl Default for TableOptions {
         Self {
             clock: Clock::monotonic(),
             runtime_folder: lockfile::standard_folder(),
-            travel_deg: 400.0,
             extras: true,
         }
     }

@@ -154,14 +154,13 @@ mod tests {
 
     use super::*;
     use crate::turntable::family::Family;
-    use crate::turntable::identity::Extras;
     use crate::turntable::wire::ControllerState;
 
     fn identity(low_deg: f64, high_deg: f64) -> Identity {
         Identity {
             family: Family::Rig,
             firmware: String::new(),
-            extras: Extras::default(),
+            extras: false,
             steps_per_degree: 88.889,
             max_degrees_per_second: 36.0,
             acceleration: 36.0,

@@ -9,7 +9,7 @@ use std::fmt;
 
 use relit_data::causes::with_causes;
 
-use super::{Camera, CameraError, Control, ControlId, ControlKind};
+use super::{Camera, CameraError, Control, ControlKind};
 
 /// A property of the picture that must not change during a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -48,7 +48,6 @@ impl Aspect {
             Self::Exposure => &[
                 ("auto_exposure", Manual::MenuItem(1, "manual")),
                 ("exposure_auto", Manual::MenuItem(1, "manual")),
-                ("exposure_mode", Manual::Locked),
             ],
             Self::Gain => &[
                 ("gain_automatic", Manual::Off),
@@ -59,12 +58,10 @@ impl Aspect {
                 ("white_balance_automatic", Manual::Off),
                 ("white_balance_temperature_auto", Manual::Off),
                 ("auto_white_balance", Manual::Off),
-                ("white_balance_mode", Manual::Locked),
             ],
             Self::Focus => &[
                 ("focus_automatic_continuous", Manual::Off),
                 ("focus_auto", Manual::Off),
-                ("focus_mode", Manual::Locked),
             ],
             Self::FrameRate => &[
                 ("exposure_dynamic_framerate", Manual::Off),
@@ -113,8 +110,6 @@ enum Manual {
     /// A menu's item: its index in the kernel's interface, which must be offered, or a word in
     /// its label.
     MenuItem(i64, &'static str),
-    /// A menu's first item, which holds the value that the automatic has found.
-    Locked,
 }
 
 /// Values to hold instead of the camera's current ones, in the controls' own units.
@@ -128,9 +123,6 @@ pub struct ManualValues {
     pub white_balance: Option<i64>,
     /// Focus.
     pub focus: Option<i64>,
-    /// Power-line filter: 0 off, 1 for 50 Hz, 2 for 60 Hz. Off when not given: with a fixed
-    /// exposure it can only interfere.
-    pub power_line: Option<i64>,
 }
 
 impl ManualValues {
@@ -140,7 +132,8 @@ impl ManualValues {
             Aspect::Gain => self.gain,
             Aspect::WhiteBalance if name == "white_balance_temperature" => self.white_balance,
             Aspect::Focus => self.focus,
-            Aspect::PowerLine => Some(self.power_line.unwrap_or(0)),
+            // Off: with a fixed exposure the filter can only interfere.
+            Aspect::PowerLine => Some(0),
             Aspect::WhiteBalance | Aspect::Backlight | Aspect::FrameRate => None,
         }
     }
@@ -152,7 +145,7 @@ pub struct ControlSetting {
     /// The property that it holds.
     pub aspect: Aspect,
     /// The control.
-    pub id: ControlId,
+    pub id: u32,
     /// Its name.
     pub name: String,
     /// The value.
@@ -193,8 +186,7 @@ impl ManualPlan {
         for aspect in Aspect::ALL {
             let before = plan.missing.len();
             let switched = plan.switch_off(controls, aspect);
-            let locked = matches!(switched, Some(Manual::Locked));
-            let held = plan.hold(controls, wanted, aspect, &mut values) || locked;
+            let held = plan.hold(controls, wanted, aspect, &mut values);
             if aspect == Aspect::FrameRate || aspect == Aspect::Backlight {
                 // A camera without these has a fixed rate and no correction: none is missing.
                 continue;
@@ -220,7 +212,6 @@ impl ManualPlan {
             (Aspect::Gain, wanted.gain),
             (Aspect::WhiteBalance, wanted.white_balance),
             (Aspect::Focus, wanted.focus),
-            (Aspect::PowerLine, wanted.power_line),
         ];
         let planned = |aspect, value| {
             let mut steps = self.steps.iter();
@@ -341,7 +332,7 @@ fn drift_between(before: &[Control], after: &[Control]) -> Vec<ControlDrift> {
         .collect()
 }
 
-fn moved(name: &str, id: ControlId, should: i64, controls: &[Control]) -> Option<ControlDrift> {
+fn moved(name: &str, id: u32, should: i64, controls: &[Control]) -> Option<ControlDrift> {
     let control = controls.iter().find(|control| control.id == id);
     let is = control.and_then(|control| control.value);
     (is != Some(should)).then(|| ControlDrift {
@@ -362,11 +353,11 @@ impl Manual {
                 .map(|item| item.index),
             (Self::MenuItem(index, _), _) => in_range(control, index),
             // Some switches are menus whose first item is manual.
-            (Self::Off | Self::Locked, ControlKind::Menu(items)) => items
+            (Self::Off, ControlKind::Menu(items)) => items
                 .iter()
                 .find(|item| item.index == 0)
                 .map(|item| item.index),
-            (Self::Off | Self::Locked, _) => in_range(control, 0),
+            (Self::Off, _) => in_range(control, 0),
         }
     }
 }

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::timeline::Timeline;
 use crate::camera::{
-    CameraAddress, Control, ControlFlags, ControlId, ControlKind, DeviceInfo, GrantedMode,
+    CameraAddress, Control, ControlFlags, ControlKind, DeviceInfo, GrantedMode,
     MenuItem, Mode, Rate, Rates, Sizes,
 };
 use relit_data::session::{Manifest, Recording};
@@ -62,7 +62,7 @@ pub(super) fn controls(manifest: &Manifest) -> Vec<Control> {
                 _ => return None,
             };
             Some(Control {
-                id: ControlId(id),
+                id: id,
                 name: name.clone(),
                 kind,
                 minimum: value,

@@ -22,7 +22,7 @@ use self::faults::FaultInjector;
 use self::source::{Delivery, Source};
 use self::timeline::{Moment, Timeline};
 use super::{
-    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
+    Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc, Frame, GrantedMode,
     Mode, ModeRequest, ReplayAddress,
 };
 use crate::clock::Clock;
@@ -101,7 +101,7 @@ impl Camera for ReplayCamera {
         Ok(self.controls.clone())
     }
 
-    fn set_control(&mut self, _: ControlId, _: i64) -> Result<i64, CameraError> {
+    fn set_control(&mut self, _: u32, _: i64) -> Result<i64, CameraError> {
         Err(CameraError::Unsupported {
             device: self.info.address.to_string(),
             what: "a recording's controls stand as they were recorded".to_owned(),

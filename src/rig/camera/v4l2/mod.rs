@@ -2,7 +2,6 @@
 
 mod controls;
 mod device;
-mod holders;
 mod ioctl;
 mod listing;
 mod modes;
@@ -14,7 +13,7 @@ use std::time::Duration;
 use self::device::Device;
 use self::stream::Stream;
 use super::{
-    Camera, CameraError, Control, ControlId, DeviceInfo, Frame, GrantedMode, Mode, ModeRequest,
+    Camera, CameraError, Control, DeviceInfo, Frame, GrantedMode, Mode, ModeRequest,
 };
 
 pub(super) use listing::list;
@@ -50,7 +49,7 @@ impl Camera for V4l2Camera {
         self.device.controls()
     }
 
-    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError> {
+    fn set_control(&mut self, id: u32, value: i64) -> Result<i64, CameraError> {
         self.device.set_control(id, value)
     }
 

@@ -1,6 +1,6 @@
 // The page beside the rig: shows the state as it comes and gives the rig its commands. All text from the
 // rig goes in as text, never as markup.
-import { ask, follow, give } from "./link.js";
+import { follow, give } from "./link.js";
 import { startPreview } from "./preview.js";
 import { make } from "./elements.js";
 import { showProcessing, startProcessing } from "./process.js";
@@ -280,8 +280,7 @@ async function refresh() {
   // Without a folder there is no list, and that is said already.
   if (state?.disk_fault) return sayOfList("");
   try {
-    await listSessions();
-    const names = await ask("/api/v1/objects");
+    const names = await listSessions();
     $("objects").replaceChildren(...names.map((value) => make("option", { value })));
     sayOfList("");
   } catch (problem) {

