@@ -131,7 +131,7 @@ impl Advice {
     fn against(obstacle: &Obstacle) -> Self {
         let (text, action) = obstacle.button.unwrap_or((obstacle.headline, None));
         Self {
-            headline: obstacle.headline().to_owned(),
+            headline: obstacle.headline.to_owned(),
             explanation: Some(capitalised(&obstacle.why)),
             button: AdvisedButton {
                 text: text.to_owned(),
