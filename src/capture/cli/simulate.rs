@@ -6,10 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use relit_rig::clock::Clock;
-use relit_rig::simulator::{
-    Simulator, SimulatorCounts, SimulatorError, SimulatorOptions, TableFaults, WireCounts,
-};
-use serde_json::json;
+use relit_rig::simulator::{Simulator, SimulatorError, SimulatorOptions, TableFaults};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::turntable_arguments::SimulateArguments;
@@ -40,7 +37,8 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
         },
     );
     wait(console);
-    report(console, &simulator.stop());
+    drop(simulator);
+    console.say("the simulated turntable has ended", &Event::Ended);
     Ok(Outcome::Whole)
 }
 
@@ -50,37 +48,11 @@ fn wait(console: Console) {
     for signal in [SIGINT, SIGTERM, SIGHUP] {
         if let Err(error) = signal_hook::flag::register(signal, Arc::clone(&ended)) {
             console.warn(&format!(
-                "signal {signal} ends the simulator without its summary: {error}"
+                "signal {signal} ends the simulator and leaves its link: {error}"
             ));
         }
     }
     while !ended.load(Ordering::Relaxed) {
         thread::sleep(LOOK);
     }
-}
-
-fn report(console: Console, counts: &SimulatorCounts) {
-    let text = format!(
-        "opened {} times; restarted by faults {} times{}\nto the table:   {}\nfrom the table: {}",
-        counts.opened,
-        counts.resets,
-        if counts.stalled { ", stalled" } else { "" },
-        of_the_wire(&counts.to_chip),
-        of_the_wire(&counts.from_chip),
-    );
-    let counts = json!(counts);
-    console.say(&text, &Event::Ended { counts });
-}
-
-fn of_the_wire(counts: &WireCounts) -> String {
-    format!(
-        "{} lines, {} bytes, {} lost, {} flipped, {} late; {} lines doubled, {} merged",
-        counts.lines,
-        counts.bytes,
-        counts.dropped,
-        counts.flipped,
-        counts.delayed,
-        counts.duplicated,
-        counts.merged,
-    )
 }

@@ -46,10 +46,6 @@ impl ProcessingPrograms {
                     "--progress".into(),
                 ],
             ),
-            ProcessingStep::Verify => (
-                &self.extract,
-                vec!["verify".into(), dataset.into(), "--progress".into()],
-            ),
         };
         if step == ProcessingStep::Extract && places.is_aborted {
             arguments.push("--partial".into());

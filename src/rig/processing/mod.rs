@@ -125,26 +125,11 @@ impl Processing {
             let error = format!("the mask of {session} is open in the editor: finish it there");
             return Err(Refused::Busy(error));
         }
-        self.queue(PendingWork {
-            session: Some(session.to_owned()),
+        self.shared.look_for_programs();
+        self.shared.submit(PendingWork {
+            session: session.to_owned(),
             steps,
         })
-    }
-
-    /// Queues the verification of the data set; returns the job's number.
-    ///
-    /// # Errors
-    /// [`Refused`] where the program is missing, or the data set is being verified.
-    pub fn verify(&self) -> Result<u64, Refused> {
-        self.queue(PendingWork {
-            session: None,
-            steps: vec![ProcessingStep::Verify],
-        })
-    }
-
-    fn queue(&self, work: PendingWork) -> Result<u64, Refused> {
-        self.shared.look_for_programs();
-        self.shared.submit(work)
     }
 
     /// Cancels a job; its program is ended. False where there is none of that number.
@@ -167,7 +152,7 @@ impl Processing {
         self.shared
             .change(|plan| plan.queue.cancel_session(session));
         let until = Instant::now() + RELEASE;
-        while self.shared.plan().queue.has(Some(session)) {
+        while self.shared.plan().queue.has(session) {
             if Instant::now() > until {
                 let error = format!("{session} is still being processed: try again in a moment");
                 return Err(Refused::Busy(error));
@@ -185,7 +170,7 @@ impl Processing {
         if is_busy(&self.shared.monitor) {
             return Err(Refused::Busy(HELD.to_owned()));
         }
-        if self.shared.plan().queue.has(Some(session)) {
+        if self.shared.plan().queue.has(session) {
             let error = format!("{session} is being processed: wait for it, or cancel it");
             return Err(Refused::Busy(error));
         }

@@ -23,8 +23,7 @@ const REMEMBERED: usize = 30;
 /// A session and what is still to be done with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct PendingWork {
-    /// `None`: the data set.
-    pub(super) session: Option<String>,
+    pub(super) session: String,
     /// At least one.
     pub(super) steps: Vec<ProcessingStep>,
 }
@@ -57,7 +56,7 @@ struct UnderWay {
 /// What the runner begins.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Begun {
-    pub(super) session: Option<String>,
+    pub(super) session: String,
     pub(super) step: ProcessingStep,
 }
 
@@ -78,8 +77,8 @@ impl ProcessingQueue {
             let none = "no step is named: name mask, check or extract";
             return Err(Refused::Invalid(none.to_owned()));
         }
-        if self.has(work.session.as_deref()) {
-            let what = work.session.as_deref().unwrap_or("the data set");
+        if self.has(&work.session) {
+            let what = &work.session;
             let already = format!("{what} is being processed already: wait for it, or cancel it");
             return Err(Refused::Busy(already));
         }
@@ -95,11 +94,11 @@ impl ProcessingQueue {
         Ok(self.numbers)
     }
 
-    /// Whether something of this session, or of the data set, waits or is under way.
-    pub(super) fn has(&self, session: Option<&str>) -> bool {
+    /// Whether something of this session waits or is under way.
+    pub(super) fn has(&self, session: &str) -> bool {
         let current = self.current.iter().map(|current| &current.entry);
         let mut all = self.waiting.iter().chain(current);
-        all.any(|entry| entry.work.session.as_deref() == session)
+        all.any(|entry| entry.work.session == session)
     }
 
     /// Takes a job out, or has its program ended. False where there is none of that number.
@@ -130,7 +129,7 @@ impl ProcessingQueue {
     pub(super) fn cancel_session(&mut self, session: &str) {
         let current = self.current.iter().map(|current| &current.entry);
         let of_session = self.waiting.iter().chain(current);
-        let of_session = of_session.filter(|entry| entry.work.session.as_deref() == Some(session));
+        let of_session = of_session.filter(|entry| entry.work.session == session);
         let numbers: Vec<u64> = of_session.map(|entry| entry.number).collect();
         for number in numbers {
             self.cancel(number);
@@ -273,7 +272,7 @@ mod tests {
 
     fn work(session: &str, steps: &[ProcessingStep]) -> PendingWork {
         PendingWork {
-            session: Some(session.to_owned()),
+            session: session.to_owned(),
             steps: steps.to_vec(),
         }
     }

@@ -89,7 +89,6 @@ fn take_up_what_was_recorded(shared: &Shared, seen: &mut Option<String>) {
         let can = |step: &ProcessingStep| plan.lacks(*step).is_none();
         ALL.into_iter().take_while(can).collect::<Vec<_>>()
     };
-    let session = Some(session);
     // Without the programs the page shows the commands.
     if !steps.is_empty()
         && let Err(refused) = shared.submit(PendingWork { session, steps })
@@ -125,11 +124,8 @@ fn begin(shared: &Shared) -> Option<Running> {
 }
 
 fn start(shared: &Shared, begun: &Begun) -> Result<Worker, String> {
-    let session = shared.root.join(begun.session.as_deref().unwrap_or("."));
-    let is_aborted = match &begun.session {
-        Some(id) => is_aborted(&session).map_err(|why| format!("{id}: {why}"))?,
-        None => false,
-    };
+    let session = shared.root.join(&begun.session);
+    let is_aborted = is_aborted(&session).map_err(|why| format!("{}: {why}", begun.session))?;
     let (programs, dataset) = {
         let plan = shared.plan();
         (plan.programs.clone(), shared.dataset.clone())
@@ -179,8 +175,7 @@ fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
 }
 
 fn finish(shared: &Shared, begun: &Begun, end: StepEnd) {
-    let of = begun.session.as_deref().unwrap_or("the data set");
-    let line = format!("{of}: {}: {}", begun.step, end.what);
+    let line = format!("{}: {}: {}", begun.session, begun.step, end.what);
     shared.change(|plan| plan.queue.finish(end));
     shared.monitor.update(|state| state.note(line));
 }

@@ -165,9 +165,7 @@ impl Plan {
             ProcessingStep::Mask | ProcessingStep::Check => {
                 self.programs.mask.is_none().then_some("relit-mask")
             }
-            ProcessingStep::Extract | ProcessingStep::Verify => {
-                self.programs.extract.is_none().then_some("relit-extract")
-            }
+            ProcessingStep::Extract => self.programs.extract.is_none().then_some("relit-extract"),
         }
     }
 }

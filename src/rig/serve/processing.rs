@@ -59,27 +59,9 @@ pub(super) async fn process(
     let processing = present(processing)?;
     let queued = permits.run(Work::Command, move || {
         library.ended(&id)?;
-        if steps.contains(&ProcessingStep::Verify) {
-            let error = "a session is not verified by itself: verify the data set";
-            return Err(Refused::Invalid(error.to_owned()).into());
-        }
         Ok(processing.submit(&id, steps)?)
     });
     let number = queued.await?;
-    Ok((StatusCode::ACCEPTED, Json(QueuedJob { number })).into_response())
-}
-
-/// Verify the data set
-///
-/// Queues a job that reads every file of it back.
-pub(super) async fn verify(
-    State(processing): State<MayProcess>,
-    State(permits): State<Arc<Permits>>,
-) -> Result<Response, Failure> {
-    let processing = present(processing)?;
-    let number = permits
-        .run(Work::Command, move || Ok(processing.verify()?))
-        .await?;
     Ok((StatusCode::ACCEPTED, Json(QueuedJob { number })).into_response())
 }
 

@@ -91,7 +91,6 @@ pub(super) fn router(app: &App) -> Router {
             "/api/v1/processing",
             get(processing::state).put(processing::configure),
         )
-        .route("/api/v1/processing/verify", post(processing::verify))
         .route(
             "/api/v1/processing/jobs/{number}",
             delete(processing::cancel),

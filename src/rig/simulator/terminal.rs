@@ -23,7 +23,7 @@ impl Terminal {
     pub(super) fn open() -> Result<Terminal, SimulatorError> {
         let failed = |step| {
             move |errno: Errno| {
-                SimulatorError::System(format!(
+                SimulatorError(format!(
                     "could not {step} a pseudoterminal: {errno}; see that /dev/pts is mounted and not full"
                 ))
             }

@@ -5,8 +5,8 @@ import { make } from "./elements.js";
 
 const $ = (id) => document.getElementById(id);
 const path = (id) => `/api/v1/sessions/${encodeURIComponent(id)}`;
-const STEPS = { mask: "Making the mask", check: "Checking the mask", extract: "Extracting", verify: "Verifying the data set" };
-const DONE = { mask: "Mask", check: "Check", extract: "Extraction", verify: "Verification" };
+const STEPS = { mask: "Making the mask", check: "Checking the mask", extract: "Extracting" };
+const DONE = { mask: "Mask", check: "Check", extract: "Extraction" };
 const ORIGINS = { turn: "made by the turn", hints: "drawn by hand", hand: "from another program" };
 const STATUS = { waiting: "waits", running: "", held: "held until the rig rests", ending: "ends" };
 
@@ -30,7 +30,7 @@ async function order(method, where, body) {
   }
 }
 
-export const isMissing = (step) => !processing || !(step === "extract" || step === "verify" ? processing.has_extract_program : processing.has_mask_program);
+export const isMissing = (step) => !processing || !(step === "extract" ? processing.has_extract_program : processing.has_mask_program);
 const jobOf = (id) => processing?.jobs.find(({ session }) => session === id);
 
 /** How a session stands, in words and with a class: for the list and its days. */
@@ -132,7 +132,6 @@ function showSettings() {
   $("when-done").checked = whenDone;
   $("when-done").disabled = isMissing("mask");
   $("dataset-folder").textContent = folder;
-  $("verify").disabled = isMissing("verify") || processing.jobs.some(({ step }) => step === "verify");
   const missing = [isMissing("mask") && "relit-mask", isMissing("extract") && "relit-extract"].filter(Boolean);
   $("missing").hidden = missing.length === 0;
   $("missing").textContent = `${missing.join(" and ")} ${missing.length > 1 ? "are" : "is"} not installed on the rig’s computer. Install the package relit there, or take the sessions to another computer.`;
@@ -140,17 +139,14 @@ function showSettings() {
 
 function showQueue() {
   const lines = processing.jobs.map((job) => {
-    const cancel = make("button", { type: "button", text: "Cancel", disabled: job.status === "ending", ariaLabel: `Cancel: ${STEPS[job.step]} ${job.session ?? ""}` });
+    const cancel = make("button", { type: "button", text: "Cancel", disabled: job.status === "ending", ariaLabel: `Cancel: ${STEPS[job.step]} ${job.session}` });
     cancel.addEventListener("click", () => order("DELETE", `/api/v1/processing/jobs/${job.number}`));
     const bar = make("progress", { max: 1 });
     advance(bar, job);
     const text = [STEPS[job.step], STATUS[job.status]].filter(Boolean).join(": ");
-    return make("li", {}, make("span", {}, make("b", { text: job.session?.replace(/^\d{8}T\d{6}Z-/, "") ?? "the data set" }), make("small", { text }), bar), cancel);
+    return make("li", {}, make("span", {}, make("b", { text: job.session.replace(/^\d{8}T\d{6}Z-/, "") }), make("small", { text }), bar), cancel);
   });
   $("jobs").replaceChildren(...lines);
-  const last = processing.finished.findLast(({ step }) => step === "verify");
-  $("verified").textContent = last ? `Verification: ${last.what}` : "";
-  $("verified").className = last ? (last.outcome === "good" ? "good" : "bad") : "quiet";
 }
 
 /** Forgets the session: the player is closed, and what it opens with next is not known yet. */
@@ -185,10 +181,6 @@ export function startProcessing(say) {
   $("when-done").addEventListener("change", () => {
     tell = say;
     configure({ when_done: $("when-done").checked });
-  });
-  $("verify").addEventListener("click", () => {
-    tell = say;
-    order("POST", "/api/v1/processing/verify");
   });
 }
 

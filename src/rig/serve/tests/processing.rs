@@ -300,8 +300,6 @@ fn where_a_program_is_missing_nothing_is_queued() {
         assert_eq!(refused.status, 503);
         assert!(refused.error().contains("install the package relit"));
     }
-    let verify = serving.ask("POST", "/api/v1/processing/verify", &[], b"");
-    assert_eq!(verify.status, 503);
     let edit = format!("/api/v1/sessions/{COW}/edit");
     assert_eq!(serving.ask("POST", &edit, &[], b"").status, 503);
     assert_eq!(state(&serving)["has_mask_program"], json!(false));
