@@ -21,8 +21,8 @@ use relit_data::session::{
 use relit_data::shard::{Dataset, ImageSize};
 use relit_extract::{ExtractOptions, extract};
 use relit_rig::camera::{
-    Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc, Frame, GrantedMode,
-    Mode, ModeRequest, Rates, open,
+    Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc, Frame, CameraMode,
+    Mode, Rates, open,
 };
 use relit_rig::capture::{End, Recorder, RecordingPlan, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
@@ -82,13 +82,8 @@ impl Camera for Scripted {
         Ok(value)
     }
 
-    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
-        Ok(GrantedMode {
-            fourcc: want.fourcc,
-            width: want.width,
-            height: want.height,
-            rate: Some(want.rate),
-        })
+    fn start(&mut self, want: &CameraMode) -> Result<CameraMode, CameraError> {
+        Ok(*want)
     }
 
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError> {
@@ -589,7 +584,7 @@ fn record_replay(root: &Path, path: &Path, period_us: f64, from: f64, to: f64) -
         panic!("a recording has one rate");
     };
     let rate = rates[0];
-    let request = ModeRequest {
+    let request = CameraMode {
         fourcc: mode.fourcc,
         width,
         height,

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use relit_data::session::FrameClock;
 use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues};
 use relit_rig::camera::{
-    self, Camera, CameraError, ControlKind, Frame, GrantedMode, Rates,
+    self, Camera, CameraError, ControlKind, Frame, CameraMode, Rates,
 };
 use relit_rig::clock::Clock;
 
@@ -57,7 +57,7 @@ fn set(camera: &mut dyn Camera, name: &str, value: i64) {
     assert_eq!(camera.set_control(id, value).unwrap(), value, "{name}");
 }
 
-fn start(camera: &mut dyn Camera, mode: &str) -> GrantedMode {
+fn start(camera: &mut dyn Camera, mode: &str) -> CameraMode {
     camera.start(&mode.parse().unwrap()).unwrap()
 }
 

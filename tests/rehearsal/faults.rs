@@ -9,8 +9,7 @@ use std::time::Duration;
 use relit_data::causes::with_causes;
 use relit_data::session::{Status, recordings};
 use relit_rig::camera::{
-    self, Camera, CameraError, Control, DeviceInfo, Frame, GrantedMode, Mode,
-    ModeRequest,
+    self, Camera, CameraError, Control, DeviceInfo, Frame, CameraMode, Mode,
 };
 use relit_rig::capture::{CaptureError, Settings, Stopped};
 use relit_rig::simulator::{SimulatedPort, SimulatedTable, SimulatorOptions};
@@ -106,7 +105,7 @@ impl Camera for LosesOneFrame {
         self.camera.set_control(id, value)
     }
 
-    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
+    fn start(&mut self, want: &CameraMode) -> Result<CameraMode, CameraError> {
         self.camera.start(want)
     }
 

@@ -37,7 +37,7 @@ pub mod hold;
 mod nokhwa;
 mod rate;
 mod replay;
-mod request;
+mod mode;
 #[cfg(target_os = "linux")]
 mod v4l2;
 
@@ -52,7 +52,7 @@ pub use format::{Fourcc, Mode, Rates, Sizes};
 use frame::SequenceUnwrapper;
 pub use frame::{Frame, FrameFault};
 pub use rate::Rate;
-pub use request::{GrantedMode, ModeRequest};
+pub use mode::CameraMode;
 
 use crate::clock::Clock;
 

@@ -7,7 +7,7 @@ use super::error::CaptureError;
 use super::settings::Settings;
 use super::stop::StopRequest;
 use crate::camera::hold::{ControlDrift, ManualPlan};
-use crate::camera::{Camera, CameraError, Control, Fourcc, GrantedMode, ModeRequest};
+use crate::camera::{Camera, CameraError, Control, Fourcc, CameraMode};
 use crate::state::Check;
 use relit_data::session::FrameClock;
 use relit_video::StreamFormat;
@@ -81,7 +81,7 @@ impl LockedCamera {
             format: format.ok_or_else(|| CameraError::format(device, fourcc))?,
             width: mode.width,
             height: mode.height,
-            fps: mode.rate.unwrap_or(request.rate).per_second(),
+            fps: mode.rate.per_second(),
         };
         Ok(Self {
             stream,
@@ -114,25 +114,15 @@ fn require_kept(moved: Vec<ControlDrift>) -> Result<(), CaptureError> {
     }
 }
 
-fn mode_check(request: &ModeRequest, mode: &GrantedMode) -> Result<Check, CaptureError> {
-    let with_rate = GrantedMode {
-        rate: mode.rate.or(Some(request.rate)),
-        ..*mode
-    };
-    let differences = with_rate.differences(request);
+fn mode_check(request: &CameraMode, mode: &CameraMode) -> Result<Check, CaptureError> {
+    let differences = mode.differences(request);
     if !differences.is_empty() {
         return Err(CaptureError::Refused(format!(
             "the camera grants {}: ask for a mode that `relit-capture devices` lists",
             differences.join(", ")
         )));
     }
-    Ok(match mode.rate {
-        Some(_) => Check::passed("camera mode", mode.to_string()),
-        None => Check::noted(
-            "camera mode",
-            format!("{request}; the camera does not say at which rate it runs"),
-        ),
-    })
+    Ok(Check::passed("camera mode", mode.to_string()))
 }
 
 /// Reads the first frames, while automatics find their values; returns the mean size of those that

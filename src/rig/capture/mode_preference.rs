@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::error::CaptureError;
-use crate::camera::{Fourcc, Mode, ModeRequest, Rate, Rates};
+use crate::camera::{Fourcc, Mode, CameraMode, Rate, Rates};
 
 /// Formats from the one that is preferred: what the camera compresses by frames comes first.
 const PREFERRED: [Fourcc; 5] = [
@@ -57,7 +57,7 @@ impl ModePreference {
     ///
     /// # Errors
     /// [`CaptureError::Refused`] with what there is.
-    pub fn choose(&self, modes: &[Mode]) -> Result<ModeRequest, CaptureError> {
+    pub fn choose(&self, modes: &[Mode]) -> Result<CameraMode, CaptureError> {
         let requests = modes.iter().filter_map(|mode| self.of(mode));
         let rank = |fourcc: Fourcc| PREFERRED.iter().position(|&known| known == fourcc);
         requests
@@ -75,7 +75,7 @@ impl ModePreference {
             })
     }
 
-    fn of(&self, mode: &Mode) -> Option<ModeRequest> {
+    fn of(&self, mode: &Mode) -> Option<CameraMode> {
         if self.fourcc.is_some_and(|fourcc| fourcc != mode.fourcc) {
             return None;
         }
@@ -84,7 +84,7 @@ impl ModePreference {
             Some(size) => size,
             None => mode.sizes.largest(),
         };
-        Some(ModeRequest {
+        Some(CameraMode {
             fourcc: mode.fourcc,
             width,
             height,

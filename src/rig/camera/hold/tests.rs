@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::*;
-use crate::camera::{ControlFlags, DeviceInfo, Frame, GrantedMode, MenuItem, Mode, ModeRequest};
+use crate::camera::{ControlFlags, DeviceInfo, Frame, CameraMode, MenuItem, Mode};
 
 fn control(name: &str, kind: ControlKind, range: (i64, i64), value: i64) -> Control {
     // Any number will do, as long as each name has its own.
@@ -284,7 +284,7 @@ impl Camera for Answers {
     fn set_control(&mut self, _: u32, value: i64) -> Result<i64, CameraError> {
         Ok(value)
     }
-    fn start(&mut self, _: &ModeRequest) -> Result<GrantedMode, CameraError> {
+    fn start(&mut self, _: &CameraMode) -> Result<CameraMode, CameraError> {
         panic!("only the controls are asked")
     }
     fn next_frame(&mut self, _: Duration) -> Result<Frame, CameraError> {

@@ -20,7 +20,7 @@ use relit_video::PixelFormat;
 use self::worker::{FrameResult, Worker};
 use super::{
     Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc,
-    Frame, GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes,
+    Frame, CameraMode, Mode, Rate, Rates, Sizes,
 };
 
 /// Longest wait for the user's permission to use the camera.
@@ -130,7 +130,7 @@ impl Camera for NokhwaCamera {
         })
     }
 
-    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
+    fn start(&mut self, want: &CameraMode) -> Result<CameraMode, CameraError> {
         self.stop()?;
         let format = want.fourcc.pixel_format().and_then(library_format);
         let format = format.ok_or_else(|| CameraError::format(self.device(), want.fourcc))?;
@@ -141,12 +141,12 @@ impl Camera for NokhwaCamera {
             owner.start(wanted, sender)
         })?;
         self.frames = Some(frames);
-        Ok(GrantedMode {
+        Ok(CameraMode {
             // The stream is of a format that has one.
             fourcc: fourcc(found.format()).unwrap_or(want.fourcc),
             width: found.width(),
             height: found.height(),
-            rate: Rate::new(found.frame_rate(), 1),
+            rate: Rate::new(found.frame_rate(), 1).unwrap_or(want.rate),
         })
     }
 

@@ -22,8 +22,8 @@ use self::faults::FaultInjector;
 use self::source::{Delivery, Source};
 use self::timeline::{Moment, Timeline};
 use super::{
-    Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc, Frame, GrantedMode,
-    Mode, ModeRequest, ReplayAddress,
+    Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc, Frame, CameraMode,
+    Mode, ReplayAddress,
 };
 use crate::clock::Clock;
 use relit_data::session::{FrameClock, Recording};
@@ -35,7 +35,7 @@ pub(super) struct ReplayCamera {
     address: ReplayAddress,
     video: Arc<Video>,
     delivery: Delivery,
-    mode: GrantedMode,
+    mode: CameraMode,
     timeline: Timeline,
     frame_clock: FrameClock,
     controls: Vec<Control>,
@@ -65,11 +65,14 @@ impl ReplayCamera {
         let timeline = Timeline::new(recording.frames.as_ref(), video.frames());
         let (width, height) = delivery.size(&video);
         let manifest = recording.manifest.as_ref();
-        let mode = GrantedMode {
+        let mode = CameraMode {
             fourcc: Fourcc::of(delivery.format),
             width,
             height,
-            rate: rate(manifest, &timeline),
+            rate: rate(manifest, &timeline).ok_or_else(|| CameraError::Replay {
+                path: address.path.clone(),
+                why: "it has no usable frame rate: replay another recording".to_owned(),
+            })?,
         };
         let device = CameraAddress::Replay(address.clone());
         Ok(Self {
@@ -108,7 +111,7 @@ impl Camera for ReplayCamera {
         })
     }
 
-    fn start(&mut self, _: &ModeRequest) -> Result<GrantedMode, CameraError> {
+    fn start(&mut self, _: &CameraMode) -> Result<CameraMode, CameraError> {
         self.playing = None;
         self.playing = Some(Playing {
             source: self.delivery.open(&self.video)?,

@@ -13,7 +13,7 @@ use std::time::Duration;
 use self::device::Device;
 use self::stream::Stream;
 use super::{
-    Camera, CameraError, Control, DeviceInfo, Frame, GrantedMode, Mode, ModeRequest,
+    Camera, CameraError, Control, DeviceInfo, Frame, CameraMode, Mode,
 };
 
 pub(super) use listing::list;
@@ -53,7 +53,7 @@ impl Camera for V4l2Camera {
         self.device.set_control(id, value)
     }
 
-    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
+    fn start(&mut self, want: &CameraMode) -> Result<CameraMode, CameraError> {
         // The driver takes no new format while it has buffers. An error of stopping shows again in the
         // next call.
         let _ = self.stop();
