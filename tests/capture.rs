@@ -21,8 +21,8 @@ use relit_data::session::{
 use relit_data::shard::{Dataset, ImageSize};
 use relit_extract::{ExtractOptions, extract};
 use relit_rig::camera::{
-    Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc, Frame, CameraMode,
-    Mode, Rates, open,
+    Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode,
+    Rates, open,
 };
 use relit_rig::capture::{End, Recorder, RecordingPlan, Window, salvage, salvage_session};
 use relit_rig::clock::Clock;
@@ -390,10 +390,7 @@ fn drops_are_found_by_time_where_the_driver_never_counts() {
     let stream = stream(200, 0).filter(|frame| frame.t_us / PERIOD_US != 70);
     let take = record(root.path(), 1, steps(stream.map(not_counted)));
     take.check_verdict(Verdict::Tolerated);
-    assert_eq!(
-        take.faults(),
-        ["1 frame missing before frame 60"]
-    );
+    assert_eq!(take.faults(), ["1 frame missing before frame 60"]);
     let gaps = take.index().gaps();
     assert_eq!((gaps.len(), gaps[0].before, gaps[0].missing), (1, 60, 1));
 }

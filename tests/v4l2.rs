@@ -18,9 +18,7 @@ use std::time::{Duration, Instant};
 
 use relit_data::session::FrameClock;
 use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues};
-use relit_rig::camera::{
-    self, Camera, CameraError, ControlKind, Frame, CameraMode, Rates,
-};
+use relit_rig::camera::{self, Camera, CameraError, CameraMode, ControlKind, Frame, Rates};
 use relit_rig::clock::Clock;
 
 const VIVID: &str = "v4l2:/dev/video0";

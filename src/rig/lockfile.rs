@@ -164,7 +164,6 @@ impl LockFile {
         let file = format!("relit-capture{}.lock", name.replace('/', "-"));
         Self::take(&folder.join(file), &name)
     }
-
 }
 
 /// Opens a lock file to take it, and makes it where it does not exist.

@@ -45,9 +45,7 @@ pub(crate) fn what_is_not_there_is_named_by_headline_and_button(browser: PathBuf
     phone.wait_for("document.getElementById('message').hidden");
 }
 
-pub(crate) fn the_emergency_stop_comes_first_and_the_aborted_object_after_it(
-    browser: PathBuf,
-) {
+pub(crate) fn the_emergency_stop_comes_first_and_the_aborted_object_after_it(browser: PathBuf) {
     let longest = SLOW_TURN.longest;
     let table = "sim:?fault=estop@30s:10s";
     let rig = Rig::start_at(&SLOW_TURN, &SLOW_TURN.camera(), table);

@@ -8,9 +8,7 @@ use std::time::Duration;
 
 use relit_data::causes::with_causes;
 use relit_data::session::{Status, recordings};
-use relit_rig::camera::{
-    self, Camera, CameraError, Control, DeviceInfo, Frame, CameraMode, Mode,
-};
+use relit_rig::camera::{self, Camera, CameraError, CameraMode, Control, DeviceInfo, Frame, Mode};
 use relit_rig::capture::{CaptureError, Settings, Stopped};
 use relit_rig::simulator::{SimulatedPort, SimulatedTable, SimulatorOptions};
 use relit_rig::state::{Phase, TakeSummary, Verdict};

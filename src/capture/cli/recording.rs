@@ -22,11 +22,7 @@ use relit_data::durable::MadeFolder;
 const UPDATE: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, CaptureError> {
-    let RecordArguments {
-        rig,
-        object,
-        yes,
-    } = record;
+    let RecordArguments { rig, object, yes } = record;
     let settings: Settings = rig.into();
     let _made = make_root(&settings)?;
     if !yes && !agreed(console, &settings)? {

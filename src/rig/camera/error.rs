@@ -56,7 +56,9 @@ pub enum CameraError {
         source: Option<io::Error>,
     },
     /// Another program has the stream of the device.
-    #[error("{device} is in use by another program (`sudo fuser {device}` names it): close that one")]
+    #[error(
+        "{device} is in use by another program (`sudo fuser {device}` names it): close that one"
+    )]
     InUse {
         /// The device.
         device: String,

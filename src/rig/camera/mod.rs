@@ -33,11 +33,11 @@ mod error;
 mod format;
 mod frame;
 pub mod hold;
+mod mode;
 #[cfg(all(feature = "nokhwa", any(target_os = "linux", target_os = "macos")))]
 mod nokhwa;
 mod rate;
 mod replay;
-mod mode;
 #[cfg(target_os = "linux")]
 mod v4l2;
 
@@ -51,8 +51,8 @@ pub use format::{Fourcc, Mode, Rates, Sizes};
 #[cfg(target_os = "linux")]
 use frame::SequenceUnwrapper;
 pub use frame::{Frame, FrameFault};
-pub use rate::Rate;
 pub use mode::CameraMode;
+pub use rate::Rate;
 
 use crate::clock::Clock;
 

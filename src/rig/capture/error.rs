@@ -77,4 +77,3 @@ pub enum Stopped {
     #[error("the program was told to end")]
     Shutdown,
 }
-

@@ -7,7 +7,7 @@ use super::error::CaptureError;
 use super::settings::Settings;
 use super::stop::StopRequest;
 use crate::camera::hold::{ControlDrift, ManualPlan};
-use crate::camera::{Camera, CameraError, Control, Fourcc, CameraMode};
+use crate::camera::{Camera, CameraError, CameraMode, Control, Fourcc};
 use crate::state::Check;
 use relit_data::session::FrameClock;
 use relit_video::StreamFormat;

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::error::CaptureError;
-use crate::camera::{Fourcc, Mode, CameraMode, Rate, Rates};
+use crate::camera::{CameraMode, Fourcc, Mode, Rate, Rates};
 
 /// Formats from the one that is preferred: what the camera compresses by frames comes first.
 const PREFERRED: [Fourcc; 5] = [

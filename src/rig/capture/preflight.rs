@@ -11,9 +11,7 @@ use jiff::Timestamp;
 use super::error::CaptureError;
 use super::settings::Settings;
 use crate::state::{Check, Obstacle};
-use crate::turntable::{
-    Alarm, Homed, MARGIN_DEG, Table, TableStatus, TurnPlan, TurntableError,
-};
+use crate::turntable::{Alarm, Homed, MARGIN_DEG, Table, TableStatus, TurnPlan, TurntableError};
 use relit_data::naming::is_session_name;
 
 /// What is added to the expected size of a take, as a fraction of it.

@@ -91,9 +91,7 @@ fn run_take(
     };
     let (track, finished) = match (equipment.table.as_ref(), turn) {
         (Some(table), Some(turn)) => match recording.with_table(table, turn) {
-            Ok((track, finished)) => {
-                (track.map(Some).map_err(CaptureError::from), Some(finished))
-            }
+            Ok((track, finished)) => (track.map(Some).map_err(CaptureError::from), Some(finished)),
             Err(error) => (Err(error), None),
         },
         _ => (recording.without_table().map(|()| None), None),

@@ -133,7 +133,10 @@ mod tests {
     #[test]
     fn only_the_end_of_a_long_complaint_is_kept() {
         let mut command = Command::new("sh");
-        command.args(["-c", "head -c 20000 /dev/zero | tr '\\0' x >&2; printf end >&2"]);
+        command.args([
+            "-c",
+            "head -c 20000 /dev/zero | tr '\\0' x >&2; printf end >&2",
+        ]);
         let mut worker = Worker::start(command).unwrap();
         worker.child.wait().unwrap();
         let complaint = worker.complaint();

@@ -195,7 +195,12 @@ impl RigState {
     pub fn obstacle_to_take(&self) -> Option<Obstacle> {
         self.obstacle_of_table()
             .or_else(|| self.obstacle_of_speed())
-            .or_else(|| Some(Obstacle::new("No room for a turn", self.table.no_room.clone()?)))
+            .or_else(|| {
+                Some(Obstacle::new(
+                    "No room for a turn",
+                    self.table.no_room.clone()?,
+                ))
+            })
             .or_else(|| self.obstacle_of_camera())
             .or_else(|| self.obstacle_of_disk())
     }

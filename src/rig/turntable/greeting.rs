@@ -54,11 +54,7 @@ pub(super) fn greet(
     link.supervisor().set_traits(ControllerTraits {
         family: identity.family,
         degrees_per_unit: identity.degrees_per_unit,
-        poll: if extras {
-            POLL_STAMPED
-        } else {
-            POLL_STOCK
-        },
+        poll: if extras { POLL_STAMPED } else { POLL_STOCK },
         stamps: extras,
         reports_homing: extras,
         step_deg: identity.step_deg(),

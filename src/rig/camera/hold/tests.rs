@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::*;
-use crate::camera::{ControlFlags, DeviceInfo, Frame, CameraMode, MenuItem, Mode};
+use crate::camera::{CameraMode, ControlFlags, DeviceInfo, Frame, MenuItem, Mode};
 
 fn control(name: &str, kind: ControlKind, range: (i64, i64), value: i64) -> Control {
     // Any number will do, as long as each name has its own.

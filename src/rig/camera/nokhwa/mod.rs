@@ -19,8 +19,8 @@ use relit_video::PixelFormat;
 
 use self::worker::{FrameResult, Worker};
 use super::{
-    Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc,
-    Frame, CameraMode, Mode, Rate, Rates, Sizes,
+    Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode, Rate,
+    Rates, Sizes,
 };
 
 /// Longest wait for the user's permission to use the camera.

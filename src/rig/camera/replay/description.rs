@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use super::timeline::Timeline;
 use crate::camera::{
-    CameraAddress, Control, ControlFlags, ControlKind, DeviceInfo, CameraMode,
-    MenuItem, Mode, Rate, Rates, Sizes,
+    CameraAddress, CameraMode, Control, ControlFlags, ControlKind, DeviceInfo, MenuItem, Mode,
+    Rate, Rates, Sizes,
 };
 use relit_data::session::{Manifest, Recording};
 use relit_video::Video;

@@ -4,7 +4,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::CameraError;
-use crate::camera::{Frame, CameraMode, ReplayAddress, ReplayFaults};
+use crate::camera::{CameraMode, Frame, ReplayAddress, ReplayFaults};
 use relit_video::PixelFormat;
 
 /// Makes damaged frames and frames of another size.

@@ -22,8 +22,8 @@ use self::faults::FaultInjector;
 use self::source::{Delivery, Source};
 use self::timeline::{Moment, Timeline};
 use super::{
-    Camera, CameraAddress, CameraError, Control, DeviceInfo, Fourcc, Frame, CameraMode,
-    Mode, ReplayAddress,
+    Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode,
+    ReplayAddress,
 };
 use crate::clock::Clock;
 use relit_data::session::{FrameClock, Recording};

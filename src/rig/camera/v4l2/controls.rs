@@ -6,9 +6,7 @@ use rustix::io::Errno;
 use v4l::v4l_sys as sys;
 
 use super::device::{Device, unplugged};
-use crate::camera::{
-    CameraError, Control, ControlFlags, ControlKind, MenuItem, snake_case,
-};
+use crate::camera::{CameraError, Control, ControlFlags, ControlKind, MenuItem, snake_case};
 
 /// Most controls that are read of a device, and most items of a menu, in case a faulty driver's list
 /// does not end.
@@ -135,10 +133,7 @@ impl Device {
     }
 
     /// A control of one number, with any flags; `None` if there is none.
-    fn look_up(
-        &self,
-        id: u32,
-    ) -> io::Result<Option<(sys::v4l2_query_ext_ctrl, ControlKind)>> {
+    fn look_up(&self, id: u32) -> io::Result<Option<(sys::v4l2_query_ext_ctrl, ControlKind)>> {
         let Some(raw) = self.node.control(id)? else {
             return Ok(None);
         };
@@ -224,6 +219,9 @@ mod tests {
         let words = "control 0x00000007 of /dev/video9 cannot be set to 10: it takes one of 0, 9";
         assert_eq!(too_wide.to_string(), words);
         let unknown = device.set_control(7, 1).unwrap_err();
-        assert!(unknown.to_string().ends_with("no such control"), "{unknown}");
+        assert!(
+            unknown.to_string().ends_with("no such control"),
+            "{unknown}"
+        );
     }
 }

@@ -12,9 +12,7 @@ use std::time::Duration;
 
 use self::device::Device;
 use self::stream::Stream;
-use super::{
-    Camera, CameraError, Control, DeviceInfo, Frame, CameraMode, Mode,
-};
+use super::{Camera, CameraError, CameraMode, Control, DeviceInfo, Frame, Mode};
 
 pub(super) use listing::list;
 

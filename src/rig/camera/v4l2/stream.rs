@@ -8,9 +8,7 @@ use v4l::v4l_sys as sys;
 use super::device::{Device, unplugged};
 use super::ioctl::Mapping;
 use crate::camera::frame::without_padding;
-use crate::camera::{
-    CameraError, Fourcc, Frame, CameraMode, Rate, SequenceUnwrapper,
-};
+use crate::camera::{CameraError, CameraMode, Fourcc, Frame, Rate, SequenceUnwrapper};
 use crate::clock::Clock;
 use relit_data::session::FrameClock;
 use relit_video::PixelFormat;
@@ -133,11 +131,7 @@ impl Stream {
     }
 
     /// Copies a filled buffer's frame and queues the buffer again at once.
-    fn take(
-        &mut self,
-        device: &Device,
-        filled: sys::v4l2_buffer,
-    ) -> Result<Frame, CameraError> {
+    fn take(&mut self, device: &Device, filled: sys::v4l2_buffer) -> Result<Frame, CameraError> {
         let arrived_us = Clock::monotonic().now_us();
         // An unknown index is a fault of the driver; the frame is then empty.
         let data = usize::try_from(filled.index)

@@ -366,7 +366,10 @@ fn the_page_about_a_session_in_the_data_set_runs_no_scripts() {
             .status
     };
     assert_eq!((page("report.html"), page("check.html")), (404, 404));
-    let dataset = state(&serving)["dataset_folder"].as_str().unwrap().to_owned();
+    let dataset = state(&serving)["dataset_folder"]
+        .as_str()
+        .unwrap()
+        .to_owned();
     let dataset = Path::new(&dataset);
     fs::create_dir_all(dataset).unwrap();
     fs::write(dataset.join(format!("{COW}.html")), "<p>fine").unwrap();

@@ -172,10 +172,7 @@ impl Point {
 }
 
 /// Fits the track of a turn to its reports.
-pub(crate) fn fit(
-    reports: &[PositionReport],
-    expected: &JournaledTurn,
-) -> Result<Track, String> {
+pub(crate) fn fit(reports: &[PositionReport], expected: &JournaledTurn) -> Result<Track, String> {
     let timed = |report: &PositionReport| self::timed(report, expected);
     let reports: Vec<_> = reports.iter().filter_map(timed).collect();
     let points = points(&reports, expected);
