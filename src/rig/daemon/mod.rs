@@ -196,7 +196,7 @@ mod tests {
         assert!(worker.unwrap().join().is_err());
         let faults = dispatcher.monitor().state().faults;
         assert!(faults[0].what.contains("failed"), "{faults:?}");
-        let refused = dispatcher.change(|schedule| schedule.submit(Job::Home));
+        let refused = dispatcher.submit(Job::Home);
         assert!(matches!(refused, Err(Refused::Unavailable(_))));
     }
 }

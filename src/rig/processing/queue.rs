@@ -287,7 +287,7 @@ mod tests {
 
     fn begun(queue: &mut ProcessingQueue) -> Option<(String, ProcessingStep)> {
         let begun = queue.begin()?;
-        Some((begun.session.unwrap_or_default(), begun.step))
+        Some((begun.session, begun.step))
     }
 
     const GOOD: ProcessingOutcome = ProcessingOutcome::Good;

@@ -224,8 +224,7 @@ fn a_turn_has_the_angles_of_the_table_and_unwinds() {
         turn.check().unwrap();
         let track = turn.wait_end().unwrap();
         let (from_us, to_us) = track.constant_us();
-        assert!((constant.0 - from_us).abs() < 200_000);
-        assert!((constant.1 - to_us).abs() < 200_000);
+        assert!((constant - from_us).abs() < 200_000);
         assert!((track.degrees_per_second() - 7.2 * 1.004).abs() < 0.01);
 
         let fake_grbl = rig.fake_grbl.lock().unwrap();

@@ -72,12 +72,12 @@ fn exchange(
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
     #[test]
     fn the_first_line_of_every_controller_is_a_restart(text in banner()) {
         prop_assert_eq!(parse(&text), Some(Message::Banner(None)));
     }
-
-    #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
     fn on_a_faulty_wire_a_checked_line_is_done_once_or_fails(faults in vec(fault(), 50)) {
