@@ -17,7 +17,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use relit_data::session::FrameClock;
-use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues};
+use relit_rig::camera::hold::{ManualPlan, ManualValues};
 use relit_rig::camera::{self, Camera, CameraError, CameraMode, ControlKind, Frame, Rates};
 use relit_rig::clock::Clock;
 
@@ -253,10 +253,10 @@ fn a_camera_is_made_to_hold_still() {
     let plan = ManualPlan::new(&camera.controls().unwrap(), &wanted);
     assert_eq!(plan.apply(&mut *camera).unwrap(), []);
     let missing = [
-        Aspect::Exposure,
-        Aspect::WhiteBalance,
-        Aspect::Focus,
-        Aspect::PowerLine,
+        "exposure",
+        "white balance",
+        "focus",
+        "power-line filter",
     ];
     let missing = missing.map(|aspect| format!("the camera has no control of its {aspect}"));
     assert_eq!(plan.missing, missing);
