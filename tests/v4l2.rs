@@ -252,12 +252,7 @@ fn a_camera_is_made_to_hold_still() {
     };
     let plan = ManualPlan::new(&camera.controls().unwrap(), &wanted);
     assert_eq!(plan.apply(&mut *camera).unwrap(), []);
-    let missing = [
-        "exposure",
-        "white balance",
-        "focus",
-        "power-line filter",
-    ];
+    let missing = ["exposure", "white balance", "focus", "power-line filter"];
     let missing = missing.map(|aspect| format!("the camera has no control of its {aspect}"));
     assert_eq!(plan.missing, missing);
     set(&mut *camera, "gain", 34);
