@@ -40,8 +40,6 @@ pub(crate) enum Error {
     UndefinedFeed = 22,
     /// A command number with a fraction.
     NotInteger = 23,
-    /// Two commands want the axis word.
-    AxisConflict = 24,
     /// A word stands twice.
     RepeatedWord = 25,
     /// The command needs an axis word.

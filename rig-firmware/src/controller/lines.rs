@@ -83,21 +83,15 @@ impl Controller {
             Motion::Feed => block.modal.feed,
             Motion::Rapid => u32::MAX,
         };
-        if let Action::Move(target) = block.action {
-            let target = self.resolve(target)?;
-            self.modal = block.modal;
-            self.go(board, target, feed);
-            return Ok(());
-        }
+        let target = match block.action {
+            Action::Move(target) => Some(self.resolve(target)?),
+            Action::Nothing | Action::Dwell(_) => None,
+        };
         self.modal = block.modal;
-        match block.action {
-            Action::Dwell(left) => self.job = Job::Dwell { since: None, left },
-            Action::SetOffset(x) => {
-                let offset = self.planned.angle.checked_sub(x);
-                self.offset = offset.ok_or(Error::InvalidTarget)?;
-                self.reports_to_offset = 0;
-            }
-            Action::Nothing | Action::Move(_) => {}
+        if let Some(target) = target {
+            self.go(board, target, feed);
+        } else if let Action::Dwell(left) = block.action {
+            self.job = Job::Dwell { since: None, left };
         }
         Ok(())
     }

@@ -117,11 +117,7 @@ pub struct Controller {
     driver: Driver,
     /// Noted by interrupts and not followed yet.
     pending: Events,
-    /// Reports until the next one that tells the work offset.
-    reports_to_offset: u8,
     planned: Planned,
-    /// `G92`: work zero until the next reset, thousandths of a degree from machine zero.
-    offset: i32,
     modal: Modal,
     session: Session,
     /// The sequence number of the line that is under way.
@@ -147,7 +143,6 @@ impl Controller {
             settings,
             profile: settings.profile(),
             store,
-            offset: 0,
             modal: Modal::new(),
             reader: LineReader::new(),
             session: Session::Closed,
@@ -162,7 +157,6 @@ impl Controller {
             emergency: false,
             driver: Driver::Off,
             heard: board.micros(),
-            reports_to_offset: 0,
         };
         board.enable_driver(false);
         controller.apply_settings(board);

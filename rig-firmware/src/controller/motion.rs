@@ -193,8 +193,7 @@ impl Controller {
     /// [`Error::InvalidTarget`] beyond what positions can tell.
     pub(super) fn resolve(&self, target: Target) -> Result<i32, Error> {
         let angle = match target {
-            Target::Machine(x) => Some(x),
-            Target::Work(x) => x.checked_add(self.offset),
+            Target::Absolute(x) => Some(x),
             Target::Relative(x) => x.checked_add(self.planned.angle),
         };
         let angle = angle.ok_or(Error::InvalidTarget)?;

@@ -17,7 +17,6 @@ pub(crate) enum Motion {
 pub(super) enum OneShot {
     Dwell,
     Machine,
-    SetOffset,
 }
 
 /// The words of a line.
@@ -25,7 +24,6 @@ pub(super) enum OneShot {
 pub(super) struct Words {
     pub(super) motion: Option<Motion>,
     pub(super) one_shot: Option<OneShot>,
-    pub(super) inches: Option<bool>,
     pub(super) relative: Option<bool>,
     pub(super) f: Option<Decimal>,
     pub(super) n: Option<Decimal>,
@@ -79,21 +77,15 @@ impl Words {
             0 => self.motion.replace(Motion::Rapid).is_some(),
             1 => self.motion.replace(Motion::Feed).is_some(),
             4 => self.one_shot.replace(OneShot::Dwell).is_some(),
-            // G92.1 and its kin are commands of their own, and none of this table's.
-            92 if !value.is_whole() => return Err(Error::Unsupported),
             53 => self.one_shot.replace(OneShot::Machine).is_some(),
-            92 => self.one_shot.replace(OneShot::SetOffset).is_some(),
-            20 => self.inches.replace(true).is_some(),
-            21 => self.inches.replace(false).is_some(),
+            // Millimetres are all there is.
+            21 => false,
             90 => self.relative.replace(false).is_some(),
             91 => self.relative.replace(true).is_some(),
             _ => return Err(Error::Unsupported),
         };
         if !value.is_whole() {
             return Err(Error::NotInteger);
-        }
-        if self.motion.is_some() && self.one_shot == Some(OneShot::SetOffset) {
-            return Err(Error::AxisConflict);
         }
         if group_taken {
             return Err(Error::ModalGroup);

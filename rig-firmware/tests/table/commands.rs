@@ -38,8 +38,6 @@ fn the_settings_are_listed_as_grbl_does() {
         "$3=0",
         "$4=0",
         "$5=0",
-        "$10=1",
-        "$13=0",
         "$14=0",
         "$20=1",
         "$22=0",
@@ -66,29 +64,11 @@ fn version_and_modal_state_are_told() {
     assert_eq!(table.ask("$I"), version);
     let modal = "[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]";
     assert_eq!(table.ask("$G"), [modal, "ok"]);
-    table.ok("G1 G20 G91 F10");
-    let modal = "[GC:G1 G54 G17 G20 G91 G94 M5 M9 T0 F254 S0]";
+    table.ok("G1 G91 F254");
+    let modal = "[GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F254 S0]";
     assert_eq!(table.ask("$g"), [modal, "ok"]);
     table.say(b"\x18");
     assert!(table.ask("$G")[0].contains("G0 G54 G17 G21 G90"));
-}
-
-#[test]
-fn the_work_position_follows_g92_until_a_reset() {
-    let mut table = Table::new();
-    table.ok("G0 X10");
-    table.wait("Idle");
-    table.ok("G92 X0.5");
-    table.ok("G0 X1");
-    table.wait("Idle");
-    assert!((table.position("MPos") - 10.5).abs() < 0.007);
-    table.ok("$10=0");
-    assert!((table.position("WPos") - 1.0).abs() < 0.007);
-    table.ok("G53 G0 X3");
-    table.wait("Idle");
-    assert!((table.position("WPos") + 6.5).abs() < 0.007);
-    table.say(b"\x18");
-    assert!((table.position("WPos") - 3.0).abs() < 0.007);
 }
 
 #[test]
@@ -103,13 +83,7 @@ fn a_status_report_has_all_its_fields() {
         (1..100_000).contains(&time.parse::<u32>().unwrap()),
         "{time}"
     );
-    assert_eq!(tail, "Bat:11.83|WCO:0.000,0.000,0.000>");
-    for _ in 0..9 {
-        assert!(!table.status().contains("WCO"));
-    }
-    assert!(table.status().contains("WCO"));
-    table.ok("G92 X1");
-    assert!(table.status().contains("|WCO:-1.000,0.000,0.000>"));
+    assert_eq!(tail, "Bat:11.83>");
 }
 
 #[test]
@@ -121,17 +95,6 @@ fn pins_show_only_while_active() {
     table.board.press_emergency(true);
     table.run_ms(1);
     assert_eq!(table.field("Pn").as_deref(), Some("XR"));
-}
-
-#[test]
-fn positions_in_inches_have_four_decimals() {
-    let mut table = Table::new();
-    table.ok("$13=1");
-    table.ok("G0 X25.4");
-    table.wait("Idle");
-    assert!((table.position("MPos") - 1.0).abs() < 0.0003);
-    let field = table.field("MPos").unwrap();
-    assert!(field.ends_with(",0.0000,0.0000"), "{field}");
 }
 
 #[test]

@@ -31,7 +31,6 @@ const POLL_STOCK: Duration = Duration::from_millis(200);
 /// What is assumed of a controller until its identity is known.
 pub(super) const UNKNOWN_CONTROLLER: ControllerTraits = ControllerTraits {
     family: Family::Grbl,
-    degrees_per_unit: 1.0,
     poll: POLL_STOCK,
     stamps: false,
     reports_homing: false,
@@ -49,11 +48,10 @@ pub(super) fn greet(
     let about = about(link)?;
     let extras = options.extras && offers_extras(&about);
     secure(link, extras)?;
-    let settings = settings(link, Family::from_messages(&about), extras)?;
+    let settings = settings(link, extras)?;
     let identity = Identity::read(&about, &settings, extras)?;
     link.supervisor().set_traits(ControllerTraits {
         family: identity.family,
-        degrees_per_unit: identity.degrees_per_unit,
         poll: if extras { POLL_STAMPED } else { POLL_STOCK },
         stamps: extras,
         reports_homing: extras,
@@ -195,7 +193,7 @@ fn lacks(about: &[Message]) -> Option<&'static str> {
 }
 
 /// The answer to `$$`, complete and twice the same: without checksums a digit could be wrong.
-fn settings(link: &Link, family: Family, extras: bool) -> Result<GrblSettings, TurntableError> {
+fn settings(link: &Link, extras: bool) -> Result<GrblSettings, TurntableError> {
     let mut last = None;
     let mut missing = Vec::new();
     for _ in 0..READINGS {
@@ -207,7 +205,7 @@ fn settings(link: &Link, family: Family, extras: bool) -> Result<GrblSettings, T
             outcome => done(link, "$$", outcome)?,
         };
         let settings = GrblSettings::of(&messages);
-        missing = settings.missing(family, extras);
+        missing = settings.missing(extras);
         if !missing.is_empty() {
             continue;
         }
@@ -221,7 +219,7 @@ fn settings(link: &Link, family: Family, extras: bool) -> Result<GrblSettings, T
         false => {
             let missing: Vec<_> = missing.iter().map(|n| format!("${n}")).collect();
             let missing = missing.join(", ");
-            format!("{missing}, which a table with {family} needs on its X axis")
+            format!("{missing}, which a table needs on its X axis")
         }
     }))
 }

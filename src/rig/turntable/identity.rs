@@ -8,8 +8,6 @@ use super::wire::Message;
 
 /// How far a table without a limit of its own may turn in either direction before its cable is wound up, degrees.
 const TRAVEL_DEG: f64 = 400.0;
-/// Degrees in a reported inch: a stock board can be set to report in inches.
-const INCH: f64 = 25.4;
 
 /// The letters in `[OPT:..]` of the rig's own firmware, Grbl's own being capitals: its reports carry the chip's time
 /// of the position, lines can be numbered and checksummed, and the table stops by itself when the host falls silent.
@@ -46,8 +44,6 @@ pub struct Identity {
     pub homing: bool,
     /// Its lease, seconds; 0 if it is off, `None` if the controller has none.
     pub lease_s: Option<f64>,
-    /// Degrees in one unit of its reports.
-    pub(super) degrees_per_unit: f64,
 }
 
 impl Identity {
@@ -63,6 +59,9 @@ impl Identity {
         settings: &GrblSettings,
         extras: bool,
     ) -> Result<Identity, TurntableError> {
+        if settings.is_on(13) {
+            return Err(not_reported("positions in millimetres ($13=0)"));
+        }
         let family = Family::from_messages(about);
         let mut firmware = None;
         for message in about {
@@ -92,7 +91,6 @@ impl Identity {
             // grblHAL's setting is a set of bits, of which the first switches homing on.
             homing: settings.get(22).is_some_and(|value| value % 2.0 == 1.0),
             lease_s: extras.then(|| settings.get(60)).flatten(),
-            degrees_per_unit: if settings.is_on(13) { INCH } else { 1.0 },
         })
     }
 }
@@ -116,12 +114,8 @@ impl GrblSettings {
     }
 
     /// The settings that this program needs and that are not there.
-    pub(super) fn missing(&self, family: Family, extras: bool) -> Vec<u16> {
+    pub(super) fn missing(&self, extras: bool) -> Vec<u16> {
         let mut needed = vec![20, 22, 100, 110, 120, 130];
-        // FluidNC has it in its configuration file only.
-        if family != Family::FluidNc {
-            needed.push(13);
-        }
         if extras {
             needed.push(60);
         }
@@ -217,16 +211,10 @@ mod tests {
     }
 
     #[test]
-    fn only_fluid_nc_may_leave_out_the_unit_of_its_reports() {
-        let settings = GrblSettings([20, 22, 100, 110, 120].map(|n| (n, 1.0)).into());
-        let missing = |family| settings.missing(family, false);
-        assert_eq!(missing(Family::FluidNc), [130]);
-        assert_eq!(missing(Family::Grbl), [130, 13]);
-    }
-
-    #[test]
     fn a_missing_setting_is_named_in_the_error() {
-        let error = identity(&RIG, &[(100, 0.0)]).unwrap_err();
-        assert!(error.to_string().contains("$100"), "{error}");
+        for (setting, named) in [((100, 0.0), "$100"), ((13, 1.0), "$13=0")] {
+            let error = identity(&RIG, &[setting]).unwrap_err();
+            assert!(error.to_string().contains(named), "{error}");
+        }
     }
 }

@@ -167,7 +167,6 @@ mod tests {
             limits: (low_deg, high_deg),
             homing: false,
             lease_s: None,
-            degrees_per_unit: 1.0,
         }
     }
 

@@ -37,7 +37,7 @@ impl PositionReport {
         traits: &ControllerTraits,
     ) -> Option<PositionReport> {
         let report = poll.report;
-        let units = match report.position {
+        let machine_deg = match report.position {
             Position::Machine(at) => at,
             Position::Work(at) => at + work_zero?,
         };
@@ -45,8 +45,8 @@ impl PositionReport {
             state: report.state,
             alarm: report.alarm,
             homed: report.homed,
-            machine_deg: units * traits.degrees_per_unit,
-            speed: report.feed.unwrap_or(0.0) * traits.degrees_per_unit / 60.0,
+            machine_deg,
+            speed: report.feed.unwrap_or(0.0) / 60.0,
             chip_us: report.chip_us.filter(|_| traits.stamps),
             battery_v: report.battery_v,
             pins: report.pins,
@@ -68,8 +68,6 @@ impl PositionReport {
 pub(crate) struct ControllerTraits {
     /// Whose alarms it reports.
     pub(crate) family: Family,
-    /// Degrees in one unit of its reports.
-    pub(crate) degrees_per_unit: f64,
     /// Interval of reports in motion.
     pub(crate) poll: Duration,
     /// Whether its reports carry the chip's time.
