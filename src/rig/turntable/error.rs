@@ -188,13 +188,8 @@ fn advice(state: ControllerState, alarm: Option<&Alarm>) -> String {
         ControllerState::Alarm => {
             alarm.map_or_else(|| "unlock or home it".to_owned(), Alarm::to_string)
         }
-        ControllerState::Held
-        | ControllerState::Holding
-        | ControllerState::Door
-        | ControllerState::DoorMoving => "stop it first".to_owned(),
-        ControllerState::Tool => "end its tool change with a reset".to_owned(),
+        ControllerState::Held | ControllerState::Holding => "stop it first".to_owned(),
         ControllerState::Check => "switch Grbl's check mode off with `$C`".to_owned(),
-        ControllerState::Sleep => "wake it with a reset".to_owned(),
         _ => "stop it, or wait until it is idle".to_owned(),
     }
 }

@@ -142,7 +142,9 @@ fn no_controller(link: &Link) -> TurntableError {
     let heard = match (supervisor.closed(), counts.noise) {
         (Some(why), _) => format!("the port is gone: {why}"),
         (None, 0) => "nothing was heard".to_owned(),
-        (None, lines) => format!("{lines} lines were heard that are none of Grbl's"),
+        (None, lines) => format!(
+            "{lines} lines were heard that are none of Grbl's, or have no machine position ($10=1)"
+        ),
     };
     TurntableError::NoController {
         port: link.port_name().to_owned(),

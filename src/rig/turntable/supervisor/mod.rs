@@ -38,7 +38,6 @@ pub(crate) struct Supervisor {
     answer: Option<(u64, LineOutcome)>,
     last_report: Option<PositionReport>,
     confirmed: bool,
-    work_zero: Option<f64>,
     /// Machine position of the angle 0, degrees; `None` if it is unknown.
     zero_deg: Option<f64>,
     /// The angle 0 was known until the controller restarted.
@@ -72,7 +71,6 @@ impl Supervisor {
             answer: None,
             last_report: None,
             confirmed: false,
-            work_zero: None,
             zero_deg: None,
             restarted: false,
             rest_deg: None,
@@ -372,10 +370,7 @@ impl Supervisor {
     }
 
     fn on_report(&mut self, now_us: i64, poll: &Poll) {
-        self.work_zero = poll.report.work_zero.or(self.work_zero);
-        let Some(report) = PositionReport::of(poll, self.work_zero, &self.traits) else {
-            return;
-        };
+        let report = PositionReport::of(poll, &self.traits);
         self.confirmed = self
             .last_report
             .is_some_and(|before| before.confirms(&report));
@@ -474,7 +469,6 @@ impl Supervisor {
         self.restarts += 1;
         self.alarm = None;
         self.emergency_stop = false;
-        self.work_zero = None;
         let asked_for = cause.as_deref().is_none_or(|cause| cause == HOST_RESET);
         let stop = self.stop.as_mut().filter(|stop| stop.outcome().is_none());
         let kept = stop.is_some_and(|stop| stop.on_reset(now_us)) && asked_for;

@@ -92,12 +92,7 @@ impl Motion {
                 })
             }
             ControllerState::Idle => self.on_idle(report, target_deg, stands_us, traits),
-            ControllerState::Held
-            | ControllerState::Holding
-            | ControllerState::Door
-            | ControllerState::DoorMoving
-            | ControllerState::Sleep
-            | ControllerState::Tool => Some(MotionFault::Held),
+            ControllerState::Held | ControllerState::Holding => Some(MotionFault::Held),
             ControllerState::Alarm => Some(MotionFault::Alarm(
                 alarm.unwrap_or(Alarm::unknown(traits.family)),
             )),

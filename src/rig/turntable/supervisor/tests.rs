@@ -194,15 +194,6 @@ fn a_motion_that_takes_too_long_is_late() {
 }
 
 #[test]
-fn work_positions_count_once_their_zero_is_known() {
-    let mut bench = Bench::new();
-    bench.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0>");
-    assert!(bench.supervisor.last_report().is_none());
-    bench.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0|WCO:2.000,0.000,0.000>");
-    assert_eq!(bench.supervisor.last_report().unwrap().machine_deg, 3.0);
-}
-
-#[test]
 fn without_checksums_a_report_counts_when_the_one_before_says_the_same() {
     let mut bench = Bench::new();
     bench.report("Idle", 3.0, 2);

@@ -28,7 +28,7 @@ pub use machine::Machine;
 pub use message::{Message, parse};
 pub use pending::ReplyTimeout;
 pub use polling::Poll;
-pub use status::{ControllerState, Pins, Position, StatusReport};
+pub use status::{ControllerState, Pins, StatusReport};
 
 /// Real-time commands: single bytes that the controller takes out of the stream anywhere; never part
 /// of a line.

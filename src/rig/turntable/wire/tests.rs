@@ -66,7 +66,7 @@ fn a_value_with_more_digits_than_grbl_writes_keeps_them() {
         "$27=1.000",
         "$100=-84444494444440",
         "<Idle|MPos:0.0005,0.000,0.000>",
-        "<Run|WPos:12.340,0.000,0.000|FS:432,0|Bat:11.845|WCO:0.1234,0.000,0.000>",
+        "<Run|MPos:12.3401,0.000,0.000|FS:432,0|Bat:11.845>",
     ] {
         let message = parse(line).unwrap();
         assert_eq!(message.to_string(), line);
@@ -369,21 +369,18 @@ fn a_report_of_a_relative_gives_its_state_its_alarm_and_its_pins() {
         (ControllerState::Alarm, Some(11))
     );
     assert!(alarm.pins.index && alarm.pins.emergency_stop);
-    let tool = report("<Tool|WPos:1.000,0.000,0.000|WCO:2.000,0.000,0.000|T:3|H:1,7>");
+    let tool = report("<Tool|MPos:1.000,0.000,0.000|WCO:2.000,0.000,0.000|T:3|H:1,7>");
     assert_eq!(
         (tool.state, tool.homed),
-        (ControllerState::Tool, Some(true))
+        (ControllerState::Held, Some(true))
     );
-    assert_eq!(
-        (tool.position, tool.work_zero),
-        (Position::Work(1.0), Some(2.0))
-    );
+    assert_eq!(tool.position, 1.0);
     let states = [
         ("Hold", ControllerState::Held),
         ("Hold:0", ControllerState::Held),
         ("Hold:2", ControllerState::Holding),
-        ("Door:1", ControllerState::Door),
-        ("Door:4", ControllerState::DoorMoving),
+        ("Door:1", ControllerState::Held),
+        ("Door:4", ControllerState::Holding),
         ("Run:2", ControllerState::Run),
         ("Idle:x", ControllerState::Idle),
         ("Critical", ControllerState::Unknown),
@@ -401,7 +398,7 @@ fn a_report_whose_position_is_damaged_or_twice_is_noise() {
         "<Idle|MPos:1.0x0,0.000,0.000>",
         "<Idle|MPos:1.000,0.000,>",
         "<Idle|MPos:1.000|MPos:2.000>",
-        "<Idle|MPos:1.000|WCO:-->",
+        "<Idle|WPos:1.000,0.000,0.000>",
         "<Idle|FS:0,0>",
         "<Idle|MPos:1.000<Idle|MPos:1.000>",
         "<Idle|MPos:1.000",

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::turntable::wire::number::LONGEST;
-use crate::turntable::wire::{Message, Position, StatusReport};
+use crate::turntable::wire::{Message, StatusReport};
 
 impl fmt::Display for Message {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -33,10 +33,7 @@ impl fmt::Display for StatusReport {
         if let Some(code) = self.alarm {
             write!(f, ":{code}")?;
         }
-        match self.position {
-            Position::Machine(at) => write!(f, "|MPos:{},0.000,0.000", shown(at, 3))?,
-            Position::Work(at) => write!(f, "|WPos:{},0.000,0.000", shown(at, 3))?,
-        }
+        write!(f, "|MPos:{},0.000,0.000", shown(self.position, 3))?;
         if let Some(feed) = self.feed {
             write!(f, "|FS:{feed},0")?;
         }
@@ -51,9 +48,6 @@ impl fmt::Display for StatusReport {
             (true, false) => f.write_str("|Pn:X")?,
             (false, true) => f.write_str("|Pn:R")?,
             (true, true) => f.write_str("|Pn:XR")?,
-        }
-        if let Some(zero) = self.work_zero {
-            write!(f, "|WCO:{},0.000,0.000", shown(zero, 3))?;
         }
         if let Some(homed) = self.homed {
             write!(f, "|H:{}", u8::from(homed))?;

@@ -173,13 +173,8 @@ fn seq() -> impl Strategy<Value = Option<u32>> {
 
 fn report() -> impl Strategy<Value = StatusReport> {
     use ControllerState::*;
-    let state = [
-        Idle, Run, Held, Holding, Jog, Home, Alarm, Check, Door, DoorMoving, Sleep, Tool, Unknown,
-    ];
-    let position = prop_oneof![
-        thousandths().prop_map(Position::Machine),
-        thousandths().prop_map(Position::Work),
-    ];
+    let state = [Idle, Run, Held, Holding, Jog, Home, Alarm, Check, Unknown];
+    let position = thousandths();
     let pins = (any::<bool>(), any::<bool>());
     let pins = pins.prop_map(|(index, emergency_stop)| Pins {
         index,
@@ -188,22 +183,18 @@ fn report() -> impl Strategy<Value = StatusReport> {
     let whole = proptest::option::of((0..40_000u32).prop_map(f64::from));
     let volts = proptest::option::of((0..2000u32).prop_map(|n| f64::from(n) / 100.0));
     let stamp = proptest::option::of(any::<u32>());
-    let zero = proptest::option::of(thousandths());
     let state = proptest::sample::select(state.to_vec());
     let state = (state, any::<Option<u8>>(), any::<Option<bool>>());
-    (state, position, whole, stamp, volts, pins, zero).prop_map(
-        |((state, alarm, homed), position, feed, chip_us, battery_v, pins, work_zero)| {
-            StatusReport {
-                state,
-                alarm: alarm.filter(|_| state == Alarm),
-                homed,
-                position,
-                feed,
-                chip_us,
-                battery_v,
-                pins,
-                work_zero,
-            }
+    (state, position, whole, stamp, volts, pins).prop_map(
+        |((state, alarm, homed), position, feed, chip_us, battery_v, pins)| StatusReport {
+            state,
+            alarm: alarm.filter(|_| state == Alarm),
+            homed,
+            position,
+            feed,
+            chip_us,
+            battery_v,
+            pins,
         },
     )
 }
@@ -228,7 +219,7 @@ fn other_field() -> impl Strategy<Value = String> {
         "(Bf|Ov|A|Ln|SD|H|T|Bat|FW|SP1|Sc|MPG|WCS|TLR|In|AR|S):[ -;=?-{}~]{0,20}",
     ]
     .prop_filter("a known field", |field| {
-        let known = ["MPos:", "WPos:", "WCO:", "FS:", "F:"];
+        let known = ["MPos:", "FS:", "F:"];
         !known.iter().any(|name| field.starts_with(name))
     })
 }
