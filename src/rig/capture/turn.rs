@@ -105,7 +105,7 @@ impl TurnRecording<'_> {
             check()?;
             let ended = self.recorder.wait_ended(LOOK);
             self.show_progress();
-            let late_us = self.clock.now_us().saturating_sub(window.to_us());
+            let late_us = self.clock.now_us().saturating_sub(window.to_us);
             let late = Duration::from_micros(u64::try_from(late_us).unwrap_or(0));
             match ended {
                 true if late_us >= 0 => return Ok(()),
