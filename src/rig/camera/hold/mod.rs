@@ -5,8 +5,6 @@
 //! controls and reads them back. The names are those that `v4l2-ctl` prints; the kernel renamed
 //! several in 5.17, and both names are known.
 
-use std::fmt;
-
 use relit_data::causes::with_causes;
 
 use super::{Camera, CameraError, Control, ControlKind};
