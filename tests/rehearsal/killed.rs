@@ -125,7 +125,7 @@ fn child_that_turns_until_it_is_killed() {
             }
         });
         truth.unwrap();
-        rig.capture(false).unwrap();
+        rig.capture().unwrap();
     });
 }
 

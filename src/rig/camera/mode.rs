@@ -1,13 +1,14 @@
-//! The mode requested of a camera, and the mode granted.
+//! The mode that a camera is asked for, or has granted.
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::{CameraError, Fourcc, Rate};
 
-/// The mode requested of a camera, written `MJPG:1920x1080@30`.
+/// The mode that a camera is asked for, or has granted: drivers take the nearest that they have. Written
+/// `MJPG:1920x1080@30`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ModeRequest {
+pub struct CameraMode {
     /// The pixel format.
     pub fourcc: Fourcc,
     /// Frame width, pixels.
@@ -18,7 +19,7 @@ pub struct ModeRequest {
     pub rate: Rate,
 }
 
-impl fmt::Display for ModeRequest {
+impl fmt::Display for CameraMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             fourcc,
@@ -30,7 +31,7 @@ impl fmt::Display for ModeRequest {
     }
 }
 
-impl FromStr for ModeRequest {
+impl FromStr for CameraMode {
     type Err = CameraError;
 
     fn from_str(text: &str) -> Result<Self, CameraError> {
@@ -42,12 +43,12 @@ impl FromStr for ModeRequest {
     }
 }
 
-fn parse_request(text: &str) -> Option<ModeRequest> {
+fn parse_request(text: &str) -> Option<CameraMode> {
     let (fourcc, rest) = text.split_once(':')?;
     let (size, rate) = rest.split_once('@')?;
     let (width, height) = size.split_once('x')?;
     let size = |text: &str| text.parse().ok().filter(|&pixels: &u32| pixels > 0);
-    Some(ModeRequest {
+    Some(CameraMode {
         fourcc: Fourcc(fourcc.as_bytes().try_into().ok()?),
         width: size(width)?,
         height: size(height)?,
@@ -55,22 +56,9 @@ fn parse_request(text: &str) -> Option<ModeRequest> {
     })
 }
 
-/// The mode that a camera granted. Drivers replace a requested mode by the nearest that they have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct GrantedMode {
-    /// The pixel format.
-    pub fourcc: Fourcc,
-    /// Frame width, pixels.
-    pub width: u32,
-    /// Frame height, pixels.
-    pub height: u32,
-    /// Frames per second; `None` if the camera does not state it.
-    pub rate: Option<Rate>,
-}
-
-impl GrantedMode {
+impl CameraMode {
     /// The differences from the request, in words; empty if there are none.
-    pub fn differences(&self, asked: &ModeRequest) -> Vec<String> {
+    pub fn differences(&self, asked: &Self) -> Vec<String> {
         let mut found = Vec::new();
         if self.fourcc != asked.fourcc {
             found.push(format!("{} instead of {}", self.fourcc, asked.fourcc));
@@ -81,27 +69,10 @@ impl GrantedMode {
                 self.width, self.height, asked.width, asked.height
             ));
         }
-        match self.rate {
-            Some(rate) if !rate.equals(asked.rate) => {
-                found.push(format!("{rate} instead of {} frames/s", asked.rate));
-            }
-            Some(_) => {}
-            None => found.push(format!(
-                "an unknown rate instead of {} frames/s",
-                asked.rate
-            )),
+        if !self.rate.equals(asked.rate) {
+            found.push(format!("{} instead of {} frames/s", self.rate, asked.rate));
         }
         found
-    }
-}
-
-impl fmt::Display for GrantedMode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {}x{}", self.fourcc, self.width, self.height)?;
-        match self.rate {
-            Some(rate) => write!(f, ", {rate} frames/s"),
-            None => f.write_str(", unknown rate"),
-        }
     }
 }
 
@@ -111,7 +82,7 @@ mod tests {
 
     use super::*;
 
-    fn request(text: &str) -> ModeRequest {
+    fn request(text: &str) -> CameraMode {
         text.parse().unwrap()
     }
 
@@ -130,25 +101,23 @@ mod tests {
             "MJPG:0x1@1",
             "MJPG:1x1@0",
         ] {
-            assert!(wrong.parse::<ModeRequest>().is_err(), "{wrong}");
+            assert!(wrong.parse::<CameraMode>().is_err(), "{wrong}");
         }
     }
 
     #[test]
     fn differences_from_the_request_are_listed() {
         let asked = request("MJPG:1280x720@30");
-        let granted = GrantedMode {
-            fourcc: Fourcc::MJPG,
-            width: 1280,
-            height: 720,
-            rate: Rate::new(60, 2),
+        let granted = CameraMode {
+            rate: Rate::new(60, 2).unwrap(),
+            ..asked
         };
         assert_eq!(granted.differences(&asked), [] as [&str; 0]);
-        let other = GrantedMode {
+        let other = CameraMode {
             fourcc: Fourcc::YUYV,
             width: 640,
             height: 480,
-            rate: Rate::new(25, 2),
+            rate: Rate::new(25, 2).unwrap(),
         };
         assert_eq!(
             other.differences(&asked),
@@ -163,8 +132,8 @@ mod tests {
     proptest! {
         #[test]
         fn no_text_makes_the_parser_panic(text in "[A-Z0-9:x@.-]{0,30}", size in any::<u64>()) {
-            let _ = text.parse::<ModeRequest>();
-            let _ = format!("MJPG:{size}x{size}@{size}").parse::<ModeRequest>();
+            let _ = text.parse::<CameraMode>();
+            let _ = format!("MJPG:{size}x{size}@{size}").parse::<CameraMode>();
         }
     }
 }
