@@ -12,7 +12,7 @@ use std::time::Duration;
 use relight_photo::nets::{INPUTS, Inference, Weights, decomposer};
 use relight_synth::{Folders, Library, PhotoViewRecipe};
 use relight_train::{
-    Adam, ComputePrecision, DataSettings, Model, Photographs, Resources, RunSettings,
+    Adam, ComputePrecision, DataSettings, Model, Photographs, Resources, RunSettings, keep_memory,
 };
 use tch::{Device, Kind, Tensor, no_grad};
 
@@ -86,6 +86,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let steps: usize = arguments.next().as_deref().unwrap_or("5").parse()?;
 
     tch::set_num_threads(1);
+    keep_memory();
     tch::manual_seed(1);
     let weights = Weights::initial(&decomposer(), 1);
     let shape = [batch, INPUTS, side, side].map(|n| n as i64);

@@ -10,7 +10,7 @@
 //! | `decompose`, `decompose_task` | the decomposing network: maps, losses, run |
 //! | `held_out` | turns and samples that networks are judged by while they train |
 //! | `task`, `run`, `checkpoint`, `journal`, `guard` | a run: what is trained, its steps, what is saved, what is logged, what ends it |
-//! | `cuda` | GPUs |
+//! | `cuda`, `memory` | GPUs; memory between steps |
 //! | `launch`, `process_group`, `agreement`, `all_reduced` | several processes: their ranks, sums over them, whether they agree, all-reduced losses |
 //! | `paper_layers`, `paper_phases`, `paper_networks`, `paper_task` | the paper's phases: layers on tensors, losses, networks, runs |
 //! | `turn_samples`, `turn_task` | the network of whole turns: views in rooms, its run |
@@ -35,6 +35,7 @@ mod launch;
 mod learner;
 mod losses;
 mod low_rank;
+mod memory;
 mod model;
 mod paper_layers;
 mod paper_networks;
@@ -62,6 +63,7 @@ pub use error::TrainError;
 pub use journal::{Journal, TABLE};
 pub use launch::Launch;
 pub use learner::Learner;
+pub use memory::keep_memory;
 pub use model::{ComputePrecision, Model};
 pub use paper_networks::PaperInputs;
 pub use paper_phases::PaperPhase;
