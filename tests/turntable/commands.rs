@@ -6,6 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use relit_rig::simulator::{Simulator, SimulatorOptions};
+use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_relit-capture");
@@ -180,11 +181,7 @@ fn what_is_wrong_is_said_in_a_sentence() {
 fn a_jog_that_is_interrupted_stops_the_table() {
     let table = Simulated::without_reset();
     let mut jog = table.jog(&["300", "--speed", "10"]);
-    let interrupted = Command::new("kill")
-        .args(["-INT", &jog.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(interrupted.success());
+    kill_process(Pid::from_child(&jog), Signal::INT).unwrap();
     assert_eq!(jog.wait().unwrap().code(), Some(1));
     let first = out(&table.ask(&["status"]));
     let second = out(&table.ask(&["status"]));

@@ -69,8 +69,10 @@ impl Table {
                 Err(error @ TurntableError::Owned { pid, .. }) => (pid, error),
                 opened => return opened,
             };
-            let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
-            is_asked = is_asked || pid.is_some_and(|pid| kill_process(pid, Signal::TERM).is_ok());
+            if !is_asked && port::has_open(pid, path, &options.runtime_folder) {
+                let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
+                is_asked = pid.is_some_and(|pid| kill_process(pid, Signal::TERM).is_ok());
+            }
             if !is_asked || options.clock.now_us() > until_us {
                 return Err(error);
             }

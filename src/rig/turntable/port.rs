@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{self, Read, Write};
 use std::os::unix::fs::MetadataExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serialport::{SerialPort as _, TTYPort};
@@ -46,14 +46,33 @@ pub(super) fn claim(port: &Path, folder: &Path) -> Result<LockFile, TurntableErr
         source,
     })?;
     lockfile::use_folder(folder)?;
-    let lock = folder.join(format!("turntable-{:x}.lock", device.rdev()));
-    LockFile::take(&lock, &port.display().to_string()).map_err(|error| match error {
-        LockError::Held { pid, .. } => TurntableError::Owned {
-            path: port.to_owned(),
-            pid: pid.unwrap_or(0),
-        },
-        error => error.into(),
+    LockFile::take(&lock_of(&device, folder), &port.display().to_string()).map_err(|error| {
+        match error {
+            LockError::Held { pid, .. } => TurntableError::Owned {
+                path: port.to_owned(),
+                pid: pid.unwrap_or(0),
+            },
+            error => error.into(),
+        }
     })
+}
+
+/// Whether a process really has the lock of a port open: the number in a lock file is only what somebody wrote there.
+pub(super) fn has_open(pid: u32, port: &Path, folder: &Path) -> bool {
+    let lock = fs::metadata(port)
+        .map(|device| lock_of(&device, folder))
+        .and_then(|lock| fs::metadata(lock));
+    let files = fs::read_dir(format!("/proc/{pid}/fd"));
+    let (Ok(lock), Ok(files)) = (lock, files) else {
+        return false;
+    };
+    files
+        .filter_map(|file| fs::metadata(file.ok()?.path()).ok())
+        .any(|file| (file.dev(), file.ino()) == (lock.dev(), lock.ino()))
+}
+
+fn lock_of(device: &fs::Metadata, folder: &Path) -> PathBuf {
+    folder.join(format!("turntable-{:x}.lock", device.rdev()))
 }
 
 /// A serial port, opened exclusively.

@@ -5,7 +5,7 @@ use relight_core::light::{Direction, Normals, Panorama, YUp};
 use relight_core::parallel;
 
 /// The highlight of smoothness `smoothness` and reflectance 1; with `closed`, light from behind the surface is left out.
-pub fn highlight(
+pub(crate) fn highlight(
     panorama: &Panorama,
     normals: &Normals<YUp>,
     smoothness: f32,

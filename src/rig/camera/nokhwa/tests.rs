@@ -19,6 +19,7 @@ use super::worker::jpeg_length;
 use super::*;
 use crate::camera::Mode;
 use crate::clock::Clock;
+use relit_data::causes::with_causes;
 use relit_data::session::FrameClock;
 
 const TIMEOUT: Duration = Duration::from_secs(20);
