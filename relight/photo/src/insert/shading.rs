@@ -193,11 +193,16 @@ mod tests {
     }
 
     #[test]
-    fn a_shadow_goes_with_the_light_in_part() {
-        let hedged = moved(&half_dark(), DARK_PLACE);
+    fn a_shadow_goes_with_the_light_as_far_as_it_is_believed() {
+        let shading = half_dark();
+        let hedged = moved(&shading, DARK_PLACE);
+        let mut trusted = shading;
+        trusted.doubt = None;
+        let believed = moved(&trusted, DARK_PLACE);
+        assert!((believed - 1.0).abs() < 0.05, "{believed}");
         // Of the change from 0.1 to 1, with d, half is that of the mean: 0.4 of that goes, and 0.8 of the rest.
         let change = (1.05_f32 / 0.15).ln();
-        let expected = (-0.4 * change / 2.0 - 0.8 * change / 2.0).exp();
+        let expected = believed * (-0.4 * change / 2.0 - 0.8 * change / 2.0).exp();
         assert!((hedged - expected).abs() < 0.03, "{hedged} {expected}");
     }
 
