@@ -28,7 +28,7 @@ mod setting_error;
 mod solving;
 
 #[cfg(test)]
-mod test_turns;
+mod tests;
 
 pub use error::TurnError;
 pub use fit::environment::fit_turn_light;

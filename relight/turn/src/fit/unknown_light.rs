@@ -110,7 +110,7 @@ mod tests {
     use super::*;
     use crate::TurnVerdict;
     use crate::observe::curves::CurveBuilder;
-    use crate::test_turns::{TAKE, ball, elevation, environment, film, knowing, metal_ball, off};
+    use crate::tests::{TAKE, ball, elevation, environment, film, knowing, metal_ball, off};
     use relight_core::image::Extent;
 
     #[test]

@@ -6,7 +6,7 @@ use crate::model::gloss::GlossLight;
 use crate::model::lighting::TableLight;
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::CurveBuilder;
-use crate::test_turns::{
+use crate::tests::{
     ELEVATION, SIDE, SOLVED, TAKE, Take, albedo_off, ball, elevation, environment, film, film_in,
     metal_ball, off, solve,
 };

@@ -1,5 +1,5 @@
 use crate::observe::curves::CurveBuilder;
-use crate::test_turns::{SOLVED, albedo_off, ball, environment, frame, mask, off, solve};
+use crate::tests::{SOLVED, albedo_off, ball, environment, frame, mask, off, solve};
 
 #[test]
 fn steps_of_the_exposure_are_found_and_taken_out() {

@@ -1,7 +1,7 @@
 use relight_core::image::Planes;
 use relight_photo::files::{FrameTiming, MovieReader};
 
-use crate::test_turns::{SIDE, SOLVED, ball, elevation, environment, metal_ball, read, solved};
+use crate::tests::{SIDE, SOLVED, ball, elevation, environment, metal_ball, read, solved};
 use crate::{MaterialKind, ReadTurn, SolvedTurn, TurnFiles, solve_in_light};
 
 /// The frames of the video that is written of a turn, as planes of sRGB.
