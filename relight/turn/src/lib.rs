@@ -9,9 +9,9 @@
 //! | module | concern |
 //! | --- | --- |
 //! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `shading` (one of them) |
-//! | `observe` | what the frames show: `reading`, `curves`, `exposure`, `conditioning`; `film` and `probe` for a ball in the video |
+//! | `observe` | what the frames show: `reading`, `curves`, `conditioning`; `film` and `probe` for a ball in the video |
 //! | `network` | `input`, `predict`: normals and albedo by the network of turns |
-//! | `fit` | `known_light`: `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the gloss), `residuals`, `albedo`, `confidence`; `unknown_light`: `environment`, `photo_albedo` |
+//! | `fit` | `known_light`: the gloss of all pixels, `search` (one pixel), `residuals`, `albedo`, `confidence`; `unknown_light`: `environment`, `photo_albedo` |
 //! | `report` | `files`, `sheet`, `movie`, `object`: what is written; `warnings`: what a user should know |
 //!
 //! `solving` puts them together. A folder knows those above it in this table. Each module has its parameters as constants, with

@@ -8,26 +8,28 @@ use crate::fit::confidence::{
     FREEDOM, FittedPixels, OwnError, common_error, own_errors, shared_albedo,
 };
 use crate::fit::curve_statistics::{CurveStatistics, all_statistics};
-use crate::fit::joint::JointOptimisation;
 use crate::fit::residuals::robust_weights;
-use crate::fit::search::{PixelFit, search_all};
+use crate::fit::search::{PixelFit, Search, search_all};
 use crate::fit::solution::TurnSolution;
-use crate::fit::unknowns::Unknowns;
 use crate::model::frame::{Elevation, TableFrame};
+use crate::model::gloss::GlossLight;
 use crate::model::known_light::KnownLight;
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
-/// Number of blocks, or of pixels, on which the gloss is fitted. By hand.
-const PIXELS: usize = 2500;
-/// Rounds of the joint optimisation on blocks: before each, the normals are searched anywhere. By hand.
-const JOINT_ROUNDS: usize = 2;
-/// Gauss-Newton steps in each of them. By hand.
-const JOINT_STEPS: usize = 8;
-/// Gauss-Newton steps of the joint optimisation in each robust round. By hand.
-const ROBUST_STEPS: usize = 3;
+/// Number of blocks of pixels on which the gloss is fitted. By hand.
+const BLOCKS: usize = 1000;
+/// How strongly gloss reflects, over a smooth dielectric. By hand: up to 16, because light by a dark grey ball is in small
+/// units.
+const STRENGTHS: [f64; 8] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+/// How much the lobe blurs the light: the deviation of a Gaussian, radians. By hand.
+const BLURS: [f64; 5] = [0.05, 0.2, 0.35, 0.55, 0.8];
+/// How often the best lobe is improved, each time by half the steps between those. By hand.
+const REFINED: i32 = 2;
+/// Distance between blurs that are tried around the best, radians. By hand.
+const BLUR_STEP: f64 = 0.15;
 /// Rounds of robust weights. By hand.
 const ROBUST_ROUNDS: usize = 3;
 /// Quantile of the distances that measures the spread of albedos. By hand: spots of another colour count, a few
@@ -49,17 +51,16 @@ pub fn solve_in_light(
     material: MaterialKind,
 ) -> TurnSolution {
     let frame = TableFrame::new(elevation);
-    let unknowns = Unknowns {
+    let finish = Finish {
         frame,
         known: &KnownLight::new(light, &frame),
         material,
     };
-    let model = model_of_blocks(curves, unknowns);
-    let conditioning = Conditioning::of(curves).in_given(&unknowns.initial());
+    let model = finish.fitted(curves);
+    let conditioning = Conditioning::of(curves).in_given(&finish.model(Lobe::SMOOTH));
     let statistics = all_statistics(curves);
     let mut solver = Solver {
         curves,
-        unknowns,
         fits: search_all(&model, &statistics, None),
         model,
         statistics,
@@ -81,28 +82,99 @@ pub fn solve_in_light(
     }
 }
 
-/// The shading model that fits blocks of pixels best.
-fn model_of_blocks(curves: &TurnCurves, unknowns: Unknowns<'_>) -> ShadingModel {
-    let pixels = curves.pixels() as f64 / PIXELS as f64;
-    let side = (pixels.sqrt().ceil() as usize).max(1);
-    let joint = JointOptimisation {
-        statistics: &all_statistics(&curves.reduced(side)),
-        unknowns,
+/// An object of a material in a known light, of which the lobe is to be found.
+#[derive(Debug, Clone, Copy)]
+struct Finish<'a> {
+    frame: TableFrame,
+    known: &'a KnownLight,
+    material: MaterialKind,
+}
+
+/// What gloss, or metal, makes of the light that a mirror would show.
+#[derive(Debug, Clone, Copy)]
+struct Lobe {
+    strength: f64,
+    blur: f64,
+}
+
+impl Lobe {
+    /// That of a mirror.
+    const SMOOTH: Self = Self {
+        strength: 1.0,
+        blur: 0.0,
     };
-    joint.found(unknowns.initial(), JOINT_ROUNDS, JOINT_STEPS)
+
+    /// How much it shows of band l.
+    fn attenuation(self, l: usize) -> f64 {
+        self.strength * (-0.5 * (l * (l + 1)) as f64 * self.blur * self.blur).exp()
+    }
+}
+
+impl Finish<'_> {
+    fn model(&self, lobe: Lobe) -> ShadingModel {
+        let bands = match self.material {
+            MaterialKind::Diffuse => self.known.bands(),
+            MaterialKind::Metal => self.known.mirror(),
+        };
+        let attenuations: Vec<f64> = (0..bands.len()).map(|l| lobe.attenuation(l)).collect();
+        ShadingModel {
+            frame: self.frame,
+            light: self.known.diffuse,
+            diffuse_beyond: self.known.diffuse_beyond,
+            gloss: GlossLight::sum(bands, &attenuations),
+            material: self.material,
+        }
+    }
+
+    /// The shading model that fits blocks of pixels best. Of an even light metal shows its albedo's part, whatever its
+    /// lobe is.
+    fn fitted(&self, curves: &TurnCurves) -> ShadingModel {
+        let side = (curves.pixels() as f64 / BLOCKS as f64).sqrt().ceil() as usize;
+        let blocks = all_statistics(&curves.reduced(side.max(1)));
+        let strengths = match self.material {
+            MaterialKind::Diffuse => &STRENGTHS[..],
+            MaterialKind::Metal => &[1.0],
+        };
+        let mut best = (self.model(Lobe::SMOOTH), Lobe::SMOOTH, f64::INFINITY);
+        let mut attempt = |lobe: Lobe, best: &mut (ShadingModel, Lobe, f64)| {
+            let model = self.model(lobe);
+            let cost = Search::new(&model).cost(&blocks);
+            if cost < best.2 {
+                *best = (model, lobe, cost);
+            }
+        };
+        for &strength in strengths {
+            for blur in BLURS {
+                attempt(Lobe { strength, blur }, &mut best);
+            }
+        }
+        for round in 1..=REFINED {
+            let (part, around) = (0.5_f64.powi(round), best.1);
+            for more in [-part, 0.0, part] {
+                for further in [-part, 0.0, part] {
+                    let strength = match self.material {
+                        MaterialKind::Diffuse => around.strength * more.exp2(),
+                        MaterialKind::Metal => around.strength,
+                    };
+                    let blur = (around.blur + further * BLUR_STEP).max(0.0);
+                    attempt(Lobe { strength, blur }, &mut best);
+                }
+            }
+        }
+        best.0
+    }
 }
 
 /// All pixels under one light.
 struct Solver<'a> {
     curves: &'a TurnCurves,
-    unknowns: Unknowns<'a>,
     model: ShadingModel,
     statistics: Vec<CurveStatistics>,
     fits: Vec<PixelFit>,
 }
 
 impl Solver<'_> {
-    /// Weights parts of the turn by their residuals, fits the gloss again, and then every pixel.
+    /// Weights parts of the turn by their residuals, and fits every pixel again.
     fn refine(&mut self) {
         let (curves, model) = (self.curves, &self.model);
         self.statistics = (0..curves.pixels())
@@ -112,16 +184,6 @@ impl Solver<'_> {
                 CurveStatistics::new(curves, pixel, Some(&robust_weights))
             })
             .collect();
-        let every = self.statistics.len().div_ceil(PIXELS).max(1);
-        let statistics: Vec<CurveStatistics> =
-            self.statistics.iter().step_by(every).copied().collect();
-        let fits: Vec<PixelFit> = self.fits.iter().step_by(every).copied().collect();
-        let near = search_all(&self.model, &statistics, Some(&fits));
-        let joint = JointOptimisation {
-            statistics: &statistics,
-            unknowns: self.unknowns,
-        };
-        (self.model, _) = joint.refined(self.model, near, ROBUST_STEPS);
         self.fits = search_all(&self.model, &self.statistics, Some(&self.fits));
     }
 

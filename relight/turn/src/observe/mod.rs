@@ -2,7 +2,6 @@
 
 pub(crate) mod conditioning;
 pub(crate) mod curves;
-pub(crate) mod exposure;
 pub(crate) mod film;
 pub(crate) mod mirror_panorama;
 pub(crate) mod probe;

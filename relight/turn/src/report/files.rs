@@ -150,7 +150,6 @@ impl TurnFiles<'_> {
             "residual": solution.residual(),
             "expected_error_deg": solution.expected_error_deg(),
             "gloss": gloss,
-            "exposure_steps": curves.exposure_steps(),
             "white": white,
         }))
     }
