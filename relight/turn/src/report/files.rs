@@ -4,13 +4,11 @@ use std::path::Path;
 
 use relight_core::files::{ResultFolder, write_png};
 use relight_core::image::{Depth, Extent};
-use relight_photo::files::MovieWriter;
-use relight_photo::files::{bright, write_light};
+use relight_photo::files::write_light;
 use relit_data::durable::write_whole;
 use serde_json::{Value, json};
 
 use crate::error::TurnError;
-use crate::report::movie::write_movie;
 use crate::report::sheet::{contact_sheet, grey};
 use crate::solving::SolvedTurn;
 
@@ -18,10 +16,9 @@ use crate::solving::SolvedTurn;
 const FIGURES: &str = "turn.json";
 /// The object as a file that can be lit.
 const OBJECT: &str = "object.relit";
-const MOVIE: &str = "relit.mp4";
 
 /// What is written beside the figures.
-const FILES: [&str; 10] = [
+const FILES: [&str; 9] = [
     "normal.png",
     "albedo.png",
     "shading.png",
@@ -30,7 +27,6 @@ const FILES: [&str; 10] = [
     "mask.png",
     "light.txt",
     "contact.png",
-    MOVIE,
     OBJECT,
 ];
 
@@ -49,22 +45,16 @@ pub struct TurnFiles<'a> {
     pub solved: &'a SolvedTurn,
     /// Where the light is from: a file's name, or none where it was found.
     pub light_source: Option<&'a str>,
-    /// Whether to write the video.
-    pub has_movie: bool,
 }
 
 impl TurnFiles<'_> {
-    /// Whether results, and a video, may be written to the folder `out`: it is not there, empty, or holds earlier results and
+    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and
     /// nothing else.
     ///
     /// # Errors
-    /// Where it holds something else, or cannot be read or written, or where no video can be.
-    pub fn check(out: &Path, has_movie: bool) -> Result<(), TurnError> {
-        RESULTS.check(out)?;
-        if has_movie {
-            MovieWriter::check()?;
-        }
-        Ok(())
+    /// Where it holds something else, or cannot be read or written.
+    pub fn check(out: &Path) -> Result<(), TurnError> {
+        Ok(RESULTS.check(out)?)
     }
 
     /// Writes all files into the folder `out`, which appears when they are there; an earlier result in it is
@@ -102,10 +92,6 @@ impl TurnFiles<'_> {
         let sheet = contact_sheet(turn, solution, &shadow, (&surface, &light))?;
         write_png(&path("contact.png"), &sheet, Depth::Eight)?;
         solution.captured_object(turn)?.write(&path(OBJECT))?;
-        if self.has_movie {
-            let white = bright(albedo.planes(), &turn.mask);
-            write_movie(&path(MOVIE), &surface, white)?;
-        }
         let figures = self.figures(&white)?;
         let text = format!("{figures:#}\n");
         let path = path(FIGURES);
