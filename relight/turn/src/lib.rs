@@ -8,7 +8,7 @@
 //!
 //! | module | concern |
 //! | --- | --- |
-//! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `shading` (one of them) |
+//! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (light along a direction), `shading` (diffuse, glossy, metal) |
 //! | `observe` | what the frames show: `reading`, `curves`, `conditioning`; `film` and `probe` for a ball in the video |
 //! | `network` | `input`, `predict`: normals and albedo by the network of turns |
 //! | `fit` | `known_light`: the gloss of all pixels, `search` (one pixel), `residuals`, `albedo`, `confidence`; `unknown_light`: `environment`, `photo_albedo` |

@@ -9,9 +9,8 @@ use relight_core::metrics::angular_error;
 use relight_core::render::{DiffuseForm, DiffuseLayer, Surface};
 
 use crate::fit::residuals::lit;
-use crate::model::gloss::{GlossLight, MIRROR};
 use crate::model::harmonics::basis_at;
-use crate::model::lighting::TableLight;
+use crate::model::lighting::{MIRROR, TableLight};
 use crate::model::shading::ShadingModel;
 use crate::network::predict::NetworkFigures;
 use crate::network::predict::TurnPrediction;
@@ -191,13 +190,11 @@ pub(crate) fn windows() -> ShLight {
 pub(crate) fn metal_ball() -> (Surface, ShLight, TurnCurves) {
     let (surface, light) = (ball(), windows());
     let table = TableFrame::new(elevation());
-    let shown = GlossLight::bands(&light.rotated(&table.rotation()));
-    let factors = [1.0, 0.95, 0.9, 0.8, 0.7].map(|factor| MIRROR * factor);
+    let shown = TableLight::of(&light.rotated(&table.rotation()));
     let metal = ShadingModel {
         frame: table,
-        light: TableLight::from_viewer(&light, &table),
-        diffuse_beyond: GlossLight::NONE,
-        gloss: GlossLight::sum(&shown, &factors),
+        diffuse: TableLight::NONE,
+        gloss: shown.scaled(|l, _| MIRROR * [1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5][l]),
         material: MaterialKind::Metal,
     };
     let curves = film_in(&metal, &surface);

@@ -31,8 +31,6 @@ pub(crate) struct CurveStatistics {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HarmonicProducts {
     base: [[f64; PAIRS]; 3],
-    /// How many products of the base layer there are.
-    count: usize,
     /// Of both, and of the gloss with itself; none without gloss.
     gloss: Option<[[[f64; PAIRS]; 2]; 3]>,
 }
@@ -47,11 +45,10 @@ impl HarmonicProducts {
     pub(crate) fn of(harmonics: &PixelHarmonics) -> Self {
         let mut products = Self {
             base: [[0.0; PAIRS]; 3],
-            count: harmonics.count * (harmonics.count + 1) / 2,
             gloss: None,
         };
         for (products, own) in products.base.iter_mut().zip(&harmonics.base) {
-            symmetric(products, &own[..harmonics.count], &own[..harmonics.count]);
+            symmetric(products, own, own);
         }
         if harmonics.gloss != [[0.0; COEFFICIENTS]; 3] {
             products.gloss = Some([0, 1, 2].map(|channel| {
@@ -194,11 +191,8 @@ impl CurveStatistics {
     ) -> Projection {
         let own = &self.products[channel];
         let mut share = Projection {
-            along: sum_of_products(
-                &self.right[channel],
-                &harmonics.base[channel][..harmonics.count],
-            ),
-            own: sum_of_products(own, &products.base[channel][..products.count]),
+            along: sum_of_products(&self.right[channel], &harmonics.base[channel]),
+            own: sum_of_products(own, &products.base[channel]),
             rest: self.energy[channel],
         };
         if let Some(gloss) = &products.gloss {

@@ -12,8 +12,7 @@ use crate::fit::residuals::robust_weights;
 use crate::fit::search::{PixelFit, Search, search_all};
 use crate::fit::solution::TurnSolution;
 use crate::model::frame::{Elevation, TableFrame};
-use crate::model::gloss::GlossLight;
-use crate::model::known_light::KnownLight;
+use crate::model::lighting::{MIRROR, TableLight};
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
@@ -53,7 +52,7 @@ pub fn solve_in_light(
     let frame = TableFrame::new(elevation);
     let finish = Finish {
         frame,
-        known: &KnownLight::new(light, &frame),
+        light: TableLight::of(&light.rotated(&frame.rotation())),
         material,
     };
     let model = finish.fitted(curves);
@@ -84,9 +83,9 @@ pub fn solve_in_light(
 
 /// An object of a material in a known light, of which the lobe is to be found.
 #[derive(Debug, Clone, Copy)]
-struct Finish<'a> {
+struct Finish {
     frame: TableFrame,
-    known: &'a KnownLight,
+    light: TableLight,
     material: MaterialKind,
 }
 
@@ -110,18 +109,16 @@ impl Lobe {
     }
 }
 
-impl Finish<'_> {
+impl Finish {
     fn model(&self, lobe: Lobe) -> ShadingModel {
-        let bands = match self.material {
-            MaterialKind::Diffuse => self.known.bands(),
-            MaterialKind::Metal => self.known.mirror(),
+        let white = match self.material {
+            MaterialKind::Diffuse => 1.0,
+            MaterialKind::Metal => MIRROR,
         };
-        let attenuations: Vec<f64> = (0..bands.len()).map(|l| lobe.attenuation(l)).collect();
         ShadingModel {
             frame: self.frame,
-            light: self.known.diffuse,
-            diffuse_beyond: self.known.diffuse_beyond,
-            gloss: GlossLight::sum(bands, &attenuations),
+            diffuse: self.light.irradiance(),
+            gloss: self.light.scaled(|l, _| white * lobe.attenuation(l)),
             material: self.material,
         }
     }

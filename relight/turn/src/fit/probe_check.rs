@@ -164,8 +164,11 @@ impl Shown {
         }
         match self.ball {
             ProbeBall::Grey => {
-                let statistics = pixels.iter().map(|&pixel| &self.statistics[pixel]);
-                relative_residual(statistics, &normals, &self.frame)
+                let statistics: Vec<&CurveStatistics> = pixels
+                    .iter()
+                    .map(|&pixel| &self.statistics[pixel])
+                    .collect();
+                relative_residual(&statistics, &normals, &self.frame)
             }
             ProbeBall::Chrome => self.residual_by_mirror(&pixels, &normals),
         }

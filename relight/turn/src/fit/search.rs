@@ -89,7 +89,8 @@ impl<'a> Search<'a> {
             .collect();
         costs.select_nth_unstable_by(REFINED, |a, b| a.0.total_cmp(&b.0));
         let refined = costs[..REFINED].iter();
-        let refined = refined.map(|&start| self.downhill(statistics, start, [FIRST_STEP, ROUGH_STEP]));
+        let refined =
+            refined.map(|&start| self.downhill(statistics, start, [FIRST_STEP, ROUGH_STEP]));
         let best = refined.min_by(|a, b| a.0.total_cmp(&b.0));
         let best = best.unwrap_or((f64::INFINITY, [0.0, 0.0, 1.0]));
         self.fit(statistics, best, ROUGH_STEP)

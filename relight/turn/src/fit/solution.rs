@@ -1,13 +1,12 @@
 //! Normals, albedo and light of a solved turn.
 
 use relight_core::image::{Linear, Planes, Rgb};
-use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
 use relight_core::statistics::median;
 
 use crate::fit::residuals::residuals;
 use crate::fit::search::PixelFit;
 use crate::model::frame::{Elevation, TableFrame};
-use crate::model::lighting::TableLight;
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
@@ -80,9 +79,16 @@ impl TurnSolution {
         })
     }
 
-    /// The light.
-    pub(crate) const fn light(&self) -> &TableLight {
-        &self.model.light
+    /// The light to order 2, in the viewer's frame at the table's angle 0.
+    ///
+    /// # Errors
+    /// Where a term is not finite.
+    pub(crate) fn light(&self) -> Result<ShLight, LightError> {
+        let light = match &self.measured {
+            Some(measured) => measured.clone(),
+            None => self.model.light()?,
+        };
+        Ok(light.with_order(Order::TWO))
     }
 
     /// The camera over the table.

@@ -42,7 +42,8 @@ pub(crate) fn solve_by_network(
     let mut albedo = mean_albedo(curves, &found.albedo, seen);
     let statistics = all_statistics(curves);
     let frame = TableFrame::new(elevation);
-    let model = fit_model(&statistics, &normals, &albedo, &frame, material);
+    let all: Vec<&CurveStatistics> = statistics.iter().collect();
+    let model = fit_model(&all, &normals, &albedo, &frame, material);
     let (model, factors) = normalised(model.ok_or(TurnError::NoLight)?, &normals);
     for albedo in &mut albedo {
         *albedo = [0, 1, 2].map(|c| albedo[c] * factors[c]);
@@ -81,10 +82,8 @@ fn normalised(mut model: ShadingModel, normals: &[[f64; 3]]) -> (ShadingModel, [
         let mean = sum / normals.len() as f64;
         if mean > 1e-12 { mean } else { 1.0 }
     });
-    let parts = factors.map(|factor| 1.0 / factor);
-    model.light = model.light.times(parts);
-    if model.material == MaterialKind::Metal {
-        model.gloss = model.gloss.times(parts);
+    for light in [&mut model.diffuse, &mut model.gloss] {
+        *light = light.scaled(|_, channel| 1.0 / factors[channel]);
     }
     (model, factors)
 }
@@ -124,7 +123,7 @@ mod tests {
         assert!(off(&surface, &found.normals(&curves)) < 0.1);
         assert!((found.expected_error_deg() - 10.0 * CALIBRATION).abs() < 1e-3);
         assert_eq!(found.verdict(), TurnVerdict::Good);
-        let coefficients = found.light().to_viewer(found.frame()).unwrap();
+        let coefficients = found.light().unwrap();
         for c in 0..3 {
             let scale = light.coefficients()[0][c] / coefficients.coefficients()[0][c];
             for (a, b) in coefficients.coefficients().iter().zip(light.coefficients()) {

@@ -87,7 +87,7 @@ impl TurnFiles<'_> {
         ] {
             write_png(&path(name), grey(plane).planes(), Depth::Eight)?;
         }
-        let light = solution.light().to_viewer(solution.frame())?;
+        let light = solution.light()?;
         light.write(&path("light.txt"))?;
         let sheet = contact_sheet(turn, solution, &shadow, (&surface, &light))?;
         write_png(&path("contact.png"), &sheet, Depth::Eight)?;

@@ -14,7 +14,6 @@ use crate::fit::smoothing::blurred;
 use crate::fit::solution::TurnSolution;
 use crate::model::harmonics::basis_at;
 use crate::model::material::MaterialKind;
-use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 use crate::observe::reading::ReadTurn;
 
@@ -80,15 +79,11 @@ impl TurnSolution {
             }));
         };
         let normals = self.normals(curves);
-        let shown = ShadingModel {
-            gloss: self.model.gloss.within(measured.order().get() + 1),
-            ..self.model
-        };
         let mut best: Option<FittedGloss> = None;
         for angle in ANGLES {
             let basis = basis_at(angle);
             let highlight = curves.map(|pixel| {
-                let [base, gloss] = lit(&shown, self.fits[pixel].normal, &basis);
+                let [base, gloss] = lit(&self.model, self.fits[pixel].normal, &basis);
                 let gloss = match self.material() {
                     MaterialKind::Diffuse => gloss,
                     MaterialKind::Metal => base,

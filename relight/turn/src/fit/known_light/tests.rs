@@ -2,7 +2,6 @@ use proptest::prelude::*;
 use relight_core::image::Extent;
 use relight_core::light::{Direction, Order, Rotation, ShLight};
 
-use crate::model::gloss::GlossLight;
 use crate::model::lighting::TableLight;
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::CurveBuilder;
@@ -74,12 +73,11 @@ fn a_known_lamp_s_fourth_band_bends_no_normals() {
 fn gloss_beside_the_diffuse_part_is_found_in_known_light() {
     let (surface, light) = (ball(), environment());
     let table = TableFrame::new(elevation());
-    let shown = GlossLight::bands(&light.rotated(&table.rotation()));
+    let shown = TableLight::of(&light.rotated(&table.rotation()));
     let glossy = ShadingModel {
         frame: table,
-        light: TableLight::from_viewer(&light, &table),
-        diffuse_beyond: GlossLight::NONE,
-        gloss: GlossLight::sum(&shown, &[0.5, 0.4, 0.3]),
+        diffuse: shown.irradiance(),
+        gloss: shown.scaled(|l, _| [0.5, 0.4, 0.3, 0.0, 0.0, 0.0, 0.0][l]),
         material: MaterialKind::Diffuse,
     };
     let curves = film_in(&glossy, &surface);
