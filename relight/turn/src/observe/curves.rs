@@ -326,6 +326,24 @@ impl TurnCurves {
         other
     }
 
+    /// The curves of some of the pixels, by their places.
+    pub(crate) fn only(&self, is_wanted: impl Fn(usize) -> bool) -> Self {
+        let mut some = Self {
+            places: Vec::new(),
+            values: Vec::new(),
+            weights: Vec::new(),
+            ..self.clone()
+        };
+        for (pixel, &place) in self.places.iter().enumerate() {
+            if is_wanted(place) {
+                some.places.push(place);
+                some.values.extend(self.values(pixel));
+                some.weights.extend(self.weights(pixel));
+            }
+        }
+        some
+    }
+
     /// The curves of blocks of `side` x `side` pixels, of those that are mostly under the mask; of an object
     /// that fills no block, of all that it touches.
     pub(crate) fn reduced(&self, side: usize) -> Self {

@@ -37,7 +37,7 @@ pub(crate) fn film(
     let mut movie = MovieReader::open(&recording.video, FrameTiming::Each)?;
     let angles: HashMap<u64, f64> = turn.sources.iter().copied().collect();
     let mut likeness = Likeness::new(turn);
-    let mut ball = ProbeBuilder::new(probe)?;
+    let mut ball = ProbeBuilder::new(probe);
     let (mut number, mut done) = (0, 0);
     while let Some(frame) = movie.frame()? {
         if let Some(&angle) = angles.get(&number) {

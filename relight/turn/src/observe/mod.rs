@@ -7,5 +7,4 @@ pub(crate) mod mirror_panorama;
 pub(crate) mod probe;
 pub(crate) mod probe_place;
 pub(crate) mod reading;
-pub(crate) mod surroundings;
 pub(crate) mod verdict;
