@@ -185,7 +185,6 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
         "normal.png",
         "object.relit",
         "shading.png",
-        "shadow.png",
         "turn.json",
     ];
     assert_eq!(names, expected);

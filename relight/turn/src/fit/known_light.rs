@@ -10,9 +10,9 @@ use crate::fit::confidence::{
 use crate::fit::curve_statistics::{CurveStatistics, all_statistics};
 use crate::fit::residuals::robust_weights;
 use crate::fit::search::{PixelFit, Search, search_all};
-use crate::fit::solution::TurnSolution;
+use crate::fit::solution::{FoundGloss, TurnSolution};
 use crate::model::frame::{Elevation, TableFrame};
-use crate::model::lighting::{MIRROR, TableLight};
+use crate::model::lighting::{HEAD_ON, MIRROR, TableLight};
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
@@ -29,6 +29,8 @@ const BLURS: [f64; 5] = [0.05, 0.2, 0.35, 0.55, 0.8];
 const REFINED: i32 = 2;
 /// Distance between blurs that are tried around the best, radians. By hand.
 const BLUR_STEP: f64 = 0.15;
+/// Largest smoothness of gloss: sharper lobes look alike in a light of order 6. By hand.
+const MOST_SMOOTHNESS: f64 = 200.0;
 /// Rounds of robust weights. By hand.
 const ROBUST_ROUNDS: usize = 3;
 /// Quantile of the distances that measures the spread of albedos. By hand: spots of another colour count, a few
@@ -55,7 +57,8 @@ pub fn solve_in_light(
         light: TableLight::of(&light.rotated(&frame.rotation())),
         material,
     };
-    let model = finish.fitted(curves);
+    let lobe = finish.best_lobe(curves);
+    let model = finish.model(lobe);
     let conditioning = Conditioning::of(curves).in_given(&finish.model(Lobe::SMOOTH));
     let statistics = all_statistics(curves);
     let mut solver = Solver {
@@ -78,6 +81,7 @@ pub fn solve_in_light(
         elevation,
         measured: Some(light.clone()),
         conditioning,
+        gloss: finish.gloss(lobe),
     }
 }
 
@@ -123,42 +127,61 @@ impl Finish {
         }
     }
 
-    /// The shading model that fits blocks of pixels best. Of an even light metal shows its albedo's part, whatever its
-    /// lobe is.
-    fn fitted(&self, curves: &TurnCurves) -> ShadingModel {
+    /// The lobe with which blocks of pixels are fitted best. Of an even light metal shows its albedo's part, whatever its lobe
+    /// is.
+    fn best_lobe(&self, curves: &TurnCurves) -> Lobe {
         let side = (curves.pixels() as f64 / BLOCKS as f64).sqrt().ceil() as usize;
         let blocks = all_statistics(&curves.reduced(side.max(1)));
         let strengths = match self.material {
             MaterialKind::Diffuse => &STRENGTHS[..],
             MaterialKind::Metal => &[1.0],
         };
-        let mut best = (self.model(Lobe::SMOOTH), Lobe::SMOOTH, f64::INFINITY);
-        let mut attempt = |lobe: Lobe, best: &mut (ShadingModel, Lobe, f64)| {
-            let model = self.model(lobe);
-            let cost = Search::new(&model).cost(&blocks);
-            if cost < best.2 {
-                *best = (model, lobe, cost);
-            }
-        };
-        for &strength in strengths {
-            for blur in BLURS {
-                attempt(Lobe { strength, blur }, &mut best);
-            }
-        }
+        let tried = strengths.iter();
+        let tried = tried.flat_map(|&strength| BLURS.map(|blur| Lobe { strength, blur }));
+        let mut best = (f64::INFINITY, Lobe::SMOOTH);
+        self.try_all(tried, &blocks, &mut best);
         for round in 1..=REFINED {
             let (part, around) = (0.5_f64.powi(round), best.1);
-            for more in [-part, 0.0, part] {
-                for further in [-part, 0.0, part] {
-                    let strength = match self.material {
-                        MaterialKind::Diffuse => around.strength * more.exp2(),
-                        MaterialKind::Metal => around.strength,
-                    };
-                    let blur = (around.blur + further * BLUR_STEP).max(0.0);
-                    attempt(Lobe { strength, blur }, &mut best);
-                }
+            let steps = [-part, 0.0, part];
+            let stronger = if strengths.len() > 1 {
+                &steps[..]
+            } else {
+                &[0.0]
+            };
+            let tried = stronger.iter().flat_map(|more| {
+                steps.map(|further| Lobe {
+                    strength: around.strength * more.exp2(),
+                    blur: (around.blur + further * BLUR_STEP).max(0.0),
+                })
+            });
+            self.try_all(tried, &blocks, &mut best);
+        }
+        best.1
+    }
+
+    fn try_all(
+        &self,
+        lobes: impl Iterator<Item = Lobe>,
+        blocks: &[CurveStatistics],
+        best: &mut (f64, Lobe),
+    ) {
+        for lobe in lobes {
+            let cost = Search::new(&self.model(lobe)).cost(blocks);
+            if cost < best.0 {
+                *best = (cost, lobe);
             }
         }
-        best.0
+    }
+
+    /// The gloss of such a lobe as the render layers take it.
+    fn gloss(&self, lobe: Lobe) -> Option<FoundGloss> {
+        let part = match self.material {
+            MaterialKind::Diffuse => HEAD_ON * lobe.strength / MIRROR,
+            MaterialKind::Metal => 1.0,
+        };
+        // A half vector is off by half of what the light is.
+        let smoothness = 4.0 / lobe.blur.powi(2);
+        (lobe.strength > 0.0).then(|| FoundGloss::new(part, smoothness.min(MOST_SMOOTHNESS)))
     }
 }
 

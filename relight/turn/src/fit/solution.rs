@@ -2,9 +2,10 @@
 
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
+use relight_core::render::mirror_reflectance;
 use relight_core::statistics::median;
+use serde::Serialize;
 
-use crate::fit::residuals::residuals;
 use crate::fit::search::PixelFit;
 use crate::model::frame::{Elevation, TableFrame};
 use crate::model::material::MaterialKind;
@@ -30,6 +31,26 @@ pub struct TurnSolution {
     /// The light, where it was measured.
     pub(crate) measured: Option<ShLight>,
     pub(crate) conditioning: Conditioning,
+    /// None where the object has none.
+    pub(crate) gloss: Option<FoundGloss>,
+}
+
+/// Specular reflectance and smoothness of the whole object, as the render layers take them; of metal of an albedo of 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct FoundGloss {
+    pub(crate) reflectance: f32,
+    pub(crate) smoothness: f32,
+}
+
+impl FoundGloss {
+    /// Of a surface that faces the viewer and reflects this part of even light.
+    pub(crate) fn new(part: f64, smoothness: f64) -> Self {
+        let smoothness = smoothness as f32;
+        Self {
+            reflectance: mirror_reflectance(part as f32, smoothness),
+            smoothness,
+        }
+    }
 }
 
 impl TurnSolution {
@@ -65,18 +86,6 @@ impl TurnSolution {
     #[must_use]
     pub fn expected_errors(&self, curves: &TurnCurves) -> Planes<1> {
         curves.map(|pixel| [self.expected_errors[pixel].to_degrees() as f32])
-    }
-
-    /// The part of the model's light over the whole turn that a pixel does not have, 0 to 1.
-    pub(crate) fn shadow(&self, curves: &TurnCurves) -> Planes<1> {
-        curves.map(|pixel| {
-            let residuals = residuals(curves, pixel, &self.fits[pixel], &self.model);
-            let missing = residuals
-                .iter()
-                .flatten()
-                .map(|residual| (-residual).max(0.0));
-            [(missing.sum::<f64>() / residuals.len().max(1) as f64).min(1.0) as f32]
-        })
     }
 
     /// The light to order 2, in the viewer's frame at the table's angle 0.

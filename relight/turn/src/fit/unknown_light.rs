@@ -10,7 +10,7 @@ use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts, all_statis
 use crate::fit::environment::fit_model;
 use crate::fit::photo_albedo::mean_albedo;
 use crate::fit::search::PixelFit;
-use crate::fit::solution::TurnSolution;
+use crate::fit::solution::{FoundGloss, TurnSolution};
 use crate::model::directions::unit;
 use crate::model::frame::{Elevation, TableFrame};
 use crate::model::material::MaterialKind;
@@ -21,6 +21,8 @@ use crate::observe::curves::TurnCurves;
 
 /// Mean error of normals over what the network expects. Measured: (docs/results/turns.md).
 const CALIBRATION: f64 = 1.14;
+/// Smoothness (exponent of the lobe) of metal in unknown light, which no turn determines. By convention.
+const METAL_SMOOTHNESS: f64 = 60.0;
 
 /// What the network of turns says of a turn, with the light that goes with it. The albedo is the mean of what it answers and
 /// of what the network of photographs has `seen`.
@@ -64,6 +66,8 @@ pub(crate) fn solve_by_network(
         elevation,
         measured: None,
         conditioning,
+        // What metal shows is all that is known of the light: it may be blurred or not.
+        gloss: (material == MaterialKind::Metal).then(|| FoundGloss::new(1.0, METAL_SMOOTHNESS)),
     };
     solution.conditioning = conditioning.by_network(solution.expected_error_deg());
     Ok(solution)

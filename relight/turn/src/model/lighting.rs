@@ -18,7 +18,7 @@ const LAMBERTIAN_BANDS: usize = 3;
 
 /// Reflectance of a dielectric at normal incidence, 0 to 1; at a glancing angle it is 1. By convention, for an index of
 /// refraction of 1.5.
-const HEAD_ON: f64 = 0.04;
+pub(crate) const HEAD_ON: f64 = 0.04;
 
 /// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a
 /// Lambertian white surface in even light, π times it, and the terms are √(4π) times the harmonics.
@@ -214,8 +214,8 @@ static SCALES: LazyLock<[[f64; GLOSS_ORDER + 1]; GLOSS_ORDER + 1]> = LazyLock::n
 mod tests {
     use super::*;
     use crate::model::frame::TableFrame;
-    use crate::model::harmonics::basis_at;
     use crate::model::shading::ShadingModel;
+    use crate::tests::basis_at;
     use crate::{Elevation, MaterialKind};
     use relight_core::image::{Extent, Planes};
     use relight_core::light::{Direction, Normals, Order, Rotation};

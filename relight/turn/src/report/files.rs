@@ -18,11 +18,10 @@ const FIGURES: &str = "turn.json";
 const OBJECT: &str = "object.relit";
 
 /// What is written beside the figures.
-const FILES: [&str; 9] = [
+const FILES: [&str; 8] = [
     "normal.png",
     "albedo.png",
     "shading.png",
-    "shadow.png",
     "confidence.png",
     "mask.png",
     "light.txt",
@@ -79,9 +78,7 @@ impl TurnFiles<'_> {
             "albedo": write_light(&path("albedo.png"), &albedo)?,
             "shading": write_light(&path("shading.png"), &shading)?,
         });
-        let shadow = solution.shadow(curves);
         for (name, plane) in [
-            ("shadow.png", &shadow),
             ("confidence.png", &solution.confidence(curves)),
             ("mask.png", &turn.mask),
         ] {
@@ -89,10 +86,10 @@ impl TurnFiles<'_> {
         }
         let light = solution.light()?;
         light.write(&path("light.txt"))?;
-        let sheet = contact_sheet(turn, solution, &shadow, (&surface, &light))?;
+        let sheet = contact_sheet(turn, solution, (&surface, &light))?;
         write_png(&path("contact.png"), &sheet, Depth::Eight)?;
         solution.captured_object(turn)?.write(&path(OBJECT))?;
-        let figures = self.figures(&white)?;
+        let figures = self.figures(&white);
         let text = format!("{figures:#}\n");
         let path = path(FIGURES);
         write_whole(&path, text.as_bytes()).map_err(TurnError::write(&path))?;
@@ -100,7 +97,7 @@ impl TurnFiles<'_> {
     }
 
     /// What `turn.json` holds. `white`: the light that the largest value of a file stands for.
-    fn figures(&self, white: &Value) -> Result<Value, TurnError> {
+    fn figures(&self, white: &Value) -> Value {
         let SolvedTurn {
             turn,
             solution,
@@ -109,14 +106,7 @@ impl TurnFiles<'_> {
         } = self.solved;
         let curves = &turn.curves;
         let Extent { width, height } = curves.extent();
-        let gloss = solution.gloss(curves)?.map(|gloss| {
-            json!({
-                "reflectance": gloss.reflectance,
-                "smoothness": gloss.smoothness,
-                "residual": gloss.residual,
-            })
-        });
-        Ok(json!({
+        json!({
             "schema": SCHEMA,
             "software": format!("relight {}", env!("CARGO_PKG_VERSION")),
             "turn": turn.name,
@@ -135,8 +125,8 @@ impl TurnFiles<'_> {
             "network": network,
             "residual": solution.residual(),
             "expected_error_deg": solution.expected_error_deg(),
-            "gloss": gloss,
+            "gloss": solution.gloss,
             "white": white,
-        }))
+        })
     }
 }
