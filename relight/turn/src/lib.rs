@@ -24,7 +24,6 @@ mod model;
 mod network;
 mod observe;
 mod report;
-mod setting_error;
 mod solving;
 
 #[cfg(test)]
@@ -46,5 +45,4 @@ pub use observe::probe_place::ProbePlace;
 pub use observe::reading::{ReadTurn, TableRotation, read_curves};
 pub use observe::verdict::TurnVerdict;
 pub use report::files::TurnFiles;
-pub use setting_error::SettingError;
 pub use solving::{SolvedTurn, TurnLight, TurnNetworks, TurnOptions, solve_turn};

@@ -33,7 +33,7 @@ pub fn fit_turn_light(
     if surface.extent() != curves.extent() {
         let [found, expected] = [surface.extent(), curves.extent()]
             .map(|size| format!("{} x {}", size.width, size.height));
-        return Err(TurnError::Frames(format!(
+        return Err(TurnError::Refused(format!(
             "the surface has {found} pixels, and the frames {expected}"
         )));
     }

@@ -76,14 +76,14 @@ pub(crate) fn check(
     if least < CLEARLY * residual && least < residual - LESS && apart > APART && least < most {
         let [x, y] = place.in_picture(best.middle);
         return Err(TurnError::Misplaced {
-            given: place,
+            given: place.to_string(),
             better: [x, y, best.radius * place.radius].map(f64::round),
             explained: [residual, least].map(|residual| 100.0 * (1.0 - residual).max(0.0)),
         });
     }
     if residual > most {
         return Err(TurnError::NoBall {
-            given: place,
+            given: place.to_string(),
             explained: 100.0 * (1.0 - residual).max(0.0),
         });
     }

@@ -38,7 +38,7 @@ pub(crate) fn solve_by_network(
 ) -> Result<TurnSolution, TurnError> {
     let conditioning = Conditioning::of(curves);
     if let Some(advice) = conditioning.verdict.exposure_advice() {
-        return Err(TurnError::Frames(advice.to_owned()));
+        return Err(TurnError::Refused(advice.to_owned()));
     }
     let normals: Vec<[f64; 3]> = curves.pixels_of(found.normals.planes()).map(unit).collect();
     let mut albedo = mean_albedo(curves, &found.albedo, seen);

@@ -76,7 +76,7 @@ impl CurveBuilder {
             .filter(|&at| mask[at] >= 0.5)
             .collect();
         if places.is_empty() {
-            return Err(TurnError::Frames(NOTHING.to_owned()));
+            return Err(TurnError::Refused(NOTHING.to_owned()));
         }
         let cells = places.len() * PARTS;
         Ok(Self {
@@ -104,7 +104,7 @@ impl CurveBuilder {
         if extent != self.extent || planes.iter().any(|plane| plane.len() != extent.pixels()) {
             let [found, expected] =
                 [extent, self.extent].map(|size| format!("{} x {}", size.width, size.height));
-            return Err(TurnError::Frames(format!(
+            return Err(TurnError::Refused(format!(
                 "a frame has {found} pixels where {expected} are needed"
             )));
         }
@@ -134,7 +134,7 @@ impl CurveBuilder {
     pub(crate) fn finish(self) -> Result<TurnCurves, TurnError> {
         let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
         if seen.len() < LEAST_PARTS {
-            return Err(TurnError::Frames(format!(
+            return Err(TurnError::Refused(format!(
                 "{} different angles were found: five terms a pixel need at least {LEAST_PARTS}, spread over the turn",
                 seen.len()
             )));

@@ -8,7 +8,6 @@ use crate::error::TurnError;
 use crate::model::frame::Elevation;
 use crate::observe::curves::{CurveBuilder, NOTHING, TurnCurves};
 use crate::observe::probe_place::ProbePlace;
-use crate::setting_error::SettingError;
 
 /// Pixels along the diameter of the given circle. By hand.
 pub(crate) const ACROSS: usize = 24;
@@ -59,11 +58,11 @@ impl ProbeBuilder {
     pub(crate) fn push(&mut self, angle_deg: f64, frame: &Rgb<Srgb>) -> Result<(), TurnError> {
         let (picture, place) = (frame.planes(), self.probe.place);
         if !place.is_within(picture.extent()) {
-            return Err(TurnError::Setting(SettingError {
+            return Err(TurnError::Setting {
                 what: "the radius of the ball",
                 value: place.radius,
                 allowed: "so small that all of the ball is in the picture",
-            }));
+            });
         }
         let builder = match &mut self.builder {
             Some(builder) => builder,
@@ -83,7 +82,7 @@ impl ProbeBuilder {
     /// # Errors
     /// Where the frames tell too little.
     pub(crate) fn curves(self) -> Result<TurnCurves, TurnError> {
-        let nothing = || TurnError::Frames(NOTHING.to_owned());
+        let nothing = || TurnError::Refused(NOTHING.to_owned());
         self.builder.ok_or_else(nothing)?.finish()
     }
 }
