@@ -14,8 +14,7 @@ impl GBuffer {
     /// For each pixel, the part of even light from all around that is not blocked, weighted by the
     /// cosine to the normal: 1 where nothing is near. `rays` a pixel, smoothed over neighbours of the
     /// same surface.
-    #[must_use]
-    pub fn ambient_visibility(&self, occluder: &Occluder, rays: u32, seed: u64) -> Vec<f32> {
+    pub(crate) fn ambient_visibility(&self, occluder: &Occluder, rays: u32, seed: u64) -> Vec<f32> {
         let open = |k: usize| {
             let turn = unit_of(mix(stream(seed, u64::from(self.pixels[k]))));
             let (normal, start) = (self.normals[k], self.ray_starts[k]);

@@ -42,7 +42,7 @@ pub struct GBuffer {
 impl GBuffer {
     /// Looks at a mesh that `placement` moves into the viewer's frame, in a square picture of `size`
     /// pixels.
-    pub fn render(mesh: &Mesh, placement: Affine3A, projection: Projection, size: u32) -> Self {
+    pub(crate) fn render(mesh: &Mesh, placement: Affine3A, projection: Projection, size: u32) -> Self {
         let posed = Posed::new(mesh, placement, projection, size);
         let seen = foremost(size, &posed.projected, &mesh.triangles);
         let covered = (0_u32..)
