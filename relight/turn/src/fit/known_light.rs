@@ -18,8 +18,8 @@ use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
-/// Number of blocks of pixels on which the gloss is fitted. By hand.
-const BLOCKS: usize = 1000;
+/// Number of pixels on which the gloss is fitted. By hand.
+const PIXELS: usize = 1000;
 /// How strongly gloss reflects, over a smooth dielectric. By hand: up to 16, because light by a dark grey ball is in small
 /// units.
 const STRENGTHS: [f64; 8] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
@@ -42,7 +42,7 @@ const SPREAD_DEVIATIONS: f64 = 1.645;
 /// Finds the normals and albedo that fit the curves of a turn best in a light that was given or measured, in the viewer's
 /// frame at the table's angle 0; bands up to 6 count.
 ///
-/// Gloss is fitted on blocks of pixels, then every pixel by itself. Then parts of the turn with a large residual, shadows
+/// Gloss is fitted on some of the pixels, then every pixel by itself. Then parts of the turn with a large residual, shadows
 /// and highlights, count less for that pixel, and it is fitted again.
 #[must_use]
 pub fn solve_in_light(
@@ -57,10 +57,10 @@ pub fn solve_in_light(
         light: TableLight::of(&light.rotated(&frame.rotation())),
         material,
     };
-    let lobe = finish.best_lobe(curves);
+    let statistics = all_statistics(curves);
+    let lobe = finish.best_lobe(&statistics);
     let model = finish.model(lobe);
     let conditioning = Conditioning::of(curves).in_given(&finish.model(Lobe::SMOOTH));
-    let statistics = all_statistics(curves);
     let mut solver = Solver {
         curves,
         fits: search_all(&model, &statistics, None),
@@ -127,11 +127,11 @@ impl Finish {
         }
     }
 
-    /// The lobe with which blocks of pixels are fitted best. Of an even light metal shows its albedo's part, whatever its lobe
+    /// The lobe with which pixels of all the object are fitted best. Of an even light metal shows its albedo's part, whatever its lobe
     /// is.
-    fn best_lobe(&self, curves: &TurnCurves) -> Lobe {
-        let side = (curves.pixels() as f64 / BLOCKS as f64).sqrt().ceil() as usize;
-        let blocks = all_statistics(&curves.reduced(side.max(1)));
+    fn best_lobe(&self, statistics: &[CurveStatistics]) -> Lobe {
+        let every = statistics.len().div_ceil(PIXELS).max(1);
+        let some: Vec<CurveStatistics> = statistics.iter().step_by(every).copied().collect();
         let strengths = match self.material {
             MaterialKind::Diffuse => &STRENGTHS[..],
             MaterialKind::Metal => &[1.0],
@@ -139,7 +139,7 @@ impl Finish {
         let tried = strengths.iter();
         let tried = tried.flat_map(|&strength| BLURS.map(|blur| Lobe { strength, blur }));
         let mut best = (f64::INFINITY, Lobe::SMOOTH);
-        self.try_all(tried, &blocks, &mut best);
+        self.try_all(tried, &some, &mut best);
         for round in 1..=REFINED {
             let (part, around) = (0.5_f64.powi(round), best.1);
             let steps = [-part, 0.0, part];
@@ -154,7 +154,7 @@ impl Finish {
                     blur: (around.blur + further * BLUR_STEP).max(0.0),
                 })
             });
-            self.try_all(tried, &blocks, &mut best);
+            self.try_all(tried, &some, &mut best);
         }
         best.1
     }
@@ -162,11 +162,11 @@ impl Finish {
     fn try_all(
         &self,
         lobes: impl Iterator<Item = Lobe>,
-        blocks: &[CurveStatistics],
+        statistics: &[CurveStatistics],
         best: &mut (f64, Lobe),
     ) {
         for lobe in lobes {
-            let cost = Search::new(&self.model(lobe)).cost(blocks);
+            let cost = Search::new(&self.model(lobe)).cost(statistics);
             if cost < best.0 {
                 *best = (cost, lobe);
             }

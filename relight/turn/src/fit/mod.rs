@@ -11,6 +11,5 @@ pub(crate) mod probe_check;
 pub(crate) mod probe_light;
 pub(crate) mod residuals;
 pub(crate) mod search;
-pub(crate) mod smoothing;
 pub(crate) mod solution;
 pub(crate) mod unknown_light;

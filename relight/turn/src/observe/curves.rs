@@ -20,9 +20,6 @@ const CLIPPED_VALUE: f32 = SATURATED_VALUE;
 const LEAST_UNCLIPPED: f32 = 0.95;
 /// Least number of parts with frames. Derived: five Fourier coefficients of a Lambertian curve, and three to spare.
 const LEAST_PARTS: usize = 8;
-/// Least share of the pixels of a block, 0 to 1, that have to be unclipped. By hand: the mean of fewer would be too
-/// dark.
-const LEAST_OF_BLOCK: f32 = 0.9;
 /// Least gap between parts with frames that is not covered, in usual gaps. By hand.
 const HOLE: f64 = 3.0;
 
@@ -342,60 +339,6 @@ impl TurnCurves {
             }
         }
         some
-    }
-
-    /// The curves of blocks of `side` x `side` pixels, of those that are mostly under the mask; of an object
-    /// that fills no block, of all that it touches.
-    pub(crate) fn reduced(&self, side: usize) -> Self {
-        let extent = Extent::new(
-            self.extent.width.div_ceil(side),
-            self.extent.height.div_ceil(side),
-        );
-        let mut members: Vec<Vec<usize>> = vec![Vec::new(); extent.pixels()];
-        for (pixel, &at) in self.places.iter().enumerate() {
-            let (x, y) = (at % self.extent.width, at / self.extent.width);
-            members[y / side * extent.width + x / side].push(pixel);
-        }
-        let is_full = |block: &&usize| 2 * members[**block].len() >= side * side;
-        let all: Vec<usize> = (0..members.len())
-            .filter(|&block| !members[block].is_empty())
-            .collect();
-        let full: Vec<usize> = all.iter().filter(is_full).copied().collect();
-        let places = if full.is_empty() { all } else { full };
-        let mut reduced = Self {
-            extent,
-            frames: self.frames,
-            harmonics: self.harmonics.clone(),
-            angles: self.angles.clone(),
-            values: Vec::with_capacity(places.len() * self.parts()),
-            weights: Vec::with_capacity(places.len() * self.parts()),
-            places,
-        };
-        for &block in &reduced.places {
-            for part in 0..self.harmonics.len() {
-                let (value, weight) = self.mean(&members[block], part);
-                reduced.values.push(value);
-                reduced.weights.push(weight);
-            }
-        }
-        reduced
-    }
-
-    /// The mean light of pixels in a part of the turn, and how much it counts.
-    fn mean(&self, pixels: &[usize], part: usize) -> ([f32; 3], [f32; 3]) {
-        let (mut sum, mut weights) = ([0.0; 3], [0.0; 3]);
-        for &pixel in pixels {
-            let (value, weight) = (self.values(pixel)[part], self.weights(pixel)[part]);
-            for channel in 0..3 {
-                sum[channel] += weight[channel] * value[channel];
-                weights[channel] += weight[channel];
-            }
-        }
-        // A block of which a pixel clips is too dark by the mean of the others: it does not count.
-        let least = LEAST_OF_BLOCK * pixels.len() as f32;
-        let mean = [0, 1, 2].map(|c| sum[c] / weights[c].max(f32::MIN_POSITIVE));
-        let weight = weights.map(|weight| if weight >= least { 1.0 } else { 0.0 });
-        (mean, weight)
     }
 }
 

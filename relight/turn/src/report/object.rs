@@ -1,19 +1,18 @@
 //! The gloss of a solved object, as the render layers take it, and the object as a file.
 
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::{Planes, Rgb, beside};
+use relight_core::image::{Extent, Planes, Rgb, beside};
 use relight_core::light::Normals;
 use relight_core::render::{Gloss, Surface};
 
 use crate::error::TurnError;
-use crate::fit::smoothing::blurred;
 use crate::fit::solution::TurnSolution;
 use crate::model::material::MaterialKind;
 use crate::observe::curves::TurnCurves;
 use crate::observe::reading::ReadTurn;
 
-/// Standard deviation of the coverage at the edge of the mask, pixels. By hand.
-const EDGE: f64 = 0.6;
+/// What a pixel beside another one contributes to its coverage, over the pixel itself. By hand: a deviation of 0.6 pixels.
+const EDGE: f32 = 0.25;
 /// Coverage below which a pixel is not part of the object, 0 to 1. By hand.
 const LEAST_ALPHA: f32 = 0.02;
 
@@ -50,7 +49,7 @@ impl TurnSolution {
         let curves = &turn.curves;
         let extent = curves.extent();
         let mask = curves.mask();
-        let alpha = blurred_mask(&turn.mask, EDGE);
+        let alpha = softened(&turn.mask);
         let inner: Vec<bool> = (0..mask.len())
             .map(|at| {
                 mask[at]
@@ -78,9 +77,28 @@ impl TurnSolution {
 }
 
 /// The part of each pixel under the mask, were its edge as soft as a lens makes it; what is hardly anything is nothing.
-fn blurred_mask(mask: &Planes<1>, deviation: f64) -> Planes<1> {
-    let everywhere = vec![true; mask.extent().pixels()];
-    blurred(mask, &everywhere, deviation).map(|alpha| if alpha < LEAST_ALPHA { 0.0 } else { alpha })
+fn softened(mask: &Planes<1>) -> Planes<1> {
+    let Extent { width, height } = mask.extent();
+    let near = |at: usize, size: usize| {
+        let places = [
+            (at.checked_sub(1), EDGE),
+            (Some(at), 1.0),
+            (Some(at + 1), EDGE),
+        ];
+        let places = places.into_iter();
+        places.filter_map(move |(at, weight)| Some((at.filter(|&at| at < size)?, weight)))
+    };
+    Planes::from_fn(mask.extent(), |x, y| {
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (row, down) in near(y, height) {
+            for (column, across) in near(x, width) {
+                sum += down * across * mask.pixel(column, row)[0];
+                weights += down * across;
+            }
+        }
+        let alpha = sum / weights;
+        [if alpha < LEAST_ALPHA { 0.0 } else { alpha }]
+    })
 }
 
 #[cfg(test)]
