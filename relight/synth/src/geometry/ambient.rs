@@ -31,10 +31,8 @@ impl GBuffer {
     /// Mean over the neighbours (5 x 5) that lie in nearly the same plane.
     fn smoothed(&self, values: &[f32]) -> Vec<f32> {
         let side = self.size as i64;
-        let mut place = vec![u32::MAX; (side * side) as usize];
-        for (k, &pixel) in (0_u32..).zip(&self.pixels) {
-            place[pixel as usize] = k;
-        }
+        let numbers: Vec<usize> = (0..self.len()).collect();
+        let place = self.spread(&numbers, usize::MAX);
         let near = 6.0 / side as f32;
         let mean = |k: usize| {
             let pixel = i64::from(self.pixels[k]);
@@ -43,7 +41,7 @@ impl GBuffer {
             let (mut sum, mut total) = (0.0, 0.0);
             for y in (row - 2).max(0)..(row + 3).min(side) {
                 for x in (column - 2).max(0)..(column + 3).min(side) {
-                    let other = place[(y * side + x) as usize] as usize;
+                    let other = place[(y * side + x) as usize];
                     let Some(&value) = values.get(other) else {
                         continue;
                     };

@@ -117,14 +117,15 @@ impl File<'_> {
         let stride = stride.max(size * N);
         // The last item need not be followed by its padding.
         let length = match count.checked_sub(1) {
-            Some(before) => stride.checked_mul(before).and_then(|all| all.checked_add(size * N)),
+            Some(before) => stride
+                .checked_mul(before)
+                .and_then(|all| all.checked_add(size * N)),
             None => Some(0),
         };
         let end = length.and_then(|length| accessor.byte_offset.checked_add(length));
         let bytes = self.view(view)?;
         let bytes = end.and_then(|end| bytes.get(accessor.byte_offset..end));
-        let bytes =
-            bytes.ok_or_else(|| format!("accessor {number} reaches beyond its buffer"))?;
+        let bytes = bytes.ok_or_else(|| format!("accessor {number} reaches beyond its buffer"))?;
         let item = |bytes: &[u8]| {
             let mut values = [T::default(); N];
             for (value, bytes) in values.iter_mut().zip(bytes.chunks(size)) {
