@@ -7,7 +7,7 @@ use relight_core::statistics::median;
 use serde::Serialize;
 
 use crate::fit::search::PixelFit;
-use crate::model::frame::{Elevation, TableFrame};
+use crate::model::frame::Elevation;
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
@@ -98,11 +98,6 @@ impl TurnSolution {
             None => self.model.light()?,
         };
         Ok(light.with_order(Order::TWO))
-    }
-
-    /// The camera over the table.
-    pub(crate) const fn frame(&self) -> &TableFrame {
-        &self.model.frame
     }
 
     /// What the object is taken for.
