@@ -111,7 +111,7 @@ impl TurnSet {
             shard: shard.clone(),
             normals: Normals::<YUp>::read(&truth.join("normal.png"))?,
             albedo: Rgb::<Linear>::read(&truth.join("albedo.png"), Transfer::Linear)?,
-            elevation: Elevation::given(out.atan2(up).to_degrees()).map_err(TurnError::from)?,
+            elevation: Elevation::given(out.atan2(up).to_degrees())?,
             light: read_light(&truth.join("light.txt"))?,
         })
     }

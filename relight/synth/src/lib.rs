@@ -54,7 +54,7 @@ mod view;
 
 pub use error::SynthError;
 pub use folder::{SynthTally, write_samples};
-pub use geometry::{GBuffer, Occluder};
+pub use geometry::GBuffer;
 pub use library::{Folders, LeftOut, Library, made_panoramas};
 pub use lighting::{BlinnPhong, LightKind, Lighting, Material, Panoramas, Shaded, SyntheticScene};
 pub use mesh::Mesh;
@@ -68,7 +68,6 @@ pub use transfer::{
     PhotoViewRecipe, Rooms, TransferCache, TransferRecipe, ViewLamp,
 };
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
-pub use view::{Pose, Projection};
 
 /// The examples of the README, so that they are built.
 #[cfg(doctest)]

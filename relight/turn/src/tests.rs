@@ -8,10 +8,8 @@ use relight_core::light::{Direction, Normals, Order, Rotation, ShLight, YUp};
 use relight_core::metrics::angular_error;
 use relight_core::render::{DiffuseForm, DiffuseLayer, Surface};
 
-use crate::fit::residuals::lit;
-use crate::model::gloss::{GlossLight, MIRROR};
-use crate::model::harmonics::basis_at;
-use crate::model::lighting::TableLight;
+use crate::model::harmonics::{COEFFICIENTS, HARMONICS};
+use crate::model::lighting::{MIRROR, TableLight};
 use crate::model::shading::ShadingModel;
 use crate::network::predict::NetworkFigures;
 use crate::network::predict::TurnPrediction;
@@ -191,13 +189,11 @@ pub(crate) fn windows() -> ShLight {
 pub(crate) fn metal_ball() -> (Surface, ShLight, TurnCurves) {
     let (surface, light) = (ball(), windows());
     let table = TableFrame::new(elevation());
-    let shown = GlossLight::bands(&light.rotated(&table.rotation()));
-    let factors = [1.0, 0.95, 0.9, 0.8, 0.7].map(|factor| MIRROR * factor);
+    let shown = TableLight::of(&light.rotated(&table.rotation()));
     let metal = ShadingModel {
         frame: table,
-        light: TableLight::from_viewer(&light, &table),
-        diffuse_beyond: GlossLight::NONE,
-        gloss: GlossLight::sum(&shown, &factors),
+        diffuse: TableLight::NONE,
+        gloss: shown.scaled(|l, _| MIRROR * [1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5][l]),
         material: MaterialKind::Metal,
     };
     let curves = film_in(&metal, &surface);
@@ -244,4 +240,26 @@ pub(crate) fn solved(mut turn: ReadTurn, solution: TurnSolution) -> SolvedTurn {
         ball: None,
         reading: Duration::ZERO,
     }
+}
+
+/// The values of the harmonics at an angle of the table, radians.
+pub(crate) fn basis_at(angle: f64) -> [f64; COEFFICIENTS] {
+    let mut basis = [1.0; COEFFICIENTS];
+    for harmonic in 1..=HARMONICS {
+        let (sin, cos) = (harmonic as f64 * angle).sin_cos();
+        basis[2 * harmonic - 1] = cos;
+        basis[2 * harmonic] = -sin;
+    }
+    basis
+}
+
+/// What a pixel shows at an angle: its base layer at an albedo of 1, which of a Lambertian one is its irradiance, and
+/// its gloss.
+fn lit(model: &ShadingModel, normal: [f64; 3], basis: &[f64; COEFFICIENTS]) -> [[f64; 3]; 2] {
+    let harmonics = model.harmonics(normal);
+    let dot = |harmonics: &[f64]| -> f64 { harmonics.iter().zip(basis).map(|(a, b)| a * b).sum() };
+    [
+        harmonics.base.each_ref().map(|harmonics| dot(harmonics)),
+        harmonics.gloss.each_ref().map(|harmonics| dot(harmonics)),
+    ]
 }
