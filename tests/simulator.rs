@@ -108,7 +108,6 @@ fn whoever_opens_the_port_resets_the_chip() {
     bench.port = bench.table.open();
     bench.until("[reset: external]\r\n");
     assert!(bench.wait("Idle").contains("MPos:0.000"));
-    assert_eq!(bench.table.counts().opened, 2);
 }
 
 #[test]
@@ -184,7 +183,6 @@ fn a_reset_in_a_turn_shows_its_banner() {
     });
     bench.ask("G1 X360 F432");
     bench.until("[reset: watchdog]\r\n");
-    assert_eq!(bench.table.counts().resets, 1);
 }
 
 #[test]
@@ -194,9 +192,7 @@ fn a_stalled_chip_neither_answers_nor_moves() {
         ..SimulatorOptions::default()
     });
     bench.ask("G1 X360 F432");
-    while !bench.table.counts().stalled {
-        bench.listen(Duration::from_millis(5));
-    }
+    bench.listen(Duration::from_secs(6));
     bench.heard.clear();
     let edges = bench.table.edges().len();
     assert!(edges > 0);
@@ -204,29 +200,6 @@ fn a_stalled_chip_neither_answers_nor_moves() {
     bench.listen(Duration::from_secs(3));
     assert_eq!(bench.heard, "");
     assert_eq!(bench.table.edges().len(), edges);
-}
-
-#[test]
-fn a_bad_wire_counts_what_it_does() {
-    let mut bench = Bench::new(SimulatorOptions {
-        faults: "to.drop=0.05,to.duplicate=0.2,to.merge=0.1,from.flip=0.02,from.delay=0.01:2ms"
-            .parse()
-            .unwrap(),
-        seed: 7,
-        ..SimulatorOptions::default()
-    });
-    bench.clock.sleep(Duration::from_secs(1));
-    for _ in 0..200 {
-        bench.say("$X\n");
-        bench.listen(Duration::from_millis(40));
-    }
-    let counts = bench.table.counts();
-    assert_eq!(counts.to_chip.bytes, 600);
-    assert!(counts.to_chip.dropped > 10, "{counts:?}");
-    assert!(counts.to_chip.duplicated > 15, "{counts:?}");
-    assert!(counts.to_chip.merged > 5, "{counts:?}");
-    assert!(counts.from_chip.flipped > 5, "{counts:?}");
-    assert!(counts.from_chip.delayed > 2, "{counts:?}");
 }
 
 #[test]
@@ -254,7 +227,6 @@ fn at_a_pseudoterminal_any_program_reaches_the_table() {
     assert!(report.contains("MPos:0.000"), "{report}");
     drop(port);
     hear(&mut open(table.path()), "external]\r\n");
-    assert_eq!(table.stop().opened, 2);
 }
 
 fn open(path: &Path) -> TTYPort {

@@ -17,10 +17,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use relit_data::session::FrameClock;
-use relit_rig::camera::hold::{Aspect, ManualPlan, ManualValues};
-use relit_rig::camera::{
-    self, Camera, CameraError, ControlFault, ControlId, ControlKind, Frame, GrantedMode, Rates,
-};
+use relit_rig::camera::hold::{ManualPlan, ManualValues};
+use relit_rig::camera::{self, Camera, CameraError, CameraMode, ControlKind, Frame, Rates};
 use relit_rig::clock::Clock;
 
 const VIVID: &str = "v4l2:/dev/video0";
@@ -46,7 +44,7 @@ fn vivid() -> Box<dyn Camera> {
     camera
 }
 
-fn id(camera: &mut dyn Camera, name: &str) -> ControlId {
+fn id(camera: &mut dyn Camera, name: &str) -> u32 {
     let controls = camera.controls().unwrap();
     let control = controls.iter().find(|control| control.name == name);
     control.unwrap_or_else(|| panic!("no control {name}")).id
@@ -57,7 +55,7 @@ fn set(camera: &mut dyn Camera, name: &str, value: i64) {
     assert_eq!(camera.set_control(id, value).unwrap(), value, "{name}");
 }
 
-fn start(camera: &mut dyn Camera, mode: &str) -> GrantedMode {
+fn start(camera: &mut dyn Camera, mode: &str) -> CameraMode {
     camera.start(&mode.parse().unwrap()).unwrap()
 }
 
@@ -234,12 +232,12 @@ fn controls_are_set_and_read_back() {
             other => panic!("{other}"),
         };
     let locked = fault("read_only_integer_32_bits", 1);
-    assert!(matches!(locked, ControlFault::Locked), "{locked}");
+    assert!(locked.contains("read-only"), "{locked}");
     let hole = fault("menu", 9);
-    assert!(matches!(hole, ControlFault::NoItem(_)), "{hole}");
+    assert!(hole.contains("takes one of"), "{hole}");
     let too_wide = fault("brightness", 1 << 40);
-    assert!(matches!(too_wide, ControlFault::Range { .. }), "{too_wide}");
-    let unknown = camera.set_control(ControlId(0x0098_09ff), 1).unwrap_err();
+    assert!(too_wide.contains("takes values from"), "{too_wide}");
+    let unknown = camera.set_control(0x0098_09ff, 1).unwrap_err();
     assert!(unknown.to_string().contains("no such control"), "{unknown}");
 }
 
@@ -254,12 +252,7 @@ fn a_camera_is_made_to_hold_still() {
     };
     let plan = ManualPlan::new(&camera.controls().unwrap(), &wanted);
     assert_eq!(plan.apply(&mut *camera).unwrap(), []);
-    let missing = [
-        Aspect::Exposure,
-        Aspect::WhiteBalance,
-        Aspect::Focus,
-        Aspect::PowerLine,
-    ];
+    let missing = ["exposure", "white balance", "focus", "power-line filter"];
     let missing = missing.map(|aspect| format!("the camera has no control of its {aspect}"));
     assert_eq!(plan.missing, missing);
     set(&mut *camera, "gain", 34);

@@ -1,4 +1,4 @@
-//! With the feature `libtorch`: compiles the way to c10d (native/c10d.cpp), and tells tests where they find libtorch.
+//! With the feature `libtorch`: compiles `native/`: the way to c10d, and settings of the allocator, and tells tests where they find libtorch.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -39,7 +39,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         ))
         .flag_if_supported("-Wno-unused-parameter")
         .file("native/c10d.cpp")
-        .try_compile("relight_c10d")?;
+        .file("native/memory.cpp")
+        .try_compile("relight_train_native")?;
     Ok(())
 }
 

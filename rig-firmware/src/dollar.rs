@@ -10,8 +10,6 @@ use crate::settings::Key;
 /// A `$` command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Dollar {
-    /// `$`: name the commands.
-    Help,
     /// `$$`: tell the settings.
     Settings,
     /// `$n=v`: change a setting.
@@ -22,21 +20,10 @@ pub(crate) enum Dollar {
     Home,
     /// `$X`: unlock after an alarm.
     Unlock,
-    /// `$C`: check lines without moving, or end that.
-    Check,
     /// `$G`: tell the modal state.
     Modal,
-    /// `$#`: tell the offsets.
-    Offsets,
     /// `$J=`: jog.
     Jog(Jog),
-    /// `$RST=`: back to the defaults.
-    Restore {
-        /// The settings.
-        settings: bool,
-        /// The work offsets.
-        offsets: bool,
-    },
 }
 
 /// Reads what stands behind the `$`.
@@ -46,10 +33,8 @@ pub(crate) enum Dollar {
 /// without `=`, [`Error::BadNumber`] for a value that is none, and what a jog gives.
 pub(crate) fn parse(text: &[u8], modal: &Modal) -> Result<Dollar, Error> {
     match text {
-        [] => Ok(Dollar::Help),
         [b'J'] => Err(Error::InvalidJog),
         [letter] => simple(*letter).ok_or(Error::InvalidStatement),
-        [b'R', b'S', b'T', b'=', what] => restore(*what).ok_or(Error::InvalidStatement),
         [b'J', b'=', jog @ ..] => gcode::parse_jog(jog, modal).map(Dollar::Jog),
         [b'J', ..] => Err(Error::InvalidJog),
         _ => set(text),
@@ -62,21 +47,9 @@ fn simple(letter: u8) -> Option<Dollar> {
         b'I' => Dollar::Version,
         b'H' => Dollar::Home,
         b'X' => Dollar::Unlock,
-        b'C' => Dollar::Check,
         b'G' => Dollar::Modal,
-        b'#' => Dollar::Offsets,
         _ => return None,
     })
-}
-
-fn restore(what: u8) -> Option<Dollar> {
-    let (settings, offsets) = match what {
-        b'$' => (true, false),
-        b'#' => (false, true),
-        b'*' => (true, true),
-        _ => return None,
-    };
-    Some(Dollar::Restore { settings, offsets })
 }
 
 fn set(text: &[u8]) -> Result<Dollar, Error> {
@@ -100,7 +73,6 @@ mod tests {
 
     #[test]
     fn commands_are_told_apart() {
-        assert_eq!(read(""), Ok(Dollar::Help));
         assert_eq!(read("$"), Ok(Dollar::Settings));
         let number = |text: &str| number::parse(text.as_bytes()).unwrap().0;
         assert_eq!(
@@ -108,11 +80,6 @@ mod tests {
             Ok(Dollar::Set(Key::MaxFeed, number("2000.5")))
         );
         assert_eq!(read("0=-1"), Ok(Dollar::Set(Key::StepPulse, number("-1"))));
-        let all = Dollar::Restore {
-            settings: true,
-            offsets: true,
-        };
-        assert_eq!(read("RST=*"), Ok(all));
     }
 
     #[test]
@@ -125,7 +92,9 @@ mod tests {
             ("0100=5", 3),
             ("=5", 3),
             ("N0=G1", 3),
-            ("RST=1", 3),
+            ("", 3),
+            ("C", 3),
+            ("RST=$", 3),
             ("HX", 3),
             ("0=", 2),
             ("0=1X", 2),

@@ -40,18 +40,14 @@ pub(crate) enum Error {
     UndefinedFeed = 22,
     /// A command number with a fraction.
     NotInteger = 23,
-    /// Two commands want the axis word.
-    AxisConflict = 24,
     /// A word stands twice.
     RepeatedWord = 25,
     /// The command needs an axis word.
     NoAxisWords = 26,
     /// A line number beyond 9999999.
     LineNumber = 27,
-    /// The command needs a `P` or `L` word.
+    /// The command needs a `P` word.
     ValueMissing = 28,
-    /// No such coordinate system.
-    CoordinateSystem = 29,
     /// `G53` without a motion.
     MachineMotion = 30,
     /// No command uses the axis word.

@@ -108,7 +108,7 @@ impl LineReader {
         match self.part {
             Part::Sum { digits, value } => self.part = sum_digit(digits, value, byte),
             Part::NoSum => {}
-            Part::Text if byte == b'*' && !self.ends_in_equals() => {
+            Part::Text if byte == b'*' => {
                 self.part = Part::Sum {
                     digits: 0,
                     value: 0,
@@ -120,12 +120,6 @@ impl LineReader {
             }
         }
         false
-    }
-
-    /// Behind `=`, as in `$RST=*`, an asterisk is a value.
-    fn ends_in_equals(&self) -> bool {
-        let last = usize::from(self.length).checked_sub(1);
-        last.and_then(|last| self.text.get(last)) == Some(&b'=')
     }
 
     fn take(&mut self, byte: u8) {
@@ -262,14 +256,6 @@ mod tests {
         check(&mut reader, "12345 6789*29B1\n", &wrong("123456789"));
         check(&mut reader, "123456789*29B10\n", &wrong("123456789"));
         check(&mut reader, "123456789*29B1*29B1\n", &wrong("123456789"));
-    }
-
-    #[test]
-    fn an_asterisk_behind_an_equals_sign_is_a_value() {
-        let mut reader = LineReader::new();
-        check(&mut reader, "$rst=*\n", &[plain("$RST=*")]);
-        let wrong = [("$RST=*", Checksum::Wrong, false, false)];
-        check(&mut reader, "$RST=**0000\n", &wrong);
     }
 
     #[test]

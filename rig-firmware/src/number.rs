@@ -29,36 +29,22 @@ impl Decimal {
         self.whole
     }
 
-    /// Whether it is this number.
-    pub(crate) fn is(self, number: u32) -> bool {
-        !self.negative && self.whole == number && self.is_whole()
-    }
-
     /// Thousandths, to the nearest, halves away from zero.
     ///
     /// `None` where the result is beyond an `i32`.
     pub(crate) fn thousandths(self) -> Option<i32> {
-        self.scaled(1000, 2_147_483, (self.millionths + 500) / 1000)
-    }
-
-    /// Inches to thousandths of a millimetre, as [`Decimal::thousandths`].
-    pub(crate) fn inches(self) -> Option<i32> {
-        self.scaled(25_400, 84_546, (self.millionths * 254 + 5000) / 10_000)
+        if self.whole > 2_147_483 {
+            return None;
+        }
+        let fraction = (self.millionths + 500) / 1000;
+        let magnitude = i32::try_from(self.whole * 1000 + fraction).ok()?;
+        Some(if self.negative { -magnitude } else { magnitude })
     }
 
     /// Seconds to microseconds; `None` for less than none or more than 4293 s.
     pub(crate) fn micros(self) -> Option<u32> {
         let fits = !self.negative && self.whole < 4294;
         fits.then(|| self.whole * 1_000_000 + self.millionths)
-    }
-
-    /// `most`: the largest whole number that fits after scaling.
-    fn scaled(self, scale: u32, most: u32, fraction: u32) -> Option<i32> {
-        if self.whole > most {
-            return None;
-        }
-        let magnitude = i32::try_from(self.whole * scale + fraction).ok()?;
-        Some(if self.negative { -magnitude } else { magnitude })
     }
 }
 
@@ -203,10 +189,6 @@ mod tests {
         assert_eq!(read("0.0014").thousandths(), Some(1));
         assert_eq!(read("2147483.647").thousandths(), Some(i32::MAX));
         assert_eq!(read("2147483.648").thousandths(), None);
-        assert_eq!(read("-1.0001").inches(), Some(-25_403));
-        assert_eq!(read("84546.6").inches(), Some(2_147_483_640));
-        assert_eq!(read("84546.7").inches(), None);
-        assert_eq!(read("999999999").inches(), None);
         assert_eq!(read("0.5").micros(), Some(500_000));
         assert_eq!(read("4293.999999").micros(), Some(4_293_999_999));
         assert_eq!(read("4295").micros(), None);

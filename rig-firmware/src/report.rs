@@ -5,7 +5,6 @@
 
 use crate::board::Board;
 use crate::crc::Crc;
-use crate::number;
 use crate::settings::{GrblSettings, Key, Kind};
 
 /// One line on its way out; [`Reply::end`] ends it.
@@ -72,19 +71,13 @@ impl<'a, B: Board> Reply<'a, B> {
     }
 
     /// Sends a position on three axes, of which the table has one; thousandths of a degree.
-    pub(crate) fn position(&mut self, position: i32, inches: bool) -> &mut Self {
-        if inches {
-            let tenths = number::scaled(position, 100, 254).unwrap_or(0);
-            self.decimal(tenths, 4).text(",0.0000,0.0000")
-        } else {
-            self.decimal(position, 3).text(",0.000,0.000")
-        }
+    pub(crate) fn position(&mut self, position: i32) -> &mut Self {
+        self.decimal(position, 3).text(",0.000,0.000")
     }
 
     /// Sends a speed in thousandths of a degree/min, as whole units/min.
-    pub(crate) fn speed(&mut self, feed: u32, inches: bool) -> &mut Self {
-        let unit = if inches { 25_400 } else { 1000 };
-        self.whole(feed.saturating_add(unit / 2) / unit)
+    pub(crate) fn speed(&mut self, feed: u32) -> &mut Self {
+        self.whole(feed.saturating_add(500) / 1000)
     }
 
     /// Ends the line.

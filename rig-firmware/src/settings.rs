@@ -10,7 +10,7 @@ use crate::ramp::{MAX_STEP_RATE, Profile, TICKS_PER_SECOND};
 use crate::stepper::StepperSettings;
 
 /// How many settings there are.
-pub(crate) const COUNT: usize = 22;
+pub(crate) const COUNT: usize = 20;
 
 /// A setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,10 +28,6 @@ pub(crate) enum Key {
     InvertEnable,
     /// `$5`: the index input is active when open (high) instead of closed (low).
     InvertIndex,
-    /// `$10`: bit 0 asks for machine positions in status reports instead of work positions.
-    Report,
-    /// `$13`: positions are reported in inches.
-    ReportInches,
     /// `$14`: the emergency-stop input is active when open (high) instead of closed (low).
     InvertEmergency,
     /// `$20`: soft limits are on.
@@ -113,8 +109,6 @@ impl Key {
         Key::InvertDirection,
         Key::InvertEnable,
         Key::InvertIndex,
-        Key::Report,
-        Key::ReportInches,
         Key::InvertEmergency,
         Key::SoftLimits,
         Key::Homing,
@@ -157,8 +151,6 @@ impl Key {
             Key::InvertDirection => flag(3, 0),
             Key::InvertEnable => flag(4, 0),
             Key::InvertIndex => flag(5, 0),
-            Key::Report => whole(10, 1, 0, 3),
-            Key::ReportInches => flag(13, 0),
             Key::InvertEmergency => flag(14, 0),
             Key::SoftLimits => flag(20, 1),
             Key::Homing => flag(22, 0),

@@ -1,40 +1,21 @@
-//! Settings and the work offset in the EEPROM, safe against a supply that goes away while writing.
+//! Settings in the EEPROM, safe against a supply that goes away while writing.
 //!
 //! Two slots take turns: what is written goes to the slot that does not hold the present values,
 //! and counts only when its checksum, which is written last, is right.
 //!
-//! Slot: version, generation, the settings and the work offset as little-endian `i32`, CRC.
+//! Slot: version, generation, the settings as little-endian `i32`, CRC.
 
 use crate::board::Board;
 use crate::crc::Crc;
 use crate::settings::{COUNT, GrblSettings};
 
 const VERSION: u8 = 1;
-const WORDS: u16 = COUNT as u16 + 1;
 /// Bytes before the checksum.
-const BODY: u16 = 2 + 4 * WORDS;
+const BODY: u16 = 2 + 4 * COUNT as u16;
 /// Bytes from one slot to the next.
 const STRIDE: u16 = 128;
 /// What an EEPROM holds before it was ever written.
 const BLANK: u8 = 0xFF;
-
-/// What outlives a reset.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Stored {
-    /// The settings.
-    pub settings: GrblSettings,
-    /// Offset of the work zero (`G54`) from machine zero, thousandths of a degree.
-    pub offset: i32,
-}
-
-impl Stored {
-    fn defaults() -> Stored {
-        Stored {
-            settings: GrblSettings::defaults(),
-            offset: 0,
-        }
-    }
-}
 
 /// How the EEPROM was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,7 +44,7 @@ enum Slot {
 
 impl Store {
     /// Reads what is stored. Damage is mended: the next call finds both slots good.
-    pub(crate) fn open(board: &mut impl Board) -> (Store, Stored, Health) {
+    pub(crate) fn open(board: &mut impl Board) -> (Store, GrblSettings, Health) {
         let slots = [examine(board, false), examine(board, true)];
         let mut store = Store::newest(slots);
         let mut found = store.and_then(|store| read(board, store.second));
@@ -75,7 +56,7 @@ impl Store {
             found = store.and_then(|store| read(board, store.second));
         }
         let none = found.is_none();
-        let stored = found.unwrap_or_else(Stored::defaults);
+        let stored = found.unwrap_or_else(GrblSettings::defaults);
         let mut store = store.unwrap_or(Store {
             second: true,
             generation: 0,
@@ -107,7 +88,7 @@ impl Store {
     }
 
     /// Writes what has changed. Takes 3.4 ms for every byte that differs from what stands there.
-    pub(crate) fn write(&mut self, board: &mut impl Board, stored: &Stored) {
+    pub(crate) fn write(&mut self, board: &mut impl Board, stored: &GrblSettings) {
         self.second = !self.second;
         self.generation = self.generation.wrapping_add(1);
         let start = start(self.second);
@@ -128,14 +109,12 @@ fn start(second: bool) -> u16 {
 }
 
 /// The byte at a place of a slot's body.
-fn body(stored: &Stored, generation: u8, at: u16) -> u8 {
+fn body(stored: &GrblSettings, generation: u8, at: u16) -> u8 {
     let Some(at) = at.checked_sub(2) else {
         return if at == 0 { VERSION } else { generation };
     };
-    let word = match stored.settings.values().get(usize::from(at / 4)) {
-        Some(value) => *value,
-        None => stored.offset,
-    };
+    let value = stored.values().get(usize::from(at / 4));
+    let word = value.copied().unwrap_or(0);
     (word >> (8 * (at % 4))) as u8
 }
 
@@ -172,7 +151,7 @@ fn examine(board: &mut impl Board, second: bool) -> Slot {
 }
 
 /// The values of a slot; `None` where they are not allowed.
-fn read(board: &mut impl Board, second: bool) -> Option<Stored> {
+fn read(board: &mut impl Board, second: bool) -> Option<GrblSettings> {
     let mut at = start(second) + 2;
     let mut word = || {
         let bytes = core::array::from_fn(|_| {
@@ -183,7 +162,5 @@ fn read(board: &mut impl Board, second: bool) -> Option<Stored> {
     };
     let mut values = [0; COUNT];
     values.iter_mut().for_each(|value| *value = word());
-    let offset = word();
-    let settings = GrblSettings::from_values(values)?;
-    Some(Stored { settings, offset })
+    GrblSettings::from_values(values)
 }

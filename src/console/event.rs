@@ -52,9 +52,7 @@ pub enum Event {
         port: String,
         speed: f64,
     },
-    Ended {
-        counts: Value,
-    },
+    Ended,
     Calibrated {
         rotation: Option<String>,
         camera_elevation_deg: Option<f64>,

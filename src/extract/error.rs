@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use relit_data::{report, session, shard};
+use relit_data::{session, shard};
 use relit_video as video;
 
 /// Why a recording, or all of them, could not be extracted.
@@ -40,8 +40,8 @@ pub enum ExtractError {
     #[error(transparent)]
     Shard(#[from] shard::ShardError),
     /// The report cannot be made.
-    #[error(transparent)]
-    Report(#[from] report::ReportError),
+    #[error("the report cannot be made")]
+    Report(#[from] image::ImageError),
     /// A file on the local disk cannot be read or written.
     #[error("{path} could not be {doing}: {source}")]
     Io {

@@ -10,7 +10,7 @@ use rayon::ThreadPool;
 use relit_data::causes::with_causes;
 use relit_data::counts::count_of;
 use relit_data::image_stats::MaskSpans;
-use relit_data::report::{self, Page, THUMBNAIL_SIDE, Thumbnail};
+use relit_data::report::{self, Page, THUMBNAIL_SIDE};
 use relit_data::session::{INDEX_FILE, Notice, Recording, Status};
 use relit_data::shard::{
     Align, Dataset, Digest, FrameRecord, ImageSize, MaskInfo, MaskMisfit, OutputFolder, Sample,
@@ -178,8 +178,7 @@ impl Job {
                     for &sample in assigned {
                         let record = self.record(&stage, &plan, &frame, sample, options);
                         if is_thumbnail(record.index, samples) {
-                            let (index, image) = (record.index, small(&frame.image));
-                            thumbnails.push(Thumbnail { index, image });
+                            thumbnails.push((record.index, small(&frame.image)));
                         }
                         let (image, png) = (frame.image.clone(), frame.png.clone());
                         writer.push(Sample { record, image, png })?;
@@ -209,7 +208,7 @@ impl Job {
             ));
         }
         steadiness.check()?;
-        thumbnails.sort_by_key(|thumbnail| thumbnail.index);
+        thumbnails.sort_by_key(|(index, _)| *index);
         notices.extend(notices_of_lost(&lost));
         if let Some(align) = &stage.align {
             notices.extend(steadiness.notices(align.aligner.least_confidence()));
@@ -435,7 +434,7 @@ impl Job {
         &self,
         options: &ExtractOptions,
         records: &[FrameRecord],
-        thumbnails: &[Thumbnail],
+        thumbnails: &[(u32, RgbImage)],
         notices: &[Notice],
         quality: &SessionQuality,
     ) -> Result<String, ExtractError> {

@@ -73,7 +73,7 @@ pub use scale::{APRON, ScaleBuffers, Scaler};
 /// be URLs: see [`objects`].
 ///
 /// # Errors
-/// [`ExtractError`] if nothing can be extracted: an option is out of range, `out` holds a data set with other
+/// [`ExtractError`] if nothing can be extracted: `out` holds a data set with other
 /// settings, or it cannot be written. A failure with one input or recording is reported to `observer`
 /// and counted.
 pub fn extract(
@@ -82,7 +82,6 @@ pub fn extract(
     options: &ExtractOptions,
     observer: &dyn Observer,
 ) -> Result<Tally, ExtractError> {
-    options.check()?;
     if inputs.iter().any(|input| objects::is_url(input)) || objects::is_url(out) {
         return objects::extract(inputs, out, options, observer);
     }

@@ -6,7 +6,7 @@ use std::thread::available_parallelism;
 use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{Align, ArrayTask, ExtractionSettings, ImageSize, Layout};
 
-use super::{ExtractError, scale};
+use super::scale;
 
 /// Largest side of a scaled image, pixels.
 pub const MAX_SIDE: u32 = 8192;
@@ -91,32 +91,6 @@ impl ExtractOptions {
                 ImageSize::Native(_) => scale::NO_METHOD,
             }
             .to_owned(),
-        }
-    }
-
-    pub(super) fn check(&self) -> Result<(), ExtractError> {
-        let side = match self.size {
-            ImageSize::Pixels(side) => side,
-            ImageSize::Native(_) => 1,
-        };
-        let ranges = [
-            ("frames", f64::from(self.frames), 1.0, f64::INFINITY),
-            ("size", f64::from(side), 1.0, f64::from(MAX_SIDE)),
-            ("margin", self.margin, 0.0, MAX_MARGIN),
-            ("gate", self.gate, 0.0, 1.0),
-            ("align-tolerance", self.align_tolerance, 0.0, MAX_SHIFT),
-            ("max-shift", self.max_shift, 1.0, MAX_SHIFT),
-            ("threads", self.threads as f64, 1.0, f64::INFINITY),
-        ];
-        // A range contains no NaN.
-        match ranges
-            .iter()
-            .find(|(_, value, least, most)| !(least..=most).contains(&value))
-        {
-            None => Ok(()),
-            Some((name, value, least, most)) => Err(ExtractError::Refused(format!(
-                "{name} is {value}: give {least} to {most}"
-            ))),
         }
     }
 }

@@ -1,20 +1,13 @@
-//! Whether a mask fits a turn: how far the object lies beside it in each frame, and where its shape differs
-//! from what the turn shows.
+//! Whether a mask fits a turn: where its shape differs from what the turn shows.
 //!
-//! The object's place in a frame is found by the directions of the brightness's gradients inside the
-//! mask, compared with the average over the turn: paint and relief stay, light does not. The mask that the turn
-//! alone gives ([`segment_with`](crate::segment_with)) shows where to look; what the curves of brightness there show
-//! decides.
-
-use std::sync::OnceLock;
+//! The mask that the turn alone gives ([`segment_with`](crate::segment_with)) shows where to look; what the curves of
+//! brightness there show decides.
 
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 use serde::Serialize;
 
 use super::bitmap::{Bitmap, Component, Connectivity};
-use super::pyramid::half_image;
-use super::registration::Reference;
 use super::turn::TurnField;
 use super::{Effort, Hints, MaskError, SegmentSettings, TurnStatistics, segment_with};
 
@@ -24,15 +17,6 @@ const NARROW: usize = 2;
 const SMALL: f64 = 0.001;
 /// A part of the mask of which more than this share is table is no object that the frame's border cuts off.
 const ON_TABLE: f64 = 0.5;
-
-/// A frame registered against the average over the turn: where the object is in it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Registration {
-    /// From the average over the turn: right and down, pixels of the frame.
-    pub shift: [f32; 2],
-    /// How alike the frame and the average are there, -1..=1.
-    pub likeness: f32,
-}
 
 /// A part of the image in which mask and turn differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -85,59 +69,24 @@ impl ShapeCheck {
 pub struct MaskCheck<'a> {
     turn: &'a TurnStatistics,
     mask: Bitmap,
-    /// Made when a frame is registered.
-    reference: OnceLock<Reference>,
 }
 
 impl<'a> MaskCheck<'a> {
     /// Takes a mask (object from 128 on) and what the turn shows; both of frames of the same size.
     ///
     /// # Errors
-    /// [`MaskError::FewFrames`]; [`MaskError::SeedsSize`] if the sizes differ; [`MaskError::Empty`].
+    /// [`MaskError::FewFrames`]; [`MaskError::Hints`] if the sizes differ; [`MaskError::Empty`].
     pub fn new(mask: &GrayImage, turn: &'a TurnStatistics) -> Result<Self, MaskError> {
         let size = mask.dimensions();
         turn.check()?;
         if size != turn.full {
-            return Err(MaskError::SeedsSize {
-                seeds: size,
-                frame: turn.full,
-            });
+            return Err(MaskError::sizes(size, turn.full));
         }
         let mask = Bitmap::of_mask(mask);
         if mask.count() == 0 {
             return Err(MaskError::Empty);
         }
-        Ok(Self {
-            turn,
-            mask,
-            reference: OnceLock::new(),
-        })
-    }
-
-    /// Where the object is in a frame of the turn; none where nothing can be told, as in a frame that is
-    /// dark or of another size.
-    #[must_use]
-    pub fn register(&self, frame: &RgbImage) -> Option<Registration> {
-        if frame.dimensions() != self.turn.full {
-            return None;
-        }
-        let mut small = None;
-        for _ in 1..=self.turn.factor().trailing_zeros() {
-            small = Some(half_image(small.as_ref().unwrap_or(frame)));
-        }
-        let picture = small.as_ref().unwrap_or(frame);
-        let light: Vec<f32> = picture.pixels().map(|pixel| luma(pixel.0)).collect();
-        let turn = self.turn;
-        let reference = self.reference.get_or_init(|| {
-            let object = turn.reduced(&self.mask);
-            Reference::new(&turn.fine.light(), &object, turn.fine.size)
-        });
-        let (shift, likeness) = reference.find(&light)?;
-        let factor = self.turn.factor() as f32;
-        Some(Registration {
-            shift: shift.map(|way| way * factor),
-            likeness,
-        })
+        Ok(Self { turn, mask })
     }
 
     /// Compares the mask's shape with that which the turn shows on `frame`, the one on which the mask was
@@ -216,10 +165,6 @@ impl<'a> MaskCheck<'a> {
             !is_object
         })
     }
-}
-
-fn luma([r, g, b]: [u8; 3]) -> f32 {
-    0.299 * f32::from(r) + 0.587 * f32::from(g) + 0.114 * f32::from(b)
 }
 
 fn regions(part: &Bitmap, least: f64) -> Vec<DoubtfulRegion> {

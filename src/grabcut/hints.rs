@@ -66,7 +66,7 @@ impl Seeds {
     /// background, everything else and what is more than half transparent is unknown.
     ///
     /// # Errors
-    /// [`MaskError::Seeds`] without any mark.
+    /// [`MaskError::Hints`] without any mark.
     pub fn from_image(image: &DynamicImage) -> Result<Self, MaskError> {
         let painted = image.to_rgba8();
         let marks = painted.pixels().map(|pixel| Mark::of(pixel.0)).collect();
@@ -77,7 +77,7 @@ impl Seeds {
     /// [`Self::from_image`] on the bytes of a PNG file of any colour type and depth.
     ///
     /// # Errors
-    /// [`MaskError::Seeds`].
+    /// [`MaskError::Hints`].
     pub fn from_png(bytes: &[u8]) -> Result<Self, MaskError> {
         Self::from_image(&decode_png(bytes)?)
     }
@@ -113,7 +113,7 @@ impl Seeds {
     /// Reads what [`Self::to_marks_png`] wrote.
     ///
     /// # Errors
-    /// [`MaskError::Seeds`].
+    /// [`MaskError::Hints`].
     pub fn from_marks_png(bytes: &[u8], coloured_px: u64) -> Result<Self, MaskError> {
         Ok(Self {
             coloured_px,
@@ -128,7 +128,7 @@ impl Seeds {
     ) -> Result<Self, MaskError> {
         if marks.iter().all(|&mark| mark == Mark::Unknown) {
             let why = "no pixel of it is white (object) or black (background): paint with a hard brush, nearly white is unknown";
-            return Err(MaskError::Seeds(why.to_owned()));
+            return Err(MaskError::Hints(why.to_owned()));
         }
         Ok(Self {
             width: size.0,
@@ -147,10 +147,10 @@ fn decode_png(bytes: &[u8]) -> Result<DynamicImage, MaskError> {
         .filter(|reader| reader.format() == Some(ImageFormat::Png));
     let Some(png) = png else {
         let why = "it is not a PNG file; save the seeds as PNG";
-        return Err(MaskError::Seeds(why.to_owned()));
+        return Err(MaskError::Hints(why.to_owned()));
     };
     png.decode().map_err(|error| {
-        MaskError::Seeds(format!(
+        MaskError::Hints(format!(
             "it cannot be decoded as PNG ({error}); save it again"
         ))
     })

@@ -24,10 +24,7 @@ impl InitialLabels {
         let rect = hints.rect.map(|rect| clip(rect, size)).transpose()?;
         let seeds = hints.seeds.as_ref();
         if let Some(seeds) = seeds.filter(|seeds| seeds.size() != size) {
-            return Err(MaskError::SeedsSize {
-                seeds: seeds.size(),
-                frame: size,
-            });
+            return Err(MaskError::sizes(seeds.size(), size));
         }
         let marks = hints.marks();
         let unmarked = |at: usize| match rect {
@@ -53,18 +50,21 @@ impl InitialLabels {
         };
         let object = initial.labels.iter().filter(|label| label.is_object());
         match (object.count(), hints.rect) {
-            (object, _) if object == pixels => Err(MaskError::NoBackground),
-            (0, Some(rect)) => Err(MaskError::NoObject { rect }),
+            (object, _) if object == pixels => Err(MaskError::Hints(
+                "the hints leave no background in the frame: draw the rectangle smaller than the frame, or mark background black in the seeds".to_owned(),
+            )),
+            (0, Some(rect)) => Err(MaskError::Hints(format!(
+                "the seeds leave no pixel of the rectangle {rect} that could be the object: mark some of the object white"
+            ))),
             _ => Ok(initial),
         }
     }
 }
 
 fn clip(rect: Rect, (width, height): (u32, u32)) -> Result<Rect, MaskError> {
-    let outside = MaskError::RectOutside {
-        rect,
-        width,
-        height,
-    };
-    rect.clipped_to(width, height).ok_or(outside)
+    rect.clipped_to(width, height).ok_or_else(|| {
+        MaskError::Hints(format!(
+            "the rectangle {rect} is outside the frame of {width} x {height} pixels: give one that contains the object"
+        ))
+    })
 }

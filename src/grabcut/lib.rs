@@ -74,7 +74,7 @@ mod turntable;
 mod warning;
 mod witness;
 
-pub use check::{DoubtfulRegion, MaskCheck, Registration, ShapeCheck};
+pub use check::{DoubtfulRegion, MaskCheck, ShapeCheck};
 pub use error::MaskError;
 pub use grab_cut::ITERATIONS;
 pub use hints::{Hints, Mark, Seeds};

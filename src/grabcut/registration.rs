@@ -119,64 +119,6 @@ fn vertex(before: f32, most: f32, after: f32) -> f32 {
     (0.5 * (before - after) / curvature).clamp(-0.5, 0.5)
 }
 
-/// Most pixels by which a reference finds the object.
-const MOST_PIXELS: usize = 8000;
-/// The gradients' strength below which their directions count less, in levels of the brightness.
-const FAINT: f32 = 4.0;
-/// Pixels so near to the outline are left out: what moves behind it is seen there.
-const RIM: usize = 2;
-
-/// The object's average over a turn, by which it is found in single frames, whatever their light.
-#[derive(Debug)]
-pub(super) struct Reference {
-    size: (usize, usize),
-    /// Places in row order, and the directions of the gradients there.
-    pixels: Vec<(usize, [f32; 2])>,
-}
-
-impl Reference {
-    /// From the average brightness and the object in it.
-    pub(super) fn new(average: &[f32], object: &Bitmap, size: (usize, usize)) -> Self {
-        let gradients = gradients(average, size);
-        let inner = object.inverted().dilated(RIM).inverted();
-        let mut pixels: Vec<(usize, [f32; 2])> = inner_pixels(&inner, size)
-            .into_iter()
-            .map(|at| (at, gradients[at]))
-            .collect();
-        let strength = |[x, y]: [f32; 2]| x * x + y * y;
-        pixels.sort_by(|a, b| strength(b.1).total_cmp(&strength(a.1)).then(a.0.cmp(&b.0)));
-        pixels.truncate(MOST_PIXELS);
-        pixels.sort_by_key(|pixel| pixel.0);
-        for (_, gradient) in &mut pixels {
-            *gradient = direction(*gradient);
-        }
-        Self { size, pixels }
-    }
-
-    /// The shift (right, down) at which the gradients' directions agree best with a frame's brightness,
-    /// and their mean cosine there; none if that is at the limit of what is looked for, or nothing agrees.
-    pub(super) fn find(&self, light: &[f32]) -> Option<([f32; 2], f32)> {
-        let directions: Vec<[f32; 2]> = gradients(light, self.size)
-            .into_iter()
-            .map(direction)
-            .collect();
-        let (shift, fit) = best_shift(self.size.0, |step| {
-            let fit = |(at, [ax, ay]): &(usize, [f32; 2])| {
-                let [bx, by] = directions[at.saturating_add_signed(step)];
-                ax * bx + ay * by
-            };
-            self.pixels.iter().map(fit).sum()
-        })?;
-        Some((shift, fit / self.pixels.len() as f32))
-    }
-}
-
-/// A gradient's direction; shorter than 1 where the gradient is faint.
-fn direction([x, y]: [f32; 2]) -> [f32; 2] {
-    let length = x.hypot(y) + FAINT;
-    [x / length, y / length]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,22 +151,6 @@ mod tests {
             let off = (dx - wanted.0).hypot(dy - wanted.1);
             assert!(off < 0.2, "{wanted:?}: {dx} {dy}");
         }
-    }
-
-    #[test]
-    fn a_reference_is_found_whatever_the_light() {
-        let reference = Reference::new(&pattern(0.0, 0.0), &middle(), SIZE);
-        for wanted in [(0.0, 0.0), (2.0, -1.0), (-1.5, 0.75)] {
-            let frame = pattern(wanted.0, wanted.1).into_iter();
-            let frame: Vec<f32> = frame.map(|light| 40.0 + 15.0 * light).collect();
-            let ([dx, dy], likeness) = reference.find(&frame).unwrap();
-            let off = (dx - wanted.0).hypot(dy - wanted.1);
-            assert!(
-                off < 0.2 && likeness > 0.0,
-                "{wanted:?}: {dx} {dy} {likeness}"
-            );
-        }
-        assert_eq!(reference.find(&vec![3.0; 3000]), None);
     }
 
     #[test]

@@ -59,10 +59,8 @@ pub struct MaskStatistics {
 /// Finds the object in `frame`. The same input gives the same mask.
 ///
 /// # Errors
-/// [`MaskError::FrameSize`]; hints that do not fit the frame ([`MaskError::RectOutside`], [`MaskError::NoBackground`],
-/// [`MaskError::NoObject`], [`MaskError::NoHints`], [`MaskError::SeedsSize`]); strokes that cannot be painted
-/// ([`MaskError::StrokesTooLarge`]); a result without object or without background ([`MaskError::Empty`],
-/// [`MaskError::Everything`]).
+/// [`MaskError::FrameSize`]; hints that do not fit the frame ([`MaskError::Hints`]); a result without object or
+/// without background ([`MaskError::Empty`], [`MaskError::Everything`]).
 pub fn segment(
     frame: &RgbImage,
     hints: &Hints,
@@ -212,7 +210,9 @@ fn initial(hints: &Hints, size: (u32, u32)) -> Result<InitialLabels, MaskError> 
     // Marks of the background alone cut nothing out of a frame; a turn may do without those of the object.
     match initial.labels.iter().any(|label| label.is_object()) {
         true => Ok(initial),
-        false => Err(MaskError::NoHints),
+        false => Err(MaskError::Hints(
+            "no hint says where the object is: give a rectangle, or seeds with some of the object painted white".to_owned(),
+        )),
     }
 }
 

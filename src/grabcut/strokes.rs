@@ -48,7 +48,7 @@ impl Strokes {
     /// Checks the strokes.
     ///
     /// # Errors
-    /// [`MaskError::Stroke`] with the place of a stroke that cannot be painted.
+    /// [`MaskError::Hints`] with the place of a stroke that cannot be painted.
     pub fn new(strokes: Vec<Stroke>) -> Result<Self, MaskError> {
         let is_near = |value: &f32| value.abs() <= FARTHEST;
         let is_valid = |stroke: &Stroke| {
@@ -58,7 +58,9 @@ impl Strokes {
                 && stroke.radius > 0.0
         };
         match strokes.iter().position(|stroke| !is_valid(stroke)) {
-            Some(at) => Err(MaskError::Stroke(at)),
+            Some(at) => Err(MaskError::Hints(format!(
+                "stroke {at} has no point, or a coordinate or radius that is out of range"
+            ))),
             None => Ok(Self(strokes)),
         }
     }
@@ -78,8 +80,7 @@ impl Strokes {
     /// The marks in a frame of `size` after painting over `base`; none if nothing is marked then.
     ///
     /// # Errors
-    /// [`MaskError::StrokesTooLarge`]; [`MaskError::SeedsSize`] if `base` has another size;
-    /// [`MaskError::FrameSize`].
+    /// [`MaskError::Hints`] if `base` has another size, or painting would take too long; [`MaskError::FrameSize`].
     pub fn paint(
         &self,
         size: (u32, u32),
@@ -91,14 +92,12 @@ impl Strokes {
             return Err(MaskError::FrameSize { width, height });
         }
         if let Some(base) = base.filter(|base| base.size() != size) {
-            return Err(MaskError::SeedsSize {
-                seeds: base.size(),
-                frame: size,
-            });
+            return Err(MaskError::sizes(base.size(), size));
         }
         let work: u64 = self.0.iter().map(|stroke| work(stroke, size)).sum();
         if work > MOST_WORK {
-            return Err(MaskError::StrokesTooLarge);
+            let why = "the strokes cover too many pixels: paint with fewer or smaller ones";
+            return Err(MaskError::Hints(why.to_owned()));
         }
         let unmarked = || vec![Mark::Unknown; pixels as usize];
         let mut marks = base.map_or_else(unmarked, |base| base.marks().to_vec());
@@ -237,7 +236,7 @@ mod tests {
         assert!(wrong(1.0, &[[f32::INFINITY, 1.0]]) && wrong(1.0, &[[1.0, 2e5]]));
         let many = vec![stroke(Brush::Object, 9e4, &[[1.0, 1.0]; 300]); 40];
         let result = Strokes::new(many).unwrap().paint((4000, 4000), None);
-        assert!(matches!(result, Err(MaskError::StrokesTooLarge)));
+        assert!(matches!(result, Err(MaskError::Hints(_))));
         let huge = Strokes::default().paint((u32::MAX, 9), None);
         assert!(matches!(huge, Err(MaskError::FrameSize { .. })));
     }

@@ -79,9 +79,9 @@ pub(super) fn read_record(path: &Path) -> Result<Option<MaskRecord>, MaskingErro
     let Some(bytes) = read_if_exists(path)? else {
         return Ok(None);
     };
-    let record = MaskRecord::from_json(&bytes).map_err(|fault| MaskingError::ForeignFile {
+    let record = MaskRecord::from_json(&bytes).map_err(|why| MaskingError::ForeignFile {
         path: path.to_owned(),
-        why: fault.to_string(),
+        why,
     })?;
     Ok(Some(record))
 }

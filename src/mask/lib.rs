@@ -5,7 +5,7 @@
 //! painted for it are applied again, and `NAME-previous.json` keeps its record.
 //!
 //! [`make_mask`] makes a mask from hints that are known; [`edit`] lets a person draw them in a browser;
-//! [`check_mask`] holds a mask against all frames.
+//! [`check_mask`] holds a mask against what the turn shows.
 //!
 //! This crate brings frames and folders to [`relit_grabcut`], and is the program `relit-mask` (in `cli/`).
 //! It knows nothing of data sets and the rig.
@@ -49,13 +49,13 @@ mod record;
 mod request;
 mod sampling;
 
-pub use checking::{CheckOutput, DriftCheck, FrameDrift, MaskReport, MaskVerdict, check_mask};
+pub use checking::{CheckOutput, MaskReport, MaskVerdict, check_mask};
 pub use editor::edit;
 pub use engine::{MaskEngine, OPENCV_KNOWS_NO_TURN};
 pub use error::MaskingError;
 pub use files::MaskFiles;
 pub use making::{MaskOutput, make_mask};
 pub use record::{
-    MASK_SCHEMA, MaskRecord, MaskSoftware, RecordFault, RecordedHints, RecordedResult, SourceFrame,
+    MASK_SCHEMA, MaskRecord, MaskSoftware, RecordedHints, RecordedResult, SourceFrame,
 };
 pub use request::{MaskRequest, read_seeds};

@@ -99,31 +99,20 @@ pub struct RecordedResult {
     pub statistics: MaskStatistics,
 }
 
-/// Why a file is not a mask's record, or cannot be used to make the mask again.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct RecordFault(String);
-
-impl RecordFault {
-    fn new(why: impl ToString) -> Self {
-        Self(why.to_string())
-    }
-}
-
 impl MaskRecord {
     /// Reads the content of a `mask.json`.
     ///
     /// # Errors
     /// Where it is not JSON, has another schema, or is not a record.
-    pub fn from_json(bytes: &[u8]) -> Result<Self, RecordFault> {
+    pub fn from_json(bytes: &[u8]) -> Result<Self, String> {
         let value = serde_json::from_slice(relit_data::text::unmarked(bytes));
-        let value: Value = value.map_err(RecordFault::new)?;
+        let value: Value = value.map_err(|error: serde_json::Error| error.to_string())?;
         let schema = value.get("schema").unwrap_or(&Value::Null);
         if schema != MASK_SCHEMA {
             let why = format!("its schema is {schema}, not {MASK_SCHEMA:?}");
-            return Err(RecordFault(why));
+            return Err(why);
         }
-        serde_json::from_value(value).map_err(RecordFault::new)
+        serde_json::from_value(value).map_err(|error| error.to_string())
     }
 
     /// The content of a `mask.json`.
@@ -182,9 +171,8 @@ impl RecordedHints {
     ///
     /// # Errors
     /// Where there are none, or the seeds are damaged.
-    pub fn hints(&self) -> Result<Hints, RecordFault> {
-        let wrong =
-            |why: &dyn std::fmt::Display| RecordFault(format!("its seeds are not valid: {why}"));
+    pub fn hints(&self) -> Result<Hints, String> {
+        let wrong = |why: &dyn std::fmt::Display| format!("its seeds are not valid: {why}");
         let seeds = match &self.seeds {
             None => None,
             Some(text) => {
@@ -199,7 +187,7 @@ impl RecordedHints {
             strokes: self.strokes.clone(),
         };
         if hints.is_empty() && self.turn_frames.is_empty() {
-            return Err(RecordFault::new("it records no hints"));
+            return Err("it records no hints".to_owned());
         }
         Ok(hints)
     }

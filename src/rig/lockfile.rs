@@ -3,8 +3,7 @@
 //! The lock is the kernel's (`flock`), which frees it when its holder dies. The file's content is the
 //! holder's process number, for those who are refused. The files lie in a folder that the accounts of
 //! a machine share through a group, [`SHARED_FOLDER`], so that a service and a person who logs in find
-//! each other. Where nobody set that up, each account has a folder of its own. Links are never
-//! followed, and checking who has a lock needs no permission to write.
+//! each other. Where nobody set that up, each account has a folder of its own. Links are never followed.
 //!
 //! Knows nothing of devices.
 
@@ -12,8 +11,6 @@ use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
-use std::thread;
-use std::time::Duration;
 
 use rustix::fs::{Access, OFlags, access};
 
@@ -23,10 +20,6 @@ pub const SHARED_FOLDER: &str = "/run/relit";
 const ROOT_LOCK: &str = ".relit-capture.lock";
 /// Where each account has a folder of its own; the second where there is no first.
 const PRIVATE_BASES: [&str; 2] = ["/run/lock", "/tmp"];
-/// A process that only checks who has a lock holds it for a moment: how often a lock is tried, and the
-/// pause between.
-const TRIES: u32 = 5;
-const PAUSE: Duration = Duration::from_millis(40);
 /// Longest content that is read, bytes.
 const LONGEST: u64 = 20;
 
@@ -126,19 +119,16 @@ impl LockFile {
     /// [`LockError::Held`], or what the file system answers.
     pub fn take(path: &Path, what: &str) -> Result<Self, LockError> {
         let mut file = open_or_create(path).map_err(LockError::system(path, "opened"))?;
-        for attempt in 1_u32.. {
-            match file.try_lock() {
-                Ok(()) => break,
-                Err(TryLockError::WouldBlock) if attempt < TRIES => thread::sleep(PAUSE),
-                Err(TryLockError::WouldBlock) => {
-                    return Err(LockError::Held {
-                        what: what.to_owned(),
-                        pid: pid_in(&file),
-                    });
-                }
-                Err(TryLockError::Error(error)) => {
-                    return Err(LockError::system(path, "locked")(error));
-                }
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(LockError::Held {
+                    what: what.to_owned(),
+                    pid: pid_in(&file),
+                });
+            }
+            Err(TryLockError::Error(error)) => {
+                return Err(LockError::system(path, "locked")(error));
             }
         }
         let written = file
@@ -174,30 +164,6 @@ impl LockFile {
         let file = format!("relit-capture{}.lock", name.replace('/', "-"));
         Self::take(&folder.join(file), &name)
     }
-
-    /// Who has the lock `path`: `None` where nobody does. Takes nothing away from anybody, and only
-    /// reads.
-    ///
-    /// # Errors
-    /// What the file system answers.
-    pub fn holder(path: &Path) -> Result<Option<Holder>, LockError> {
-        let file = match open(OpenOptions::new().read(true), path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            opened => opened.map_err(LockError::system(path, "opened"))?,
-        };
-        match file.try_lock_shared() {
-            Ok(()) => Ok(None),
-            Err(TryLockError::WouldBlock) => Ok(Some(Holder { pid: pid_in(&file) })),
-            Err(TryLockError::Error(error)) => Err(LockError::system(path, "checked")(error)),
-        }
-    }
-}
-
-/// The process that has a lock.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Holder {
-    /// Its number; `None` where it has not written it yet.
-    pub pid: Option<u32>,
 }
 
 /// Opens a lock file to take it, and makes it where it does not exist.

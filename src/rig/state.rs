@@ -42,8 +42,6 @@ pub struct RigState {
     pub phase: Phase,
     /// The object on the table.
     pub object: Option<String>,
-    /// Objects that wait for their turn.
-    pub queue: Vec<String>,
     /// The session being written.
     pub session: Option<String>,
     /// Frames written of the present take.

@@ -28,9 +28,7 @@ enum Coding {
     /// Each packet is a picture, if the stream begins where decoding can begin and has time stamps.
     OneEachInOrder,
     H264,
-    Vp8,
-    Vp9,
-    /// Packets can be fields, hold two pictures, or say that the last one is repeated.
+    /// Packets can be fields, hold two pictures or hidden ones, or say that the last one is repeated.
     Any,
 }
 
@@ -40,8 +38,6 @@ impl Coding {
             Id::FFV1 | Id::MJPEG | Id::RAWVIDEO | Id::PNG | Id::BMP | Id::TIFF => Self::OneEach,
             Id::AV1 | Id::HEVC | Id::MPEG1VIDEO | Id::MPEG2VIDEO => Self::OneEachInOrder,
             Id::H264 => Self::H264,
-            Id::VP8 => Self::Vp8,
-            Id::VP9 => Self::Vp9,
             _ if is_intra_only(codec) => Self::OneEach,
             _ => Self::Any,
         }
@@ -103,16 +99,8 @@ impl Inspector {
 
     /// The contents of the next packet, and whether decoding can begin with it.
     pub(super) fn inspect(&mut self, packet: &Packet) -> (Contents, bool) {
-        let data = packet.data().unwrap_or_default();
-        let shown = |shown| match shown {
-            Some(true) => Contents::Picture,
-            Some(false) => Contents::Hidden,
-            None => Contents::Unclear,
-        };
         let contents = match self.coding {
             Coding::OneEach | Coding::OneEachInOrder => Contents::Picture,
-            Coding::Vp8 => shown(vp8_is_shown(data)),
-            Coding::Vp9 => shown(vp9_is_shown(data)),
             Coding::H264 => match &mut self.h264 {
                 Some(h264) => h264.contents(packet),
                 None => Contents::Unclear,
@@ -121,59 +109,12 @@ impl Inspector {
         };
         // The container's flag also means a recovery point, after which some pictures are incomplete.
         let key = packet.is_key()
-            && self
-                .h264
-                .as_ref()
-                .is_none_or(|h264| nal::is_key(&h264.byte_stream.convert(data, false)));
+            && self.h264.as_ref().is_none_or(|h264| {
+                let data = packet.data().unwrap_or_default();
+                nal::is_key(&h264.byte_stream.convert(data, false))
+            });
         (contents, key)
     }
-}
-
-/// RFC 6386, section 9.1: the bit `show_frame` of the frame's tag.
-fn vp8_is_shown(data: &[u8]) -> Option<bool> {
-    data.first().map(|tag| tag & 0x10 != 0)
-}
-
-/// Whether any picture of the packet is shown (VP9 bitstream specification, sections 6.2 and annex B: a superframe ends
-/// with an index of its frames' sizes between two equal markers).
-fn vp9_is_shown(data: &[u8]) -> Option<bool> {
-    let marker = *data.last()?;
-    if marker & 0xe0 != 0xc0 {
-        return vp9_frame_is_shown(data);
-    }
-    let (frames, bytes) = (
-        usize::from(marker & 7) + 1,
-        usize::from(marker >> 3 & 3) + 1,
-    );
-    let index = data.len().checked_sub(2 + frames * bytes);
-    let Some(index) = index.filter(|&index| data[index] == marker) else {
-        return vp9_frame_is_shown(data);
-    };
-    let mut rest = &data[..index];
-    let mut any = false;
-    for size in data[index + 1..data.len() - 1].chunks_exact(bytes) {
-        let size = size
-            .iter()
-            .rev()
-            .fold(0, |sum, &byte| sum << 8 | usize::from(byte));
-        let (frame, after) = rest.split_at_checked(size)?;
-        rest = after;
-        any |= !frame.is_empty() && vp9_frame_is_shown(frame)?;
-    }
-    Some(any)
-}
-
-/// The first bits of a frame's header: the marker 2 (2 bits), the profile (2, low bit first; 1 more after profile 3),
-/// `show_existing_frame`, `frame_type` and `show_frame`.
-fn vp9_frame_is_shown(frame: &[u8]) -> Option<bool> {
-    let first = *frame.first()?;
-    let header = u16::from(first) << 8 | u16::from(*frame.get(1).unwrap_or(&0));
-    let bit = |at: u16| header >> (15 - at) & 1 == 1;
-    if first >> 6 != 2 {
-        return None;
-    }
-    let after_profile = if bit(2) && bit(3) { 5 } else { 4 };
-    Some(bit(after_profile) || bit(after_profile + 2))
 }
 
 /// FFmpeg's parser of a codec, which reads no more than headers.
@@ -258,8 +199,6 @@ pub(super) fn extra_data(parameters: &Parameters) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
     #[test]
@@ -276,36 +215,6 @@ mod tests {
         }
         for codec in [Id::MPEG4, Id::THEORA, Id::GIF, Id::VC1] {
             assert_eq!(Coding::from_codec(codec), Coding::Any, "{codec:?}");
-        }
-    }
-
-    #[test]
-    fn a_frame_of_vp8_says_whether_it_is_shown() {
-        assert_eq!(vp8_is_shown(&[0x10, 2, 0]), Some(true));
-        assert_eq!(vp8_is_shown(&[0x01, 2, 0]), Some(false));
-        assert_eq!(vp8_is_shown(&[]), None);
-    }
-
-    #[test]
-    fn a_superframe_of_vp9_is_shown_if_one_of_its_frames_is() {
-        let (hidden, shown, again) = ([0x84, 0], [0x86, 0], [0x88, 0]);
-        assert_eq!(vp9_is_shown(&hidden), Some(false));
-        assert_eq!(vp9_is_shown(&shown), Some(true));
-        assert_eq!(vp9_is_shown(&again), Some(true));
-        let superframe = |frames: [&[u8]; 2]| {
-            let sizes = frames.map(|frame| frame.len() as u8);
-            [frames[0], frames[1], &[0xc1], &sizes, &[0xc1]].concat()
-        };
-        assert_eq!(vp9_is_shown(&superframe([&hidden, &shown])), Some(true));
-        assert_eq!(vp9_is_shown(&superframe([&hidden, &hidden])), Some(false));
-        assert_eq!(vp9_is_shown(&[0xc1, 200, 200, 0xc1]), None);
-    }
-
-    proptest! {
-        #[test]
-        fn no_bytes_make_it_panic(bytes in prop::collection::vec(any::<u8>(), 0..40)) {
-            vp8_is_shown(&bytes);
-            vp9_is_shown(&bytes);
         }
     }
 }

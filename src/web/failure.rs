@@ -4,20 +4,13 @@ use axum::Json;
 use axum::extract::rejection::QueryRejection;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde::Serialize;
+use serde_json::json;
 
 /// Why a request was not served.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{error}")]
 pub struct Failure {
     status: StatusCode,
-    error: String,
-}
-
-/// What the client gets to read.
-#[derive(Debug, Serialize)]
-pub struct Problem {
-    /// What failed, on what, what to do.
     error: String,
 }
 
@@ -65,8 +58,7 @@ impl From<QueryRejection> for Failure {
 
 impl IntoResponse for Failure {
     fn into_response(self) -> Response {
-        let problem = Problem { error: self.error };
-        let mut response = (self.status, Json(problem)).into_response();
+        let mut response = (self.status, Json(json!({ "error": self.error }))).into_response();
         let headers = response.headers_mut();
         match self.status {
             StatusCode::UNAUTHORIZED => {

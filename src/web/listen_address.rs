@@ -11,18 +11,13 @@ use std::str::FromStr;
 ///
 /// let address: ListenAddress = "8430".parse()?;
 /// assert_eq!(address.socket().to_string(), "127.0.0.1:8430");
-/// # Ok::<(), relit_web::ListenAddressFault>(())
+/// # Ok::<(), String>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ListenAddress {
     socket: SocketAddr,
     name: Option<String>,
 }
-
-/// Why an address is none, and what to give.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct ListenAddressFault(String);
 
 impl ListenAddress {
     /// The address to listen on.
@@ -39,7 +34,7 @@ impl ListenAddress {
 }
 
 impl FromStr for ListenAddress {
-    type Err = ListenAddressFault;
+    type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         if let Ok(socket) = text.parse() {
@@ -47,7 +42,7 @@ impl FromStr for ListenAddress {
         }
         if text.contains("://") {
             let url = "this is a URL: give the address and the port alone, such as localhost:8430";
-            return Err(ListenAddressFault(url.to_owned()));
+            return Err(url.to_owned());
         }
         let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
         let (host, port) = match text.rsplit_once(':') {
@@ -59,15 +54,15 @@ impl FromStr for ListenAddress {
         // What follows the last colon may be a port, or belong to the address.
         if let Ok(address) = host.parse::<Ipv6Addr>() {
             let why = format!("an IPv6 address stands in brackets: give [{address}]:PORT");
-            return Err(ListenAddressFault(why));
+            return Err(why);
         }
         if let Ok(address) = text.parse::<Ipv6Addr>() {
             return Err(no_port(&format!("[{address}]")));
         }
         let port: u16 = port.parse().map_err(|_| {
-            ListenAddressFault(format!(
+            format!(
                 "{port:?} is not a port: give a number from 0 to 65535 after the colon, 0 for any free port"
-            ))
+            )
         })?;
         if host.is_empty() {
             let socket = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port);
@@ -81,18 +76,16 @@ impl FromStr for ListenAddress {
     }
 }
 
-fn no_port(address: &str) -> ListenAddressFault {
-    ListenAddressFault(format!(
-        "the port is missing: give ADDRESS:PORT, such as {address}:8430"
-    ))
+fn no_port(address: &str) -> String {
+    format!("the port is missing: give ADDRESS:PORT, such as {address}:8430")
 }
 
 /// The address of a name: that of IPv4 where there are both, as where no name is given.
-fn look_up(name: &str, port: u16) -> Result<SocketAddr, ListenAddressFault> {
+fn look_up(name: &str, port: u16) -> Result<SocketAddr, String> {
     let unknown = |why: String| {
-        ListenAddressFault(format!(
+        format!(
             "{name:?} is not the name of this machine or an address ({why}): give localhost:PORT or 0.0.0.0:PORT"
-        ))
+        )
     };
     let found = (name, port).to_socket_addrs();
     let found = found.map_err(|why| unknown(why.to_string()))?;
@@ -110,7 +103,7 @@ mod tests {
         address.socket().to_string()
     }
 
-    fn fault(text: &str) -> ListenAddressFault {
+    fn fault(text: &str) -> String {
         text.parse::<ListenAddress>().unwrap_err()
     }
 
@@ -150,7 +143,7 @@ mod tests {
     #[test]
     fn what_is_no_address_is_refused_for_what_it_is() {
         let says = |text: &str, words: &[&str]| {
-            let said = fault(text).to_string();
+            let said = fault(text);
             assert!(
                 words.iter().any(|word| said.contains(word)),
                 "{text}: {said}"

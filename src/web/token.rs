@@ -4,7 +4,7 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::str::FromStr;
 
 /// Bytes of a random token: 128 bits.
@@ -20,41 +20,9 @@ pub struct Token(String);
 const LONGEST_FILE: u64 = 256;
 /// Permissions that a token's file must not give: to others any, to its group writing.
 const FORBIDDEN: u32 = 0o027;
-
-/// Why a text is no token.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a token has 16 to 128 letters a-z, digits, '-' and '_': leave it out to get a random one")]
-pub struct InvalidToken;
-
-/// Why a file gives no token.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TokenFileError {
-    /// It cannot be read.
-    #[error("the token's file {path} could not be read")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
-    },
-    /// It was not there, and cannot be made.
-    #[error("the token's file {path} could not be made: make its folder, or give another file")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
-    },
-    /// It is open to other accounts, or holds no token.
-    #[error("the token's file {path} {why}")]
-    Invalid {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it, and what to do.
-        why: String,
-    },
-}
+/// What is wrong with a text that is no token.
+const NO_TOKEN: &str =
+    "a token has 16 to 128 letters a-z, digits, '-' and '_': leave it out to get a random one";
 
 impl Token {
     /// 128 random bits as 32 hexadecimal digits.
@@ -71,21 +39,17 @@ impl Token {
     /// around it, such as the end of the line, is no part of it.
     ///
     /// # Errors
-    /// [`TokenFileError`].
-    pub fn from_file(path: &Path) -> Result<Self, TokenFileError> {
-        let failed = |source| TokenFileError::Read {
-            path: path.to_owned(),
-            source,
-        };
+    /// Where it cannot be read, is open to other accounts, or holds no token.
+    pub fn from_file(path: &Path) -> io::Result<Self> {
+        let failed =
+            |error: io::Error| of_file(path, error.kind(), &format!("could not be read: {error}"));
+        let invalid = |why: String| of_file(path, io::ErrorKind::InvalidData, &why);
         let file = File::open(path).map_err(failed)?;
         let mode = file.metadata().map_err(failed)?.mode() & 0o777;
         if mode & FORBIDDEN != 0 {
-            return Err(TokenFileError::Invalid {
-                path: path.to_owned(),
-                why: format!(
-                    "is open to other accounts (mode {mode:03o}): `chmod 600` it, or 640 for a group that may know it"
-                ),
-            });
+            return Err(invalid(format!(
+                "is open to other accounts (mode {mode:03o}): `chmod 600` it, or 640 for a group that may know it"
+            )));
         }
         let mut text = String::new();
         file.take(LONGEST_FILE)
@@ -95,27 +59,23 @@ impl Token {
         text.trim_start_matches('\u{feff}')
             .trim()
             .parse()
-            .map_err(|wrong: InvalidToken| TokenFileError::Invalid {
-                path: path.to_owned(),
-                why: format!("holds no token: {wrong}"),
-            })
+            .map_err(|wrong| invalid(format!("holds no token: {wrong}")))
     }
 
     /// The token that a file holds. Where there is no such file, it is made with a random token, for its
     /// owner alone.
     ///
     /// # Errors
-    /// [`TokenFileError`].
-    pub fn from_file_or_new(path: &Path) -> Result<Self, TokenFileError> {
+    /// As [`Self::from_file`], and where the file cannot be made.
+    pub fn from_file_or_new(path: &Path) -> io::Result<Self> {
         match Self::from_file(path) {
-            Err(TokenFileError::Read { source, .. })
-                if source.kind() == io::ErrorKind::NotFound => {}
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             read => return read,
         }
         let made = Self::random().and_then(|token| token.write(path));
-        made.map_err(|source| TokenFileError::Write {
-            path: path.to_owned(),
-            source,
+        made.map_err(|error| {
+            let why = format!("could not be made ({error}): make its folder, or give another file");
+            of_file(path, error.kind(), &why)
         })?;
         // Another process may have been first: what lies there counts.
         Self::from_file(path)
@@ -148,17 +108,21 @@ impl Token {
     }
 }
 
-impl FromStr for Token {
-    type Err = InvalidToken;
+fn of_file(path: &Path, kind: io::ErrorKind, why: &str) -> io::Error {
+    io::Error::new(kind, format!("the token's file {} {why}", path.display()))
+}
 
-    fn from_str(text: &str) -> Result<Self, InvalidToken> {
+impl FromStr for Token {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
         let plain = text
             .bytes()
             .all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_'));
         if plain && LENGTHS.contains(&text.len()) {
             Ok(Self(text.to_owned()))
         } else {
-            Err(InvalidToken)
+            Err(NO_TOKEN)
         }
     }
 }
@@ -204,7 +168,7 @@ mod tests {
             "0123456789abcdef&x=1",
             "ä0123456789abcdef",
         ] {
-            assert_eq!(text.parse::<Token>(), Err(InvalidToken), "{text:?}");
+            assert_eq!(text.parse::<Token>(), Err(NO_TOKEN), "{text:?}");
         }
     }
 
@@ -231,13 +195,9 @@ mod tests {
         fs::write(&path, "\u{feff}0123456789abcdef\r\n").unwrap();
         assert!(Token::from_file(&path).is_ok());
         fs::write(&path, "short").unwrap();
-        let read = Token::from_file(&path);
-        assert!(
-            matches!(read, Err(TokenFileError::Invalid { .. })),
-            "{read:?}"
-        );
-        let none = Token::from_file(&folder.path().join("none"));
-        assert!(matches!(none, Err(TokenFileError::Read { .. })), "{none:?}");
+        let kind = |path: &Path| Token::from_file(path).unwrap_err().kind();
+        assert_eq!(kind(&path), io::ErrorKind::InvalidData);
+        assert_eq!(kind(&folder.path().join("none")), io::ErrorKind::NotFound);
     }
 
     #[test]
@@ -250,8 +210,10 @@ mod tests {
         assert_eq!(Token::from_file_or_new(&path).unwrap(), token);
         let nowhere = Token::from_file_or_new(&folder.path().join("none/token"));
         assert!(
-            matches!(nowhere, Err(TokenFileError::Write { .. })),
-            "{nowhere:?}"
+            nowhere
+                .unwrap_err()
+                .to_string()
+                .contains("could not be made")
         );
     }
 

@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 use proptest::prelude::*;
 use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::session::{
-    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, ManifestFault, Notice, Recording,
-    SessionError, SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of,
-    recordings,
+    CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionError,
+    SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
 };
 use tempfile::TempDir;
 
@@ -131,7 +130,7 @@ fn what_is_known_of_the_rig_comes_back_and_nothing_is_written_of_one_that_is_not
     let half = with(r#"{"rotation": null}"#).unwrap().rig;
     assert_eq!(half, Some(RigFacts::default()));
     let refused = with(r#"{"camera_elevation_deg": 95.0}"#);
-    assert!(matches!(refused, Err(ManifestFault::Elevation(_))));
+    assert!(refused.is_err_and(|fault| fault.contains("camera_elevation_deg")));
 }
 
 #[test]
@@ -215,8 +214,8 @@ fn what_is_wrong_in_a_manifest_is_named() {
             "relit.session/2",
             "its schema is \"relit.session/2\"",
         ),
-        ("\"complete\"", "\"finished\"", "its status \"finished\""),
-        ("\"complete\"", "\"aborted\"", "no reason"),
+        ("\"complete\"", "\"finished\"", "`finished`"),
+        ("\"complete\"", "\"aborted\"", "`reason`"),
         ("\"width\": 640", "\"width\": \"wide\"", "line"),
         ("\"bytes\": 10", "\"bytes\": null", "video.bytes is missing"),
         ("\"video.mkv\"", "\"../video.mkv\"", "not a plain file name"),

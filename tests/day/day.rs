@@ -30,7 +30,7 @@ impl<'a> Day<'a> {
     /// From an empty table to a verified data set, and on to the next object.
     pub(crate) fn go_through(mut self) {
         self.name_the_object();
-        let cow = self.record_and_queue_the_next();
+        let cow = self.record();
         self.see_the_mask_by_the_turn(&cow);
         self.correct_it_by_a_stroke(&cow);
         self.check_it();
@@ -64,7 +64,7 @@ impl<'a> Day<'a> {
     }
 
     /// Returns the session's name.
-    fn record_and_queue_the_next(&mut self) -> String {
+    fn record(&mut self) -> String {
         let longest = self.rig.turn.longest;
         let phone = &mut self.phone;
         phone.tap("#go");
@@ -72,17 +72,11 @@ impl<'a> Day<'a> {
         phone.wait_for("document.getElementById('progress').value > 0.1");
         phone.wait_text("#go", "Stop");
         phone.see("recording");
-        phone.page().erase("cow".len());
-        phone.value("document.activeElement.blur()");
-        phone.value("document.getElementById('object').value = ''");
-        phone.write("#object", "calf");
-        phone.tap("#enqueue");
-        phone.wait_text("#queue-list", "calf");
         phone.wait_text_so_long("#last-text", "clean", longest);
-        phone.wait_text_so_long("#phase", "Put the next object on the table", longest);
-        phone.wait_text("#go", "Capture calf");
+        phone.wait_text_so_long("#phase", "Ready", longest);
+        phone.wait_text("#go", "Start cow");
         phone.wait_text("#sessions .day", "1 recorded");
-        phone.see("next-object");
+        phone.see("recorded");
         let sessions = self.sessions();
         assert_eq!(sessions.len(), 1, "{sessions:?}");
         let cow = sessions[0].clone();
@@ -223,18 +217,7 @@ impl<'a> Day<'a> {
         assert!(folder.is_dir());
     }
 
-    fn verify_the_data_set(&mut self) {
-        let longest = self.rig.turn.longest;
-        let phone = &mut self.phone;
-        phone.tap("#verify");
-        phone.wait_text_so_long("#verified", "Verification: ", longest);
-        assert_eq!(
-            phone.value("document.getElementById('verified').className"),
-            "good",
-            "{}",
-            phone.text("#verified")
-        );
-        phone.see("verified");
+    fn verify_the_data_set(&self) {
         let verified = self.rig.verify();
         assert_eq!(verified.status.code(), Some(0), "{verified:?}");
     }
@@ -252,7 +235,9 @@ impl<'a> Day<'a> {
     fn record_the_next(&mut self, before: &str) -> String {
         let longest = self.rig.turn.longest;
         let phone = &mut self.phone;
-        phone.wait_text("#go", "Capture calf");
+        phone.value("document.getElementById('object').value = ''");
+        phone.write("#object", "calf");
+        phone.wait_text("#go", "Start calf");
         phone.tap("#go");
         phone.wait_text("#phase", "Recording");
         phone.tap("#sessions li button:enabled");
@@ -287,7 +272,7 @@ impl<'a> Day<'a> {
             longest,
         );
         phone.wait_text_so_long("#phase", "Ready", longest);
-        phone.wait_text("#go", "Name the object");
+        phone.wait_text("#go", "Start");
         phone.value("document.getElementById('sessions-title').scrollIntoView()");
         phone.see("end-of-the-day");
         self.mask_is_right(session);

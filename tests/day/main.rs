@@ -28,7 +28,7 @@ fn main() -> ExitCode {
     let mut trials = trials![with chromium::find =>
         a_day_goes_by_taps_from_an_empty_table_to_a_verified_data_set_and_the_next_object,
         trouble::what_is_not_there_is_named_by_headline_and_button,
-        trouble::the_emergency_stop_comes_before_the_queue_and_the_aborted_object_after_it,
+        trouble::the_emergency_stop_comes_first_and_the_aborted_object_after_it,
         where_the_programs_are_missing_a_session_shows_its_commands,
     ];
     let long = trial("a_day_of_whole_turns", chromium::find, a_day_of_whole_turns);

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 /// What stands on the table, and how it turns.
@@ -158,9 +159,7 @@ fn fixtures() -> PathBuf {
 impl Drop for Rig {
     fn drop(&mut self) {
         // It ends its programs when it is asked to end.
-        let _ = Command::new("kill")
-            .arg(self.child.id().to_string())
-            .status();
+        let _ = kill_process(Pid::from_child(&self.child), Signal::TERM);
         let _ = self.child.wait();
     }
 }

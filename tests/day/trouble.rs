@@ -45,22 +45,17 @@ pub(crate) fn what_is_not_there_is_named_by_headline_and_button(browser: PathBuf
     phone.wait_for("document.getElementById('message').hidden");
 }
 
-pub(crate) fn the_emergency_stop_comes_before_the_queue_and_the_aborted_object_after_it(
-    browser: PathBuf,
-) {
+pub(crate) fn the_emergency_stop_comes_first_and_the_aborted_object_after_it(browser: PathBuf) {
     let longest = SLOW_TURN.longest;
     let table = "sim:?fault=estop@30s:10s";
     let rig = Rig::start_at(&SLOW_TURN, &SLOW_TURN.camera(), table);
     let mut phone = Phone::open(&browser, &rig.url, "emergency");
     phone.write("#object", "calf");
-    phone.tap("#enqueue");
-    phone.wait_text("#queue-list", "calf");
-    phone.wait_button("Capture calf", true);
+    phone.wait_button("Start calf", true);
     phone.tap("#go");
     phone.wait_button("Stop", true);
     phone.wait_text_so_long("#alarm", "release it", longest);
     phone.wait_button("Release the emergency stop", false);
-    phone.wait_for("document.getElementById('next').checkVisibility() === false");
     phone.value("scrollTo(0, 0)");
     phone.see("pressed");
     phone.wait_text_so_long("#phase", "The table is locked", longest);

@@ -1,4 +1,4 @@
-//! The rig as a daemon: commands, the queue, and what comes back by itself.
+//! The rig as a daemon: commands, and what comes back by itself.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -42,19 +42,9 @@ fn once(daemon: &Daemon, mut wanted: impl FnMut(&RigState) -> bool) -> RigState 
     state
 }
 
-fn dequeue(place: usize) -> Command {
-    Command::Dequeue {
-        place,
-        object: None,
-    }
-}
-
-const NEXT: Command = Command::Next { object: None };
-
-fn enqueue(daemon: &Daemon, objects: &[&str]) {
-    for object in objects {
-        let object = (*object).to_owned();
-        daemon.command(Command::Enqueue { object }).unwrap();
+fn start(object: &str) -> Command {
+    Command::Start {
+        object: object.to_owned(),
     }
 }
 
@@ -71,54 +61,37 @@ fn is_ready(state: &RigState) -> bool {
 }
 
 #[test]
-fn a_queue_is_captured_object_by_object_and_a_second_start_is_refused() {
+fn an_object_is_captured_and_a_second_start_is_refused() {
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
     once(&daemon, is_ready);
     once(&daemon, |state| state.camera.focus.is_some());
     once(&daemon, |_| daemon.monitor().preview().is_some());
-    enqueue(&daemon, &["mug", "cow"]);
-    once(&daemon, |state| state.phase == Phase::WaitingForObject);
-    daemon.command(NEXT).unwrap();
-    let again = daemon.command(NEXT).unwrap_err();
+    daemon.command(start("mug")).unwrap();
+    let again = daemon.command(start("mug")).unwrap_err();
     assert!(matches!(again, Refused::Busy(_)), "{again}");
     let state = once(&daemon, |state| {
-        state.last_take.is_some() && state.session.is_none()
+        state.last_take.is_some() && state.phase == Phase::Idle
     });
     let take = state.last_take.unwrap();
     assert_eq!(take.verdict, Verdict::Clean, "{take:?}");
     assert!(take.session.ends_with("-mug"));
-    assert_eq!(
-        once(&daemon, |state| state.phase == Phase::WaitingForObject).queue,
-        ["cow"]
-    );
-    daemon.command(dequeue(0)).unwrap();
-    assert_eq!(daemon.monitor().state().phase, Phase::Idle);
 }
 
 #[test]
-fn a_stopped_take_leaves_its_object_at_the_head_and_the_stop_does_not_reach_the_next_job() {
+fn the_stop_of_a_take_does_not_reach_the_next_job() {
     let root = tempfile::tempdir().unwrap();
     let mut settings = settings(root.path(), "", "none");
     // The take is stopped in its middle: it lasts until then, however late that is.
     settings.degrees_per_second = 1.0;
     let daemon = Daemon::start(settings).unwrap();
     once(&daemon, |state| state.camera.present);
-    enqueue(&daemon, &["mug", "cow", "bust"]);
-    daemon.command(NEXT).unwrap();
+    daemon.command(start("mug")).unwrap();
     once(&daemon, |state| state.frames > 5);
-    // A removal in the middle of the take takes out what stands at that place, and nothing else.
-    daemon.command(dequeue(1)).unwrap();
     daemon.command(Command::Stop).unwrap();
-    let state = once(&daemon, |state| state.phase == Phase::WaitingForObject);
+    let state = once(&daemon, |state| state.phase == Phase::Idle);
     assert_eq!(state.last_take.unwrap().verdict, Verdict::Aborted);
-    assert_eq!(state.queue, ["mug", "bust"]);
-    let other = Command::Next {
-        object: Some("bust".to_owned()),
-    };
-    let refused = daemon.command(other).unwrap_err();
-    assert!(matches!(refused, Refused::Busy(_)), "{refused}");
-    daemon.command(NEXT).unwrap();
+    once(&daemon, |_| daemon.command(start("mug")).is_ok());
     once(&daemon, |state| {
         state.phase == Phase::Recording && state.frames > 5
     });
@@ -138,18 +111,13 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
     once(&daemon, |state| state.table.state == "Idle");
     assert!(!moves(&daemon));
 
-    let object = "mug".to_owned();
-    let start = Command::Start {
-        object,
-        meter: false,
-    };
-    once(&daemon, |_| daemon.command(start.clone()).is_ok());
+    once(&daemon, |_| daemon.command(start("mug")).is_ok());
     once(&daemon, |state| state.frames > 20);
     daemon.end();
     let take = daemon.monitor().state().last_take.unwrap();
     assert_eq!(take.verdict, Verdict::Aborted);
     assert!(take.reason.unwrap().contains("told to end"));
-    assert!(daemon.command(start).is_err());
+    assert!(daemon.command(start("mug")).is_err());
 }
 
 #[test]
@@ -221,20 +189,7 @@ fn commands_that_make_no_sense_are_refused_where_they_are_given() {
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
     let refused = |command: Command| daemon.command(command).unwrap_err();
-    let object = || "a/b".to_owned();
-    assert!(matches!(
-        refused(Command::Start {
-            object: object(),
-            meter: false
-        }),
-        Refused::Invalid(_)
-    ));
-    assert!(matches!(
-        refused(Command::Enqueue { object: object() }),
-        Refused::Invalid(_)
-    ));
-    assert!(matches!(refused(dequeue(0)), Refused::Invalid(_)));
-    assert!(matches!(refused(NEXT), Refused::Invalid(_)));
+    assert!(matches!(refused(start("a/b")), Refused::Invalid(_)));
     assert!(matches!(refused(Command::Home), Refused::Unavailable(_)));
     assert!(matches!(
         refused(Command::Jog { degrees: f64::NAN }),
@@ -258,14 +213,9 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
     let state = press_in_motion(&daemon);
     let pressed = "the emergency stop is pressed: release it";
     assert_eq!(state.table.fault.as_deref(), Some(pressed));
-    let start = || Command::Start {
-        object: "mug".to_owned(),
-        meter: false,
-    };
     for command in [
-        start(),
+        start("mug"),
         Command::Home,
-        Command::Unlock,
         Command::Reset,
         Command::Jog { degrees: 5.0 },
     ] {
@@ -281,7 +231,7 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
     );
     // Nothing moves before a person has looked at the table.
     once(&daemon, |state| state.phase == Phase::Idle);
-    let refused = daemon.command(start()).unwrap_err();
+    let refused = daemon.command(start("mug")).unwrap_err();
     assert!(
         matches!(&refused, Refused::Unavailable(why) if why.contains("reset and home")),
         "{refused}"
@@ -291,13 +241,13 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
     once(&daemon, |state| {
         state.table.homed && state.table.state == "Idle"
     });
-    once(&daemon, |_| daemon.command(start()).is_ok());
+    once(&daemon, |_| daemon.command(start("mug")).is_ok());
     let state = once(&daemon, |state| state.last_take.is_some());
     assert_eq!(state.last_take.unwrap().verdict, Verdict::Clean);
 }
 
 #[test]
-fn a_speed_that_the_table_does_not_reach_is_refused_before_start_and_taken_back_by_settings() {
+fn a_speed_that_the_table_does_not_reach_is_refused_before_start() {
     let root = tempfile::tempdir().unwrap();
     let mut settings = settings(root.path(), "", "sim:?speed=20");
     settings.degrees_per_second = 72.0;
@@ -305,72 +255,11 @@ fn a_speed_that_the_table_does_not_reach_is_refused_before_start_and_taken_back_
     let state = once(&daemon, is_ready);
     assert_eq!(state.table.max_degrees_per_second, Some(36.0));
     let sentence = "the table turns at 36 degrees/s at most, and 72 degrees/s are set";
-    let start = || Command::Start {
-        object: "mug".to_owned(),
-        meter: false,
-    };
-    let refused = daemon.command(start()).unwrap_err();
+    let refused = daemon.command(start("mug")).unwrap_err();
     assert!(
         matches!(&refused, Refused::Unavailable(why) if why.contains(sentence)),
         "{refused}"
     );
     let advice = daemon.monitor().state().advice;
     assert!(advice.button.action.is_none(), "{advice:?}");
-    let speed = |degrees_per_second| Command::Configure {
-        size: None,
-        fps: None,
-        degrees_per_second: Some(degrees_per_second),
-        max_dropped: None,
-        retries: None,
-    };
-    let refused = daemon.command(speed(72.0)).unwrap_err();
-    assert!(
-        matches!(&refused, Refused::Invalid(why) if why.contains(sentence)),
-        "{refused}"
-    );
-    daemon.command(speed(36.0)).unwrap();
-    once(&daemon, |state| state.advice.headline == "Ready");
-    once(&daemon, |_| daemon.command(start()).is_ok());
-    let state = once(&daemon, |state| state.last_take.is_some());
-    assert_eq!(state.last_take.unwrap().verdict, Verdict::Clean);
-}
-
-#[test]
-fn settings_are_shown_and_changed_while_the_rig_rests() {
-    let root = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
-    let before = once(&daemon, |state| state.camera.present).settings;
-    assert_eq!((before.degrees_per_second, before.max_dropped), (36.0, 0));
-    let configure = |fps, max_dropped| Command::Configure {
-        size: None,
-        fps,
-        degrees_per_second: None,
-        max_dropped,
-        retries: None,
-    };
-    let refused = daemon.command(configure(Some(0.0), None)).unwrap_err();
-    assert!(matches!(refused, Refused::Invalid(_)), "{refused}");
-    daemon.command(configure(None, Some(7))).unwrap();
-    let after = once(&daemon, |state| state.settings.max_dropped == 7).settings;
-    assert_eq!((after.fps, after.degrees_per_second), (before.fps, 36.0));
-    // A rate that the camera does not have shows at the camera, and can be taken back.
-    once(&daemon, |_| {
-        daemon.command(configure(Some(60.0), None)).is_ok()
-    });
-    let state = once(&daemon, |state| {
-        !state.camera.present && state.camera.fault.is_some()
-    });
-    assert!(state.camera.fault.unwrap().contains("60"));
-    once(&daemon, |_| {
-        daemon.command(configure(Some(30.0), None)).is_ok()
-    });
-    once(&daemon, |state| state.camera.present);
-    assert!(
-        daemon
-            .monitor()
-            .state()
-            .log
-            .iter()
-            .any(|line| line.what.contains("60"))
-    );
 }

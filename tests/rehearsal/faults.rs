@@ -8,11 +8,8 @@ use std::time::Duration;
 
 use relit_data::causes::with_causes;
 use relit_data::session::{Status, recordings};
-use relit_rig::camera::{
-    self, Camera, CameraError, Control, ControlId, DeviceInfo, Frame, GrantedMode, Mode,
-    ModeRequest,
-};
-use relit_rig::capture::{CaptureError, MeterFault, Settings, Stopped};
+use relit_rig::camera::{self, Camera, CameraError, CameraMode, Control, DeviceInfo, Frame, Mode};
+use relit_rig::capture::{CaptureError, Settings, Stopped};
 use relit_rig::simulator::{SimulatedPort, SimulatedTable, SimulatorOptions};
 use relit_rig::state::{Phase, TakeSummary, Verdict};
 use relit_rig::turntable::{self, Port, Table};
@@ -33,7 +30,7 @@ fn check_aborted(rig: &Rehearsal, take: &TakeSummary, words: &str) {
 #[test]
 fn a_camera_unplugged_in_the_turn_ends_the_take_and_what_came_before_is_kept() {
     let mut rig = Rehearsal::short("&unplug=220", |_| {});
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     check_aborted(&rig, &take, "was unplugged");
     assert!(take.frames > 0);
 }
@@ -41,21 +38,21 @@ fn a_camera_unplugged_in_the_turn_ends_the_take_and_what_came_before_is_kept() {
 #[test]
 fn a_camera_that_falls_silent_ends_the_take() {
     let mut rig = Rehearsal::short("&stall=220", |_| {});
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     check_aborted(&rig, &take, "gave no frame");
 }
 
 #[test]
 fn a_camera_that_changes_its_size_ends_the_take() {
     let mut rig = Rehearsal::short("&resize=220", |_| {});
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     check_aborted(&rig, &take, "changed what it delivers");
 }
 
 #[test]
 fn a_take_with_a_dropped_frame_is_repeated_and_both_are_kept() {
     let mut rig = Rehearsal::short("&drop=220", |settings| settings.retries = 1);
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     check_aborted(&rig, &take, "1 frame lost");
     assert_eq!((take.frames, take.dropped), (299, 1));
     assert_eq!(recordings(rig.root.path()).unwrap().len(), 2);
@@ -76,7 +73,7 @@ fn a_tolerated_take_is_not_repeated_with_the_usual_settings() {
         settings.retries = usual.retries;
         settings.max_dropped = 5;
     });
-    let captured = rig.capture_all(false).unwrap();
+    let captured = rig.capture_all().unwrap();
     assert_eq!(captured.take.verdict, Verdict::Tolerated, "{captured:?}");
     assert_eq!(captured.repeated, 0);
     assert_eq!(recordings(rig.root.path()).unwrap().len(), 1);
@@ -102,11 +99,11 @@ impl Camera for LosesOneFrame {
         self.camera.controls()
     }
 
-    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError> {
+    fn set_control(&mut self, id: u32, value: i64) -> Result<i64, CameraError> {
         self.camera.set_control(id, value)
     }
 
-    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
+    fn start(&mut self, want: &CameraMode) -> Result<CameraMode, CameraError> {
         self.camera.start(want)
     }
 
@@ -132,7 +129,7 @@ fn a_clean_take_after_one_that_is_not_usable_counts_and_the_first_is_kept() {
         camera,
         frames_until_loss: 220,
     }));
-    let captured = rig.capture_all(false).unwrap();
+    let captured = rig.capture_all().unwrap();
     assert_eq!(captured.take.verdict, Verdict::Clean, "{captured:?}");
     assert_eq!(captured.repeated, 1);
     assert_eq!(recordings(rig.root.path()).unwrap().len(), 2);
@@ -142,7 +139,7 @@ fn a_clean_take_after_one_that_is_not_usable_counts_and_the_first_is_kept() {
 fn dropped_and_damaged_frames_within_the_limit_are_listed_and_kept() {
     let camera = "&drop=220&damage=240";
     let mut rig = Rehearsal::short(camera, |settings| settings.max_dropped = 2);
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     assert_eq!(
         (take.verdict, take.dropped),
         (Verdict::Tolerated, 1),
@@ -171,18 +168,18 @@ fn dropped_and_damaged_frames_within_the_limit_are_listed_and_kept() {
 #[test]
 fn a_controller_that_restarts_in_the_turn_ends_the_take() {
     let mut rig = Rehearsal::whole(SHORT, "&fault=reset@35s");
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     check_aborted(&rig, &take, "restarted");
     // Its position is lost: the next take looks for zero again, and comes out well.
     rig.equipment.table = None;
-    let again = rig.capture(false).unwrap();
+    let again = rig.capture().unwrap();
     assert_eq!(again.verdict, Verdict::Clean, "{again:?}");
 }
 
 #[test]
 fn a_table_that_stalls_ends_the_take() {
     let mut rig = Rehearsal::whole(SHORT, "&fault=stall@35s");
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     check_aborted(&rig, &take, "could not be seen at rest");
 }
 
@@ -204,7 +201,7 @@ fn interfere_in(phase: Phase, rig: &mut Rehearsal, interfere: impl FnOnce() + Se
             interfere();
         });
         interferes.unwrap();
-        rig.capture(false).unwrap()
+        rig.capture().unwrap()
     })
 }
 
@@ -221,7 +218,7 @@ fn a_stop_ends_the_take_within_five_seconds_and_stops_the_table() {
     assert!(took_us < 5_000_000, "{took_us} us");
     check_aborted(&rig, &take, "the program was told to end");
     // Another capture while the program ends is refused.
-    let error = rig.capture(false).unwrap_err();
+    let error = rig.capture().unwrap_err();
     assert!(matches!(error, CaptureError::Stopped(Stopped::Shutdown)));
 }
 
@@ -264,7 +261,7 @@ fn an_emergency_stop_while_the_table_turns_back_costs_no_take() {
         table.press_emergency_stop(true)
     });
     check_whole(&rig, &take, "ALARM:10");
-    let error = with_causes(&rig.capture(false).unwrap_err());
+    let error = with_causes(&rig.capture().unwrap_err());
     assert!(
         error.contains("the emergency stop is pressed: release it"),
         "{error}"
@@ -353,34 +350,19 @@ fn a_serial_line_that_is_unplugged_ends_the_take_and_the_next_one_finds_it_again
     rig.equipment.table = None;
     unplugged.store(false, Ordering::Relaxed);
     rig.equipment.table = Some(plug_in(&unplugged));
-    let again = rig.capture(false).unwrap();
+    let again = rig.capture().unwrap();
     assert_eq!(again.verdict, Verdict::Clean, "{again:?}");
     assert!(rig.stands(&simulated));
 }
 
 #[test]
-fn a_camera_whose_exposure_cannot_be_set_is_not_metered_and_nothing_is_recorded() {
-    let mut rig = Rehearsal::short("", |_| {});
-    let error = rig.capture(true).unwrap_err();
-    let fault = matches!(error, CaptureError::Meter(MeterFault::NoExposure));
-    assert!(fault, "{error}");
-    assert!(rig.table_stands());
-    assert!(recordings(rig.root.path()).is_err(), "no session was begun");
-}
-
-#[test]
-fn what_preflight_refuses_is_reported_with_its_numbers_and_nothing_turns() {
-    let mut rig = Rehearsal::short("", |settings| settings.min_battery_v = Some(13.0));
-    let error = with_causes(&rig.capture(false).unwrap_err());
-    assert!(error.contains("V and 13.00 V are demanded"), "{error}");
-    let simulator = rig.equipment.simulator().unwrap();
-    assert_eq!(simulator.angle_at(rig.equipment.clock().now_us()), 0.0);
-    drop(rig);
-
+fn what_preflight_refuses_is_reported_and_nothing_turns() {
     let mut rig = Rehearsal::short("", |settings| settings.mode.fps = 60.0);
-    let error = with_causes(&rig.capture(false).unwrap_err());
+    let error = with_causes(&rig.capture().unwrap_err());
     assert!(
         error.contains("does not offer any format of any size at 60"),
         "{error}"
     );
+    let simulator = rig.equipment.simulator().unwrap();
+    assert_eq!(simulator.angle_at(rig.equipment.clock().now_us()), 0.0);
 }

@@ -13,6 +13,7 @@ use relit_rig::capture::salvage;
 use relit_rig::clock::Clock;
 
 use crate::support::{Rehearsal, SHORT, fixture};
+use rustix::process::{Pid, Signal, kill_process};
 
 /// Frames of the turns that are recorded here at 36 degrees/s.
 const FRAMES: usize = 300;
@@ -38,7 +39,7 @@ fn only_session(root: &Path) -> (Recording, Vec<FrameEntry>) {
 
 /// Records a turn with the program, ends it by `signal` so many milliseconds after the table began to
 /// turn back, and checks that the take is whole.
-fn end_while_it_turns_back(signal: &str, milliseconds: u64) {
+fn end_while_it_turns_back(signal: Signal, milliseconds: u64) {
     let root = tempfile::tempdir().unwrap();
     let camera = format!("replay:{}?loop=1", fixture(SHORT).display());
     let mut child = Command::new(relit_tests::program("relit-capture"))
@@ -68,16 +69,15 @@ fn end_while_it_turns_back(signal: &str, milliseconds: u64) {
     assert!(entries.iter().all(|entry| entry.angle_deg.is_some()));
 }
 
-fn end(child: &mut Child, signal: &str) {
-    let pid = child.id().to_string();
+fn end(child: &mut Child, signal: Signal) {
     // It may have ended by itself.
-    let _status = Command::new("kill").args([signal, &pid]).status().unwrap();
+    let _ = kill_process(Pid::from_child(child), signal);
     child.wait().unwrap();
 }
 
 #[test]
 fn a_program_that_ends_while_the_table_turns_back_leaves_a_whole_take() {
-    for (signal, milliseconds) in ["-KILL", "-TERM"].iter().zip(random()) {
+    for (signal, milliseconds) in [Signal::KILL, Signal::TERM].into_iter().zip(random()) {
         end_while_it_turns_back(signal, milliseconds % 600);
     }
 }
@@ -87,7 +87,7 @@ fn a_program_that_ends_while_the_table_turns_back_leaves_a_whole_take() {
 #[ignore = "takes minutes"]
 fn thirty_programs_that_end_while_the_table_turns_back_leave_whole_takes() {
     for (n, at) in random().take(30).enumerate() {
-        let signal = ["-KILL", "-TERM"][n % 2];
+        let signal = [Signal::KILL, Signal::TERM][n % 2];
         end_while_it_turns_back(signal, at % 600);
     }
 }
@@ -125,7 +125,7 @@ fn child_that_turns_until_it_is_killed() {
             }
         });
         truth.unwrap();
-        rig.capture(false).unwrap();
+        rig.capture().unwrap();
     });
 }
 
@@ -166,7 +166,7 @@ fn kill_in_the_turn(frames: u64) -> f64 {
         line == "ENOUGH"
     });
     assert!(enough, "the turn ended before so many frames were written");
-    end(&mut child, "-KILL");
+    end(&mut child, Signal::KILL);
     assert_eq!(salvage(root.path()).unwrap().len(), 1);
     let (recording, entries) = only_session(root.path());
     let known: Vec<_> = entries

@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 use crate::support::{SHORT, fixture};
@@ -90,14 +91,7 @@ fn a_service_reports_its_start_life_and_end_and_lets_in_who_has_the_files_token(
     let bearer = format!("Authorization: Bearer {TOKEN}\r\n");
     assert_eq!(status(address, &bearer), "200");
 
-    let pid = running.0.id().to_string();
-    assert!(
-        Command::new("kill")
-            .args(["-TERM", &pid])
-            .status()
-            .unwrap()
-            .success()
-    );
+    kill_process(Pid::from_child(&running.0), Signal::TERM).unwrap();
     let last = std::iter::repeat_with(hear).find(|line| !line.starts_with("WATCHDOG"));
     assert_eq!(last.unwrap(), "STOPPING=1\n");
     assert!(running.0.wait().unwrap().success());

@@ -5,8 +5,7 @@ use std::time::Duration;
 
 use relit_data::session::Recording;
 use relit_rig::capture::{
-    CaptureContext, CaptureError, CaptureRequest, Captured, Equipment, Settings, StopRequest,
-    capture,
+    CaptureContext, CaptureError, Captured, Equipment, Settings, StopRequest, capture,
 };
 use relit_rig::clock::Participant;
 use relit_rig::simulator::SimulatedTable;
@@ -87,21 +86,17 @@ impl Rehearsal {
     }
 
     /// Captures, and gives the take that counts.
-    pub(crate) fn capture(&mut self, meter: bool) -> Result<TakeSummary, CaptureError> {
-        Ok(self.capture_all(meter)?.take)
+    pub(crate) fn capture(&mut self) -> Result<TakeSummary, CaptureError> {
+        Ok(self.capture_all()?.take)
     }
 
-    pub(crate) fn capture_all(&mut self, meter: bool) -> Result<Captured, CaptureError> {
+    pub(crate) fn capture_all(&mut self) -> Result<Captured, CaptureError> {
         let context = CaptureContext {
             monitor: &self.monitor,
             preview: None,
             stop: &self.stop,
         };
-        let request = CaptureRequest {
-            object: "mug".to_owned(),
-            meter,
-        };
-        capture(&mut self.equipment, &request, context)
+        capture(&mut self.equipment, "mug", context)
     }
 
     /// The session that a take left.

@@ -12,7 +12,7 @@ use crate::support::{Rehearsal, SHORT, TURN, fixture};
 
 /// Checks a whole take: so many frames, none lost, each with its angle. Gives its folder.
 fn check_whole(rig: &mut Rehearsal, wanted: usize) -> std::path::PathBuf {
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     assert_ne!(take.verdict, Verdict::Aborted, "{take:?}");
     assert_eq!((take.frames, take.dropped), (wanted as u64, 0));
     let session = rig.session(&take);
@@ -63,7 +63,7 @@ fn a_camera_without_a_table_is_recorded_as_long_as_a_turn_takes() {
     let mut rig = Rehearsal::with(SHORT, "&speed=0", "none", |settings| {
         settings.degrees_per_second = 36.0;
     });
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     assert_eq!(
         (take.verdict, take.frames),
         (Verdict::Clean, 300),
@@ -101,7 +101,7 @@ fn even_room(folder: &Path) -> PathBuf {
 
 /// What a take says of the room: whether it is good, and a sentence.
 fn room_check(rig: &mut Rehearsal) -> (bool, String) {
-    let take = rig.capture(false).unwrap();
+    let take = rig.capture().unwrap();
     assert_eq!(take.verdict, Verdict::Clean, "{take:?}");
     let checks = rig.monitor.state().checks;
     let check = checks.into_iter().find(|check| check.what == "light");

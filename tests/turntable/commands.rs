@@ -1,38 +1,36 @@
 //! `relit-capture turntable` and `relit-capture simulate`, as a person types them.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use relit_rig::lockfile;
-use relit_rig::turntable::Owner;
+use relit_rig::simulator::{Simulator, SimulatorOptions};
+use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_relit-capture");
 
-/// A simulator in a process of its own.
+/// A simulated table at a port that programs open.
 struct Simulated {
-    process: Child,
+    simulator: Simulator,
     folder: TempDir,
 }
 
 impl Simulated {
-    fn start(more: &[&str]) -> Simulated {
+    fn start(options: &SimulatorOptions) -> Simulated {
         let folder = TempDir::new().unwrap();
-        let mut process = Command::new(PROGRAM)
-            .args(["--json", "simulate", "--for", "600", "--link"])
-            .arg(folder.path().join("table"))
-            .args(more)
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut ready = String::new();
-        BufReader::new(process.stdout.as_mut().unwrap())
-            .read_line(&mut ready)
-            .unwrap();
-        assert!(ready.contains("\"ready\""), "{ready}");
-        Simulated { process, folder }
+        let link = folder.path().join("table");
+        let simulator = Simulator::start(options, Some(&link)).unwrap();
+        Simulated { simulator, folder }
+    }
+
+    /// One that opening does not reset.
+    fn without_reset() -> Simulated {
+        Simulated::start(&SimulatorOptions {
+            reset_on_open: false,
+            ..SimulatorOptions::default()
+        })
     }
 
     fn port(&self) -> PathBuf {
@@ -40,36 +38,46 @@ impl Simulated {
     }
 
     fn ask(&self, words: &[&str]) -> Output {
-        Command::new(PROGRAM)
-            .args(["turntable", "--turntable"])
-            .arg(format!("serial:{}", self.port().display()))
-            .args(words)
-            .output()
-            .unwrap()
+        ask(&self.port(), words)
     }
 
-    /// What `status` says once the table moves. The port is left alone until `owner` has it: whoever
-    /// comes first owns it.
-    fn status_in_motion(&self, owner: &Child) -> String {
-        let folder = lockfile::standard_folder();
+    /// Starts a jog in a process of its own, and waits until the table moves.
+    fn jog(&self, words: &[&str]) -> Child {
+        let jog = Command::new(PROGRAM)
+            .args(["turntable", "--turntable"])
+            .arg(format!("serial:{}", self.port().display()))
+            .arg("jog")
+            .args(words)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
         for _ in 0..600 {
-            std::thread::sleep(std::time::Duration::from_millis(100));
-            let found = Owner::find(&self.port(), &folder).unwrap();
-            if found.is_some_and(|found| found.pid() == owner.id()) {
-                let status = out(&self.ask(&["status"]));
-                if status.starts_with("Jog") {
-                    return status;
-                }
+            if self.simulator.table().edges().len() > 100 {
+                return jog;
             }
+            std::thread::sleep(Duration::from_millis(100));
         }
         panic!("the table never moved");
     }
 }
 
-impl Drop for Simulated {
+fn ask(port: &Path, words: &[&str]) -> Output {
+    Command::new(PROGRAM)
+        .args(["turntable", "--turntable"])
+        .arg(format!("serial:{}", port.display()))
+        .args(words)
+        .output()
+        .unwrap()
+}
+
+/// A simulator in a process of its own, until it is dropped.
+struct Program(Child);
+
+impl Drop for Program {
     fn drop(&mut self) {
-        let _gone = self.process.kill();
-        let _gone = self.process.wait();
+        let _gone = self.0.kill();
+        let _gone = self.0.wait();
     }
 }
 
@@ -83,8 +91,20 @@ fn err(output: &Output) -> String {
 
 #[test]
 fn a_table_is_looked_at_moved_and_stopped_from_the_command_line() {
-    let table = Simulated::start(&["--no-reset"]);
-    let status = table.ask(&["status"]);
+    let folder = TempDir::new().unwrap();
+    let port = folder.path().join("table");
+    let process = Command::new(PROGRAM)
+        .args(["--json", "simulate", "--link"])
+        .arg(&port)
+        .stdout(Stdio::piped())
+        .spawn();
+    let mut program = Program(process.unwrap());
+    let mut ready = String::new();
+    BufReader::new(program.0.stdout.as_mut().unwrap())
+        .read_line(&mut ready)
+        .unwrap();
+    assert!(ready.contains("\"ready\""), "{ready}");
+    let status = ask(&port, &["status"]);
     assert!(status.status.success(), "{}", err(&status));
     assert!(
         out(&status).starts_with("Idle, 0.000 degrees"),
@@ -92,41 +112,35 @@ fn a_table_is_looked_at_moved_and_stopped_from_the_command_line() {
         out(&status)
     );
     assert!(out(&status).contains("battery 12.0"), "{}", out(&status));
-    let jogged = table.ask(&["jog", "-12.5", "--speed", "20"]);
+    let jogged = ask(&port, &["jog", "-12.5", "--speed", "20"]);
     assert!(jogged.status.success(), "{}", err(&jogged));
     assert!(out(&jogged).contains("-12.499 degrees"), "{}", out(&jogged));
-    let home = table.ask(&["home"]);
+    let home = ask(&port, &["home"]);
     assert!(home.status.success(), "{}", err(&home));
     assert!(
         err(&home).contains("where the table stands"),
         "{}",
         err(&home)
     );
-    let json = table.ask(&["status", "--json"]);
+    let json = ask(&port, &["status", "--json"]);
     let value: serde_json::Value = serde_json::from_str(&out(&json)).unwrap();
     assert_eq!(value["event"], "status");
     assert_eq!(value["state"], "idle");
 }
 
 #[test]
-fn a_second_program_reaches_a_moving_table_through_its_owner() {
-    let table = Simulated::start(&[]);
-    let mut jog = Command::new(PROGRAM)
-        .args(["turntable", "--turntable"])
-        .arg(format!("serial:{}", table.port().display()))
-        .args(["jog", "300", "--speed", "10"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    assert!(table.status_in_motion(&jog).contains("degrees/s"));
-    let refused = table.ask(&["jog", "5"]);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(
-        err(&refused).contains(&format!("process {}", jog.id())),
-        "{}",
-        err(&refused)
-    );
+fn a_second_program_is_told_who_has_the_table_and_a_stop_ends_that_one() {
+    let table = Simulated::start(&SimulatorOptions::default());
+    let mut jog = table.jog(&["300", "--speed", "10"]);
+    for words in [&["jog", "5"][..], &["status"]] {
+        let refused = table.ask(words);
+        assert_eq!(refused.status.code(), Some(1));
+        assert!(
+            err(&refused).contains(&format!("process {}", jog.id())),
+            "{}",
+            err(&refused)
+        );
+    }
     let stopped = table.ask(&["stop"]);
     assert!(stopped.status.success(), "{}", err(&stopped));
     assert!(out(&stopped).starts_with("Idle"), "{}", out(&stopped));
@@ -151,7 +165,7 @@ fn what_is_wrong_is_said_in_a_sentence() {
         err(&nothing)
     );
     let fault = Command::new(PROGRAM)
-        .args(["simulate", "--fault", "gremlins=1", "--for", "1"])
+        .args(["simulate", "--fault", "gremlins=1"])
         .output()
         .unwrap();
     assert_eq!(fault.status.code(), Some(1));
@@ -165,21 +179,9 @@ fn what_is_wrong_is_said_in_a_sentence() {
 
 #[test]
 fn a_jog_that_is_interrupted_stops_the_table() {
-    let table = Simulated::start(&["--no-reset"]);
-    let mut jog = Command::new(PROGRAM)
-        .args(["turntable", "--turntable"])
-        .arg(format!("serial:{}", table.port().display()))
-        .args(["jog", "300", "--speed", "10"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    table.status_in_motion(&jog);
-    let interrupted = Command::new("kill")
-        .args(["-INT", &jog.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(interrupted.success());
+    let table = Simulated::without_reset();
+    let mut jog = table.jog(&["300", "--speed", "10"]);
+    kill_process(Pid::from_child(&jog), Signal::INT).unwrap();
     assert_eq!(jog.wait().unwrap().code(), Some(1));
     let first = out(&table.ask(&["status"]));
     let second = out(&table.ask(&["status"]));
@@ -207,7 +209,10 @@ fn type_in(port: &std::path::Path, line: &str) {
 
 #[test]
 fn where_each_opening_resets_and_locks_the_controller_a_jog_can_home_first() {
-    let table = Simulated::start(&["--index-at", "3"]);
+    let table = Simulated::start(&SimulatorOptions {
+        index_at: 3.0,
+        ..SimulatorOptions::default()
+    });
     type_in(&table.port(), "$22=1");
     let home = table.ask(&["home"]);
     assert!(home.status.success(), "{}", err(&home));
@@ -227,16 +232,8 @@ fn where_each_opening_resets_and_locks_the_controller_a_jog_can_home_first() {
 
 #[test]
 fn a_moving_table_that_nobody_has_is_stopped_and_that_is_said() {
-    let table = Simulated::start(&["--no-reset"]);
-    let mut jog = Command::new(PROGRAM)
-        .args(["turntable", "--turntable"])
-        .arg(format!("serial:{}", table.port().display()))
-        .args(["jog", "390", "--speed", "5"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    table.status_in_motion(&jog);
+    let table = Simulated::without_reset();
+    let mut jog = table.jog(&["390", "--speed", "5"]);
     jog.kill().unwrap();
     jog.wait().unwrap();
     let status = table.ask(&["status"]);

@@ -2,7 +2,7 @@
 
 use relit_rig::clock::{Clock, Participant};
 use relit_rig::simulator::{SimulatedTable, Simulator, SimulatorOptions};
-use relit_rig::turntable::{Table, TableOptions, TurnPlan, TurnRequest, TurntableError};
+use relit_rig::turntable::{Table, TableOptions, TurnPlan, TurntableError};
 use tempfile::TempDir;
 
 /// Degrees in one step, at the firmware's default of 88.889 steps a degree.
@@ -92,14 +92,7 @@ pub(crate) fn paper_turn(table: &Table) -> TurnPlan {
 
 /// As much of the paper's turn.
 pub(crate) fn turn_by(table: &Table, turn_deg: f64) -> TurnPlan {
-    let request = TurnRequest {
-        degrees_per_second: 7.2,
-        turn_deg,
-        margin_deg: 3.6,
-        direction: None,
-        unwind: true,
-    };
-    TurnPlan::new(table.identity(), &table.status().unwrap(), &request).unwrap()
+    TurnPlan::new(table.identity(), &table.status().unwrap(), 7.2, turn_deg).unwrap()
 }
 
 /// Median, 99th percentile and largest of what is given, without their signs.

@@ -4,7 +4,6 @@ mod command_line;
 mod commands;
 mod folder;
 mod library;
-mod light;
 mod photos;
 mod shipped;
 mod values;

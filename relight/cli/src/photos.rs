@@ -3,14 +3,85 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use relight_core::image::Transfer;
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, SpecularGate};
-use relight_photo::files::UnusedFile;
+use relight_photo::files::{FoundPhotos, PhotoInput, PhotoReading, UnusedFile};
 use relight_photo::nets::{NetError, Weights};
-use relit_console::Console;
+use relit_console::{Console, Outcome};
+use relit_data::geometry::Rect;
 use serde_json::json;
 
+use crate::commands::CommandResult;
 use crate::shipped;
-use crate::values::{GATES, one_of};
+use crate::values::{GATES, TRANSFERS, one_of};
+
+/// Photographs, and where their objects are.
+#[derive(Args)]
+pub(crate) struct PhotoArguments {
+    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
+    #[arg(required = true, value_name = "PHOTO")]
+    pub(crate) photos: Vec<PathBuf>,
+    /// A grey image as large as the photograph, white on the object; or a folder of such, <photo's name>.png
+    /// [default: the photograph's alpha, or what is not black before a black background].
+    #[arg(long, value_name = "FILE|DIR")]
+    pub(crate) mask: Option<PathBuf>,
+    /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
+    #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
+    pub(crate) rect: Option<Rect>,
+    /// How PNG, JPEG and WebP photographs are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
+    #[arg(long, value_parser = one_of(TRANSFERS))]
+    pub(crate) transfer: Option<Transfer>,
+}
+
+impl PhotoArguments {
+    /// Whether one of the inputs is a folder or a shard.
+    pub(crate) fn has_set(&self) -> bool {
+        self.photos
+            .iter()
+            .any(|path| path.is_dir() || path.extension().is_some_and(|e| e == "tar"))
+    }
+
+    pub(crate) fn reading(&self) -> PhotoReading {
+        PhotoReading {
+            mask: self.mask.clone(),
+            rectangle: self.rect,
+            transfer: self.transfer,
+        }
+    }
+
+    /// The photographs, of each shard at most so many; names the files of folders that are not used.
+    pub(crate) fn find(
+        &self,
+        most: Option<u32>,
+        output: &Path,
+        console: Console,
+    ) -> Result<FoundPhotos, DecomposeError> {
+        let mut found = PhotoInput::find(&self.photos, most)?;
+        found
+            .unused
+            .retain(|file| !is_at(&file.path, self.mask.as_deref(), output));
+        name_unused(&found.unused, console);
+        Ok(found)
+    }
+}
+
+/// What comes of a run in which so many photographs were lost.
+pub(crate) fn outcome(found: &FoundPhotos, lost: usize, what: &str) -> CommandResult {
+    match lost {
+        0 if found.unused.is_empty() => Ok(Outcome::Whole),
+        _ if lost > 0 && lost == found.inputs.len() => {
+            Err(format!("no photograph could be {what}").into())
+        }
+        _ => Ok(Outcome::Incomplete),
+    }
+}
+
+/// Says that a photograph is lost, and why.
+pub(crate) fn name_lost(input: &PhotoInput, message: &str, console: Console) {
+    let text = format!("{}: {message}", input.place());
+    let event = json!({ "event": "failed", "photo": input.place(), "message": message });
+    console.warn_with(&text, &event);
+}
 
 /// How photographs are decomposed.
 #[derive(Args)]
@@ -56,7 +127,7 @@ impl NetworkArguments {
 }
 
 /// Whether a path is that of the masks or of what is written.
-pub(crate) fn is_at(path: &Path, masks: Option<&Path>, output: &Path) -> bool {
+fn is_at(path: &Path, masks: Option<&Path>, output: &Path) -> bool {
     let real = |path: &Path| path.canonicalize().ok();
     let known = masks.into_iter().chain([output]);
     known
@@ -65,7 +136,7 @@ pub(crate) fn is_at(path: &Path, masks: Option<&Path>, output: &Path) -> bool {
 }
 
 /// Names the files of folders that are not used.
-pub(crate) fn name_unused(unused: &[UnusedFile], console: Console) {
+fn name_unused(unused: &[UnusedFile], console: Console) {
     for file in unused {
         let event = json!({ "event": "unused", "file": file.path, "message": file.message });
         console.warn_with(&file.message, &event);

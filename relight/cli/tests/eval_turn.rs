@@ -67,7 +67,7 @@ fn a_turn_is_scored_by_each_method() {
 /// What `relight turn` writes and warns of with these options.
 fn solved(data: &Path, options: &[&str], out: &Path) -> (serde_json::Value, String) {
     let shard = data.join("synth-12-0000.tar");
-    let mut arguments = vec!["turn", shard.to_str().unwrap(), "--no-video"];
+    let mut arguments = vec!["turn", shard.to_str().unwrap()];
     arguments.extend(["-o", out.to_str().unwrap()]);
     arguments.extend(options);
     let output = relight(&arguments);

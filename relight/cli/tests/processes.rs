@@ -23,7 +23,7 @@ use tempfile::TempDir;
 fn settings(steps: u64, precision: &str) -> String {
     format!(
         "[run]\nsteps = {steps}\nbatch = 4\nprecision = \"{precision}\"\nlog_every = 1\nvalidate_every = 1000000\n\
-         [data]\nsize = 32\nviews = 1\nlightings = 2\nshuffle_buffer = 8\nreuse = 2.0\nvalidation = 1\n"
+         [data]\nsize = 32\nviews = 8\nrays = 16\nvalidation = 1\n"
     )
 }
 

@@ -3,14 +3,16 @@
 //!
 //!     cargo run --release -p relight --example pictures -- docs/images
 
+mod integral;
+
 use std::error::Error;
 use std::path::Path;
 
 use relight_core::image::{Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Direction, Normals, Order, Panorama, YUp};
 use relight_core::render::{
-    DiffuseForm, DiffuseLayer, Gloss, LobeLayer, Look, MonteCarlo, PowerLayer, SpecularForm,
-    Surface, exposure_for,
+    DiffuseForm, DiffuseLayer, Gloss, LobeLayer, Look, PowerLayer, SpecularForm, Surface,
+    exposure_for,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -55,7 +57,7 @@ fn conventions() -> Result<Rgb<Linear>, Box<dyn Error>> {
     Ok(Rgb::new(beside(&parts)))
 }
 
-/// From above: Monte Carlo, the lobe for light of order 24 and of order 2, and the paper's formula in the
+/// From above: the ground truth, the lobe for light of order 24 and of order 2, and the paper's formula in the
 /// scale that suits best; from the left, smoothness from 5 to 200.
 fn highlights() -> Result<Rgb<Linear>, Box<dyn Error>> {
     let normals = Normals::sphere(96);
@@ -65,7 +67,7 @@ fn highlights() -> Result<Rgb<Linear>, Box<dyn Error>> {
     let mut rows = [const { Vec::new() }; 4];
     for smoothness in [5.0, 10.0, 20.0, 50.0, 100.0, 200.0] {
         let gloss = Gloss::even(normals.extent(), [1.0; 3], smoothness);
-        let [truth, _] = MonteCarlo::new(&panorama, 1000).highlights(&normals, &gloss, 1)?;
+        let truth = integral::highlight(&panorama, &normals, smoothness, false);
         let power = PowerLayer::new(&second).highlight(&normals, &gloss)?;
         let scale = inner(&power, &truth) / inner(&power, &power);
         // All in one exposure, in which the brightest of the ground truth is white.

@@ -1,15 +1,17 @@
-//! The specular layers' errors against Monte Carlo integration of the Blinn-Phong highlight, on a
-//! sphere under each panorama of a folder, as a table in Markdown.
+//! The specular layers' errors against the Blinn-Phong highlight, summed over a panorama's pixels, on a sphere under each
+//! panorama of a folder, as a table in Markdown.
 //!
-//!     cargo run --release -p relight --example specular_error -- FOLDER [SAMPLES]
+//!     cargo run --release -p relight-core --features files,threads --example specular_error -- FOLDER
 #![allow(clippy::print_stdout, reason = "it prints a table")]
+
+mod integral;
 
 use std::error::Error;
 use std::path::PathBuf;
 
 use relight_core::image::{Linear, Rgb};
 use relight_core::light::{Normals, Order, Panorama, YUp};
-use relight_core::render::{Gloss, Horizon, LobeLayer, MonteCarlo, PowerLayer};
+use relight_core::render::{Gloss, LobeLayer, PowerLayer};
 
 const SMOOTHNESSES: [f32; 6] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 
@@ -17,8 +19,7 @@ const SMOOTHNESSES: [f32; 6] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 const SIDE: usize = 16;
 
 /// The columns of the table, apart from the smoothness.
-const COLUMNS: [&str; 8] = [
-    "Monte Carlo's own",
+const COLUMNS: [&str; 7] = [
     "paper's formula",
     "the same, best scale",
     "lobe, order 2",
@@ -29,9 +30,9 @@ const COLUMNS: [&str; 8] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let folder = arguments.next().ok_or("give a folder of panoramas")?;
-    let samples = arguments.next().map_or(Ok(4096), |text| text.parse())?;
+    let folder = std::env::args()
+        .nth(1)
+        .ok_or("give a folder of panoramas")?;
     let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)?
         .map(|entry| entry.map(|entry| entry.path()))
         .collect::<Result<_, _>>()?;
@@ -43,11 +44,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in &paths {
         let panorama = Panorama::read(path)?;
         for (errors, smoothness) in errors.iter_mut().zip(SMOOTHNESSES) {
-            errors.push(row(&panorama, &normals, smoothness, samples)?);
+            errors.push(row(&panorama, &normals, smoothness)?);
         }
     }
 
-    println!("{} panoramas, {samples} samples a normal.", paths.len());
+    println!("{} panoramas.", paths.len());
     println!(
         "Root mean square error over that of the truth, mean (and largest) over the panoramas.\n"
     );
@@ -72,13 +73,10 @@ fn row(
     panorama: &Panorama,
     normals: &Normals<YUp>,
     smoothness: f32,
-    samples: u32,
 ) -> Result<[f64; COLUMNS.len()], Box<dyn Error>> {
     let gloss = Gloss::even(normals.extent(), [1.0; 3], smoothness);
-    let integrator = MonteCarlo::new(panorama, samples);
-    let [truth, standard] = integrator.highlights(normals, &gloss, 1)?;
-    let integrator = integrator.with_horizon(Horizon::Closed);
-    let [closed, _] = integrator.highlights(normals, &gloss, 1)?;
+    let [truth, closed] =
+        [false, true].map(|closed| integral::highlight(panorama, normals, smoothness, closed));
 
     let all = panorama.project(Order::new(48)?);
     let lobe = |order: usize| -> Result<f64, Box<dyn Error>> {
@@ -88,7 +86,6 @@ fn row(
     let power = PowerLayer::new(&all).highlight(normals, &gloss)?;
     let scale = inner(&power, &truth) / inner(&power, &power);
     Ok([
-        (inner(&standard, &standard) / inner(&truth, &truth)).sqrt(),
         error(&power, &truth, 1.0),
         error(&power, &truth, scale),
         lobe(2)?,

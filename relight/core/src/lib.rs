@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | [`image`] | planes of `f32`, colours that know their space, encoded pictures |
 //! | [`light`] | directions, rotations, spherical harmonics, panoramas, normal maps |
-//! | [`render`] | diffuse and specular layers on normals, Monte Carlo as the reference |
+//! | [`render`] | diffuse and specular layers on normals |
 //! | [`metrics`] | how far an estimate is from the ground truth |
 //! | [`captured_object`] | a captured object in one file, ready to be lit |
 //! | [`statistics`] | median and quantiles of samples |

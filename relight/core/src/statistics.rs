@@ -3,55 +3,39 @@
 //! All of them are samples themselves, by the nearest rank. Nothing is interpolated. Samples are compared by the total
 //! order of floating-point numbers.
 
-use std::cmp::Ordering;
-
-/// A floating-point number with a total order.
-pub trait TotalOrder: Copy {
-    /// The total order.
-    fn total_order(&self, other: &Self) -> Ordering;
-}
-
-impl TotalOrder for f32 {
-    fn total_order(&self, other: &Self) -> Ordering {
-        self.total_cmp(other)
-    }
-}
-
-impl TotalOrder for f64 {
-    fn total_order(&self, other: &Self) -> Ordering {
-        self.total_cmp(other)
-    }
-}
-
 /// The sample that has `rank` others before it, from 0; the largest where there are fewer. None where there are no
 /// samples. The samples are left in another order.
-pub fn ranked<T: TotalOrder>(samples: &mut [T], rank: usize) -> Option<T> {
+pub fn ranked<T: Copy + Into<f64>>(samples: &mut [T], rank: usize) -> Option<T> {
     let last = samples.len().checked_sub(1)?;
-    let (_, found, _) = samples.select_nth_unstable_by(rank.min(last), T::total_order);
+    let order = |a: &T, b: &T| (*a).into().total_cmp(&(*b).into());
+    let (_, found, _) = samples.select_nth_unstable_by(rank.min(last), order);
     Some(*found)
 }
 
 /// The sample that this part of all, 0 to 1, lies below. None where there are no samples.
-pub fn above_part<T: TotalOrder>(samples: impl IntoIterator<Item = T>, part: f64) -> Option<T> {
+pub fn above_part<T: Copy + Into<f64>>(
+    samples: impl IntoIterator<Item = T>,
+    part: f64,
+) -> Option<T> {
     let mut samples: Vec<T> = samples.into_iter().collect();
     let rank = (samples.len() as f64 * part) as usize;
     ranked(&mut samples, rank)
 }
 
 /// The quantile of a part, 0 to 1: the sample of rank `part (n - 1)`, rounded down. None where there are no samples.
-pub fn quantile<T: TotalOrder>(samples: impl IntoIterator<Item = T>, part: f64) -> Option<T> {
+pub fn quantile<T: Copy + Into<f64>>(samples: impl IntoIterator<Item = T>, part: f64) -> Option<T> {
     let mut samples: Vec<T> = samples.into_iter().collect();
     let rank = (samples.len().saturating_sub(1) as f64 * part) as usize;
     ranked(&mut samples, rank)
 }
 
 /// The sample in the middle, the lower of two; none where there are no samples.
-pub fn median<T: TotalOrder>(samples: impl IntoIterator<Item = T>) -> Option<T> {
+pub fn median<T: Copy + Into<f64>>(samples: impl IntoIterator<Item = T>) -> Option<T> {
     quantile(samples, 0.5)
 }
 
 /// The sample in the middle, the upper of two; none where there are no samples.
-pub fn upper_median<T: TotalOrder>(samples: impl IntoIterator<Item = T>) -> Option<T> {
+pub fn upper_median<T: Copy + Into<f64>>(samples: impl IntoIterator<Item = T>) -> Option<T> {
     let mut samples: Vec<T> = samples.into_iter().collect();
     let rank = samples.len() / 2;
     ranked(&mut samples, rank)

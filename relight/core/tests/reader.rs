@@ -415,38 +415,6 @@ fn the_files_of_janner_et_al_hold_y_down_in_red_and_x_in_green() {
 }
 
 #[test]
-fn the_files_of_lime_are_paired_in_order_and_y_points_down() {
-    let dir = tempfile::tempdir().unwrap();
-    for name in ["a", "b"] {
-        plain(
-            &dir.path().join(format!("Input_Masked/{name}_in.png")),
-            [188; 3],
-        );
-        plain(
-            &dir.path().join(format!("Normal/{name}_n.png")),
-            [RIGHT, DOWN, VIEWER],
-        );
-        fs::create_dir_all(dir.path().join("Mask")).unwrap();
-        mask()
-            .save(dir.path().join(format!("Mask/{name}.png")))
-            .unwrap();
-    }
-    let set = TruthSet::open(dir.path(), TruthLayout::Lime).unwrap();
-    let sample = set.load(1).unwrap();
-    assert_eq!(sample.name, "b");
-    let normals = sample.normals.unwrap();
-    assert!(near(first_pixel(normals.planes()), [0.6, 0.36, 0.714]));
-    let image = sample.image.unwrap();
-    assert!(near(first_pixel(image.planes()), [0.503; 3]));
-
-    plain(&dir.path().join("Normal/c_n.png"), [0; 3]);
-    let Err(error) = TruthSet::open(dir.path(), TruthLayout::Lime) else {
-        panic!("opened")
-    };
-    assert!(error.to_string().contains("has 3 files and"), "{error}");
-}
-
-#[test]
 fn a_part_of_another_size_is_damage() {
     let dir = tempfile::tempdir().unwrap();
     for file in ["original", "diffuse", "reflectance", "shading", "specular"] {

@@ -1,9 +1,8 @@
 //! Albedo and shading of single images: the table on MIT Intrinsic Images.
 
-use super::retinex::{self, divided};
 use super::run::{Scored, UNLIT, add_method, grey, measured, need, object, of_grey};
 use super::{EvalError, EvalProgress, MaskRule, Predictions, ScoreTable};
-use relight_core::image::{Linear, Rgb};
+use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::metrics::{Convention, IntrinsicError, Windows, intrinsic_error};
 use relight_core::reader::{TruthSample, TruthSet};
 use relight_core::render::{DiffuseForm, DiffuseLayer, fit_light};
@@ -28,8 +27,6 @@ enum Baseline {
     LuminanceShading,
     /// The shading is the square root of that mean.
     RootShading,
-    /// Colour Retinex.
-    Retinex,
     /// Not a baseline but a bound: the true normals under the light of order 2 that fits the true
     /// shading best. The shading is at least a fifth of its mean.
     Oracle,
@@ -37,12 +34,11 @@ enum Baseline {
 
 impl Baseline {
     /// All of them, as a table names them.
-    const ALL: [(Self, &str); 6] = [
+    const ALL: [(Self, &str); 5] = [
         (Self::ConstantAlbedo, "constant albedo"),
         (Self::ConstantShading, "constant shading"),
         (Self::LuminanceShading, "shading = luminance"),
         (Self::RootShading, "shading = root of luminance"),
-        (Self::Retinex, "colour Retinex"),
         (Self::Oracle, "oracle: true normals, fitted light"),
     ];
 
@@ -71,7 +67,6 @@ impl Baseline {
             }),
             Self::LuminanceShading => shaded_by(grey(image)),
             Self::RootShading => shaded_by(grey(image).into_iter().map(f32::sqrt).collect()),
-            Self::Retinex => shaded_by(retinex::shading(image, mask)),
             Self::Oracle => shaded_by(fitted_shading(sample, mask)?),
         }
     }
@@ -81,6 +76,17 @@ impl Baseline {
 struct IntrinsicImages {
     albedo: Rgb<Linear>,
     shading: Option<Rgb<Linear>>,
+}
+
+/// The image divided by a shading; 0 where the shading is.
+fn divided(image: &Rgb<Linear>, shading: &[f32]) -> Rgb<Linear> {
+    let mut planes: Planes<3> = image.planes().clone();
+    for plane in planes.planes_mut() {
+        for (value, &shading) in plane.iter_mut().zip(shading) {
+            *value = if shading > 0.0 { *value / shading } else { 0.0 };
+        }
+    }
+    Rgb::new(planes)
 }
 
 /// The grey shading of the true normals under the light that fits the true shading best.

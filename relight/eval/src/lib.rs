@@ -6,7 +6,6 @@
 //! | [`evaluate_normals`] | normals | normals | MSE, DSSIM, angles |
 //! | [`evaluate_light`] | normals and shading | light as coefficients | MSE, SMSE, SSIM of the shading that it makes |
 //! | [`evaluate_highlights`] | image, highlight | highlight | MSE, DSSIM of the highlight and of what it leaves |
-//! | [`evaluate_ordinal`] | what people judged of points | albedo | WHDR |
 //! | [`evaluate_turns`] | turns with normals, albedo, light | nothing: it runs `turn` | angles, albedo, what is expected beside what is |
 //! | [`evaluate_relighting`] | an object's maps, images under many lights | maps, or images | MSE, DSSIM |
 //!
@@ -19,10 +18,8 @@ mod highlights;
 mod intrinsic;
 mod light;
 mod normals;
-mod ordinal;
 mod predictions;
 mod relighting;
-mod retinex;
 mod run;
 mod scores;
 mod turns;
@@ -32,14 +29,13 @@ pub use highlights::evaluate_highlights;
 pub use intrinsic::{IntrinsicInput, evaluate_intrinsic};
 pub use light::evaluate_light;
 pub use normals::evaluate_normals;
-pub use ordinal::evaluate_ordinal;
 pub use predictions::Predictions;
 pub use relighting::{
     RelightMethod, RelightingRecipe, RelightingSet, evaluate_relighting, make_relighting,
 };
 pub use run::EvalProgress;
-pub use scores::{ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
-pub use turns::{TurnMethod, TurnTable, evaluate_turns};
+pub use scores::{ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
+pub use turns::{TurnTable, evaluate_turns};
 
 /// The examples of the README, so that they are built.
 #[cfg(doctest)]

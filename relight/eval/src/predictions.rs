@@ -6,11 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::EvalError;
-use relight_core::files::read_planes;
-use relight_core::image::{Extent, Linear, Planes, Rgb, Samples, Transfer};
-use relight_core::light::NormalsFrame;
-use relight_core::light::{LightError, Normals, ShLight, YDown, YUp};
-use relight_core::render::{Gloss, Surface};
+use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
+use relight_core::light::{LightError, Normals, NormalsFrame, ShLight, YDown, YUp};
 use relit_data::text;
 
 /// A folder with a folder for each image of the ground truth, of the same name, in which the estimates lie:
@@ -20,8 +17,6 @@ use relit_data::text;
 #[derive(Debug, Clone)]
 pub struct Predictions {
     root: PathBuf,
-    /// As the caller says; none: as the folder says.
-    transfer: Option<Transfer>,
     frame: NormalsFrame,
 }
 
@@ -33,23 +28,18 @@ const SCHEMA: &str = "relight.decomposition/1";
 /// What is wrong with a description that does not parse.
 pub(crate) const NO_SET: &str = "does not describe a set";
 
-/// The part of it that says how its PNGs hold colours. The first files of the schema did not say it, and held sRGB.
+/// The part of it that says what it is.
 #[derive(Deserialize)]
-struct Encoding {
+struct Description {
     schema: String,
-    transfer: Option<String>,
 }
 
 impl Predictions {
-    /// The predictions in the folder `root`, of which PNGs hold colours by `transfer`. Where that is none, an image's
-    /// folder says it if `relight decompose` wrote it, and else they are linear.
+    /// The predictions in the folder `root`. PNGs hold colours in sRGB where `relight decompose` wrote an image's folder,
+    /// and else linear.
     #[must_use]
-    pub const fn new(root: PathBuf, transfer: Option<Transfer>, frame: NormalsFrame) -> Self {
-        Self {
-            root,
-            transfer,
-            frame,
-        }
+    pub const fn new(root: PathBuf, frame: NormalsFrame) -> Self {
+        Self { root, frame }
     }
 
     /// How a table names them: the folder's name.
@@ -73,38 +63,18 @@ impl Predictions {
 
     /// How PNGs of the sample `name` hold colours.
     fn transfer(&self, name: &str) -> Result<Transfer, EvalError> {
-        let written = self.written_transfer(name)?;
-        match (self.transfer, written) {
-            (Some(said), Some(written)) if said != written => Err(EvalError::Unfit(format!(
-                "{} says that its files are {}, and --transfer that they are {}: leave --transfer out",
-                self.file(name, DESCRIPTION).display(),
-                transfer_name(written),
-                transfer_name(said),
-            ))),
-            (said, written) => Ok(said.or(written).unwrap_or(Transfer::Linear)),
-        }
-    }
-
-    /// How they do by the description beside them; none where there is none, or it describes something else.
-    fn written_transfer(&self, name: &str) -> Result<Option<Transfer>, EvalError> {
         let path = self.file(name, DESCRIPTION);
         let bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
-            Err(source) if source.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(source) if source.kind() == ErrorKind::NotFound => return Ok(Transfer::Linear),
             Err(source) => return Err(EvalError::read(&path)(source)),
         };
-        let parsed: Result<Encoding, _> = serde_json::from_slice(text::unmarked(&bytes));
-        let encoding = parsed.map_err(EvalError::file(&path, NO_SET))?;
-        if encoding.schema != SCHEMA {
-            return Err(EvalError::schema(&path, &encoding.schema, SCHEMA));
-        }
-        match encoding.transfer.as_deref() {
-            None | Some("srgb") => Ok(Some(Transfer::Srgb)),
-            Some("linear") => Ok(Some(Transfer::Linear)),
-            Some(other) => {
-                let found = format!("transfer {other}");
-                Err(EvalError::schema(&path, &found, "transfer srgb or linear"))
-            }
+        let parsed: Result<Description, _> = serde_json::from_slice(text::unmarked(&bytes));
+        let description = parsed.map_err(EvalError::file(&path, NO_SET))?;
+        if description.schema == SCHEMA {
+            Ok(Transfer::Srgb)
+        } else {
+            Err(EvalError::schema(&path, &description.schema, SCHEMA))
         }
     }
 
@@ -125,37 +95,6 @@ impl Predictions {
     /// The predicted light of the sample `name`.
     pub(super) fn light(&self, name: &str) -> Result<ShLight, EvalError> {
         read_light(&self.file(name, "light.txt"))
-    }
-
-    /// The predicted maps of the object `name`; none where there is no map of normals.
-    pub(super) fn surface(&self, name: &str, extent: Extent) -> Result<Option<Surface>, EvalError> {
-        if self.existing(name, "normal").is_none() {
-            return Ok(None);
-        }
-        let normals = self.normals(name, extent)?;
-        let albedo = self.colour(name, "albedo", extent)?;
-        let gloss = match self.existing(name, "reflectance") {
-            None => None,
-            Some(_) => {
-                let reflectance = self.colour(name, "reflectance", extent)?;
-                let smoothness = self.smoothness(name, extent)?;
-                Some(Gloss::new(reflectance.into_planes(), smoothness)?)
-            }
-        };
-        Ok(Some(Surface::new(normals, albedo, gloss)?))
-    }
-
-    /// The predicted smoothness: the values of an EXR, or those of an 8-bit PNG, 0..=255.
-    fn smoothness(&self, name: &str, extent: Extent) -> Result<Planes<1>, EvalError> {
-        let path = self.find(name, "smoothness")?;
-        let (planes, samples) = read_planes(&path)?;
-        check_size(path, planes.extent(), extent)?;
-        let scale = match samples {
-            Samples::Integer => 255.0,
-            Samples::Float => 1.0,
-        };
-        let [values, ..] = planes.into_planes();
-        Ok(Planes::from_planes(extent, [values])?.map(|value| value * scale))
     }
 
     /// The path of a file of the sample `name`.
@@ -197,14 +136,6 @@ fn brought_to(path: PathBuf, planes: Planes<3>, extent: Extent) -> Result<Planes
     }
     check_size(path, found, extent)?;
     Ok(planes)
-}
-
-fn transfer_name(transfer: Transfer) -> &'static str {
-    match transfer {
-        Transfer::Linear => "linear",
-        Transfer::Srgb => "sRGB",
-        Transfer::Gamma22 => "of gamma 2.2",
-    }
 }
 
 fn check_size(path: PathBuf, found: Extent, expected: Extent) -> Result<(), EvalError> {

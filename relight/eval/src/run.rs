@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{EvalError, ImageScores, MaskRule, MeasureTerms, Measured, ScoreLine, ScoreTable};
+use super::{EvalError, ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::metrics::MetricError;
 use relight_core::parallel;
@@ -109,13 +109,11 @@ fn lines(
                 value: mean(at, measure),
             })
             .collect(),
-        terms: MeasureTerms {
-            colour: scored.colour.to_owned(),
-            scale: scored.scale.to_owned(),
-            mask: scored.mask,
-            images: samples.len() * each,
-            split: split.to_owned(),
-        },
+        colour: scored.colour.to_owned(),
+        scale: scored.scale.to_owned(),
+        mask: scored.mask,
+        images: samples.len() * each,
+        split: split.to_owned(),
     };
     first.iter().enumerate().map(line).collect()
 }

@@ -15,8 +15,6 @@ pub enum MaskRule {
     Known,
     /// All of the image; both images are 0 outside the object.
     WholeImage,
-    /// Those that people were asked about.
-    Points,
 }
 
 impl fmt::Display for MaskRule {
@@ -25,25 +23,8 @@ impl fmt::Display for MaskRule {
             Self::Object => "object",
             Self::Known => "where known",
             Self::WholeImage => "whole image",
-            Self::Points => "judged points",
         })
     }
-}
-
-/// How the numbers of a line were taken.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
-pub struct MeasureTerms {
-    /// Colour space and units of the values that were compared.
-    pub colour: String,
-    /// Which scales were fitted to the estimate.
-    pub scale: String,
-    /// Which pixels count.
-    pub mask: MaskRule,
-    /// How many images there were.
-    pub images: usize,
-    /// Which part of which data they are.
-    pub split: String,
 }
 
 /// A measure, the mean over all images.
@@ -65,9 +46,16 @@ pub struct ScoreLine {
     pub part: String,
     /// The means over all images.
     pub measures: Vec<Measured>,
-    /// How they were taken.
-    #[serde(flatten)]
-    pub terms: MeasureTerms,
+    /// Colour space and units of the values that were compared.
+    pub colour: String,
+    /// Which scales were fitted to the estimate.
+    pub scale: String,
+    /// Which pixels count.
+    pub mask: MaskRule,
+    /// How many images there were.
+    pub images: usize,
+    /// Which part of which data they are.
+    pub split: String,
 }
 
 /// What a method scored on one image.
@@ -130,15 +118,9 @@ impl ScoreTable {
                 let found = line.measures.iter().find(|one| one.name == *name);
                 found.map_or_else(String::new, |one| number(one.value))
             }));
-            let MeasureTerms {
-                colour,
-                scale,
-                mask,
-                images,
-                split,
-            } = &line.terms;
-            row.extend([colour.clone(), scale.clone(), mask.to_string()]);
-            row.extend([images.to_string(), split.clone()]);
+            row.extend([line.colour.clone(), line.scale.clone()]);
+            row.push(line.mask.to_string());
+            row.extend([line.images.to_string(), line.split.clone()]);
             rows.push(row);
         }
         rows
@@ -191,13 +173,11 @@ mod tests {
                 name: name.to_owned(),
                 value,
             }],
-            terms: MeasureTerms {
-                colour: "linear grey".to_owned(),
-                scale: "one an image".to_owned(),
-                mask: MaskRule::Object,
-                images: 10,
-                split: "all".to_owned(),
-            },
+            colour: "linear grey".to_owned(),
+            scale: "one an image".to_owned(),
+            mask: MaskRule::Object,
+            images: 10,
+            split: "all".to_owned(),
         }
     }
 

@@ -23,27 +23,8 @@ const LIMITS_DEG: [f64; 3] = [10.0, 20.0, 30.0];
 /// Azimuths that are tried for the turn about the table's axis, degrees to each side.
 const AZIMUTHS_DEG: i32 = 90;
 
-/// How a turn is solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TurnMethod {
-    /// In a light that is not known: what the network of turns answers, and the light that goes with it.
-    UnknownLight,
-    /// In its true light, with all bands that the solver knows of.
-    KnownLight,
-}
-
-impl TurnMethod {
-    /// All of them, in the table's order.
-    pub const ALL: [Self; 2] = [Self::UnknownLight, Self::KnownLight];
-
-    /// Its name in the table.
-    const fn name(self) -> &'static str {
-        match self {
-            Self::UnknownLight => "light unknown",
-            Self::KnownLight => "light known",
-        }
-    }
-}
+/// The ways in which turns are solved, as the table names them, and whether the solver is given the true light.
+const METHODS: [(&str, bool); 2] = [("light unknown", false), ("light known", true)];
 
 /// The errors of a turn by a method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -80,7 +61,7 @@ struct TurnLine {
 pub struct TurnTable {
     /// What the turns are called.
     split: String,
-    lines: Vec<TurnLine>,
+    lines: [TurnLine; METHODS.len()],
 }
 
 /// Turns in the layout of `relight synth --turn`, with their ground truth.
@@ -130,7 +111,7 @@ impl TurnSet {
             shard: shard.clone(),
             normals: Normals::<YUp>::read(&truth.join("normal.png"))?,
             albedo: Rgb::<Linear>::read(&truth.join("albedo.png"), Transfer::Linear)?,
-            elevation: Elevation::given(out.atan2(up).to_degrees()).map_err(TurnError::from)?,
+            elevation: Elevation::given(out.atan2(up).to_degrees())?,
             light: read_light(&truth.join("light.txt"))?,
         })
     }
@@ -144,23 +125,19 @@ impl TurnSet {
 pub fn evaluate_turns(
     folder: &Path,
     split: &str,
-    methods: &[TurnMethod],
     networks: &TurnNetworks,
     progress: EvalProgress<'_>,
 ) -> Result<TurnTable, EvalError> {
     let set = TurnSet::open(folder)?;
-    let mut lines: Vec<TurnLine> = methods
-        .iter()
-        .map(|method| TurnLine {
-            method: method.name(),
-            turns: Vec::new(),
-        })
-        .collect();
-    let steps = methods.len() * set.turns.len();
+    let mut lines = METHODS.map(|(method, _)| TurnLine {
+        method,
+        turns: Vec::new(),
+    });
+    let steps = METHODS.len() * set.turns.len();
     for number in 0..set.turns.len() {
         let truth = set.read(number)?;
-        for (line, &method) in lines.iter_mut().zip(methods) {
-            let answer = truth.solve(method, networks)?;
+        for (line, (_, knows_light)) in lines.iter_mut().zip(METHODS) {
+            let answer = truth.solve(knows_light, networks)?;
             line.turns
                 .push(score(&set.turns[number].0, &truth, &answer));
             progress(steps);
@@ -173,13 +150,14 @@ pub fn evaluate_turns(
 }
 
 impl TrueTurn {
-    fn solve(&self, method: TurnMethod, networks: &TurnNetworks) -> Result<SolvedTurn, TurnError> {
+    fn solve(&self, knows_light: bool, networks: &TurnNetworks) -> Result<SolvedTurn, TurnError> {
         let options = TurnOptions {
             rotation: Some(RotationDirection::CounterClockwise),
             elevation: Some(self.elevation),
-            light: match method {
-                TurnMethod::UnknownLight => TurnLight::Unknown,
-                TurnMethod::KnownLight => TurnLight::Given(self.light.clone()),
+            light: if knows_light {
+                TurnLight::Given(self.light.clone())
+            } else {
+                TurnLight::Unknown
             },
             material: MaterialKind::Diffuse,
         };

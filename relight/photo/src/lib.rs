@@ -5,15 +5,14 @@
 //! | module | concern |
 //! | --- | --- |
 //! | [`decompose`] | a photograph into normals, albedo, shading, highlight and light |
-//! | [`nets`] | the networks as data, their weights, and engines that run them |
+//! | [`nets`] | the networks as data, their weights and inference |
 //! | [`insert`] | objects of photographs in another light and in other pictures |
 #![cfg_attr(
     feature = "files",
     doc = "| [`files`], [`export`] | photographs and decompositions in files and shards; objects for other programs |"
 )]
 //!
-//! The feature `files` reads photographs from files and shards and writes results, `threads` works on rayon's threads,
-//! `onnxruntime` runs networks by ONNX Runtime where its library is installed.
+//! The feature `files` reads photographs from files and shards and writes results, `threads` works on rayon's threads.
 pub mod decompose;
 #[cfg(feature = "files")]
 pub mod export;

@@ -13,7 +13,7 @@ use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Planes, Rgb};
 use relight_core::light::Normals;
 use relight_core::render::{Gloss, Surface};
-use relight_photo::export::{ExportError, ObjectMesh, read_object, script, to_glb, to_layers};
+use relight_photo::export::{ExportError, ObjectMesh, read_object, to_glb, to_layers};
 
 /// A ball of an albedo, glossy if asked for.
 fn ball(side: usize, is_glossy: bool) -> CapturedObject {
@@ -101,16 +101,6 @@ fn an_exr_has_all_maps_as_layers() {
     assert_eq!(value("smoothness.Y", middle), 30.0);
     assert!(value("normal.Z", middle) > 0.99);
     assert!((10.0..16.0).contains(&value("height.Z", middle)));
-}
-
-#[test]
-fn the_script_names_the_files_whatever_they_are_called() {
-    let text = script("a \"b\".glb", Some(("light.exr", 2.5)), 2.0);
-    assert!(text.contains(r#"GLB = "a \"b\".glb""#));
-    assert!(text.contains(r#"LIGHT = "light.exr""#));
-    assert!(text.contains("STRENGTH = 2.5"));
-    assert!(text.contains("resolution_y = 512"));
-    assert!(script("a.glb", None, 1.0).contains("LIGHT = None"));
 }
 
 #[test]

@@ -56,7 +56,7 @@ mod view;
 
 pub use error::SynthError;
 pub use folder::{SynthTally, write_samples};
-pub use geometry::{GBuffer, Occluder};
+pub use geometry::GBuffer;
 pub use library::{Folders, LeftOut, Library, made_panoramas};
 pub use lighting::{BlinnPhong, LightKind, Lighting, Material, Panoramas, Shaded, SyntheticScene};
 pub use mesh::Mesh;
@@ -66,9 +66,11 @@ pub use random::stream;
 pub use recipe::Recipe;
 pub use sample::SynthSample;
 pub use shape::ShapeKind;
-pub use transfer::{DrawnTurn, Rooms, TransferCache, TransferRecipe};
+pub use transfer::{
+    DrawnTurn, PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint, PhotoView,
+    PhotoViewRecipe, Rooms, TransferCache, TransferRecipe, ViewLamp,
+};
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
-pub use view::{Pose, Projection};
 
 /// The examples of the README, so that they are built.
 #[cfg(doctest)]

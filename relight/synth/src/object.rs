@@ -43,9 +43,9 @@ pub struct SyntheticView {
     /// Where it comes from.
     pub object: ObjectSource,
     /// How it stands.
-    pub pose: Pose,
+    pub(crate) pose: Pose,
     /// How it is seen.
-    pub projection: Projection,
+    pub(crate) projection: Projection,
     /// What is seen.
     pub scene: SyntheticScene,
 }

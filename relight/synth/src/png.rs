@@ -44,14 +44,8 @@ impl Sixteen {
 
 /// The map as PNG, 0 outside the object.
 pub(super) fn encode_sixteen(buffer: &GBuffer, map: &Sixteen) -> Result<Vec<u8>, SynthError> {
-    let side = buffer.size as usize;
-    let mut pixels = vec![0; side * side * 6];
-    for (&pixel, value) in buffer.pixels.iter().zip(&map.values) {
-        let at = pixel as usize * 6;
-        for (channel, value) in value.iter().enumerate() {
-            pixels[at + 2 * channel..at + 2 * channel + 2].copy_from_slice(&value.to_be_bytes());
-        }
-    }
+    let values = buffer.spread(&map.values, [0; 3]).into_flattened();
+    let pixels: Vec<u8> = values.into_iter().flat_map(u16::to_be_bytes).collect();
     let mut bytes = Vec::with_capacity(pixels.len() / 2);
     let mut encoder = png::Encoder::new(&mut bytes, buffer.size, buffer.size);
     encoder.set_color(ColorType::Rgb);

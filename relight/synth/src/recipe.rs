@@ -91,8 +91,18 @@ impl Recipe {
     /// The object of a number.
     #[must_use]
     pub fn object<'a>(&self, library: &'a Library, number: u64) -> (ObjectSource, Cow<'a, Mesh>) {
+        self.object_with(library, number, MESHES)
+    }
+
+    /// The same where another part of the objects are meshes.
+    pub(crate) fn object_with<'a>(
+        &self,
+        library: &'a Library,
+        number: u64,
+        meshes: f32,
+    ) -> (ObjectSource, Cow<'a, Mesh>) {
         let mut random = Random::new(stream(stream(self.seed, 1), number));
-        if random.chance(MESHES)
+        if random.chance(meshes)
             && let Some((file, mesh)) = library.meshes.get(random.index(library.meshes.len()))
         {
             return (
@@ -112,14 +122,36 @@ impl Recipe {
     #[must_use]
     pub fn view(&self, object: &ObjectSource, mesh: &Mesh, number: u64) -> SyntheticView {
         let mut random = Random::new(stream(stream(self.seed, 3), number));
+        let (pose, projection, buffer) = self.framed(object, mesh, &mut random);
+        let scene = if self.shadows {
+            let occluder = Occluder::new(mesh, pose.place(mesh, projection));
+            SyntheticScene::shaded(buffer, occluder, AMBIENT_RAYS, random.seed())
+        } else {
+            SyntheticScene::open(buffer)
+        };
+        SyntheticView {
+            object: object.clone(),
+            pose,
+            projection,
+            scene,
+        }
+    }
+
+    /// Of several draws of a pose and a camera the first in which the object covers enough of the picture.
+    pub(crate) fn framed(
+        &self,
+        object: &ObjectSource,
+        mesh: &Mesh,
+        random: &mut Random,
+    ) -> (Pose, Projection, GBuffer) {
         let kind = match object {
             ObjectSource::Mesh { .. } => None,
             ObjectSource::Shape { kind, .. } => Some(*kind),
         };
         let least = (LEAST_COVER * (self.size * self.size) as f32) as usize;
         let mut draw = || {
-            let pose = Pose::draw(&mut random, kind);
-            let projection = Projection::draw(&mut random);
+            let pose = Pose::draw(random, kind);
+            let projection = Projection::draw(random);
             let placement = pose.place(mesh, projection);
             let buffer = GBuffer::render(mesh, placement, projection, self.size);
             (pose, projection, buffer)
@@ -134,19 +166,7 @@ impl Recipe {
                 best = other;
             }
         }
-        let (pose, projection, buffer) = best;
-        let scene = if self.shadows {
-            let occluder = Occluder::new(mesh, pose.place(mesh, projection));
-            SyntheticScene::shaded(buffer, occluder, AMBIENT_RAYS, random.seed())
-        } else {
-            SyntheticScene::open(buffer)
-        };
-        SyntheticView {
-            object: object.clone(),
-            pose,
-            projection,
-            scene,
-        }
+        best
     }
 
     /// The material of a number on what a view shows: paint, relief on a third, gloss on a third.

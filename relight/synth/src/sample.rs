@@ -1,7 +1,7 @@
 //! One sample: a picture, its ground truth, and every number that it was made of.
 
 use glam::Vec3;
-use image::{GrayImage, Luma, Rgb, RgbImage};
+use image::{GrayImage, RgbImage};
 use serde::{Deserialize, Serialize};
 
 use super::SynthError;
@@ -168,11 +168,8 @@ impl<'a> SynthSample<'a> {
 
 /// The mask of what a buffer covers, 0 and 255.
 pub(super) fn mask(buffer: &GBuffer) -> GrayImage {
-    let mut mask = GrayImage::new(buffer.size, buffer.size);
-    for &pixel in &buffer.pixels {
-        mask.put_pixel(pixel % buffer.size, pixel / buffer.size, Luma([255]));
-    }
-    mask
+    let values = buffer.spread(&vec![255; buffer.len()], 0);
+    GrayImage::from_raw(buffer.size, buffer.size, values).unwrap_or_default()
 }
 
 /// The camera's picture of light that already has its gain.
@@ -199,9 +196,6 @@ pub(super) fn photograph(
 
 /// A picture with these colours at the covered pixels and black elsewhere.
 pub(super) fn picture_of(buffer: &GBuffer, values: &[[u8; 3]]) -> RgbImage {
-    let mut picture = RgbImage::new(buffer.size, buffer.size);
-    for (&pixel, &value) in buffer.pixels.iter().zip(values) {
-        picture.put_pixel(pixel % buffer.size, pixel / buffer.size, Rgb(value));
-    }
-    picture
+    let values = buffer.spread(values, [0; 3]).into_flattened();
+    RgbImage::from_raw(buffer.size, buffer.size, values).unwrap_or_default()
 }

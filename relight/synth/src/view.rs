@@ -11,7 +11,7 @@ use super::shape::ShapeKind;
 /// How points become places in the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Projection {
+pub(crate) enum Projection {
     /// Along z: the viewer is far away.
     Orthographic,
     /// Through an eye on the z axis.
@@ -42,7 +42,7 @@ impl Projection {
 
 /// How an object stands before the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
+pub(crate) struct Pose {
     /// The rotation, column by column, after a stretch.
     pub turn: Mat3,
     /// Factors along the object's own axes.
@@ -56,8 +56,7 @@ pub struct Pose {
 impl Pose {
     /// Upright and unstretched in the middle, seen from this many radians above the horizon and
     /// turned about its own vertical axis.
-    #[must_use]
-    pub fn upright(elevation: f32, azimuth: f32, fill: f32) -> Self {
+    pub(crate) fn upright(elevation: f32, azimuth: f32, fill: f32) -> Self {
         Self {
             turn: Mat3::from_rotation_x(elevation) * Mat3::from_rotation_y(azimuth),
             stretch: Vec3::ONE,
@@ -87,7 +86,7 @@ impl Pose {
     }
 
     /// The map from the mesh's own frame into the viewer's.
-    pub fn place(&self, mesh: &Mesh, projection: Projection) -> Affine3A {
+    pub(crate) fn place(&self, mesh: &Mesh, projection: Projection) -> Affine3A {
         let linear = self.turn * Mat3::from_diagonal(self.stretch);
         let turned: Vec<Vec3> = mesh.positions.iter().map(|&p| linear * p).collect();
         let (mut scale, mut offset) = (0.5, Vec3::ZERO);

@@ -1,16 +1,19 @@
-//! Processor seconds of the decomposing network on one thread: `network_speed train|forward|inference|compose SIDE [BATCH [STEPS]]`.
+//! Processor seconds of the decomposing network on one thread: `network_speed train|forward|inference|light|cast SIDE [BATCH [STEPS]]`.
 //!
 //! `train` makes steps of Adam on random pictures, `forward` computes them by libtorch without gradients, `inference`
-//! as `relight decompose` does, and `compose` makes the samples of a batch that training draws from. The best of the steps
-//! counts; of `compose`, whose samples differ, the mean.
+//! as `relight decompose` does, `light` makes a batch of photographs of views that are cast, and `cast` casts a view. The best
+//! of the steps counts; of `cast`, whose views differ, the mean.
 #![allow(clippy::print_stdout, reason = "the example is a program of its own")]
 
 use std::error::Error;
+use std::sync::Arc;
 use std::time::Duration;
 
 use relight_photo::nets::{INPUTS, Inference, Weights, decomposer};
-use relight_synth::{Folders, Library, Recipe};
-use relight_train::{Adam, Composition, ComputePrecision, DataSettings, Model, RunSettings};
+use relight_synth::{Folders, Library, PhotoViewRecipe};
+use relight_train::{
+    Adam, ComputePrecision, DataSettings, Model, Photographs, Resources, RunSettings, keep_memory,
+};
 use tch::{Device, Kind, Tensor, no_grad};
 
 /// The least processor time of the calls after the first, which is a warm-up.
@@ -33,17 +36,40 @@ fn processor_time() -> Duration {
     now.try_into().unwrap_or_default()
 }
 
-/// What `relight train` composes by default, with made shapes and panoramas.
-fn composition(side: usize) -> Result<Composition, Box<dyn Error>> {
-    let data = DataSettings::default();
-    Ok(Composition {
-        recipe: Recipe {
-            size: u32::try_from(side)?,
-            views: data.views,
-            lightings: data.lightings,
-            ..Recipe::default()
-        },
-        library: Library::read(&Folders::default())?,
+/// What `relight train` lights by default, of made shapes and panoramas.
+fn photographs(side: usize, batch: usize) -> Result<Photographs, Box<dyn Error>> {
+    let data = DataSettings {
+        size: u32::try_from(side)?,
+        views: u64::try_from(batch)?,
+        new_views: 0,
+        ..DataSettings::default()
+    };
+    let run = RunSettings {
+        batch: u64::try_from(batch)?,
+        ..RunSettings::default()
+    };
+    let resources = Resources {
+        device: Device::Cpu,
+        workers: 1,
+        stop: Arc::default(),
+    };
+    Ok(Photographs::new(&data, &run, resources)?)
+}
+
+/// One view more with each call.
+fn cast(side: usize) -> Result<impl FnMut() -> usize, Box<dyn Error>> {
+    let library = Library::read(&Folders::default())?;
+    let recipe = PhotoViewRecipe {
+        seed: 1,
+        size: u32::try_from(side)?,
+        rays: DataSettings::default().rays,
+    };
+    let mut next = 0..;
+    Ok(move || {
+        recipe
+            .cast(&library, next.next().unwrap_or_default())
+            .base
+            .len()
     })
 }
 
@@ -51,7 +77,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let what = arguments
         .next()
-        .ok_or("say train, forward, inference or compose")?;
+        .ok_or("say train, forward, inference, light or cast")?;
     let side: usize = arguments
         .next()
         .ok_or("give the side of a picture")?
@@ -60,6 +86,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let steps: usize = arguments.next().as_deref().unwrap_or("5").parse()?;
 
     tch::set_num_threads(1);
+    keep_memory();
     tch::manual_seed(1);
     let weights = Weights::initial(&decomposer(), 1);
     let shape = [batch, INPUTS, side, side].map(|n| n as i64);
@@ -100,21 +127,25 @@ fn main() -> Result<(), Box<dyn Error>> {
                 Ok(())
             })?
         }
-        "compose" => {
-            let views = composition(side)?;
-            let samples = (batch * steps).max(1);
+        "light" => {
+            let mut photographs = photographs(side, batch)?;
+            let mut step = 0;
+            least(steps, || {
+                photographs.batch(step)?;
+                step += 1;
+                Ok(())
+            })?
+        }
+        "cast" => {
+            let mut cast = cast(side)?;
             let start = processor_time();
-            let mut composed = 0;
-            for view in 0_u64.. {
-                if composed >= samples {
-                    break;
-                }
-                composed += views.samples_of(view).len();
-            }
-            (processor_time() - start).as_secs_f64() * batch as f64 / composed as f64
+            (0..steps).for_each(|_| {
+                cast();
+            });
+            (processor_time() - start).as_secs_f64() / steps.max(1) as f64
         }
         other => {
-            return Err(format!("{other}: say train, forward, inference or compose").into());
+            return Err(format!("{other}: say train, forward, inference, light or cast").into());
         }
     };
     println!("{{\"seconds\": {seconds}}}");

@@ -1,13 +1,13 @@
-//! The run that trains the decomposing network on composed samples.
+//! The run that trains the decomposing network on photographs of synthetic objects.
 
 use tch::Tensor;
 
-use super::composed::ComposedBatches;
 use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, highlight_figures};
 use super::learner::Learner;
 use super::losses::{angular_degrees, relative_distance, scale_invariant, windowed};
+use super::photographs::Photographs;
 use super::process_group::ProcessGroup;
 use super::sample::TruthBatch;
 use super::settings::{DecomposeSettings, first_difference};
@@ -25,12 +25,12 @@ pub struct DecomposeTask {
     settings: DecomposeSettings,
     resources: Resources,
     learner: Learner,
-    composed: ComposedBatches,
+    photographs: Photographs,
     validation: HeldOutSamples,
 }
 
 impl DecomposeTask {
-    /// Reads what samples are composed of, composes the validation, and begins with `weights`, or with random ones.
+    /// Reads what photographs are made of, and begins with `weights`, or with random ones.
     ///
     /// # Errors
     /// Settings out of range, files that cannot be read, weights that do not fit.
@@ -40,12 +40,13 @@ impl DecomposeTask {
         weights: Option<&Weights>,
     ) -> Result<Self, TrainError> {
         settings.check()?;
-        let composed = ComposedBatches::new(&settings.data, &settings.run, resources.clone())?;
-        let validation = HeldOutSamples::new(composed.composition(), settings.data.validation);
+        let photographs = Photographs::new(&settings.data, &settings.run, resources.clone())?;
+        let (size, count) = (settings.data.size, settings.data.validation);
+        let validation = HeldOutSamples::new(photographs.library(), size, count);
         let graph = decomposer_with_heads();
         let learner = Learner::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
-            composed,
+            photographs,
             settings,
             resources,
             learner,
@@ -69,7 +70,7 @@ impl TrainingTask for DecomposeTask {
     }
 
     fn left_out(&self) -> &[LeftOut] {
-        self.composed.left_out()
+        self.photographs.left_out()
     }
 
     fn learner(&mut self) -> &mut Learner {
@@ -77,11 +78,11 @@ impl TrainingTask for DecomposeTask {
     }
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
-        self.composed.set_rank(group.rank())
+        self.photographs.set_rank(group.rank())
     }
 
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
-        let batch = self.composed.batch(step)?;
+        let batch = self.photographs.batch(step)?;
         let answer = self.learner.model.forward(&batch.input)?;
         let answer = AnsweredTensors::of_outputs(&batch.input, &answer)?;
         Ok(StepLosses {

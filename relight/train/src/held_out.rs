@@ -6,19 +6,21 @@ use std::path::Path;
 
 use tch::{Device, Kind, Tensor, no_grad};
 
-use super::data_loader::Composition;
 use super::error::TrainError;
 use super::low_rank::rank_one;
 use super::paper_phases::equal_rows;
-use super::sample::{DrawnSample, TruthArrays, TruthBatch};
-use super::symmetry::Symmetry;
+use super::sample::{Linearisation, TruthArrays, TruthBatch};
 use super::turn_reader::{TurnReader, TurnTensors, no_frames};
-use relight_synth::{Recipe, stream};
+use relight_synth::{Library, Recipe, stream};
 
 /// Batches of turns that are kept.
 const TURN_BATCHES: usize = 4;
 /// Samples of a batch of composed samples.
 const SAMPLE_BATCH: usize = 16;
+/// Part of the pictures whose values are taken for sRGB, whatever the camera's response.
+const TAKEN_AS_SRGB: f64 = 0.10;
+/// Part of the pictures that a plain camera takes (sRGB, no noise, no compression); the others are taken as the recipe says.
+const PLAIN: f64 = 0.5;
 /// A highlight is there from this part of white on.
 const SEEN_HIGHLIGHT: f64 = 0.05;
 
@@ -72,40 +74,54 @@ impl HeldOutTurns {
     }
 }
 
-/// Composed samples of objects that are never trained on: their shapes are made, none of them is a mesh.
+/// Ray-cast samples of objects that are never trained on: their shapes are made, none of them is a mesh.
 #[derive(Debug)]
 pub(super) struct HeldOutSamples {
-    composition: Composition,
+    recipe: Recipe,
+    library: Library,
     count: u64,
-    /// Composed when they are needed first: only one process of several looks at them.
+    /// Made when they are needed first: only one process of several looks at them.
     samples: OnceCell<Vec<TruthArrays>>,
 }
 
 impl HeldOutSamples {
-    /// One sample each of `count` objects. Neither their seed nor their light depends on the run's, so that runs can be
-    /// compared.
-    pub(super) fn new(composition: &Composition, count: u64) -> Self {
-        let composition = Composition {
+    /// One sample each of `count` objects of a size. Neither their seed nor their light depends on the run's, so that runs
+    /// can be compared.
+    pub(super) fn new(library: &Library, size: u32, count: u64) -> Self {
+        Self {
             recipe: Recipe {
                 seed: stream(0x76_61_6c, 23),
-                size: composition.recipe.size,
+                size,
                 views: 1,
                 lightings: 1,
                 ..Recipe::default()
             },
-            library: composition.library.without_meshes(),
-        };
-        Self {
-            composition,
+            library: library.without_meshes(),
             count,
             samples: OnceCell::new(),
         }
     }
 
     fn samples(&self) -> &[TruthArrays] {
-        let compose = |view| self.composition.samples_of(view);
+        let made = |number| self.sample(number);
         self.samples
-            .get_or_init(|| (0..self.count).flat_map(compose).collect())
+            .get_or_init(|| (0..self.count).map(made).collect())
+    }
+
+    fn sample(&self, number: u64) -> TruthArrays {
+        let draw = |which: u64| unit(stream(stream(self.recipe.seed, which), number));
+        let recipe = Recipe {
+            random_camera: draw(11) >= PLAIN,
+            ..self.recipe.clone()
+        };
+        let linearisation = if draw(12) < TAKEN_AS_SRGB {
+            Linearisation::AsSrgb
+        } else {
+            Linearisation::Exact
+        };
+        let (object, mesh) = recipe.object(&self.library, number);
+        let seen = recipe.view(&object, &mesh, number);
+        TruthArrays::new(&recipe.sample(&self.library, &seen, number), linearisation)
     }
 
     /// The mean of each figure over the samples.
@@ -118,7 +134,7 @@ impl HeldOutSamples {
         let mut sums = Figures::new();
         for samples in self.samples().chunks(SAMPLE_BATCH) {
             let share = samples.len() as f64 / self.samples().len() as f64;
-            let batch = batch_of(samples, kind, device)?;
+            let batch = TruthBatch::new(samples, kind, device)?;
             for (name, value) in no_grad(|| of(&batch))? {
                 *sums.entry(name.to_owned()).or_default() += share * value;
             }
@@ -127,14 +143,9 @@ impl HeldOutSamples {
     }
 }
 
-/// A batch of samples as they are.
-fn batch_of(samples: &[TruthArrays], kind: Kind, device: Device) -> Result<TruthBatch, TrainError> {
-    let plain = |arrays| DrawnSample {
-        arrays,
-        symmetry: Symmetry::NONE,
-    };
-    let samples: Vec<DrawnSample<'_>> = samples.iter().map(plain).collect();
-    TruthBatch::new(&samples, kind, device)
+/// A hash as a number in 0..1.
+fn unit(hash: u64) -> f64 {
+    (hash >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// How far pictures of one reflectance, `frames x channels x height x width`, are from being multiples of one: the

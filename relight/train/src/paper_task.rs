@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use tch::{Kind, Tensor};
 
 use super::agreement::fingerprint;
-use super::composed::ComposedBatches;
 use super::error::TrainError;
 use super::held_out::{HeldOutSamples, HeldOutTurns};
 use super::learner::Learner;
 use super::losses::Mean;
 use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed};
 use super::paper_phases::PaperPhase;
+use super::photographs::Photographs;
 use super::process_group::{ProcessGroup, indivisible};
 use super::settings::{PaperSettings, first_difference};
 use super::task::{Resources, StepLosses, TrainingTask, Validation};
@@ -27,7 +27,7 @@ pub struct PaperTask {
     settings: PaperSettings,
     resources: Resources,
     learner: Learner,
-    composed: ComposedBatches,
+    photographs: Photographs,
     turns: Option<TurnReader>,
     rank: Rank,
     held_out_samples: HeldOutSamples,
@@ -35,7 +35,7 @@ pub struct PaperTask {
 }
 
 impl PaperTask {
-    /// Reads what samples are composed of, opens the turns, and makes the networks.
+    /// Reads what photographs are made of, opens the turns, and makes the networks.
     ///
     /// # Errors
     /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Refused`] where the phase
@@ -52,7 +52,7 @@ impl PaperTask {
         }
         if inputs.turns.is_some() && !phase.learns_from_turns() {
             return Err(TrainError::Refused(format!(
-                "relight train {} learns from composed samples, not from turns: leave --turns away",
+                "relight train {} learns from synthetic photographs, not from turns: leave --turns away",
                 phase.name()
             )));
         }
@@ -68,19 +68,23 @@ impl PaperTask {
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
         let held_out = |path: &PathBuf| HeldOutTurns::read(path, kind, resources.device);
-        let composed = ComposedBatches::new(&settings.data, &settings.run, resources.clone())?;
+        let photographs = Photographs::new(&settings.data, &settings.run, resources.clone())?;
         // On them, nothing is known of the paper's smoothness.
         let samples = match phase {
             PaperPhase::Specular => 0,
             _ => settings.data.validation,
         };
         Ok(Self {
-            held_out_samples: HeldOutSamples::new(composed.composition(), samples),
+            held_out_samples: HeldOutSamples::new(
+                photographs.library(),
+                settings.data.size,
+                samples,
+            ),
             held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),
             learner: Learner::new(graph, weights, &settings.run, resources.device)?,
-            composed,
+            photographs,
             turns: inputs.turns.as_ref().map(open).transpose()?,
             rank: Rank::ONLY,
             settings,
@@ -150,7 +154,7 @@ impl TrainingTask for PaperTask {
     }
 
     fn left_out(&self) -> &[LeftOut] {
-        self.composed.left_out()
+        self.photographs.left_out()
     }
 
     fn learner(&mut self) -> &mut Learner {
@@ -171,7 +175,7 @@ impl TrainingTask for PaperTask {
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
         let (rank, groups) = (group.rank(), self.settings.turns.groups);
         if self.supervised() > 0.0 {
-            self.composed.set_rank(rank)?;
+            self.photographs.set_rank(rank)?;
         }
         if let Some(reader) = &mut self.turns {
             if !groups.is_multiple_of(u64::from(rank.world_size())) {
@@ -188,7 +192,7 @@ impl TrainingTask for PaperTask {
         let mut losses = StepLosses::default();
         let supervised = self.supervised();
         if supervised > 0.0 {
-            let batch = self.composed.batch(step)?;
+            let batch = self.photographs.batch(step)?;
             if let Some(loss) = self.networks.on_truth(&self.learner.model, &batch)? {
                 losses.terms.add_mean("supervised", supervised, loss.mean);
                 losses.spreads.insert(loss.head, loss.spread);

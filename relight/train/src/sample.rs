@@ -2,11 +2,9 @@
 
 use glam::Vec3;
 use half::f16;
-use rayon::prelude::*;
 use tch::{Device, Kind, Tensor};
 
 use super::error::TrainError;
-use super::symmetry::Symmetry;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 use relight_photo::decompose::{EncodedPicture, PredictedLight};
 use relight_photo::nets::{INPUTS, LIGHT_OUTPUTS};
@@ -27,25 +25,16 @@ pub(crate) enum Linearisation {
 /// A picture as the decomposing network sees it, and its ground truth. Light is in parts of the picture's white; shading
 /// has the mean 1 under the mask. Half precision, as many are kept.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TruthArrays {
+pub(crate) struct TruthArrays {
     extent: Extent,
     values: Vec<f16>,
     /// What the head for light should answer; 0 where the light is not known.
     light: [f32; LIGHT_OUTPUTS],
 }
 
-/// A sample in a batch.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct DrawnSample<'a> {
-    /// The sample.
-    pub arrays: &'a TruthArrays,
-    /// How it is seen, normals and all.
-    pub symmetry: Symmetry,
-}
-
 /// A batch of them on a device, `batch x channels x height x width`.
 #[derive(Debug)]
-pub(crate) struct TruthBatch {
+pub struct TruthBatch {
     /// What the network sees.
     pub input: Tensor,
     /// 1 inside the mask, 1 channel.
@@ -91,12 +80,6 @@ impl TruthArrays {
             values,
             light: light.numbers().map(|number| number as f32),
         }
-    }
-
-    /// Width and height.
-    #[must_use]
-    pub fn extent(&self) -> Extent {
-        self.extent
     }
 }
 
@@ -163,23 +146,22 @@ impl TruthBatch {
     /// # Errors
     /// [`TrainError::Torch`].
     pub(crate) fn new(
-        samples: &[DrawnSample<'_>],
+        samples: &[TruthArrays],
         kind: Kind,
         device: Device,
     ) -> Result<Self, TrainError> {
         let extent = samples
             .first()
-            .map_or(Extent::new(0, 0), |first| first.arrays.extent);
-        let each = PLANES * extent.pixels();
-        let mut bytes = vec![0_u8; 2 * each * samples.len()];
-        bytes
-            .par_chunks_exact_mut(2 * each.max(1))
-            .zip(samples)
-            .for_each(|(to, sample)| sample.write(to));
-        let lights: Vec<f32> = samples.iter().flat_map(DrawnSample::light).collect();
+            .map_or(Extent::new(0, 0), |first| first.extent);
+        let values: Vec<f16> = samples
+            .iter()
+            .flat_map(|sample| sample.values.iter().copied())
+            .collect();
+        let lights: Vec<f32> = samples.iter().flat_map(|sample| sample.light).collect();
         let light = Tensor::f_from_slice(&lights)?.f_reshape([-1, LIGHT_OUTPUTS as i64])?;
         let shape = [samples.len(), PLANES, extent.height, extent.width].map(|n| n as i64);
-        let all = Tensor::f_from_data_size(&bytes, &shape, Kind::Half)?
+        let all = Tensor::f_from_slice(&values)?
+            .f_reshape(shape)?
             .f_to_device(device)?
             .f_to_kind(kind)?;
         let part = |from: usize, count: usize| all.f_narrow(1, from as i64, count as i64);
@@ -193,70 +175,5 @@ impl TruthBatch {
             highlight: part(INPUTS + 10, 1)?,
             light: light.f_to_device(device)?.f_to_kind(kind)?,
         })
-    }
-}
-
-/// The plane of the normals' x.
-const NORMAL_X: usize = INPUTS + 7;
-
-impl DrawnSample<'_> {
-    fn light(&self) -> [f32; LIGHT_OUTPUTS] {
-        self.symmetry.light(self.arrays.light)
-    }
-
-    /// Writes the planes one after the other, two bytes a value.
-    fn write(&self, to: &mut [u8]) {
-        let extent = self.arrays.extent;
-        let pixels = extent.pixels().max(1);
-        for (plane, to) in to.chunks_exact_mut(2 * pixels).enumerate() {
-            let (from, sign) = match plane.checked_sub(NORMAL_X) {
-                Some(axis @ 0..2) => self.symmetry.component(axis),
-                _ => (0, 1.0),
-            };
-            let is_turned = (NORMAL_X..NORMAL_X + 2).contains(&plane);
-            let from = if is_turned { NORMAL_X + from } else { plane };
-            let values = &self.arrays.values[from * pixels..][..pixels];
-            let is_negated = is_turned && sign < 0.0;
-            let (to, _) = to.as_chunks_mut::<2>();
-            for (at, to) in to.iter_mut().enumerate() {
-                let (x, y) = (at % extent.width, at / extent.width);
-                let value = values[self.symmetry.source(extent, x, y)];
-                *to = (if is_negated { -value } else { value }).to_le_bytes();
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_mirrored_sample_is_turned_from_right_to_left_and_x_of_its_normals_changes_sign() {
-        let extent = Extent::new(3, 2);
-        let values = (0..PLANES * 6).map(|value| f16::from_f32(value as f32));
-        let arrays = TruthArrays {
-            extent,
-            values: values.collect(),
-            light: std::array::from_fn(|at| at as f32),
-        };
-        let batch = |mirrored: bool| {
-            let arrays = &arrays;
-            let symmetry = Symmetry {
-                mirrored,
-                ..Symmetry::NONE
-            };
-            let sample = DrawnSample { arrays, symmetry };
-            TruthBatch::new(&[sample], Kind::Float, Device::Cpu).unwrap()
-        };
-        let (plain, mirrored) = (batch(false), batch(true));
-        let flipped = |of: &Tensor| of.flip([3]);
-        assert_eq!(mirrored.input, flipped(&plain.input));
-        assert_eq!(mirrored.highlight, flipped(&plain.highlight));
-        let (normals, found) = (flipped(&plain.normals), mirrored.normals);
-        assert_eq!(found.narrow(1, 0, 1), -normals.narrow(1, 0, 1));
-        assert_eq!(found.narrow(1, 1, 2), normals.narrow(1, 1, 2));
-        let light = [0.0_f32, 1.0, 2.0, -3.0, -4.0, 5.0, 6.0, -7.0, 8.0];
-        assert_eq!(mirrored.light, Tensor::from_slice(&light).reshape([1, 9]));
     }
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Neg;
 
+#[cfg(test)]
 use relight_core::image::Extent;
 
 /// One of them: the picture's axes are swapped, then each is turned over.
@@ -16,13 +17,6 @@ pub(crate) struct Symmetry {
 }
 
 impl Symmetry {
-    /// The picture as it is.
-    pub(crate) const NONE: Self = Self {
-        transposed: false,
-        mirrored: false,
-        upside_down: false,
-    };
-
     /// The one that the lowest three bits of a number say.
     pub(crate) fn of_bits(bits: u64) -> Self {
         Self {
@@ -33,6 +27,7 @@ impl Symmetry {
     }
 
     /// Which pixel of the picture is seen at a place.
+    #[cfg(test)]
     pub(super) fn source(self, extent: Extent, x: usize, y: usize) -> usize {
         let (mut u, mut v) = if self.transposed { (y, x) } else { (x, y) };
         if self.mirrored {
@@ -155,6 +150,6 @@ mod tests {
         for (at, one) in all.iter().enumerate() {
             assert!(!all[..at].contains(one));
         }
-        assert_eq!(all[0], Symmetry::NONE);
+        assert_eq!(all[0], Symmetry::default());
     }
 }

@@ -13,16 +13,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use relight_core::image::{Extent, Planes};
-use relight_core::reader::Rank;
 use relight_photo::decompose::EncodedPicture;
 use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
 use relight_photo::nets::{Graph, Inference, Weights, decomposer, decomposer_with_heads};
 use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight_train::{
-    Adam, AnsweredTensors, Checkpoint, Composition, ComputePrecision, DataLoader, DataSettings,
-    DecomposeSettings, DecomposeTask, Journal, Learner, Model, PaperInputs, PaperLossCoefficients,
-    PaperPhase, PaperSettings, PaperTask, ProcessGroup, Resources, Run, RunOutcome, RunSettings,
-    StepLosses, TABLE, TrainError, TrainObserver, TrainingTask, TransferSettings, TruthArrays,
+    Adam, AnsweredTensors, Checkpoint, ComputePrecision, DataSettings, DecomposeSettings,
+    DecomposeTask, Journal, Learner, Model, PaperInputs, PaperLossCoefficients, PaperPhase,
+    PaperSettings, PaperTask, Photographs, ProcessGroup, Resources, Run, RunOutcome, RunSettings,
+    StepLosses, TABLE, TrainError, TrainObserver, TrainingTask, TransferSettings,
     TurnNetworkSettings, TurnNetworkTask, Validation, read_settings,
 };
 use tch::{Device, Kind, Tensor};
@@ -138,10 +137,8 @@ fn small_run(steps: u64) -> RunSettings {
 fn small_data() -> DataSettings {
     DataSettings {
         size: 32,
-        views: 1,
-        lightings: 2,
-        shuffle_buffer: 6,
-        reuse: 2.0,
+        views: 8,
+        rays: 16,
         validation: 2,
         ..DataSettings::default()
     }
@@ -293,29 +290,57 @@ fn a_folder_with_a_run_is_not_overwritten_and_another_runs_checkpoint_is_refused
 }
 
 #[test]
-fn samples_are_the_same_on_any_number_of_threads() {
-    let composition = Arc::new(Composition {
-        recipe: Recipe {
-            size: 32,
-            views: 1,
-            lightings: 3,
-            ..Recipe::default()
-        },
-        library: Library::read(&Folders::default()).unwrap(),
-    });
-    let first = |threads: usize| -> Vec<TruthArrays> {
-        let composition = Arc::clone(&composition);
-        let mut loader = DataLoader::start(composition, Rank::ONLY, 1, threads).unwrap();
-        let mut next = || loader.next_sample().unwrap();
-        (3..12)
-            .map(|number| {
-                let (found, sample) = next();
-                assert_eq!(found, number);
-                sample
-            })
-            .collect()
+fn photographs_are_the_same_on_any_number_of_threads() {
+    let batches = |workers: usize| {
+        let resources = Resources {
+            workers,
+            ..resources()
+        };
+        let mut photographs = Photographs::new(&small_data(), &small_run(9), resources).unwrap();
+        (0..4)
+            .map(|step| photographs.batch(step).unwrap())
+            .collect::<Vec<_>>()
     };
-    assert_eq!(first(1), first(3));
+    for (one, other) in batches(1).iter().zip(&batches(3)) {
+        assert_eq!(one.input, other.input);
+        assert_eq!(one.normals, other.normals);
+        assert_eq!(one.light, other.light);
+    }
+}
+
+#[test]
+fn photographs_of_a_later_step_are_those_that_come_after_the_steps_before() {
+    let photographs = || Photographs::new(&small_data(), &small_run(9), resources()).unwrap();
+    let (mut through, mut later) = (photographs(), photographs());
+    let mut reached = through.batch(0).unwrap();
+    for step in 1..=12 {
+        reached = through.batch(step).unwrap();
+    }
+    assert_eq!(reached.input, later.batch(12).unwrap().input);
+}
+
+#[test]
+fn a_photograph_is_albedo_times_shading_and_highlight_where_it_is_not_clipped() {
+    let data = DataSettings {
+        size: 64,
+        ..small_data()
+    };
+    let mut photographs = Photographs::new(&data, &small_run(9), resources()).unwrap();
+    let mut apart = Vec::new();
+    for step in 0..6 {
+        let batch = photographs.batch(step).unwrap();
+        let made = batch.albedo.mean_dim([1_i64].as_slice(), true, Kind::Float);
+        let diffuse =
+            (&batch.picture - &batch.highlight).mean_dim([1_i64].as_slice(), true, Kind::Float);
+        // The shading is right up to a factor of each picture.
+        let both = &made * &batch.shading * &batch.mask;
+        let over = |of: &Tensor| of.sum_dim_intlist([1_i64, 2, 3].as_slice(), true, Kind::Float);
+        let factor = over(&(&both * &diffuse)) / over(&(&both * &both)).clamp_min(1e-9);
+        let off = over(&(both * factor - &diffuse).square()) / over(&diffuse.square());
+        apart.extend(Vec::<f32>::try_from(off.flatten(0, -1).sqrt()).unwrap());
+    }
+    apart.sort_by(f32::total_cmp);
+    assert!(apart[apart.len() / 2] < 0.15, "{apart:?}");
 }
 
 #[test]
@@ -628,11 +653,12 @@ fn a_run_does_not_go_on_with_other_turns_or_another_network_beside_it() {
 }
 
 #[test]
-fn a_run_that_is_asked_to_stop_while_its_first_samples_are_composed_stops_then() {
+fn a_run_that_is_asked_to_stop_while_its_first_views_are_cast_stops_then() {
     let settings = DecomposeSettings {
         run: small_run(4),
         data: DataSettings {
-            shuffle_buffer: 1_000_000,
+            views: 500,
+            rays: 4096,
             ..small_data()
         },
         ..DecomposeSettings::default()

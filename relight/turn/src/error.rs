@@ -13,9 +13,6 @@ use relight_photo::files::MovieError;
 use relight_photo::nets::NetError;
 use relit_data::session::SessionError;
 
-use crate::observe::probe_place::ProbePlace;
-use crate::setting_error::SettingError;
-
 /// Why a turn cannot be solved, or what was found cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -41,12 +38,19 @@ pub enum TurnError {
         /// How many it has.
         found: usize,
     },
-    /// The frames do not make a turn: why.
+    /// The frames do not make a turn, or a folder or a video is another than what is needed: why.
     #[error("{0}")]
-    Frames(String),
-    /// A setting cannot be.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
+    Refused(String),
+    /// A setting is beyond what may be given.
+    #[error("{what} is {value}: it has to be {allowed}")]
+    Setting {
+        /// Which setting.
+        what: &'static str,
+        /// What was given.
+        value: f64,
+        /// What may be given.
+        allowed: &'static str,
+    },
     /// No light fits the curves.
     #[error("no light explains the turn: all of it is dark, or all of it is clipped")]
     NoLight,
@@ -65,21 +69,13 @@ pub enum TurnError {
     /// The session whose video shows the ball cannot be read.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The video is not that of the turn.
-    #[error("{} is not the turn's video: {why}; give the session from which the shard was made", path.display())]
-    OtherVideo {
-        /// The video.
-        path: PathBuf,
-        /// What tells them apart.
-        why: String,
-    },
     /// The ball is under the object's mask.
     #[error(
         "the object's mask covers {percent:.0} % of the ball at {given}: measure the ball's place in the video again, or take the ball out of the mask"
     )]
     BallInMask {
         /// Where it is said to be.
-        given: ProbePlace,
+        given: String,
         /// The part of the ball that is covered.
         percent: f64,
     },
@@ -90,7 +86,7 @@ pub enum TurnError {
     )]
     NoBall {
         /// Where it is said to be.
-        given: ProbePlace,
+        given: String,
         /// The part that is explained, percent.
         explained: f64,
     },
@@ -99,7 +95,7 @@ pub enum TurnError {
          measure its middle and radius in the video again", explained[0], better[0], better[1], better[2], explained[1])]
     Misplaced {
         /// Where it is said to be.
-        given: ProbePlace,
+        given: String,
         /// Middle and radius of a circle that fits clearly better, pixels.
         better: [f64; 3],
         /// The parts of the variation that both explain, percent.
@@ -108,12 +104,17 @@ pub enum TurnError {
     /// A video cannot be read or written.
     #[error(transparent)]
     Movie(#[from] MovieError),
-    /// The folder for the results holds something else, or cannot be used: why.
-    #[error("{0}")]
-    Folder(String),
 }
 
 impl TurnError {
+    /// That a video is not that of the turn, and what tells them apart.
+    pub(crate) fn other_video(path: &Path, why: &str) -> Self {
+        let path = path.display();
+        Self::Refused(format!(
+            "{path} is not the turn's video: {why}; give the session from which the shard was made"
+        ))
+    }
+
     /// Puts the path to an operating system's reason.
     pub(crate) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
@@ -136,7 +137,7 @@ impl From<LightError> for TurnError {
 
 impl From<FolderFault> for TurnError {
     fn from(fault: FolderFault) -> Self {
-        Self::Folder(match fault {
+        Self::Refused(match fault {
             FolderFault::Foreign(path, name) => format!(
                 "{} holds {name}, which is no result of a turn: give a folder that is new, empty, or holds an earlier result",
                 path.display()

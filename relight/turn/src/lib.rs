@@ -8,10 +8,10 @@
 //!
 //! | module | concern |
 //! | --- | --- |
-//! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (Lambertian), `gloss`, `shading` (one of them) |
-//! | `observe` | what the frames show: `reading`, `curves`, `exposure`, `conditioning`; `film` and `probe` for a ball in the video |
+//! | `model` | what a pixel shows: `frame` (the camera over the table), `harmonics` (the curve as a Fourier series), `lighting` (light along a direction), `shading` (diffuse, glossy, metal) |
+//! | `observe` | what the frames show: `reading`, `curves`, `conditioning`; `film` and `probe` for a ball in the video |
 //! | `network` | `input`, `predict`: normals and albedo by the network of turns |
-//! | `fit` | `known_light`: `search` and `normal_step` (one pixel), `joint`, `unknowns` and `schur` (all of them with the gloss), `residuals`, `albedo`, `confidence`; `unknown_light`: `environment`, `photo_albedo` |
+//! | `fit` | `known_light`: the gloss of all pixels, `search` (one pixel), `residuals`, `albedo`, `confidence`; `unknown_light`: `environment`, `photo_albedo` |
 //! | `report` | `files`, `sheet`, `movie`, `object`: what is written; `warnings`: what a user should know |
 //!
 //! `solving` puts them together. A folder knows those above it in this table. Each module has its parameters as constants, with
@@ -24,11 +24,10 @@ mod model;
 mod network;
 mod observe;
 mod report;
-mod setting_error;
 mod solving;
 
 #[cfg(test)]
-mod test_turns;
+mod tests;
 
 pub use error::TurnError;
 pub use fit::environment::fit_turn_light;
@@ -46,5 +45,4 @@ pub use observe::probe_place::ProbePlace;
 pub use observe::reading::{ReadTurn, TableRotation, read_curves};
 pub use observe::verdict::TurnVerdict;
 pub use report::files::TurnFiles;
-pub use setting_error::SettingError;
 pub use solving::{SolvedTurn, TurnLight, TurnNetworks, TurnOptions, solve_turn};

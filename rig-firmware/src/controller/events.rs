@@ -166,12 +166,10 @@ impl Controller {
         self.session = Session::Closed;
         self.reader.reset();
         self.modal = Modal::new();
-        self.shift = 0;
         self.banner(board, "host");
     }
 
     pub(super) fn banner<B: Board>(&mut self, board: &mut B, cause: &str) {
-        self.reports_to_offset = 0;
         Reply::new(board, false).end();
         let mut reply = Reply::new(board, false);
         reply.text("Grbl 1.1h ['$' for help] [reset: ");

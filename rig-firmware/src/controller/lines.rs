@@ -8,8 +8,7 @@ use crate::error::Error;
 use crate::gcode::{self, Action, Block, Jog, Motion};
 use crate::number::Decimal;
 use crate::report::{self, Reply};
-use crate::settings::{GrblSettings, Key};
-use crate::store::Stored;
+use crate::settings::Key;
 
 /// Most bytes that one round of the main loop reads.
 const BYTES_A_ROUND: u8 = 128;
@@ -76,10 +75,6 @@ impl Controller {
         let sequence = self.sequence.take();
         self.session.remember(sequence, answer);
         report::answer(board, self.session.is_open(), sequence, answer);
-        if self.restart_due {
-            self.restart_due = false;
-            self.restart(board);
-        }
     }
 
     /// Does what a line says, or leaves a job that will.
@@ -88,45 +83,20 @@ impl Controller {
             Motion::Feed => block.modal.feed,
             Motion::Rapid => u32::MAX,
         };
-        let moving = match block.action {
-            Action::Move(target) => Some((self.resolve(target)?, None, feed)),
-            Action::GoHome(None) => Some((0, None, u32::MAX)),
-            Action::GoHome(Some(via)) => Some((self.resolve(via)?, Some(0), u32::MAX)),
-            _ => None,
+        let target = match block.action {
+            Action::Move(target) => Some(self.resolve(target)?),
+            Action::Nothing | Action::Dwell(_) => None,
         };
         self.modal = block.modal;
-        if self.mode == Mode::Check {
-            return Ok(());
-        }
-        if let Some((target, then, feed)) = moving {
-            self.go(board, target, then, feed);
-            return Ok(());
-        }
-        match block.action {
-            Action::Dwell(left) => self.job = Job::Dwell { since: None, left },
-            Action::SetOrigin(x) => {
-                self.offset = self.zero_for(x, self.shift)?;
-                self.reports_to_offset = 0;
-                self.save(board);
-            }
-            Action::SetOffset(x) => {
-                self.shift = self.zero_for(x, self.offset)?;
-                self.reports_to_offset = 0;
-            }
-            Action::Nothing | Action::Move(_) | Action::GoHome(_) => {}
+        if let Some(target) = target {
+            self.go(board, target, feed);
+        } else if let Action::Dwell(left) = block.action {
+            self.job = Job::Dwell { since: None, left };
         }
         Ok(())
     }
 
-    /// The offset that, together with `other`, gives the place where the plan ends the work
-    /// position `x`.
-    fn zero_for(&self, x: i32, other: i32) -> Result<i32, Error> {
-        let zero = self.planned.angle.checked_sub(other);
-        zero.and_then(|zero| zero.checked_sub(x))
-            .ok_or(Error::InvalidTarget)
-    }
-
-    fn go<B: Board>(&mut self, board: &mut B, target: i32, then: Option<i32>, feed: u32) {
+    fn go<B: Board>(&mut self, board: &mut B, target: i32, feed: u32) {
         if self.is_beyond(target) {
             self.job = Job::Refusal;
             self.stop(board, Stop::Alarm(Alarm::SoftLimit));
@@ -134,57 +104,30 @@ impl Controller {
         }
         self.job = Job::Move(Way {
             target,
-            then,
             feed,
             jog: false,
         });
     }
 
-    fn save<B: Board>(&mut self, board: &mut B) {
-        let stored = Stored {
-            settings: self.settings,
-            offset: self.offset,
-        };
-        self.store.write(board, &stored);
-    }
-
     fn execute_dollar<B: Board>(&mut self, board: &mut B, command: Dollar) -> Result<(), Error> {
-        match command {
-            Dollar::Help | Dollar::Settings | Dollar::Version => self.send_report(board, command),
-            Dollar::Modal => self.tell_modal(board),
-            Dollar::Offsets => self.tell_offsets(board),
-            Dollar::Set(key, value) => return self.set(board, key, value),
-            Dollar::Restore { settings, offsets } => {
-                return self.restore(board, settings, offsets);
-            }
-            Dollar::Home => return self.home(board),
-            Dollar::Unlock => return self.unlock(board),
-            Dollar::Check => return self.toggle_check(board),
-            Dollar::Jog(jog) => return self.jog(board, jog),
-        }
-        Ok(())
-    }
-
-    fn send_report<B: Board>(&self, board: &mut B, command: Dollar) {
-        let checked = self.session.is_open();
         match command {
             Dollar::Settings => {
                 for key in Key::ALL {
-                    report::setting(board, checked, &self.settings, key);
+                    report::setting(board, self.session.is_open(), &self.settings, key);
                 }
             }
             Dollar::Version => {
-                let mut reply = Reply::new(board, checked);
-                reply.text("[VER:1.1h.20261121:relit]").end();
-                let mut reply = Reply::new(board, checked);
-                reply.text("[OPT:NHtcl,8,128]").end();
+                for text in ["[VER:1.1h.20261121:relit]", "[OPT:NHtcl,8,128]"] {
+                    Reply::new(board, self.session.is_open()).text(text).end();
+                }
             }
-            _ => {
-                let mut reply = Reply::new(board, checked);
-                reply.text("[HLP:$$ $n=v $I $H $X $C $G $# $J= $RST= ? ! ~ ctrl-x]");
-                reply.end();
-            }
+            Dollar::Modal => self.tell_modal(board),
+            Dollar::Set(key, value) => return self.set(board, key, value),
+            Dollar::Home => return self.home(board),
+            Dollar::Unlock => return self.unlock(board),
+            Dollar::Jog(jog) => return self.jog(board, jog),
         }
+        Ok(())
     }
 
     /// Settings change only at rest or locked, for they change what a step is.
@@ -200,34 +143,8 @@ impl Controller {
         self.require_rest(board)?;
         self.settings.set(key, value)?;
         self.apply_settings(board);
-        self.save(board);
+        self.store.write(board, &self.settings);
         Ok(())
-    }
-
-    fn restore<B: Board>(
-        &mut self,
-        board: &mut B,
-        settings: bool,
-        offsets: bool,
-    ) -> Result<(), Error> {
-        self.require_rest(board)?;
-        if settings {
-            self.settings = GrblSettings::defaults();
-            self.apply_settings(board);
-        }
-        if offsets {
-            self.offset = 0;
-            self.shift = 0;
-            self.reports_to_offset = 0;
-        }
-        self.save(board);
-        self.message(board, "Restoring defaults");
-        Ok(())
-    }
-
-    fn message<B: Board>(&self, board: &mut B, text: &str) {
-        let mut reply = Reply::new(board, self.session.is_open());
-        reply.text("[MSG:").text(text).text("]").end();
     }
 
     fn home<B: Board>(&mut self, board: &mut B) -> Result<(), Error> {
@@ -248,23 +165,9 @@ impl Controller {
         }
         if let Mode::Alarm(_) = self.mode {
             self.mode = Mode::Ready;
-            self.message(board, "Caution: Unlocked");
+            let text = "[MSG:Caution: Unlocked]";
+            Reply::new(board, self.session.is_open()).text(text).end();
         }
-        Ok(())
-    }
-
-    /// `$C`. Its end is a reset, so that nothing that lines said while checked stays.
-    fn toggle_check<B: Board>(&mut self, board: &mut B) -> Result<(), Error> {
-        if self.mode == Mode::Check {
-            self.message(board, "Disabled");
-            self.restart_due = true;
-            return Ok(());
-        }
-        if !self.is_idle(board) {
-            return Err(Error::NotIdle);
-        }
-        self.mode = Mode::Check;
-        self.message(board, "Enabled");
         Ok(())
     }
 
@@ -280,7 +183,6 @@ impl Controller {
         }
         self.job = Job::Move(Way {
             target,
-            then: None,
             feed: jog.feed,
             jog: true,
         });

@@ -17,7 +17,7 @@ use crate::line::LineReader;
 use crate::ramp::Profile;
 use crate::report;
 use crate::settings::{GrblSettings, Key};
-use crate::store::{Health, Store, Stored};
+use crate::store::{Health, Store};
 
 /// Why the table is locked: the numbers of `ALARM:N`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,8 +44,6 @@ impl Alarm {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
     Ready,
-    /// Lines are checked and move nothing.
-    Check,
     Alarm(Alarm),
 }
 
@@ -63,8 +61,6 @@ enum Stop {
 struct Way {
     /// Thousandths of a degree from machine zero.
     target: i32,
-    /// Where to go on from there.
-    then: Option<i32>,
     /// Thousandths of a degree/min.
     feed: u32,
     jog: bool,
@@ -121,15 +117,7 @@ pub struct Controller {
     driver: Driver,
     /// Noted by interrupts and not followed yet.
     pending: Events,
-    /// Reports until the next one that tells the work offset.
-    reports_to_offset: u8,
-    /// The line under way ends check mode, which takes a reset after its answer.
-    restart_due: bool,
     planned: Planned,
-    /// `G54`: work zero, thousandths of a degree from machine zero.
-    offset: i32,
-    /// `G92`: on top of that, until the next reset.
-    shift: i32,
     modal: Modal,
     session: Session,
     /// The sequence number of the line that is under way.
@@ -145,7 +133,7 @@ pub struct Controller {
 impl Controller {
     /// Reads the settings and sends the banner.
     pub fn new<B: Board>(board: &mut B) -> Controller {
-        let (store, Stored { settings, offset }, health) = Store::open(board);
+        let (store, settings, health) = Store::open(board);
         let mode = if settings.flag(Key::Homing) {
             Mode::Alarm(Alarm::Locked)
         } else {
@@ -155,8 +143,6 @@ impl Controller {
             settings,
             profile: settings.profile(),
             store,
-            offset,
-            shift: 0,
             modal: Modal::new(),
             reader: LineReader::new(),
             session: Session::Closed,
@@ -171,8 +157,6 @@ impl Controller {
             emergency: false,
             driver: Driver::Off,
             heard: board.micros(),
-            reports_to_offset: 0,
-            restart_due: false,
         };
         board.enable_driver(false);
         controller.apply_settings(board);

@@ -41,19 +41,8 @@ impl Controller {
     }
 
     fn advance_move<B: Board>(&mut self, board: &mut B, way: Way) {
-        match self.push_way(board, way) {
-            Err(Full) => {}
-            Ok(()) => match way.then {
-                Some(target) => {
-                    let then = None;
-                    self.job = Job::Move(Way {
-                        target,
-                        then,
-                        ..way
-                    });
-                }
-                None => self.finish(board, Ok(())),
-            },
+        if self.push_way(board, way).is_ok() {
+            self.finish(board, Ok(()));
         }
     }
 
@@ -204,10 +193,7 @@ impl Controller {
     /// [`Error::InvalidTarget`] beyond what positions can tell.
     pub(super) fn resolve(&self, target: Target) -> Result<i32, Error> {
         let angle = match target {
-            Target::Machine(x) => Some(x),
-            Target::Work(x) => x
-                .checked_add(self.offset)
-                .and_then(|x| x.checked_add(self.shift)),
+            Target::Absolute(x) => Some(x),
             Target::Relative(x) => x.checked_add(self.planned.angle),
         };
         let angle = angle.ok_or(Error::InvalidTarget)?;

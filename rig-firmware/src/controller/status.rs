@@ -1,4 +1,4 @@
-//! Status reports, and what `$G` and `$#` tell.
+//! Status reports, and what `$G` tells.
 
 use super::{Controller, Job, Mode};
 use crate::board::Board;
@@ -7,8 +7,6 @@ use crate::number::scaled;
 use crate::report::Reply;
 use crate::settings::Key;
 
-/// Every so many reports tell the work offset.
-const OFFSET_EVERY: u8 = 10;
 /// The battery input's full scale.
 const BATTERY_FULL: u32 = 1023;
 
@@ -23,7 +21,7 @@ struct Snapshot {
 
 impl Controller {
     /// Answers `?`.
-    pub(super) fn report_status<B: Board>(&mut self, board: &mut B) {
+    pub(super) fn report_status<B: Board>(&self, board: &mut B) {
         let now = board.with_stepper(|stepper, micros| Snapshot {
             micros,
             position: stepper.position(),
@@ -34,23 +32,16 @@ impl Controller {
         let (room, battery, inputs) = (board.receive_room(), board.battery(), board.inputs());
         let index = inputs.index != self.settings.flag(Key::InvertIndex);
         let emergency = inputs.emergency_stop != self.settings.flag(Key::InvertEmergency);
-        let inches = self.settings.flag(Key::ReportInches);
 
         let mut reply = Reply::new(board, self.session.is_open());
         reply.text("<").text(self.state(&now));
-        let machine = self.angle(now.position);
-        if self.settings.get(Key::Report) & 1 != 0 {
-            reply.text("|MPos:").position(machine, inches);
-        } else {
-            let work = machine.saturating_sub(self.work_zero());
-            reply.text("|WPos:").position(work, inches);
-        }
+        reply.text("|MPos:").position(self.angle(now.position));
         let buffers = reply.text("|Bf:").whole(u32::from(now.free)).text(",");
         buffers.whole(u32::from(room));
         let feed = now
             .interval
             .map_or(0, |interval| self.profile.feed(interval));
-        reply.text("|FS:").speed(feed, inches).text(",0");
+        reply.text("|FS:").speed(feed).text(",0");
         reply.text("|T:").whole(now.micros);
         reply.text("|Bat:").decimal(self.centivolts(battery), 2);
         if index || emergency {
@@ -58,11 +49,6 @@ impl Controller {
             reply.text(if index { "X" } else { "" });
             reply.text(if emergency { "R" } else { "" });
         }
-        if self.reports_to_offset == 0 {
-            self.reports_to_offset = OFFSET_EVERY;
-            reply.text("|WCO:").position(self.work_zero(), inches);
-        }
-        self.reports_to_offset -= 1;
         reply.text(">").end();
     }
 
@@ -70,7 +56,6 @@ impl Controller {
         let moving = now.interval.is_some();
         match (self.mode, self.job) {
             (Mode::Alarm(_), _) => "Alarm",
-            (Mode::Check, _) => "Check",
             _ if self.hold && moving => "Hold:1",
             _ if self.hold => "Hold:0",
             (_, Job::Home(_)) => "Home",
@@ -78,10 +63,6 @@ impl Controller {
             (_, Job::None) if !moving && !now.planned => "Idle",
             _ => "Run",
         }
-    }
-
-    fn work_zero(&self) -> i32 {
-        self.offset.saturating_add(self.shift)
     }
 
     fn centivolts(&self, battery: u16) -> i32 {
@@ -97,21 +78,9 @@ impl Controller {
             Motion::Rapid => "0",
             Motion::Feed => "1",
         });
-        reply.text(" G54 G17 G2");
-        reply.text(if self.modal.inches { "0" } else { "1" });
-        reply.text(" G9");
+        reply.text(" G54 G17 G21 G9");
         reply.text(if self.modal.relative { "1" } else { "0" });
         reply.text(" G94 M5 M9 T0 F");
-        let inches = self.settings.flag(Key::ReportInches);
-        reply.speed(self.modal.feed, inches).text(" S0]").end();
-    }
-
-    /// `$#`.
-    pub(super) fn tell_offsets<B: Board>(&self, board: &mut B) {
-        let inches = self.settings.flag(Key::ReportInches);
-        for (name, value) in [("[G54:", self.offset), ("[G28:", 0), ("[G92:", self.shift)] {
-            let mut reply = Reply::new(board, self.session.is_open());
-            reply.text(name).position(value, inches).text("]").end();
-        }
+        reply.speed(self.modal.feed).text(" S0]").end();
     }
 }

@@ -8,15 +8,12 @@ mod words;
 pub(crate) use self::words::Motion;
 use self::words::{OneShot, Words};
 use crate::error::Error;
-use crate::number::Decimal;
 
 /// What one line leaves for the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Modal {
     /// `G0` or `G1`.
     pub motion: Motion,
-    /// `G20` instead of `G21`.
-    pub inches: bool,
     /// `G91` instead of `G90`.
     pub relative: bool,
     /// `F`, thousandths of a degree/min; 0: none given yet.
@@ -28,7 +25,6 @@ impl Modal {
     pub(crate) const fn new() -> Modal {
         Modal {
             motion: Motion::Rapid,
-            inches: false,
             relative: false,
             feed: 0,
         }
@@ -44,10 +40,8 @@ impl Default for Modal {
 /// A place to go to, thousandths of a degree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Target {
-    /// From machine zero.
-    Machine(i32),
-    /// From work zero.
-    Work(i32),
+    /// From zero.
+    Absolute(i32),
     /// From where the moves before end.
     Relative(i32),
 }
@@ -61,12 +55,6 @@ pub(crate) enum Action {
     Move(Target),
     /// `G4`: wait so many microseconds at rest.
     Dwell(u32),
-    /// `G10 L20`: the present place has this work position, kept in the EEPROM.
-    SetOrigin(i32),
-    /// `G28`: go to machine zero at full speed, over a place if one is named.
-    GoHome(Option<Target>),
-    /// `G92`: the present place has this work position, until the next reset.
-    SetOffset(i32),
 }
 
 /// A line of G-code.
@@ -90,57 +78,34 @@ pub(crate) struct Jog {
 impl Words {
     /// The modal state under this line.
     fn modal(&self, before: &Modal) -> Result<Modal, Error> {
-        let inches = self.inches.unwrap_or(before.inches);
         let feed = match self.f {
-            Some(feed) => {
-                let feed = degrees(feed, inches).ok_or(Error::InvalidTarget)?;
-                feed.unsigned_abs()
-            }
+            Some(feed) => feed
+                .thousandths()
+                .ok_or(Error::InvalidTarget)?
+                .unsigned_abs(),
             None => before.feed,
         };
         Ok(Modal {
             motion: self.motion.unwrap_or(before.motion),
-            inches,
             relative: self.relative.unwrap_or(before.relative),
             feed,
         })
     }
 
-    /// The axis word in thousandths of a degree.
-    fn axis(&self, inches: bool) -> Result<Option<i32>, Error> {
-        match self.x {
-            Some(value) => degrees(value, inches).map(Some).ok_or(Error::InvalidTarget),
-            None => Ok(None),
-        }
-    }
-
     /// Where the axis word points to.
     fn target(&self, modal: &Modal) -> Result<Option<Target>, Error> {
-        let machine = self.one_shot == Some(OneShot::Machine);
-        Ok(self.axis(modal.inches)?.map(|x| match modal.relative {
-            _ if machine => Target::Machine(x),
+        let Some(x) = self.x else {
+            return Ok(None);
+        };
+        let x = x.thousandths().ok_or(Error::InvalidTarget)?;
+        let relative = modal.relative && self.one_shot != Some(OneShot::Machine);
+        Ok(Some(match relative {
             true => Target::Relative(x),
-            false => Target::Work(x),
+            false => Target::Absolute(x),
         }))
     }
 
-    /// The one-shot commands that set work zero.
-    fn origin(&self, modal: &Modal) -> Result<i32, Error> {
-        self.axis(modal.inches)?.ok_or(Error::NoAxisWords)
-    }
-
-    /// That no word is left over which only `G4` and `G10` use.
-    fn without_values(&self) -> Result<(), Error> {
-        match self.l.is_some() || self.p.is_some() {
-            true => Err(Error::UnusedWords),
-            false => Ok(()),
-        }
-    }
-
     fn dwell(&self) -> Result<Action, Error> {
-        if self.l.is_some() {
-            return Err(Error::UnusedWords);
-        }
         if self.x.is_some() {
             return Err(Error::UnusedAxisWords);
         }
@@ -148,22 +113,11 @@ impl Words {
         micros.map(Action::Dwell).ok_or(Error::BadNumber)
     }
 
-    fn set_origin(&self, modal: &Modal) -> Result<Action, Error> {
-        let x = self.origin(modal)?;
-        let (Some(l), Some(p)) = (self.l, self.p) else {
-            return Err(Error::ValueMissing);
-        };
-        if !l.is(20) {
-            return Err(Error::Unsupported);
-        }
-        if !p.is(0) && !p.is(1) {
-            return Err(Error::CoordinateSystem);
-        }
-        Ok(Action::SetOrigin(x))
-    }
-
     fn go(&self, modal: &Modal) -> Result<Action, Error> {
-        self.without_values()?;
+        // Only `G4` uses it.
+        if self.p.is_some() {
+            return Err(Error::UnusedWords);
+        }
         let Some(target) = self.target(modal)? else {
             return match self.one_shot {
                 Some(OneShot::Machine) => Err(Error::MachineMotion),
@@ -177,15 +131,6 @@ impl Words {
     }
 }
 
-/// Millimetres or inches to thousandths of a degree.
-fn degrees(value: Decimal, inches: bool) -> Option<i32> {
-    if inches {
-        value.inches()
-    } else {
-        value.thousandths()
-    }
-}
-
 /// Reads a line of G-code under the modal state before it.
 ///
 /// # Errors
@@ -196,15 +141,6 @@ pub(crate) fn parse(text: &[u8], before: &Modal) -> Result<Block, Error> {
     let modal = words.modal(before)?;
     let action = match words.one_shot {
         Some(OneShot::Dwell) => words.dwell()?,
-        Some(OneShot::SetOrigin) => words.set_origin(&modal)?,
-        Some(OneShot::GoHome) => {
-            words.without_values()?;
-            Action::GoHome(words.target(&modal)?)
-        }
-        Some(OneShot::SetOffset) => {
-            words.without_values()?;
-            Action::SetOffset(words.origin(&modal)?)
-        }
         Some(OneShot::Machine) | None => words.go(&modal)?,
     };
     Ok(Block { modal, action })
@@ -220,7 +156,7 @@ pub(crate) fn parse_jog(text: &[u8], modal: &Modal) -> Result<Jog, Error> {
     let mut words = Words::default();
     words.read(text)?;
     let allowed = matches!(words.one_shot, None | Some(OneShot::Machine));
-    if !allowed || words.motion.is_some() || words.l.is_some() || words.p.is_some() {
+    if !allowed || words.motion.is_some() || words.p.is_some() {
         return Err(Error::InvalidJog);
     }
     let modal = words.modal(&Modal { feed: 0, ..*modal })?;
@@ -252,18 +188,12 @@ mod tests {
             ("", Action::Nothing),
             ("G1", Action::Nothing),
             ("N7F100", Action::Nothing),
-            ("G0X1.5", Action::Move(Target::Work(1500))),
-            ("X-2", Action::Move(Target::Work(-2000))),
+            ("G0X1.5", Action::Move(Target::Absolute(1500))),
+            ("G21X-2", Action::Move(Target::Absolute(-2000))),
             ("G91G1X3", Action::Move(Target::Relative(3000))),
-            ("G91G53X3", Action::Move(Target::Machine(3000))),
-            ("G20X1", Action::Move(Target::Work(25_400))),
+            ("G91G53X3", Action::Move(Target::Absolute(3000))),
             ("G4P0.5", Action::Dwell(500_000)),
-            ("G10L20P1X0", Action::SetOrigin(0)),
-            ("G10L20P0X9", Action::SetOrigin(9000)),
-            ("G28", Action::GoHome(None)),
-            ("G28X4", Action::GoHome(Some(Target::Work(4000)))),
-            ("G92X-1", Action::SetOffset(-1000)),
-            ("G00001X1", Action::Move(Target::Work(1000))),
+            ("G00001X1", Action::Move(Target::Absolute(1000))),
         ];
         for (text, expected) in cases {
             assert_eq!(action(text), Ok(expected), "{text}");
@@ -285,37 +215,28 @@ mod tests {
             ("G2X1", 20),
             ("M5", 20),
             ("Y1", 20),
-            ("G92.1", 20),
-            ("G28.1", 20),
+            ("G20", 20),
+            ("G92X1", 20),
             ("G10L2P1X1", 20),
+            ("G28", 20),
             ("G54", 20),
             ("G-5", 20),
             ("G0G1X1", 21),
-            ("G20G21", 21),
             ("G90G91", 21),
             ("G4P1G53", 21),
             ("G1.5X1", 23),
             ("G90.1", 23),
-            ("G0G92X1", 24),
-            ("G28G1X1", 24),
             ("X1X2", 25),
             ("F1F2", 25),
-            ("G92", 26),
-            ("G10L20P1", 26),
             ("N10000000", 27),
             ("G4", 28),
-            ("G10X1", 28),
-            ("G10L20X1", 28),
-            ("G10L20P2X1", 29),
             ("G53", 30),
             ("G4P1X1", 31),
             ("X3000000", 33),
-            ("G20X100000", 33),
             ("F3000000", 33),
             ("G1X1P1", 36),
-            ("G1X1L1", 36),
+            ("G1X1L1", 20),
             ("P1", 36),
-            ("G92X1P1", 36),
         ];
         for (text, code) in cases {
             let got = action(text).map_err(Error::code);
@@ -327,16 +248,15 @@ mod tests {
 
     #[test]
     fn the_modal_state_goes_from_line_to_line() {
-        let block = parse(b"G20G91G1F10", &Modal::new()).unwrap();
+        let block = parse(b"G91G1F10", &Modal::new()).unwrap();
         let expected = Modal {
             motion: Motion::Feed,
-            inches: true,
             relative: true,
-            feed: 254_000,
+            feed: 10_000,
         };
         assert_eq!(block.modal, expected);
         let next = parse(b"X1", &block.modal).unwrap();
-        assert_eq!(next.action, Action::Move(Target::Relative(25_400)));
+        assert_eq!(next.action, Action::Move(Target::Relative(1000)));
         assert_eq!(next.modal, expected);
     }
 
@@ -354,14 +274,13 @@ mod tests {
         assert_eq!(jog("G91X5F100"), Ok(expected));
         assert_eq!(
             jog("G53X5F1").map(|jog| jog.target),
-            Ok(Target::Machine(5000))
+            Ok(Target::Absolute(5000))
         );
-        assert_eq!(jog("N5G20X1F1").map(|jog| jog.feed), Ok(25_400));
+        assert_eq!(jog("N5X1F1").map(|jog| jog.feed), Ok(1000));
         let wrong = [
             ("X5", 22),
             ("F5", 26),
             ("G1X5F1", 16),
-            ("G92X5F1", 16),
             ("X5F1P1", 16),
             ("G4X5F1", 16),
             ("X5FF", 2),

@@ -16,10 +16,7 @@ pub(crate) enum Motion {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OneShot {
     Dwell,
-    SetOrigin,
-    GoHome,
     Machine,
-    SetOffset,
 }
 
 /// The words of a line.
@@ -27,10 +24,8 @@ pub(super) enum OneShot {
 pub(super) struct Words {
     pub(super) motion: Option<Motion>,
     pub(super) one_shot: Option<OneShot>,
-    pub(super) inches: Option<bool>,
     pub(super) relative: Option<bool>,
     pub(super) f: Option<Decimal>,
-    pub(super) l: Option<Decimal>,
     pub(super) n: Option<Decimal>,
     pub(super) p: Option<Decimal>,
     pub(super) x: Option<Decimal>,
@@ -57,7 +52,6 @@ impl Words {
         let place = match letter {
             b'G' => return self.command(value),
             b'F' => &mut self.f,
-            b'L' => &mut self.l,
             b'N' => &mut self.n,
             b'P' => &mut self.p,
             b'X' => &mut self.x,
@@ -83,27 +77,15 @@ impl Words {
             0 => self.motion.replace(Motion::Rapid).is_some(),
             1 => self.motion.replace(Motion::Feed).is_some(),
             4 => self.one_shot.replace(OneShot::Dwell).is_some(),
-            10 => self.one_shot.replace(OneShot::SetOrigin).is_some(),
-            // G28.1, G92.1 and their kin are commands of their own, and none of this table's.
-            28 | 92 if !value.is_whole() => return Err(Error::Unsupported),
-            28 => self.one_shot.replace(OneShot::GoHome).is_some(),
             53 => self.one_shot.replace(OneShot::Machine).is_some(),
-            92 => self.one_shot.replace(OneShot::SetOffset).is_some(),
-            20 => self.inches.replace(true).is_some(),
-            21 => self.inches.replace(false).is_some(),
+            // Millimetres are all there is.
+            21 => false,
             90 => self.relative.replace(false).is_some(),
             91 => self.relative.replace(true).is_some(),
             _ => return Err(Error::Unsupported),
         };
         if !value.is_whole() {
             return Err(Error::NotInteger);
-        }
-        let wants_axis = matches!(
-            self.one_shot,
-            Some(OneShot::SetOrigin | OneShot::GoHome | OneShot::SetOffset)
-        );
-        if self.motion.is_some() && wants_axis {
-            return Err(Error::AxisConflict);
         }
         if group_taken {
             return Err(Error::ModalGroup);

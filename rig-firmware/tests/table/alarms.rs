@@ -27,7 +27,7 @@ fn the_soft_limit_counts_either_way_and_can_be_off() {
     table.ok("G0 X-10");
     assert_eq!(table.answer("G0 X-10.001"), "error:9");
     table.answer("$X");
-    assert_eq!(table.answer("G28 X11"), "error:9");
+    assert_eq!(table.answer("G1 X11 F100"), "error:9");
     table.answer("$X");
     table.ok("$20=0");
     table.ok("G0 X-11");

@@ -7,10 +7,10 @@ use crate::support::{Edge, Table, extremes};
 const ACCELERATION: f64 = 36.0 * 88.889;
 
 /// Pieces of lines: random bytes alone would hardly ever mean something.
-const PIECES: [&str; 40] = [
-    "G0", "G1", "G4", "G20", "G21", "G28", "G53", "G90", "G91", "G92", "G10L20P1", "X", "F", "P",
-    "N", "-", "1", "20", "360", "0.5", "99999999", "\n", "\n", "\r\n", " ", "(", ")", ";", "*",
-    "$", "$H", "$X", "$C", "$J=", "$I", "$$", "=", "N0*1D0F", "~", "!",
+const PIECES: [&str; 37] = [
+    "G0", "G1", "G4", "G20", "G21", "G53", "G90", "G91", "G92", "X", "F", "P", "N", "-", "1", "20",
+    "360", "0.5", "99999999", "\n", "\n", "\r\n", " ", "(", ")", ";", "*", "$", "$H", "$X", "$J=",
+    "$I", "$$", "=", "N0*1D0F", "~", "!",
 ];
 
 fn noise() -> impl Strategy<Value = Vec<u8>> {

@@ -48,7 +48,7 @@ pub(crate) enum Verb {
     Devices,
     /// Capture one turn of the object on the table.
     #[command(
-        after_help = "Example:\n  relit-capture record --object mug --turntable serial: --meter"
+        after_help = "Example:\n  relit-capture record --object mug --turntable serial: --exposure 100"
     )]
     Record(Box<RecordArguments>),
     /// Measure once which way the table turns, and note how high the camera looks down; sessions carry both.
@@ -74,9 +74,6 @@ pub(crate) struct RecordArguments {
     /// The object's name, as it goes into the session's: letters, digits, '-', '_', '.'.
     #[arg(long, value_name = "NAME")]
     pub(crate) object: String,
-    /// Find the exposure on a slow metering turn first.
-    #[arg(long)]
-    pub(crate) meter: bool,
     /// Do not ask before the table turns.
     #[arg(long)]
     pub(crate) yes: bool,
@@ -152,9 +149,6 @@ pub(crate) struct RigArguments {
     /// Focus to hold [default: as it is].
     #[arg(long, value_name = "VALUE")]
     focus: Option<i64>,
-    /// Least voltage of the table's battery [default: not looked at].
-    #[arg(long, value_name = "VOLTS", value_parser = volts)]
-    min_battery: Option<f64>,
     /// Frames that may be missing or damaged in a take.
     #[arg(long, value_name = "N", default_value_t = 0)]
     max_dropped: u64,
@@ -176,10 +170,8 @@ impl From<RigArguments> for Settings {
             gain: line.gain,
             white_balance: line.white_balance,
             focus: line.focus,
-            power_line: None,
         };
         settings.degrees_per_second = line.degrees_per_second;
-        settings.min_battery_v = line.min_battery;
         settings.max_dropped = line.max_dropped;
         settings.retries = line.retries;
         settings.commit = option_env!("RELIT_COMMIT").unwrap_or_default().to_owned();
@@ -221,10 +213,6 @@ fn rate(text: &str) -> Result<f64, String> {
 
 fn elevation(text: &str) -> Result<f64, String> {
     figure(text, 0.0, 89.0, "degrees")
-}
-
-fn volts(text: &str) -> Result<f64, String> {
-    figure(text, 0.0, 100.0, "volts")
 }
 
 #[cfg(test)]

@@ -39,9 +39,8 @@ pub(crate) fn programs() -> ProcessingPrograms {
         let mut places = folders.iter().map(|folder| folder.join(name));
         places.find(|place| place.is_file())
     };
-    // The disk, too, is the capture's first.
-    let launcher = find("ionice").map_or(Vec::new(), |ionice| {
-        vec![ionice.into(), "-c".into(), "3".into()]
+    let launcher = find("nice").map_or(Vec::new(), |nice| {
+        vec![nice.into(), "-n".into(), "19".into()]
     });
     ProcessingPrograms {
         mask: find("relit-mask"),

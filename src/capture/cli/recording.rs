@@ -6,8 +6,8 @@ use std::thread;
 use std::time::Duration;
 
 use relit_rig::capture::{
-    CaptureContext, CaptureError, CaptureRequest, Captured, Equipment, Settings, StopRequest,
-    Stopped, capture, salvage,
+    CaptureContext, CaptureError, Captured, Equipment, Settings, StopRequest, Stopped, capture,
+    salvage,
 };
 use relit_rig::state::{Monitor, Phase, RigState, Verdict};
 use relit_rig::turntable::TurntableAddress;
@@ -22,12 +22,7 @@ use relit_data::durable::MadeFolder;
 const UPDATE: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, CaptureError> {
-    let RecordArguments {
-        rig,
-        object,
-        meter,
-        yes,
-    } = record;
+    let RecordArguments { rig, object, yes } = record;
     let settings: Settings = rig.into();
     let _made = make_root(&settings)?;
     if !yes && !agreed(console, &settings)? {
@@ -41,14 +36,13 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
     at_end(move || asked.ask(Stopped::Shutdown))
         .map_err(CaptureError::system("the signals", "listened to"))?;
     let monitor = Monitor::default();
-    let request = CaptureRequest { object, meter };
     let context = CaptureContext {
         monitor: &monitor,
         preview: None,
         stop: &stop,
     };
     let captured = while_reporting(console, &monitor, || {
-        capture(&mut equipment, &request, context)
+        capture(&mut equipment, &object, context)
     })?;
     let folder = equipment.settings().root.join(&captured.take.session);
     Ok(report(console, &captured, &folder.display().to_string()))

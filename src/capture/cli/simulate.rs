@@ -3,13 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use relit_rig::clock::Clock;
-use relit_rig::simulator::{
-    Simulator, SimulatorCounts, SimulatorError, SimulatorOptions, TableFaults, WireCounts,
-};
-use serde_json::json;
+use relit_rig::simulator::{Simulator, SimulatorError, SimulatorOptions, TableFaults};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::turntable_arguments::SimulateArguments;
@@ -25,9 +22,6 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
             factor => Clock::paced(factor),
         },
         faults: asked.fault.join(",").parse::<TableFaults>()?,
-        seed: asked.seed,
-        index_at: asked.index_at,
-        reset_on_open: !asked.no_reset,
         ..SimulatorOptions::default()
     };
     let simulator = Simulator::start(&options, asked.link.as_deref())?;
@@ -42,50 +36,23 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
             speed: asked.speed,
         },
     );
-    wait(console, asked.for_seconds);
-    report(console, &simulator.stop());
+    wait(console);
+    drop(simulator);
+    console.say("the simulated turntable has ended", &Event::Ended);
     Ok(Outcome::Whole)
 }
 
-/// Waits until the given time is over or a signal arrives.
-fn wait(console: Console, for_seconds: Option<f64>) {
+/// Waits until a signal arrives.
+fn wait(console: Console) {
     let ended = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM, SIGHUP] {
         if let Err(error) = signal_hook::flag::register(signal, Arc::clone(&ended)) {
             console.warn(&format!(
-                "signal {signal} ends the simulator without its summary: {error}"
+                "signal {signal} ends the simulator and leaves its link: {error}"
             ));
         }
     }
-    let limit = for_seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    let began = Instant::now();
-    while !ended.load(Ordering::Relaxed) && limit.is_none_or(|limit| began.elapsed() < limit) {
+    while !ended.load(Ordering::Relaxed) {
         thread::sleep(LOOK);
     }
-}
-
-fn report(console: Console, counts: &SimulatorCounts) {
-    let text = format!(
-        "opened {} times; restarted by faults {} times{}\nto the table:   {}\nfrom the table: {}",
-        counts.opened,
-        counts.resets,
-        if counts.stalled { ", stalled" } else { "" },
-        of_the_wire(&counts.to_chip),
-        of_the_wire(&counts.from_chip),
-    );
-    let counts = json!(counts);
-    console.say(&text, &Event::Ended { counts });
-}
-
-fn of_the_wire(counts: &WireCounts) -> String {
-    format!(
-        "{} lines, {} bytes, {} lost, {} flipped, {} late; {} lines doubled, {} merged",
-        counts.lines,
-        counts.bytes,
-        counts.dropped,
-        counts.flipped,
-        counts.delayed,
-        counts.duplicated,
-        counts.merged,
-    )
 }

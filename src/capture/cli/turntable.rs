@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use relit_rig::turntable::{
-    Homed, Owner, Table, TableOptions, TableStatus, TurntableAddress, TurntableError, find_serial,
+    Homed, Table, TableOptions, TableStatus, TurntableAddress, TurntableError, find_serial,
 };
 use serde_json::{Value, json};
 
@@ -22,8 +22,16 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
     };
     let options = TableOptions::default();
     match asked.action {
-        Action::Status => status(console, &port, &options),
-        Action::Stop => stop(console, &port, &options),
+        Action::Status => {
+            let table = open(console, &port, &options)?;
+            report(console, Event::Status, &table.status()?);
+            Ok(Outcome::Whole)
+        }
+        Action::Stop => {
+            let table = Table::take_over(&port, &options)?;
+            report(console, Event::Stopped, &table.stop()?);
+            Ok(Outcome::Whole)
+        }
         Action::Home => home(console, open_to_move(console, &port, &options)?.as_ref()),
         Action::Jog {
             degrees,
@@ -84,28 +92,6 @@ fn no_port(address: &TurntableAddress) -> TurntableError {
               `relit-capture simulate` and name the port that it prints"
             .to_owned(),
     }
-}
-
-fn status(
-    console: Console,
-    port: &Path,
-    options: &TableOptions,
-) -> Result<Outcome, TurntableError> {
-    let status = match Owner::find(port, &options.runtime_folder)? {
-        Some(owner) => owner.status()?,
-        None => open(console, port, options)?.status()?,
-    };
-    report(console, Event::Status, &status);
-    Ok(Outcome::Whole)
-}
-
-fn stop(console: Console, port: &Path, options: &TableOptions) -> Result<Outcome, TurntableError> {
-    let status = match Owner::find(port, &options.runtime_folder)? {
-        Some(owner) => owner.stop()?,
-        None => Table::open_serial(port, options)?.stop()?,
-    };
-    report(console, Event::Stopped, &status);
-    Ok(Outcome::Whole)
 }
 
 fn home(console: Console, table: &Table) -> Result<Outcome, TurntableError> {

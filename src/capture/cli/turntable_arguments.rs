@@ -16,7 +16,7 @@ Examples:
   relit-capture turntable jog --home 45
       find zero, then turn to 45 degrees
   relit-capture turntable stop
-      stop it, also from beside a capture that runs
+      stop it; a capture that has the table is ended
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
 
@@ -59,7 +59,7 @@ pub(crate) enum Action {
         #[arg(long)]
         home: bool,
     },
-    /// Slow the table down to a stop and drop what it had to do.
+    /// Slow the table down to a stop and drop what it had to do; a program of the toolkit that has it is ended.
     Stop,
     /// Release the lock after an alarm.
     Unlock,
@@ -76,23 +76,6 @@ pub(crate) struct SimulateArguments {
     /// What goes wrong, such as drop=0.01 or reset@12.5s; may be given again.
     #[arg(long, value_name = "FAULT")]
     pub(crate) fault: Vec<String>,
-    /// Seed of the random faults.
-    #[arg(long, default_value_t = 0)]
-    pub(crate) seed: u64,
-    /// Angle of the index sensor, degrees.
-    #[arg(
-        long,
-        value_name = "DEGREES",
-        default_value_t = 30.0,
-        allow_negative_numbers = true
-    )]
-    pub(crate) index_at: f64,
-    /// Opening the port does not reset the controller, as an Arduino's does.
-    #[arg(long)]
-    pub(crate) no_reset: bool,
-    /// End by itself after so many seconds.
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
-    pub(crate) for_seconds: Option<f64>,
 }
 
 fn degrees(text: &str) -> Result<f64, String> {
@@ -108,11 +91,4 @@ fn speed(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|factor: &f64| factor.is_finite() && (0.01..=100.0).contains(factor))
         .ok_or_else(|| "a speed is a number from 0.01 to 100".to_owned())
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|seconds: &f64| (0.0..=1e9).contains(seconds))
-        .ok_or_else(|| "give seconds, from 0 on".to_owned())
 }

@@ -4,44 +4,40 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ImageEncoder as _, RgbImage};
+use image::{ImageEncoder as _, ImageError, RgbImage};
 
+use super::Page;
 use super::axis::{degrees, percent};
 use super::turn::Turn;
-use super::{Page, THUMBNAIL_SIDE, Thumbnail};
 use crate::shard::record::FrameRecord;
 
 /// Good enough to judge mask and light; a quarter of a PNG's size on a real frame.
 const JPEG_QUALITY: u8 = 85;
 
 /// The thumbnails as figures, in the given order.
-pub(super) fn sheet(page: &Page<'_>, turn: &Turn) -> Result<String, String> {
-    page.thumbnails
-        .iter()
-        .map(|thumbnail| figure(page.records, turn, thumbnail))
-        .collect()
+pub(super) fn sheet(page: &Page<'_>, turn: &Turn) -> Result<String, ImageError> {
+    let figures = page.thumbnails.iter().filter_map(|(index, image)| {
+        let position = page.records.binary_search_by_key(index, |r| r.index);
+        let position = position.ok()?;
+        let angle = turn.degrees.get(position).copied();
+        Some(figure(
+            page.records.get(position)?,
+            &angle.map(degrees).unwrap_or_default(),
+            image,
+        ))
+    });
+    figures.collect()
 }
 
-fn figure(records: &[FrameRecord], turn: &Turn, thumbnail: &Thumbnail) -> Result<String, String> {
-    let unknown = || format!("sample {} has a thumbnail and no record", thumbnail.index);
-    let position = records
-        .binary_search_by_key(&thumbnail.index, |r| r.index)
-        .map_err(|_| unknown())?;
-    let record = records.get(position).ok_or_else(unknown)?;
-    let angle = turn
-        .degrees
-        .get(position)
-        .copied()
-        .map(degrees)
-        .unwrap_or_default();
+fn figure(record: &FrameRecord, angle: &str, image: &RgbImage) -> Result<String, ImageError> {
     let class = if record.spec_net { "frame on" } else { "frame" };
     Ok(format!(
         "<figure class=\"{class}\"><img src=\"{uri}\" width=\"{width}\" height=\"{height}\" \
          alt=\"Sample {index} at {angle}, {saturated} saturated\">\
          <figcaption><b>{angle}</b> <span>{index}</span>{marks}</figcaption></figure>\n",
-        uri = data_uri(thumbnail)?,
-        width = thumbnail.image.width(),
-        height = thumbnail.image.height(),
+        uri = data_uri(image)?,
+        width = image.width(),
+        height = image.height(),
         index = record.index,
         saturated = percent(record.saturated_fraction),
         marks = marks(record),
@@ -63,18 +59,8 @@ fn marks(record: &FrameRecord) -> String {
 }
 
 /// The image as JPEG or PNG, whichever is smaller: PNG is smaller for small and flat images.
-fn data_uri(thumbnail: &Thumbnail) -> Result<String, String> {
-    let (index, image) = (thumbnail.index, &thumbnail.image);
-    let (width, height) = image.dimensions();
-    let fits = |side| (1..=THUMBNAIL_SIDE).contains(&side);
-    if !fits(width) || !fits(height) {
-        return Err(format!(
-            "the thumbnail of sample {index} is {width} x {height} pixels"
-        ));
-    }
-    let failed = |error| format!("the thumbnail of sample {index} could not be encoded: {error}");
-    let jpeg = jpeg(image).map_err(failed)?;
-    let png = png(image).map_err(failed)?;
+fn data_uri(image: &RgbImage) -> Result<String, ImageError> {
+    let (jpeg, png) = (jpeg(image)?, png(image)?);
     Ok(if jpeg.len() < png.len() {
         format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg))
     } else {
@@ -82,13 +68,13 @@ fn data_uri(thumbnail: &Thumbnail) -> Result<String, String> {
     })
 }
 
-fn jpeg(image: &RgbImage) -> Result<Vec<u8>, image::ImageError> {
+fn jpeg(image: &RgbImage) -> Result<Vec<u8>, ImageError> {
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY).encode_image(image)?;
     Ok(bytes)
 }
 
-fn png(image: &RgbImage) -> Result<Vec<u8>, image::ImageError> {
+fn png(image: &RgbImage) -> Result<Vec<u8>, ImageError> {
     let mut bytes = Vec::new();
     let (width, height) = image.dimensions();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)

@@ -40,7 +40,7 @@ impl SessionError {
     }
 
     /// That a manifest does not follow the format.
-    pub(super) fn manifest(path: &Path, fault: &super::ManifestFault) -> Self {
+    pub(super) fn manifest(path: &Path, fault: &str) -> Self {
         let what = format!(
             "is not a usable manifest: {fault}; repair it, or give the video file itself to go on without it"
         );

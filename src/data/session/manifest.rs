@@ -14,7 +14,7 @@ use crate::text;
 pub const MANIFEST_SCHEMA: &str = "relit.session/1";
 
 /// The description of a session.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// The session's name: `<UTC date>T<time>Z-<object>`.
     pub id: String,
@@ -23,27 +23,33 @@ pub struct Manifest {
     /// When the capture began, UTC.
     pub created: Timestamp,
     /// Whether the capture is running, complete or aborted.
+    #[serde(flatten)]
     pub status: Status,
     /// The camera and its settings.
     pub camera: CameraFacts,
     /// The turntable; `None` if the camera recorded without one.
     pub turntable: Option<TurntableFacts>,
     /// What is known of the rig; `None` where it was not measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig: Option<RigFacts>,
     /// The video file.
     pub video: VideoFacts,
     /// What went wrong during the capture, in order of time.
+    #[serde(default)]
     pub faults: Vec<Fault>,
     /// The program that recorded.
     pub software: SoftwareFacts,
     /// What a person noted of the take.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
     /// How a person rated the take, 1 to 5.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rating: Option<u8>,
 }
 
-/// The state of a capture.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// The state of a capture: in the file `status`, and `reason` where it has one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "status", content = "reason", rename_all = "lowercase")]
 pub enum Status {
     /// Running, or interrupted and not yet salvaged.
     Recording,
@@ -144,92 +150,22 @@ pub struct SoftwareFacts {
     pub commit: String,
 }
 
-/// What is wrong in a manifest.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ManifestFault {
-    /// Not JSON, or a field is missing or has another type.
-    #[error("{0}")]
-    Json(#[from] serde_json::Error),
-    /// Another schema, probably from a newer version.
-    #[error("its schema is {found:?}, and this version reads {MANIFEST_SCHEMA:?}")]
-    Schema {
-        /// The schema in the file.
-        found: String,
-    },
-    /// The id cannot be a session's name.
-    #[error("its id {0:?} cannot be a session's name")]
-    Id(String),
-    /// The object has no name.
-    #[error("its object is empty")]
-    NoObject,
-    /// `status` has an unknown value.
-    #[error("its status {0:?} is none of \"recording\", \"complete\", \"aborted\"")]
-    Status(String),
-    /// Aborted without a reason.
-    #[error("its status is \"aborted\", but it has no reason")]
-    NoReason,
-    /// A field about the video of a complete session is missing.
-    #[error("its status is \"complete\", but video.{0} is missing")]
-    Incomplete(&'static str),
-    /// The video's file name is a path.
-    #[error("its video.file {0:?} is not a plain file name")]
-    VideoName(String),
-    /// The hash is malformed.
-    #[error("its video.blake3 {0:?} is not a hash of 64 hexadecimal digits")]
-    Hash(String),
-    /// A rating that does not exist.
-    #[error("its rating is {0}, but must be 1 to 5")]
-    Rating(u8),
-    /// A number is not positive and finite.
-    #[error("its {field} is {value}, but must be positive")]
-    Number {
-        /// The field.
-        field: &'static str,
-        /// The value in the file.
-        value: f64,
-    },
-    /// The camera's elevation cannot be.
-    #[error("its rig.camera_elevation_deg is {0}, but must be 0 to 89")]
-    Elevation(f64),
-}
-
 impl Manifest {
     /// Reads a manifest from the bytes of its file.
     ///
     /// # Errors
-    /// [`ManifestFault`] with the first fault found.
-    pub fn from_json(bytes: &[u8]) -> Result<Self, ManifestFault> {
+    /// The first fault found.
+    pub fn from_json(bytes: &[u8]) -> Result<Self, String> {
         let bytes = text::unmarked(bytes);
+        let no_manifest = |error: serde_json::Error| error.to_string();
         // The schema first: complaints about the fields of another version would mislead.
-        let schema: SchemaOnly = serde_json::from_slice(bytes)?;
-        if schema.schema != MANIFEST_SCHEMA {
-            return Err(ManifestFault::Schema {
-                found: schema.schema,
-            });
+        let SchemaOnly { schema } = serde_json::from_slice(bytes).map_err(no_manifest)?;
+        if schema != MANIFEST_SCHEMA {
+            return Err(format!(
+                "its schema is {schema:?}, and this version reads {MANIFEST_SCHEMA:?}"
+            ));
         }
-        let file: ManifestFile = serde_json::from_slice(bytes)?;
-        let status = match (file.status.as_str(), file.reason) {
-            ("recording", _) => Status::Recording,
-            ("complete", _) => Status::Complete,
-            ("aborted", Some(reason)) => Status::Aborted(reason),
-            ("aborted", None) => return Err(ManifestFault::NoReason),
-            _ => return Err(ManifestFault::Status(file.status)),
-        };
-        let manifest = Self {
-            id: file.id,
-            object: file.object,
-            created: file.created,
-            status,
-            camera: file.camera,
-            turntable: file.turntable,
-            rig: file.rig,
-            video: file.video,
-            faults: file.faults,
-            software: file.software,
-            note: file.note,
-            rating: file.rating,
-        };
+        let manifest: Self = serde_json::from_slice(bytes).map_err(no_manifest)?;
         manifest.check()?;
         Ok(manifest)
     }
@@ -238,75 +174,72 @@ impl Manifest {
     ///
     /// # Errors
     /// As [`Self::from_json`]: what could not be read back is not written.
-    pub fn to_json(&self) -> Result<Vec<u8>, ManifestFault> {
+    pub fn to_json(&self) -> Result<Vec<u8>, String> {
         self.check()?;
-        let (status, reason) = match &self.status {
-            Status::Recording => ("recording", None),
-            Status::Complete => ("complete", None),
-            Status::Aborted(reason) => ("aborted", Some(reason.clone())),
+        let written = WrittenManifest {
+            schema: MANIFEST_SCHEMA,
+            manifest: self,
         };
-        let file = ManifestFile {
-            schema: MANIFEST_SCHEMA.to_owned(),
-            id: self.id.clone(),
-            object: self.object.clone(),
-            created: self.created,
-            status: status.to_owned(),
-            reason,
-            camera: self.camera.clone(),
-            turntable: self.turntable.clone(),
-            rig: self.rig,
-            video: self.video.clone(),
-            faults: self.faults.clone(),
-            software: self.software.clone(),
-            note: self.note.clone(),
-            rating: self.rating,
-        };
-        let mut bytes = serde_json::to_vec_pretty(&file)?;
+        let mut bytes = serde_json::to_vec_pretty(&written).map_err(|error| error.to_string())?;
         bytes.push(b'\n');
         Ok(bytes)
     }
 
-    fn check(&self) -> Result<(), ManifestFault> {
-        if !is_session_name(&self.id) {
-            return Err(ManifestFault::Id(self.id.clone()));
+    fn check(&self) -> Result<(), String> {
+        let Self { id, video, .. } = self;
+        let file = &video.file;
+        let is_path =
+            file.is_empty() || file == "." || file == ".." || file.contains(['/', '\\', '\0']);
+        let is_hash =
+            |hash: &String| hash.len() == 64 && hash.bytes().all(|byte| byte.is_ascii_hexdigit());
+        let missing = [
+            ("frames", video.frames.is_none()),
+            ("bytes", video.bytes.is_none()),
+            ("blake3", video.blake3.is_none()),
+        ];
+        let missing = missing.iter().find(|(_, is_missing)| *is_missing);
+        let table = self.turntable.as_ref();
+        let numbers = [
+            ("camera.fps", Some(self.camera.fps)),
+            (
+                "turntable.degrees_per_second",
+                table.map(|table| table.degrees_per_second),
+            ),
+            (
+                "turntable.steps_per_degree",
+                table.map(|table| table.steps_per_degree),
+            ),
+        ];
+        let is_wrong = |value: f64| !value.is_finite() || value <= 0.0;
+        let wrong = numbers
+            .iter()
+            .find_map(|&(field, value)| Some((field, value.filter(|&value| is_wrong(value))?)));
+        let elevation = self.rig.and_then(|rig| rig.camera_elevation_deg);
+        if !is_session_name(id) {
+            Err(format!("its id {id:?} cannot be a session's name"))
+        } else if self.object.trim().is_empty() {
+            Err("its object is empty".to_owned())
+        } else if is_path {
+            Err(format!("its video.file {file:?} is not a plain file name"))
+        } else if let Some(hash) = video.blake3.as_ref().filter(|hash| !is_hash(hash)) {
+            Err(format!(
+                "its video.blake3 {hash:?} is not a hash of 64 hexadecimal digits"
+            ))
+        } else if let Some(rating) = self.rating.filter(|rating| !(1..=5).contains(rating)) {
+            Err(format!("its rating is {rating}, but must be 1 to 5"))
+        } else if let Some((field, value)) = wrong {
+            Err(format!("its {field} is {value}, but must be positive"))
+        } else if let Some(degrees) = elevation.filter(|at| !CAMERA_ELEVATIONS_DEG.contains(at)) {
+            Err(format!(
+                "its rig.camera_elevation_deg is {degrees}, but must be 0 to 89"
+            ))
+        } else if let (Status::Complete, Some((field, _))) = (&self.status, missing) {
+            Err(format!(
+                "its status is \"complete\", but video.{field} is missing"
+            ))
+        } else {
+            Ok(())
         }
-        if self.object.trim().is_empty() {
-            return Err(ManifestFault::NoObject);
-        }
-        let file = &self.video.file;
-        if file.is_empty() || file == "." || file == ".." || file.contains(['/', '\\', '\0']) {
-            return Err(ManifestFault::VideoName(file.clone()));
-        }
-        if let Some(hash) = &self.video.blake3
-            && (hash.len() != 64 || !hash.bytes().all(|b| b.is_ascii_hexdigit()))
-        {
-            return Err(ManifestFault::Hash(hash.clone()));
-        }
-        if let Some(rating) = self.rating
-            && !(1..=5).contains(&rating)
-        {
-            return Err(ManifestFault::Rating(rating));
-        }
-        positive("camera.fps", self.camera.fps)?;
-        if let Some(table) = &self.turntable {
-            positive("turntable.degrees_per_second", table.degrees_per_second)?;
-            positive("turntable.steps_per_degree", table.steps_per_degree)?;
-        }
-        if let Some(degrees) = self.rig.and_then(|rig| rig.camera_elevation_deg)
-            && !CAMERA_ELEVATIONS_DEG.contains(&degrees)
-        {
-            return Err(ManifestFault::Elevation(degrees));
-        }
-        if self.status == Status::Complete {
-            let video = &self.video;
-            video.frames.ok_or(ManifestFault::Incomplete("frames"))?;
-            video.bytes.ok_or(ManifestFault::Incomplete("bytes"))?;
-            video
-                .blake3
-                .as_ref()
-                .ok_or(ManifestFault::Incomplete("blake3"))?;
-        }
-        Ok(())
     }
 }
 
@@ -329,39 +262,15 @@ pub fn object_of(id: &str) -> &str {
     }
 }
 
-fn positive(field: &'static str, value: f64) -> Result<(), ManifestFault> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(ManifestFault::Number { field, value })
-    }
-}
-
 #[derive(Deserialize)]
 struct SchemaOnly {
     schema: String,
 }
 
-/// The manifest as it is in the file, where `status` and `reason` are two fields.
-#[derive(Serialize, Deserialize)]
-struct ManifestFile {
-    schema: String,
-    id: String,
-    object: String,
-    created: Timestamp,
-    status: String,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    reason: Option<String>,
-    camera: CameraFacts,
-    turntable: Option<TurntableFacts>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    rig: Option<RigFacts>,
-    video: VideoFacts,
-    #[serde(default)]
-    faults: Vec<Fault>,
-    software: SoftwareFacts,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    note: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    rating: Option<u8>,
+/// What the file holds.
+#[derive(Serialize)]
+struct WrittenManifest<'a> {
+    schema: &'static str,
+    #[serde(flatten)]
+    manifest: &'a Manifest,
 }

@@ -28,8 +28,8 @@ pub use interrupted::InterruptedSession;
 pub use journal::{JOURNAL_FILE, JournaledReport, JournaledTurn, TurnJournal};
 use lock::SessionLock;
 pub use manifest::{
-    CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, ManifestFault, SoftwareFacts,
-    Status, TurntableFacts, VideoFacts, object_of,
+    CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, SoftwareFacts, Status,
+    TurntableFacts, VideoFacts, object_of,
 };
 pub use recording::{Notice, Recording, beside_sessions, recording_name, recordings};
 pub use remarks::remark;

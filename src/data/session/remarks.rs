@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{MANIFEST_FILE, Manifest, ManifestFault, SessionError};
+use super::{MANIFEST_FILE, Manifest, SessionError};
 use crate::durable;
 
 /// Writes note and rating (1 to 5) of a session that has ended to its manifest; `None` removes them. All
@@ -16,17 +16,15 @@ use crate::durable;
 pub fn remark(folder: &Path, note: Option<&str>, rating: Option<u8>) -> Result<(), SessionError> {
     let path = folder.join(MANIFEST_FILE);
     let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
-    let fault = |fault| SessionError::manifest(&path, &fault);
+    let fault = |fault: String| SessionError::manifest(&path, &fault);
     let bytes = with_remarks(&bytes, note, rating).map_err(fault)?;
     durable::write_whole(&path, &bytes).map_err(SessionError::io(&path, "written"))
 }
 
-fn with_remarks(
-    bytes: &[u8],
-    note: Option<&str>,
-    rating: Option<u8>,
-) -> Result<Vec<u8>, ManifestFault> {
-    let mut manifest: serde_json::Map<String, Value> = serde_json::from_slice(bytes)?;
+fn with_remarks(bytes: &[u8], note: Option<&str>, rating: Option<u8>) -> Result<Vec<u8>, String> {
+    let fault = |error: serde_json::Error| error.to_string();
+    let mut manifest: serde_json::Map<String, Value> =
+        serde_json::from_slice(bytes).map_err(fault)?;
     for (field, value) in [
         ("note", note.map(Value::from)),
         ("rating", rating.map(Value::from)),
@@ -36,7 +34,7 @@ fn with_remarks(
             None => manifest.remove(field),
         };
     }
-    let mut bytes = serde_json::to_vec_pretty(&manifest)?;
+    let mut bytes = serde_json::to_vec_pretty(&manifest).map_err(fault)?;
     bytes.push(b'\n');
     Manifest::from_json(&bytes)?;
     Ok(bytes)

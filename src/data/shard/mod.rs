@@ -17,7 +17,6 @@
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
 //! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
 //! | [`ArrayTask`], [`TaskPiece`], [`merge`] | a data set that several tasks write |
-//! | [`Overview`] | a data set at a glance, by its tables |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
 //! This module knows pixel rectangles, images and their statistics
@@ -34,7 +33,6 @@ mod index;
 mod names;
 mod order;
 mod output;
-mod overview;
 mod parquet_table;
 mod pieces;
 mod quality;
@@ -55,9 +53,8 @@ pub use index::{SampleSpan, SampleSpans};
 pub use names::{check_session, sample_key};
 pub use order::order;
 pub use output::OutputFolder;
-pub use overview::{Overview, OverviewTotals, SATURATION_BOUNDS, SaturationHistogram};
 pub use parquet_table::{TableRow, read_table};
-pub use pieces::{ArrayTask, MAX_TASKS, Merged, TaskOutcome, TaskPiece, merge};
+pub use pieces::{ArrayTask, MAX_TASKS, Merged, TaskOutcome, TaskPiece, described_so_far, merge};
 pub use quality::{MaskMisfit, QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;

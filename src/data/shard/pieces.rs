@@ -132,11 +132,6 @@ impl TaskPiece {
         output::write_whole(out, &file, &json_of(self, &file)?).map(|_| ())
     }
 
-    /// Number of tasks that write the data set together.
-    pub(super) fn task_count(&self) -> u32 {
-        self.count
-    }
-
     fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ShardError> {
         let piece: Self = described(path, bytes, SCHEMA)?;
         piece.dataset.check_names()?;
@@ -185,8 +180,39 @@ pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Mer
     }
 }
 
+/// The description of the data set in `out`. Where there is none yet, that of what the tasks have written so far, and a
+/// sentence that says so.
+///
+/// # Errors
+/// As [`Dataset::read`].
+pub fn described_so_far(out: &Path) -> Result<(Dataset, Option<String>), ShardError> {
+    let none = match Dataset::read(out) {
+        Err(none @ ShardError::NoDataset(_)) => none,
+        read => return Ok((read?, None)),
+    };
+    let pieces = read_pieces(out)?;
+    let Some(first) = pieces.first() else {
+        return Err(none);
+    };
+    let mut dataset = Dataset::new(first.dataset.settings.clone());
+    for piece in &pieces {
+        for entry in &piece.dataset.sessions {
+            dataset.replace(entry.clone(), Vec::new());
+        }
+    }
+    let done: usize = pieces.iter().map(|piece| piece.outcomes.len()).sum();
+    let problem = format!(
+        "this is what {} of {} tasks have written so far, {done} of {} recordings: when all are done, run relit-extract merge {}",
+        pieces.len(),
+        first.count,
+        first.recordings.len(),
+        out.display()
+    );
+    Ok((dataset, Some(problem)))
+}
+
 /// The pieces of all tasks that are there.
-pub(super) fn read_pieces(out: &Path) -> Result<Vec<TaskPiece>, ShardError> {
+fn read_pieces(out: &Path) -> Result<Vec<TaskPiece>, ShardError> {
     let folder = out.join(names::TASKS);
     let files = output::names_in(&folder)?;
     let pieces = files

@@ -208,27 +208,14 @@ impl<R: Read> TarReader<R> {
         if bytes > limit {
             return Err(too_large(path, start, limit));
         }
-        let mut data = Vec::new();
-        let read = (&mut self.source).take(bytes).read_to_end(&mut data);
-        self.offset += data.len() as u64;
-        read.map_err(|source| self.unread(source))?;
-        if (data.len() as u64) < bytes {
-            return Err(ShardError::ShardTruncated(self.offset));
-        }
+        let data = self.read(bytes)?;
         Ok((data, self.skip_padding()?))
     }
 
     /// Skips to the next block; returns whether all skipped bytes are zero.
     fn skip_padding(&mut self) -> Result<bool, ShardError> {
-        let over = usize::try_from(self.offset % BLOCK as u64).unwrap_or(0);
-        if over == 0 {
-            return Ok(true);
-        }
-        let mut padding = [0; BLOCK];
-        let padding = padding.get_mut(over..).unwrap_or_default();
-        let read = fill(&mut self.source, padding);
-        self.count(read, padding.len())?;
-        Ok(is_zero(padding))
+        let padding = self.offset.next_multiple_of(BLOCK as u64) - self.offset;
+        Ok(is_zero(&self.read(padding)?))
     }
 
     fn skip(&mut self, bytes: u64) -> Result<(), ShardError> {
@@ -245,19 +232,19 @@ impl<R: Read> TarReader<R> {
         if let Some(block) = self.found.take() {
             return Ok(block);
         }
-        let mut block = [0; BLOCK];
-        let read = fill(&mut self.source, &mut block);
-        self.count(read, BLOCK)?;
-        Ok(block)
+        let block = self.read(BLOCK as u64)?;
+        Ok(block.try_into().unwrap_or([0; BLOCK]))
     }
 
-    fn count(&mut self, read: io::Result<usize>, wanted: usize) -> Result<(), ShardError> {
-        let read = read.map_err(|source| self.unread(source))?;
-        self.offset += read as u64;
-        if read < wanted {
-            return Err(ShardError::ShardTruncated(self.offset));
+    fn read(&mut self, bytes: u64) -> Result<Vec<u8>, ShardError> {
+        let mut data = Vec::new();
+        let read = (&mut self.source).take(bytes).read_to_end(&mut data);
+        self.offset += data.len() as u64;
+        read.map_err(|source| self.unread(source))?;
+        match (data.len() as u64) < bytes {
+            true => Err(ShardError::ShardTruncated(self.offset)),
+            false => Ok(data),
         }
-        Ok(())
     }
 
     fn unread(&self, source: io::Error) -> ShardError {
@@ -382,20 +369,6 @@ fn valid_header(block: &Block) -> Option<&Header> {
 
 fn is_zero(bytes: &[u8]) -> bool {
     bytes.iter().all(|&byte| byte == 0)
-}
-
-/// Reads until the buffer is full or the source ends.
-fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
-    let mut filled = 0;
-    while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
-        match source.read(rest) {
-            Ok(0) => break,
-            Ok(read) => filled += read,
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(e),
-        }
-    }
-    Ok(filled)
 }
 
 #[cfg(test)]

@@ -70,7 +70,7 @@ pub(crate) enum Verb {
     },
     /// Show a data set at a glance: sessions with verdicts, saturation, shifts and what else was found.
     #[command(
-        after_help = "Example:\n  relit-extract stats dataset\n\nIt reads dataset.json and the tables, and no shards."
+        after_help = "Example:\n  relit-extract stats dataset\n\nIt reads dataset.json alone."
     )]
     Stats {
         /// The data set's folder, or a URL of one.

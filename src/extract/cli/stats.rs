@@ -1,29 +1,43 @@
 //! `relit-extract stats OUT`: the data set at a glance.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
-use relit_data::shard::{
-    Overview, OverviewTotals, QualityVerdict, SATURATION_BOUNDS, SaturationHistogram, SessionEntry,
-};
+use relit_data::shard::{QualityVerdict, SessionEntry, SessionQuality};
 use relit_extract::ExtractError;
-use relit_extract::objects::overview;
-use serde_json::{Value, json};
+use relit_extract::objects::described;
+use serde_json::{Map, Value, json};
 
-/// Characters of the longest bar of the histogram.
-const BAR: u64 = 40;
 /// Sessions that are printed for a person.
 const MAX_PRINTED: usize = 200;
 
+/// What is counted over all sessions: its name for a machine, its name for a person, and its number in one session.
+type Sum = (&'static str, &'static str, fn(&SessionQuality) -> u32);
+const SUMS: [Sum; 5] = [
+    ("moved", "moved back", |quality| quality.moved),
+    ("unregistered", "not registered", |quality| {
+        quality.unregistered
+    }),
+    ("exposure_steps", "exposure steps", |quality| {
+        quality.exposure_steps
+    }),
+    ("identical", "pictures repeated", |quality| {
+        quality.identical
+    }),
+    ("blurred", "blurred", |quality| quality.blurred),
+];
+
 pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
-    let overview = overview(out)?;
-    for problem in &overview.problems {
+    let (dataset, problem) = described(out)?;
+    let sessions = &dataset.sessions;
+    if let Some(problem) = &problem {
         console.warn(problem);
     }
     let most = console.most_lines(MAX_PRINTED);
     let longest = |name: &str, of: fn(&SessionEntry) -> &str| {
-        let lengths = overview.sessions.iter().map(|(e, _)| of(e).chars().count());
+        let lengths = sessions.iter().map(|entry| of(entry).chars().count());
         lengths.max().unwrap_or_default().max(name.len())
     };
     let widths = [
@@ -37,24 +51,20 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         id = widths[0],
         object = widths[1],
     ));
-    for (entry, histogram) in overview.sessions.iter().take(most) {
-        console.say(&line(entry, widths), &event(entry, histogram));
+    for entry in sessions.iter().take(most) {
+        console.say(&line(entry, widths), &event(entry));
     }
-    if let Some(more @ 1..) = overview.sessions.len().checked_sub(most) {
+    if let Some(more @ 1..) = sessions.len().checked_sub(most) {
         console.warn(&format!(
             "{} not shown: --json has them all",
             count_of(more as u64, "session")
         ));
     }
-    let totals = overview.totals();
-    console.say_to_people(&histogram(&totals));
-    console.say(
-        &sums(out, &overview, &totals),
-        &sums_event(out, &overview, &totals),
-    );
-    Ok(match overview.problems.is_empty() {
-        true => Outcome::Whole,
-        false => Outcome::Incomplete,
+    let (text, event) = sums(out, sessions);
+    console.say(&text, &event);
+    Ok(match problem {
+        None => Outcome::Whole,
+        Some(_) => Outcome::Incomplete,
     })
 }
 
@@ -85,7 +95,7 @@ fn percent(part: u64, whole: u64) -> f64 {
 }
 
 /// One session for a machine.
-fn event(entry: &SessionEntry, histogram: &SaturationHistogram) -> Value {
+fn event(entry: &SessionEntry) -> Value {
     json!({
         "event": "session",
         "id": entry.id,
@@ -96,81 +106,55 @@ fn event(entry: &SessionEntry, histogram: &SaturationHistogram) -> Value {
         "lossy": entry.lossy,
         "warnings": entry.warnings,
         "quality": entry.quality,
-        "histogram": histogram,
     })
 }
 
-/// The samples by saturated fraction, as bars.
-fn histogram(totals: &OverviewTotals) -> String {
-    let largest = totals.histogram.iter().copied().max().unwrap_or_default();
-    let lines = totals
-        .histogram
-        .iter()
-        .enumerate()
-        .map(|(class, &samples)| {
-            let bar = "#".repeat((BAR * samples).div_ceil(largest.max(1)) as usize);
-            let bound = |class: usize| 100.0 * SATURATION_BOUNDS.get(class).copied().unwrap_or(1.0);
-            let name = match class {
-                0 => "0 %".to_owned(),
-                n => format!("{} to {} %", bound(n - 1), bound(n)),
-            };
-            format!("  {name:>13}  {samples:>8}  {bar}")
-                .trim_end()
-                .to_owned()
-        });
-    let lines: Vec<String> = lines.collect();
-    format!(
-        "\nsamples by saturated part of the object:\n{}\n",
-        lines.join("\n")
-    )
-}
-
-fn sums(out: &Path, overview: &Overview, totals: &OverviewTotals) -> String {
-    let counts =
-        QualityVerdict::ALL.map(|verdict| format!("{} {verdict}", overview.count(verdict)));
-    format!(
-        "{}: {} ({}) of {}, {}, Spec-Net on for {} ({:.1} %)\n\
-         moved back {}, not registered {}, exposure steps {}, pictures repeated {}, frames used again {}, \
-         blurred {}; {} with losses, {}",
+/// All sessions together, for a person and for a machine.
+fn sums(out: &Path, sessions: &[SessionEntry]) -> (String, Event) {
+    let sum = |of: &dyn Fn(&SessionEntry) -> u32| -> u64 {
+        sessions.iter().map(|entry| u64::from(of(entry))).sum()
+    };
+    let objects: BTreeSet<&str> = sessions.iter().map(|entry| &*entry.object).collect();
+    let samples = sum(&|entry| entry.samples);
+    let spec_net = sum(&|entry| entry.spec_net);
+    let duplicates = sum(&|entry| entry.duplicates);
+    let lossy = sum(&|entry| u32::from(entry.lossy));
+    let warnings = sum(&|entry| entry.warnings.len() as u32);
+    let verdicts = QualityVerdict::ALL.map(|verdict| {
+        let count = sum(&|entry| u32::from(entry.quality.verdict == verdict));
+        (verdict, count)
+    });
+    let figures = SUMS.map(|(name, words, of)| (name, words, sum(&|entry| of(&entry.quality))));
+    let text = format!(
+        "{}: {} ({}) of {}, {}, Spec-Net on for {spec_net} ({:.1} %)\n{}, frames used again {duplicates}; {} with losses, {}",
         out.display(),
-        count_of(overview.sessions.len() as u64, "session"),
-        counts.join(", "),
-        count_of(totals.objects as u64, "object"),
-        count_of(totals.samples, "sample"),
-        totals.spec_net,
-        percent(totals.spec_net, totals.samples),
-        totals.moved,
-        totals.unregistered,
-        totals.exposure_steps,
-        totals.identical,
-        totals.duplicates,
-        totals.blurred,
-        count_of(totals.lossy as u64, "session"),
-        count_of(totals.warnings as u64, "warning"),
-    )
-}
-
-fn sums_event(out: &Path, overview: &Overview, totals: &OverviewTotals) -> Event {
-    let verdicts: serde_json::Map<String, Value> = QualityVerdict::ALL
-        .into_iter()
-        .map(|verdict| (verdict.to_string(), overview.count(verdict).into()))
-        .collect();
-    Event::Stats(json!({
+        count_of(sessions.len() as u64, "session"),
+        verdicts
+            .map(|(verdict, count)| format!("{count} {verdict}"))
+            .join(", "),
+        count_of(objects.len() as u64, "object"),
+        count_of(samples, "sample"),
+        percent(spec_net, samples),
+        figures
+            .map(|(_, words, count)| format!("{words} {count}"))
+            .join(", "),
+        count_of(lossy, "session"),
+        count_of(warnings, "warning"),
+    );
+    let verdicts = verdicts.map(|(verdict, count)| (verdict.to_string(), count.into()));
+    let mut event = json!({
         "out": out.to_string_lossy(),
-        "sessions": overview.sessions.len(),
-        "verdicts": verdicts,
-        "objects": totals.objects,
-        "samples": totals.samples,
-        "spec_net": totals.spec_net,
-        "duplicates": totals.duplicates,
-        "moved": totals.moved,
-        "unregistered": totals.unregistered,
-        "exposure_steps": totals.exposure_steps,
-        "identical": totals.identical,
-        "blurred": totals.blurred,
-        "lossy": totals.lossy,
-        "warnings": totals.warnings,
-        "bounds": SATURATION_BOUNDS,
-        "histogram": totals.histogram,
-    }))
+        "sessions": sessions.len(),
+        "verdicts": Map::from_iter(verdicts),
+        "objects": objects.len(),
+        "samples": samples,
+        "spec_net": spec_net,
+        "duplicates": duplicates,
+        "lossy": lossy,
+        "warnings": warnings,
+    });
+    for (name, _, count) in figures {
+        event[name] = count.into();
+    }
+    (text, Event::Stats(event))
 }

@@ -24,7 +24,7 @@ use std::path::Path;
 #[cfg(not(feature = "object-store"))]
 use std::path::PathBuf;
 
-use relit_data::shard::{self, Merged, Overview};
+use relit_data::shard::{self, Dataset, Merged};
 
 use super::ExtractError;
 #[cfg(not(feature = "object-store"))]
@@ -54,15 +54,15 @@ fn not_built(path: &Path) -> ExtractError {
     ))
 }
 
-/// The data set in `out` at a glance, a folder or a URL, of which descriptions and tables are downloaded.
+/// The description of the data set in `out`, a folder or a URL: see [`described_so_far`](shard::described_so_far).
 ///
 /// # Errors
-/// As [`Overview::read`]; [`ExtractError::Refused`] where an object store cannot be used.
-pub fn overview(out: &Path) -> Result<Overview, ExtractError> {
+/// As there; [`ExtractError::Refused`] where an object store cannot be used.
+pub fn described(out: &Path) -> Result<(Dataset, Option<String>), ExtractError> {
     match is_url(out) {
-        false => Ok(Overview::read(out)?),
+        false => Ok(shard::described_so_far(out)?),
         #[cfg(feature = "object-store")]
-        true => staging::overview(out),
+        true => staging::described(out),
         #[cfg(not(feature = "object-store"))]
         true => Err(not_built(out)),
     }

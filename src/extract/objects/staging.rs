@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use relit_data::session::{self, recordings};
-use relit_data::shard::{self, ArrayTask, Dataset, Merged, Overview, ShardError};
+use relit_data::shard::{self, ArrayTask, Dataset, Merged, ShardError};
 use tempfile::TempDir;
 
 use super::bucket::{Bucket, not_there};
@@ -60,34 +60,30 @@ pub(crate) fn extract(
     Ok(tally)
 }
 
-/// The data set at a URL at a glance.
-pub(super) fn overview(out: &Path) -> Result<Overview, ExtractError> {
-    let folder = temporary()?;
-    let bucket = Bucket::open(out)?;
-    for (name, _) in bucket.list()? {
-        if name == Dataset::FILE || is_piece(&name) || name.ends_with(".parquet") {
-            bucket.download(&name, &folder.path().join(&name))?;
-        }
-    }
+/// The description of the data set at a URL.
+pub(super) fn described(out: &Path) -> Result<(Dataset, Option<String>), ExtractError> {
+    let (bucket, folder) = with_descriptions(out)?;
     let url = bucket.url("");
-    let read = Overview::read(folder.path());
-    let mut overview = read.map_err(|error| named_by_url(error, &url))?;
+    let read = shard::described_so_far(folder.path());
+    let (dataset, problem) = read.map_err(|error| named_by_url(error, &url))?;
     let local = folder.path().display().to_string();
-    for problem in &mut overview.problems {
-        *problem = problem.replace(&local, &url);
-    }
-    Ok(overview)
+    Ok((dataset, problem.map(|text| text.replace(&local, &url))))
 }
 
-/// Joins the pieces of several tasks at a URL.
-pub(super) fn merge(out: &Path) -> Result<Merged, ExtractError> {
-    let folder = temporary()?;
-    let bucket = Bucket::open(out)?;
+/// A data set at a URL, and a folder with its descriptions.
+fn with_descriptions(out: &Path) -> Result<(Bucket, TempDir), ExtractError> {
+    let (bucket, folder) = (Bucket::open(out)?, temporary()?);
     for (name, _) in bucket.list()? {
         if name == Dataset::FILE || is_piece(&name) {
             bucket.download(&name, &folder.path().join(&name))?;
         }
     }
+    Ok((bucket, folder))
+}
+
+/// Joins the pieces of several tasks at a URL.
+pub(super) fn merge(out: &Path) -> Result<Merged, ExtractError> {
+    let (bucket, folder) = with_descriptions(out)?;
     let length = |file: &str| match bucket.length(file) {
         Ok(Some(length)) => Ok(length),
         // A folder of images, of which no length is asked.

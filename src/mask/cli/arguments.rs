@@ -42,7 +42,7 @@ pub(crate) struct CommandLine {
 /// What is done other than making masks.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Verb {
-    /// Hold the mask of a recording against all its frames; writes NAME-check.html beside it
+    /// Hold the mask of a recording against what its turn shows; writes NAME-check.html
     #[command(
         after_help = "Example:\n  relit-mask check 20261120T093015Z-mug\n\nExit codes: 0 the mask fits, 1 it does not or could not be checked."
     )]
@@ -56,9 +56,6 @@ pub(crate) enum Verb {
         /// Print one JSON line per event on standard output
         #[arg(long)]
         json: bool,
-        /// With --json, print also how far the check has come
-        #[arg(long, requires = "json")]
-        progress: bool,
     },
 }
 

@@ -1,4 +1,4 @@
-//! `relit-mask check`: a mask against all frames of its recording.
+//! `relit-mask check`: a mask against what the turn of its recording shows.
 
 use std::path::Path;
 
@@ -16,13 +16,7 @@ pub(crate) fn run(
     let mut outcome = Outcome::Whole;
     let paths = recordings(input)?;
     for path in &paths {
-        let bar = console.progress(0, "frames");
-        let checked = check_mask(path, mask, &|done, all| {
-            bar.set_length(all);
-            bar.set_position(done);
-        });
-        bar.finish_and_clear();
-        match checked {
+        match check_mask(path, mask) {
             Ok(output) => {
                 print(&output, console);
                 if output.report.verdict != MaskVerdict::Fits {
@@ -42,15 +36,7 @@ pub(crate) fn run(
 fn print(output: &CheckOutput, console: Console) {
     let (id, report) = (&output.recording, &output.report);
     let (_, word) = report.verdict.words();
-    let drift = report.drift.as_ref().map_or(String::new(), |drift| {
-        format!(
-            "; drift {:.2} px in the median, {:.2} px at most (frame {})",
-            drift.median_px,
-            drift.most.px(),
-            drift.most.frame
-        )
-    });
-    let mut text = format!("{id}: {word}{drift}; see {}", output.page.display());
+    let mut text = format!("{id}: {word}; see {}", output.page.display());
     for reason in &report.reasons {
         text += &format!("\n  {reason}");
     }

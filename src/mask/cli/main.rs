@@ -17,16 +17,8 @@ fn main() -> ExitCode {
     }
     let line = CommandLine::parse();
     match (line.verb, line.mask) {
-        (
-            Some(Verb::Check {
-                input,
-                mask,
-                json,
-                progress,
-            }),
-            _,
-        ) => {
-            let console = Console::new(json).with_progress(progress);
+        (Some(Verb::Check { input, mask, json }), _) => {
+            let console = Console::new(json);
             console.finish(checking::run(console, &input, mask.as_deref()))
         }
         (None, Some(arguments)) => making::run(&arguments),

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use super::address::CameraAddress;
-use super::control::{Control, ControlId};
+use super::control::Control;
 use super::error::CameraError;
 use super::format::Mode;
 use super::frame::Frame;
-use super::request::{GrantedMode, ModeRequest};
+use super::mode::CameraMode;
 
 /// A camera that may be started and stopped any number of times.
 pub trait Camera: Send {
@@ -31,15 +31,15 @@ pub trait Camera: Send {
     ///
     /// # Errors
     /// [`CameraError::Control`], [`CameraError::Unplugged`], or [`CameraError::Unsupported`].
-    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError>;
+    fn set_control(&mut self, id: u32, value: i64) -> Result<i64, CameraError>;
 
     /// Starts the stream and returns what was granted, which may differ from the request:
-    /// [`GrantedMode::differences`]. A running stream is stopped first.
+    /// [`CameraMode::differences`]. A running stream is stopped first.
     ///
     /// # Errors
     /// [`CameraError::InUse`], [`CameraError::Unsupported`], [`CameraError::Unplugged`], or another
     /// error of the device; the camera is then stopped and may be started again.
-    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError>;
+    fn start(&mut self, want: &CameraMode) -> Result<CameraMode, CameraError>;
 
     /// The next frame, in order. Waits for at most `timeout`, of real time or, for a replay, of its
     /// clock.

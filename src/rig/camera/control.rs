@@ -1,22 +1,10 @@
 //! Controls of a camera, by the names that `v4l2-ctl` prints.
 
-use std::fmt;
-
-/// A control's number, as the kernel gives it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ControlId(pub u32);
-
-impl fmt::Display for ControlId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "0x{:08x}", self.0)
-    }
-}
-
 /// One control, with its value when it was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Control {
-    /// Its number.
-    pub id: ControlId,
+    /// Its number, as the kernel gives it.
+    pub id: u32,
     /// The driver's name in snake case, such as `exposure_time_absolute`.
     pub name: String,
     /// What values it takes.

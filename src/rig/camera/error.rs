@@ -4,7 +4,6 @@ use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::control::ControlId;
 use super::format::Fourcc;
 use relit_data::session;
 use relit_video as video;
@@ -57,12 +56,12 @@ pub enum CameraError {
         source: Option<io::Error>,
     },
     /// Another program has the stream of the device.
-    #[error("{device} is in use by {holders}: close that one")]
+    #[error(
+        "{device} is in use by another program (`sudo fuser {device}` names it): close that one"
+    )]
     InUse {
         /// The device.
         device: String,
-        /// The programs that have it open, or how to find them.
-        holders: String,
         /// The system's answer.
         source: io::Error,
     },
@@ -124,16 +123,16 @@ pub enum CameraError {
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A control could not be read or set.
-    #[error("control {control} of {device} cannot be {doing}: {fault}")]
+    #[error("control {control:#010x} of {device} cannot be {doing}: {fault}")]
     Control {
         /// The device.
         device: String,
         /// The control's number.
-        control: ControlId,
+        control: u32,
         /// What was done, as a participle: "set to 5".
         doing: String,
         /// Why not.
-        fault: ControlFault,
+        fault: String,
         /// The system's answer, where there is one.
         source: Option<io::Error>,
     },
@@ -179,38 +178,4 @@ impl CameraError {
         );
         Self::Unsupported { device, what }
     }
-}
-
-/// Why a control could not be read or set.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ControlFault {
-    /// The camera has no such control.
-    #[error("the camera has no such control")]
-    Unknown,
-    /// A menu has no such item.
-    #[error("it takes one of {}", list_words(.0))]
-    NoItem(Vec<i64>),
-    /// The value is out of range.
-    #[error("it takes values from {minimum} to {maximum}")]
-    Range {
-        /// Smallest value.
-        minimum: i64,
-        /// Largest value.
-        maximum: i64,
-    },
-    /// An automatic controls it, or it is read-only.
-    #[error("it is read-only, or an automatic controls it: switch that off first")]
-    Locked,
-    /// The stream or another program holds it.
-    #[error("it is held while the camera streams, or by another program: stop that first")]
-    Busy,
-    /// Anything else.
-    #[error("the driver refuses")]
-    Driver,
-}
-
-fn list_words(values: &[i64]) -> String {
-    let words: Vec<String> = values.iter().map(i64::to_string).collect();
-    words.join(", ")
 }

@@ -33,11 +33,11 @@ mod error;
 mod format;
 mod frame;
 pub mod hold;
+mod mode;
 #[cfg(all(feature = "nokhwa", any(target_os = "linux", target_os = "macos")))]
 mod nokhwa;
 mod rate;
 mod replay;
-mod request;
 #[cfg(target_os = "linux")]
 mod v4l2;
 
@@ -45,14 +45,14 @@ use std::path::Path;
 
 pub use address::{CameraAddress, ReplayAddress, ReplayFaults};
 pub use backend::{Camera, DeviceInfo};
-pub use control::{Control, ControlFlags, ControlId, ControlKind, MenuItem, snake_case};
-pub use error::{CameraError, ControlFault};
+pub use control::{Control, ControlFlags, ControlKind, MenuItem, snake_case};
+pub use error::CameraError;
 pub use format::{Fourcc, Mode, Rates, Sizes};
 #[cfg(target_os = "linux")]
 use frame::SequenceUnwrapper;
 pub use frame::{Frame, FrameFault};
+pub use mode::CameraMode;
 pub use rate::Rate;
-pub use request::{GrantedMode, ModeRequest};
 
 use crate::clock::Clock;
 

@@ -11,7 +11,7 @@ use relit_data::rig::{RigFacts, RotationDirection};
 use relit_video::LiveDecoder;
 
 use super::equipment::Equipment;
-use super::error::{CaptureError, Refusal};
+use super::error::CaptureError;
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::preflight;
 use super::stop::StopRequest;
@@ -80,7 +80,7 @@ pub fn measure_rotation(
         return Err(CaptureError::Missing(none.to_owned()));
     };
     let stream = LockedCamera::lock(camera.as_mut(), &settings, stop)?.stream;
-    let ready = stop.over(table, || preflight::ready_table(table, &settings));
+    let ready = stop.over(table, || preflight::ready_table(table));
     stop.explain(ready)?;
     let status = table.status()?;
     let (_, high_deg) = table.limits(&status);
@@ -92,7 +92,7 @@ pub fn measure_rotation(
     let decoder = LiveDecoder::new(stream.format, stream.width, stream.height);
     let mut background = Background {
         decoder: decoder.map_err(|error| {
-            Refusal::Other(format!(
+            CaptureError::Refused(format!(
                 "the camera's pictures cannot be decoded ({error}): ask for another format"
             ))
         })?,
@@ -145,7 +145,7 @@ impl Background {
         }
     }
 
-    fn moves_to_the_right(&self) -> Result<bool, Refusal> {
+    fn moves_to_the_right(&self) -> Result<bool, CaptureError> {
         let shifts = self.shifts.iter().copied();
         let moving = shifts.filter(|shift| shift.abs() >= LEAST_SHIFT);
         let (right, left): (Vec<f64>, Vec<f64>) = moving.partition(|shift| *shift > 0.0);
@@ -153,7 +153,7 @@ impl Background {
         let most = right.len().max(left.len());
         if all < FEWEST || (most as f64) < AGREED * all as f64 {
             let unseen = "the camera does not see which way the table turns: leave something to see behind the object, and light on it";
-            return Err(Refusal::Other(unseen.to_owned()));
+            return Err(CaptureError::Refused(unseen.to_owned()));
         }
         Ok(right.len() > left.len())
     }

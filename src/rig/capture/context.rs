@@ -1,17 +1,8 @@
-//! What a capture is asked to do, and who follows it.
+//! Who follows a capture.
 
 use super::stop::StopRequest;
 use crate::preview::Preview;
 use crate::state::{Check, Monitor, Phase, TakeSummary};
-
-/// What is to be captured.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CaptureRequest {
-    /// The object's name.
-    pub object: String,
-    /// Whether a metering turn comes first.
-    pub meter: bool,
-}
 
 /// Who follows a capture, and who may stop it.
 #[derive(Debug, Clone, Copy)]

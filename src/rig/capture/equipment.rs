@@ -9,7 +9,6 @@ use super::settings::Settings;
 use crate::camera::{self, Camera};
 use crate::clock::Clock;
 use crate::simulator::{SimulatedTable, SimulatorOptions};
-use crate::state::CaptureSettings;
 use crate::turntable::{Table, TableOptions, TurntableAddress, find_serial};
 
 /// How many times faster than real time a rehearsal runs at most where people look at it.
@@ -36,7 +35,7 @@ impl Equipment {
     /// [virtual time](Clock::virtual_time), at most as fast as their addresses say.
     ///
     /// # Errors
-    /// [`super::Refusal::Pace`], or a fault that the simulated table cannot make.
+    /// [`CaptureError::Refused`] for speeds that do not fit, or a fault that the simulated table cannot make.
     pub fn new(settings: Settings) -> Result<Self, CaptureError> {
         let speed = settings.speed()?;
         Self::at_speed(settings, speed)
@@ -82,16 +81,6 @@ impl Equipment {
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
-    }
-
-    /// Changes what may be changed of the settings. A camera that is to run in another mode is closed,
-    /// and opened again when it is needed.
-    pub fn change_settings(&mut self, changed: &CaptureSettings) {
-        let mode = self.settings.mode;
-        self.settings.change(changed);
-        if self.settings.mode != mode {
-            self.camera = None;
-        }
     }
 
     /// The clock that everything goes by.

@@ -1,7 +1,6 @@
 //! What keeps a turn from being captured, each with the way out.
 
 use std::io;
-use std::path::PathBuf;
 
 use super::recording::RecordingError;
 use crate::camera::CameraError;
@@ -14,11 +13,8 @@ use crate::turntable::TurntableError;
 #[non_exhaustive]
 pub enum CaptureError {
     /// Something was not as it has to be before the table turns.
-    #[error("the capture was not begun")]
-    Refused(#[from] Refusal),
-    /// No exposure was found.
-    #[error("metering failed")]
-    Meter(#[from] MeterFault),
+    #[error("the capture was not begun: {0}")]
+    Refused(String),
     /// The camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
@@ -65,6 +61,10 @@ impl CaptureError {
             source,
         }
     }
+
+    pub(crate) fn no_camera() -> Self {
+        Self::Missing("there is no camera at the moment: plug it in".to_owned())
+    }
 }
 
 /// Who asked for the stop.
@@ -76,67 +76,4 @@ pub enum Stopped {
     /// The program is to end.
     #[error("the program was told to end")]
     Shutdown,
-}
-
-/// What preflight found wrong; nothing has turned yet.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Refusal {
-    /// A real camera or table beside a rehearsal that is to run faster.
-    #[error(
-        "a real camera or turntable goes by real time: leave speed= out of the other one's address"
-    )]
-    Pace,
-    /// Too little space.
-    #[error(
-        "{folder} has {} MB free and the take needs {} MB (a fifth in reserve): free some space, or give another --root",
-        .free / 1_000_000, .needed.div_ceil(1_000_000)
-    )]
-    DiskFull {
-        /// The folder.
-        folder: PathBuf,
-        /// Bytes free.
-        free: u64,
-        /// Bytes needed, reserve included.
-        needed: u64,
-    },
-    /// Anything else, with the way out.
-    #[error("{0}")]
-    Other(String),
-}
-
-impl CaptureError {
-    pub(crate) fn no_camera() -> Self {
-        Self::Missing("there is no camera at the moment: plug it in".to_owned())
-    }
-}
-
-/// Why metering found no exposure.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MeterFault {
-    /// Too bright even at the darkest exposure.
-    #[error(
-        "{:.1} % of the middle saturate at the darkest exposure ({exposure}), and {:.1} % are allowed: less light, a smaller aperture or less gain",
-        100.0 * .clipped, 100.0 * .allowed
-    )]
-    TooBright {
-        /// The exposure, in the control's own units.
-        exposure: i64,
-        /// The part that saturates.
-        clipped: f64,
-        /// The part that may.
-        allowed: f64,
-    },
-    /// The turns were over before all was seen.
-    #[error(
-        "{0} degrees of the turn were not seen at an exposure that holds: the light changes, or frames are missing; meter again, or set the exposure"
-    )]
-    Unseen(usize),
-    /// The camera's exposure cannot be set.
-    #[error("the camera's exposure cannot be set: leave --meter out")]
-    NoExposure,
-    /// No picture could be decoded.
-    #[error("the camera's pictures cannot be decoded: ask for another format")]
-    NoPicture(#[source] relit_video::DecodeFault),
 }

@@ -3,11 +3,11 @@
 
 use std::time::Duration;
 
-use super::error::{CaptureError, Refusal};
+use super::error::CaptureError;
 use super::settings::Settings;
 use super::stop::StopRequest;
 use crate::camera::hold::{ControlDrift, ManualPlan};
-use crate::camera::{Camera, CameraError, Control, Fourcc, GrantedMode, ModeRequest};
+use crate::camera::{Camera, CameraError, CameraMode, Control, Fourcc};
 use crate::state::Check;
 use relit_data::session::FrameClock;
 use relit_video::StreamFormat;
@@ -57,11 +57,10 @@ impl LockedCamera {
         let plan = ManualPlan::new(&camera.controls()?, &settings.wanted);
         let not_held = plan.without(&settings.wanted);
         if !not_held.is_empty() {
-            return Err(Refusal::Other(format!(
+            return Err(CaptureError::Refused(format!(
                 "the camera cannot be set to {}: leave that out, or set it at the camera",
                 not_held.join(", ")
-            ))
-            .into());
+            )));
         }
         require_kept(plan.apply(camera)?)?;
         let mut clock = FrameClock::default();
@@ -82,7 +81,7 @@ impl LockedCamera {
             format: format.ok_or_else(|| CameraError::format(device, fourcc))?,
             width: mode.width,
             height: mode.height,
-            fps: mode.rate.unwrap_or(request.rate).per_second(),
+            fps: mode.rate.per_second(),
         };
         Ok(Self {
             stream,
@@ -95,21 +94,6 @@ impl LockedCamera {
         })
     }
 
-    /// Sets step `at` of the plan to a value that the camera has been set to since, and reads all
-    /// controls again.
-    pub(super) fn relock(
-        &mut self,
-        camera: &mut dyn Camera,
-        at: usize,
-        value: i64,
-    ) -> Result<(), CaptureError> {
-        if let Some(step) = self.plan.steps.get_mut(at) {
-            step.value = value;
-        }
-        self.controls = camera.controls()?;
-        Ok(require_kept(self.plan.check(&self.controls))?)
-    }
-
     /// Bytes that so many frames are expected to take on disk.
     pub(super) fn bytes_for(&self, frames: u64) -> u64 {
         let each = self.frame_bytes + INDEX_LINE;
@@ -117,12 +101,12 @@ impl LockedCamera {
     }
 }
 
-fn require_kept(moved: Vec<ControlDrift>) -> Result<(), Refusal> {
+fn require_kept(moved: Vec<ControlDrift>) -> Result<(), CaptureError> {
     match moved.is_empty() {
         true => Ok(()),
         false => {
             let moved: Vec<String> = moved.iter().map(ControlDrift::to_string).collect();
-            Err(Refusal::Other(format!(
+            Err(CaptureError::Refused(format!(
                 "the camera does not keep its settings: {}; close other programs that use it, or give values that it takes",
                 moved.join(", ")
             )))
@@ -130,25 +114,15 @@ fn require_kept(moved: Vec<ControlDrift>) -> Result<(), Refusal> {
     }
 }
 
-fn mode_check(request: &ModeRequest, mode: &GrantedMode) -> Result<Check, Refusal> {
-    let with_rate = GrantedMode {
-        rate: mode.rate.or(Some(request.rate)),
-        ..*mode
-    };
-    let differences = with_rate.differences(request);
+fn mode_check(request: &CameraMode, mode: &CameraMode) -> Result<Check, CaptureError> {
+    let differences = mode.differences(request);
     if !differences.is_empty() {
-        return Err(Refusal::Other(format!(
+        return Err(CaptureError::Refused(format!(
             "the camera grants {}: ask for a mode that `relit-capture devices` lists",
             differences.join(", ")
         )));
     }
-    Ok(match mode.rate {
-        Some(_) => Check::passed("camera mode", mode.to_string()),
-        None => Check::noted(
-            "camera mode",
-            format!("{request}; the camera does not say at which rate it runs"),
-        ),
-    })
+    Ok(Check::passed("camera mode", mode.to_string()))
 }
 
 /// Reads the first frames, while automatics find their values; returns the mean size of those that
@@ -166,10 +140,9 @@ fn warm_up(camera: &mut dyn Camera, stop: &StopRequest) -> Result<f64, CaptureEr
         }
     }
     match last_fault.filter(|_| sizes.is_empty()) {
-        Some(fault) => Err(Refusal::Other(format!(
+        Some(fault) => Err(CaptureError::Refused(format!(
             "the camera's first {WARM_UP} frames were damaged ({fault}): check its cable, or ask for another mode"
-        ))
-        .into()),
+        ))),
         None => Ok(sizes.iter().sum::<f64>() / sizes.len() as f64),
     }
 }

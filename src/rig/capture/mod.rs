@@ -1,7 +1,7 @@
 //! The capture: from a rig at rest to a session folder that holds one whole turn.
 //!
 //! ```text
-//! settings -> equipment -> preflight -> (metering) -> turn + recorder -> angles, verdict -> session
+//! settings -> equipment -> preflight -> turn + recorder -> angles, verdict -> session
 //! ```
 //!
 //! [`capture`] makes one session: it checks and locks everything, turns the table, and records
@@ -15,7 +15,6 @@ mod equipment;
 mod error;
 mod locked_camera;
 mod manifest;
-mod metering;
 mod mode_preference;
 pub(crate) mod preflight;
 mod recording;
@@ -25,9 +24,9 @@ mod take;
 pub(crate) mod turn;
 
 pub use calibrate::{measure_rotation, read_facts, write_facts};
-pub use context::{CaptureContext, CaptureRequest};
+pub use context::CaptureContext;
 pub use equipment::Equipment;
-pub use error::{CaptureError, MeterFault, Refusal, Stopped};
+pub use error::{CaptureError, Stopped};
 pub use mode_preference::ModePreference;
 pub use recording::{
     End, Progress, Recorded, Recorder, RecordingError, RecordingPlan, Salvaged, Saved, Window,

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::error::Refusal;
-use crate::camera::{Fourcc, Mode, ModeRequest, Rate, Rates};
+use super::error::CaptureError;
+use crate::camera::{CameraMode, Fourcc, Mode, Rate, Rates};
 
 /// Formats from the one that is preferred: what the camera compresses by frames comes first.
 const PREFERRED: [Fourcc; 5] = [
@@ -56,8 +56,8 @@ impl ModePreference {
     /// one whose frames take the least space.
     ///
     /// # Errors
-    /// [`Refusal::Other`] with what there is.
-    pub fn choose(&self, modes: &[Mode]) -> Result<ModeRequest, Refusal> {
+    /// [`CaptureError::Refused`] with what there is.
+    pub fn choose(&self, modes: &[Mode]) -> Result<CameraMode, CaptureError> {
         let requests = modes.iter().filter_map(|mode| self.of(mode));
         let rank = |fourcc: Fourcc| PREFERRED.iter().position(|&known| known == fourcc);
         requests
@@ -68,14 +68,14 @@ impl ModePreference {
             })
             .ok_or_else(|| {
                 let offered: Vec<String> = modes.iter().map(Mode::to_string).collect();
-                Refusal::Other(format!(
+                CaptureError::Refused(format!(
                     "the camera does not offer {self}; it offers {}",
                     first_of(&offered)
                 ))
             })
     }
 
-    fn of(&self, mode: &Mode) -> Option<ModeRequest> {
+    fn of(&self, mode: &Mode) -> Option<CameraMode> {
         if self.fourcc.is_some_and(|fourcc| fourcc != mode.fourcc) {
             return None;
         }
@@ -84,7 +84,7 @@ impl ModePreference {
             Some(size) => size,
             None => mode.sizes.largest(),
         };
-        Some(ModeRequest {
+        Some(CameraMode {
             fourcc: mode.fourcc,
             width,
             height,

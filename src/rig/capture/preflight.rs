@@ -1,23 +1,21 @@
 //! What is checked before anything turns.
 //!
 //! A check that is passed leaves a line for the person at the rig; one that is not ends the capture
-//! with a [`Refusal`] before the table moves for it. Only an unknown zero of the table is put right
+//! with a [`CaptureError::Refused`] before the table moves for it. Only an unknown zero of the table is put right
 //! here: the table is homed.
 
 use std::path::Path;
 
 use jiff::Timestamp;
 
-use super::error::{CaptureError, Refusal};
+use super::error::CaptureError;
 use super::settings::Settings;
 use crate::state::{Check, Obstacle};
-use crate::turntable::{Alarm, Homed, Table, TableStatus, TurnPlan, TurnRequest, TurntableError};
+use crate::turntable::{Alarm, Homed, MARGIN_DEG, Table, TableStatus, TurnPlan, TurntableError};
 use relit_data::naming::is_session_name;
 
 /// What is added to the expected size of a take, as a fraction of it.
 const RESERVE: f64 = 0.2;
-/// Degrees at constant speed on either side of the turn.
-const MARGIN_DEG: f64 = 2.0;
 /// Longest object name, bytes: a session's name has date and time before it.
 const LONGEST_OBJECT: usize = 80;
 /// 2025-01-01, seconds since 1970.
@@ -28,13 +26,12 @@ pub(super) fn check_disk(root: &Path, expected: u64) -> Result<Check, CaptureErr
     let free = free_bytes(root)?;
     let needed = (expected as f64 * (1.0 + RESERVE)).ceil() as u64;
     if free < needed {
-        let folder = root.to_owned();
-        let full = Refusal::DiskFull {
-            folder,
-            free,
-            needed,
-        };
-        return Err(full.into());
+        return Err(CaptureError::Refused(format!(
+            "{} has {} MB free and the take needs {} MB (a fifth in reserve): free some space, or give another --root",
+            root.display(),
+            free / 1_000_000,
+            needed.div_ceil(1_000_000)
+        )));
     }
     let (free, needed) = (free / 1_000_000, needed.div_ceil(1_000_000));
     let words = format!("{free} MB free, {needed} MB needed");
@@ -49,9 +46,9 @@ pub(crate) fn free_bytes(root: &Path) -> Result<u64, CaptureError> {
 }
 
 /// Checks that the time of day is one in which this program can run.
-pub(super) fn check_clock(now: Timestamp) -> Result<Check, Refusal> {
+pub(super) fn check_clock(now: Timestamp) -> Result<Check, CaptureError> {
     match now.as_second() < EARLIEST {
-        true => Err(Refusal::Other(format!(
+        true => Err(CaptureError::Refused(format!(
             "the system's clock says {now}, before this program was written: set it, or the session's name would be wrong"
         ))),
         false => Ok(Check::passed("clock", format!("{now:.0}"))),
@@ -59,27 +56,26 @@ pub(super) fn check_clock(now: Timestamp) -> Result<Check, Refusal> {
 }
 
 /// Checks that an object's name can be part of a session's.
-pub(crate) fn check_object(name: &str) -> Result<(), Refusal> {
+pub(crate) fn check_object(name: &str) -> Result<(), String> {
     match is_session_name(name) && name.len() <= LONGEST_OBJECT {
         true => Ok(()),
-        false => Err(Refusal::Other(format!(
+        false => Err(format!(
             "{name:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most {LONGEST_OBJECT} bytes"
-        ))),
+        )),
     }
 }
 
 /// Checks that the table turns as fast as it is to.
-pub(super) fn check_speed(table: &Table, set: f64) -> Result<(), Refusal> {
+pub(super) fn check_speed(table: &Table, set: f64) -> Result<(), CaptureError> {
     let highest = table.identity().max_degrees_per_second;
     match Obstacle::of_speed(set, highest) {
-        Some(obstacle) => Err(Refusal::Other(obstacle.to_string())),
+        Some(obstacle) => Err(CaptureError::Refused(obstacle.to_string())),
         None => Ok(()),
     }
 }
 
-/// Makes sure that the table can turn: it answers, knows its zero (or is homed now), and its
-/// battery has the voltage demanded.
-pub(super) fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Check>, CaptureError> {
+/// Makes sure that the table can turn: it answers, and knows its zero or is homed now.
+pub(super) fn ready_table(table: &Table) -> Result<Vec<Check>, CaptureError> {
     let status = table.status()?;
     if status.emergency_stop {
         return Err(TurntableError::EmergencyStop.into());
@@ -90,18 +86,6 @@ pub(super) fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Chec
         return Err(TurntableError::NotReady { state, alarm }.into());
     }
     let mut checks = Vec::new();
-    if let Some(least) = settings.min_battery_v {
-        let none = "the table does not report its battery's voltage: leave --min-battery out";
-        let volts = status.battery_v;
-        let volts = volts.ok_or_else(|| Refusal::Other(none.to_owned()))?;
-        if volts < least {
-            let low = format!(
-                "the table's battery has {volts:.2} V and {least:.2} V are demanded: charge it"
-            );
-            return Err(Refusal::Other(low).into());
-        }
-        checks.push(Check::passed("battery", format!("{volts:.2} V")));
-    }
     let firmware = &table.identity().firmware;
     checks.push(Check::passed("table", format!("Grbl {firmware} answers")));
     // Without an index, the place where it stands would become the zero of a cable that may be wound.
@@ -121,17 +105,6 @@ pub(super) fn ready_table(table: &Table, settings: &Settings) -> Result<Vec<Chec
     Ok(checks)
 }
 
-/// The turn of a take.
-fn request(degrees_per_second: f64) -> TurnRequest {
-    TurnRequest {
-        degrees_per_second,
-        turn_deg: 360.0,
-        margin_deg: MARGIN_DEG,
-        direction: None,
-        unwind: true,
-    }
-}
-
 /// Why the turn of a take has no room from where the table stands, where its zero is known.
 pub(crate) fn no_room(
     table: &Table,
@@ -141,7 +114,7 @@ pub(crate) fn no_room(
     if !status.homed {
         return None;
     }
-    match TurnPlan::new(table.identity(), status, &request(degrees_per_second)) {
+    match TurnPlan::new(table.identity(), status, degrees_per_second, 360.0) {
         Err(error @ TurntableError::NoRoom { .. }) => Some(error.to_string()),
         _ => None,
     }
@@ -152,8 +125,8 @@ pub(super) fn plan_turn(
     table: &Table,
     settings: &Settings,
 ) -> Result<(TurnPlan, Check), CaptureError> {
-    let request = request(settings.degrees_per_second);
-    let plan = TurnPlan::new(table.identity(), &table.status()?, &request)?;
+    let speed = settings.degrees_per_second;
+    let plan = TurnPlan::new(table.identity(), &table.status()?, speed, 360.0)?;
     let (from, to) = (plan.back_deg(), plan.end_deg());
     let words = format!("room for the turn from {from:.1} to {to:.1} degrees");
     Ok((plan, Check::passed("cable", words)))
@@ -174,10 +147,7 @@ mod tests {
     fn a_full_disk_is_refused_with_both_numbers() {
         let root = tempfile::tempdir().unwrap();
         let error = check_disk(root.path(), 1 << 60).unwrap_err();
-        assert!(matches!(
-            error,
-            CaptureError::Refused(Refusal::DiskFull { .. })
-        ));
+        assert!(matches!(error, CaptureError::Refused(_)));
         let error = with_causes(&error);
         assert!(error.contains("1383505805529 MB"), "{error}");
     }

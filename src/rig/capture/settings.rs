@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::error::Refusal;
+use super::error::CaptureError;
 use super::mode_preference::ModePreference;
 use crate::camera::CameraAddress;
 use crate::camera::hold::ManualValues;
@@ -25,8 +25,6 @@ pub struct Settings {
     pub wanted: ManualValues,
     /// Speed of the turn, degrees a second.
     pub degrees_per_second: f64,
-    /// Least voltage of the table's battery.
-    pub min_battery_v: Option<f64>,
     /// Frames that may be missing of a take.
     pub max_dropped: u64,
     /// How often a take that came out bad is repeated.
@@ -49,7 +47,6 @@ impl Settings {
             mode: ModePreference::default(),
             wanted: ManualValues::default(),
             degrees_per_second: 7.2,
-            min_battery_v: None,
             max_dropped: 0,
             retries: 1,
             runtime_folder: lockfile::standard_folder(),
@@ -57,7 +54,7 @@ impl Settings {
         }
     }
 
-    /// The same as everybody may see and some may change.
+    /// The same as everybody may see.
     #[must_use]
     pub fn shown(&self) -> CaptureSettings {
         CaptureSettings {
@@ -70,13 +67,6 @@ impl Settings {
             max_dropped: self.max_dropped,
             retries: self.retries,
         }
-    }
-
-    /// Takes over what may be changed of `shown`.
-    pub fn change(&mut self, shown: &CaptureSettings) {
-        (self.mode.size, self.mode.fps) = (shown.size, shown.fps);
-        self.degrees_per_second = shown.degrees_per_second;
-        (self.max_dropped, self.retries) = (shown.max_dropped, shown.retries);
     }
 
     /// Takes the camera for this process; `None` for one that any number of programs can have.
@@ -102,8 +92,8 @@ impl Settings {
     /// by real time.
     ///
     /// # Errors
-    /// [`Refusal::Pace`] where one side is real and the other is to run faster.
-    pub fn speed(&self) -> Result<f64, Refusal> {
+    /// [`CaptureError::Refused`] where one side is real and the other is to run faster.
+    pub fn speed(&self) -> Result<f64, CaptureError> {
         let replayed = match &self.camera {
             CameraAddress::Replay(replay) => Some(replay.speed),
             _ => None,
@@ -116,7 +106,10 @@ impl Settings {
             (Some(_), Some(table), _) => Ok(table),
             (Some(camera), None, TurntableAddress::None) => Ok(camera),
             (Some(1.0), None, _) | (None, Some(1.0), _) | (None, None, _) => Ok(1.0),
-            _ => Err(Refusal::Pace),
+            _ => Err(CaptureError::Refused(
+                "a real camera or turntable goes by real time: leave speed= out of the other one's address"
+                    .to_owned(),
+            )),
         }
     }
 
@@ -169,7 +162,7 @@ mod tests {
             ("replay:a?speed=0", "serial:"),
         ] {
             let refusal = settings(camera, table).speed().unwrap_err();
-            assert!(matches!(refusal, Refusal::Pace));
+            assert!(refusal.to_string().contains("real time"), "{refusal}");
         }
     }
 

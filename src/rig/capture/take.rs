@@ -1,5 +1,5 @@
-//! One capture: preflight, metering where it is asked for, the turn with its recording, the
-//! verdict; and all of it again where the take is not usable.
+//! One capture: preflight, the turn with its recording, the verdict; and all of it again where the take is not
+//! usable.
 //!
 //! The session is closed before the table turns back: from then on the take stands, whatever happens
 //! to the table or the program.
@@ -15,24 +15,20 @@ use relit_data::causes::with_causes;
 use relit_data::turn_light::LEAST_MODULATION;
 
 use super::calibrate::read_facts;
-use super::context::{CaptureContext, CaptureRequest};
+use super::context::CaptureContext;
 use super::equipment::Equipment;
-use super::error::{CaptureError, Refusal};
+use super::error::CaptureError;
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::manifest::manifest;
-use super::metering::meter;
 use super::preflight;
 use super::recording::{End, Recorder, RecordingPlan};
 use super::turn::{TurnRecording, unwind};
 use crate::camera::CameraAddress;
 use crate::state::{Check, Phase, TakeSummary, Verdict};
-use crate::turntable::{Track, TurnPlan, TurntableError};
+use crate::turntable::{Track, TurnPlan};
 
 /// How long a replayed camera waits for the disk, so that a rehearsal on a slow disk loses nothing.
 const REPLAY_WAIT: Duration = Duration::from_secs(60);
-
-const WITHOUT_TABLE: &str =
-    "metering turns the table, and there is none: give --turntable, or set the exposure";
 
 /// What a capture left.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,23 +46,20 @@ pub struct Captured {
 /// What keeps a take from beginning. What spoiled one that began is in its summary.
 pub fn capture(
     equipment: &mut Equipment,
-    request: &CaptureRequest,
+    object: &str,
     context: CaptureContext<'_>,
 ) -> Result<Captured, CaptureError> {
     let clock = equipment.clock();
     let _part = clock.take_part();
-    preflight::check_object(&request.object)?;
+    preflight::check_object(object).map_err(CaptureError::Refused)?;
     let retries = equipment.settings().retries;
-    let mut request = request.clone();
     let mut repeated = 0;
     loop {
-        let (take, repeatable) = run_take(equipment, &request, context)?;
+        let (take, repeatable) = run_take(equipment, object, context)?;
         if take.verdict != Verdict::Aborted || !repeatable || repeated == retries {
             return Ok(Captured { take, repeated });
         }
         repeated += 1;
-        // The exposure that was found stays set.
-        request.meter = false;
         let fault = format!("the take is repeated: {}", take.reason.unwrap_or_default());
         context.monitor.fault(clock.now_us(), fault);
     }
@@ -75,14 +68,14 @@ pub fn capture(
 /// One take, and whether its camera and table are good for another one.
 fn run_take(
     equipment: &mut Equipment,
-    request: &CaptureRequest,
+    object: &str,
     context: CaptureContext<'_>,
 ) -> Result<(TakeSummary, bool), CaptureError> {
     let begun = equipment.session_time();
-    context.begin_take(&request.object);
+    context.begin_take(object);
     context.note([preflight::check_clock(begun)?]);
-    let (locked, turn) = prepare(equipment, request.meter, context)?;
-    let plan = plan_recording(equipment, request, begun, &locked, context)?;
+    let (locked, turn) = prepare(equipment, context)?;
+    let plan = plan_recording(equipment, object, begun, &locked, context)?;
     let clock = equipment.clock();
     let turn_us = equipment.settings().turn_us();
     let camera = equipment
@@ -98,10 +91,7 @@ fn run_take(
     };
     let (track, finished) = match (equipment.table.as_ref(), turn) {
         (Some(table), Some(turn)) => match recording.with_table(table, turn) {
-            Ok((track, finished)) => {
-                let track = track.map_err(TurntableError::from);
-                (track.map(Some).map_err(CaptureError::from), Some(finished))
-            }
+            Ok((track, finished)) => (track.map(Some).map_err(CaptureError::from), Some(finished)),
             Err(error) => (Err(error), None),
         },
         _ => (recording.without_table().map(|()| None), None),
@@ -154,14 +144,14 @@ fn check_room(modulation: f64) -> Check {
 /// What is recorded, and where; shows it.
 fn plan_recording(
     equipment: &Equipment,
-    request: &CaptureRequest,
+    object: &str,
     begun: Timestamp,
     locked: &LockedCamera,
     context: CaptureContext<'_>,
 ) -> Result<RecordingPlan, CaptureError> {
     let settings = equipment.settings();
     let rig = read_facts(&settings.root)?;
-    let manifest = manifest(equipment, &request.object, begun, locked, rig);
+    let manifest = manifest(equipment, object, begun, locked, rig);
     context.monitor.update(|state| {
         state.session = Some(manifest.id.clone());
         state.frames_wanted = settings.frames(locked.stream.fps);
@@ -184,7 +174,6 @@ fn plan_recording(
 /// Opens, checks and locks what a take needs, before the table turns for it.
 fn prepare(
     equipment: &mut Equipment,
-    with_metering: bool,
     context: CaptureContext<'_>,
 ) -> Result<(LockedCamera, Option<TurnPlan>), CaptureError> {
     let settings = equipment.settings().clone();
@@ -196,26 +185,17 @@ fn prepare(
         return Err(CaptureError::no_camera());
     };
     let camera = camera.as_mut();
-    let mut locked = LockedCamera::lock(camera, &settings, context.stop)?;
+    let locked = LockedCamera::lock(camera, &settings, context.stop)?;
     context.note(locked.checks.clone());
     let needed = locked.bytes_for(settings.frames(locked.stream.fps));
     context.monitor.update(|state| state.needed_bytes = needed);
     context.note([preflight::check_disk(&settings.root, needed)?]);
     let Some(table) = table else {
-        return match with_metering {
-            true => Err(Refusal::Other(WITHOUT_TABLE.to_owned()).into()),
-            false => Ok((locked, None)),
-        };
+        return Ok((locked, None));
     };
     let stop = context.stop;
-    let ready = stop.over(table, || preflight::ready_table(table, &settings));
+    let ready = stop.over(table, || preflight::ready_table(table));
     context.note(stop.explain(ready)?);
-    if with_metering {
-        context.enter(Phase::Metering);
-        let exposure = meter(camera, table, &mut locked, stop)?;
-        let found = format!("metered: {exposure}");
-        context.note([Check::passed("exposure", found)]);
-    }
     let (turn, check) = preflight::plan_turn(table, &settings)?;
     context.note([check]);
     Ok((locked, Some(turn)))

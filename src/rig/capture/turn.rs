@@ -10,8 +10,8 @@ use super::recording::{Recorder, Window};
 use crate::clock::Clock;
 use crate::state::{Monitor, Obstacle, Phase, TableState};
 use crate::turntable::{
-    ControllerState, FinishedTurn, MotionFault, Table, TableStatus, Track, TrackError, Turn,
-    TurnPlan, TurntableError,
+    ControllerState, FinishedTurn, MotionFault, Table, TableStatus, Track, Turn, TurnPlan,
+    TurntableError,
 };
 use relit_data::causes::with_causes;
 
@@ -38,7 +38,7 @@ impl TurnRecording<'_> {
         &self,
         table: &'t Table,
         plan: TurnPlan,
-    ) -> Result<(Result<Track, TrackError>, FinishedTurn<'t>), CaptureError> {
+    ) -> Result<(Result<Track, TurntableError>, FinishedTurn<'t>), CaptureError> {
         let stop = self.context.stop;
         stop.explain(stop.over(table, || self.turn(table, plan)))
     }
@@ -52,12 +52,12 @@ impl TurnRecording<'_> {
         &self,
         table: &'t Table,
         plan: TurnPlan,
-    ) -> Result<(Result<Track, TrackError>, FinishedTurn<'t>), CaptureError> {
+    ) -> Result<(Result<Track, TurntableError>, FinishedTurn<'t>), CaptureError> {
         enter_without_reports(self.context, Phase::MovingBack);
         let margin_us = preflight::margin_us(&plan);
         let mut turn = table.start_turn(plan)?;
         self.context.enter(Phase::Starting);
-        let (constant_us, _) = turn.wait_constant()?;
+        let constant_us = turn.wait_constant()?;
         let from_us = constant_us.saturating_add(margin_us);
         self.recorder.begin_journal(turn.expected());
         let mut seen = 0;
@@ -105,7 +105,7 @@ impl TurnRecording<'_> {
             check()?;
             let ended = self.recorder.wait_ended(LOOK);
             self.show_progress();
-            let late_us = self.clock.now_us().saturating_sub(window.to_us());
+            let late_us = self.clock.now_us().saturating_sub(window.to_us);
             let late = Duration::from_micros(u64::try_from(late_us).unwrap_or(0));
             match ended {
                 true if late_us >= 0 => return Ok(()),
@@ -155,7 +155,7 @@ fn enter_without_reports(context: CaptureContext<'_>, phase: Phase) {
 /// What is wrong with the table, in a sentence.
 fn fault_of(status: &TableStatus) -> Option<String> {
     if status.emergency_stop {
-        return Some(Obstacle::EmergencyStop.to_string());
+        return Some(Obstacle::emergency_stop().to_string());
     }
     let restarted = || {
         status

@@ -1,13 +1,12 @@
 //! The rig as a daemon: it takes commands, and one thread that has camera and table carries them out.
 //!
-//! What is to be done, and what a stop means, is decided by the `schedule`, a state machine; the
-//! `worker` does it, and keeps pictures and state fresh in between. Commands are checked where they
+//! What is to be done, and what a stop means, is decided by the `dispatcher`; the `worker` does it, and keeps
+//! pictures and state fresh in between. Commands are checked where they
 //! are given. When the daemon is dropped, a take under way is aborted and closed, the table stands, and
 //! the thread has ended.
 
 mod dispatcher;
 mod idle;
-mod schedule;
 mod worker;
 
 use std::io;
@@ -15,17 +14,14 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-use relit_data::causes::with_causes;
-
 use crate::capture::{CaptureError, Equipment, Settings, preflight, salvage};
 use crate::clock::{Clock, JoinHandle};
 use crate::command::{Command, Refused, Rig};
 use crate::lockfile::LockFile;
 use crate::preview::Preview;
 use crate::simulator::SimulatedTable;
-use crate::state::{CaptureSettings, Monitor, Obstacle, RigState, TableState};
-use dispatcher::Dispatcher;
-use schedule::Job;
+use crate::state::{Monitor, RigState};
+use dispatcher::{Dispatcher, Job};
 use worker::Worker;
 
 /// Farthest that a table is turned by one command, degrees.
@@ -46,7 +42,7 @@ impl Daemon {
     /// the worker, which opens camera and table, and keeps trying while they are not there.
     ///
     /// # Errors
-    /// [`CaptureError::Lock`] where another daemon has them, [`crate::capture::Refusal::Pace`], or what
+    /// [`CaptureError::Lock`] where another daemon has them, [`CaptureError::Refused`] for speeds that do not fit, or what
     /// the system answers.
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
         // The lock of the folder is a file in it: nothing is left there where the camera is another's.
@@ -93,17 +89,13 @@ impl Daemon {
     fn lock_worker(&self) -> MutexGuard<'_, Option<JoinHandle<()>>> {
         self.worker.lock().unwrap_or_else(PoisonError::into_inner)
     }
-
-    fn submit(&self, job: Job) -> Result<(), Refused> {
-        self.dispatcher.change(|schedule| schedule.submit(job))
-    }
 }
 
 impl Rig for Daemon {
     fn command(&self, command: Command) -> Result<(), Refused> {
         let dispatcher = &self.dispatcher;
         // A name that cannot be is the better answer than a camera that is away.
-        if let Command::Start { object, .. } = &command {
+        if let Command::Start { object } = &command {
             check_object(object)?;
         }
         if let Command::Jog { degrees } = command {
@@ -111,50 +103,16 @@ impl Rig for Daemon {
         }
         command.check(&dispatcher.monitor().state())?;
         match command {
-            Command::Start { object, meter } => {
-                dispatcher.change(|schedule| schedule.submit(Job::Capture { object, meter }))
-            }
+            Command::Start { object } => dispatcher.submit(Job::Capture(object)),
             Command::Stop => {
                 dispatcher.stop();
                 Ok(())
             }
-            Command::Enqueue { object } => {
-                check_object(&object)?;
-                dispatcher.change(|schedule| schedule.enqueue(object))
-            }
-            Command::Dequeue { place, object } => {
-                dispatcher.change(|schedule| schedule.dequeue(place, object.as_deref()))
-            }
-            Command::Next { object } => {
-                dispatcher.change(|schedule| schedule.submit_next(object.as_deref()))
-            }
-            Command::Home => self.submit(Job::Home),
-            Command::Jog { degrees } => self.submit(Job::Jog(degrees)),
-            Command::Unlock => self.submit(Job::Unlock),
-            Command::Reset => self.submit(Job::ResetTable),
-            Command::Configure {
-                size,
-                fps,
-                degrees_per_second,
-                max_dropped,
-                retries,
-            } => {
-                let state = self.dispatcher.monitor().state();
-                let now = state.settings;
-                let settings = CaptureSettings {
-                    size: size.unwrap_or(now.size),
-                    fps: fps.unwrap_or(now.fps),
-                    degrees_per_second: degrees_per_second.unwrap_or(now.degrees_per_second),
-                    max_dropped: max_dropped.unwrap_or(now.max_dropped),
-                    retries: retries.unwrap_or(now.retries),
-                    ..now
-                };
-                check_settings(&settings)?;
-                check_speed(settings.degrees_per_second, &state.table)?;
-                dispatcher.change(|schedule| schedule.submit(Job::Configure(settings)))
-            }
+            Command::Home => dispatcher.submit(Job::Home),
+            Command::Jog { degrees } => dispatcher.submit(Job::Jog(degrees)),
+            Command::Reset => dispatcher.submit(Job::ResetTable),
             Command::SetControl { name, value } => {
-                dispatcher.change(|schedule| schedule.submit(Job::SetControl { name, value }))
+                dispatcher.submit(Job::SetControl { name, value })
             }
         }
     }
@@ -212,43 +170,8 @@ fn check_jog(degrees: f64) -> Result<(), Refused> {
     }
 }
 
-/// The same bounds as on the command line.
-fn check_settings(settings: &CaptureSettings) -> Result<(), Refused> {
-    let size = settings
-        .size
-        .is_none_or(|(width, height)| width > 0 && height > 0);
-    let wrong = [
-        (!size, "a frame's size has two numbers above 0"),
-        (
-            !(1.0..=1000.0).contains(&settings.fps),
-            "the frame rate goes from 1 to 1000 frames/s",
-        ),
-        (
-            !(0.1..=360.0).contains(&settings.degrees_per_second),
-            "the speed goes from 0.1 to 360 degrees/s",
-        ),
-        (
-            settings.retries > 100,
-            "a take is repeated 100 times at most",
-        ),
-    ];
-    match wrong.iter().find(|(is_wrong, _)| *is_wrong) {
-        Some((_, why)) => Err(Refused::Invalid((*why).to_owned())),
-        None => Ok(()),
-    }
-}
-
-/// The table is asked for no more than it can do, where that is known.
-fn check_speed(degrees_per_second: f64, table: &TableState) -> Result<(), Refused> {
-    let highest = table.max_degrees_per_second;
-    let too_fast = highest.and_then(|highest| Obstacle::of_speed(degrees_per_second, highest));
-    too_fast.map_or(Ok(()), |obstacle| {
-        Err(Refused::Invalid(obstacle.to_string()))
-    })
-}
-
 fn check_object(object: &str) -> Result<(), Refused> {
-    preflight::check_object(object).map_err(|refusal| Refused::Invalid(with_causes(&refusal)))
+    preflight::check_object(object).map_err(Refused::Invalid)
 }
 
 /// Salvages what an earlier run left, and shows what came of it.
@@ -273,7 +196,7 @@ mod tests {
         assert!(worker.unwrap().join().is_err());
         let faults = dispatcher.monitor().state().faults;
         assert!(faults[0].what.contains("failed"), "{faults:?}");
-        let refused = dispatcher.change(|schedule| schedule.submit(Job::Home));
+        let refused = dispatcher.submit(Job::Home);
         assert!(matches!(refused, Err(Refused::Unavailable(_))));
     }
 }

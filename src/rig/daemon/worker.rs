@@ -6,17 +6,13 @@ use std::time::Duration;
 
 use relit_data::causes::with_causes;
 
-use super::dispatcher::Dispatcher;
+use super::dispatcher::{Dispatcher, Job, Next};
 use super::idle::Idle;
-use super::schedule::{Job, Next};
 use crate::camera::Camera;
 use crate::camera::hold::{ManualPlan, ManualValues};
 use crate::capture::turn::show_table;
-use crate::capture::{
-    CaptureContext, CaptureError, CaptureRequest, Equipment, StopRequest, capture,
-};
+use crate::capture::{CaptureContext, CaptureError, Equipment, StopRequest, capture};
 use crate::preview::Preview;
-use crate::state::{CaptureSettings, Verdict};
 use crate::turntable::{Table, TurntableError};
 
 /// Time between two checks of a motion.
@@ -45,63 +41,50 @@ impl Worker {
     pub(super) fn run(&mut self) {
         loop {
             match self.dispatcher.begin() {
-                (Next::Job(job), stop) => self.work(job, &stop),
-                (Next::Idle, _) => self.idle.poll(&mut self.equipment),
-                (Next::End, _) => return,
+                Next::Job(job, stop) => self.work(job, &stop),
+                Next::Idle => self.idle.poll(&mut self.equipment),
+                Next::End => return,
             }
         }
     }
 
     fn work(&mut self, job: Job, stop: &StopRequest) {
-        let done = self.do_job(job, stop);
-        if let Err(error) = &done {
-            self.report(with_causes(error));
+        if let Err(error) = self.do_job(job, stop) {
+            self.report(with_causes(&error));
         }
         self.idle.restart();
-        let succeeded = done.unwrap_or(false);
-        self.dispatcher
-            .change(|schedule| schedule.finish(succeeded));
+        self.dispatcher.finish();
     }
 
-    /// Carries a job out; false where nothing usable came of it.
-    fn do_job(&mut self, job: Job, stop: &StopRequest) -> Result<bool, CaptureError> {
+    fn do_job(&mut self, job: Job, stop: &StopRequest) -> Result<(), CaptureError> {
         match job {
-            Job::Capture { object, meter } => {
-                return self.capture(&CaptureRequest { object, meter }, stop);
-            }
-            Job::StopTable if !self.equipment.wants_table() => {}
-            Job::StopTable => self.with_table(stop, Table::stop).map(drop)?,
-            Job::Home => self.with_table(stop, Table::home).map(drop)?,
+            Job::Capture(object) => self.capture(&object, stop),
+            Job::StopTable if !self.equipment.wants_table() => Ok(()),
+            Job::StopTable => self.with_table(stop, Table::stop).map(drop),
+            Job::Home => self.with_table(stop, Table::home).map(drop),
             Job::Jog(degrees) => {
                 let jog = |table: &Table| table.jog(degrees, None);
-                self.with_table(stop, jog).map(drop)?;
+                self.with_table(stop, jog).map(drop)
             }
-            Job::Unlock => self.with_table(stop, Table::unlock).map(drop)?,
-            Job::ResetTable => self.with_table(stop, Table::reset).map(drop)?,
-            Job::Configure(settings) => self.configure(&settings),
-            Job::SetControl { name, value } => self.set_control(&name, value)?,
+            Job::ResetTable => self.with_table(stop, Table::reset).map(drop),
+            Job::SetControl { name, value } => self.set_control(&name, value),
         }
-        Ok(true)
     }
 
-    fn capture(
-        &mut self,
-        request: &CaptureRequest,
-        stop: &StopRequest,
-    ) -> Result<bool, CaptureError> {
+    fn capture(&mut self, object: &str, stop: &StopRequest) -> Result<(), CaptureError> {
         let monitor = self.dispatcher.monitor();
         let context = CaptureContext {
             monitor,
             preview: Some(&self.preview),
             stop,
         };
-        let captured = capture(&mut self.equipment, request, context);
+        let captured = capture(&mut self.equipment, object, context);
         monitor.update(|state| state.session = None);
         let summary = captured?.take;
         if let Some(reason) = summary.reason {
             self.report(format!("{}: {reason}", summary.session));
         }
-        Ok(summary.verdict != Verdict::Aborted)
+        Ok(())
     }
 
     fn report(&self, fault: String) {
@@ -139,14 +122,6 @@ impl Worker {
                 Ok::<_, CaptureError>(moved.unwrap_or(Err(TurntableError::NotStopped))?)
             })
         })
-    }
-
-    fn configure(&mut self, settings: &CaptureSettings) {
-        self.equipment.change_settings(settings);
-        let shown = self.equipment.settings().shown();
-        let monitor = self.dispatcher.monitor();
-        // Takes of another size or speed need another space.
-        monitor.update(|state| (state.settings, state.needed_bytes) = (shown, 0));
     }
 
     fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {

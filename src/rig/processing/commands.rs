@@ -4,8 +4,6 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use serde::Serialize;
-
 use crate::state::ProcessingStep;
 
 /// Where the programs are on this machine.
@@ -15,17 +13,8 @@ pub struct ProcessingPrograms {
     pub mask: Option<PathBuf>,
     /// `relit-extract`, where it is installed.
     pub extract: Option<PathBuf>,
-    /// What a program is started by, such as `ionice -c 3`; the program and its arguments follow.
+    /// What a program is started by, such as `nice`; the program and its arguments follow.
     pub launcher: Vec<OsString>,
-}
-
-/// The same work for a terminal, to be copied.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct ProcessingCommands {
-    /// Makes the mask by the turn.
-    pub mask: String,
-    /// Extracts the session into the data set.
-    pub extract: String,
 }
 
 /// Folders that a step works on.
@@ -43,10 +32,7 @@ impl ProcessingPrograms {
         let (session, dataset) = (places.session.as_os_str(), places.dataset.as_os_str());
         let (program, mut arguments): (_, Vec<OsString>) = match step {
             ProcessingStep::Mask => (&self.mask, vec![session.into(), "--auto".into()]),
-            ProcessingStep::Check => (
-                &self.mask,
-                vec!["check".into(), session.into(), "--progress".into()],
-            ),
+            ProcessingStep::Check => (&self.mask, vec!["check".into(), session.into()]),
             ProcessingStep::Extract => (
                 &self.extract,
                 vec![
@@ -56,10 +42,6 @@ impl ProcessingPrograms {
                     "--resume".into(),
                     "--progress".into(),
                 ],
-            ),
-            ProcessingStep::Verify => (
-                &self.extract,
-                vec!["verify".into(), dataset.into(), "--progress".into()],
             ),
         };
         if step == ProcessingStep::Extract && places.is_aborted {
@@ -86,28 +68,6 @@ impl ProcessingPrograms {
         let mut command = Command::new(words.next().unwrap_or_default());
         command.args(words).args(arguments);
         command
-    }
-}
-
-impl ProcessingCommands {
-    /// The commands for a session's folder and a data set's.
-    #[must_use]
-    pub(crate) fn of(session: &Path, dataset: &Path) -> Self {
-        let (session, dataset) = (quoted(session), quoted(dataset));
-        Self {
-            mask: format!("relit-mask {session} --auto"),
-            extract: format!("relit-extract {session} -o {dataset}"),
-        }
-    }
-}
-
-/// A path as a shell takes it for one word.
-fn quoted(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    let plain = |c: char| c.is_alphanumeric() || "/._-+,:@%".contains(c);
-    match !text.is_empty() && !text.starts_with('-') && text.chars().all(plain) {
-        true => text.into_owned(),
-        false => format!("'{}'", text.replace('\'', r"'\''")),
     }
 }
 
@@ -141,12 +101,5 @@ mod tests {
         let wanted =
             "ionice -c 3 /bin/relit-extract /s/mug -o /d --resume --progress --partial --json";
         assert_eq!(words(&command).join(" "), wanted);
-    }
-
-    #[test]
-    fn commands_to_copy_are_safe_for_a_shell() {
-        let commands = ProcessingCommands::of(Path::new("/my rig/it's"), Path::new("/d"));
-        assert_eq!(commands.mask, r"relit-mask '/my rig/it'\''s' --auto");
-        assert_eq!(commands.extract, r"relit-extract '/my rig/it'\''s' -o /d");
     }
 }

@@ -12,8 +12,6 @@ use super::commands::ProcessingPrograms;
 use super::heard::Heard;
 use crate::command::Refused;
 
-/// Its niceness: a person waits for it, and the rig comes first.
-const ATTENDED: i32 = 5;
 /// Time in which the editor has to come up: it reads the video through once.
 const START: Duration = Duration::from_secs(60);
 /// An editor that nobody used for so long is ended.
@@ -55,7 +53,7 @@ impl OpenEditor {
         let missing =
             || Refused::Unavailable("relit-mask is not installed on this machine".to_owned());
         let failed = |why: String| Refused::Unavailable(format!("the editor did not open: {why}"));
-        let mut worker = Worker::start(command.ok_or_else(missing)?, ATTENDED)
+        let mut worker = Worker::start(command.ok_or_else(missing)?)
             .map_err(|error| failed(error.to_string()))?;
         let mut heard = Heard::default();
         let until = Instant::now() + START;

@@ -50,9 +50,6 @@ pub(super) struct Heard {
     /// A session that was not extracted again: whether it is lossy, and has the mask of something else.
     skipped: Option<(bool, bool)>,
     left_out: Option<String>,
-    problems: Vec<String>,
-    problem_count: u64,
-    is_verified: bool,
     has_mask: bool,
     editor: Option<EditorPlace>,
 }
@@ -74,11 +71,6 @@ impl Heard {
             Event::Extracted { session } => self.extracted = serde_json::from_value(session).ok(),
             Event::Skipped { lossy, misfit, .. } => self.skipped = Some((lossy, misfit)),
             Event::LeftOut { message, .. } => self.left_out = Some(message),
-            Event::Problem { message, .. } => {
-                self.problem_count += 1;
-                keep(&mut self.problems, message);
-            }
-            Event::Verified { .. } => self.is_verified = true,
             Event::Editor { address, url } => self.editor = Some(EditorPlace { address, url }),
             _ => {}
         }
@@ -119,17 +111,6 @@ impl Heard {
             (ProcessingStep::Mask, Some(0)) if self.has_mask => Some(self.masked()),
             (ProcessingStep::Check, Some(_)) => self.check.take().map(checked),
             (ProcessingStep::Extract, Some(code @ (0 | 3))) => self.extracted(code),
-            (ProcessingStep::Verify, Some(0)) if self.is_verified => Some(good(
-                "every file of the data set reads back as it was written",
-            )),
-            (ProcessingStep::Verify, Some(_)) if self.problem_count > 0 => {
-                let first = self.problems.first().map_or("", String::as_str);
-                Some(StepEnd {
-                    outcome: ProcessingOutcome::Failed,
-                    what: format!("{} problems, the first: {first}", self.problem_count),
-                    goes_on: false,
-                })
-            }
             _ => None,
         };
         end.unwrap_or_else(|| StepEnd {
@@ -175,8 +156,6 @@ fn checked(report: CheckReport) -> StepEnd {
     let why = report.reasons.join("; ");
     match &*report.verdict {
         "fits" => good("the mask fits"),
-        // Extraction aligns the frames.
-        "drifts" => doubtful(&why, true),
         verdict => doubtful(&format!("{verdict}: {why}"), false),
     }
 }
@@ -223,7 +202,7 @@ mod tests {
 
     #[test]
     fn each_programs_last_word_is_understood() {
-        use ProcessingStep::{Check, Extract, Mask, Verify};
+        use ProcessingStep::{Check, Extract, Mask};
         let good = r#"{"event":"extracted","session":{"samples":1500,"lossy":false,"quality":{"verdict":"good","reasons":[]},"warnings":[]}}"#;
         let usable = r#"{"event":"extracted","session":{"samples":1500,"lossy":true,"quality":{"verdict":"usable","reasons":["3 frames are lost"]},"warnings":["the camera dropped 3 frames"]}}"#;
         for (step, code, line, outcome, words, goes_on) in [
@@ -241,14 +220,6 @@ mod tests {
                 r#"{"event":"check","report":{"verdict":"fits","reasons":[]}}"#,
                 Good,
                 "fits",
-                true,
-            ),
-            (
-                Check,
-                1,
-                r#"{"event":"check","report":{"verdict":"drifts","reasons":["by 3 px"]}}"#,
-                Doubtful,
-                "by 3 px",
                 true,
             ),
             (
@@ -310,22 +281,6 @@ mod tests {
                 false,
             ),
             (Extract, 1, good, Failed, "no space", false),
-            (
-                Verify,
-                0,
-                r#"{"event":"verified"}"#,
-                Good,
-                "reads back",
-                true,
-            ),
-            (
-                Verify,
-                1,
-                r#"{"event":"problem","message":"x.tar differs"}"#,
-                Failed,
-                "1 problems, the first: x.tar differs",
-                false,
-            ),
             (Mask, 0, "no JSON", Failed, "no space", false),
         ] {
             let (found, what, on) = end(step, Some(code), &[line]);

@@ -2,9 +2,9 @@
 //! relit-extract where they are installed.
 //!
 //! The `queue` decides what is done when, `heard` what a program's words mean; both are without I/O. One thread
-//! starts the programs as `child` processes of the lowest priority. While the rig captures or moves nothing begins,
+//! starts the programs as `child` processes. While the rig captures or moves nothing begins,
 //! and what runs is stopped (`SIGSTOP`) until the rig rests. Results lie where the programs leave them, in the session
-//! and the data set; only settings and what is not done yet are kept (`store`) here.
+//! and the data set; only the settings are kept (`store`) here.
 
 mod child;
 mod commands;
@@ -22,9 +22,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use relit_data::naming::is_session_name;
-
-pub(crate) use commands::ProcessingCommands;
 pub use commands::ProcessingPrograms;
 pub(crate) use editor::EditorTarget;
 pub use shared::ProcessingOptions;
@@ -34,8 +31,10 @@ use crate::state::{Monitor, ProcessingStep};
 use editor::OpenEditor;
 use queue::{PendingWork, ProcessingQueue};
 use shared::{HELD, Plan, Shared, is_busy};
-use store::KeptProcessing;
+pub(crate) use store::ProcessingSettings;
 
+/// The data set's name.
+const DATASET: &str = "dataset";
 /// Longest wait for a cancelled program to end.
 const RELEASE: Duration = Duration::from_secs(10);
 /// Time between two looks while waiting for that.
@@ -55,16 +54,6 @@ impl ProcessingError {
     }
 }
 
-/// What a request changes of the settings; what is left out stays.
-#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct ProcessingChange {
-    /// Whether each usable take is processed once the rig rests.
-    pub when_done: Option<bool>,
-    /// The data set's name: a folder beside that of the sessions.
-    pub dataset: Option<String>,
-}
-
 /// Works on sessions until it is dropped.
 #[derive(Debug)]
 pub struct Processing {
@@ -73,7 +62,7 @@ pub struct Processing {
 }
 
 impl Processing {
-    /// Goes on with what an earlier run left. `monitor` says when the rig rests, and shows what is done.
+    /// Waits for work. `monitor` says when the rig rests, and shows what is done.
     ///
     /// # Errors
     /// [`ProcessingError`].
@@ -87,33 +76,28 @@ impl Processing {
             root.display()
         );
         let root = root.canonicalize().map_err(ProcessingError::of(missing))?;
-        let kept = KeptProcessing::read(&root).map_err(ProcessingError::of(format!(
+        let settings = ProcessingSettings::read(&root).map_err(ProcessingError::of(format!(
             "{} could not be read: mend it, or remove it and set again what it held",
             store::path(&root).display()
         )))?;
         let beside = || root.parent().unwrap_or(&root).to_owned();
-        let datasets = options.datasets.clone().unwrap_or_else(beside);
-        let mut settings = kept.settings;
-        if datasets.join(&settings.dataset) == root {
-            settings.dataset.push_str("-shards");
-        }
-        let mut queue = ProcessingQueue::default();
-        for work in kept.pending {
-            // A file that a person changed may name a session twice.
-            let _ = queue.submit(work);
+        let datasets = options.datasets.unwrap_or_else(beside);
+        let mut dataset = datasets.join(DATASET);
+        if dataset == root {
+            dataset.as_mut_os_string().push("-shards");
         }
         let shared = Arc::new(Shared {
-            datasets,
+            dataset,
             monitor,
             plan: Mutex::new(Plan {
-                queue,
+                queue: ProcessingQueue::default(),
                 settings,
                 programs: (options.programs)(),
             }),
             editor: Mutex::default(),
             opening: Mutex::default(),
             is_ending: AtomicBool::new(false),
-            options,
+            programs: options.programs,
             root,
         });
         shared.show();
@@ -141,26 +125,11 @@ impl Processing {
             let error = format!("the mask of {session} is open in the editor: finish it there");
             return Err(Refused::Busy(error));
         }
-        self.queue(PendingWork {
-            session: Some(session.to_owned()),
+        self.shared.look_for_programs();
+        self.shared.submit(PendingWork {
+            session: session.to_owned(),
             steps,
         })
-    }
-
-    /// Queues the verification of the data set; returns the job's number.
-    ///
-    /// # Errors
-    /// [`Refused`] where the program is missing, or the data set is being verified.
-    pub fn verify(&self) -> Result<u64, Refused> {
-        self.queue(PendingWork {
-            session: None,
-            steps: vec![ProcessingStep::Verify],
-        })
-    }
-
-    fn queue(&self, work: PendingWork) -> Result<u64, Refused> {
-        self.shared.look_for_programs();
-        self.shared.submit(work)
     }
 
     /// Cancels a job; its program is ended. False where there is none of that number.
@@ -169,28 +138,9 @@ impl Processing {
     }
 
     /// Changes the settings.
-    ///
-    /// # Errors
-    /// [`Refused::Invalid`] where the data set cannot have that name.
-    pub(crate) fn configure(&self, change: ProcessingChange) -> Result<(), Refused> {
-        let names = change.dataset.as_deref();
-        if names.is_some_and(|name| !is_session_name(name)) {
-            let error = "the data set's name has letters, digits, '-', '_' and '.', and no dot at its beginning: it is a folder beside that of the sessions";
-            return Err(Refused::Invalid(error.to_owned()));
-        }
-        if names.is_some_and(|name| self.shared.datasets.join(name) == self.shared.root) {
-            let error = "that is the folder of the sessions: give the data set another name";
-            return Err(Refused::Invalid(error.to_owned()));
-        }
+    pub(crate) fn configure(&self, settings: ProcessingSettings) {
         self.shared.look_for_programs();
-        self.shared.change(|plan| {
-            let settings = &mut plan.settings;
-            settings.when_done = change.when_done.unwrap_or(settings.when_done);
-            if let Some(name) = change.dataset {
-                settings.dataset = name;
-            }
-        });
-        Ok(())
+        self.shared.change(|plan| plan.settings = settings);
     }
 
     /// Ends all work on a session, so that its folder can be moved.
@@ -202,7 +152,7 @@ impl Processing {
         self.shared
             .change(|plan| plan.queue.cancel_session(session));
         let until = Instant::now() + RELEASE;
-        while self.shared.plan().queue.has(Some(session)) {
+        while self.shared.plan().queue.has(session) {
             if Instant::now() > until {
                 let error = format!("{session} is still being processed: try again in a moment");
                 return Err(Refused::Busy(error));
@@ -220,7 +170,7 @@ impl Processing {
         if is_busy(&self.shared.monitor) {
             return Err(Refused::Busy(HELD.to_owned()));
         }
-        if self.shared.plan().queue.has(Some(session)) {
+        if self.shared.plan().queue.has(session) {
             let error = format!("{session} is being processed: wait for it, or cancel it");
             return Err(Refused::Busy(error));
         }
@@ -262,7 +212,7 @@ impl Processing {
     /// The folder of the data set.
     #[must_use]
     pub fn dataset(&self) -> PathBuf {
-        self.shared.dataset(&self.shared.plan().settings)
+        self.shared.dataset.clone()
     }
 
     /// Ends the programs, and comes back when that is done. Does nothing the second time.

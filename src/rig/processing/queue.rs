@@ -10,8 +10,6 @@
 
 use std::collections::VecDeque;
 
-use serde::{Deserialize, Serialize};
-
 use crate::command::Refused;
 use crate::state::{
     FinishedJob, ProcessingJob, ProcessingOutcome, ProcessingStatus, ProcessingStep,
@@ -22,11 +20,10 @@ const LONGEST: usize = 200;
 /// Ended jobs that are remembered.
 const REMEMBERED: usize = 30;
 
-/// A session and what is still to be done with it: what is kept when the program ends.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+/// A session and what is still to be done with it.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct PendingWork {
-    /// `None`: the data set.
-    pub(super) session: Option<String>,
+    pub(super) session: String,
     /// At least one.
     pub(super) steps: Vec<ProcessingStep>,
 }
@@ -59,7 +56,7 @@ struct UnderWay {
 /// What the runner begins.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Begun {
-    pub(super) session: Option<String>,
+    pub(super) session: String,
     pub(super) step: ProcessingStep,
 }
 
@@ -80,8 +77,8 @@ impl ProcessingQueue {
             let none = "no step is named: name mask, check or extract";
             return Err(Refused::Invalid(none.to_owned()));
         }
-        if self.has(work.session.as_deref()) {
-            let what = work.session.as_deref().unwrap_or("the data set");
+        if self.has(&work.session) {
+            let what = &work.session;
             let already = format!("{what} is being processed already: wait for it, or cancel it");
             return Err(Refused::Busy(already));
         }
@@ -97,11 +94,11 @@ impl ProcessingQueue {
         Ok(self.numbers)
     }
 
-    /// Whether something of this session, or of the data set, waits or is under way.
-    pub(super) fn has(&self, session: Option<&str>) -> bool {
+    /// Whether something of this session waits or is under way.
+    pub(super) fn has(&self, session: &str) -> bool {
         let current = self.current.iter().map(|current| &current.entry);
         let mut all = self.waiting.iter().chain(current);
-        all.any(|entry| entry.work.session.as_deref() == session)
+        all.any(|entry| entry.work.session == session)
     }
 
     /// Takes a job out, or has its program ended. False where there is none of that number.
@@ -132,7 +129,7 @@ impl ProcessingQueue {
     pub(super) fn cancel_session(&mut self, session: &str) {
         let current = self.current.iter().map(|current| &current.entry);
         let of_session = self.waiting.iter().chain(current);
-        let of_session = of_session.filter(|entry| entry.work.session.as_deref() == Some(session));
+        let of_session = of_session.filter(|entry| entry.work.session == session);
         let numbers: Vec<u64> = of_session.map(|entry| entry.number).collect();
         for number in numbers {
             self.cancel(number);
@@ -223,14 +220,6 @@ impl ProcessingQueue {
         });
     }
 
-    /// All that is not done yet, in its order: a step under way begins anew after a restart.
-    pub(super) fn pending(&self) -> Vec<PendingWork> {
-        let current = self.current.iter().filter(|current| !current.is_cancelled);
-        let current = current.map(|current| &current.entry);
-        let all = current.chain(&self.waiting);
-        all.map(|entry| entry.work.clone()).collect()
-    }
-
     /// What is under way and what waits, as it is shown.
     pub(super) fn jobs(&self) -> Vec<ProcessingJob> {
         let waiting = self.waiting.iter().filter_map(|entry| {
@@ -283,7 +272,7 @@ mod tests {
 
     fn work(session: &str, steps: &[ProcessingStep]) -> PendingWork {
         PendingWork {
-            session: Some(session.to_owned()),
+            session: session.to_owned(),
             steps: steps.to_vec(),
         }
     }
@@ -298,7 +287,7 @@ mod tests {
 
     fn begun(queue: &mut ProcessingQueue) -> Option<(String, ProcessingStep)> {
         let begun = queue.begin()?;
-        Some((begun.session.unwrap_or_default(), begun.step))
+        Some((begun.session, begun.step))
     }
 
     const GOOD: ProcessingOutcome = ProcessingOutcome::Good;
@@ -371,7 +360,6 @@ mod tests {
         );
         assert_eq!(queue.jobs().len(), 1);
         assert_eq!(queue.jobs()[0].status, ProcessingStatus::Ending);
-        assert!(queue.pending().is_empty());
         queue.finish(end(ProcessingOutcome::Failed, false));
         assert!(queue.jobs().is_empty() && !queue.cancel(mug));
         let outcomes: Vec<_> = queue.finished().iter().map(|job| job.outcome).collect();
@@ -406,18 +394,6 @@ mod tests {
         assert!(matches!(nothing, Err(Refused::Invalid(_))), "{nothing:?}");
         queue.cancel_session("mug");
         assert!(queue.jobs().is_empty());
-    }
-
-    #[test]
-    fn what_waits_and_what_is_under_way_is_kept_with_the_steps_that_are_left() {
-        let mut queue = ProcessingQueue::default();
-        queue.submit(work("mug", &[Mask, Check])).unwrap();
-        queue.submit(work("cow", &[Extract])).unwrap();
-        begun(&mut queue).unwrap();
-        queue.finish(end(GOOD, true));
-        begun(&mut queue).unwrap();
-        let left = [work("mug", &[Check]), work("cow", &[Extract])];
-        assert_eq!(queue.pending(), left);
     }
 
     #[test]

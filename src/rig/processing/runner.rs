@@ -4,7 +4,6 @@ use std::fs;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use relit_data::causes::with_causes;
 use relit_data::session::{MANIFEST_FILE, Manifest, Status};
 
 use super::child::Worker;
@@ -18,8 +17,6 @@ use crate::state::{Monitor, ProcessingOutcome, ProcessingStep, Verdict};
 const LOOK: Duration = Duration::from_millis(50);
 /// Time between two searches for the programs.
 const SEARCH: Duration = Duration::from_secs(5);
-/// Niceness of what nobody waits for.
-const LAST: i32 = 19;
 /// What is done with a usable take by itself.
 const ALL: [ProcessingStep; 3] = [
     ProcessingStep::Mask,
@@ -57,8 +54,6 @@ pub(super) fn run(shared: &Shared) {
         };
         shared.show();
     }
-    // What was under way is still pending on the disk, and begins anew with the next start.
-    drop(running);
 }
 
 fn look_after_editor(shared: &Shared, is_busy: bool) {
@@ -93,7 +88,6 @@ fn take_up_what_was_recorded(shared: &Shared, seen: &mut Option<String>) {
         let can = |step: &ProcessingStep| plan.lacks(*step).is_none();
         ALL.into_iter().take_while(can).collect::<Vec<_>>()
     };
-    let session = Some(session);
     // Without the programs the page shows the commands.
     if !steps.is_empty()
         && let Err(refused) = shared.submit(PendingWork { session, steps })
@@ -129,14 +123,11 @@ fn begin(shared: &Shared) -> Option<Running> {
 }
 
 fn start(shared: &Shared, begun: &Begun) -> Result<Worker, String> {
-    let session = shared.root.join(begun.session.as_deref().unwrap_or("."));
-    let is_aborted = match &begun.session {
-        Some(id) => is_aborted(&session).map_err(|why| format!("{id}: {why}"))?,
-        None => false,
-    };
+    let session = shared.root.join(&begun.session);
+    let is_aborted = is_aborted(&session).map_err(|why| format!("{}: {why}", begun.session))?;
     let (programs, dataset) = {
         let plan = shared.plan();
-        (plan.programs.clone(), shared.dataset(&plan.settings))
+        (plan.programs.clone(), shared.dataset.clone())
     };
     let places = StepPlaces {
         session,
@@ -146,13 +137,13 @@ fn start(shared: &Shared, begun: &Begun) -> Result<Worker, String> {
     let command = programs.command(begun.step, &places);
     let command = command.ok_or("its program is not installed on this machine")?;
     let program = command.get_program().to_string_lossy().into_owned();
-    Worker::start(command, LAST).map_err(|error| format!("{program} could not be started: {error}"))
+    Worker::start(command).map_err(|error| format!("{program} could not be started: {error}"))
 }
 
 fn is_aborted(session: &std::path::Path) -> Result<bool, String> {
     let bytes = fs::read(session.join(MANIFEST_FILE))
         .map_err(|error| format!("the session is gone: {error}"))?;
-    let manifest = Manifest::from_json(&bytes).map_err(|error| with_causes(&error))?;
+    let manifest = Manifest::from_json(&bytes)?;
     Ok(matches!(manifest.status, Status::Aborted(_)))
 }
 
@@ -183,8 +174,7 @@ fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
 }
 
 fn finish(shared: &Shared, begun: &Begun, end: StepEnd) {
-    let of = begun.session.as_deref().unwrap_or("the data set");
-    let line = format!("{of}: {}: {}", begun.step, end.what);
+    let line = format!("{}: {}: {}", begun.session, begun.step, end.what);
     shared.change(|plan| plan.queue.finish(end));
     shared.monitor.update(|state| state.note(line));
 }

@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::commands::ProcessingPrograms;
 use super::editor::OpenEditor;
 use super::queue::{PendingWork, ProcessingQueue};
-use super::store::{self, KeptProcessing, ProcessingSettings};
+use super::store::{self, ProcessingSettings};
 use crate::command::Refused;
 use crate::state::{Monitor, ProcessingState, ProcessingStep};
 
@@ -30,17 +30,23 @@ impl fmt::Debug for ProcessingOptions {
 }
 
 /// What those who ask and the thread that works share.
-#[derive(Debug)]
 pub(super) struct Shared {
     pub(super) root: PathBuf,
-    pub(super) datasets: PathBuf,
-    pub(super) options: ProcessingOptions,
+    /// The folder of the data set.
+    pub(super) dataset: PathBuf,
+    pub(super) programs: Box<dyn Fn() -> ProcessingPrograms + Send + Sync>,
     pub(super) monitor: Monitor,
     pub(super) plan: Mutex<Plan>,
     pub(super) editor: Mutex<Option<OpenEditor>>,
     /// Held by who opens an editor, which takes a while.
     pub(super) opening: Mutex<()>,
     pub(super) is_ending: AtomicBool,
+}
+
+impl fmt::Debug for Shared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Shared").finish_non_exhaustive()
+    }
 }
 
 #[derive(Debug)]
@@ -68,12 +74,8 @@ impl Shared {
         self.editor.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn dataset(&self, settings: &ProcessingSettings) -> PathBuf {
-        self.datasets.join(&settings.dataset)
-    }
-
     pub(super) fn look_for_programs(&self) {
-        let found = (self.options.programs)();
+        let found = (self.programs)();
         self.plan().programs = found;
     }
 
@@ -116,22 +118,21 @@ impl Shared {
     /// Changes the plan, keeps on disk what is to outlast the program, and shows what came of it.
     pub(super) fn change<T>(&self, change: impl FnOnce(&mut Plan) -> T) -> T {
         let mut plan = self.plan();
-        let before = (plan.settings.clone(), plan.queue.pending());
+        let before = plan.settings;
         let done = change(&mut plan);
-        let after = (plan.settings.clone(), plan.queue.pending());
-        if before != after {
-            let (settings, pending) = after;
-            if let Err(error) = KeptProcessing::new(settings, pending).write(&self.root) {
-                let path = store::path(&self.root);
-                self.monitor.update(|state| {
-                    state.note(format!(
-                        "{} could not be written, what is to be processed is forgotten at the next start: {error}",
-                        path.display()
-                    ));
-                });
-            }
-        }
+        let after = plan.settings;
         drop(plan);
+        if before != after
+            && let Err(error) = after.write(&self.root)
+        {
+            let path = store::path(&self.root);
+            self.monitor.update(|state| {
+                state.note(format!(
+                    "{} could not be written, what is set is forgotten at the next start: {error}",
+                    path.display()
+                ));
+            });
+        }
         self.show();
         done
     }
@@ -145,8 +146,7 @@ impl Shared {
                 has_mask_program: plan.programs.mask.is_some(),
                 has_extract_program: plan.programs.extract.is_some(),
                 when_done: plan.settings.when_done,
-                dataset: plan.settings.dataset.clone(),
-                dataset_folder: self.dataset(&plan.settings).display().to_string(),
+                dataset_folder: self.dataset.display().to_string(),
                 jobs: plan.queue.jobs(),
                 finished: plan.queue.finished(),
                 editing,
@@ -165,9 +165,7 @@ impl Plan {
             ProcessingStep::Mask | ProcessingStep::Check => {
                 self.programs.mask.is_none().then_some("relit-mask")
             }
-            ProcessingStep::Extract | ProcessingStep::Verify => {
-                self.programs.extract.is_none().then_some("relit-extract")
-            }
+            ProcessingStep::Extract => self.programs.extract.is_none().then_some("relit-extract"),
         }
     }
 }

@@ -1,23 +1,24 @@
 //! The rig itself: its state, once and as events, and commands to it.
 
-use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::Json;
 use axum::extract::State;
-use axum::http::{StatusCode, header};
+use axum::http::StatusCode;
 use axum::response::sse::{Event, KeepAlive, Sse};
-use axum::response::{IntoResponse, Response};
 use futures_util::{Stream, StreamExt};
 use tokio::time::timeout;
 use tokio_stream::wrappers::WatchStream;
 
 use super::permits::{Permits, Work, permit};
-use super::snapshots::{PERIOD, Snapshots};
 use crate::command::{Command, Refused, Rig};
+use crate::state::{Monitor, RigState};
 use relit_web::Shutdown;
 use relit_web::{Failure, JsonBody};
 
+/// Shortest time between two states that a subscriber gets: ten a second.
+const PERIOD: Duration = Duration::from_millis(100);
 /// A subscriber hears something at least so often: silence means a lost connection.
 const BEAT: Duration = Duration::from_secs(2);
 /// Time in which the rig has to take or refuse a command.
@@ -25,14 +26,9 @@ const COMMAND: Duration = Duration::from_secs(15);
 
 /// The rig's state
 ///
-/// Phase, progress, table, camera, disk space, queue, faults and the last take.
-pub(super) async fn state(State(snapshots): State<Snapshots>) -> Response {
-    newest(&snapshots)
-}
-
-fn newest(snapshots: &Snapshots) -> Response {
-    let json = snapshots.newest().json.clone();
-    ([(header::CONTENT_TYPE, "application/json")], json).into_response()
+/// Phase, progress, table, camera, disk space, faults and the last take.
+pub(super) async fn state(State(monitor): State<Monitor>) -> Json<RigState> {
+    Json(monitor.state())
 }
 
 /// The rig's state on every change
@@ -41,15 +37,15 @@ fn newest(snapshots: &Snapshots) -> Response {
 /// ten times a second; who reads slowly gets fewer, never old ones. `beat` comes where nothing changed
 /// for two seconds.
 pub(super) async fn events(
-    State(snapshots): State<Snapshots>,
+    State(monitor): State<Monitor>,
     State(permits): State<Arc<Permits>>,
     State(shutdown): State<Shutdown>,
-) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Failure> {
+) -> Result<Sse<impl Stream<Item = Result<Event, axum::Error>>>, Failure> {
     let permit = permit(&permits.subscribers, "pages that watch the rig")?;
-    let events = WatchStream::new(snapshots.subscribe());
-    let events = tokio_stream::StreamExt::throttle(events, PERIOD).map(move |snapshot| {
+    let versions = WatchStream::new(monitor.versions());
+    let events = tokio_stream::StreamExt::throttle(versions, PERIOD).map(move |_| {
         let _held = &permit;
-        Ok(Event::default().event("state").data(&snapshot.json))
+        Event::default().event("state").json_data(monitor.state())
     });
     let beat = KeepAlive::new().interval(BEAT);
     let beat = beat.event(Event::default().event("beat").data(""));
@@ -62,18 +58,17 @@ pub(super) async fn events(
 /// once, one is taken.
 pub(super) async fn command(
     State(rig): State<Arc<dyn Rig>>,
-    State(snapshots): State<Snapshots>,
+    State(monitor): State<Monitor>,
     State(permits): State<Arc<Permits>>,
     JsonBody(command): JsonBody<Command>,
-) -> Result<Response, Failure> {
+) -> Result<(StatusCode, Json<RigState>), Failure> {
     let given = permits.run(Work::Command, move || Ok(rig.command(command)?));
     let answered = timeout(COMMAND, given).await;
     answered.map_err(|_| {
         let error = "the rig did not answer: check it, and its state, before you try again";
         Failure::new(StatusCode::GATEWAY_TIMEOUT, error)
     })??;
-    snapshots.refresh();
-    Ok((StatusCode::ACCEPTED, newest(&snapshots)).into_response())
+    Ok((StatusCode::ACCEPTED, Json(monitor.state())))
 }
 
 impl From<Refused> for Failure {

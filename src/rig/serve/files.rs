@@ -1,138 +1,183 @@
-//! What was recorded as files, whole or a part of them: a session's video, a session, all sessions of
-//! a day.
+//! What was recorded as files: a session's mask, its video, and a session as one tar file that is made while it is
+//! sent. The length is known beforehand, so that a download that broke off shows.
 
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Read, Write};
+use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
+use std::time::UNIX_EPOCH;
 
-use axum::body::Body;
+use axum::body::{Body, Bytes};
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::header;
 use axum::response::{IntoResponse, Response};
-use futures_util::StreamExt;
-use http_range_header::parse_range_header;
-use serde::Deserialize;
+use relit_data::session::{INDEX_FILE, MANIFEST_FILE};
+use tokio::sync::mpsc::{Sender, channel};
+use tokio::task::spawn_blocking;
+use tokio_stream::wrappers::ReceiverStream;
 
-use super::archive::Archive;
 use super::library::Library;
 use super::permits::{Permits, Work, permit};
-use relit_web::{Failure, QueryParams};
+use relit_web::Failure;
 
-const TAR: &str = "application/x-tar";
-const NO_RANGE: &str = "there is one range at a time, and it has to begin inside the file";
+/// Unit of a tar file, bytes.
+const BLOCK: u64 = 512;
+/// Bytes that are sent at once.
+const CHUNK: usize = 256 << 10;
+/// Chunks that wait for the client.
+const AHEAD: usize = 2;
 
 /// The video file
 ///
-/// As the camera's stream was written, for download. Takes one `Range` of bytes, with `If-Range`.
+/// As the camera's stream was written, for download.
 pub(super) async fn video(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
-    headers: HeaderMap,
 ) -> Result<Response, Failure> {
     let name = attachment(&id, "mkv");
-    send(&permits, &name, "video/x-matroska", &headers, move || {
-        let file = library.video_file(&id)?;
-        Archive::of_file(&file.path).map_err(unread)
+    let file = permits.run(Work::Listing, move || {
+        SentFile::of(library.video_file(&id)?.path).map_err(unread)
+    });
+    let file = file.await?;
+    send(&permits, &name, "video/x-matroska", file.bytes, move |to| {
+        io::copy(&mut file.open()?, to).map(drop)
     })
-    .await
 }
 
 /// A session
 ///
 /// All its files as one tar file, under `<session>/`: unpacked it is a session that `relit-mask` and
-/// `relit-extract` take. Takes one `Range` of bytes, with `If-Range`. The length is sent before: a
-/// download that broke off is shorter.
+/// `relit-extract` take. The length is sent before: a download that broke off is shorter.
 pub(super) async fn session_tar(
     library: Arc<Library>,
     permits: Arc<Permits>,
     id: String,
-    headers: &HeaderMap,
 ) -> Result<Response, Failure> {
-    let name = attachment(&id, "tar");
-    send(&permits, &name, TAR, headers, move || {
-        let folder = library.ended(&id)?;
-        Archive::of(&[(id, folder)]).map_err(unread)
+    let session = id.clone();
+    let files = permits.run(Work::Listing, move || {
+        files_of(&library.ended(&id)?).map_err(unread)
+    });
+    let files = files.await?;
+    let blocks = files.iter().map(|file| file.bytes.div_ceil(BLOCK) + 1);
+    let length = (blocks.sum::<u64>() + 2) * BLOCK;
+    let name = attachment(&session, "tar");
+    send(&permits, &name, "application/x-tar", length, move |to| {
+        write_tar(&session, &files, to)
     })
-    .await
 }
 
-/// Which day.
-#[derive(Debug, Deserialize)]
-pub(super) struct Day {
-    /// Its date, UTC, as session names begin.
-    day: String,
-}
-
-/// All sessions of a day
-///
-/// As one tar file, without those that are being recorded. Takes one `Range` of bytes, with
-/// `If-Range`.
-pub(super) async fn day_tar(
-    State(library): State<Arc<Library>>,
-    State(permits): State<Arc<Permits>>,
-    QueryParams(Day { day }): QueryParams<Day>,
-    headers: HeaderMap,
-) -> Result<Response, Failure> {
-    let name = attachment(&day, "tar");
-    send(&permits, &name, TAR, &headers, move || {
-        Archive::of(&library.of_day(&day)?).map_err(unread)
-    })
-    .await
-}
-
-fn unread(error: std::io::Error) -> Failure {
+fn unread(error: io::Error) -> Failure {
     Failure::broken(format!("the session cannot be read: {error}"))
 }
 
-/// Sends what a client wants of an archive.
-async fn send(
+/// Sends what `write` writes, `length` bytes. Where it fails, the connection ends early.
+fn send(
     permits: &Permits,
     name: &str,
     kind: &str,
-    headers: &HeaderMap,
-    archive: impl FnOnce() -> Result<Archive, Failure> + Send + 'static,
+    length: u64,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()> + Send + 'static,
 ) -> Result<Response, Failure> {
     let permit = permit(&permits.downloads, "downloads")?;
-    let archive = permits.run(Work::Listing, archive).await?;
-    let (length, version) = (archive.len(), archive.version());
-    let Some((status, from, bytes)) = part_of(headers, &version, length) else {
-        let range = [(header::CONTENT_RANGE, format!("bytes */{length}"))];
-        let failure = Failure::new(StatusCode::RANGE_NOT_SATISFIABLE, NO_RANGE);
-        return Ok((range, failure).into_response());
-    };
-    let pieces = archive.read(from, bytes).inspect(move |_| {
-        // The permit is given back with the last piece.
-        let _held = &permit;
+    let (sender, receiver) = channel(AHEAD);
+    spawn_blocking(move || {
+        let _permit = permit;
+        let mut chunks = BufWriter::with_capacity(CHUNK, Chunks(sender.clone()));
+        let written = write(&mut chunks).and_then(|()| chunks.flush());
+        if let Err(error) = written {
+            // A client that is gone hears nothing.
+            let _ = sender.blocking_send(Err(error));
+        }
     });
-    let mut answer = Response::builder()
-        .status(status)
+    let answer = Response::builder()
         .header(header::CONTENT_TYPE, kind)
-        .header(header::CONTENT_LENGTH, bytes)
-        .header(header::ACCEPT_RANGES, "bytes")
-        .header(header::ETAG, version)
-        .header(header::CONTENT_DISPOSITION, name);
-    if status == StatusCode::PARTIAL_CONTENT {
-        let range = format!("bytes {from}-{}/{length}", from + bytes - 1);
-        answer = answer.header(header::CONTENT_RANGE, range);
-    }
-    let answer = answer.body(Body::from_stream(pieces));
+        .header(header::CONTENT_LENGTH, length)
+        .header(header::CONTENT_DISPOSITION, name)
+        .body(Body::from_stream(ReceiverStream::new(receiver)));
     answer.map_err(|error| Failure::broken(format!("the answer cannot be made: {error}")))
 }
 
-/// Status, first byte and number of bytes of what a client wants; `None` where that is not there.
-fn part_of(headers: &HeaderMap, version: &str, length: u64) -> Option<(StatusCode, u64, u64)> {
-    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    let is_same = text(header::IF_RANGE).is_none_or(|known| known == version);
-    let Some(range) = text(header::RANGE).filter(|_| is_same) else {
-        return Some((StatusCode::OK, 0, length));
-    };
-    let ranges = parse_range_header(range).and_then(|ranges| ranges.validate(length));
-    match ranges.ok()?.as_slice() {
-        [range] => {
-            let (from, last) = range.clone().into_inner();
-            Some((StatusCode::PARTIAL_CONTENT, from, last - from + 1))
-        }
-        _ => None,
+/// Hands what is written to the client.
+struct Chunks(Sender<io::Result<Bytes>>);
+
+impl Write for Chunks {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let sent = self.0.blocking_send(Ok(Bytes::copy_from_slice(bytes)));
+        sent.map_err(|_| io::ErrorKind::BrokenPipe)?;
+        Ok(bytes.len())
     }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A file to be sent, as it was when its length was promised.
+struct SentFile {
+    path: PathBuf,
+    bytes: u64,
+    modified_s: u64,
+}
+
+impl SentFile {
+    fn of(path: PathBuf) -> io::Result<Self> {
+        let data = fs::metadata(&path)?;
+        let since_epoch = data.modified()?.duration_since(UNIX_EPOCH);
+        Ok(Self {
+            path,
+            bytes: data.len(),
+            modified_s: since_epoch.unwrap_or_default().as_secs(),
+        })
+    }
+
+    /// Its content, if it is still the same. One that becomes shorter while it is sent breaks the promise of the
+    /// length, which ends the connection.
+    fn open(&self) -> io::Result<impl Read + use<>> {
+        let now = Self::of(self.path.clone())?;
+        match (now.bytes, now.modified_s) == (self.bytes, self.modified_s) {
+            true => Ok(File::open(&self.path)?.take(self.bytes)),
+            false => Err(io::Error::other("the file has changed since")),
+        }
+    }
+}
+
+fn write_tar(session: &str, files: &[SentFile], to: &mut dyn Write) -> io::Result<()> {
+    let mut tar = tar::Builder::new(to);
+    for file in files {
+        let mut header = tar::Header::new_ustar();
+        let name = file.path.file_name().unwrap_or_default();
+        header.set_path(FilePath::new(session).join(name))?;
+        header.set_entry_type(tar::EntryType::Regular);
+        header.set_mode(0o644);
+        header.set_mtime(file.modified_s);
+        header.set_size(file.bytes);
+        header.set_cksum();
+        tar.append(&header, file.open()?)?;
+    }
+    tar.finish()
+}
+
+/// The files of a session folder, the manifest and the index first: neither links nor what a recorder or
+/// `relit-mask` writes at the moment.
+fn files_of(folder: &FilePath) -> io::Result<Vec<SentFile>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if let Ok(name) = entry.file_name().into_string()
+            && entry.file_type()?.is_file()
+            && !name.starts_with('.')
+        {
+            names.push(name);
+        }
+    }
+    let rank = |name: &str| {
+        let mut first = [MANIFEST_FILE, INDEX_FILE].iter();
+        first.position(|&first| first == name).unwrap_or(usize::MAX)
+    };
+    names.sort_by_key(|name| (rank(name), name.clone()));
+    let files = names.iter().map(|name| SentFile::of(folder.join(name)));
+    files.collect()
 }
 
 /// The mask
@@ -159,17 +204,20 @@ fn attachment(session: &str, ending: &str) -> String {
         .collect();
     format!("attachment; filename*=UTF-8''{name}.{ending}")
 }
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_name_of_any_script_stays_one_header_value() {
-        let header = attachment("20261120T093015Z-Ölkanne", "mkv");
-        assert!(
-            header.ends_with("''20261120T093015Z-%C3%96lkanne.mkv"),
-            "{header}"
-        );
+    fn a_file_that_was_replaced_meanwhile_ends_the_tar_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let manifest = folder.path().join(MANIFEST_FILE);
+        fs::write(&manifest, "{}").unwrap();
+        let files = files_of(folder.path()).unwrap();
+        let sent = || write_tar("20261120T093015Z-mug", &files, &mut Vec::new());
+        assert!(sent().is_ok());
+        // A longer one would be sent in part, as if it were whole.
+        fs::write(&manifest, r#"{"note": "a fly"}"#).unwrap();
+        assert!(sent().is_err());
     }
 }

@@ -8,8 +8,7 @@ use axum::http::StatusCode;
 use serde::Serialize;
 
 use super::cache::{Cache, FileVersion};
-use super::results::{CHECK_PAGE, ResultsReader, SessionResults};
-use crate::processing::ProcessingCommands;
+use super::results::{CHECK_PAGE, DatasetEntries, SessionResults, entries_in, results_of};
 use relit_data::causes::with_causes;
 use relit_data::naming::is_session_name;
 use relit_data::session::{
@@ -75,19 +74,6 @@ pub(super) struct SessionDetail {
     pub(super) times_s: Vec<f64>,
     /// Each frame's angle, degrees; `null` where there was no table.
     pub(super) angles_deg: Vec<Option<f64>>,
-    /// Where frames are missing.
-    pub(super) gaps: Vec<DroppedFrames>,
-    /// Commands that make its mask and extract it, for a terminal.
-    pub(super) commands: ProcessingCommands,
-}
-
-/// Frames that are missing.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct DroppedFrames {
-    /// Number of the frame after the gap.
-    pub(super) before: u64,
-    /// How many are missing.
-    pub(super) missing: u64,
 }
 
 /// The video of a session that has ended.
@@ -104,7 +90,6 @@ pub(super) struct Library {
     dataset: Box<dyn Fn() -> PathBuf + Send + Sync>,
     /// Summaries by folder, and the version of the manifest that each was made from.
     summaries: Cache<(PathBuf, FileVersion), SessionSummary>,
-    results: ResultsReader,
 }
 
 impl Library {
@@ -113,7 +98,6 @@ impl Library {
             root,
             dataset,
             summaries: Cache::new(SUMMARIES),
-            results: ResultsReader::new(),
         }
     }
 
@@ -128,32 +112,17 @@ impl Library {
         names.retain(|name| before.is_none_or(|before| name.as_str() < before));
         names.retain(|name| day.is_none_or(|day| name.starts_with(day)));
         names.truncate(most);
-        let dataset = (self.dataset)();
+        let made = entries_in(&(self.dataset)());
         let listed = names.iter().filter_map(|name| {
             let mut summary = self.summary(&self.root, name)?;
-            summary.results = Some(self.results_of(name, &dataset));
+            summary.results = Some(self.results_of(name, &made));
             Some(summary)
         });
         Ok(listed.collect())
     }
 
-    fn results_of(&self, name: &str, dataset: &Path) -> SessionResults {
-        self.results.of(name, &self.root.join(name), Some(dataset))
-    }
-
-    /// The objects of the newest sessions, each once.
-    pub(super) fn objects(&self, most: usize) -> Result<Vec<String>, Failure> {
-        let mut objects: Vec<String> = Vec::new();
-        for name in self.names()? {
-            let object = object_of(&name);
-            if !objects.iter().any(|known| known == object) {
-                objects.push(object.to_owned());
-            }
-            if objects.len() == most {
-                break;
-            }
-        }
-        Ok(objects)
+    fn results_of(&self, name: &str, made: &DatasetEntries) -> SessionResults {
+        results_of(&self.root.join(name), made.get(name).cloned())
     }
 
     /// Names of all session folders, newest first: they begin with the date.
@@ -190,19 +159,14 @@ impl Library {
         let folder = self.folder(id)?;
         let manifest = read_manifest(&folder).map_err(Failure::broken)?;
         let index = read_index(&folder, &manifest);
-        let dataset = (self.dataset)();
         let mut summary = summarise(id, &manifest, index.as_ref());
-        summary.results = Some(self.results_of(id, &dataset));
-        let json = manifest.to_json().map_err(|error| with_causes(&error));
-        let json = json
+        summary.results = Some(self.results_of(id, &entries_in(&(self.dataset)())));
+        let json = manifest
+            .to_json()
             .and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));
         let index = index.unwrap_or_default();
         let entries = index.entries();
         let first = entries.first().map_or(0, |entry| entry.t_us);
-        let gaps = index.gaps().into_iter().map(|gap| DroppedFrames {
-            before: gap.before,
-            missing: gap.missing,
-        });
         Ok(SessionDetail {
             summary,
             manifest: json.map_err(Failure::broken)?,
@@ -212,8 +176,6 @@ impl Library {
                 .map(|entry| seconds(first, entry.t_us))
                 .collect(),
             angles_deg: entries.iter().map(|entry| entry.angle_deg).collect(),
-            gaps: gaps.collect(),
-            commands: ProcessingCommands::of(&absolute(&folder), &absolute(&dataset)),
         })
     }
 
@@ -242,25 +204,6 @@ impl Library {
             }
             // One that cannot be read can still be had as it is.
             _ => Ok(folder),
-        }
-    }
-
-    /// Names and folders of the sessions of a day (`20261120`) that are not being recorded.
-    pub(super) fn of_day(&self, day: &str) -> Result<Vec<(String, PathBuf)>, Failure> {
-        if day.len() != 8 || !day.bytes().all(|byte| byte.is_ascii_digit()) {
-            return Err(Failure::bad("give the day as 20261120"));
-        }
-        let names = self.names()?.into_iter().rev();
-        let of_day = names.filter(|name| name.starts_with(&format!("{day}T")));
-        let found: Vec<_> = of_day
-            .filter_map(|name| {
-                let folder = self.ended(&name).ok()?;
-                Some((name, folder))
-            })
-            .collect();
-        match found.is_empty() {
-            true => Err(Failure::not_found(format!("there is no session of {day}"))),
-            false => Ok(found),
         }
     }
 
@@ -328,16 +271,11 @@ pub(super) fn read_names(root: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// The path as it is understood in every folder.
-fn absolute(path: &Path) -> PathBuf {
-    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
-}
-
 fn read_manifest(folder: &Path) -> Result<Manifest, String> {
     let bytes = fs::read(folder.join(MANIFEST_FILE))
         .map_err(|error| format!("its {MANIFEST_FILE} cannot be read: {error}"))?;
     Manifest::from_json(&bytes)
-        .map_err(|error| format!("its {MANIFEST_FILE} is not usable: {}", with_causes(&error)))
+        .map_err(|fault| format!("its {MANIFEST_FILE} is not usable: {fault}"))
 }
 
 /// The frame index of a session that has ended. A damaged one counts as none: the programs that need it

@@ -2,16 +2,14 @@
 //!
 //! It stands on [`Rig`]: it hands commands on, shows what the [`Monitor`](crate::state::Monitor)
 //! holds and reads what lies in the session folder. It knows nothing of cameras, tables or how a
-//! capture goes. The capture is never held up by it: one task reads the state, at most ten times a
-//! second whatever the number of clients, its threads give way to all others of the process, and
-//! whatever a client can ask for is bounded in number, size and time.
+//! capture goes. The capture is never held up by it: its threads give way to all others of the process,
+//! and whatever a client can ask for is bounded in number, size and time.
 //!
 //! Who may do what: without a token only programs on this machine get in, and no web page but this
 //! one. Everywhere else a token of 128 random bits is demanded; the page's own files alone go
 //! without, as they hold nothing of the rig.
 
 mod api;
-mod archive;
 mod cache;
 mod editor;
 mod files;
@@ -25,7 +23,6 @@ mod processing;
 mod results;
 mod routes;
 mod sessions;
-mod snapshots;
 mod trash;
 
 #[cfg(test)]
@@ -128,7 +125,6 @@ pub fn serve(
     let served = runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(failed)?;
         announce(&announcement);
-        tokio::spawn(app.snapshots.clone().follow());
         if let Some(heartbeat) = options.heartbeat {
             tokio::spawn(beat(heartbeat, app.rig.clone()));
         }

@@ -18,44 +18,31 @@ const THUMBNAIL: u32 = 192;
 const QUALITY: u8 = 80;
 /// Videos that are kept open: each knows where its frames are, some 50 bytes a frame.
 const VIDEOS: usize = 3;
-/// Frames of a few hundred kB that are kept.
-const FRAMES: usize = 64;
-/// Thumbnails of a few kB that are kept.
-const THUMBNAILS: usize = 512;
 
-/// Makes pictures, and keeps those that were asked for last.
+/// Makes pictures. Browsers keep them.
 #[derive(Debug)]
 pub(super) struct Pictures {
     videos: Cache<VideoFile, Arc<Video>>,
-    frames: Cache<(VideoFile, u64, u32), Bytes>,
-    thumbnails: Cache<VideoFile, Bytes>,
 }
 
 impl Pictures {
     pub(super) fn new() -> Self {
         Self {
             videos: Cache::new(VIDEOS),
-            frames: Cache::new(FRAMES),
-            thumbnails: Cache::new(THUMBNAILS),
         }
     }
 
     /// The video's first frame, small. Reads no more of the file than that frame.
-    pub(super) fn thumbnail(&self, file: VideoFile) -> Result<Bytes, Failure> {
-        self.thumbnails.get_or_make(file, |file| {
-            let picture = relit_video::first_picture(&file.path).map_err(failed)?;
-            encode(&picture, THUMBNAIL)
-        })
+    pub(super) fn thumbnail(file: &VideoFile) -> Result<Bytes, Failure> {
+        let picture = relit_video::first_picture(&file.path).map_err(failed)?;
+        encode(&picture, THUMBNAIL)
     }
 
     /// Frame `number`, at most `width` pixels wide.
     pub(super) fn frame(&self, file: VideoFile, number: u64, width: u32) -> Result<Bytes, Failure> {
-        self.frames
-            .get_or_make((file, number, width), |(file, ..)| {
-                let open = |file: &VideoFile| Video::open(&file.path).map(Arc::new).map_err(failed);
-                let video = self.videos.get_or_make(file.clone(), open)?;
-                encode(&video.frame(number).map_err(failed)?, width)
-            })
+        let open = |file: &VideoFile| Video::open(&file.path).map(Arc::new).map_err(failed);
+        let video = self.videos.get_or_make(file, open)?;
+        encode(&video.frame(number).map_err(failed)?, width)
     }
 }
 

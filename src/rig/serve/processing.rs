@@ -10,10 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use super::library::Library;
 use super::permits::{Permits, Work};
-use super::snapshots::Snapshots;
 use crate::command::Refused;
-use crate::processing::{Processing, ProcessingChange};
-use crate::state::{ProcessingState, ProcessingStep};
+use crate::processing::{Processing, ProcessingSettings};
+use crate::state::{Monitor, ProcessingState, ProcessingStep};
 use relit_web::{Failure, JsonBody};
 
 /// The pages hold their own style and pictures, no scripts, and load nothing.
@@ -60,27 +59,9 @@ pub(super) async fn process(
     let processing = present(processing)?;
     let queued = permits.run(Work::Command, move || {
         library.ended(&id)?;
-        if steps.contains(&ProcessingStep::Verify) {
-            let error = "a session is not verified by itself: verify the data set";
-            return Err(Refused::Invalid(error.to_owned()).into());
-        }
         Ok(processing.submit(&id, steps)?)
     });
     let number = queued.await?;
-    Ok((StatusCode::ACCEPTED, Json(QueuedJob { number })).into_response())
-}
-
-/// Verify the data set
-///
-/// Queues a job that reads every file of it back.
-pub(super) async fn verify(
-    State(processing): State<MayProcess>,
-    State(permits): State<Arc<Permits>>,
-) -> Result<Response, Failure> {
-    let processing = present(processing)?;
-    let number = permits
-        .run(Work::Command, move || Ok(processing.verify()?))
-        .await?;
     Ok((StatusCode::ACCEPTED, Json(QueuedJob { number })).into_response())
 }
 
@@ -103,9 +84,8 @@ pub(super) async fn cancel(
 }
 
 /// Jobs, programs and settings
-pub(super) async fn state(State(snapshots): State<Snapshots>) -> Json<ProcessingState> {
-    snapshots.refresh();
-    Json(snapshots.newest().state.processing.clone())
+pub(super) async fn state(State(monitor): State<Monitor>) -> Json<ProcessingState> {
+    Json(monitor.state().processing)
 }
 
 /// Change how sessions are processed
@@ -113,14 +93,17 @@ pub(super) async fn state(State(snapshots): State<Snapshots>) -> Json<Processing
 /// The settings are kept on the disk.
 pub(super) async fn configure(
     State(processing): State<MayProcess>,
-    State(snapshots): State<Snapshots>,
+    State(monitor): State<Monitor>,
     State(permits): State<Arc<Permits>>,
-    JsonBody(change): JsonBody<ProcessingChange>,
+    JsonBody(settings): JsonBody<ProcessingSettings>,
 ) -> Result<Json<ProcessingState>, Failure> {
     let processing = present(processing)?;
-    let changed = permits.run(Work::Command, move || Ok(processing.configure(change)?));
+    let changed = permits.run(Work::Command, move || {
+        processing.configure(settings);
+        Ok(())
+    });
     changed.await?;
-    Ok(state(State(snapshots)).await)
+    Ok(state(State(monitor)).await)
 }
 
 /// The page about the check of a session's mask

@@ -2,27 +2,19 @@
 //! entry in the data set. Nothing of this is kept anywhere else.
 
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
 use relit_data::session::MASK_FILE;
 use relit_data::shard::{Dataset, QualityVerdict};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::cache::{Cache, FileVersion};
-
 /// The record of a mask, and of its check, in a session's folder.
 const RECORD_FILE: &str = "mask.json";
 const CHECK_FILE: &str = "mask-check.json";
 /// The page about a check.
 pub(super) const CHECK_PAGE: &str = "mask-check.html";
-/// Results that are kept in memory.
-const KEPT: usize = 4096;
-/// Descriptions of data sets that are kept in memory.
-const DATASETS: usize = 2;
 
 /// How far a session has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -62,7 +54,7 @@ pub(super) struct MaskState {
 /// What `relit-mask check` found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(super) struct CheckState {
-    /// `fits`, `drifts`, `wrong`, `unknown`.
+    /// `fits`, `wrong`, `unknown`.
     pub(super) verdict: String,
     /// Why it does not fit.
     pub(super) reasons: Vec<String>,
@@ -101,64 +93,18 @@ pub(super) struct SessionResults {
 }
 
 /// A session's entry, and the hash of the mask that it was made with.
-type Entry = (ExtractionState, String);
+pub(super) type Entry = (ExtractionState, String);
 
-/// What differs between one state of a session's results and another.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-struct ResultsKey {
-    folder: PathBuf,
-    files: [Option<FileVersion>; 3],
-    dataset: Option<(PathBuf, FileVersion)>,
-}
+/// The entries of a data set's sessions by their names.
+pub(super) type DatasetEntries = BTreeMap<String, Entry>;
 
-/// Reads results, and remembers them.
-#[derive(Debug)]
-pub(super) struct ResultsReader {
-    results: Cache<ResultsKey, SessionResults>,
-    datasets: Cache<(PathBuf, FileVersion), Arc<BTreeMap<String, Entry>>>,
-}
-
-impl ResultsReader {
-    pub(super) fn new() -> Self {
-        Self {
-            results: Cache::new(KEPT),
-            datasets: Cache::new(DATASETS),
-        }
-    }
-
-    /// What was made of the session `id` in `folder`, with the data set in `dataset`.
-    pub(super) fn of(&self, id: &str, folder: &Path, dataset: Option<&Path>) -> SessionResults {
-        let of = |name: &str| FileVersion::of(&folder.join(name));
-        let described = dataset.and_then(|dataset| {
-            let version = FileVersion::of(&dataset.join(Dataset::FILE))?;
-            Some((dataset.to_owned(), version))
-        });
-        let key = ResultsKey {
-            folder: folder.to_owned(),
-            files: [of(MASK_FILE), of(RECORD_FILE), of(CHECK_FILE)],
-            dataset: described.clone(),
-        };
-        let made = self.results.get_or_make(key, |_| {
-            let entry = described.and_then(|key| self.entries(key).get(id).cloned());
-            Ok::<_, Infallible>(read(folder, entry))
-        });
-        made.unwrap_or_else(|never| match never {})
-    }
-
-    fn entries(&self, key: (PathBuf, FileVersion)) -> Arc<BTreeMap<String, Entry>> {
-        let read = self.datasets.get_or_make(key, |(dataset, _)| {
-            // A description that cannot be read tells of no session; `relit-extract` says what is wrong with it.
-            let read = Dataset::read(dataset).map(|dataset| Arc::new(entries_of(&dataset)));
-            Ok::<_, Infallible>(read.unwrap_or_default())
-        });
-        read.unwrap_or_else(|never| match never {})
-    }
-}
-
-fn entries_of(dataset: &Dataset) -> BTreeMap<String, Entry> {
-    let entries = dataset.sessions.iter().map(|session| {
-        let mut reasons = session.quality.reasons.clone();
-        reasons.extend(session.warnings.iter().cloned());
+/// What a data set says of its sessions. A description that cannot be read tells of none; `relit-extract` says what
+/// is wrong with it.
+pub(super) fn entries_in(dataset: &Path) -> DatasetEntries {
+    let sessions = Dataset::read(dataset).map(|dataset| dataset.sessions);
+    let entries = sessions.into_iter().flatten().map(|session| {
+        let mut reasons = session.quality.reasons;
+        reasons.extend(session.warnings);
         let state = ExtractionState {
             verdict: session.quality.verdict.to_string(),
             reasons,
@@ -166,12 +112,13 @@ fn entries_of(dataset: &Dataset) -> BTreeMap<String, Entry> {
             is_lossy: session.lossy,
             is_current: false,
         };
-        (session.id.clone(), (state, session.mask.blake3.to_string()))
+        (session.id, (state, session.mask.blake3.to_string()))
     });
     entries.collect()
 }
 
-fn read(folder: &Path, entry: Option<Entry>) -> SessionResults {
+/// What was made of the session in `folder`, with its entry in the data set.
+pub(super) fn results_of(folder: &Path, entry: Option<Entry>) -> SessionResults {
     let png = fs::read(folder.join(MASK_FILE)).ok();
     let hash = png.map(|png| blake3::hash(&png).to_hex().to_string());
     let is_same = |made: &str| hash.as_deref() == Some(made);
@@ -236,7 +183,7 @@ fn judged(results: &SessionResults) -> (SessionStage, Option<bool>) {
         return (SessionStage::Recorded, None);
     };
     let check = results.check.as_ref().filter(|check| check.is_current);
-    let wrong = check.is_some_and(|check| !matches!(&*check.verdict, "fits" | "drifts"));
+    let wrong = check.is_some_and(|check| check.verdict != "fits");
     let extraction = results.extraction.as_ref();
     match (extraction.filter(|made| made.is_current), check) {
         (Some(made), _) => {

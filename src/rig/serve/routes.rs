@@ -13,7 +13,6 @@ use super::options::ClientLimits;
 use super::permits::Permits;
 use super::pictures::Pictures;
 use super::processing::MayProcess;
-use super::snapshots::Snapshots;
 use super::{api, editor, files, page, preview, processing, sessions};
 use crate::command::Rig;
 use crate::state::Monitor;
@@ -28,7 +27,6 @@ const LARGEST_BODY: usize = 16 * 1024;
 pub(super) struct App {
     pub(super) rig: Arc<dyn Rig>,
     pub(super) monitor: Monitor,
-    pub(super) snapshots: Snapshots,
     pub(super) policy: Arc<AccessPolicy>,
     pub(super) limits: ClientLimits,
     pub(super) permits: Arc<Permits>,
@@ -52,7 +50,6 @@ impl App {
         let dataset = move || worker.as_ref().map_or(beside.clone(), |it| it.dataset());
         Self {
             monitor: rig.monitor().clone(),
-            snapshots: Snapshots::new(rig.monitor()),
             policy: Arc::new(policy),
             limits,
             permits: Arc::new(Permits::new(&limits)),
@@ -87,16 +84,13 @@ pub(super) fn router(app: &App) -> Router {
         .route("/api/v1/events", get(api::events))
         .route("/api/v1/command", post(api::command))
         .route("/api/v1/preview.jpg", get(preview::picture))
-        .route("/api/v1/objects", get(sessions::objects))
         .route("/api/v1/trash", get(sessions::trash))
         .route("/api/v1/sessions", get(sessions::list))
-        .route("/api/v1/sessions.tar", get(files::day_tar))
         .merge(of_a_session())
         .route(
             "/api/v1/processing",
             get(processing::state).put(processing::configure),
         )
-        .route("/api/v1/processing/verify", post(processing::verify))
         .route(
             "/api/v1/processing/jobs/{number}",
             delete(processing::cancel),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
@@ -18,8 +18,6 @@ use relit_web::{Failure, JsonBody, QueryParams};
 /// Sessions in one answer, unless asked otherwise, and at most.
 const SESSIONS: usize = 100;
 const MOST_SESSIONS: usize = 1000;
-/// Names that are suggested.
-const OBJECTS: usize = 20;
 /// Width of a frame in the player, unless asked otherwise, and what can be asked for; pixels.
 const WIDTH: u32 = 960;
 const WIDTHS: std::ops::RangeInclusive<u32> = 64..=1920;
@@ -55,13 +53,12 @@ pub(super) async fn detail(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
-    headers: HeaderMap,
 ) -> Result<Response, Failure> {
     // One path for the router: a session's name may end in anything, also in `.tar`.
     if let Some(session) = id.strip_suffix(".tar")
         && library.has(session)
     {
-        return session_tar(library, permits, session.to_owned(), &headers).await;
+        return session_tar(library, permits, session.to_owned()).await;
     }
     let detail = permits.run(Work::Listing, move || library.detail(&id));
     Ok(Json(detail.await?).into_response())
@@ -131,12 +128,11 @@ pub(super) async fn remark(
 /// The first frame, small
 pub(super) async fn thumbnail(
     State(library): State<Arc<Library>>,
-    State(pictures): State<Arc<Pictures>>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
 ) -> Result<Response, Failure> {
     let jpeg = permits.run(Work::Decoding, move || {
-        pictures.thumbnail(library.video_file(&id)?)
+        Pictures::thumbnail(&library.video_file(&id)?)
     });
     Ok(picture(jpeg.await?))
 }
@@ -172,13 +168,4 @@ fn picture(jpeg: axum::body::Bytes) -> Response {
         (header::CACHE_CONTROL, KEEP),
     ];
     (headers, jpeg).into_response()
-}
-
-/// Names of objects captured last, newest first
-pub(super) async fn objects(
-    State(library): State<Arc<Library>>,
-    State(permits): State<Arc<Permits>>,
-) -> Result<Json<Vec<String>>, Failure> {
-    let objects = permits.run(Work::Listing, move || library.objects(OBJECTS));
-    Ok(Json(objects.await?))
 }

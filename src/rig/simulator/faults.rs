@@ -55,9 +55,8 @@ impl FromStr for TableFaults {
             .map(str::trim)
             .filter(|item| !item.is_empty())
         {
-            faults.add(item).map_err(|why| SimulatorError::Fault {
-                item: item.to_owned(),
-                why,
+            faults.add(item).map_err(|why| {
+                SimulatorError(format!("the fault {item:?} is not understood: {why}"))
             })?;
         }
         Ok(faults)

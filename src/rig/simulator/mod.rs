@@ -34,7 +34,6 @@ mod chip;
 mod faults;
 mod ground_truth;
 mod model;
-mod openings;
 mod options;
 mod simulated_table;
 mod terminal;
@@ -49,31 +48,18 @@ use crate::clock::{Clock, JoinHandle};
 
 pub use faults::{TableFaults, WireFaults};
 pub use ground_truth::{STEPS_PER_TURN, StepEdge};
-pub use options::{SimulatorCounts, SimulatorOptions};
+pub use options::SimulatorOptions;
 pub use simulated_table::{SimulatedPort, SimulatedTable};
-pub use wire::WireCounts;
 
 use simulated_table::LOOK;
 use terminal::Terminal;
 
-/// An error of the simulator.
+/// A fault that is not understood, or a pseudoterminal, link or thread that could not be had: why, and what to do.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimulatorError {
-    /// A fault that does not exist.
-    #[error("the fault {item:?} is not understood: {why}")]
-    Fault {
-        /// The fault.
-        item: String,
-        /// What is wrong with it.
-        why: &'static str,
-    },
-    /// A pseudoterminal, its link or a thread could not be had; why, and what to do.
-    #[error("{0}")]
-    System(String),
-}
+#[error("{0}")]
+pub struct SimulatorError(String);
 
-/// A simulated table at a pseudoterminal, with a thread. Runs until it is stopped or dropped.
+/// A simulated table at a pseudoterminal, with a thread. Runs until it is dropped.
 ///
 /// Other programs cannot take part in virtual time: the clock has to be the monotonic one, or a
 /// [paced](Clock::paced) one for a table that runs faster than real time.
@@ -89,7 +75,7 @@ impl Simulator {
     /// Starts a table. `link`: path of a symbolic link to its port, to be created.
     ///
     /// # Errors
-    /// [`SimulatorError::System`].
+    /// [`SimulatorError`].
     pub fn start(
         options: &SimulatorOptions,
         link: Option<&Path>,
@@ -112,7 +98,7 @@ impl Simulator {
             carry(&clock, &table, terminal, &stop);
         });
         simulator.thread = Some(thread.map_err(|error| {
-            SimulatorError::System(format!(
+            SimulatorError(format!(
                 "could not start the simulated table's thread: {error}; end other programs and try again"
             ))
         })?);
@@ -128,14 +114,10 @@ impl Simulator {
     pub fn table(&self) -> &SimulatedTable {
         &self.table
     }
+}
 
-    /// Ends the thread; returns the counters.
-    pub fn stop(mut self) -> SimulatorCounts {
-        self.end();
-        self.table.counts()
-    }
-
-    fn end(&mut self) {
+impl Drop for Simulator {
+    fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             // A panic was already reported by the thread itself.
@@ -150,12 +132,6 @@ impl Simulator {
     }
 }
 
-impl Drop for Simulator {
-    fn drop(&mut self) {
-        self.end();
-    }
-}
-
 /// The thread: transfers bytes between table and pseudoterminal.
 fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &AtomicBool) {
     const LARGEST: usize = 4096;
@@ -163,11 +139,13 @@ fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &A
     while !stop.load(Ordering::Relaxed) {
         let now_us = clock.now_us();
         let mut model = table.model();
-        for _ in 0..terminal.opened() {
+        let capacity = model.capacity().min(LARGEST);
+        let was_closed = terminal.is_closed();
+        let received = terminal.read(buffer.get_mut(..capacity).unwrap_or_default());
+        // A port that is closed and opened again between two looks counts as open all the time.
+        if was_closed && !terminal.is_closed() {
             model.open(now_us);
         }
-        let capacity = model.capacity().min(LARGEST);
-        let received = terminal.read(buffer.get_mut(..capacity).unwrap_or_default());
         model.receive(now_us, received);
         let output = model.take_output(now_us, usize::MAX);
         drop(model);
@@ -179,7 +157,7 @@ fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &A
 /// Creates the link. A link that exists is replaced, any other file is not.
 fn make_link(port: &Path, link: &Path) -> Result<(), SimulatorError> {
     let failed = |error: std::io::Error| {
-        SimulatorError::System(format!(
+        SimulatorError(format!(
             "could not make {} a link to the simulated port: {error}; choose another name",
             link.display()
         ))

@@ -9,7 +9,7 @@ use rig_firmware::board::ResetCause;
 use super::chip::{Chip, IndexPlace, Pins};
 use super::faults::TableFaults;
 use super::ground_truth::{GroundTruth, STEPS_PER_TURN, StepEdge};
-use super::options::{SimulatorCounts, SimulatorOptions};
+use super::options::SimulatorOptions;
 use super::wire::{Timed, Wire};
 
 /// Ticks of the chip's timer per microsecond.
@@ -55,7 +55,6 @@ pub(super) struct Model {
     /// What happens by itself, and when: the next one last.
     events: Vec<(u64, Event)>,
     ground_truth: GroundTruth,
-    counts: SimulatorCounts,
 }
 
 impl Model {
@@ -85,7 +84,6 @@ impl Model {
             reset_on_open: options.reset_on_open,
             events,
             ground_truth: GroundTruth::new(options.start_angle, start_us),
-            counts: SimulatorCounts::default(),
         }
     }
 
@@ -110,14 +108,8 @@ impl Model {
 
     fn happen(&mut self, event: Event) {
         match event {
-            Event::Restart => {
-                self.chip.restart(ResetCause::Watchdog);
-                self.counts.resets += 1;
-            }
-            Event::Stall => {
-                self.chip.stall();
-                self.counts.stalled = true;
-            }
+            Event::Restart => self.chip.restart(ResetCause::Watchdog),
+            Event::Stall => self.chip.stall(),
             Event::EmergencyStop(pressed) => {
                 self.pins.emergency = pressed;
                 self.chip.set_pins(self.pins);
@@ -128,7 +120,6 @@ impl Model {
     /// A host opens the port.
     pub(super) fn open(&mut self, now_us: i64) {
         self.advance(now_us);
-        self.counts.opened += 1;
         if self.reset_on_open {
             self.chip.restart(ResetCause::External);
         }
@@ -166,14 +157,6 @@ impl Model {
 
     pub(super) fn ground_truth(&self) -> &GroundTruth {
         &self.ground_truth
-    }
-
-    pub(super) fn counts(&self) -> SimulatorCounts {
-        SimulatorCounts {
-            to_chip: self.to_chip.counts,
-            from_chip: self.from_chip.counts,
-            ..self.counts
-        }
     }
 }
 

@@ -1,9 +1,6 @@
-//! What a simulated table is like, and what it counts.
-
-use serde::Serialize;
+//! What a simulated table is like.
 
 use super::faults::TableFaults;
-use super::wire::WireCounts;
 use crate::clock::Clock;
 
 /// Options of a simulated table.
@@ -43,20 +40,4 @@ impl Default for SimulatorOptions {
             reset_on_open: true,
         }
     }
-}
-
-/// Counters since power-on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-#[non_exhaustive]
-pub struct SimulatorCounts {
-    /// On the way to the chip.
-    pub to_chip: WireCounts,
-    /// On the way from the chip.
-    pub from_chip: WireCounts,
-    /// How many times the port was opened.
-    pub opened: u64,
-    /// How many times a fault restarted the chip.
-    pub resets: u64,
-    /// Whether a fault stopped the chip.
-    pub stalled: bool,
 }

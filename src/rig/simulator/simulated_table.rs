@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::chip::{IndexInput, Pins};
 use super::ground_truth::StepEdge;
 use super::model::Model;
-use super::options::{SimulatorCounts, SimulatorOptions};
+use super::options::SimulatorOptions;
 use crate::clock::Clock;
 use crate::turntable::Port;
 
@@ -69,11 +69,6 @@ impl SimulatedTable {
     /// All steps so far, at most the last two million.
     pub fn edges(&self) -> Vec<StepEdge> {
         self.now().ground_truth().edges()
-    }
-
-    /// Counters since power-on.
-    pub fn counts(&self) -> SimulatorCounts {
-        self.now().counts()
     }
 
     /// Fixes the level of the index input; `None`: it depends on the angle.

@@ -10,12 +10,10 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::SimulatorError;
-use super::openings::Openings;
 
 /// The chip's end of the serial line.
 pub(super) struct Terminal {
     line: OwnedFd,
-    openings: Openings,
     path: PathBuf,
     /// No process has the port open.
     closed: bool,
@@ -25,7 +23,7 @@ impl Terminal {
     pub(super) fn open() -> Result<Terminal, SimulatorError> {
         let failed = |step| {
             move |errno: Errno| {
-                SimulatorError::System(format!(
+                SimulatorError(format!(
                     "could not {step} a pseudoterminal: {errno}; see that /dev/pts is mounted and not full"
                 ))
             }
@@ -47,10 +45,8 @@ impl Terminal {
         modes.make_raw();
         tcsetattr(&port, OptionalActions::Now, &modes).map_err(failed("set up"))?;
         drop(port);
-        let openings = Openings::watch(&path).map_err(failed("watch"))?;
         Ok(Terminal {
             line,
-            openings,
             path,
             closed: true,
         })
@@ -61,9 +57,9 @@ impl Terminal {
         &self.path
     }
 
-    /// How many times the port was opened since the last call.
-    pub(super) fn opened(&mut self) -> u64 {
-        self.openings.count(self.closed)
+    /// Whether no process has the port open, by the last read.
+    pub(super) fn is_closed(&self) -> bool {
+        self.closed
     }
 
     /// Reads what the host has written, up to the size of the buffer.
@@ -78,9 +74,8 @@ impl Terminal {
     }
 
     /// Sends bytes to the host. They are lost if no process has the port open, or if its buffer is
-    /// full. Returns the number of bytes sent.
-    pub(super) fn write(&self, mut bytes: &[u8]) -> usize {
-        let whole = bytes.len();
+    /// full.
+    pub(super) fn write(&self, mut bytes: &[u8]) {
         while !self.closed && !bytes.is_empty() {
             match rustix::io::write(&self.line, bytes) {
                 Ok(count) if count > 0 => bytes = bytes.get(count..).unwrap_or(&[]),
@@ -88,6 +83,5 @@ impl Terminal {
                 Ok(_) | Err(_) => break,
             }
         }
-        whole - bytes.len()
     }
 }

@@ -14,87 +14,61 @@ const RESERVE: f64 = 1.2;
 /// By how much of itself a table's highest speed is rounded, which it counts in units a minute.
 const ROUNDING: f64 = 1e-9;
 
-/// Something that keeps a take from beginning, or the table from moving.
+/// Something that keeps a take from beginning, or the table from moving. It is shown as the sentence for the person at
+/// the rig: what is wrong, and what to do.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum Obstacle {
-    /// The emergency stop is pressed.
-    EmergencyStop,
-    /// An alarm has locked the table; what it says.
-    Locked(String),
-    /// The table is not there; why, where that is known.
-    NoTable(Option<String>),
-    /// The speed that is set, and the highest of the table, which is less, both in degrees a second.
-    TooFast(f64, f64),
-    /// A turn has no room in the cable from where the table stands; why, and what to do.
-    NoRoom(String),
-    /// The camera is not there; why, where that is known.
-    NoCamera(Option<String>),
-    /// Nothing can be written into the folder of sessions; why.
-    NoFolder(String),
-    /// Too little space for a take: bytes free, and bytes needed with the reserve.
-    NoSpace(u64, u64),
+pub struct Obstacle {
+    headline: &'static str,
+    why: String,
+    /// What the button says in place of the headline, and does.
+    button: Option<(&'static str, Option<AdvisedAction>)>,
 }
 
 impl Obstacle {
+    fn new(headline: &'static str, why: impl Into<String>) -> Self {
+        Self {
+            headline,
+            why: why.into(),
+            button: None,
+        }
+    }
+
+    /// The emergency stop is pressed.
+    pub(crate) fn emergency_stop() -> Self {
+        let release = ("Release the emergency stop", None);
+        Self {
+            button: Some(release),
+            ..Self::new(
+                "The emergency stop is pressed",
+                "the emergency stop is pressed: release it",
+            )
+        }
+    }
+
     /// The obstacle that a table's highest speed is to a turn at the speed that is set, where it is one.
     pub(crate) fn of_speed(set: f64, highest: f64) -> Option<Self> {
-        (set > highest * (1.0 + ROUNDING)).then_some(Self::TooFast(set, highest))
+        let why = format!(
+            "the table turns at {} degrees/s at most, and {} degrees/s are set: set a lower speed",
+            rounded(highest),
+            rounded(set)
+        );
+        (set > highest * (1.0 + ROUNDING)).then(|| Self::new("Too fast for the table", why))
     }
 
-    fn headline(&self) -> &'static str {
-        match self {
-            Self::EmergencyStop => "The emergency stop is pressed",
-            Self::Locked(_) => "The table is locked",
-            Self::NoTable(_) => "No turntable",
-            Self::TooFast(..) => "Too fast for the table",
-            Self::NoRoom(_) => "No room for a turn",
-            Self::NoCamera(_) => "No camera",
-            Self::NoFolder(_) => "No folder for sessions",
-            Self::NoSpace(..) => "Too little space",
-        }
+    fn no_camera(why: Option<&str>) -> Self {
+        let none = "there is no camera yet: it is being looked for";
+        Self::new("No camera", why.unwrap_or(none))
     }
 
-    fn button(&self) -> AdvisedButton {
-        let (text, action) = match self {
-            Self::EmergencyStop => ("Release the emergency stop", None),
-            Self::Locked(_) => ("Reset and home the table", Some(AdvisedAction::Reset)),
-            other => (other.headline(), None),
-        };
-        AdvisedButton {
-            text: text.to_owned(),
-            action,
-            object: None,
-        }
+    /// Whether the table has to be looked at before anything else.
+    fn is_alarm(&self) -> bool {
+        self.button.is_some()
     }
 }
 
-/// The sentence for the person at the rig: what is wrong, and what to do.
 impl fmt::Display for Obstacle {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::EmergencyStop => f.write_str("the emergency stop is pressed: release it"),
-            Self::Locked(why) if why.is_empty() => f.write_str("the table is locked: reset it"),
-            Self::NoTable(None) => f.write_str("there is no turntable yet: it is being looked for"),
-            Self::NoCamera(None) => f.write_str("there is no camera yet: it is being looked for"),
-            Self::Locked(why)
-            | Self::NoTable(Some(why))
-            | Self::NoRoom(why)
-            | Self::NoCamera(Some(why))
-            | Self::NoFolder(why) => f.write_str(why),
-            Self::TooFast(set, highest) => write!(
-                f,
-                "the table turns at {} degrees/s at most, and {} degrees/s are set: set a lower speed",
-                rounded(*highest),
-                rounded(*set)
-            ),
-            Self::NoSpace(free, needed) => write!(
-                f,
-                "{} MB are free and a take needs {} MB (a fifth in reserve): free some space",
-                free / 1_000_000,
-                needed.div_ceil(1_000_000)
-            ),
-        }
+        f.write_str(&self.why)
     }
 }
 
@@ -106,8 +80,6 @@ pub enum AdvisedAction {
     Start,
     /// Captures again what was aborted: command `start` with the object.
     Again,
-    /// Captures the next object of the queue: command `next`.
-    Next,
     /// Stops what is under way: command `stop`.
     Stop,
     /// Brings the table back after an alarm: command `reset`.
@@ -139,7 +111,7 @@ pub struct Advice {
 /// The advice of a rig of which nothing is known yet.
 impl Default for Advice {
     fn default() -> Self {
-        Self::against(&Obstacle::NoCamera(None))
+        Self::against(&Obstacle::no_camera(None))
     }
 }
 
@@ -148,9 +120,8 @@ impl Advice {
         if !state.rests() {
             return Self::stopping(doing(state.phase));
         }
-        let obstacle = state.obstacle_to_take();
-        match &obstacle {
-            Some(alarm @ (Obstacle::EmergencyStop | Obstacle::Locked(_))) => Self::against(alarm),
+        match &state.obstacle_to_take() {
+            Some(alarm) if alarm.is_alarm() => Self::against(alarm),
             _ if state.table.moves() => Self::stopping("The table moves"),
             Some(other) => Self::against(other),
             None => Self::of_ready(state),
@@ -158,10 +129,15 @@ impl Advice {
     }
 
     fn against(obstacle: &Obstacle) -> Self {
+        let (text, action) = obstacle.button.unwrap_or((obstacle.headline, None));
         Self {
-            headline: obstacle.headline().to_owned(),
-            explanation: Some(capitalised(&obstacle.to_string())),
-            button: obstacle.button(),
+            headline: obstacle.headline.to_owned(),
+            explanation: Some(capitalised(&obstacle.why)),
+            button: AdvisedButton {
+                text: text.to_owned(),
+                action,
+                object: None,
+            },
         }
     }
 
@@ -178,43 +154,29 @@ impl Advice {
     }
 
     fn of_ready(state: &RigState) -> Self {
-        let next = state.queue.first().map(String::as_str);
         if let Some(take) = state.last_take.as_ref().filter(|take| is_aborted(take)) {
-            return Self::after_an_abort(take, next);
+            return Self::after_an_abort(take);
         }
-        let (headline, text, action) = match next {
-            Some(object) => (
-                "Put the next object on the table".to_owned(),
-                format!("Capture {object}"),
-                AdvisedAction::Next,
-            ),
-            None => ("Ready".to_owned(), "Start".to_owned(), AdvisedAction::Start),
-        };
-        let object = next.map(str::to_owned);
         Self {
-            headline,
+            headline: "Ready".to_owned(),
             explanation: None,
             button: AdvisedButton {
-                text,
-                action: Some(action),
-                object,
+                text: "Start".to_owned(),
+                action: Some(AdvisedAction::Start),
+                object: None,
             },
         }
     }
 
     /// What failed still stands on the table: it comes again before anything else.
-    fn after_an_abort(take: &TakeSummary, next: Option<&str>) -> Self {
+    fn after_an_abort(take: &TakeSummary) -> Self {
         let object = object_of(&take.session);
-        let action = match next == Some(object) {
-            true => AdvisedAction::Next,
-            false => AdvisedAction::Again,
-        };
         Self {
             headline: format!("The take of {object} was aborted"),
             explanation: take.reason.as_deref().map(capitalised),
             button: AdvisedButton {
                 text: format!("Again: {object}"),
-                action: Some(action),
+                action: Some(AdvisedAction::Again),
                 object: Some(object.to_owned()),
             },
         }
@@ -225,7 +187,7 @@ impl RigState {
     /// Whether nothing is captured at the moment.
     #[must_use]
     pub fn rests(&self) -> bool {
-        matches!(self.phase, Phase::Idle | Phase::WaitingForObject)
+        self.phase == Phase::Idle
     }
 
     /// What keeps a take from beginning: of several obstacles the first that a person has to remove.
@@ -233,29 +195,46 @@ impl RigState {
     pub fn obstacle_to_take(&self) -> Option<Obstacle> {
         self.obstacle_of_table()
             .or_else(|| self.obstacle_of_speed())
-            .or_else(|| self.table.no_room.clone().map(Obstacle::NoRoom))
+            .or_else(|| {
+                Some(Obstacle::new(
+                    "No room for a turn",
+                    self.table.no_room.clone()?,
+                ))
+            })
             .or_else(|| self.obstacle_of_camera())
             .or_else(|| self.obstacle_of_disk())
     }
 
-    /// What keeps the table from moving, other than that there is to be none.
+    /// What keeps the table from moving, other than that there is to be none; its lock apart, which homing lifts.
     #[must_use]
     pub fn obstacle_to_motion(&self) -> Option<Obstacle> {
-        self.obstacle_of_table()
-            .filter(|obstacle| !matches!(obstacle, Obstacle::Locked(_)))
+        match self.table.emergency_stop || !self.table.locked {
+            true => self.obstacle_of_table(),
+            false => None,
+        }
     }
 
     /// What is wrong with the table, other than that there is to be none.
     #[must_use]
     pub fn obstacle_of_table(&self) -> Option<Obstacle> {
         let table = &self.table;
+        let fault = table.fault.as_deref();
         if table.emergency_stop {
-            return Some(Obstacle::EmergencyStop);
+            return Some(Obstacle::emergency_stop());
         }
         if table.locked {
-            return Some(Obstacle::Locked(table.fault.clone().unwrap_or_default()));
+            let reset = ("Reset and home the table", Some(AdvisedAction::Reset));
+            return Some(Obstacle {
+                button: Some(reset),
+                ..Obstacle::new(
+                    "The table is locked",
+                    fault.unwrap_or("the table is locked: reset it"),
+                )
+            });
         }
-        (self.has_table() && !table.present).then(|| Obstacle::NoTable(table.fault.clone()))
+        let none = "there is no turntable yet: it is being looked for";
+        (self.has_table() && !table.present)
+            .then(|| Obstacle::new("No turntable", fault.unwrap_or(none)))
     }
 
     fn obstacle_of_speed(&self) -> Option<Obstacle> {
@@ -265,15 +244,20 @@ impl RigState {
 
     fn obstacle_of_camera(&self) -> Option<Obstacle> {
         let camera = &self.camera;
-        (!camera.present).then(|| Obstacle::NoCamera(camera.fault.clone()))
+        (!camera.present).then(|| Obstacle::no_camera(camera.fault.as_deref()))
     }
 
     fn obstacle_of_disk(&self) -> Option<Obstacle> {
         if let Some(why) = &self.disk_fault {
-            return Some(Obstacle::NoFolder(why.clone()));
+            return Some(Obstacle::new("No folder for sessions", why));
         }
         let needed = (self.needed_bytes as f64 * RESERVE).ceil() as u64;
-        (self.free_bytes < needed).then_some(Obstacle::NoSpace(self.free_bytes, needed))
+        let why = format!(
+            "{} MB are free and a take needs {} MB (a fifth in reserve): free some space",
+            self.free_bytes / 1_000_000,
+            needed.div_ceil(1_000_000)
+        );
+        (self.free_bytes < needed).then(|| Obstacle::new("Too little space", why))
     }
 }
 
@@ -285,9 +269,7 @@ fn is_aborted(take: &TakeSummary) -> bool {
 fn doing(phase: Phase) -> &'static str {
     match phase {
         Phase::Idle => "Ready",
-        Phase::WaitingForObject => "Put the next object on the table",
         Phase::Preflight => "Checking camera, table and disk",
-        Phase::Metering => "Finding the exposure",
         Phase::MovingBack => "Moving back for the run-up",
         Phase::Starting => "Gathering speed",
         Phase::Recording => "Recording",

@@ -13,8 +13,6 @@ pub enum Phase {
     Idle,
     /// Camera, table and disk are being checked and the camera's settings locked.
     Preflight,
-    /// A slow turn that finds the exposure.
-    Metering,
     /// The table goes back by its ramp.
     MovingBack,
     /// The table gathers speed.
@@ -25,17 +23,13 @@ pub enum Phase {
     Unwinding,
     /// The take is being checked and the session closed.
     Checking,
-    /// A queue of objects waits for somebody to say that the next one stands on the table.
-    WaitingForObject,
 }
 
 impl fmt::Display for Phase {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Idle => "waiting",
-            Self::WaitingForObject => "waiting for the next object",
             Self::Preflight => "checking camera, table and disk",
-            Self::Metering => "metering: the table turns slowly",
             Self::MovingBack => "the table goes back by its ramp",
             Self::Starting => "the table gathers speed",
             Self::Recording => "recording",
@@ -147,7 +141,7 @@ pub struct LogLine {
     pub what: String,
 }
 
-/// How takes are captured. All but the addresses can be changed by the command `configure`.
+/// How takes are captured, by the command line.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct CaptureSettings {
     /// The folder of sessions.
@@ -156,7 +150,7 @@ pub struct CaptureSettings {
     pub camera: String,
     /// The turntable's address.
     pub turntable: String,
-    /// Frame width and height that are asked for, pixels; `null` takes the largest.
+    /// Frame width and height that are asked for, pixels; `null` for the largest.
     pub size: Option<(u32, u32)>,
     /// Frames a second.
     pub fps: f64,

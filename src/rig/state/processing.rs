@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// One thing that is done with a session, or with the data set.
+/// One thing that is done with a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ProcessingStep {
@@ -14,8 +14,6 @@ pub enum ProcessingStep {
     Check,
     /// It is extracted into the data set: `relit-extract SESSION -o DATASET`.
     Extract,
-    /// The data set is read back: `relit-extract verify DATASET`.
-    Verify,
 }
 
 impl fmt::Display for ProcessingStep {
@@ -24,7 +22,6 @@ impl fmt::Display for ProcessingStep {
             Self::Mask => "the mask",
             Self::Check => "the check of the mask",
             Self::Extract => "the extraction",
-            Self::Verify => "the verification",
         })
     }
 }
@@ -48,8 +45,8 @@ pub enum ProcessingStatus {
 pub struct ProcessingJob {
     /// Its number, by which it is cancelled.
     pub number: u64,
-    /// The session; `null` for the data set.
-    pub session: Option<String>,
+    /// The session.
+    pub session: String,
     /// What is done.
     pub step: ProcessingStep,
     /// What comes after it, if all is well.
@@ -81,8 +78,8 @@ pub enum ProcessingOutcome {
 pub struct FinishedJob {
     /// Its number.
     pub number: u64,
-    /// The session; `null` for the data set.
-    pub session: Option<String>,
+    /// The session.
+    pub session: String,
     /// What was done.
     pub step: ProcessingStep,
     /// How it ended.
@@ -100,9 +97,7 @@ pub struct ProcessingState {
     pub has_extract_program: bool,
     /// Whether each usable take is masked, checked and extracted once the rig rests.
     pub when_done: bool,
-    /// The data set's name: a folder beside that of the sessions.
-    pub dataset: String,
-    /// The same as a path on the rig's machine.
+    /// The folder of the data set, on the rig's machine.
     pub dataset_folder: String,
     /// What is done and what waits, in that order.
     pub jobs: Vec<ProcessingJob>,

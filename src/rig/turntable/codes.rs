@@ -60,64 +60,22 @@ impl Alarm {
             (7, _) => "a door opened while it looked for the index: close it and home again",
             (8, _) => "the index sensor stayed active after it was left: check sensor and $27",
             (9, _) => "no index was found within a turn: check the sensor, its wiring and $5",
-            (_, Family::FluidNc | Family::GrblEsp32) => fluid_nc(code),
+            (10, Family::Rig | Family::Grbl | Family::GrblHal) => EMERGENCY,
             (20, Family::Rig) => {
                 "the host was silent longer than its lease, the position is kept: unlock it"
             }
-            _ => grbl_hal(code),
+            _ => "an alarm of its own, its position counts as lost: see the firmware's manual",
         }
     }
 }
 
-const UNKNOWN: &str = "an alarm this program does not know: see the firmware's manual";
-
-/// grblHAL's alarms. The rig's firmware has the emergency stop from it; stock Grbl has none of them.
-fn grbl_hal(code: u8) -> &'static str {
-    match code {
-        10 => {
-            "the emergency stop was pressed, its position is lost: once it is released, reset and home the table"
-        }
-        11 => "it has to be homed before it moves: home it",
-        12 => "a limit switch is active: free it and unlock",
-        13 => "a probe is active, which tables have none of: unlock it",
-        14 => "a spindle failed, which tables have none of: unlock it",
-        15 => "no second limit switch was found: home X alone, without automatic squaring",
-        16 => "its self-test failed: restart it",
-        17 => {
-            "the motor's driver reports a fault, its position is lost: check motor and supply, then home it"
-        }
-        18 => "homing is set up wrong: check $22 and $44",
-        19 => "a Modbus device does not answer, which tables have none of: switch it off",
-        20 => "an I/O expander failed: restart the controller",
-        _ => UNKNOWN,
-    }
-}
-
-/// The alarms of FluidNC and, as far as it has them, of Grbl_ESP32.
-fn fluid_nc(code: u8) -> &'static str {
-    match code {
-        10 => "a spindle failed, which tables have none of: unlock it",
-        11 => {
-            "a control pin was active at the start: release it (emergency stop, reset, hold), then reset and home"
-        }
-        12 => "a limit switch is active and it cannot tell which side: free it and home again",
-        13 => {
-            "a limit switch or a fault stopped it at once, its position is lost: free it, unlock and home it"
-        }
-        14 => "it is not homed: home it",
-        15 => "it has just started: unlock or home it",
-        16 => "an I/O expander restarted: restart the controller",
-        17 => "a line of a file failed: unlock it",
-        18 => "a probe stopped it, which tables have none of: unlock it",
-        _ => UNKNOWN,
-    }
-}
+const EMERGENCY: &str = "the emergency stop was pressed, its position is lost: once it is released, reset and home the table";
 
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.code {
             Some(code) => write!(f, "ALARM:{code}, {}", self.meaning(code))?,
-            None if self.emergency_stop => return f.write_str(grbl_hal(10)),
+            None if self.emergency_stop => return f.write_str(EMERGENCY),
             None => f.write_str("the controller is locked: unlock or home it")?,
         }
         match self.emergency_stop && self.code != self.family.emergency_stop_alarm() {
@@ -129,50 +87,24 @@ impl fmt::Display for Alarm {
     }
 }
 
-/// What an `error:` number means.
+/// What an `error:` number means, of those that the lines of this program can get.
 pub(super) fn meaning_of_error(code: u8) -> &'static str {
     match code {
-        1 => "a word has no letter",
-        2 => "a number is malformed",
-        3 => "an unknown `$` command",
-        4 => "a value is negative that may not be",
+        3 | 20 => "a command it does not know",
         5 => "homing is switched off ($22)",
-        6 => "the step pulse is too short",
         7 => "its stored settings were damaged and are the defaults again",
         8 => "that needs an idle table",
         9 => "the table is locked: unlock or home it",
         10 => "soft limits need homing",
-        11 | 14 => "the line is too long",
         12 => "that speed needs more steps a second than it can make",
         13 => "a door is open",
-        18 => "its reset pin is active, or homing is not set up",
         15 => "the jog goes beyond the soft limit",
-        16 => "the jog is malformed",
-        20 => "a command it does not know",
-        21 | 24 => "two commands of one line exclude each other",
-        22 => "a feed rate is missing",
-        23 => "a number has to be whole",
-        25 => "a word is repeated",
-        26 | 28 => "a value is missing",
-        27 => "a line number is out of range",
-        29 => "a coordinate system it does not have",
-        30 => "G53 needs G0 or G1",
-        31 | 36 => "words are left over",
-        32 | 34 | 35 => "an arc, which tables cannot drive",
-        33 => "the target is invalid",
-        37 => "a tool offset, which tables have none of",
-        38 => "a tool number too large",
-        40 => "a control pin is active",
-        45 => "a limit switch is active",
-        46 => "it has to be homed first",
         50 => "its emergency stop is pressed",
-        51 => "the motor's driver reports a fault",
-        79 => "it has to be reset first, once its emergency stop is released",
-        152 => "its configuration is invalid: see what it prints at its start",
         70 => "the line came damaged",
         71 => "the line's number is out of order",
         72 => "no checked session is open",
-        _ => "a number this program does not know: see the firmware's manual",
+        79 => "it has to be reset first, once its emergency stop is released",
+        _ => "see the firmware's manual",
     }
 }
 
@@ -219,7 +151,10 @@ mod tests {
             "{text}"
         );
         let text = alarm(11, Family::GrblHal).to_string();
-        assert!(text.contains("ALARM:11") && text.contains("home"), "{text}");
+        assert!(
+            text.contains("ALARM:11") && text.contains("manual"),
+            "{text}"
+        );
     }
 
     #[test]

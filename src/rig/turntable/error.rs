@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use super::codes::{Alarm, meaning_of_error};
-use super::wire::{ControllerState, LineFault, RestartCause, SendError};
+use super::supervisor::MotionFault;
+use super::wire::{ControllerState, LineFault, SendError};
 use crate::lockfile::LockError;
 
 /// An error of a turntable.
@@ -34,7 +35,7 @@ pub enum TurntableError {
     ),
     /// Another process owns the port.
     #[error(
-        "process {pid} has {path}: ask it for `status` or `stop`, which reach the table through it, or end it first"
+        "process {pid} has {path}: look at the table there, or end that process, which stops the table (`relit-capture turntable stop` does)"
     )]
     Owned {
         /// The port.
@@ -52,19 +53,9 @@ pub enum TurntableError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// Lock, socket or folder of the port's owner could not be used.
+    /// The lock of the port could not be used.
     #[error(transparent)]
     Lock(#[from] LockError),
-    /// The process that owns the port could not be asked, or reports an error.
-    #[error("process {pid}, which has {path}, {why}")]
-    Owner {
-        /// The port.
-        path: PathBuf,
-        /// The owner.
-        pid: u32,
-        /// What it did, and what to do.
-        why: String,
-    },
     /// There is no Grbl controller at the port.
     #[error(
         "{port} does not answer as a Grbl 1.1 controller ({heard}): check port, cable and power, and that its firmware is the rig's, Grbl 1.1, grblHAL or FluidNC"
@@ -187,62 +178,9 @@ pub enum TurntableError {
         "the table was told to stop and could not be seen at rest: cut its power, then check the cable"
     )]
     NotStopped,
-    /// The reports of a turn do not determine its angles.
+    /// The reports of a turn do not determine its angles; why.
     #[error("the turn's angles cannot be determined: {0}")]
-    Track(#[from] super::sync::TrackError),
-}
-
-/// The fault that ended a motion. The table is being stopped then, or has been.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MotionFault {
-    /// The controller restarted.
-    #[error("the controller restarted{}, and its position is lost; check its supply and cable, then home it", .0.map_or_else(String::new, |cause| format!(" ({cause})")))]
-    Restarted(Option<RestartCause>),
-    /// An alarm.
-    #[error("{0}")]
-    Alarm(Alarm),
-    /// The table was put on hold, but not by this program.
-    #[error(
-        "the table was put on hold, and not by this program; look for a button or another sender, and start again"
-    )]
-    Held,
-    /// The controller fell silent.
-    #[error("the controller was silent for {milliseconds} ms; check cable and power")]
-    Silent {
-        /// Duration of the silence.
-        milliseconds: i64,
-    },
-    /// The controller reports motion but always the same position.
-    #[error("the controller reports motion and stays at {machine_deg:.3} degrees; restart it")]
-    Stalled {
-        /// The place, from machine zero.
-        machine_deg: f64,
-    },
-    /// The table stands in another place than its target, or does something else.
-    #[error(
-        "the table was sent to {target_deg:.3} degrees and is in state {state} at {machine_deg:.3} (from machine zero); the line to it was damaged, it restarted, or something else drives it; look at the cable, then home it"
-    )]
-    Astray {
-        /// Its state.
-        state: ControllerState,
-        /// Where it is, from machine zero.
-        machine_deg: f64,
-        /// Where it was sent, from machine zero.
-        target_deg: f64,
-    },
-    /// It did not arrive in time.
-    #[error("the table did not arrive in time; compare its speed with the settings $110 and $120")]
-    Late,
-    /// The line that moves the table got no answer.
-    #[error("the line that moves it may or may not have been taken: {0}")]
-    Line(LineFault),
-    /// The port is gone.
-    #[error("the port is gone ({0}); check that the controller is plugged in")]
-    PortLost(String),
-    /// A stop was requested.
-    #[error("a stop was asked for")]
-    Stopped,
+    Track(String),
 }
 
 fn advice(state: ControllerState, alarm: Option<&Alarm>) -> String {
@@ -250,13 +188,8 @@ fn advice(state: ControllerState, alarm: Option<&Alarm>) -> String {
         ControllerState::Alarm => {
             alarm.map_or_else(|| "unlock or home it".to_owned(), Alarm::to_string)
         }
-        ControllerState::Held
-        | ControllerState::Holding
-        | ControllerState::Door
-        | ControllerState::DoorMoving => "stop it first".to_owned(),
-        ControllerState::Tool => "end its tool change with a reset".to_owned(),
+        ControllerState::Held | ControllerState::Holding => "stop it first".to_owned(),
         ControllerState::Check => "switch Grbl's check mode off with `$C`".to_owned(),
-        ControllerState::Sleep => "wake it with a reset".to_owned(),
         _ => "stop it, or wait until it is idle".to_owned(),
     }
 }

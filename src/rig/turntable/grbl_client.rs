@@ -3,36 +3,37 @@
 use std::path::Path;
 use std::time::Duration;
 
+use rustix::process::{Pid, Signal, kill_process};
+
 use super::TableOptions;
 use super::codes::Alarm;
-use super::error::{MotionFault, TurntableError};
+use super::error::TurntableError;
 use super::greeting;
 use super::identity::Identity;
 use super::link::{IoThread, Link};
-use super::owner::{Claim, Server};
-use super::port::{Port, SerialPort};
+use super::port::{self, Port, SerialPort};
 use super::status::TableStatus;
-use super::supervisor::MotionGoal;
+use super::supervisor::{MotionFault, MotionGoal};
 use super::wire::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
-use crate::clock::{Clock, Waitable};
+use crate::clock::Clock;
+use crate::lockfile::LockFile;
 
 /// Added to the computed time of a motion.
 const MOTION_SLACK: Duration = Duration::from_secs(4);
+/// How long a program that was asked to end may take, which stops its table first, and the pause between two looks.
+const TAKE_OVER: Duration = Duration::from_secs(25);
+const LOOK: Duration = Duration::from_millis(100);
 /// Speed limit of unwinding, and of jogs without a given speed, degrees/s.
 const BRISK: f64 = 30.0;
 
 /// A table, owned by this process. Dropping it stops the table.
 pub struct Table {
-    // Fields are dropped in this order: requests of other processes end, the port is closed, and
-    // only then the claim is released.
-    server: Option<Server>,
+    // Fields are dropped in this order: the port is closed, and only then its lock is released.
     link: Link,
     _io_thread: IoThread,
-    _claim: Option<Claim>,
+    _lock: Option<LockFile>,
     identity: Identity,
     was_stopped: bool,
-    /// Whether a line waits for its answer.
-    line_open: Waitable<bool>,
 }
 
 impl Table {
@@ -45,35 +46,54 @@ impl Table {
         Self::greet(Box::new(port), None, options)
     }
 
-    /// Opens a serial port exclusively, and answers requests of other processes for `status` and
-    /// `stop` (see [`super::Owner`]).
+    /// Opens a serial port exclusively.
     ///
     /// # Errors
     /// [`TurntableError::Owned`] if another process has it, and the errors of [`Table::open`].
     pub fn open_serial(path: &Path, options: &TableOptions) -> Result<Table, TurntableError> {
         // Opening the port resets an Arduino: this must not happen to another owner's table.
-        let claim = Claim::take(path, &options.runtime_folder)?;
+        let lock = port::claim(path, &options.runtime_folder)?;
         let port = SerialPort::open(path)?;
-        Self::greet(Box::new(port), Some(claim), options)
+        Self::greet(Box::new(port), Some(lock), options)
+    }
+
+    /// The same, and ends a program of the toolkit that has the port, which stops its table then.
+    ///
+    /// # Errors
+    /// [`TurntableError::Owned`] if that one may not be ended or does not end, and the errors of [`Table::open`].
+    pub fn take_over(path: &Path, options: &TableOptions) -> Result<Table, TurntableError> {
+        let until_us = options.clock.after(TAKE_OVER);
+        let mut is_asked = false;
+        loop {
+            let (pid, error) = match Self::open_serial(path, options) {
+                Err(error @ TurntableError::Owned { pid, .. }) => (pid, error),
+                opened => return opened,
+            };
+            if !is_asked && port::has_open(pid, path, &options.runtime_folder) {
+                let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
+                is_asked = pid.is_some_and(|pid| kill_process(pid, Signal::TERM).is_ok());
+            }
+            if !is_asked || options.clock.now_us() > until_us {
+                return Err(error);
+            }
+            options.clock.sleep(LOOK);
+        }
     }
 
     fn greet(
         port: Box<dyn Port>,
-        claim: Option<Claim>,
+        lock: Option<LockFile>,
         options: &TableOptions,
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
         let (link, io_thread) = Link::start(port, &options.clock, greeting::UNKNOWN_CONTROLLER)?;
         let (identity, was_stopped) = greeting::greet(&link, resets, options)?;
-        let server = claim.as_ref().map(|claim| claim.serve(link.clone()));
         Ok(Table {
-            server: server.transpose()?,
             link,
             _io_thread: io_thread,
-            _claim: claim,
+            _lock: lock,
             identity,
             was_stopped,
-            line_open: Waitable::new(&options.clock, false),
         })
     }
 
@@ -333,8 +353,7 @@ impl Table {
 
     /// Opens a checked session if the controller offers one and none is open.
     pub(super) fn secure(&self) -> Result<(), TurntableError> {
-        let _turn = LineTurn::take(&self.line_open);
-        greeting::secure(&self.link, &self.identity.extras)
+        greeting::secure(&self.link, self.identity.extras)
     }
 
     pub(super) fn outcome(
@@ -343,7 +362,6 @@ impl Table {
         timeout: ReplyTimeout,
     ) -> Result<LineOutcome, TurntableError> {
         self.secure()?;
-        let _turn = LineTurn::take(&self.line_open);
         self.link.line(block, timeout)
     }
 
@@ -369,25 +387,8 @@ impl Table {
     }
 }
 
-/// Permission to send a line and wait for its answer. One thread has it at a time.
-struct LineTurn<'a>(&'a Waitable<bool>);
-
-impl<'a> LineTurn<'a> {
-    fn take(open: &'a Waitable<bool>) -> Self {
-        open.wait(|open| (!std::mem::replace(open, true)).then_some(()));
-        Self(open)
-    }
-}
-
-impl Drop for LineTurn<'_> {
-    fn drop(&mut self) {
-        self.0.update(|open| *open = false);
-    }
-}
-
 impl Drop for Table {
     fn drop(&mut self) {
-        self.server = None;
         self.link.supervisor().release(self.clock().now_us());
         if self.link.supervisor().is_stopping() {
             // Nobody is left to receive an error. The lease, if there is one, also stops the table.

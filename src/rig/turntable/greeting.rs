@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::TableOptions;
 use super::error::TurntableError;
 use super::family::Family;
-use super::identity::{Extras, GrblSettings, Identity};
+use super::identity::{GrblSettings, Identity, offers_extras};
 use super::link::Link;
 use super::supervisor::ControllerTraits;
 use super::wire::{ControllerState, Counts, LineFault, LineOutcome, Message, ReplyTimeout};
@@ -31,7 +31,6 @@ const POLL_STOCK: Duration = Duration::from_millis(200);
 /// What is assumed of a controller until its identity is known.
 pub(super) const UNKNOWN_CONTROLLER: ControllerTraits = ControllerTraits {
     family: Family::Grbl,
-    degrees_per_unit: 1.0,
     poll: POLL_STOCK,
     stamps: false,
     reports_homing: false,
@@ -47,35 +46,23 @@ pub(super) fn greet(
 ) -> Result<(Identity, bool), TurntableError> {
     let moved = wake(link, resets)?;
     let about = about(link)?;
-    let build = |message: &Message| match message {
-        Message::Build { letters, .. } => Some(Extras::of(letters)),
-        _ => None,
-    };
-    let offered = about.iter().find_map(build).filter(|_| options.extras);
-    let extras = offered.unwrap_or_default();
-    secure(link, &extras)?;
-    let settings = settings(link, Family::from_messages(&about), extras)?;
-    let mut identity = Identity::read(&about, &settings, options.travel_deg)?;
-    identity.extras = extras;
-    identity.lease_s = identity.lease_s.filter(|_| extras.lease);
+    let extras = options.extras && offers_extras(&about);
+    secure(link, extras)?;
+    let settings = settings(link, extras)?;
+    let identity = Identity::read(&about, &settings, extras)?;
     link.supervisor().set_traits(ControllerTraits {
         family: identity.family,
-        degrees_per_unit: identity.degrees_per_unit,
-        poll: if extras.stamps {
-            POLL_STAMPED
-        } else {
-            POLL_STOCK
-        },
-        stamps: extras.stamps,
-        reports_homing: !identity.is_stock(),
+        poll: if extras { POLL_STAMPED } else { POLL_STOCK },
+        stamps: extras,
+        reports_homing: extras,
         step_deg: identity.step_deg(),
     });
     Ok((identity, moved))
 }
 
 /// Opens a checked session if the controller offers one and none is open.
-pub(super) fn secure(link: &Link, extras: &Extras) -> Result<(), TurntableError> {
-    if !extras.checked_lines || link.supervisor().is_checked() {
+pub(super) fn secure(link: &Link, extras: bool) -> Result<(), TurntableError> {
+    if !extras || link.supervisor().is_checked() {
         return Ok(());
     }
     done(link, "N0", link.open_session()?).map(|_| ())
@@ -155,7 +142,9 @@ fn no_controller(link: &Link) -> TurntableError {
     let heard = match (supervisor.closed(), counts.noise) {
         (Some(why), _) => format!("the port is gone: {why}"),
         (None, 0) => "nothing was heard".to_owned(),
-        (None, lines) => format!("{lines} lines were heard that are none of Grbl's"),
+        (None, lines) => format!(
+            "{lines} lines were heard that are none of Grbl's, or have no machine position ($10=1)"
+        ),
     };
     TurntableError::NoController {
         port: link.port_name().to_owned(),
@@ -206,19 +195,19 @@ fn lacks(about: &[Message]) -> Option<&'static str> {
 }
 
 /// The answer to `$$`, complete and twice the same: without checksums a digit could be wrong.
-fn settings(link: &Link, family: Family, extras: Extras) -> Result<GrblSettings, TurntableError> {
+fn settings(link: &Link, extras: bool) -> Result<GrblSettings, TurntableError> {
     let mut last = None;
     let mut missing = Vec::new();
     for _ in 0..READINGS {
         let messages = match link.line("$$", ReplyTimeout::AtOnce)? {
             LineOutcome::Failed(fault) if recover(link, fault).is_ok() => {
-                secure(link, &extras)?;
+                secure(link, extras)?;
                 continue;
             }
             outcome => done(link, "$$", outcome)?,
         };
         let settings = GrblSettings::of(&messages);
-        missing = settings.missing(family, extras);
+        missing = settings.missing(extras);
         if !missing.is_empty() {
             continue;
         }
@@ -232,7 +221,7 @@ fn settings(link: &Link, family: Family, extras: Extras) -> Result<GrblSettings,
         false => {
             let missing: Vec<_> = missing.iter().map(|n| format!("${n}")).collect();
             let missing = missing.join(", ");
-            format!("{missing}, which a table with {family} needs on its X axis")
+            format!("{missing}, which a table needs on its X axis")
         }
     }))
 }

@@ -1,9 +1,9 @@
 //! Where the angle 0 is: at the index, or where the table stands.
 
 use super::codes::Alarm;
-use super::error::{MotionFault, TurntableError};
+use super::error::TurntableError;
 use super::grbl_client::{Table, refused, require_released};
-use super::supervisor::MotionGoal;
+use super::supervisor::{MotionFault, MotionGoal};
 
 use super::wire::{ControllerState, LineOutcome, ReplyTimeout};
 

@@ -6,29 +6,20 @@ use super::error::TurntableError;
 use super::family::Family;
 use super::wire::Message;
 
-/// Degrees in a reported inch: a stock board can be set to report in inches.
-const INCH: f64 = 25.4;
+/// How far a table without a limit of its own may turn in either direction before its cable is wound up, degrees.
+const TRAVEL_DEG: f64 = 400.0;
 
-/// Extensions of the rig's own firmware to Grbl.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Extras {
-    /// Status reports carry the chip's time of the position.
-    pub stamps: bool,
-    /// Lines can be numbered and checksummed.
-    pub checked_lines: bool,
-    /// The table stops by itself when the host falls silent.
-    pub lease: bool,
-}
+/// The letters in `[OPT:..]` of the rig's own firmware, Grbl's own being capitals: its reports carry the chip's time
+/// of the position, lines can be numbered and checksummed, and the table stops by itself when the host falls silent.
+const EXTRAS: [char; 3] = ['t', 'c', 'l'];
 
-impl Extras {
-    /// Reads the letters of `[OPT:..]`; Grbl's own are capitals.
-    pub(super) fn of(letters: &str) -> Extras {
-        Extras {
-            stamps: letters.contains('t'),
-            checked_lines: letters.contains('c'),
-            lease: letters.contains('l'),
-        }
-    }
+/// Whether a controller offers what the rig's own firmware has beyond Grbl.
+pub(super) fn offers_extras(about: &[Message]) -> bool {
+    let build = about.iter().find_map(|message| match message {
+        Message::Build { letters } => Some(letters),
+        _ => None,
+    });
+    build.is_some_and(|letters| EXTRAS.iter().all(|letter| letters.contains(*letter)))
 }
 
 /// A controller, as it describes itself.
@@ -39,8 +30,8 @@ pub struct Identity {
     pub firmware: String,
     /// Which firmware of the Grbl family it is.
     pub family: Family,
-    /// Its extensions to Grbl: none on a stock board.
-    pub extras: Extras,
+    /// Whether what the rig's firmware has beyond Grbl is used: never on a stock board.
+    pub extras: bool,
     /// Steps per degree.
     pub steps_per_degree: f64,
     /// Highest speed, degrees/s.
@@ -53,33 +44,26 @@ pub struct Identity {
     pub homing: bool,
     /// Its lease, seconds; 0 if it is off, `None` if the controller has none.
     pub lease_s: Option<f64>,
-    /// Degrees in one unit of its reports.
-    pub(super) degrees_per_unit: f64,
 }
 
 impl Identity {
-    /// Whether this is a Grbl board without the rig's extensions.
-    #[must_use]
-    pub fn is_stock(&self) -> bool {
-        self.extras == Extras::default()
-    }
-
     /// One step, degrees.
     #[must_use]
     pub fn step_deg(&self) -> f64 {
         self.steps_per_degree.recip()
     }
 
-    /// Reads the answers to `$I` and `$$`. `travel_deg`: how far the table may turn in either
-    /// direction if the controller has no limit of its own.
+    /// Reads the answers to `$I` and `$$`. `extras`: whether to use what goes beyond Grbl.
     pub(super) fn read(
         about: &[Message],
         settings: &GrblSettings,
-        travel_deg: f64,
+        extras: bool,
     ) -> Result<Identity, TurntableError> {
+        if settings.is_on(13) {
+            return Err(not_reported("positions in millimetres ($13=0)"));
+        }
         let family = Family::from_messages(about);
         let mut firmware = None;
-        let mut extras = None;
         for message in about {
             match message {
                 Message::Version { version, note } if note.is_empty() => {
@@ -88,14 +72,10 @@ impl Identity {
                 Message::Version { version, note } => {
                     firmware = Some(format!("{version} ({note})"))
                 }
-                Message::Build { letters, .. } => {
-                    extras = Some(Extras::of(letters));
-                }
                 _ => {}
             }
         }
         let firmware = firmware.ok_or_else(|| not_reported("its version ([VER:..])"))?;
-        let extras = extras.ok_or_else(|| not_reported("its options ([OPT:..])"))?;
         let positive = |number, what| settings.positive(number).ok_or_else(|| not_reported(what));
         Ok(Identity {
             firmware: match family {
@@ -107,11 +87,10 @@ impl Identity {
             steps_per_degree: positive(100, "its steps per degree ($100)")?,
             max_degrees_per_second: positive(110, "its fastest speed ($110)")? / 60.0,
             acceleration: positive(120, "its acceleration ($120)")?,
-            limits: settings.limits(extras, travel_deg)?,
+            limits: settings.limits(extras)?,
             // grblHAL's setting is a set of bits, of which the first switches homing on.
             homing: settings.get(22).is_some_and(|value| value % 2.0 == 1.0),
-            lease_s: extras.lease.then(|| settings.get(60)).flatten(),
-            degrees_per_unit: if settings.is_on(13) { INCH } else { 1.0 },
+            lease_s: extras.then(|| settings.get(60)).flatten(),
         })
     }
 }
@@ -135,13 +114,9 @@ impl GrblSettings {
     }
 
     /// The settings that this program needs and that are not there.
-    pub(super) fn missing(&self, family: Family, extras: Extras) -> Vec<u16> {
+    pub(super) fn missing(&self, extras: bool) -> Vec<u16> {
         let mut needed = vec![20, 22, 100, 110, 120, 130];
-        // FluidNC has it in its configuration file only.
-        if family != Family::FluidNc {
-            needed.push(13);
-        }
-        if extras.lease {
+        if extras {
             needed.push(60);
         }
         needed.retain(|number| !self.0.contains_key(number));
@@ -160,15 +135,15 @@ impl GrblSettings {
         self.get(number).is_some_and(|value| value != 0.0)
     }
 
-    fn limits(&self, extras: Extras, travel_deg: f64) -> Result<(f64, f64), TurntableError> {
+    fn limits(&self, extras: bool) -> Result<(f64, f64), TurntableError> {
         let reach_deg = match self.is_on(20) {
             true => self
                 .positive(130)
                 .ok_or_else(|| not_reported("its soft limit ($130)"))?,
-            false => travel_deg,
+            false => TRAVEL_DEG,
         };
         // Stock Grbl's soft limits reach from the far end of the axis to machine zero.
-        let stock = self.is_on(20) && extras == Extras::default();
+        let stock = self.is_on(20) && !extras;
         Ok((-reach_deg, if stock { 0.0 } else { reach_deg }))
     }
 }
@@ -191,7 +166,7 @@ mod tests {
         ];
         let settings = GrblSettings(usual.iter().chain(changed).copied().collect());
         let about: Vec<_> = about.iter().filter_map(|line| parse(line)).collect();
-        Identity::read(&about, &settings, 400.0)
+        Identity::read(&about, &settings, offers_extras(&about))
     }
 
     const RIG: [&str; 2] = ["[VER:1.1h.20261121:relit]", "[OPT:NHtcl,8,128]"];
@@ -200,13 +175,13 @@ mod tests {
     #[test]
     fn the_rigs_firmware_is_known_by_its_option_letters() {
         let rig = identity(&RIG, &[]).unwrap();
-        assert!(rig.extras.stamps && rig.extras.checked_lines && rig.extras.lease);
+        assert!(rig.extras);
         assert_eq!(rig.firmware, "1.1h.20261121 (relit)");
         assert_eq!(rig.lease_s, Some(0.0));
         assert_eq!(rig.limits, (-400.0, 400.0));
         assert!((rig.max_degrees_per_second - 36.0).abs() < 1e-9);
         let stock = identity(&STOCK, &[]).unwrap();
-        assert!(stock.is_stock());
+        assert!(!stock.extras);
         assert_eq!(stock.lease_s, None);
     }
 
@@ -226,7 +201,7 @@ mod tests {
         ];
         let hal = identity(&hal, &[(22, 9.0)]).unwrap();
         assert_eq!((hal.family, hal.homing), (Family::GrblHal, true));
-        assert!(hal.is_stock() && hal.firmware.contains("grblHAL"));
+        assert!(!hal.extras && hal.firmware.contains("grblHAL"));
         let fluid = ["[VER:3.7 FluidNC v3.7.8 (wifi):]", "[OPT:PHS]"];
         assert_eq!(identity(&fluid, &[]).unwrap().family, Family::FluidNc);
         let esp = ["[VER:1.3a.20211103:]", "[OPT:PHBSW]"];
@@ -236,18 +211,10 @@ mod tests {
     }
 
     #[test]
-    fn only_fluid_nc_may_leave_out_the_unit_of_its_reports() {
-        let settings = GrblSettings([20, 22, 100, 110, 120].map(|n| (n, 1.0)).into());
-        let missing = |family| settings.missing(family, Extras::default());
-        assert_eq!(missing(Family::FluidNc), [130]);
-        assert_eq!(missing(Family::Grbl), [130, 13]);
-    }
-
-    #[test]
-    fn a_missing_setting_or_option_is_named_in_the_error() {
-        let error = identity(&RIG[..1], &[]).unwrap_err();
-        assert!(error.to_string().contains("[OPT:..]"), "{error}");
-        let error = identity(&RIG, &[(100, 0.0)]).unwrap_err();
-        assert!(error.to_string().contains("$100"), "{error}");
+    fn a_missing_setting_is_named_in_the_error() {
+        for (setting, named) in [((100, 0.0), "$100"), ((13, 1.0), "$13=0")] {
+            let error = identity(&RIG, &[setting]).unwrap_err();
+            assert!(error.to_string().contains(named), "{error}");
+        }
     }
 }

@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use relit_data::causes::with_causes;
 
-use super::error::{MotionFault, TurntableError};
+use super::error::TurntableError;
 use super::port::Port;
 use super::status::TableStatus;
-use super::supervisor::{ControllerTraits, StopOutcome, Supervisor};
+use super::supervisor::{ControllerTraits, MotionFault, StopOutcome, Supervisor};
 use super::wire::{LineOutcome, ReplyTimeout, SendError};
 use crate::clock::{Clock, JoinHandle, Waitable};
 

@@ -18,7 +18,7 @@
 //! ```
 //! use relit_rig::clock::Clock;
 //! use relit_rig::simulator::{SimulatedTable, SimulatorOptions};
-//! use relit_rig::turntable::{Table, TableOptions, TurnPlan, TurnRequest};
+//! use relit_rig::turntable::{Table, TableOptions, TurnPlan};
 //!
 //! # fn main() -> Result<(), relit_rig::turntable::TurntableError> {
 //! let clock = Clock::virtual_time();
@@ -34,7 +34,7 @@
 //! // A real one: `Table::open_serial(Path::new("/dev/ttyUSB0"), &options)`.
 //! let table = Table::open(simulated.open(), &options)?;
 //! table.home()?;
-//! let plan = TurnPlan::new(table.identity(), &table.status()?, &TurnRequest::default())?;
+//! let plan = TurnPlan::new(table.identity(), &table.status()?, 7.2, 360.0)?;
 //! let track = table.start_turn(plan)?.wait_end()?;
 //! let (from_us, to_us) = track.constant_us();
 //! assert!(track.angle_at(to_us) > track.angle_at(from_us));
@@ -54,7 +54,6 @@ mod greeting;
 mod homing;
 mod identity;
 mod link;
-mod owner;
 mod plan;
 mod port;
 mod status;
@@ -72,31 +71,27 @@ use crate::lockfile;
 
 pub use address::{SimulatedAddress, TurntableAddress, find_serial};
 pub use codes::Alarm;
-pub use error::{MotionFault, TurntableError};
+pub use error::TurntableError;
 pub use family::Family;
 pub use grbl_client::Table;
 pub use homing::Homed;
-pub use identity::{Extras, Identity};
-pub use owner::Owner;
-pub use plan::{TurnDirection, TurnPlan, TurnRequest};
+pub use identity::Identity;
+pub(crate) use plan::MARGIN_DEG;
+pub use plan::TurnPlan;
 pub use port::{Port, SerialPort};
 pub use status::TableStatus;
-pub use sync::{Track, TrackError};
-
+pub use supervisor::MotionFault;
+pub use sync::Track;
 pub use turn::{FinishedTurn, Turn};
-pub use wire::{ControllerState, Counts, LineFault, RestartCause, SendError};
+pub use wire::{ControllerState, Counts, LineFault, SendError};
 
 /// How a table is opened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableOptions {
     /// The clock of all waits and time stamps. A simulated table needs the clock of its simulator.
     pub clock: Clock,
-    /// Folder for the lock and the socket of a port's owner: one that every program on the machine
-    /// agrees on, such as [`lockfile::standard_folder`].
+    /// Folder for the lock of a port's owner: one that every program on the machine agrees on, such as [`lockfile::standard_folder`].
     pub runtime_folder: PathBuf,
-    /// How far the table may turn from the angle 0 in either direction before its cable is wound
-    /// up, degrees. Applies if the controller has no limit of its own.
-    pub travel_deg: f64,
     /// Whether to use what the rig's firmware offers beyond Grbl. If false, it is treated as a stock
     /// board.
     pub extras: bool,
@@ -107,7 +102,6 @@ impl Default for TableOptions {
         Self {
             clock: Clock::monotonic(),
             runtime_folder: lockfile::standard_folder(),
-            travel_deg: 400.0,
             extras: true,
         }
     }

@@ -1,12 +1,15 @@
 //! The serial port: bytes in and out, with a limit on every wait.
 
+use std::fs;
 use std::io::{self, Read, Write};
-use std::path::Path;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serialport::{SerialPort as _, TTYPort};
 
 use super::error::TurntableError;
+use crate::lockfile::{self, LockError, LockFile};
 
 /// Grbl's baud rate, bits/s.
 const BAUD: u32 = 115_200;
@@ -33,6 +36,43 @@ pub trait Port: Send + 'static {
 
     /// Whether opening it may have reset the controller, as an Arduino's USB side does.
     fn resets(&self) -> bool;
+}
+
+/// Makes this process the owner of `port`, without opening it: opening an Arduino's port resets it. The lock
+/// is named by the port's device number, so that every name of the port leads to it.
+pub(super) fn claim(port: &Path, folder: &Path) -> Result<LockFile, TurntableError> {
+    let device = fs::metadata(port).map_err(|source| TurntableError::Open {
+        path: port.to_owned(),
+        source,
+    })?;
+    lockfile::use_folder(folder)?;
+    LockFile::take(&lock_of(&device, folder), &port.display().to_string()).map_err(|error| {
+        match error {
+            LockError::Held { pid, .. } => TurntableError::Owned {
+                path: port.to_owned(),
+                pid: pid.unwrap_or(0),
+            },
+            error => error.into(),
+        }
+    })
+}
+
+/// Whether a process really has the lock of a port open: the number in a lock file is only what somebody wrote there.
+pub(super) fn has_open(pid: u32, port: &Path, folder: &Path) -> bool {
+    let lock = fs::metadata(port)
+        .map(|device| lock_of(&device, folder))
+        .and_then(|lock| fs::metadata(lock));
+    let files = fs::read_dir(format!("/proc/{pid}/fd"));
+    let (Ok(lock), Ok(files)) = (lock, files) else {
+        return false;
+    };
+    files
+        .filter_map(|file| fs::metadata(file.ok()?.path()).ok())
+        .any(|file| (file.dev(), file.ino()) == (lock.dev(), lock.ino()))
+}
+
+fn lock_of(device: &fs::Metadata, folder: &Path) -> PathBuf {
+    folder.join(format!("turntable-{:x}.lock", device.rdev()))
 }
 
 /// A serial port, opened exclusively.

@@ -8,8 +8,8 @@ use super::error::TurntableError;
 use super::grbl_client::{Table, straight};
 use super::plan::TurnPlan;
 use super::status::TableStatus;
-use super::supervisor::PositionReport;
-use super::sync::{self, Track, TrackError};
+use super::supervisor::{MotionFault, PositionReport};
+use super::sync::{self, Track};
 use super::wire::{ControllerState, Message};
 
 /// Rest before the start, until the table has stopped swinging.
@@ -86,24 +86,18 @@ impl<'table> Turn<'table> {
         })
     }
 
-    /// The plan it follows.
-    #[must_use]
-    pub fn plan(&self) -> &TurnPlan {
-        &self.plan
-    }
-
     /// Degrees since the speed became constant; negative before.
     fn gone(&self, report: &PositionReport) -> f64 {
         let angle = report.machine_deg - self.zero_deg - self.plan.constant_from_deg();
-        angle * self.plan.direction.sign()
+        angle * self.plan.sign
     }
 
-    /// Waits until the speed is constant; start and end of the time in which it is, extrapolated from the first
-    /// reports there, microseconds of the host's clock.
+    /// Waits until the speed is constant; returns since when it is, extrapolated from the first reports there,
+    /// microseconds of the host's clock.
     ///
     /// # Errors
     /// The fault that has ended the turn; the table has been stopped.
-    pub fn wait_constant(&mut self) -> Result<(i64, i64), TurntableError> {
+    pub fn wait_constant(&mut self) -> Result<i64, TurntableError> {
         let speed = self.plan.degrees_per_second;
         let ramp = self.table.travel_time(0.0, speed) + RAMP_SLACK;
         let found = self.table.link().wait(ramp, |supervisor| {
@@ -119,18 +113,15 @@ impl<'table> Turn<'table> {
         self.check()?;
         let Some(Some((report, gone))) = found else {
             self.stop()?;
-            return Err(super::error::MotionFault::Late.into());
+            return Err(MotionFault::Late.into());
         };
         let at_us = report.asked_us.map_or(report.came_us, |asked_us| {
             i64::midpoint(asked_us, report.came_us)
         });
-        let micros = |degrees: f64| (degrees / speed * 1e6).round() as i64;
-        let to_us = at_us + micros(self.plan.constant_deg - gone);
-        Ok((at_us - micros(gone), to_us))
+        Ok(at_us - (gone / speed * 1e6).round() as i64)
     }
 
-    /// Waits until the table rests at the turn's end, turns it back if the plan says so, and returns
-    /// its angles over time.
+    /// Waits until the table rests at the turn's end, turns it back, and returns its angles over time.
     ///
     /// # Errors
     /// The fault that has ended the turn; the table has been stopped. [`TurntableError::Track`] if
@@ -138,7 +129,7 @@ impl<'table> Turn<'table> {
     pub fn wait_end(self) -> Result<Track, TurntableError> {
         let (track, finished) = self.wait_rest();
         finished.unwind()?;
-        Ok(track?)
+        track
     }
 
     /// Waits until the table rests at the turn's end, and returns its angles over time. They are
@@ -146,20 +137,18 @@ impl<'table> Turn<'table> {
     /// its part at constant speed, which [`FinishedTurn::unwind`] reports.
     ///
     /// # Errors
-    /// [`TrackError`] in the first part of the result, if the angles cannot be determined.
-    pub fn wait_rest(mut self) -> (Result<Track, TrackError>, FinishedTurn<'table>) {
+    /// [`TurntableError::Track`] in the first part of the result, if the angles cannot be determined.
+    pub fn wait_rest(mut self) -> (Result<Track, TurntableError>, FinishedTurn<'table>) {
         let plan = &self.plan;
         let distance = (plan.end_deg() - plan.back_deg()).abs();
         let limit = self.table.travel_time(distance, plan.degrees_per_second);
         let arrived = self.table.wait_arrival(limit);
         let reports = self.leave();
-        let track = sync::fit(&reports, &self.expected());
-        let back_to = self.plan.unwind;
-        let back_to = back_to.then_some(self.zero_deg + self.plan.start_deg);
+        let track = sync::fit(&reports, &self.expected()).map_err(TurntableError::Track);
         let finished = FinishedTurn {
             table: self.table,
             arrived,
-            back_to,
+            back_to: self.zero_deg + self.plan.start_deg,
             zero_deg: self.zero_deg,
         };
         (track, finished)
@@ -240,24 +229,19 @@ impl Drop for Turn<'_> {
 pub struct FinishedTurn<'table> {
     table: &'table Table,
     arrived: Result<(), TurntableError>,
-    /// Where the turn began, degrees from machine zero; `None` if it is not to be unwound.
-    back_to: Option<f64>,
+    /// Where the turn began, degrees from machine zero.
+    back_to: f64,
     zero_deg: f64,
 }
 
 impl FinishedTurn<'_> {
-    /// Turns the table back to where the turn began, if the plan says so.
+    /// Turns the table back to where the turn began.
     ///
     /// # Errors
     /// The fault that has ended the turn or the way back; the table has been stopped.
     pub fn unwind(self) -> Result<(), TurntableError> {
         self.arrived?;
-        match self.back_to {
-            Some(machine_deg) => {
-                let speed = self.table.brisk();
-                self.table.go(machine_deg, speed, self.zero_deg)
-            }
-            None => Ok(()),
-        }
+        let speed = self.table.brisk();
+        self.table.go(self.back_to, speed, self.zero_deg)
     }
 }

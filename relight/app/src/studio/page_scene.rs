@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use relight_core::image::Transfer;
 use relight_photo::insert::{
-    DiscLamp, LightDescription, ObjectDescription, SceneDescription, SceneFault,
+    DiscLamp, InsertError, LightDescription, ObjectDescription, SceneDescription,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -87,7 +87,7 @@ impl PageScene {
         }
         match scene.check() {
             // A background alone is a picture too.
-            Ok(()) | Err(SceneFault::Objects(0)) => Ok(scene),
+            Ok(()) | Err(InsertError::Objects(0)) => Ok(scene),
             Err(fault) => Err(fault.into()),
         }
     }

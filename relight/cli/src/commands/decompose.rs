@@ -1,30 +1,22 @@
 //! `relight decompose`: photographs into normals, albedo, shading, highlight and light.
 
-use std::env;
 use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use clap::Args;
 use clap::builder::RangedU64ValueParser;
-use clap::{Args, ValueEnum};
-use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_core::parallel;
-use relight_photo::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, MaskSource, WORKING_SIDE,
-};
-use relight_photo::files::{
-    DecompositionFigures, DecompositionFiles, FoundPhotos, PhotoInput, PhotoReading,
-};
-use relight_photo::nets::{InferenceEngine, NetError, OnnxRuntime};
+use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, MaskSource};
+use relight_photo::files::{DecompositionFigures, DecompositionFiles, PhotoInput, PhotoReading};
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
-use relit_data::geometry::Rect;
 use serde_json::{Value, json};
 
 use crate::commands::CommandResult;
-use crate::photos::{NetworkArguments, is_at, name_unused};
-use crate::values::{NORMALS_Y, TRANSFERS, one_of};
+use crate::photos::{NetworkArguments, PhotoArguments, name_lost, outcome};
+use crate::values::{NORMALS_Y, one_of};
 
 /// Each photograph takes its memory, gigabytes where it is large.
 const MOST_SIDE_BY_SIDE: usize = 4;
@@ -42,19 +34,11 @@ Examples:
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
-    #[arg(required = true, value_name = "PHOTO")]
-    photos: Vec<PathBuf>,
+    #[command(flatten)]
+    photos: PhotoArguments,
     /// The folder for the results; several photographs have a folder each in it.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// A grey image as large as the photograph, white on the object; or a folder of such, <photo's name>.png
-    /// [default: the photograph's alpha, or what is not black before a black background].
-    #[arg(long, value_name = "FILE|DIR")]
-    mask: Option<PathBuf>,
-    /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
-    #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
-    rect: Option<Rect>,
     #[command(flatten)]
     network: NetworkArguments,
     /// Leave out the mirror image: faster, and a little worse.
@@ -67,28 +51,12 @@ pub(crate) struct Arguments {
     /// Which way y points in that network's normals [default: as MoGe-2 and Metric3D have it, else up].
     #[arg(long, value_parser = one_of(NORMALS_Y), value_name = "WAY", requires = "normals")]
     normals_y: Option<NormalsFrame>,
-    /// What computes the network.
-    #[arg(long, value_enum, default_value_t = EngineName::Tract)]
-    engine: EngineName,
-    /// How PNG, JPEG and WebP files are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
-    #[arg(long, value_parser = one_of(TRANSFERS))]
-    transfer: Option<Transfer>,
     /// Of each shard the first so many samples, which are spread over the turn.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     count: Option<u32>,
     /// How many photographs are decomposed side by side [default: as many as there are cores, at most 4].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum EngineName {
-    /// A part of this program.
-    Tract,
-    /// The library of ONNX Runtime at ORT_DYLIB_PATH, or where the system finds it: faster.
-    Onnxruntime,
-    /// ONNX Runtime where it is installed, else tract.
-    Auto,
 }
 
 impl Arguments {
@@ -98,14 +66,19 @@ impl Arguments {
     }
 
     fn frames_fault(&self) -> Option<String> {
-        let Some(frames) = self.photos.iter().find(|path| PhotoInput::has_frames(path)) else {
+        let Some(frames) = self
+            .photos
+            .photos
+            .iter()
+            .find(|path| PhotoInput::has_frames(path))
+        else {
             let given = self.count.is_some();
             return given.then(|| "--count is for shards, and there is none".to_owned());
         };
         let given = [
-            ("--mask", self.mask.is_some()),
-            ("--rect", self.rect.is_some()),
-            ("--transfer", self.transfer.is_some()),
+            ("--mask", self.photos.mask.is_some()),
+            ("--rect", self.photos.rect.is_some()),
+            ("--transfer", self.photos.transfer.is_some()),
         ];
         let (option, _) = given.into_iter().find(|(_, is_given)| *is_given)?;
         let frames = frames.display();
@@ -115,19 +88,12 @@ impl Arguments {
     }
 
     fn mask_fault(&self) -> Option<String> {
-        let mask = self.mask.as_ref().filter(|mask| !mask.is_dir())?;
-        let is_one = matches!(self.photos.as_slice(), [photo] if !photo.is_dir());
+        let mask = self.photos.mask.as_ref().filter(|mask| !mask.is_dir())?;
+        let is_one = matches!(self.photos.photos.as_slice(), [photo] if !photo.is_dir());
         (!is_one).then(|| {
             let mask = mask.display();
             format!("--mask {mask}: one mask belongs to one photograph; give a folder of masks")
         })
-    }
-
-    /// Whether one of the inputs is a folder or a shard.
-    fn has_set(&self) -> bool {
-        self.photos
-            .iter()
-            .any(|path| path.is_dir() || path.extension().is_some_and(|e| e == "tar"))
     }
 
     fn options(&self) -> DecomposeOptions {
@@ -137,19 +103,10 @@ impl Arguments {
         }
     }
 
-    fn reading(&self) -> PhotoReading {
-        PhotoReading {
-            mask: self.mask.clone(),
-            rectangle: self.rect,
-            transfer: self.transfer,
-        }
-    }
-
     /// The network, and how its weights are named.
     fn decomposer(&self, console: Console) -> Result<(Decomposer, String), DecomposeError> {
         let (weights, name) = self.network.weights()?;
-        let engine = self.engine.engine(console)?;
-        let mut decomposer = Decomposer::with_engine(&weights, WORKING_SIDE, engine)?;
+        let mut decomposer = Decomposer::new(&weights)?;
         if let Some(path) = &self.normals {
             decomposer.read_normals(path, self.normals_y)?;
             let name = decomposer.normals_network().unwrap_or_default();
@@ -160,36 +117,10 @@ impl Arguments {
     }
 }
 
-impl EngineName {
-    fn engine(self, console: Console) -> Result<InferenceEngine, NetError> {
-        let named = env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());
-        let load = || {
-            let path = named
-                .clone()
-                .unwrap_or_else(|| OnnxRuntime::library().into());
-            OnnxRuntime::load(path.as_ref()).map(InferenceEngine::OnnxRuntime)
-        };
-        match self {
-            Self::Tract => Ok(InferenceEngine::Tract),
-            Self::Onnxruntime => load(),
-            Self::Auto => Ok(load().unwrap_or_else(|fault| {
-                // Nobody asked for a library that is not installed.
-                if named.is_some() || !matches!(fault, NetError::NoLibrary { .. }) {
-                    let text = with_causes(&fault);
-                    let event = json!({ "event": "engine", "message": text });
-                    console.warn_with(&format!("tract is used: {text}"), &event);
-                }
-                InferenceEngine::Tract
-            })),
-        }
-    }
-}
-
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let FoundPhotos { inputs, mut unused } = PhotoInput::find(&arguments.photos, arguments.count)?;
-    unused.retain(|file| !is_at(&file.path, arguments.mask.as_deref(), &arguments.output));
-    name_unused(&unused, console);
-    let own_folders = inputs.len() > 1 || arguments.has_set();
+    let found = (arguments.photos).find(arguments.count, &arguments.output, console)?;
+    let inputs = &found.inputs;
+    let own_folders = inputs.len() > 1 || arguments.photos.has_set();
     let run = Run::new(arguments, own_folders, console)?;
     if !run.own_folders
         && let [input] = inputs.as_slice()
@@ -200,9 +131,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     }
     let bar = console.progress(inputs.len() as u64, "photographs");
     let failed = |input: &PhotoInput, message: &str| {
-        let text = format!("{}: {message}", input.place());
-        let event = json!({ "event": "failed", "photo": input.place(), "message": message });
-        bar.suspend(|| console.warn_with(&text, &event));
+        bar.suspend(|| name_lost(input, message, console));
     };
     let decompose = |input: &PhotoInput| {
         let result = parallel::caught(|| run.decompose(input));
@@ -217,15 +146,10 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let side_by_side = arguments
         .threads
         .unwrap_or_else(|| rayon::current_num_threads().min(MOST_SIDE_BY_SIDE));
-    let whole = parallel::jobs(&inputs, side_by_side, decompose);
+    let whole = parallel::jobs(inputs, side_by_side, decompose);
     let lost = whole.iter().filter(|is_whole| !**is_whole).count();
     bar.finish_and_clear();
-    match lost {
-        0 if unused.is_empty() => Ok(Outcome::Whole),
-        0 => Ok(Outcome::Incomplete),
-        _ if lost == inputs.len() => Err("no photograph could be decomposed".into()),
-        _ => Ok(Outcome::Incomplete),
-    }
+    outcome(&found, lost, "decomposed")
 }
 
 /// What is said of a photograph.
@@ -255,7 +179,7 @@ impl Run {
             decomposer,
             weights,
             options: arguments.options(),
-            reading: arguments.reading(),
+            reading: arguments.photos.reading(),
             output: arguments.output.clone(),
             own_folders,
         })
@@ -308,7 +232,6 @@ impl Run {
             "photo": input.place(),
             "output": out,
             "seconds": seconds,
-            "engine": self.decomposer.engine().name(),
             "figures": figures,
         });
         Ok(Decomposed { text, event })

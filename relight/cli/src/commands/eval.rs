@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
-use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
-use relight_core::reader::{JudgedImages, TruthLayout, TruthSet};
+use relight_core::reader::{TruthLayout, TruthSet};
 use relight_core::render::{DiffuseForm, SpecularForm};
 use relight_eval::{
     EvalProgress, IntrinsicInput, Predictions, RelightMethod, RelightingRecipe, RelightingSet,
-    ScoreTable, TurnMethod, evaluate_highlights, evaluate_intrinsic, evaluate_light,
-    evaluate_normals, evaluate_ordinal, evaluate_relighting, evaluate_turns, make_relighting,
+    ScoreTable, evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals,
+    evaluate_relighting, evaluate_turns, make_relighting,
 };
 use relight_photo::decompose::Decomposer;
 use relight_photo::nets::Weights;
@@ -26,7 +25,7 @@ use serde_json::json;
 use crate::commands::CommandResult;
 use crate::library::read_library;
 use crate::shipped;
-use crate::values::{Choices, DIFFUSE_FORMS, NORMALS_Y, TRANSFERS, one_of};
+use crate::values::{Choices, DIFFUSE_FORMS, NORMALS_Y, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -80,8 +79,6 @@ enum Protocol {
     Relighting(RelightingArguments),
     /// Whole turns in unknown rooms: normals, albedo, and whether what is said to be sure is right.
     Turn(TurnArguments),
-    /// Albedo as people judge it: WHDR on the folder of Intrinsic Images in the Wild.
-    Whdr(CommonArguments),
 }
 
 #[derive(Args)]
@@ -89,9 +86,6 @@ struct TurnArguments {
     /// Turns with their ground truth, as relight synth --turn writes them.
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// How turns are solved; may be given several times [default: all ways].
-    #[arg(long, value_name = "HOW", value_parser = one_of(METHODS))]
-    method: Vec<TurnMethod>,
     /// Weights of the network of turns [default: those that come with the program].
     #[arg(long, value_name = "FILE")]
     turn_network: Option<PathBuf>,
@@ -108,10 +102,6 @@ struct CommonArguments {
     /// A folder of estimates, with a folder for each image. May be given several times.
     #[arg(long, value_name = "DIR")]
     predictions: Vec<PathBuf>,
-    /// How PNG files of colour among the estimates are encoded; EXR is linear [default: as decomposition.json says, linear
-    /// where there is none].
-    #[arg(long, value_name = "SPACE", value_parser = one_of(TRANSFERS))]
-    transfer: Option<Transfer>,
     /// Which way y points in estimated normals.
     #[arg(long, value_name = "WAY", default_value = "up", value_parser = one_of(NORMALS_Y))]
     normals_y: NormalsFrame,
@@ -171,15 +161,6 @@ struct RelightingArguments {
     panoramas: Option<PathBuf>,
 }
 
-const METHODS: Choices<TurnMethod> = &[
-    (
-        "turn",
-        "In a light that is not known",
-        TurnMethod::UnknownLight,
-    ),
-    ("light", "In the true light", TurnMethod::KnownLight),
-];
-
 const INPUTS: Choices<IntrinsicInput> = &[
     ("diffuse", "Without highlights", IntrinsicInput::Diffuse),
     ("original", "As it was taken", IntrinsicInput::Original),
@@ -195,7 +176,7 @@ impl Arguments {
             | Protocol::Highlight { set } => {
                 (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
             }
-            Protocol::Relighting(_) | Protocol::Turn(_) | Protocol::Whdr(_) => None,
+            Protocol::Relighting(_) | Protocol::Turn(_) => None,
         }
     }
 
@@ -208,7 +189,6 @@ impl Arguments {
             | Protocol::Light { set, .. }
             | Protocol::Highlight { set } => &set.common,
             Protocol::Relighting(arguments) => &arguments.common,
-            Protocol::Whdr(common) => common,
         };
         common.output.as_deref()
     }
@@ -222,7 +202,7 @@ impl CommonArguments {
     }
 
     fn predictions(&self) -> Vec<Predictions> {
-        let folder = |path: &PathBuf| Predictions::new(path.clone(), self.transfer, self.normals_y);
+        let folder = |path: &PathBuf| Predictions::new(path.clone(), self.normals_y);
         self.predictions.iter().map(folder).collect()
     }
 }
@@ -243,55 +223,32 @@ impl SetArguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let whole = |table: ScoreTable| (table, Outcome::Whole);
     let (table, outcome) = match &arguments.protocol {
-        Protocol::Mit { set, input } => mit(set, *input, console).map(whole),
-        Protocol::Normals { set } => normals(set, console).map(whole),
-        Protocol::Light { set, diffuse } => light(set, *diffuse, console).map(whole),
-        Protocol::Highlight { set } => highlight(set, console).map(whole),
-        Protocol::Relighting(arguments) => relighting(arguments, console),
-        Protocol::Whdr(common) => ordinal(common, console).map(whole),
+        Protocol::Mit { set, .. }
+        | Protocol::Normals { set }
+        | Protocol::Light { set, .. }
+        | Protocol::Highlight { set } => {
+            (images(&arguments.protocol, set, console)?, Outcome::Whole)
+        }
+        Protocol::Relighting(arguments) => relighting(arguments, console)?,
         Protocol::Turn(arguments) => return turns(arguments, console),
-    }?;
+    };
     report(&table, arguments.output(), console)?;
     Ok(outcome)
 }
 
-type Evaluated = Result<ScoreTable, Box<dyn Error>>;
-
-fn mit(arguments: &SetArguments, input: IntrinsicInput, console: Console) -> Evaluated {
+/// The table of a protocol over single images.
+fn images(
+    protocol: &Protocol,
+    arguments: &SetArguments,
+    console: Console,
+) -> Result<ScoreTable, Box<dyn Error>> {
     let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
-    with_progress("evaluating", console, |progress| {
-        evaluate_intrinsic(&set, &split, input, &found, progress)
-    })
-}
-
-fn normals(arguments: &SetArguments, console: Console) -> Evaluated {
-    let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
-    with_progress("evaluating", console, |progress| {
-        evaluate_normals(&set, &split, &found, progress)
-    })
-}
-
-fn light(arguments: &SetArguments, form: DiffuseForm, console: Console) -> Evaluated {
-    let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
-    with_progress("evaluating", console, |progress| {
-        evaluate_light(&set, &split, form, &found, progress)
-    })
-}
-
-fn highlight(arguments: &SetArguments, console: Console) -> Evaluated {
-    let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
-    with_progress("evaluating", console, |progress| {
-        evaluate_highlights(&set, &split, &found, progress)
-    })
-}
-
-fn ordinal(common: &CommonArguments, console: Console) -> Evaluated {
-    let images = JudgedImages::open(&common.data)?;
-    let (split, found) = (common.split("all of"), common.predictions());
-    with_progress("evaluating", console, |progress| {
-        evaluate_ordinal(&images, &split, &found, progress)
+    with_progress("evaluating", console, |progress| match protocol {
+        Protocol::Mit { input, .. } => evaluate_intrinsic(&set, &split, *input, &found, progress),
+        Protocol::Light { diffuse, .. } => evaluate_light(&set, &split, *diffuse, &found, progress),
+        Protocol::Highlight { .. } => evaluate_highlights(&set, &split, &found, progress),
+        _ => evaluate_normals(&set, &split, &found, progress),
     })
 }
 
@@ -318,7 +275,7 @@ fn relighting(
         RelightMethod::Oracle(SpecularForm::Lobe),
     ];
     let found = common.predictions().into_iter();
-    methods.extend(found.map(|folder| RelightMethod::Predictions(folder, SpecularForm::Lobe)));
+    methods.extend(found.map(RelightMethod::Predictions));
     let table = with_progress("evaluating", console, |progress| {
         evaluate_relighting(&set, &common.split("all of"), &methods, progress)
     })?;
@@ -359,12 +316,8 @@ fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
         .file_name()
         .unwrap_or(arguments.data.as_os_str());
     let split = name.to_string_lossy();
-    let methods = match arguments.method.as_slice() {
-        [] => &TurnMethod::ALL,
-        methods => methods,
-    };
     let table = with_progress("solving", console, |progress| {
-        evaluate_turns(&arguments.data, &split, methods, &networks, progress)
+        evaluate_turns(&arguments.data, &split, &networks, progress)
     })?;
     write_json(&table, arguments.output.as_deref())?;
     let event = json!({ "event": "table", "table": table });

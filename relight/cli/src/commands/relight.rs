@@ -6,25 +6,22 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use relight_core::image::{Extent, Linear, Rgb, Transfer};
+use relight_core::image::Extent;
 use relight_photo::files::{
-    FoundPhotos, InsertionError, MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading,
-    write_picture,
+    MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading, write_picture,
 };
 use relight_photo::insert::{
-    Backdrop, InsertError, LightSource, MaterialChange, ObjectGloss, PanoramaView, Shot, Subject,
-    WhiteBalance, likeness,
+    Backdrop, DiscLamp, InsertError, LightSource, PanoramaView, Shot, Subject, WhiteBalance,
+    likeness,
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
-use relit_data::geometry::Rect;
 use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
-use crate::light::NewLightArguments;
-use crate::photos::{Network, NetworkArguments, is_at, name_unused, not_an_input};
-use crate::values::{TRANSFERS, WHITE_BALANCES, degrees, one_of, within};
+use crate::photos::{Network, NetworkArguments, PhotoArguments, name_lost, not_an_input, outcome};
+use crate::values::{WHITE_BALANCES, degrees, one_of, within};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -34,31 +31,36 @@ Examples:
       in the light of a warm lamp from the right, at its own place
   relight relight mug.jpg --mask mug-mask.png --light studio.hdr --turn 360 --seconds 10 -o turn.mp4
       a video in which the light turns once
-  relight relight photos --mask masks --lamp -45,40 --compare -o relit
-      many photographs: relit/<name>.png, each beside the photograph and naive insertion";
+  relight relight photos --mask masks --lamp -45,40 -o relit
+      many photographs: relit/<name>.png";
 
 /// The longest side of a video's frames where nothing is said.
 const MOVIE_SIDE: usize = 1080;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
-    #[arg(required = true, value_name = "PHOTO")]
-    photos: Vec<PathBuf>,
+    #[command(flatten)]
+    photos: PhotoArguments,
     /// The picture (.png, .jpg, .exr), or for --turn a video (.mp4, .webm); of several photographs a folder. It is made where
     /// there is none.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// A grey image as large as the photograph, white on the object; or a folder of such, <photo's name>.png
-    /// [default: the photograph's alpha, or what is not black before a black background].
-    #[arg(long, value_name = "FILE|DIR")]
-    mask: Option<PathBuf>,
-    /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
-    #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
-    rect: Option<Rect>,
-    #[command(flatten)]
-    light: NewLightArguments,
-    /// Keep the photograph's own light, as it was estimated, to change its exposure or the material.
+    /// The light: an HDR or EXR panorama, whose middle is what the viewer sees behind the object, or a text file of
+    /// coefficients as relight writes them.
+    #[arg(long, value_name = "FILE", conflicts_with = "lamp")]
+    light: Option<PathBuf>,
+    /// The light: a lamp at so many degrees about the vertical (0 at the viewer's side, 90 on the right, 180 behind) and above
+    /// the horizon, in a colour (#ffd9b0 or 3200K), so many degrees large [default: white, 30].
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
+        allow_hyphen_values = true
+    )]
+    lamp: Option<DiscLamp>,
+    /// Even light beside a lamp, as a part of it.
+    #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = within(0.0..=10.0, "a part"), requires = "lamp")]
+    ambient: f64,
+    /// Keep the photograph's own light, as it was estimated, to change its exposure or to turn it.
     #[arg(long, conflicts_with_all = ["light", "lamp"])]
     own_light: bool,
     /// Turn the light about the vertical first, from the viewer to the right.
@@ -82,32 +84,17 @@ pub(crate) struct Arguments {
     /// How many degrees of a panorama the picture's longer side shows.
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = within(1.0..=150.0, "degrees"))]
     field: f64,
-    /// How far the camera looks down into a panorama.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = within(-89.0..=89.0, "degrees"), allow_hyphen_values = true)]
-    down: f64,
-    /// Put the photograph and naive insertion beside the result.
-    #[arg(long)]
-    compare: bool,
     /// How the colour of the light is shown.
     #[arg(long, value_parser = one_of(WHITE_BALANCES), default_value = "light")]
     white_balance: WhiteBalance,
     /// Brightness in stops. With 0 the strongest light is as strong as in the photograph.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = within(-20.0_f32..=20.0, "stops"), allow_hyphen_values = true)]
     exposure: f32,
-    /// Multiply the object's albedo with a colour, linear.
-    #[arg(long, value_name = "R,G,B", value_parser = tint)]
-    tint: Option<[f32; 3]>,
-    /// Make the object glossy: the part of even light that it reflects, and its smoothness α (5 to 200); 0,1 is diffuse.
-    #[arg(long, value_name = "PART,SMOOTHNESS", value_parser = gloss)]
-    gloss: Option<ObjectGloss>,
     /// The longest side of the result, pixels [default: the photograph's; of a video at most 1080].
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=16_384))]
     size: Option<u32>,
     #[command(flatten)]
     network: NetworkArguments,
-    /// How PNG, JPEG and WebP photographs are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
-    #[arg(long, value_parser = one_of(TRANSFERS))]
-    transfer: Option<Transfer>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -125,12 +112,12 @@ enum BackgroundName {
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
-        if self.light.light.is_none() && self.light.lamp.is_none() && !self.own_light {
+        if self.light.is_none() && self.lamp.is_none() && !self.own_light {
             return Some(
                 "give the new light by --light FILE or --lamp AZIMUTH,ELEVATION".to_owned(),
             );
         }
-        let has_panorama = self.light.light.is_some();
+        let has_panorama = self.light.is_some();
         if matches!(self.background, Some(BackgroundName::Light)) && !has_panorama {
             return Some(
                 "--background light: there is no panorama; give one by --light".to_owned(),
@@ -155,33 +142,16 @@ impl Arguments {
 
     /// Whether results go into a folder.
     fn is_set(&self) -> bool {
-        let is_many =
-            |path: &PathBuf| path.is_dir() || path.extension().is_some_and(|e| e == "tar");
-        self.photos.len() > 1 || self.photos.iter().any(is_many)
+        self.photos.photos.len() > 1 || self.photos.has_set()
     }
 
-    fn reading(&self) -> PhotoReading {
-        PhotoReading {
-            mask: self.mask.clone(),
-            rectangle: self.rect,
-            transfer: self.transfer,
+    /// The light that is asked for, if any is.
+    fn new_light(&self) -> Result<Option<LightSource>, InsertError> {
+        if let Some(lamp) = self.lamp {
+            let ambient = self.ambient;
+            return Ok(Some(LightSource::Lamp(DiscLamp { ambient, ..lamp })));
         }
-    }
-
-    fn change(&self) -> MaterialChange {
-        MaterialChange {
-            tint: self.tint.unwrap_or([1.0; 3]),
-            gloss: self.gloss,
-        }
-    }
-
-    /// The picture after the light has turned by so many radians, as it is written.
-    fn shown(&self, shot: &Shot<'_>, turn: f64) -> Result<Rgb<Linear>, InsertError> {
-        if self.compare {
-            shot.compared(turn)
-        } else {
-            shot.picture(turn)
-        }
+        self.light.as_deref().map(LightSource::read).transpose()
     }
 
     fn longest(&self) -> Option<usize> {
@@ -213,17 +183,16 @@ struct Run<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let FoundPhotos { inputs, mut unused } = PhotoInput::find(&arguments.photos, None)?;
-    unused.retain(|file| !is_at(&file.path, arguments.mask.as_deref(), &arguments.output));
-    name_unused(&unused, console);
+    let found = arguments.photos.find(None, &arguments.output, console)?;
+    let inputs = &found.inputs;
     let run = Run {
         arguments,
-        light: match arguments.light.read()? {
+        light: match arguments.new_light()? {
             Some(light) => Some(arguments.white_balance.shown(light)?),
             None => None,
         },
         network: OnceLock::new(),
-        reading: arguments.reading(),
+        reading: arguments.photos.reading(),
         photos: inputs.iter().filter_map(file_of).collect(),
     };
     if !arguments.is_set()
@@ -233,23 +202,13 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         return Ok(Outcome::Whole);
     }
     let mut lost = 0;
-    for input in &inputs {
+    for input in inputs {
         if let Err(error) = run.relight(input, console) {
             lost += 1;
-            let message = with_causes(error.as_ref());
-            let text = format!("{}: {message}", input.place());
-            console.warn_with(
-                &text,
-                &json!({ "event": "failed", "photo": input.place(), "message": message }),
-            );
+            name_lost(input, &with_causes(error.as_ref()), console);
         }
     }
-    match lost {
-        0 if unused.is_empty() => Ok(Outcome::Whole),
-        0 => Ok(Outcome::Incomplete),
-        _ if lost == inputs.len() => Err("no photograph could be relit".into()),
-        _ => Ok(Outcome::Incomplete),
-    }
+    outcome(&found, lost, "relit")
 }
 
 impl Run<'_> {
@@ -277,19 +236,12 @@ impl Run<'_> {
         let light = source.light()?;
         let backdrop = self.backdrop(photo.picture.planes().extent());
         let exposure = arguments.exposure.exp2();
-        let shot = Shot::new(
-            &photo.picture,
-            &subject,
-            &light,
-            arguments.change(),
-            backdrop,
-            exposure,
-        )?;
+        let shot = Shot::new(&photo.picture, &subject, &light, backdrop, exposure)?;
         let start = Instant::now();
         let frames = match OutputKind::of(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
             _ => {
-                let picture = arguments.shown(&shot, arguments.turned.to_radians())?;
+                let picture = shot.picture(arguments.turned.to_radians())?;
                 write_picture(&output, &picture)?;
                 1
             }
@@ -321,12 +273,13 @@ impl Run<'_> {
             PhotoInput::check_result(output)?;
         }
         let mask = arguments
+            .photos
             .mask
             .as_deref()
             .map(|mask| PhotoReading::mask_path(mask, name));
         let mut inputs: Vec<PathBuf> = mask.into_iter().collect();
         inputs.extend(self.photos.iter().cloned());
-        inputs.extend(arguments.light.light.clone());
+        inputs.extend(arguments.light.clone());
         not_an_input(output, &inputs)?;
         // What lies in the way of a folder is told before the work.
         if let Some(folder) = output.parent()
@@ -342,7 +295,7 @@ impl Run<'_> {
         let grey = Backdrop::Even([0.18; 3]);
         let panorama = || match &self.light {
             Some(LightSource::Panorama(panorama)) => {
-                let view = PanoramaView::new(extent, arguments.field, arguments.down);
+                let view = PanoramaView::new(extent, arguments.field, 0.0);
                 Some(Backdrop::Panorama(view, panorama.clone()))
             }
             _ => None,
@@ -364,7 +317,7 @@ impl Run<'_> {
         output: &Path,
         format: MovieFormat,
         console: Console,
-    ) -> Result<u32, InsertionError> {
+    ) -> Result<u32, InsertError> {
         let arguments = self.arguments;
         let frames = (arguments.seconds * f64::from(arguments.fps))
             .round()
@@ -374,7 +327,7 @@ impl Run<'_> {
         let frame = |frame: u32| {
             let part = f64::from(frame) / f64::from(frames);
             let turn = (arguments.turned + all * part).to_radians();
-            Ok::<_, InsertionError>(arguments.shown(shot, turn)?.encode())
+            Ok::<_, InsertError>(shot.picture(turn)?.encode())
         };
         let encoding = (format, arguments.fps);
         MovieWriter::write_frames(output, encoding, frames, frame, || bar.inc(1))?;
@@ -387,31 +340,5 @@ fn file_of(input: &PhotoInput) -> Option<PathBuf> {
     match input {
         PhotoInput::File(path) => Some(path.clone()),
         _ => None,
-    }
-}
-
-fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
-    let numbers: Vec<f32> = text
-        .split(',')
-        .map(|part| {
-            part.trim()
-                .parse()
-                .ok()
-                .filter(|value| (0.0..=1000.0).contains(value))
-        })
-        .collect::<Option<_>>()?;
-    numbers.try_into().ok()
-}
-
-fn tint(text: &str) -> Result<[f32; 3], String> {
-    numbers(text).ok_or_else(|| "give R,G,B: three factors that are not negative".to_owned())
-}
-
-fn gloss(text: &str) -> Result<ObjectGloss, String> {
-    match numbers(text) {
-        Some([part, smoothness]) if part <= 1.0 && smoothness > 0.0 => {
-            Ok(ObjectGloss::of_part(part, smoothness))
-        }
-        _ => Err("give PART,SMOOTHNESS: a part from 0 to 1, and α above 0".to_owned()),
     }
 }

@@ -16,7 +16,7 @@ use relight_photo::nets::{NetError, Weights};
 use relight_train::{
     DecomposeSettings, DecomposeTask, Launch, PaperInputs, PaperPhase, PaperSettings, PaperTask,
     ProcessGroup, Resources, Run, RunOutcome, RunSettings, TrainError, TrainObserver, TrainingTask,
-    TurnNetworkSettings, TurnNetworkTask, cuda_device, read_settings,
+    TurnNetworkSettings, TurnNetworkTask, cuda_device, keep_memory, read_settings,
 };
 use relit_console::{Console, Outcome, ProgressBar};
 use serde::Serialize;
@@ -247,6 +247,7 @@ impl RunArguments {
     /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads. What
     /// this process has, and the group of all.
     fn join(&self, console: Console) -> Result<(Resources, Option<ProcessGroup>), Box<dyn Error>> {
+        keep_memory();
         let launch = Launch::from_variables(|name| env::var(name).ok())?;
         if let Some(threads) = self.threads {
             tch::set_num_threads(threads as i32);

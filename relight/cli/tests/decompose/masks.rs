@@ -140,11 +140,6 @@ fn a_photograph_that_is_held_otherwise_is_turned_and_a_mask_of_how_it_is_stored_
     });
     let error = load(&held, &with_mask(side)).unwrap_err().to_string();
     assert!(error.contains("as the photograph is stored"), "{error}");
-    // Of the picture upside down, only its record tells.
-    let record = r#"{"schema": "relit.mask/1", "source": {"video": "held.jpg", "frame": 0}}"#;
-    std::fs::write(displayed.with_extension("json"), record).unwrap();
-    let error = load(&held, &with_mask(displayed)).unwrap_err().to_string();
-    assert!(error.contains("before it was turned"), "{error}");
 }
 
 fn mask_of_displayed(folder: &Folder) -> std::path::PathBuf {

@@ -1,9 +1,7 @@
-//! Everything that knows paths: pictures and light in files, an object's maps, folders of results.
+//! Everything that knows paths: pictures and light in files, folders of results.
 
-mod maps;
 mod pictures;
 mod result_folder;
 
-pub use maps::{Map, MapFiles};
 pub use pictures::{read_planes, write_exr, write_jpeg, write_png, write_png_of};
 pub use result_folder::{FolderFault, ResultFolder};

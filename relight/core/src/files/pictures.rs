@@ -1,10 +1,10 @@
 //! Pictures, panoramas, maps of normals, coefficients of light and captured objects in files.
 
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::Path;
 
-use relit_data::durable::{Partial, write_whole};
+use relit_data::durable::write_whole;
 use relit_data::text;
 
 use crate::captured_object::{CapturedObject, CapturedObjectError};
@@ -201,19 +201,6 @@ impl CapturedObject {
         file.read_to_end(&mut content).map_err(&read)?;
         let is_none = CapturedObjectError::file(path, "is no object that relight can light");
         Self::from_bytes(&content).map_err(is_none)
-    }
-
-    /// Whether a file can be written at a path.
-    ///
-    /// # Errors
-    /// Where its folder is not there or cannot be written, or it is a folder itself.
-    pub fn check(path: &Path) -> Result<(), CapturedObjectError> {
-        let write = CapturedObjectError::file(path, "cannot be written");
-        if path.is_dir() {
-            return Err(write(io::ErrorKind::IsADirectory.into()));
-        }
-        // Such a file is gone when it is dropped.
-        Partial::create(path).map(drop).map_err(write)
     }
 
     /// Writes the file, whole or not at all.

@@ -1,7 +1,7 @@
 //! Colour images that know how their values are encoded.
 //!
 //! Everything inside is linear: only [`Rgb<Linear>`] can be rendered, added or measured. Files hold
-//! [`Srgb`] or [`Gamma22`] values, and turning one into the other is always written out.
+//! [`Srgb`] values, or values to the power 1 / 2.2, and turning one into the other is always written out.
 
 use std::fmt::Debug;
 use std::marker::PhantomData;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Planes;
 
-/// How colour values stand for light. [`Linear`], [`Srgb`] or [`Gamma22`].
+/// How colour values stand for light: [`Linear`] or [`Srgb`].
 pub trait ColourSpace: Copy + Debug + Send + Sync + 'static {
     /// The light that an encoded value stands for; 1 is white. Negative values are mirrored.
     fn to_linear(encoded: f32) -> f32;
@@ -26,10 +26,6 @@ pub enum Linear {}
 /// Values encoded by the transfer function of sRGB (IEC 61966-2-1), 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Srgb {}
-
-/// Values encoded by the power 1 / 2.2, 0 to 1: the paper's backgrounds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Gamma22 {}
 
 impl ColourSpace for Linear {
     fn to_linear(encoded: f32) -> f32 {
@@ -51,16 +47,6 @@ impl ColourSpace for Srgb {
     }
 }
 
-impl ColourSpace for Gamma22 {
-    fn to_linear(encoded: f32) -> f32 {
-        encoded.abs().powf(2.2).copysign(encoded)
-    }
-
-    fn from_linear(light: f32) -> f32 {
-        light.abs().powf(1.0 / 2.2).copysign(light)
-    }
-}
-
 /// How the integer values of a file are encoded, where that is known only at run time. Files of
 /// floating point values (EXR, HDR) are always linear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
@@ -70,7 +56,7 @@ pub enum Transfer {
     Linear,
     /// As in [`Srgb`].
     Srgb,
-    /// As in [`Gamma22`].
+    /// By the power 1 / 2.2: the paper's backgrounds.
     Gamma22,
 }
 
@@ -157,7 +143,6 @@ mod tests {
     fn encoding_and_decoding_cancel() {
         comes_back::<Linear>();
         comes_back::<Srgb>();
-        comes_back::<Gamma22>();
     }
 
     #[test]

@@ -11,7 +11,7 @@ mod reduced;
 mod resize;
 
 pub use codec::{Depth, Samples, StoredImage, encode_exr, encode_jpeg};
-pub use colour::{ColourSpace, Gamma22, Linear, Rgb, Srgb, Transfer};
+pub use colour::{ColourSpace, Linear, Rgb, Srgb, Transfer};
 pub use colour_image::ColourImage;
 pub use error::{ImageError, check_extent};
 pub use extent::Extent;

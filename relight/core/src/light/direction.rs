@@ -52,16 +52,6 @@ impl Direction {
         dot(self.0, other.0)
     }
 
-    /// Half way between the two; none where they are opposite.
-    #[must_use]
-    pub fn half_way_to(self, other: Self) -> Option<Self> {
-        let [x, y, z] = [0, 1, 2].map(|i| self.0[i] + other.0[i]);
-        // What is left of opposite vectors is rounding.
-        (dot([x, y, z], [x, y, z]) > 1e-24)
-            .then(|| Self::new(x, y, z))
-            .flatten()
-    }
-
     /// A unit vector that was made by arithmetic which keeps the length.
     pub(super) const fn from_unit(components: [f64; 3]) -> Self {
         Self(components)
@@ -89,14 +79,5 @@ mod tests {
             let d = Direction::new(3.0 * scale, 0.0, 4.0 * scale).unwrap();
             assert!((d.components()[0] - 0.6).abs() < 1e-12, "{d:?}");
         }
-    }
-
-    #[test]
-    fn the_half_vector_has_half_the_polar_angle_and_the_same_azimuth() {
-        let light = Direction::from_angles(2.4, 0.7);
-        let half = light.half_way_to(Direction::VIEWER).unwrap();
-        assert!(half.dot(Direction::from_angles(1.2, 0.7)) > 1.0 - 1e-12);
-        let behind = Direction::from_unit([0.0, 0.0, -1.0]);
-        assert_eq!(behind.half_way_to(Direction::VIEWER), None);
     }
 }

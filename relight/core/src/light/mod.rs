@@ -31,4 +31,3 @@ pub use order::Order;
 pub use panorama::{DrawnLight, LightSampler, Panorama};
 pub(crate) use quadrature::Quadrature;
 pub use rotation::Rotation;
-pub use wigner::ShRotation;

@@ -11,7 +11,7 @@ use super::LightError;
 /// | [`Order::ZERO`] | 0 | even light |
 /// | [`Order::TWO`] | 2 | the paper's: light that is estimated |
 /// | [`Order::GLOSS`] | 6 | what the gloss of a turning object shows of its light |
-/// | [`Order::LAMP`] | 8 | a lamp that goes round an object in a video |
+/// | [`Order::LAMP`] | 8 | rooms with lamps around an object on a table |
 /// | [`Order::HIGHLIGHT`] | 24 | panoramas and lamps that are given for a photograph: sharp enough for highlights |
 /// | [`Order::RENDER`] | 48 | a panorama that lights given maps, where nothing else is asked for |
 /// | [`Order::HIGHEST`] | 64 | the highest that can be asked for |

@@ -1,65 +1,42 @@
 //! Rotation of coefficients by Wigner matrices of the real spherical harmonics.
 
-use super::{Order, Rotation, ShLight};
+use super::{Rotation, ShLight};
 
-/// What a [`Rotation`] does to the coefficients of light: one square matrix a band.
-///
-/// Ivanic and Ruedenberg, *Rotation Matrices for Real Spherical Harmonics*, J. Phys. Chem. 100 (1996),
-/// with their correction of 1998: the matrix of band l follows from those of bands 1 and l - 1.
-///
-/// ```
-/// use relight_core::light::{Direction, Order, Rotation, ShLight, ShRotation};
-///
-/// let mut light = ShLight::dark(Order::TWO);
-/// light.coefficients_mut()[2] = [1.0; 3]; // Y_1^0, from the viewer
-/// let turn = Rotation::about(Direction::UP, 0.4);
-/// let turned = ShRotation::new(&turn, Order::TWO).apply(&light);
-/// let from = turn.apply(Direction::VIEWER);
-/// assert!((turned.radiance(from)[0] - light.radiance(Direction::VIEWER)[0]).abs() < 1e-12);
-/// ```
-#[derive(Debug, Clone)]
-pub struct ShRotation {
-    bands: Vec<Band>,
-}
-
-impl ShRotation {
-    /// The matrices of a rotation for all bands of `order`.
+impl ShLight {
+    /// The light after a rotation: what came from d comes from where d is turned to.
+    ///
+    /// Ivanic and Ruedenberg, *Rotation Matrices for Real Spherical Harmonics*, J. Phys. Chem. 100 (1996),
+    /// with their correction of 1998: the matrix of band l follows from those of bands 1 and l - 1.
+    ///
+    /// ```
+    /// use relight_core::light::{Direction, Order, Rotation, ShLight};
+    ///
+    /// let mut light = ShLight::dark(Order::TWO);
+    /// light.coefficients_mut()[2] = [1.0; 3]; // Y_1^0, from the viewer
+    /// let turn = Rotation::about(Direction::UP, 0.4);
+    /// let turned = light.rotated(&turn);
+    /// let from = turn.apply(Direction::VIEWER);
+    /// assert!((turned.radiance(from)[0] - light.radiance(Direction::VIEWER)[0]).abs() < 1e-12);
+    /// ```
     #[must_use]
-    pub fn new(rotation: &Rotation, order: Order) -> Self {
+    pub fn rotated(&self, rotation: &Rotation) -> Self {
         let mut bands = vec![Band::zeroth()];
-        if order.get() >= 1 {
+        if self.order().get() >= 1 {
             bands.push(Band::first(rotation));
         }
-        for l in 2..=order.get() {
+        for l in 2..=self.order().get() {
             let next = Band::after(&bands[l - 1], &bands[1]);
             bands.push(next);
         }
-        Self { bands }
-    }
-
-    /// The light after the rotation: what came from d comes from where d is turned to. Bands beyond
-    /// the order of the matrices are left out.
-    #[must_use]
-    pub fn apply(&self, light: &ShLight) -> ShLight {
-        let mut turned = light.clone();
-        let bands = light.order().get().min(self.bands.len() - 1);
-        for (l, band) in self.bands[..=bands].iter().enumerate() {
+        let mut turned = self.clone();
+        for (l, band) in bands.iter().enumerate() {
             let range = l * l..(l + 1) * (l + 1);
-            let from = &light.coefficients()[range.clone()];
+            let from = &self.coefficients()[range.clone()];
             for (row, to) in turned.coefficients_mut()[range].iter_mut().enumerate() {
                 *to = band.row_times(row, from);
             }
         }
-        turned.coefficients_mut()[(bands + 1) * (bands + 1)..].fill([0.0; 3]);
         turned
-    }
-}
-
-impl ShLight {
-    /// The light after a rotation. For many lights and one rotation, keep the [`ShRotation`].
-    #[must_use]
-    pub fn rotated(&self, rotation: &Rotation) -> Self {
-        ShRotation::new(rotation, self.order()).apply(self)
     }
 }
 
@@ -184,7 +161,7 @@ impl Step<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Direction;
+    use super::super::{Direction, Order};
     use super::*;
     use proptest::prelude::*;
 
@@ -232,15 +209,5 @@ mod tests {
             let [a, b] = [&light, &turned].map(|light| light.coefficients()[middle][0]);
             assert!((a - b).abs() < 1e-12);
         }
-    }
-
-    #[test]
-    fn bands_without_a_matrix_become_zero() {
-        let light = some_light(Order::new(4).unwrap());
-        let turned = ShRotation::new(&Rotation::IDENTITY, Order::TWO).apply(&light);
-        assert_eq!(
-            turned,
-            light.with_order(Order::TWO).with_order(light.order())
-        );
     }
 }

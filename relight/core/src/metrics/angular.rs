@@ -10,8 +10,6 @@ pub struct AngularError {
     pub mean: f64,
     /// Their median; of an even number the lower of the two in the middle.
     pub median: f64,
-    /// The square root of the mean of their squares.
-    pub rms: f64,
     /// The fraction of pixels, 0..=1, with an angle of at most [`AngularError::LIMITS`].
     pub within: [f64; 3],
 }
@@ -65,7 +63,6 @@ fn summary(sorted: &[f64]) -> AngularError {
             .get((sorted.len() - 1) / 2)
             .copied()
             .unwrap_or_default(),
-        rms: (sorted.iter().map(|angle| angle * angle).sum::<f64>() / count).sqrt(),
         within,
     }
 }

@@ -18,15 +18,6 @@ impl Convention {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Strict, Self::FileUnits];
 
-    /// How a table names it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Strict => "strict",
-            Self::FileUnits => "file units, one scale a channel",
-        }
-    }
-
     /// Which scales it fits.
     #[must_use]
     pub const fn fit(self) -> ScaleFit {

@@ -12,7 +12,6 @@
 //! | SMSE and LMSE by convention | [`intrinsic_error`] | the same; [`Convention`] |
 //! | SSIM, DSSIM | [`Comparison::ssim`] | Wang et al. 2004, "Image quality assessment: from error visibility to structural similarity" |
 //! | angle between normals | [`angular_error`] | |
-//! | WHDR | [`whdr`] | Bell et al. 2014, "Intrinsic images in the wild" |
 //!
 //! What cannot be measured is an error that says why: [`MetricError`]. Sums are kept in `f64`.
 //!
@@ -32,7 +31,6 @@ mod angular;
 mod comparison;
 mod error;
 mod intrinsic;
-mod ordinal;
 mod scaled;
 mod structural;
 
@@ -40,6 +38,5 @@ pub use angular::{AngularError, angular_error};
 pub use comparison::Comparison;
 pub use error::MetricError;
 pub use intrinsic::{Convention, IntrinsicError, intrinsic_error};
-pub use ordinal::{Darker, Judgement, whdr};
 pub use scaled::{ScaleFit, Windows};
 pub use structural::{SSIM_WINDOW, dssim};

@@ -4,15 +4,13 @@
 //! | what | type |
 //! | --- | --- |
 //! | whole turns: shards of `relit-extract`, and folders in the layout of the paper's released data set | [`Turns`] |
-//! | images with their ground truth, in folders: of `relight synth` (the warm-up set), MIT Intrinsic Images, Janner et al., LIME | [`TruthSet`] |
-//! | photographs with what people judged of them: Intrinsic Images in the Wild | [`JudgedImages`] |
+//! | images with their ground truth, in folders: of `relight synth` (the warm-up set), MIT Intrinsic Images, Janner et al. | [`TruthSet`] |
 //! | the order in which samples are drawn: batches of neighbours, shuffled, restartable | [`DrawPlan`] |
 //! | batches decoded by threads ahead of their consumer | [`Stream`] |
 //!
 //! A sample that is damaged is never left out in silence: [`DamagedBatch`].
 
 mod error;
-mod judgements;
 mod listing;
 mod plan;
 mod stream;
@@ -20,7 +18,6 @@ mod truth;
 mod turns;
 
 pub use error::{DamagedBatch, DamagedSample, OpenError, SampleFault};
-pub use judgements::JudgedImages;
 pub use plan::{Cursor, Draw, DrawPlan, Rank, SampleId};
 pub use stream::{Drawn, Source, Stream, Streaming};
 pub use truth::{TruthLayout, TruthSample, TruthSet};

@@ -1,5 +1,5 @@
-//! Light on surfaces that are given by their normals: the paper's render layers, a specular layer that is
-//! closer to the ground truth, and the reference by Monte Carlo. Knows light and images only.
+//! Light on surfaces that are given by their normals: the paper's render layers, and a specular layer that is
+//! closer to the ground truth. Knows light and images only.
 //!
 //! All of it is in the paper's units: I = A S + H, where S is the irradiance and H the integral of
 //! radiance times the specular lobe, without a factor 1/π. Under even light of radiance 1 a white diffuse
@@ -11,7 +11,6 @@ mod lanes;
 mod layers;
 mod lobe;
 mod power;
-mod reference;
 mod series;
 mod shots;
 mod surface;
@@ -23,7 +22,6 @@ pub use layers::{EXPOSURE, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;
 pub use power::PowerLayer;
 pub use power::power_constants;
-pub use reference::{Estimate, Horizon, MonteCarlo};
 pub use shots::{Look, exposure_for, mirror_reflectance};
 pub use surface::{Gloss, Surface};
 

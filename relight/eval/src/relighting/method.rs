@@ -23,10 +23,8 @@ pub enum RelightMethod<'d> {
     /// paper's layer under its nine coefficients, which tells what the paper's representation costs; with the lobe under
     /// all bands.
     Oracle(SpecularForm),
-    /// What was predicted from the image: maps of the object, which are rendered as those of the
-    /// oracle (`normal`, `albedo`, and `reflectance` with `smoothness` for highlights, in a folder
-    /// for each object), or else the relit images under the names that the set has.
-    Predictions(Predictions, SpecularForm),
+    /// What was predicted: the relit images, under the names that the set has.
+    Predictions(Predictions),
     /// What `relight relight` makes of the image: layers, light and hedge. Of the image's light the mean irradiance is given,
     /// as all lights of a set have the same: how bright the new light is beside it cannot be seen.
     Photograph(&'d Decomposer),
@@ -41,7 +39,7 @@ impl RelightMethod<'_> {
             Self::Naive => "naive insertion".to_owned(),
             Self::Oracle(SpecularForm::Power) => "oracle, the paper's specular layer".to_owned(),
             Self::Oracle(SpecularForm::Lobe) => "oracle, lobe layer".to_owned(),
-            Self::Predictions(predictions, _) => predictions.name(),
+            Self::Predictions(predictions) => predictions.name(),
             Self::Photograph(_) => "relight relight".to_owned(),
             Self::Maps(_) => "relight decompose, its maps rendered".to_owned(),
         }
@@ -69,16 +67,11 @@ impl RelightMethod<'_> {
         match self {
             Self::Naive => Ok(Relight::Same(set.image(object, object.input, part)?)),
             Self::Oracle(form) => rendered(object.surface.clone(), *form),
-            Self::Predictions(predictions, form) => {
-                match predictions.surface(&object.name, object.surface.extent())? {
-                    Some(surface) => rendered(surface, *form),
-                    None => Ok(Relight::Files {
-                        predictions,
-                        object,
-                        part,
-                    }),
-                }
-            }
+            Self::Predictions(predictions) => Ok(Relight::Files {
+                predictions,
+                object,
+                part,
+            }),
             Self::Photograph(decomposer) => {
                 let photo = Photographed::of(set, object, part)?;
                 let mask = &photo.mask;

@@ -10,7 +10,7 @@ use super::gloss::{FittedGloss, fit_gloss};
 use super::light::light_of_shading;
 use super::other::OtherNormals;
 use super::strips::{Enlargement, LayerPlan};
-use crate::nets::{Inference, InferenceEngine, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
+use crate::nets::{Inference, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, NormalsFrame, ShLight, YUp};
 use relight_core::parallel;
@@ -125,7 +125,6 @@ pub struct Decomposer {
     /// Whether the network tells paint from shadow.
     tells_paint: bool,
     normals: Option<OtherNormals>,
-    engine: InferenceEngine,
 }
 
 impl std::fmt::Debug for Decomposer {
@@ -133,7 +132,6 @@ impl std::fmt::Debug for Decomposer {
         f.debug_struct("Decomposer")
             .field("side", &self.side())
             .field("normals", &self.normals)
-            .field("engine", &self.engine)
             .finish()
     }
 }
@@ -152,22 +150,10 @@ impl Decomposer {
     /// # Errors
     /// Where the weights are not this network's, or it cannot take such pictures.
     pub fn with_side(weights: &Weights, side: usize) -> Result<Self, DecomposeError> {
-        Self::with_engine(weights, side, InferenceEngine::default())
-    }
-
-    /// The same, computed by an engine; so is another network for normals.
-    ///
-    /// # Errors
-    /// Where the weights are not this network's, or it cannot take such pictures.
-    pub fn with_engine(
-        weights: &Weights,
-        side: usize,
-        engine: InferenceEngine,
-    ) -> Result<Self, DecomposeError> {
         let graph = decomposer_of(weights);
         let net = |weights: &Weights, side: usize| -> Result<Box<dyn MapsNet>, NetError> {
             let graph = decomposer_of(weights);
-            let inference = Inference::with_engine(&graph, weights, (side, side), &engine)?;
+            let inference = Inference::new(&graph, weights, (side, side))?;
             Ok(Box::new(Engine { inference, side }))
         };
         let has_coarse = side.is_multiple_of(2 * graph.multiple());
@@ -183,7 +169,6 @@ impl Decomposer {
         let (fine, coarse) = parallel::join(fine, coarse);
         let found = Self::of(fine?, coarse?);
         Ok(Self {
-            engine,
             tells_paint: graph.outputs().iter().any(|output| output.name == "paint"),
             ..found
         })
@@ -194,17 +179,10 @@ impl Decomposer {
             scales: Scales { fine, coarse },
             tells_paint: false,
             normals: None,
-            engine: InferenceEngine::default(),
         }
     }
 
-    /// What computes its networks.
-    #[must_use]
-    pub fn engine(&self) -> &InferenceEngine {
-        &self.engine
-    }
-
-    /// Takes the normals of another network from now on, the content of an ONNX file that errors name as `path`.
+    /// Takes the normals of another network from now on, of an ONNX file.
     ///
     /// MoGe-2's and Metric3D's published files are known by the names of their inputs and outputs, and used as they are. Any
     /// other takes one picture, 1 x 3 x side x side, (x - 0.5) / 0.5 of the sRGB values x, 0 outside the mask; and answers
@@ -212,15 +190,15 @@ impl Decomposer {
     /// `frame` says which way y points; where it is none, y points as a known network has it, and else up.
     ///
     /// # Errors
-    /// Where it cannot be run, or answers something else; then all stays as it was.
-    pub fn set_normals(
+    /// Where it cannot be read or run, or answers something else; then all stays as it was.
+    #[cfg(feature = "files")]
+    pub fn read_normals(
         &mut self,
         path: &Path,
-        onnx: &[u8],
         frame: Option<NormalsFrame>,
     ) -> Result<(), DecomposeError> {
-        let side = self.side();
-        self.normals = Some(OtherNormals::new(path, onnx, side, frame, &self.engine)?);
+        let onnx = crate::nets::read_onnx(path)?;
+        self.normals = Some(OtherNormals::new(path, &onnx, self.side(), frame)?);
         Ok(())
     }
 

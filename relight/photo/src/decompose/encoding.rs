@@ -9,9 +9,9 @@ use relight_core::statistics::above_part;
 /// Part of the pixels that are darker than the encoded picture's white.
 const WHITE_PERCENTILE: f64 = 0.99;
 /// Encoded light is cut off here, in whites.
-pub(super) const MOST_LIGHT: f32 = 1.5;
+pub const MOST_LIGHT: f32 = 1.5;
 /// Keeps the logarithm of black finite.
-pub(super) const LOG_FLOOR: f32 = 0.01;
+pub const LOG_FLOOR: f32 = 0.01;
 /// Range of the answered logarithm of shading.
 pub const LOG_SHADING: (f32, f32) = (-6.0, 3.0);
 /// Least part of a normal along the line of sight, before its length is made 1.

@@ -26,7 +26,9 @@ pub use decomposer::{
     DecomposeOptions, Decomposer, Decomposition, MOST_PIXELS, SpecularGate, WORKING_SIDE,
 };
 pub use encoding::{AnsweredMaps, EncodedPicture};
-pub use encoding::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING, MASK};
+pub use encoding::{
+    HIGHLIGHT_OFFSET, LEAST_FACING, LOG_FLOOR, LOG_LUMINANCE, LOG_SHADING, MASK, MOST_LIGHT,
+};
 pub use error::DecomposeError;
 pub use gloss::FittedGloss;
 pub use gloss::fit_gloss;

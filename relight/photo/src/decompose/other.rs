@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::convention::{Axes, Channels, Convention};
-use crate::nets::{Inference, InferenceEngine, NetError, OnnxSignature};
+use crate::nets::{Inference, NetError, OnnxSignature};
 use relight_core::image::{ColourSpace, Extent, Part, Planes, Srgb};
 use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
 
@@ -24,7 +24,6 @@ impl OtherNormals {
         onnx: &[u8],
         side: usize,
         frame: Option<NormalsFrame>,
-        engine: &InferenceEngine,
     ) -> Result<Self, NetError> {
         let fault = |fault| NetError::File {
             path: path.to_owned(),
@@ -34,7 +33,7 @@ impl OtherNormals {
         let convention = Convention::of(&signature, side).map_err(fault)?;
         let Extent { width, height } = convention.extent;
         let size = (width, height);
-        let net = Inference::from_onnx(path, onnx, 3, size, &convention.given, engine)?;
+        let net = Inference::from_onnx(path, onnx, 3, size, &convention.given)?;
         let other = Self {
             net,
             side,

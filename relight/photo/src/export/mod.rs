@@ -7,11 +7,9 @@
 //! | `mesh` | a relief with the object's outline |
 //! | `glb` | the mesh with its material as one binary glTF file |
 //! | `layers` | all maps as layers of one EXR file |
-//! | `blender` | a script that sets up object, light and camera in Blender |
 //!
 //! Axes are those of all of relight, which are glTF's too: x to the right, y up, z to the viewer.
 
-mod blender;
 mod error;
 mod glb;
 mod heights;
@@ -19,7 +17,6 @@ mod layers;
 mod mesh;
 mod source;
 
-pub use blender::script;
 pub use error::ExportError;
 pub use glb::to_glb;
 pub use layers::to_layers;

@@ -8,9 +8,9 @@ use relight_core::light::Panorama;
 use relit_data::file_names::{VIDEO_EXTENSIONS, has_extension};
 use relit_data::still::Format;
 
-use super::{FrameTiming, InsertionError, MovieReader};
+use super::{FrameTiming, MovieReader};
 use crate::decompose::stated_extent;
-use crate::insert::{PanoramaView, SceneDescription};
+use crate::insert::{InsertError, PanoramaView, SceneDescription};
 
 /// A background out of a file.
 #[derive(Debug)]
@@ -37,7 +37,7 @@ impl BackgroundFile {
     ///
     /// # Errors
     /// Where it cannot be read, or has values that are no light.
-    pub fn read(path: &Path, scene: &SceneDescription) -> Result<Self, InsertionError> {
+    pub fn read(path: &Path, scene: &SceneDescription) -> Result<Self, InsertError> {
         if has_extension(path, &VIDEO_EXTENSIONS) {
             let movie = MovieReader::open(path, FrameTiming::Even)?;
             return Ok(Self::Movie(Box::new(movie)));
@@ -51,7 +51,7 @@ impl BackgroundFile {
         let picture = ColourImage::from_bytes(path, &bytes, None)?.into_light();
         let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
         if !picture.planes().planes().into_iter().all(is_light) {
-            return Err(InsertionError::Input(format!(
+            return Err(InsertError::Input(format!(
                 "{} has a value that is negative, infinite or not a number",
                 path.display()
             )));

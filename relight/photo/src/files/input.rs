@@ -11,9 +11,8 @@ use relight_core::reader::{Encoding, SampleId, Source, Turns};
 use relit_data::file_names::{alike_beside, folded, has_extension, is_hidden};
 use relit_data::geometry::Rect;
 use relit_data::shard::Dataset;
-use relit_data::still::{Format, Orientation, is_named};
+use relit_data::still::{Format, is_named};
 
-use super::mask_record::check_turned;
 use super::results::FIGURES;
 use crate::decompose::{DecomposeError, Photo, PhotoHints, stem};
 
@@ -288,8 +287,6 @@ fn read_file(path: &Path, reading: &PhotoReading) -> Result<Photo, DecomposeErro
     let mask = match &reading.mask {
         Some(file) => {
             let file = mask_file(file, &stem(path))?;
-            let orientation = relit_data::still::orientation(&bytes).map(Orientation::to_exif);
-            check_turned(&file, path, orientation)?;
             let image = StoredImage::read(&file)?;
             Some((file, image))
         }

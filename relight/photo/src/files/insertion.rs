@@ -7,13 +7,13 @@ use relight_core::image::{Linear, Planes, Rgb, StoredImage};
 use relit_data::causes::with_causes;
 
 use super::{
-    BackgroundFile, InsertionError, MovieFormat, MovieReader, MovieWriter, OutputKind, PhotoInput,
-    PhotoReading, write_picture,
+    BackgroundFile, MovieFormat, MovieReader, MovieWriter, OutputKind, PhotoInput, PhotoReading,
+    write_picture,
 };
 use crate::decompose::{DecomposeOptions, Decomposer, Photo};
 use crate::insert::{
-    InsertScene, LightSource, ObjectDescription, SceneBackground, SceneDescription, SceneSetting,
-    Subject,
+    InsertError, InsertScene, LightSource, ObjectDescription, SceneBackground, SceneDescription,
+    SceneSetting, Subject,
 };
 
 /// The most frames of a video in which a panorama turns.
@@ -59,11 +59,11 @@ impl InsertSource {
     ///
     /// # Errors
     /// Where a file cannot be read, or a captured object is given a mask.
-    pub fn read(object: &ObjectDescription, folder: &Path) -> Result<Self, InsertionError> {
+    pub fn read(object: &ObjectDescription, folder: &Path) -> Result<Self, InsertError> {
         let path = folder.join(&object.photo);
         if CapturedObject::is_named(&path) {
             if object.mask.is_some() {
-                return Err(InsertionError::Input(format!(
+                return Err(InsertError::Input(format!(
                     "{}: it has its own mask, give none",
                     path.display()
                 )));
@@ -91,7 +91,7 @@ impl<'a> Insertion<'a> {
         folder: &Path,
         decomposer: &'a Decomposer,
         options: DecomposeOptions,
-    ) -> Result<Self, InsertionError> {
+    ) -> Result<Self, InsertError> {
         let first = match &mut background {
             BackgroundFile::Movie(movie) => Some(first_frame(movie)?),
             _ => None,
@@ -129,7 +129,7 @@ impl<'a> Insertion<'a> {
         &self,
         object: &ObjectDescription,
         source: InsertSource,
-    ) -> Result<Subject, InsertionError> {
+    ) -> Result<Subject, InsertError> {
         Ok(match source {
             InsertSource::Photo(photo) => {
                 let photo = self.setting.reduced(object, *photo);
@@ -158,7 +158,7 @@ impl<'a> Insertion<'a> {
         scene: &InsertScene<'_>,
         output: &InsertionOutput<'_>,
         written: impl FnMut(),
-    ) -> Result<u32, InsertionError> {
+    ) -> Result<u32, InsertError> {
         match OutputKind::of(output.path) {
             Some(OutputKind::Movie(format)) => match &self.background {
                 BackgroundFile::Movie(_) => self.film_over(scene, output.path, format, written),
@@ -192,7 +192,7 @@ impl<'a> Insertion<'a> {
         path: &Path,
         format: MovieFormat,
         mut written: impl FnMut(),
-    ) -> Result<u32, InsertionError> {
+    ) -> Result<u32, InsertError> {
         let layers = scene.layers(self.turned)?;
         let mut next = Some(self.still(0.0));
         let BackgroundFile::Movie(movie) = &mut self.background else {
@@ -219,7 +219,7 @@ impl<'a> Insertion<'a> {
         output: &InsertionOutput<'_>,
         format: MovieFormat,
         mut written: impl FnMut(),
-    ) -> Result<u32, InsertionError> {
+    ) -> Result<u32, InsertError> {
         let frames = output.turn_frames();
         let (extent, rate) = (self.setting.extent, output.frames_per_second);
         let mut film = MovieWriter::create(output.path, format, extent, rate)?;
@@ -242,11 +242,11 @@ impl InsertionOutput<'_> {
     }
 }
 
-fn no_frame() -> InsertionError {
-    InsertionError::Input("the video has no frame".to_owned())
+fn no_frame() -> InsertError {
+    InsertError::Input("the video has no frame".to_owned())
 }
 
-fn first_frame(movie: &mut MovieReader) -> Result<Rgb<Linear>, InsertionError> {
+fn first_frame(movie: &mut MovieReader) -> Result<Rgb<Linear>, InsertError> {
     let frame = movie.frame()?.ok_or_else(no_frame)?;
     Ok(frame.to_linear())
 }
@@ -257,7 +257,7 @@ fn given_light(
     folder: &Path,
     background: SceneBackground<'_>,
     (decomposer, options): (&Decomposer, &DecomposeOptions),
-) -> Result<Option<LightSource>, InsertionError> {
+) -> Result<Option<LightSource>, InsertError> {
     let light = &scene.light;
     if let Some(lamp) = light.lamp()? {
         return Ok(Some(LightSource::Lamp(lamp)));
@@ -269,7 +269,7 @@ fn given_light(
         return Ok(None);
     };
     let SceneBackground::Picture(picture) = background else {
-        return Err(InsertionError::Input(
+        return Err(InsertError::Input(
             "light.object: a panorama shows its light itself; give a photograph or a video"
                 .to_owned(),
         ));
@@ -277,7 +277,7 @@ fn given_light(
     let path = folder.join(mask);
     let (mask, _) = StoredImage::read(&path)?.object_mask(&path)?;
     let subject = Subject::new(picture, &mask, None, decomposer, options).map_err(|source| {
-        InsertionError::Input(format!("{}: {}", path.display(), with_causes(&source)))
+        InsertError::Input(format!("{}: {}", path.display(), with_causes(&source)))
     })?;
     Ok(Some(LightSource::Coefficients(subject.light.clone())))
 }

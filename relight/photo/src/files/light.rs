@@ -4,8 +4,7 @@ use std::path::Path;
 
 use relight_core::light::{Panorama, ShLight};
 
-use super::InsertionError;
-use crate::insert::LightSource;
+use crate::insert::{InsertError, LightSource};
 
 impl LightSource {
     /// Whether a file is called as a text of coefficients (`.txt`).
@@ -19,7 +18,7 @@ impl LightSource {
     ///
     /// # Errors
     /// Where the file cannot be read or holds no light.
-    pub fn read(path: &Path) -> Result<Self, InsertionError> {
+    pub fn read(path: &Path) -> Result<Self, InsertError> {
         Ok(if Self::is_text(path) {
             Self::Coefficients(ShLight::read(path)?)
         } else {

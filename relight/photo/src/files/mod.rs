@@ -1,22 +1,18 @@
-//! Photographs, decompositions and scenes in files: inputs from files, folders and shards, networks, light, folders of
+//! Photographs, decompositions and scenes in files: inputs from files, folders and shards, light, folders of
 //! results, objects put into pictures and videos, and videos by the program `ffmpeg`.
 
 mod background;
 mod input;
 mod insertion;
-mod insertion_error;
 mod light;
-mod mask_record;
 mod movie;
 mod movie_reader;
-mod networks;
 mod output;
 mod results;
 
 pub use background::BackgroundFile;
 pub use input::{FoundPhotos, PhotoInput, PhotoReading, UnusedFile};
 pub use insertion::{InsertSource, Insertion, InsertionOutput};
-pub use insertion_error::InsertionError;
 pub use movie::{FrameRate, MovieError, MovieFormat, MovieWriter};
 pub use movie_reader::{FrameTiming, MovieReader};
 pub use output::{OutputKind, write_picture};

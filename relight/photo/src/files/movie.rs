@@ -11,7 +11,10 @@ use std::thread::{self, JoinHandle};
 
 use relight_core::image::{Extent, Rgb, Srgb};
 use relight_core::parallel;
+use relit_data::causes::with_causes;
 use relit_data::durable;
+
+use crate::insert::InsertError;
 
 /// The colours of what is written, as a filter.
 const COLOURS: &str = "setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1";
@@ -50,6 +53,12 @@ impl MovieError {
             path: path.to_owned(),
             fault,
         }
+    }
+}
+
+impl From<MovieError> for InsertError {
+    fn from(fault: MovieError) -> Self {
+        Self::Input(with_causes(&fault))
     }
 }
 

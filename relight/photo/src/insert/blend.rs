@@ -31,29 +31,6 @@ impl Subject {
         )
     }
 
-    /// A background with the photograph's pixels under the mask, as they are: naive insertion.
-    ///
-    /// # Panics
-    /// Where the background or the photograph has another size.
-    #[must_use]
-    pub fn pasted(&self, photo: &Rgb<Linear>, background: &Rgb<Linear>) -> Rgb<Linear> {
-        self.check_size(photo);
-        self.check_size(background);
-        let mut picture = background.clone();
-        let Extent { width, height } = self.extent();
-        let [left, top] = self.place;
-        for y in 0..height {
-            for x in 0..width {
-                if self.mask.pixel(x, y)[0] >= 0.5 {
-                    let (x, y) = (left + x, top + y);
-                    let pixel = photo.planes().pixel(x, y);
-                    picture.planes_mut().set_pixel(x, y, pixel);
-                }
-            }
-        }
-        picture
-    }
-
     fn check_size(&self, picture: &Rgb<Linear>) {
         let found = picture.planes().extent();
         assert_eq!(found, self.photo, "size of the picture");

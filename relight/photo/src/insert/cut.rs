@@ -6,16 +6,6 @@ use super::InsertError;
 use super::matte::Matte;
 use crate::decompose::{CropSquare, DecomposeError};
 
-/// Which colours the soft edge of an object has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum EdgeColours {
-    /// The object's own: those of the background are taken out.
-    #[default]
-    Freed,
-    /// What the photograph shows there, mixed with its background: to see what the other way is good for.
-    Photographed,
-}
-
 /// The part of a photograph around an object.
 pub(super) struct Cut {
     /// Column and row of its first pixel.
@@ -31,7 +21,6 @@ impl Cut {
     pub(super) fn new(
         photo: &Rgb<Linear>,
         (mask, alpha): (&Planes<1>, Option<&Planes<1>>),
-        edges: EdgeColours,
     ) -> Result<Self, InsertError> {
         let expected = photo.planes().extent();
         for (what, image) in [("mask", Some(mask)), ("alpha", alpha)] {
@@ -46,13 +35,10 @@ impl Cut {
         let mask = mask
             .cut(place, extent)
             .map(|m| f32::from(u8::from(m >= 0.5)));
-        let mut matte = match alpha {
+        let matte = match alpha {
             Some(alpha) => Matte::of_cut_out(&picture, &alpha.cut(place, extent)),
             None => Matte::estimate(&picture, &mask, edge),
         };
-        if edges == EdgeColours::Photographed {
-            matte.foreground = picture;
-        }
         Ok(Self {
             place,
             photo: expected,

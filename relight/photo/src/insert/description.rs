@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use relight_core::image::{Extent, Transfer};
 use serde::{Deserialize, Serialize};
 
-use super::{DiscLamp, MaterialChange, ObjectGloss, Placement, WhiteBalance};
+use super::{DiscLamp, InsertError, MaterialChange, ObjectGloss, Placement, WhiteBalance};
 
 /// Sides of a picture, pixels.
 const SIDES: RangeInclusive<f64> = 16.0..=16_384.0;
@@ -18,7 +18,7 @@ const TURNS: RangeInclusive<f64> = -3600.0..=3600.0;
 /// What a channel is multiplied with.
 const TINTS: RangeInclusive<f64> = 0.0..=1000.0;
 /// The most objects of a scene.
-const MOST_OBJECTS: usize = 100;
+pub(super) const MOST_OBJECTS: usize = 100;
 
 /// A picture that objects are put into, and all about them.
 ///
@@ -37,7 +37,7 @@ const MOST_OBJECTS: usize = 100;
 /// "##)?;
 /// assert_eq!(scene.objects[0].height, 0.35);
 /// assert!(SceneDescription::parse("background = 1").is_err());
-/// # Ok::<(), relight_photo::insert::SceneFault>(())
+/// # Ok::<(), relight_photo::insert::InsertError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -128,26 +128,14 @@ pub struct ObjectDescription {
     pub shadow: f32,
 }
 
-/// Why a text describes no scene.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SceneFault {
-    /// It is no TOML, has fields that a scene has not, or says what cannot be.
-    #[error("{0}")]
-    Content(String),
-    /// There is a number of objects that cannot be.
-    #[error("there are {0} objects: give [[object]] 1 to {MOST_OBJECTS} times")]
-    Objects(usize),
-}
-
 impl SceneDescription {
     /// Reads a description, and checks its numbers.
     ///
     /// # Errors
     /// Where the text is no TOML, or says what a scene cannot be.
-    pub fn parse(text: &str) -> Result<Self, SceneFault> {
+    pub fn parse(text: &str) -> Result<Self, InsertError> {
         let scene: Self = toml::from_str(text).map_err(|fault| {
-            SceneFault::Content(format!("it is no scene: {}", fault.to_string().trim_end()))
+            InsertError::Input(format!("it is no scene: {}", fault.to_string().trim_end()))
         })?;
         scene.check()?;
         Ok(scene)
@@ -157,9 +145,9 @@ impl SceneDescription {
     ///
     /// # Errors
     /// Where a path is no Unicode.
-    pub fn to_toml(&self) -> Result<String, SceneFault> {
+    pub fn to_toml(&self) -> Result<String, InsertError> {
         toml::to_string(self)
-            .map_err(|fault| SceneFault::Content(format!("it cannot be written: {fault}")))
+            .map_err(|fault| InsertError::Input(format!("it cannot be written: {fault}")))
     }
 
     /// The files that it names: background, light, photographs and masks.
@@ -184,8 +172,8 @@ impl SceneDescription {
     /// Whether all that is said can be.
     ///
     /// # Errors
-    /// [`SceneFault`] names the first number that is out of its range; the number of objects comes last.
-    pub fn check(&self) -> Result<(), SceneFault> {
+    /// [`InsertError`] names the first number that is out of its range; the number of objects comes last.
+    pub fn check(&self) -> Result<(), InsertError> {
         let [width, height] = self.size.map(f64::from);
         let tilt = self.tilt.unwrap_or(20.0);
         check_all([
@@ -202,7 +190,7 @@ impl SceneDescription {
         }
         match self.objects.len() {
             1..=MOST_OBJECTS => Ok(()),
-            count => Err(SceneFault::Objects(count)),
+            count => Err(InsertError::Objects(count)),
         }
     }
 }
@@ -212,18 +200,18 @@ impl LightDescription {
     ///
     /// # Errors
     /// Where its text is none.
-    pub fn lamp(&self) -> Result<Option<DiscLamp>, SceneFault> {
+    pub fn lamp(&self) -> Result<Option<DiscLamp>, InsertError> {
         let Some(text) = &self.lamp else {
             return Ok(None);
         };
         let lamp: DiscLamp = text
             .parse()
-            .map_err(|fault| SceneFault::Content(format!("light.lamp: {fault}")))?;
+            .map_err(|fault| InsertError::Input(format!("light.lamp: {fault}")))?;
         let ambient = self.ambient.unwrap_or(lamp.ambient);
         Ok(Some(DiscLamp { ambient, ..lamp }))
     }
 
-    fn check(&self) -> Result<(), SceneFault> {
+    fn check(&self) -> Result<(), InsertError> {
         let given: Vec<&'static str> = [
             ("panorama", self.panorama.is_some()),
             ("lamp", self.lamp.is_some()),
@@ -234,7 +222,7 @@ impl LightDescription {
         .filter_map(|(name, is_given)| is_given.then_some(name))
         .collect();
         if let [first, second, ..] = given.as_slice() {
-            return Err(SceneFault::Content(format!(
+            return Err(InsertError::Input(format!(
                 "light has both {first} and {second}: give one"
             )));
         }
@@ -269,7 +257,7 @@ impl ObjectDescription {
         }
     }
 
-    fn check(&self, number: usize) -> Result<(), SceneFault> {
+    fn check(&self, number: usize) -> Result<(), InsertError> {
         let [across, down] = self.at;
         let [red, green, blue] = self.tint.map(f64::from);
         let [part, smoothness] = self.gloss.unwrap_or([0.0, 1.0]).map(f64::from);
@@ -291,17 +279,17 @@ impl ObjectDescription {
                 "a smoothness from 0.01 to 1000",
             ),
         ]);
-        checked.map_err(|fault| SceneFault::Content(format!("object {number}: {fault}")))
+        checked.map_err(|fault| InsertError::Input(format!("object {number}: {fault}")))
     }
 }
 
 /// Whether each number, with its name, lies in its range, which is told in words too. One that is none lies in no range.
 fn check_all<const N: usize>(
     numbers: [(&str, f64, RangeInclusive<f64>, &str); N],
-) -> Result<(), SceneFault> {
+) -> Result<(), InsertError> {
     for (what, value, range, allowed) in numbers {
         if !range.contains(&value) {
-            return Err(SceneFault::Content(format!(
+            return Err(InsertError::Input(format!(
                 "{what} is {value}, it has to be {allowed}"
             )));
         }

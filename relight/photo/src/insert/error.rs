@@ -1,6 +1,8 @@
 //! Why an object cannot be relit or inserted.
 
+use super::description::MOST_OBJECTS;
 use crate::decompose::DecomposeError;
+use relight_core::captured_object::CapturedObjectError;
 use relight_core::image::ImageError;
 use relight_core::light::LightError;
 
@@ -30,6 +32,15 @@ pub enum InsertError {
     /// There is no light at all.
     #[error("the light is dark: it has no radiance from anywhere")]
     Dark,
+    /// A text describes no scene, the parts of one cannot be used together, or a video of it cannot be read or written.
+    #[error("{0}")]
+    Input(String),
+    /// A scene has a number of objects that cannot be.
+    #[error("there are {0} objects: give [[object]] 1 to {MOST_OBJECTS} times")]
+    Objects(usize),
+    /// A captured object cannot be read.
+    #[error(transparent)]
+    Captured(#[from] CapturedObjectError),
     /// An object cannot stand so.
     #[error("object {number} {fault}")]
     Object {

@@ -50,8 +50,7 @@ mod tests;
 mod view;
 mod white_balance;
 
-pub use cut::EdgeColours;
-pub use description::{LightDescription, ObjectDescription, SceneDescription, SceneFault};
+pub use description::{LightDescription, ObjectDescription, SceneDescription};
 pub use error::InsertError;
 pub use exposure::PanoramaExposure;
 pub use lamp::{DiscLamp, colour_of_temperature};

@@ -16,20 +16,6 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Where an object that covers these pixels stood in its photograph, of which they begin at column and row `place`.
-    pub(super) fn in_photo(alpha: &Planes<1>, place: [usize; 2], photo: Extent) -> Self {
-        let rows = rows(alpha);
-        let [left, top] = place.map(|at| at as f64);
-        Self {
-            at: [
-                (left + middle(alpha)) / photo.width as f64,
-                (top + rows.end as f64) / photo.height as f64,
-            ],
-            height: rows.len() as f64 / photo.height as f64,
-            rotation: 0.0,
-        }
-    }
-
     /// Whether any of an object of this coverage would be seen in a picture of this size.
     pub(super) fn is_seen(&self, alpha: &Planes<1>, scene: Extent) -> bool {
         let (width, height) = (scene.width as f64, scene.height as f64);

@@ -5,7 +5,7 @@ use super::matching::grain;
 use super::placement::Fit;
 use super::shadow::Shadow;
 use super::standing::Standing;
-use super::{InsertError, LightSource, Matching, SceneObject, exposure_between};
+use super::{InsertError, Matching, SceneObject, exposure_between};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::light::{Direction, Panorama, Rotation, ShLight};
 
@@ -22,24 +22,12 @@ pub struct InsertScene<'a> {
 }
 
 impl<'a> InsertScene<'a> {
-    /// A picture of a size in this light, whose ground the camera looks down on by `tilt` degrees (0 to 90), with objects from back to
-    /// front.
+    /// A picture of a size in this light, as coefficients and as a panorama, whose ground the camera looks down on by `tilt`
+    /// degrees (0 to 90), with objects from back to front.
     ///
     /// # Errors
-    /// Where the light is dark, or an object would lie outside, or be larger than can be.
-    pub fn new(
-        extent: Extent,
-        source: &LightSource,
-        tilt: f64,
-        matching: Matching,
-        objects: Vec<SceneObject<'a>>,
-    ) -> Result<Self, InsertError> {
-        let light = (source.light()?, source.panorama());
-        Self::in_light(extent, light, tilt, matching, objects)
-    }
-
-    /// As [`InsertScene::new`], in a light whose coefficients and panorama are known.
-    pub(super) fn in_light(
+    /// Where an object would lie outside, or be larger than can be.
+    pub(super) fn new(
         extent: Extent,
         (light, panorama): (ShLight, Panorama),
         tilt: f64,
@@ -203,7 +191,7 @@ impl<'a> InsertScene<'a> {
 mod tests {
     use super::*;
     use crate::decompose::{DecomposeOptions, Decomposer};
-    use crate::insert::{DiscLamp, MaterialChange, Placement, Subject};
+    use crate::insert::{DiscLamp, LightSource, MaterialChange, Placement, Subject};
     use crate::nets::{Weights, decomposer};
     use relight_core::image::{ColourSpace, Srgb};
 
@@ -247,17 +235,25 @@ mod tests {
         }
     }
 
-    fn lamp() -> LightSource {
-        LightSource::Lamp(DiscLamp {
+    fn lamp() -> (ShLight, Panorama) {
+        let lamp = LightSource::Lamp(DiscLamp {
             azimuth: 90.0,
             elevation: 45.0,
             ..DiscLamp::default()
-        })
+        });
+        (lamp.light().unwrap(), lamp.panorama())
     }
+
+    /// Where the object stands in its own photograph.
+    const OWN_PLACE: Placement = Placement {
+        at: [32.0 / 60.0, 40.0 / 50.0],
+        height: 30.0 / 50.0,
+        rotation: 0.0,
+    };
 
     fn composed(extent: Extent, objects: Vec<SceneObject<'_>>) -> Rgb<Linear> {
         let white = Rgb::new(Planes::filled(extent, [0.8; 3]));
-        let scene = InsertScene::new(extent, &lamp(), 25.0, Matching::default(), objects).unwrap();
+        let scene = InsertScene::new(extent, lamp(), 25.0, Matching::default(), objects).unwrap();
         scene.compose(&white, &scene.layers(0.0).unwrap(), 0)
     }
 
@@ -299,10 +295,10 @@ mod tests {
     #[test]
     fn at_its_own_place_it_covers_itself() {
         let subject = subject();
-        let placement = subject.own_placement();
+        let placement = OWN_PLACE;
         let scene = InsertScene::new(
             PHOTO,
-            &lamp(),
+            lamp(),
             25.0,
             Matching::default(),
             vec![SceneObject {
@@ -382,7 +378,7 @@ mod tests {
         let extent = Extent::new(160, 120);
         let black = Rgb::new(Planes::zeros(extent));
         let brightness = |matching: Matching, object: SceneObject<'_>| {
-            let scene = InsertScene::new(extent, &lamp(), 25.0, matching, vec![object]).unwrap();
+            let scene = InsertScene::new(extent, lamp(), 25.0, matching, vec![object]).unwrap();
             let picture = scene.compose(&black, &scene.layers(0.0).unwrap(), 0);
             let middle: Vec<f32> = (70..90)
                 .map(|x| Srgb::from_linear(picture.planes().pixel(x, 70)[1]))
@@ -424,15 +420,12 @@ mod tests {
     fn what_cannot_stand_is_named() {
         let subject = subject();
         let refused = |placement| {
-            let objects = vec![
-                object(&subject, subject.own_placement()),
-                object(&subject, placement),
-            ];
-            InsertScene::new(PHOTO, &lamp(), 25.0, Matching::default(), objects)
+            let objects = vec![object(&subject, OWN_PLACE), object(&subject, placement)];
+            InsertScene::new(PHOTO, lamp(), 25.0, Matching::default(), objects)
                 .unwrap_err()
                 .to_string()
         };
-        let good = subject.own_placement();
+        let good = OWN_PLACE;
         for at in [
             [1.5, 0.9],
             [0.5, 1.9],
@@ -459,7 +452,7 @@ mod tests {
         )];
         let error = InsertScene::new(
             Extent::new(4000, 4000),
-            &lamp(),
+            lamp(),
             25.0,
             Matching::default(),
             objects,

@@ -92,9 +92,7 @@ impl SceneSetting {
         };
         let light = given.unwrap_or_else(|| match background {
             SceneBackground::Panorama(panorama) => LightSource::Panorama(panorama.clone()),
-            SceneBackground::Picture(picture) => {
-                LightSource::of_picture_with(picture, scene.field, sun)
-            }
+            SceneBackground::Picture(picture) => LightSource::of_picture(picture, scene.field, sun),
         });
         let coefficients = light.light()?;
         let tint = scene.white_balance.tint(&coefficients);
@@ -162,7 +160,7 @@ impl SceneSetting {
     /// As [`InsertScene::new`].
     pub fn scene<'a>(&self, objects: Vec<SceneObject<'a>>) -> Result<InsertScene<'a>, InsertError> {
         let light = (self.projected.clone(), self.around.clone());
-        InsertScene::in_light(self.extent, light, self.tilt, self.matching, objects)
+        InsertScene::new(self.extent, light, self.tilt, self.matching, objects)
     }
 
     /// What is seen of a panorama that has turned by so many radians, as bright as it is shown.

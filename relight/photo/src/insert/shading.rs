@@ -118,11 +118,6 @@ impl Shading {
         self
     }
 
-    /// Takes what was found for the truth.
-    pub(super) fn believe(&mut self) {
-        self.doubt = None;
-    }
-
     /// The shading of a pixel in new irradiance, red, green and blue, where `kept` of the shadows are kept.
     pub(super) fn at(&self, at: usize, irradiance: [f32; 3], kept: f32) -> [f32; 3] {
         let ratio = (self.relief[at] + kept * self.shadow[at]).exp();
@@ -202,7 +197,7 @@ mod tests {
         let shading = half_dark();
         let hedged = moved(&shading, DARK_PLACE);
         let mut trusted = shading;
-        trusted.believe();
+        trusted.doubt = None;
         let believed = moved(&trusted, DARK_PLACE);
         assert!((believed - 1.0).abs() < 0.05, "{believed}");
         // Of the change from 0.1 to 1, with d, half is that of the mean: 0.4 of that goes, and 0.8 of the rest.

@@ -25,7 +25,6 @@ pub struct Shot<'a> {
     subject: &'a Subject,
     /// In the subject's units.
     light: ShLight,
-    change: MaterialChange,
     backdrop: Backdrop,
     exposure: f32,
 }
@@ -40,7 +39,6 @@ impl<'a> Shot<'a> {
         photo: &'a Rgb<Linear>,
         subject: &'a Subject,
         light: &ShLight,
-        change: MaterialChange,
         backdrop: Backdrop,
         exposure: f32,
     ) -> Result<Self, InsertError> {
@@ -50,7 +48,6 @@ impl<'a> Shot<'a> {
             photo,
             subject,
             light: light.clone().tinted([f64::from(scale); 3]),
-            change,
             backdrop: match backdrop {
                 Backdrop::Panorama(view, panorama) => {
                     let planes = panorama.image().planes().clone();
@@ -70,36 +67,12 @@ impl<'a> Shot<'a> {
     /// As [`Subject::relit`].
     pub fn picture(&self, turn: f64) -> Result<Rgb<Linear>, InsertError> {
         let turned = self.turned(turn);
-        let relit = self.subject.relit(&turned, &self.change)?;
+        let relit = self.subject.relit(&turned, &MaterialChange::default())?;
         let colours = relit.map(|v| v * self.exposure);
         Ok(match self.background(turn) {
             None => self.subject.in_place(self.photo, &colours),
             Some(background) => self.subject.before(&background, &colours),
         })
-    }
-
-    /// The same by naive insertion: the photograph's pixels under the mask, whatever the light.
-    fn naive(&self, turn: f64) -> Rgb<Linear> {
-        match self.background(turn) {
-            None => self.photo.clone(),
-            Some(background) => self.subject.pasted(self.photo, &background),
-        }
-    }
-
-    /// The photograph, the picture by naive insertion, and the picture, side by side.
-    ///
-    /// # Errors
-    /// As [`Subject::relit`].
-    pub fn compared(&self, turn: f64) -> Result<Rgb<Linear>, InsertError> {
-        let pictures = [self.photo.clone(), self.naive(turn), self.picture(turn)?];
-        let tiles = pictures.map(Rgb::into_planes);
-        Ok(Rgb::new(Planes::sheet(&tiles, tiles.len())?))
-    }
-
-    /// The photograph.
-    #[must_use]
-    pub const fn photo(&self) -> &Rgb<Linear> {
-        self.photo
     }
 
     fn turned(&self, turn: f64) -> ShLight {

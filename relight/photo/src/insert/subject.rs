@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::InsertError;
-use super::cut::{Cut, EdgeColours};
+use super::cut::Cut;
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
-use super::placement::{Fit, Placement};
+use super::placement::Fit;
 use super::shading::{DARK, Shading};
 use super::smooth::weighted_mean;
 use super::source::likeness;
@@ -47,8 +47,6 @@ pub struct Subject {
     pub(super) place: [usize; 2],
     /// Width and height of the photograph.
     pub(super) photo: Extent,
-    /// 1 on the object, else 0.
-    pub(super) mask: Planes<1>,
     /// What the object covers of each pixel, and its colours.
     pub(super) matte: Matte,
     /// Also under the soft edge.
@@ -80,13 +78,14 @@ impl Subject {
         decomposer: &Decomposer,
         options: &DecomposeOptions,
     ) -> Result<Self, InsertError> {
-        Self::with_edges(
-            photo,
-            (mask, alpha),
-            decomposer,
-            options,
-            EdgeColours::Freed,
-        )
+        let cut = Cut::new(photo, (mask, alpha))?;
+        let foreground = Rgb::new(cut.matte.foreground.clone());
+        let options = DecomposeOptions {
+            paint: true,
+            ..*options
+        };
+        let found = decomposer.decompose(&foreground, &cut.mask, &options)?;
+        Self::of_parts(cut, &found)
     }
 
     /// The object of a photograph with its mask.
@@ -106,27 +105,6 @@ impl Subject {
             decomposer,
             &options,
         )
-    }
-
-    /// As [`Subject::new`], with mask and alpha in one, and a choice of the colours of the edge.
-    ///
-    /// # Errors
-    /// As [`Subject::new`].
-    pub fn with_edges(
-        photo: &Rgb<Linear>,
-        (mask, alpha): (&Planes<1>, Option<&Planes<1>>),
-        decomposer: &Decomposer,
-        options: &DecomposeOptions,
-        edges: EdgeColours,
-    ) -> Result<Self, InsertError> {
-        let cut = Cut::new(photo, (mask, alpha), edges)?;
-        let foreground = Rgb::new(cut.matte.foreground.clone());
-        let options = DecomposeOptions {
-            paint: true,
-            ..*options
-        };
-        let found = decomposer.decompose(&foreground, &cut.mask, &options)?;
-        Self::of_parts(cut, &found)
     }
 
     /// A captured object, whose maps are known. It counts as photographed in even light of irradiance 1, in which it looks as
@@ -152,7 +130,6 @@ impl Subject {
         Ok(Self {
             place: [0, 0],
             photo: extent,
-            mask,
             matte: Matte::of_cut_out(&albedo, asset.alpha()),
             normals: surface.normals().completed(&wanted),
             albedo,
@@ -214,7 +191,6 @@ impl Subject {
         Ok(Self {
             place: cut.place,
             photo: cut.photo,
-            mask: cut.mask,
             shading: Shading::new(&shading, own.planes(), &wanted).doubted(paint.as_ref(), &wanted),
             matte: cut.matte,
             normals,
@@ -227,23 +203,10 @@ impl Subject {
         })
     }
 
-    /// The same, whose decomposition is taken for the truth: to see what the hedge is good for.
-    #[must_use]
-    pub fn without_hedge(mut self) -> Self {
-        self.shading.believe();
-        self
-    }
-
     /// Width and height of the part of the photograph that holds the object.
     #[must_use]
     pub const fn extent(&self) -> Extent {
         self.albedo.extent()
-    }
-
-    /// Where it stood in its photograph.
-    #[must_use]
-    pub fn own_placement(&self) -> Placement {
-        Placement::in_photo(&self.matte.alpha, self.place, self.photo)
     }
 
     /// The object as it stands by this fit.

@@ -25,12 +25,7 @@ impl LightSource {
     ///
     /// It is a guess. What lights a scene is mostly beside the picture.
     #[must_use]
-    pub fn of_picture(picture: &Rgb<Linear>, field: f64) -> Self {
-        Self::of_picture_with(picture, field, SeenSun::find(picture.planes()))
-    }
-
-    /// As [`LightSource::of_picture`], with this sun, or none.
-    pub(super) fn of_picture_with(picture: &Rgb<Linear>, field: f64, sun: Option<SeenSun>) -> Self {
+    pub(super) fn of_picture(picture: &Rgb<Linear>, field: f64, sun: Option<SeenSun>) -> Self {
         let extent = picture.planes().extent();
         let radiance = picture.planes().clone().map(|v| {
             let v = if v.is_finite() { v.max(0.0) } else { 0.0 };
@@ -116,7 +111,7 @@ mod tests {
         let picture = Rgb::new(Planes::from_fn(Extent::new(90, 60), |x, y| {
             [0.1 + 0.5 * (x as f32 / 90.0) * (1.0 - y as f32 / 60.0); 3]
         }));
-        let source = LightSource::of_picture(&picture, 60.0);
+        let source = LightSource::of_picture(&picture, 60.0, SeenSun::find(picture.planes()));
         let LightSource::Panorama(panorama) = &source else {
             panic!("a panorama")
         };
@@ -134,7 +129,9 @@ mod tests {
             let glow = 0.3 + 0.55 * (-(from - 3.0).max(0.0) / 5.0).exp();
             [if from < 3.0 { 1.0 } else { glow as f32 }; 3]
         }));
-        let LightSource::Panorama(panorama) = LightSource::of_picture(&picture, 60.0) else {
+        let LightSource::Panorama(panorama) =
+            LightSource::of_picture(&picture, 60.0, SeenSun::find(picture.planes()))
+        else {
             panic!("a panorama")
         };
         // 70.5 of 90 columns is 17 degrees to the right, 10.5 of 60 rows 13 degrees up.

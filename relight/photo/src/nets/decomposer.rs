@@ -13,7 +13,7 @@
 //! darkness is paint rather than shadow (1, logit). `light`, a vector of [`LIGHT_OUTPUTS`] numbers: the coefficients of order 2
 //! of the grey irradiance that arrives from all around where nothing is in its way, in units of the mean shading.
 
-use super::graph::{Graph, Value};
+use super::graph::{Graph, GroupedLayers, Value};
 use super::weights::Weights;
 
 /// Channels of the input.
@@ -26,7 +26,7 @@ const BLOCK: usize = 2;
 /// Channels of the encoder's steps.
 const ENCODER: [usize; 5] = [32, 64, 128, 256, 256];
 /// Channels in a group of a normalisation.
-const GROUP: usize = 16;
+const LAYERS: GroupedLayers = GroupedLayers { group: 16 };
 /// Residual blocks between encoder and decoder.
 const MIDDLE: usize = 2;
 
@@ -88,18 +88,18 @@ fn build(heads: Heads) -> Graph {
     let features = encode(&mut net, blocks);
     let mut value = features[ENCODER.len() - 1];
     for step in 0..MIDDLE {
-        value = residual(&mut net, &format!("middle.{step}"), value);
+        value = LAYERS.residual(&mut net, &format!("middle.{step}"), value);
     }
     let middle = value;
     let skips = features.iter().rev();
     let outputs = ENCODER.iter().rev().skip(1);
     for (step, (&outputs, &skip)) in outputs.zip(skips).enumerate() {
         value = net.concatenate(value, skip);
-        value = layer(&mut net, &format!("decoder.{step}"), value, outputs, 1);
+        value = LAYERS.layer(&mut net, &format!("decoder.{step}"), value, outputs, 1);
         value = net.upsample(value, false);
     }
     value = net.concatenate(value, features[0]);
-    value = layer(&mut net, "head.0", value, ENCODER[0], 1);
+    value = LAYERS.layer(&mut net, "head.0", value, ENCODER[0], 1);
     let maps = net.convolution("head.1".to_owned(), value, OUTPUTS * BLOCK * BLOCK, 1);
     let maps = net.pixel_shuffle(maps, BLOCK);
     net.output("maps", maps);
@@ -133,30 +133,13 @@ fn encode(net: &mut Graph, input: Value) -> Vec<Value> {
     let mut features = Vec::with_capacity(ENCODER.len());
     for (step, &outputs) in ENCODER.iter().enumerate() {
         let stride = if step == 0 { 1 } else { 2 };
-        value = layer(net, &format!("encoder.{step}"), value, outputs, stride);
+        value = LAYERS.layer(net, &format!("encoder.{step}"), value, outputs, stride);
         if step >= 2 {
-            value = residual(net, &format!("encoder.{step}.residual"), value);
+            value = LAYERS.residual(net, &format!("encoder.{step}.residual"), value);
         }
         features.push(value);
     }
     features
-}
-
-/// Convolution, normalisation of groups, ReLU.
-fn layer(net: &mut Graph, name: &str, of: Value, outputs: usize, stride: usize) -> Value {
-    let value = net.convolution(format!("{name}.conv"), of, outputs, stride);
-    let value = net.group_norm(format!("{name}.norm"), value, GROUP);
-    net.relu(value)
-}
-
-/// Two layers whose result is added to what went in.
-fn residual(net: &mut Graph, name: &str, of: Value) -> Value {
-    let channels = net.node(of).channels;
-    let value = layer(net, &format!("{name}.0"), of, channels, 1);
-    let value = net.convolution(format!("{name}.1.conv"), value, channels, 1);
-    let value = net.group_norm(format!("{name}.1.norm"), value, GROUP);
-    let sum = net.add(of, value);
-    net.relu(sum)
 }
 
 #[cfg(test)]

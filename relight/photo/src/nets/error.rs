@@ -28,15 +28,6 @@ pub enum NetError {
         /// What is wrong with it.
         fault: String,
     },
-    /// A library of an engine that is not installed.
-    #[error(
-        "there is no ONNX Runtime at {path}: install it and set ORT_DYLIB_PATH to its library, or use --engine tract",
-        path = .path.display()
-    )]
-    NoLibrary {
-        /// Where it should be.
-        path: PathBuf,
-    },
     /// A network that cannot be run, or cannot take such a picture.
     #[error("{0}")]
     Run(String),

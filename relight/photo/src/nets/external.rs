@@ -60,17 +60,6 @@ pub fn with_external_weights(
     Ok(Some(model.encode_to_vec()))
 }
 
-/// The name of the first other file in which an ONNX file's weights stand, if any do.
-pub(super) fn first_location(onnx: &[u8]) -> Option<String> {
-    let mut first = None;
-    // That nothing is read ends it at the first part, which is all that is asked for.
-    let _ = with_external_weights(onnx, |part| {
-        first = Some(part.location.clone());
-        Err(String::new())
-    });
-    first
-}
-
 fn tensors_of_graph<'a>(graph: &'a mut GraphProto, found: &mut Vec<&'a mut TensorProto>) {
     found.extend(&mut graph.initializer);
     tensors_of_nodes(&mut graph.node, found);
@@ -138,8 +127,7 @@ fn bytes_of(tensor: &TensorProto) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nets::{Inference, InferenceEngine, Weights, decomposer, to_onnx};
-    use std::path::Path;
+    use crate::nets::{Weights, decomposer, to_onnx};
     use tract_onnx::pb::StringStringEntryProto as Entry;
 
     const SIZE: (usize, usize) = (32, 32);
@@ -189,27 +177,12 @@ mod tests {
             Ok(range(&others, part).unwrap())
         });
         assert_eq!(merged.unwrap().unwrap(), plain);
-        assert_eq!(first_location(&outside).as_deref(), Some("weights.bin"));
     }
 
     #[test]
     fn a_file_with_its_own_weights_stays_as_it_is() {
         let read = |_: &ExternalPart| unreachable!();
         assert!(with_external_weights(&network(), read).unwrap().is_none());
-        assert_eq!(first_location(&network()), None);
-        assert_eq!(first_location(b"not a network"), None);
-    }
-
-    #[test]
-    fn content_that_needs_another_file_is_refused_by_its_name() {
-        let outside = moved(&network(), &mut Vec::new());
-        let engine = InferenceEngine::default();
-        let error = Inference::from_onnx(Path::new("a.onnx"), &outside, 7, SIZE, &[], &engine);
-        let error = error.unwrap_err().to_string();
-        assert!(
-            error.contains("a.onnx") && error.contains("weights.bin"),
-            "{error}"
-        );
     }
 
     fn tensor(entries: &[(&str, &str)]) -> Vec<u8> {

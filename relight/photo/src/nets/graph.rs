@@ -4,7 +4,41 @@
 //! [`Graph`], so they cannot differ. Values have a number of channels and, where they are pictures,
 //! a scale: the size of the input divided by their own.
 
-use super::parameter::{Parameter, Role};
+/// What a parameter is for, and so how it begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The weight of a convolution or of a fully connected layer.
+    Weight,
+    /// An offset.
+    Bias,
+    /// A normalisation's factor.
+    Gain,
+}
+
+/// A parameter that a graph needs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Parameter {
+    /// Its name, as in a PyTorch state dict.
+    pub name: String,
+    /// Its shape; a weight's first number is the outputs.
+    pub shape: Vec<usize>,
+    /// What it is for.
+    pub role: Role,
+}
+
+impl Parameter {
+    /// How many numbers it has.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Inputs that go into one output.
+    #[must_use]
+    pub fn fan_in(&self) -> usize {
+        self.shape.iter().skip(1).product()
+    }
+}
 
 /// A value inside a graph: the output of one of its nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -356,6 +390,37 @@ impl Graph {
     /// Names a value as a result.
     pub fn output(&mut self, name: &'static str, value: Value) {
         self.outputs.push(Output { name, value });
+    }
+}
+
+/// Layers whose normalisation has groups of `group` channels.
+pub(super) struct GroupedLayers {
+    pub(super) group: usize,
+}
+
+impl GroupedLayers {
+    /// Convolution, normalisation of groups, ReLU.
+    pub(super) fn layer(
+        &self,
+        net: &mut Graph,
+        name: &str,
+        of: Value,
+        outputs: usize,
+        stride: usize,
+    ) -> Value {
+        let value = net.convolution(format!("{name}.conv"), of, outputs, stride);
+        let value = net.group_norm(format!("{name}.norm"), value, self.group);
+        net.relu(value)
+    }
+
+    /// Two layers whose result is added to what went in.
+    pub(super) fn residual(&self, net: &mut Graph, name: &str, of: Value) -> Value {
+        let channels = net.node(of).channels;
+        let value = self.layer(net, &format!("{name}.0"), of, channels, 1);
+        let value = net.convolution(format!("{name}.1.conv"), value, channels, 1);
+        let value = net.group_norm(format!("{name}.1.norm"), value, self.group);
+        let sum = net.add(of, value);
+        net.relu(sum)
     }
 }
 

@@ -1,60 +1,46 @@
-//! Running a network on the CPU: the ONNX file, made in memory, by an engine.
+//! Running a network on the CPU: the ONNX file, made in memory, by tract.
 
 use std::path::Path;
 
-use super::engine::{InferenceEngine, Plan};
 use super::error::NetError;
-use super::external::first_location;
 use super::graph::Graph;
 use super::onnx::to_onnx;
+use super::tract::TractPlan;
 use super::weights::{Tensor, Weights};
 
 /// A network ready to be run on single pictures of one size.
 pub struct Inference {
     name: &'static str,
-    engine: &'static str,
     shape: [usize; 4],
-    plan: Box<dyn Plan>,
+    plan: TractPlan,
 }
 
 impl std::fmt::Debug for Inference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Inference")
             .field("name", &self.name)
-            .field("engine", &self.engine)
             .field("shape", &self.shape)
             .finish_non_exhaustive()
     }
 }
 
 impl Inference {
-    /// Makes a network ready for pictures of `width` x `height` pixels, by tract.
-    ///
-    /// # Errors
-    /// [`NetError::Run`], or what [`Weights::fitted_to`] answers.
-    pub fn new(graph: &Graph, weights: &Weights, size: (usize, usize)) -> Result<Self, NetError> {
-        Self::with_engine(graph, weights, size, &InferenceEngine::default())
-    }
-
     /// Makes a network ready for pictures of `width` x `height` pixels.
     ///
     /// # Errors
     /// [`NetError::Run`], or what [`Weights::fitted_to`] answers.
-    pub fn with_engine(
+    pub fn new(
         graph: &Graph,
         weights: &Weights,
         (width, height): (usize, usize),
-        engine: &InferenceEngine,
     ) -> Result<Self, NetError> {
         let bytes = to_onnx(graph, weights, 1, (width, height))?;
         let shape = [1, graph.input_channels(), height, width];
-        let plan = engine.prepare(&bytes, shape, &[]).map_err(|fault| {
-            let (engine, net) = (engine.name(), graph.name());
-            NetError::Run(format!("{engine} could not prepare {net}: {fault}"))
+        let plan = TractPlan::new(&bytes, shape, &[]).map_err(|fault| {
+            NetError::Run(format!("tract could not prepare {}: {fault}", graph.name()))
         });
         Ok(Self {
             name: graph.name(),
-            engine: engine.name(),
             shape,
             plan: plan?,
         })
@@ -71,22 +57,14 @@ impl Inference {
         channels: usize,
         (width, height): (usize, usize),
         given: &[(String, i64)],
-        engine: &InferenceEngine,
     ) -> Result<Self, NetError> {
         let shape = [1, channels, height, width];
-        let unusable = |fault| NetError::File {
+        let plan = TractPlan::new(bytes, shape, given).map_err(|fault| NetError::File {
             path: path.to_owned(),
             fault,
-        };
-        if let Some(location) = first_location(bytes) {
-            return Err(unusable(format!(
-                "its weights stand in another file, {location:?}: save it as one file"
-            )));
-        }
-        let plan = engine.prepare(bytes, shape, given).map_err(unusable);
+        });
         Ok(Self {
             name: "the network of the ONNX file",
-            engine: engine.name(),
             shape,
             plan: plan?,
         })
@@ -105,11 +83,8 @@ impl Inference {
                 input.len()
             )));
         }
-        self.plan.run(input).map_err(|fault| {
-            NetError::Run(format!(
-                "{} could not run {}: {fault}",
-                self.engine, self.name
-            ))
-        })
+        self.plan
+            .run(input)
+            .map_err(|fault| NetError::Run(format!("tract could not run {}: {fault}", self.name)))
     }
 }

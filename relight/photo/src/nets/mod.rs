@@ -3,7 +3,7 @@
 //!
 //! [`paper`] has the paper's four networks with the released shapes and parameter names, and
 //! [`decomposer`] and [`turn_network`] ours. [`Weights`] reads safetensors,
-//! [`to_onnx`] writes what any engine runs, and [`Inference`] runs it here, by an [`InferenceEngine`].
+//! [`to_onnx`] writes what any engine runs, and [`Inference`] runs it here.
 //! Knows nothing of pictures, colour or light: tensors go in and come out.
 //!
 //! ```
@@ -19,7 +19,6 @@
 
 mod codec;
 mod decomposer;
-mod engine;
 mod error;
 mod external;
 #[cfg(feature = "files")]
@@ -27,10 +26,7 @@ mod files;
 mod graph;
 mod inference;
 mod onnx;
-#[cfg(feature = "onnxruntime")]
-mod onnxruntime;
 pub mod paper;
-mod parameter;
 mod signature;
 mod tract;
 mod turn_network;
@@ -41,19 +37,13 @@ pub use decomposer::{
     INPUTS, LIGHT_OUTPUTS, LIGHT_PARAMETERS, OUTPUTS, PAINT_PARAMETERS, decomposer, decomposer_of,
     decomposer_with_heads,
 };
-pub use engine::InferenceEngine;
 pub use error::NetError;
 pub use external::{ExternalPart, with_external_weights};
 #[cfg(feature = "files")]
 pub use files::read_onnx;
-pub use graph::{EPSILON, Graph, Node, Operation, Output, Value};
+pub use graph::{EPSILON, Graph, Node, Operation, Output, Parameter, Role, Value};
 pub use inference::Inference;
 pub use onnx::{INPUT, check_size, to_onnx};
-#[cfg(feature = "onnxruntime")]
-pub use onnxruntime::OnnxRuntime;
-pub use parameter::{Parameter, Role};
 pub use signature::{OnnxSignature, OnnxValue};
-pub use turn_network::{
-    ALBEDO_OUTPUTS, ALBEDO_PARAMETERS, LOG_MEANS, TURN_INPUTS, TURN_OUTPUTS, turn_network,
-};
+pub use turn_network::{ALBEDO_OUTPUTS, LOG_MEANS, TURN_INPUTS, TURN_OUTPUTS, turn_network};
 pub use weights::{Tensor, Weights};

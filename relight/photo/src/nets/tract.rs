@@ -8,7 +8,6 @@ use tract_onnx::prelude::{
 };
 use tract_onnx::tract_core::plan::eval;
 
-use super::engine::Plan;
 use super::weights::Tensor;
 
 /// A network in tract.
@@ -55,6 +54,28 @@ impl TractPlan {
             inputs,
             plan,
         })
+    }
+
+    /// The outputs for an input of the shape it was made ready for, or tract's own words.
+    pub(super) fn run(&self, input: &[f32]) -> Result<Vec<Tensor>, String> {
+        let failed = |fault: &dyn std::fmt::Display| format!("{fault:#}");
+        let input = TractTensor::from_shape(&self.shape, input).map_err(|fault| failed(&fault))?;
+        let picture = TValue::from(input);
+        let value = |given: &Option<TractTensor>| match given {
+            Some(number) => TValue::from(number.clone()),
+            None => picture.clone(),
+        };
+        let outputs = self.outputs(self.inputs.iter().map(value).collect());
+        outputs
+            .map_err(|fault| failed(&fault))?
+            .iter()
+            .map(|output| {
+                let view = output.to_plain_array_view::<f32>();
+                let view = view.map_err(|fault| failed(&fault))?;
+                let tensor = Tensor::new(view.shape().to_vec(), view.iter().copied().collect());
+                tensor.ok_or_else(|| "an output has no shape".to_owned())
+            })
+            .collect()
     }
 
     fn outputs(&self, inputs: TVec<TValue>) -> TractResult<TVec<TValue>> {
@@ -115,26 +136,3 @@ fn clear_upper_halves() {
 /// No other processor has AVX in use.
 #[cfg(not(target_arch = "x86_64"))]
 fn clear_upper_halves() {}
-
-impl Plan for TractPlan {
-    fn run(&self, input: &[f32]) -> Result<Vec<Tensor>, String> {
-        let failed = |fault: &dyn std::fmt::Display| format!("{fault:#}");
-        let input = TractTensor::from_shape(&self.shape, input).map_err(|fault| failed(&fault))?;
-        let picture = TValue::from(input);
-        let value = |given: &Option<TractTensor>| match given {
-            Some(number) => TValue::from(number.clone()),
-            None => picture.clone(),
-        };
-        let outputs = self.outputs(self.inputs.iter().map(value).collect());
-        outputs
-            .map_err(|fault| failed(&fault))?
-            .iter()
-            .map(|output| {
-                let view = output.to_plain_array_view::<f32>();
-                let view = view.map_err(|fault| failed(&fault))?;
-                let tensor = Tensor::new(view.shape().to_vec(), view.iter().copied().collect());
-                tensor.ok_or_else(|| "an output has no shape".to_owned())
-            })
-            .collect()
-    }
-}

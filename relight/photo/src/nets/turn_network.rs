@@ -5,7 +5,7 @@
 //! logarithm of the expected length of the chord to the true one (1). Output `albedo`, [`ALBEDO_OUTPUTS`] channels: the
 //! logarithm of albedo over the mean of the curve, each channel in any unit.
 
-use super::graph::{Graph, Value};
+use super::graph::{Graph, GroupedLayers, Value};
 
 /// Channels of the input.
 pub const TURN_INPUTS: usize = 65;
@@ -15,8 +15,6 @@ pub const TURN_OUTPUTS: usize = 4;
 pub const ALBEDO_OUTPUTS: usize = 3;
 /// The first of the three channels of the input that have the logarithms of the curves' means.
 pub const LOG_MEANS: usize = 32;
-/// How the names of the parameters of the head for albedo begin.
-pub const ALBEDO_PARAMETERS: &str = "albedo.";
 
 /// Channels that every pixel has of its own.
 const STEM: usize = 24;
@@ -27,7 +25,7 @@ const ENCODER: [usize; 4] = [40, 72, 128, 176];
 /// Channels that come back to a pixel.
 const FINE: usize = 16;
 /// Channels in a group of a normalisation.
-const GROUP: usize = 8;
+const LAYERS: GroupedLayers = GroupedLayers { group: 8 };
 
 /// The network; width and height of its input are multiples of 16.
 #[must_use]
@@ -39,17 +37,17 @@ pub fn turn_network() -> Graph {
     let mut skips = Vec::new();
     for (step, &outputs) in ENCODER.iter().enumerate() {
         let stride = if step == 0 { 1 } else { 2 };
-        value = layer(&mut net, &format!("encoder.{step}"), value, outputs, stride);
+        value = LAYERS.layer(&mut net, &format!("encoder.{step}"), value, outputs, stride);
         if step > 0 {
-            value = residual(&mut net, &format!("encoder.{step}.residual"), value);
+            value = LAYERS.residual(&mut net, &format!("encoder.{step}.residual"), value);
         }
         skips.push(value);
     }
-    value = residual(&mut net, "middle", value);
+    value = LAYERS.residual(&mut net, "middle", value);
     for (step, &skip) in skips.iter().enumerate().rev().skip(1) {
         value = net.upsample(value, false);
         value = net.concatenate(value, skip);
-        value = layer(
+        value = LAYERS.layer(
             &mut net,
             &format!("decoder.{step}"),
             value,
@@ -80,23 +78,6 @@ fn head(net: &mut Graph, names: [&str; 3], blocks: Value, stem: Value, outputs: 
     let value = net.convolution(first, value, STEM, 1);
     let value = net.relu(value);
     net.convolution(last, value, outputs, 1)
-}
-
-/// Convolution, normalisation of groups, ReLU.
-fn layer(net: &mut Graph, name: &str, of: Value, outputs: usize, stride: usize) -> Value {
-    let value = net.convolution(format!("{name}.conv"), of, outputs, stride);
-    let value = net.group_norm(format!("{name}.norm"), value, GROUP);
-    net.relu(value)
-}
-
-/// Two layers whose result is added to what went in.
-fn residual(net: &mut Graph, name: &str, of: Value) -> Value {
-    let channels = net.node(of).channels;
-    let value = layer(net, &format!("{name}.0"), of, channels, 1);
-    let value = net.convolution(format!("{name}.1.conv"), value, channels, 1);
-    let value = net.group_norm(format!("{name}.1.norm"), value, GROUP);
-    let sum = net.add(of, value);
-    net.relu(sum)
 }
 
 #[cfg(test)]

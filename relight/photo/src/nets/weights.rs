@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::error::NetError;
-use super::graph::Graph;
-use super::parameter::{Parameter, Role};
+use super::graph::{Graph, Parameter, Role};
 
 /// Numbers with a shape, in row-major order.
 #[derive(Debug, Clone, PartialEq)]

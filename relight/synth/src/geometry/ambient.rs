@@ -14,8 +14,7 @@ impl GBuffer {
     /// For each pixel, the part of even light from all around that is not blocked, weighted by the
     /// cosine to the normal: 1 where nothing is near. `rays` a pixel, smoothed over neighbours of the
     /// same surface.
-    #[must_use]
-    pub fn ambient_visibility(&self, occluder: &Occluder, rays: u32, seed: u64) -> Vec<f32> {
+    pub(crate) fn ambient_visibility(&self, occluder: &Occluder, rays: u32, seed: u64) -> Vec<f32> {
         let open = |k: usize| {
             let turn = unit_of(mix(stream(seed, u64::from(self.pixels[k]))));
             let (normal, start) = (self.normals[k], self.ray_starts[k]);
@@ -32,10 +31,8 @@ impl GBuffer {
     /// Mean over the neighbours (5 x 5) that lie in nearly the same plane.
     fn smoothed(&self, values: &[f32]) -> Vec<f32> {
         let side = self.size as i64;
-        let mut place = vec![u32::MAX; (side * side) as usize];
-        for (k, &pixel) in (0_u32..).zip(&self.pixels) {
-            place[pixel as usize] = k;
-        }
+        let numbers: Vec<usize> = (0..self.len()).collect();
+        let place = self.spread(&numbers, usize::MAX);
         let near = 6.0 / side as f32;
         let mean = |k: usize| {
             let pixel = i64::from(self.pixels[k]);
@@ -44,7 +41,7 @@ impl GBuffer {
             let (mut sum, mut total) = (0.0, 0.0);
             for y in (row - 2).max(0)..(row + 3).min(side) {
                 for x in (column - 2).max(0)..(column + 3).min(side) {
-                    let other = place[(y * side + x) as usize] as usize;
+                    let other = place[(y * side + x) as usize];
                     let Some(&value) = values.get(other) else {
                         continue;
                     };

@@ -42,7 +42,12 @@ pub struct GBuffer {
 impl GBuffer {
     /// Looks at a mesh that `placement` moves into the viewer's frame, in a square picture of `size`
     /// pixels.
-    pub fn render(mesh: &Mesh, placement: Affine3A, projection: Projection, size: u32) -> Self {
+    pub(crate) fn render(
+        mesh: &Mesh,
+        placement: Affine3A,
+        projection: Projection,
+        size: u32,
+    ) -> Self {
         let posed = Posed::new(mesh, placement, projection, size);
         let seen = foremost(size, &posed.projected, &mesh.triangles);
         let covered = (0_u32..)
@@ -99,35 +104,23 @@ impl GBuffer {
     }
 
     /// A picture with these colours at the covered pixels and 0 elsewhere.
-    ///
-    /// # Panics
-    /// Where there are fewer values than covered pixels.
     #[must_use]
     pub fn planes(&self, values: &[Vec3]) -> Planes<3> {
-        let side = self.size as usize;
-        let mut planes = Planes::zeros(Extent::new(side, side));
-        for (&pixel, value) in self.pixels.iter().zip(&values[..self.len()]) {
-            let (column, row) = (pixel as usize % side, pixel as usize / side);
-            planes.set_pixel(column, row, value.to_array());
-        }
-        planes
+        let (side, values) = (self.size as usize, self.spread(values, Vec3::ZERO));
+        Planes::from_fn(Extent::new(side, side), |x, y| {
+            values[y * side + x].to_array()
+        })
     }
 
     /// 1 at the covered pixels, 0 elsewhere.
     #[must_use]
     pub fn mask(&self) -> Planes<1> {
         let side = self.size as usize;
-        let mut planes = Planes::zeros(Extent::new(side, side));
-        for &pixel in &self.pixels {
-            planes.set_pixel(pixel as usize % side, pixel as usize / side, [1.0]);
-        }
-        planes
+        let covered = self.spread(&vec![[1.0]; self.len()], [0.0]);
+        Planes::from_fn(Extent::new(side, side), |x, y| covered[y * side + x])
     }
 
     /// These normals as a map.
-    ///
-    /// # Panics
-    /// Where there are fewer values than covered pixels.
     #[must_use]
     pub fn normal_map(&self, normals: &[Vec3]) -> Normals<YUp> {
         Normals::new(self.planes(normals))

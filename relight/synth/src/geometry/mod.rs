@@ -8,4 +8,4 @@ mod raster;
 pub use buffer::GBuffer;
 pub(super) use buffer::turned_to;
 pub(super) use occluder::Disc;
-pub use occluder::Occluder;
+pub(super) use occluder::Occluder;

@@ -12,7 +12,7 @@ use obvhs::triangle::Triangle;
 use crate::mesh::Mesh;
 
 /// Triangles in the viewer's frame, ready to be asked whether they block a ray.
-pub struct Occluder {
+pub(crate) struct Occluder {
     tree: CwBvh,
     /// In the order of the tree's leaves.
     triangles: Vec<Triangle>,
@@ -28,7 +28,7 @@ pub(crate) struct Hit {
 
 impl Occluder {
     /// The mesh in its place.
-    pub fn new(mesh: &Mesh, placement: Affine3A) -> Self {
+    pub(crate) fn new(mesh: &Mesh, placement: Affine3A) -> Self {
         Self::of(triangles(mesh, placement), usize::MAX)
     }
 
@@ -82,8 +82,7 @@ impl Occluder {
 
     /// Whether anything stands between a point and what lies from it in a direction (of unit length)
     /// up to a distance.
-    #[must_use]
-    pub fn blocks(&self, from: Vec3, direction: Vec3, distance: f32) -> bool {
+    pub(crate) fn blocks(&self, from: Vec3, direction: Vec3, distance: f32) -> bool {
         let ray = Ray::new(Vec3A::from(from), Vec3A::from(direction), 0.0, distance);
         !self
             .tree

@@ -103,7 +103,8 @@ impl Lighting {
 }
 
 impl SyntheticLamp {
-    fn draw(random: &mut Random, buffer: &GBuffer, strength: f32) -> Self {
+    /// A lamp that lights a good part of what is seen, of this irradiance.
+    pub(crate) fn draw(random: &mut Random, buffer: &GBuffer, strength: f32) -> Self {
         let towards = lighting_direction(random, buffer);
         let (emitter, rays) = if random.chance(0.3) {
             let centre = towards * random.uniform(2.5..7.0);
@@ -193,7 +194,7 @@ fn lighting_direction(random: &mut Random, buffer: &GBuffer) -> Vec3 {
 }
 
 /// A colour near white, of mean 1.
-fn tint(random: &mut Random, most: f32) -> Vec3 {
+pub(crate) fn tint(random: &mut Random, most: f32) -> Vec3 {
     let strength = random.pick([0.25, 0.6, 1.0]) * most;
     let colour = Vec3::from_array([(); 3].map(|()| (random.normal() * strength).exp()));
     colour * 3.0 / colour.element_sum()

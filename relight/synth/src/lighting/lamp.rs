@@ -127,7 +127,7 @@ impl Emitter {
     }
 
     /// The same, at least as high as 9 degrees over the horizon of this vertical.
-    pub(super) fn above(self, vertical: Vec3) -> Self {
+    pub(crate) fn above(self, vertical: Vec3) -> Self {
         let raised = |place: Vec3| {
             let length = place.length();
             let height = place.dot(vertical);
@@ -136,6 +136,22 @@ impl Emitter {
             (level + vertical * height.abs().max(least)).normalize_or(vertical) * length
         };
         self.at(raised)
+    }
+
+    /// Its middle; `far` stands for the distance of what is far away.
+    pub(crate) fn middle(self, far: f32) -> Vec3 {
+        match self {
+            Self::Distant { .. } => self.towards() * far,
+            Self::Disc { centre, .. } => centre,
+        }
+    }
+
+    /// Half of the angle under which it is seen from the origin, radians.
+    pub(crate) fn half_angle(self) -> f32 {
+        match self {
+            Self::Distant { half_angle, .. } => half_angle,
+            Self::Disc { centre, radius } => (radius / centre.length().max(1e-3)).atan(),
+        }
     }
 
     /// The same with its place or direction changed.
@@ -178,6 +194,11 @@ impl Emitter {
 }
 
 impl LampShadows {
+    /// The part of a lamp's rays that arrive at a covered pixel.
+    pub(crate) fn visible_part(&self, pixel: usize, lamp: &SyntheticLamp) -> f32 {
+        self.open[pixel].count_ones() as f32 / lamp.rays.clamp(1, MOST_RAYS) as f32
+    }
+
     /// Whether a ray arrives at a covered pixel.
     pub(super) fn arrives(&self, pixel: usize, ray: usize) -> bool {
         self.open[pixel] >> ray & 1 == 1

@@ -24,6 +24,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 pub use draw::LightKind;
+pub(crate) use draw::tint;
 pub use environment::Panoramas;
 pub(crate) use environment::{Environment, Method};
 pub(crate) use lamp::{Emitter, SyntheticLamp};

@@ -20,8 +20,7 @@ struct Shade {
 
 impl SyntheticScene {
     /// A scene in which nothing is ever in the way of light.
-    #[must_use]
-    pub fn open(buffer: GBuffer) -> Self {
+    pub(crate) fn open(buffer: GBuffer) -> Self {
         Self {
             buffer,
             shade: None,
@@ -29,8 +28,7 @@ impl SyntheticScene {
     }
 
     /// A scene with shadows. `rays` rays a pixel tell how much of the sky it sees.
-    #[must_use]
-    pub fn shaded(buffer: GBuffer, occluder: Occluder, rays: u32, seed: u64) -> Self {
+    pub(crate) fn shaded(buffer: GBuffer, occluder: Occluder, rays: u32, seed: u64) -> Self {
         let open = buffer.ambient_visibility(&occluder, rays, seed);
         Self {
             buffer,

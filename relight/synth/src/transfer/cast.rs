@@ -95,18 +95,7 @@ impl RadianceTransfer {
         rays: u32,
         seed: u64,
     ) -> Self {
-        let to_table = table_frame(elevation);
-        let mut random = Random::new(seed);
-        let sets: Vec<Directions> = (0..SETS)
-            .map(|_| Directions::draw(&mut random, rays, to_table))
-            .collect();
-        let cast = |k: usize| {
-            let pixel = buffer.pixels[k];
-            let (column, row) = (pixel % buffer.size, pixel / buffer.size);
-            let set = &sets[(column % 4 + 4 * (row % 4)) as usize % SETS];
-            PixelRays::cast(buffer, occluder, k, set, to_table)
-        };
-        let cast: Vec<PixelRays> = (0..buffer.len()).into_par_iter().map(cast).collect();
+        let cast = cast_pixels(buffer, occluder, table_frame(elevation), rays, seed);
         Self {
             size: buffer.size,
             elevation,
@@ -120,11 +109,32 @@ impl RadianceTransfer {
     }
 }
 
+/// Casts the rays of each covered pixel; harmonics are those of the frame into which `to_frame` takes the viewer's.
+pub(super) fn cast_pixels(
+    buffer: &GBuffer,
+    occluder: &Occluder,
+    to_frame: Mat3,
+    rays: u32,
+    seed: u64,
+) -> Vec<PixelRays> {
+    let mut random = Random::new(seed);
+    let sets: Vec<Directions> = (0..SETS)
+        .map(|_| Directions::draw(&mut random, rays, to_frame))
+        .collect();
+    let cast = |k: usize| {
+        let pixel = buffer.pixels[k];
+        let (column, row) = (pixel % buffer.size, pixel / buffer.size);
+        let set = &sets[(column % 4 + 4 * (row % 4)) as usize % SETS];
+        PixelRays::cast(buffer, occluder, k, set, to_frame)
+    };
+    (0..buffer.len()).into_par_iter().map(cast).collect()
+}
+
 /// What the rays of a pixel found.
-struct PixelRays {
-    mirrors: bool,
-    blocked: [f32; COEFFICIENTS],
-    bounced: [f32; BOUNCE_COEFFICIENTS],
+pub(super) struct PixelRays {
+    pub(super) mirrors: bool,
+    pub(super) blocked: [f32; COEFFICIENTS],
+    pub(super) bounced: [f32; BOUNCE_COEFFICIENTS],
 }
 
 impl PixelRays {

@@ -22,11 +22,15 @@
 //! | `cache` | views on disk |
 //! | `timing` | the table's angle as a rig knows it |
 //! | `drawn` | a view in a random material, room and camera |
+//! | `photo_view` | a view for photographs: what a device needs to light it without a ray |
+//! | `photo_plan` | the material, light and camera of one such photograph |
 
 mod cache;
 mod cast;
 mod curves;
 mod drawn;
+mod photo_plan;
+mod photo_view;
 mod rooms;
 #[cfg(test)]
 mod tests;
@@ -38,6 +42,8 @@ use relight_core::render::cosine_lobe;
 
 pub use cache::TransferCache;
 pub use drawn::DrawnTurn;
+pub use photo_plan::{PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint};
+pub use photo_view::{PhotoView, PhotoViewRecipe, ViewLamp};
 pub use rooms::Rooms;
 pub use views::TransferRecipe;
 

@@ -118,7 +118,7 @@ impl Rooms {
     }
 }
 
-fn rotation(matrix: Mat3) -> Rotation {
+pub(super) fn rotation(matrix: Mat3) -> Rotation {
     // The rows are exact: this is a rotation.
     Rotation::from_matrix(rotation_rows(matrix)).unwrap_or(Rotation::IDENTITY)
 }

@@ -10,7 +10,7 @@ use super::*;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::{Folders, Library};
 use crate::lighting::{
-    BlinnPhong, Environment, Lighting, Material, Method, Panoramas, SyntheticScene,
+    BlinnPhong, Environment, Lighting, Material, Method, Panoramas, SyntheticLamp, SyntheticScene,
 };
 use crate::made_panoramas;
 use crate::mesh::Mesh;
@@ -401,4 +401,130 @@ fn a_mirror_image_has_the_normals_and_curves_of_the_mirrored_object_under_the_mi
     let half = drawn.halved();
     assert_eq!(half.size, 16);
     assert!((half.pixels.len() as f32 * 4.0 / drawn.pixels.len() as f32 - 1.0).abs() < 0.15);
+}
+
+#[test]
+fn the_light_of_rooms_and_lamps_on_a_photograph_is_that_of_rays() {
+    let (_, buffer, occluder) = standing(24, 16);
+    let table = Vec3::new(0.0, 0.35_f32.cos(), 0.35_f32.sin());
+    let seen = photo_view::Seen::new(buffer.clone(), occluder, Some(table));
+    let mut random = crate::random::Random::new(6);
+    let lamps: Vec<SyntheticLamp> = (0..4).map(|_| seen.lamp(&mut random)).collect();
+    let area = 24 * 24;
+    let base = seen.base(1500, 4);
+    let of = |plane: usize, pixel: u32| f32::from(base[plane * area + pixel as usize]);
+    let (panoramas, _) = soft_room(0.0);
+    let room = panoramas.get(0).unwrap().project(PhotoView::ORDER);
+    let visible: Vec<_> = lamps.iter().map(|lamp| seen.visibility(lamp, 3)).collect();
+    let scene = SyntheticScene::shaded(buffer.clone(), seen.into_occluder(), 16, 7);
+    let material = Material {
+        albedo: vec![Vec3::ONE; buffer.len()],
+        normals: buffer.normals.clone(),
+        gloss: None,
+    };
+    let shaded = |lighting: Lighting| {
+        let lighting = Lighting {
+            has_shadows: true,
+            ..lighting
+        };
+        scene.light(&material, &lighting, &panoramas, 1).shading
+    };
+    let mean = |values: &[f32]| values.iter().sum::<f32>() / values.len() as f32;
+    let apart = |found: &[f32], rays: &[f32]| {
+        let off: Vec<f32> = found.iter().zip(rays).map(|(a, b)| (a - b).abs()).collect();
+        (
+            (mean(found) / mean(rays) - 1.0).abs(),
+            mean(&off) / mean(rays),
+        )
+    };
+    for (lamp, visible) in lamps.iter().zip(&visible) {
+        let lamp = SyntheticLamp {
+            irradiance: Vec3::ONE,
+            ..*lamp
+        };
+        let rays = shaded(Lighting {
+            lamps: vec![lamp],
+            ..Lighting::default()
+        });
+        let rays: Vec<f32> = rays.iter().map(|light| light.x).collect();
+        let centre = lamp.emitter.middle(1e3);
+        let found: Vec<f32> = (0..buffer.len())
+            .map(|k| {
+                let way = centre - buffer.points[k];
+                let towards = way.normalize();
+                let falloff = towards.dot(centre.normalize()) * centre.length_squared()
+                    / way.length_squared();
+                let visible = f32::from(visible[buffer.pixels[k] as usize]);
+                visible * falloff * buffer.normals[k].dot(towards).max(0.0)
+            })
+            .collect();
+        let (in_all, each) = apart(&found, &rays);
+        assert!(in_all < 0.03 && each < 0.06, "{lamp:?}: {in_all} {each}");
+    }
+    let environment = Environment {
+        panorama: 0,
+        rotation: *Rotation::IDENTITY.matrix(),
+        irradiance: Vec3::ONE,
+        method: Method::MonteCarlo,
+    };
+    let rays = shaded(Lighting {
+        environment: Some(environment),
+        ..Lighting::default()
+    });
+    let radiance: Vec<f32> = room.coefficients().iter().map(|c| c[0] as f32).collect();
+    let found: Vec<f32> = (0..buffer.len())
+        .map(|k| {
+            let harmonics: [f32; 49] = cast::harmonics_at(PhotoView::ORDER, buffer.normals[k]);
+            (0..49)
+                .map(|at| {
+                    let blocked = of(PhotoView::BLOCKED + at, buffer.pixels[k]);
+                    (harmonics[at] * cosine_band(band(at)) - blocked) * radiance[at]
+                })
+                .sum()
+        })
+        .collect();
+    // Rendered rooms have a mean irradiance of 1 on a sphere; this one is as it is.
+    let rays: Vec<f32> = rays.iter().map(|light| light.x).collect();
+    let scale = mean(&found) / mean(&rays);
+    let unit = panoramas_irradiance(&room);
+    assert!((scale / unit - 1.0).abs() < 0.03, "{scale} {unit}");
+    let found: Vec<f32> = found.iter().map(|value| value / scale).collect();
+    let (_, each) = apart(&found, &rays);
+    assert!(each < 0.06, "{each}");
+}
+
+/// The mean irradiance, over all directions and channels, of a light.
+fn panoramas_irradiance(light: &ShLight) -> f32 {
+    let mean = light.coefficients()[0].iter().sum::<f64>() / 3.0;
+    (mean * std::f64::consts::PI.sqrt() / 2.0) as f32
+}
+
+#[test]
+fn a_photograph_is_the_same_for_the_same_seed_and_its_light_is_room_and_lamps() {
+    let library = Library::read(&Folders::default()).unwrap();
+    let recipe = PhotoViewRecipe {
+        seed: 3,
+        size: 16,
+        rays: 32,
+    };
+    let view = recipe.cast(&library, 5);
+    assert_eq!(view, recipe.cast(&library, 5));
+    assert_eq!(view.base.len(), PhotoView::BASE * 256);
+    assert_eq!(
+        view.finishes.len(),
+        PhotoView::FINISHES * PhotoView::FINISH_PLANES * 256
+    );
+    assert_eq!(view.visibility.len(), PhotoView::LAMPS * 256);
+    let made = made_panoramas().unwrap();
+    let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
+    let rooms = Rooms::new(&panoramas, 2, 1);
+    for seed in 0..40 {
+        let plan = PhotoPlan::draw(seed, &view.lamps, &rooms);
+        assert_eq!(plan, PhotoPlan::draw(seed, &view.lamps, &rooms));
+        let from_lamps: f32 = plan.lamps.iter().map(|lamp| lamp.irradiance[1]).sum();
+        // The first harmonic is constant.
+        let found = (plan.light[0][1] - plan.room[0][1]) / 0.282_094_8;
+        assert!((found - from_lamps).abs() < 1e-4, "{found} {from_lamps}");
+        assert!(plan.finish < PhotoView::FINISHES && plan.lamps.len() <= 3);
+    }
 }

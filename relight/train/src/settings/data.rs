@@ -11,20 +11,20 @@ use crate::error::TrainError;
 const MOST_SAMPLES: u64 = 1_000_000;
 const LARGEST_SIZE: u32 = 1024;
 
-/// What samples are composed of: the table `[data]`.
+/// Of what photographs are made: the table `[data]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DataSettings {
     /// Width and height of the pictures, a multiple of 32.
     pub size: u32,
-    /// Views of each object.
-    pub views: u32,
-    /// Materials and lightings of each view.
-    pub lightings: u32,
-    /// Samples of the shuffle buffer, from which batches are drawn.
-    pub shuffle_buffer: u64,
-    /// How often each is seen, in the mean.
-    pub reuse: f64,
+    /// Views from which each step draws.
+    pub views: u64,
+    /// Views that are cast anew at each step, in place of the oldest.
+    pub new_views: u64,
+    /// Rays a pixel of a view.
+    pub rays: u32,
+    /// Curves of brightness of each panorama.
+    pub variants: u32,
     /// A folder of meshes, or the training part of a packed library, beside the procedural shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub meshes: Option<PathBuf>,
@@ -42,10 +42,10 @@ impl Default for DataSettings {
     fn default() -> Self {
         Self {
             size: 128,
-            views: 2,
-            lightings: 6,
-            shuffle_buffer: 768,
-            reuse: 4.0,
+            views: 256,
+            new_views: 1,
+            rays: 128,
+            variants: 8,
             meshes: None,
             textures: None,
             panoramas: None,
@@ -69,7 +69,7 @@ impl Default for TurnSettings {
 }
 
 impl DataSettings {
-    /// Whether all numbers are in range; the recipe checks the others.
+    /// Whether all numbers are in range.
     ///
     /// # Errors
     /// [`TrainError::Refused`] names the first that is not.
@@ -81,9 +81,23 @@ impl DataSettings {
             self.size,
             "a multiple of 32 up to 1024",
         )?;
-        within("data.shuffle_buffer", self.shuffle_buffer, 1..=MOST_SAMPLES)?;
-        within("data.reuse", self.reuse, 1.0..=1e6)?;
+        within("data.views", self.views, 1..=MOST_SAMPLES)?;
+        within("data.new_views", self.new_views, 0..=MOST_SAMPLES)?;
+        within("data.rays", self.rays, 16..=4096)?;
+        within("data.variants", self.variants, 1..=1000)?;
         within("data.validation", self.validation, 1..=MOST_SAMPLES)
+    }
+
+    /// Whether batches of this size can be drawn: the samples of one are of different views.
+    pub(crate) fn check_batch(&self, batch: u64) -> Result<(), TrainError> {
+        let needed = format!("at least run.batch, {batch}");
+        ensure(self.views >= batch, "data.views", self.views, &needed)
+    }
+
+    /// How many views have been cast when a step draws.
+    pub(crate) fn views_at(&self, step: u64) -> u64 {
+        let joined = self.new_views.saturating_mul(step);
+        self.views.saturating_add(joined)
     }
 }
 

@@ -3,21 +3,19 @@
 use std::f64::consts::FRAC_PI_2;
 
 use rayon::prelude::*;
+use relight_core::image::Extent;
 use relight_core::statistics::median;
 
 use crate::fit::albedo::shared;
 use crate::fit::curve_statistics::CurveStatistics;
 use crate::fit::search::{PixelFit, Search};
-use crate::fit::smoothing::smoothed_normals;
-use crate::model::directions::dot;
+use crate::model::directions::{dot, unit};
 use crate::model::frame::Elevation;
 use crate::model::shading::ShadingModel;
 use crate::observe::curves::TurnCurves;
 
-/// Least smoothing of a map of normals, standard deviation in pixels. By hand.
-const LEAST_BLUR: f64 = 0.6;
-/// Standard deviation of a pixel's surroundings, in widths of the frame. By hand.
-const SURROUNDINGS: f64 = 1.0 / 40.0;
+/// Cells across the frame whose mean normals are a pixel's surroundings. By hand.
+const CELLS: usize = 20;
 /// Degrees of freedom of the residual of a curve. Measured: fitted to the angles that the standard deviation stands
 /// for.
 pub(crate) const FREEDOM: f64 = 3.0;
@@ -76,10 +74,15 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
         fits,
     } = pixels;
     let search = Search::new(model);
-    let deviation = SURROUNDINGS * curves.extent().width as f64;
-    let surroundings = smoothed_normals(curves, deviation.max(LEAST_BLUR), |pixel| {
-        fits[pixel].normal
-    });
+    let normals = curves.map(|pixel| fits[pixel].normal.map(|v| v as f32));
+    let Extent { width, height } = curves.extent();
+    let coarse = [
+        CELLS.min(width),
+        (CELLS * height).div_ceil(width).min(height),
+    ];
+    let around = normals.resized(Extent::new(coarse[0], coarse[1]));
+    let around = around.resized(curves.extent());
+    let surroundings: Vec<[f64; 3]> = curves.pixels_of(&around).map(unit).collect();
     (0..fits.len())
         .into_par_iter()
         .map(|pixel| {

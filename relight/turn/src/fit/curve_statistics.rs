@@ -7,7 +7,7 @@ use crate::model::shading::PixelHarmonics;
 use crate::observe::curves::TurnCurves;
 
 /// Products of two harmonics.
-pub(crate) const PAIRS: usize = COEFFICIENTS * (COEFFICIENTS + 1) / 2;
+const PAIRS: usize = COEFFICIENTS * (COEFFICIENTS + 1) / 2;
 
 /// Weight of the mean of a curve beside its variation, 0 to 1. By hand: shade in hollows and bounced light change
 /// the mean more than the harmonics.
@@ -31,8 +31,6 @@ pub(crate) struct CurveStatistics {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HarmonicProducts {
     base: [[f64; PAIRS]; 3],
-    /// How many products of the base layer there are.
-    count: usize,
     /// Of both, and of the gloss with itself; none without gloss.
     gloss: Option<[[[f64; PAIRS]; 2]; 3]>,
 }
@@ -47,11 +45,10 @@ impl HarmonicProducts {
     pub(crate) fn of(harmonics: &PixelHarmonics) -> Self {
         let mut products = Self {
             base: [[0.0; PAIRS]; 3],
-            count: harmonics.count * (harmonics.count + 1) / 2,
             gloss: None,
         };
         for (products, own) in products.base.iter_mut().zip(&harmonics.base) {
-            symmetric(products, &own[..harmonics.count], &own[..harmonics.count]);
+            symmetric(products, own, own);
         }
         if harmonics.gloss != [[0.0; COEFFICIENTS]; 3] {
             products.gloss = Some([0, 1, 2].map(|channel| {
@@ -82,7 +79,7 @@ fn symmetric(products: &mut [f64], a: &[f64], b: &[f64]) {
 /// The projection of a channel's curve on a pixel's harmonics: products of the base layer's harmonics with the residual
 /// of the gloss, of the base layer's harmonics with themselves, and the energy of that residual.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Projection {
+struct Projection {
     along: f64,
     own: f64,
     rest: f64,
@@ -186,11 +183,6 @@ impl CurveStatistics {
         self.unit == 0.0
     }
 
-    /// One over the energy of the curve's variation.
-    pub(crate) const fn unit(&self) -> f64 {
-        self.unit
-    }
-
     fn share(
         &self,
         channel: usize,
@@ -199,11 +191,8 @@ impl CurveStatistics {
     ) -> Projection {
         let own = &self.products[channel];
         let mut share = Projection {
-            along: sum_of_products(
-                &self.right[channel],
-                &harmonics.base[channel][..harmonics.count],
-            ),
-            own: sum_of_products(own, &products.base[channel][..products.count]),
+            along: sum_of_products(&self.right[channel], &harmonics.base[channel]),
+            own: sum_of_products(own, &products.base[channel]),
             rest: self.energy[channel],
         };
         if let Some(gloss) = &products.gloss {
@@ -246,37 +235,6 @@ impl CurveStatistics {
         })
     }
 
-    /// The products of each harmonic with a curve of such Fourier coefficients.
-    pub(crate) fn times(
-        &self,
-        channel: usize,
-        harmonics: &[f64; COEFFICIENTS],
-    ) -> [f64; COEFFICIENTS] {
-        let mut all = [0.0; COEFFICIENTS];
-        let mut at = 0;
-        for j in 0..COEFFICIENTS {
-            for i in 0..j {
-                let product = self.products[channel][at];
-                all[i] += product * harmonics[j];
-                all[j] += product * harmonics[i];
-                at += 1;
-            }
-            all[j] += self.products[channel][at] * harmonics[j];
-            at += 1;
-        }
-        all
-    }
-
-    /// The products of each harmonic with the residual of such Fourier coefficients.
-    pub(crate) fn residual_products(
-        &self,
-        channel: usize,
-        harmonics: &[f64; COEFFICIENTS],
-    ) -> [f64; COEFFICIENTS] {
-        let seen = self.times(channel, harmonics);
-        std::array::from_fn(|i| self.right[channel][i] - seen[i])
-    }
-
     /// The energy of a channel's curve.
     pub(crate) const fn energy(&self, channel: usize) -> f64 {
         self.energy[channel]
@@ -284,10 +242,10 @@ impl CurveStatistics {
 
     /// The residual energy of such Fourier coefficients.
     pub(crate) fn residual_energy(&self, channel: usize, harmonics: &[f64; COEFFICIENTS]) -> f64 {
-        let rest = self.residual_products(channel, harmonics);
-        self.energy[channel]
-            - sum_of_products(harmonics, &self.right[channel])
-            - sum_of_products(harmonics, &rest)
+        let mut products = [0.0; PAIRS];
+        symmetric(&mut products, harmonics, harmonics);
+        self.energy[channel] - 2.0 * sum_of_products(harmonics, &self.right[channel])
+            + sum_of_products(&products, &self.products[channel])
     }
 
     /// The product of two terms of a light.
@@ -324,7 +282,7 @@ impl CurveStatistics {
 }
 
 /// The sum of products, as far as the shorter list goes: in four sums, which do not wait for each other.
-pub(crate) fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
+fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     let length = a.len().min(b.len());
     let (mut a, mut b) = (a[..length].chunks_exact(4), b[..length].chunks_exact(4));
     let mut sums = [0.0; 4];

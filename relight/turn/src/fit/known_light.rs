@@ -8,26 +8,29 @@ use crate::fit::confidence::{
     FREEDOM, FittedPixels, OwnError, common_error, own_errors, shared_albedo,
 };
 use crate::fit::curve_statistics::{CurveStatistics, all_statistics};
-use crate::fit::joint::JointOptimisation;
 use crate::fit::residuals::robust_weights;
-use crate::fit::search::{PixelFit, search_all};
-use crate::fit::solution::TurnSolution;
-use crate::fit::unknowns::Unknowns;
+use crate::fit::search::{PixelFit, Search, search_all};
+use crate::fit::solution::{FoundGloss, TurnSolution};
 use crate::model::frame::{Elevation, TableFrame};
-use crate::model::known_light::KnownLight;
+use crate::model::lighting::{HEAD_ON, MIRROR, TableLight};
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
-/// Number of blocks, or of pixels, on which the gloss is fitted. By hand.
-const PIXELS: usize = 2500;
-/// Rounds of the joint optimisation on blocks: before each, the normals are searched anywhere. By hand.
-const JOINT_ROUNDS: usize = 2;
-/// Gauss-Newton steps in each of them. By hand.
-const JOINT_STEPS: usize = 8;
-/// Gauss-Newton steps of the joint optimisation in each robust round. By hand.
-const ROBUST_STEPS: usize = 3;
+/// Number of pixels on which the gloss is fitted. By hand.
+const PIXELS: usize = 500;
+/// How strongly gloss reflects, over a smooth dielectric. By hand: up to 16, because light by a dark grey ball is in small
+/// units.
+const STRENGTHS: [f64; 8] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+/// How much the lobe blurs the light: the deviation of a Gaussian, radians. By hand.
+const BLURS: [f64; 5] = [0.05, 0.2, 0.35, 0.55, 0.8];
+/// How often the best lobe is improved, each time by half the steps between those. By hand.
+const REFINED: i32 = 2;
+/// Distance between blurs that are tried around the best, radians. By hand.
+const BLUR_STEP: f64 = 0.15;
+/// Largest smoothness of gloss: sharper lobes look alike in a light of order 6. By hand.
+const MOST_SMOOTHNESS: f64 = 200.0;
 /// Rounds of robust weights. By hand.
 const ROBUST_ROUNDS: usize = 3;
 /// Quantile of the distances that measures the spread of albedos. By hand: spots of another colour count, a few
@@ -39,7 +42,7 @@ const SPREAD_DEVIATIONS: f64 = 1.645;
 /// Finds the normals and albedo that fit the curves of a turn best in a light that was given or measured, in the viewer's
 /// frame at the table's angle 0; bands up to 6 count.
 ///
-/// Gloss is fitted on blocks of pixels, then every pixel by itself. Then parts of the turn with a large residual, shadows
+/// Gloss is fitted on some of the pixels, then every pixel by itself. Then parts of the turn with a large residual, shadows
 /// and highlights, count less for that pixel, and it is fitted again.
 #[must_use]
 pub fn solve_in_light(
@@ -49,17 +52,17 @@ pub fn solve_in_light(
     material: MaterialKind,
 ) -> TurnSolution {
     let frame = TableFrame::new(elevation);
-    let unknowns = Unknowns {
+    let finish = Finish {
         frame,
-        known: &KnownLight::new(light, &frame),
+        light: TableLight::of(&light.rotated(&frame.rotation())),
         material,
     };
-    let model = model_of_blocks(curves, unknowns);
-    let conditioning = Conditioning::of(curves).in_given(&unknowns.initial());
     let statistics = all_statistics(curves);
+    let lobe = finish.best_lobe(&statistics);
+    let model = finish.model(lobe);
+    let conditioning = Conditioning::of(curves).in_given(&finish.model(Lobe::SMOOTH));
     let mut solver = Solver {
         curves,
-        unknowns,
         fits: search_all(&model, &statistics, None),
         model,
         statistics,
@@ -78,31 +81,126 @@ pub fn solve_in_light(
         elevation,
         measured: Some(light.clone()),
         conditioning,
+        gloss: finish.gloss(lobe),
     }
 }
 
-/// The shading model that fits blocks of pixels best.
-fn model_of_blocks(curves: &TurnCurves, unknowns: Unknowns<'_>) -> ShadingModel {
-    let pixels = curves.pixels() as f64 / PIXELS as f64;
-    let side = (pixels.sqrt().ceil() as usize).max(1);
-    let joint = JointOptimisation {
-        statistics: &all_statistics(&curves.reduced(side)),
-        unknowns,
+/// An object of a material in a known light, of which the lobe is to be found.
+#[derive(Debug, Clone, Copy)]
+struct Finish {
+    frame: TableFrame,
+    light: TableLight,
+    material: MaterialKind,
+}
+
+/// What gloss, or metal, makes of the light that a mirror would show.
+#[derive(Debug, Clone, Copy)]
+struct Lobe {
+    strength: f64,
+    blur: f64,
+}
+
+impl Lobe {
+    /// That of a mirror.
+    const SMOOTH: Self = Self {
+        strength: 1.0,
+        blur: 0.0,
     };
-    joint.found(unknowns.initial(), JOINT_ROUNDS, JOINT_STEPS)
+
+    /// How much it shows of band l.
+    fn attenuation(self, l: usize) -> f64 {
+        self.strength * (-0.5 * (l * (l + 1)) as f64 * self.blur * self.blur).exp()
+    }
+}
+
+impl Finish {
+    fn model(&self, lobe: Lobe) -> ShadingModel {
+        let white = match self.material {
+            MaterialKind::Diffuse => 1.0,
+            MaterialKind::Metal => MIRROR,
+        };
+        ShadingModel {
+            frame: self.frame,
+            diffuse: self.light.irradiance(),
+            gloss: self.light.scaled(|l, _| white * lobe.attenuation(l)),
+            material: self.material,
+        }
+    }
+
+    /// The lobe with which pixels of all the object are fitted best. Of an even light metal shows its albedo's part, whatever its lobe
+    /// is.
+    fn best_lobe(&self, statistics: &[CurveStatistics]) -> Lobe {
+        let every = statistics.len().div_ceil(PIXELS).max(1);
+        let some: Vec<CurveStatistics> = statistics.iter().step_by(every).copied().collect();
+        let strengths = match self.material {
+            MaterialKind::Diffuse => &STRENGTHS[..],
+            MaterialKind::Metal => &[1.0],
+        };
+        let tried = strengths.iter();
+        let tried = tried.flat_map(|&strength| BLURS.map(|blur| Lobe { strength, blur }));
+        let first = Lobe {
+            strength: strengths[0],
+            ..Lobe::SMOOTH
+        };
+        let mut best = (f64::INFINITY, first);
+        self.try_all(tried, &some, &mut best);
+        for round in 1..=REFINED {
+            let (part, around) = (0.5_f64.powi(round), best.1);
+            let steps = [-part, 0.0, part];
+            let stronger = if strengths.len() > 1 {
+                &steps[..]
+            } else {
+                &[0.0]
+            };
+            let tried = stronger.iter().flat_map(|more| {
+                steps.map(|further| Lobe {
+                    strength: around.strength * more.exp2(),
+                    blur: (around.blur + further * BLUR_STEP).max(0.0),
+                })
+            });
+            self.try_all(tried, &some, &mut best);
+        }
+        best.1
+    }
+
+    fn try_all(
+        &self,
+        lobes: impl Iterator<Item = Lobe>,
+        statistics: &[CurveStatistics],
+        best: &mut (f64, Lobe),
+    ) {
+        let near = search_all(&self.model(best.1), statistics, None);
+        best.0 = f64::INFINITY;
+        for lobe in lobes {
+            let cost = Search::new(&self.model(lobe)).cost(statistics, &near);
+            if cost < best.0 {
+                *best = (cost, lobe);
+            }
+        }
+    }
+
+    /// The gloss of such a lobe as the render layers take it.
+    fn gloss(&self, lobe: Lobe) -> Option<FoundGloss> {
+        let part = match self.material {
+            MaterialKind::Diffuse => HEAD_ON * lobe.strength / MIRROR,
+            MaterialKind::Metal => 1.0,
+        };
+        // A half vector is off by half of what the light is.
+        let smoothness = 4.0 / lobe.blur.powi(2);
+        (lobe.strength > 0.0).then(|| FoundGloss::new(part, smoothness.min(MOST_SMOOTHNESS)))
+    }
 }
 
 /// All pixels under one light.
 struct Solver<'a> {
     curves: &'a TurnCurves,
-    unknowns: Unknowns<'a>,
     model: ShadingModel,
     statistics: Vec<CurveStatistics>,
     fits: Vec<PixelFit>,
 }
 
 impl Solver<'_> {
-    /// Weights parts of the turn by their residuals, fits the gloss again, and then every pixel.
+    /// Weights parts of the turn by their residuals, and fits every pixel again.
     fn refine(&mut self) {
         let (curves, model) = (self.curves, &self.model);
         self.statistics = (0..curves.pixels())
@@ -112,16 +210,6 @@ impl Solver<'_> {
                 CurveStatistics::new(curves, pixel, Some(&robust_weights))
             })
             .collect();
-        let every = self.statistics.len().div_ceil(PIXELS).max(1);
-        let statistics: Vec<CurveStatistics> =
-            self.statistics.iter().step_by(every).copied().collect();
-        let fits: Vec<PixelFit> = self.fits.iter().step_by(every).copied().collect();
-        let near = search_all(&self.model, &statistics, Some(&fits));
-        let joint = JointOptimisation {
-            statistics: &statistics,
-            unknowns: self.unknowns,
-        };
-        (self.model, _) = joint.refined(self.model, near, ROBUST_STEPS);
         self.fits = search_all(&self.model, &self.statistics, Some(&self.fits));
     }
 

@@ -79,7 +79,7 @@ fn without_gate() -> DecomposeOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_turns::{TAKE, ball, environment, film};
+    use crate::tests::{TAKE, ball, environment, film};
 
     fn are_alike(a: &[[f64; 3]], b: &[[f64; 3]]) -> bool {
         let pairs = a.iter().flatten().zip(b.iter().flatten());

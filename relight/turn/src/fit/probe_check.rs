@@ -2,13 +2,13 @@
 //! has a clearly smaller residual. Knows nothing of what the light is used for.
 
 use crate::error::TurnError;
-use crate::fit::curve_statistics::CurveStatistics;
+use crate::fit::curve_statistics::{CurveStatistics, all_statistics};
 use crate::fit::environment::relative_residual;
-use crate::model::frame::{Elevation, TableFrame};
+use crate::model::frame::TableFrame;
 use crate::observe::curves::TurnCurves;
 use crate::observe::mirror_panorama::MirrorPanorama;
-use crate::observe::probe::ProbeBall;
-use crate::observe::surroundings::{ACROSS, Surroundings, middle_of};
+use crate::observe::probe::{ACROSS, ProbeBall, middle_of};
+use crate::observe::probe_place::ProbePlace;
 
 /// Share of a circle's radius that counts, 0 to 1. By hand: the rim also shows what is behind it.
 const RADIUS_SHARE: f64 = 0.92;
@@ -35,67 +35,59 @@ const LEAST_INSIDE: f64 = 0.9;
 
 /// A circle, in radii from the middle that was given: to the right and up.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Circle {
+pub(crate) struct Circle {
     middle: [f64; 2],
     radius: f64,
 }
 
-/// A ball's pixels, each as a curve, and where they are.
-struct Shown {
-    curves: TurnCurves,
+/// The pixels at and around a ball, each as a curve, and where they are.
+struct Shown<'a> {
+    curves: &'a TurnCurves,
     statistics: Vec<CurveStatistics>,
     at: Vec<[f64; 2]>,
     frame: TableFrame,
     ball: ProbeBall,
 }
 
-impl Surroundings {
-    /// The residual of the ball's own light, over the variation, 0 to 1.
-    ///
-    /// # Errors
-    /// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle has a clearly
-    /// smaller one.
-    pub(crate) fn check(self, ball: ProbeBall, elevation: Elevation) -> Result<f64, TurnError> {
-        let (place, side) = (self.place, self.side);
-        let curves = self.builder.finish()?;
-        let shown = Shown {
-            statistics: (0..curves.pixels())
-                .map(|pixel| CurveStatistics::new(&curves, pixel, None))
-                .collect(),
-            at: curves
-                .places()
-                .iter()
-                .map(|&at| middle_of(side, at))
-                .collect(),
-            curves,
-            frame: TableFrame::new(elevation),
-            ball,
-        };
-        let given = Circle {
-            middle: [0.0; 2],
-            radius: 1.0,
-        };
-        let residual = shown.residual(given).unwrap_or(1.0);
-        let (best, least) = shown.best(given, residual);
-        let [x, y] = best.middle;
-        let apart = x.hypot(y).max((best.radius - 1.0).abs());
-        let most = most_residual(ball);
-        if least < CLEARLY * residual && least < residual - LESS && apart > APART && least < most {
-            let [x, y] = place.in_picture(best.middle);
-            return Err(TurnError::Misplaced {
-                given: place,
-                better: [x, y, best.radius * place.radius].map(f64::round),
-                explained: [residual, least].map(|residual| 100.0 * (1.0 - residual).max(0.0)),
-            });
-        }
-        if residual > most {
-            return Err(TurnError::NoBall {
-                given: place,
-                explained: 100.0 * (1.0 - residual).max(0.0),
-            });
-        }
-        Ok(residual)
+/// The residual of a ball's own light, over the variation, 0 to 1, at the place that was given for it.
+///
+/// # Errors
+/// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle has a clearly
+/// smaller one.
+pub(crate) fn check(
+    curves: &TurnCurves,
+    frame: TableFrame,
+    place: ProbePlace,
+    ball: ProbeBall,
+) -> Result<f64, TurnError> {
+    let shown = Shown {
+        statistics: all_statistics(curves),
+        at: curves.places().iter().map(|&at| middle_of(at)).collect(),
+        curves,
+        frame,
+        ball,
+    };
+    let given = Circle::GIVEN;
+    let residual = shown.residual(given).unwrap_or(1.0);
+    let (best, least) = shown.best(given, residual);
+    let [x, y] = best.middle;
+    let apart = x.hypot(y).max((best.radius - 1.0).abs());
+    let most = most_residual(ball);
+    if least < CLEARLY * residual && least < residual - LESS && apart > APART && least < most {
+        let [x, y] = place.in_picture(best.middle);
+        return Err(TurnError::Misplaced {
+            given: place.to_string(),
+            better: [x, y, best.radius * place.radius].map(f64::round),
+            explained: [residual, least].map(|residual| 100.0 * (1.0 - residual).max(0.0)),
+        });
     }
+    if residual > most {
+        return Err(TurnError::NoBall {
+            given: place.to_string(),
+            explained: 100.0 * (1.0 - residual).max(0.0),
+        });
+    }
+    Ok(residual)
 }
 
 /// The largest residual of a ball by its own light.
@@ -106,7 +98,7 @@ pub(crate) const fn most_residual(ball: ProbeBall) -> f64 {
     }
 }
 
-impl Shown {
+impl Shown<'_> {
     /// The circle of the smallest residual, and that residual.
     fn best(&self, given: Circle, residual: f64) -> (Circle, f64) {
         let mut best = (given, residual);
@@ -164,8 +156,11 @@ impl Shown {
         }
         match self.ball {
             ProbeBall::Grey => {
-                let statistics = pixels.iter().map(|&pixel| &self.statistics[pixel]);
-                relative_residual(statistics, &normals, &self.frame)
+                let statistics: Vec<&CurveStatistics> = pixels
+                    .iter()
+                    .map(|&pixel| &self.statistics[pixel])
+                    .collect();
+                relative_residual(&statistics, &normals, &self.frame)
             }
             ProbeBall::Chrome => self.residual_by_mirror(&pixels, &normals),
         }
@@ -209,8 +204,14 @@ impl Shown {
 }
 
 impl Circle {
+    /// The one that was given.
+    pub(crate) const GIVEN: Self = Self {
+        middle: [0.0; 2],
+        radius: 1.0,
+    };
+
     /// The normal of the ball in it at a place, where that is well inside.
-    fn normal(self, at: [f64; 2]) -> Option<[f64; 3]> {
+    pub(crate) fn normal(self, at: [f64; 2]) -> Option<[f64; 3]> {
         let [x, y] = [0, 1].map(|i| (at[i] - self.middle[i]) / self.radius);
         let square = x * x + y * y;
         (square < RADIUS_SHARE * RADIUS_SHARE).then(|| [x, y, (1.0 - square).sqrt()])

@@ -1,16 +1,17 @@
 //! The light by a ball.
 
 use relight_core::image::{Linear, Planes, Rgb};
-use relight_core::light::ShLight;
+use relight_core::light::{Normals, ShLight};
 use relight_core::render::Surface;
 
 use crate::error::TurnError;
 use crate::fit::environment::fit_turn_light;
-use crate::fit::probe_check::most_residual;
+use crate::fit::probe_check::{Circle, check, most_residual};
 use crate::model::frame::TableFrame;
 use crate::model::material::MaterialKind;
 use crate::observe::conditioning::Conditioning;
-use crate::observe::probe::{ProbeBall, ProbeBuilder};
+use crate::observe::mirror_panorama::MirrorPanorama;
+use crate::observe::probe::{Probe, ProbeBall, ProbeBuilder, middle_of};
 
 /// Share of the variation beyond the second harmonic from which a ball looks like chrome, 0 to 1. By hand.
 const SHARP: f64 = 0.06;
@@ -48,39 +49,43 @@ impl ProbeBuilder {
     /// Where the frames tell too little, or the ball is not where it is said to be: [`TurnError::Misplaced`] and
     /// [`TurnError::NoBall`].
     pub(crate) fn finish(self) -> Result<ProbeLight, TurnError> {
-        let frame = TableFrame::new(self.probe.elevation);
-        let curves = self.builder.finish()?;
+        let Probe {
+            place,
+            ball,
+            elevation,
+        } = self.probe;
+        let frame = TableFrame::new(elevation);
+        let around = self.curves()?;
+        let width = around.extent().width;
+        let normals = Planes::from_fn(around.extent(), |x, y| {
+            let normal = Circle::GIVEN.normal(middle_of(y * width + x));
+            normal.unwrap_or_default().map(|value| value as f32)
+        });
+        let curves = around.only(|at| normals.pixel(at % width, at / width) != [0.0; 3]);
         let looks = if Conditioning::of(&curves).beyond > SHARP {
             ProbeBall::Chrome
         } else {
             ProbeBall::Grey
         };
-        let ball = self.probe.ball.unwrap_or(looks);
-        let residual = match self.surroundings {
-            Some(surroundings) => {
-                surroundings
-                    .check(ball, self.probe.elevation)
-                    .map_err(|error| match error {
-                        // Of a ball of the other kind, its place is not observable.
-                        TurnError::Misplaced {
-                            given, explained, ..
-                        } if ball != looks => TurnError::NoBall {
-                            given,
-                            explained: explained[0],
-                        },
-                        error => error,
-                    })?
-            }
-            None => 1.0,
-        };
+        let ball = ball.unwrap_or(looks);
+        let residual = check(&around, frame, place, ball).map_err(|error| match error {
+            // Of a ball of the other kind, its place is not observable.
+            TurnError::Misplaced {
+                given, explained, ..
+            } if ball != looks => TurnError::NoBall {
+                given,
+                explained: explained[0],
+            },
+            error => error,
+        })?;
         let light = match ball {
             ProbeBall::Grey => {
-                let albedo = Rgb::<Linear>::new(Planes::filled(self.normals.extent(), [1.0; 3]));
-                let surface = Surface::new(self.normals, albedo, None)?;
+                let albedo = Rgb::<Linear>::new(Planes::filled(normals.extent(), [1.0; 3]));
+                let surface = Surface::new(Normals::new(normals), albedo, None)?;
                 fit_turn_light(&curves, &surface, MaterialKind::Diffuse, &frame)?
             }
             ProbeBall::Chrome => {
-                let light = self.panorama.light()?;
+                let light = MirrorPanorama::of(&curves, &normals, frame).light()?;
                 light.rotated(&frame.rotation().inverse())
             }
         };
@@ -98,11 +103,10 @@ impl ProbeBuilder {
 mod tests {
     use super::*;
     use crate::model::directions::reflected;
-    use crate::observe::probe::Probe;
     use crate::{Elevation, ProbePlace};
     use relight_core::image::{ColourSpace, Extent, Srgb};
     use relight_core::light::Rotation;
-    use relight_core::light::{Direction, Normals, Order, YUp, basis};
+    use relight_core::light::{Direction, Order, YUp, basis};
     use relight_core::render::{DiffuseForm, DiffuseLayer};
     use std::f64::consts::FRAC_1_PI;
 
@@ -150,7 +154,7 @@ mod tests {
         probe: Probe,
         shown: impl Fn(&ShLight, &Normals<YUp>) -> Planes<3>,
     ) -> Result<ProbeLight, TurnError> {
-        let mut builder = ProbeBuilder::new(probe).unwrap();
+        let mut builder = ProbeBuilder::new(probe);
         let normals = Normals::sphere(60);
         let frame = TableFrame::new(Elevation::given(ELEVATION).unwrap());
         let [x, y, z] = frame.axis();
@@ -294,7 +298,7 @@ mod tests {
             ..probe(None)
         };
         let picture = Rgb::<Srgb>::new(Planes::zeros(Extent::new(100, 100)));
-        let refused = ProbeBuilder::new(beyond).unwrap().push(0.0, &picture);
+        let refused = ProbeBuilder::new(beyond).push(0.0, &picture);
         assert!(matches!(refused, Err(TurnError::Setting { .. })));
     }
 }

@@ -83,18 +83,3 @@ fn predicted(
         .map(|i| (albedo * harmonics.base[channel][i] + harmonics.gloss[channel][i]) * basis[i]);
     all.sum()
 }
-
-/// What a pixel shows at an angle: its base layer at an albedo of 1, which of a Lambertian one is its irradiance, and
-/// its gloss.
-pub(crate) fn lit(
-    model: &ShadingModel,
-    normal: [f64; 3],
-    basis: &[f64; COEFFICIENTS],
-) -> [[f64; 3]; 2] {
-    let harmonics = model.harmonics(normal);
-    let dot = |harmonics: &[f64]| -> f64 { harmonics.iter().zip(basis).map(|(a, b)| a * b).sum() };
-    [
-        harmonics.base.each_ref().map(|harmonics| dot(harmonics)),
-        harmonics.gloss.each_ref().map(|harmonics| dot(harmonics)),
-    ]
-}

@@ -2,32 +2,24 @@
 
 use rayon::prelude::*;
 
-use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts, sum_of_products};
-use crate::fit::normal_step::{NormalDerivatives, QuadraticCost};
+use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts};
 use crate::model::directions::{LEAST_FACING, half_sphere, tangents, tilted};
-use crate::model::harmonics::COEFFICIENTS;
 use crate::model::shading::{PixelHarmonics, ShadingModel};
 
 /// Candidates over the visible half sphere. By hand: about 7 degrees apart.
 const CANDIDATES: usize = 400;
 /// How many of the best candidates are refined. By hand.
 const REFINED: usize = 3;
-/// Gauss-Newton steps of each of them before the best is taken. By hand.
-const FIRST_STEPS: usize = 4;
-/// Largest number of Gauss-Newton steps. By hand.
-const STEPS: usize = 16;
-/// Length of a step at which the refinement ends, radians. Numerical.
-const LAST_STEP: f64 = 1e-4;
-/// Step of the finite differences of the gradient, radians. Numerical.
-const GRADIENT_STEP: f64 = 1e-4;
+/// First step of a refinement, radians. By hand: half the distance of candidates.
+const FIRST_STEP: f64 = 0.06;
+/// Step at which it is told which of the candidates is the best, radians. By hand.
+const ROUGH_STEP: f64 = 0.01;
+/// Step at which a refinement ends, radians. Numerical.
+const LAST_STEP: f64 = 2e-4;
+/// Where a step may lead.
+const AROUND: [[f64; 2]; 4] = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
 /// Step of the finite differences of the Hessian, radians. By hand.
 const HESSIAN_STEP: f64 = 0.06;
-/// Damping of the first step, relative to the trace of the Hessian (Levenberg-Marquardt). Numerical.
-const DAMPING: f64 = 1e-3;
-/// Factor of the damping after a step that lowers the cost. Numerical.
-const DAMPING_FALL: f64 = 0.2;
-/// Factor of the damping after one that does not. Numerical.
-const DAMPING_RISE: f64 = 8.0;
 /// Least eigenvalue of the Hessian: at a border of what is allowed it need not be positive. Numerical.
 const LEAST_CURVATURE: f64 = 1e-3;
 
@@ -80,119 +72,66 @@ impl<'a> Search<'a> {
 
     /// The best normal anywhere.
     pub(crate) fn anywhere(&self, statistics: &CurveStatistics) -> PixelFit {
-        let mut best = [(f64::INFINITY, [0.0, 0.0, 1.0]); REFINED];
-        for tried in &self.tried {
-            let cost = statistics.residual(&tried.harmonics, &tried.products);
-            if cost < best[REFINED - 1].0 {
-                insert(&mut best, (cost, tried.normal));
-            }
-        }
-        let refined = best.map(|(_, start)| self.downhill(statistics, start, FIRST_STEPS));
-        let [first, rest @ ..] = refined;
-        let (start, _) = rest.into_iter().fold(
-            first,
-            |best, other| {
-                if other.1 < best.1 { other } else { best }
-            },
-        );
-        self.near(statistics, start)
+        let mut costs: Vec<(f64, [f64; 3])> = (self.tried.iter())
+            .map(|tried| {
+                let cost = statistics.residual(&tried.harmonics, &tried.products);
+                (cost, tried.normal)
+            })
+            .collect();
+        costs.select_nth_unstable_by(REFINED, |a, b| a.0.total_cmp(&b.0));
+        let refined = costs[..REFINED].iter();
+        let refined =
+            refined.map(|&start| self.downhill(statistics, start, [FIRST_STEP, ROUGH_STEP]));
+        let best = refined.min_by(|a, b| a.0.total_cmp(&b.0));
+        let best = best.unwrap_or((f64::INFINITY, [0.0, 0.0, 1.0]));
+        self.fit(statistics, best, ROUGH_STEP)
     }
 
     /// The best normal that is reached from `start` downhill.
-    pub(crate) fn near(&self, statistics: &CurveStatistics, start: [f64; 3]) -> PixelFit {
-        let (normal, _) = self.downhill(statistics, start, STEPS);
+    fn near(&self, statistics: &CurveStatistics, start: [f64; 3]) -> PixelFit {
+        let start = (self.residual(statistics, start), start);
+        self.fit(statistics, start, FIRST_STEP)
+    }
+
+    fn fit(&self, statistics: &CurveStatistics, start: (f64, [f64; 3]), step: f64) -> PixelFit {
+        let (residual, normal) = self.downhill(statistics, start, [step, LAST_STEP]);
         PixelFit {
             normal,
             albedo: statistics.albedo(&self.model.harmonics(normal)),
-            residual: self.residual(statistics, normal),
+            residual,
         }
     }
 
-    /// Where so many steps lead, and what it costs there: Gauss-Newton steps, damped as by Levenberg-Marquardt,
-    /// with the albedo at its best for each normal.
+    /// Residual and normal where steps lead that become shorter where none leads further down, with the albedo at its best
+    /// for each normal.
     fn downhill(
         &self,
         statistics: &CurveStatistics,
-        start: [f64; 3],
-        steps: usize,
-    ) -> ([f64; 3], f64) {
-        let cost = |normal| self.residual(statistics, normal);
-        let mut normal = start;
-        let mut least = cost(normal);
-        let mut damping = DAMPING;
-        for _ in 0..steps {
+        (mut least, mut normal): (f64, [f64; 3]),
+        [mut step, last]: [f64; 2],
+    ) -> (f64, [f64; 3]) {
+        while step > last {
             let axes = tangents(normal);
-            let quadratic = self.quadratic(statistics, normal, axes);
-            let step = quadratic.step(damping);
-            let other = tilted(normal, axes, step);
-            let found = cost(other);
-            let length = step[0].hypot(step[1]);
-            if other[2] >= LEAST_FACING && found < least {
-                (normal, least) = (other, found);
-                damping *= DAMPING_FALL;
-            } else {
-                damping *= DAMPING_RISE;
-            }
-            if length < LAST_STEP {
-                break;
+            let around = AROUND.map(|to| tilted(normal, axes, to.map(|part| step * part)));
+            let visible = around.into_iter().filter(|to| to[2] >= LEAST_FACING);
+            let costs = visible.map(|to| (self.residual(statistics, to), to));
+            match costs.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((cost, to)) if cost < least => (least, normal) = (cost, to),
+                _ => step /= 2.0,
             }
         }
-        (normal, least)
+        (least, normal)
     }
 
-    /// How the cost changes as a normal leans.
-    fn quadratic(
-        &self,
-        statistics: &CurveStatistics,
-        normal: [f64; 3],
-        axes: [[f64; 3]; 2],
-    ) -> QuadraticCost {
-        let derivatives = self.derivatives(statistics, normal, axes);
-        let mut quadratic = QuadraticCost::default();
-        for (channel, jacobian) in derivatives.jacobian.iter().enumerate() {
-            quadratic.add(statistics, channel, jacobian, &derivatives.seen[channel]);
-        }
-        quadratic.scale(statistics.unit());
-        quadratic
-    }
-
-    /// How the harmonics of a pixel change as its normal leans.
-    pub(crate) fn derivatives(
-        &self,
-        statistics: &CurveStatistics,
-        normal: [f64; 3],
-        [u, v]: [[f64; 3]; 2],
-    ) -> NormalDerivatives {
-        let here = self.model.harmonics(normal);
-        let albedo = statistics.albedo(&here);
-        let there = [[GRADIENT_STEP, 0.0], [0.0, GRADIENT_STEP]]
-            .map(|step| self.model.harmonics(tilted(normal, [u, v], step)));
-        let base = here.base;
-        let seen: [_; 3] = std::array::from_fn(|c| sum(&base[c], albedo[c], &here.gloss[c]));
-        let jacobian = std::array::from_fn(|c| {
-            let along = statistics.times(c, &base[c]);
-            let own = sum_of_products(&base[c], &along);
-            there.map(|there| {
-                let moved = sum(&there.base[c], albedo[c], &there.gloss[c]);
-                let mut column: [f64; COEFFICIENTS] =
-                    std::array::from_fn(|i| (moved[i] - seen[c][i]) / GRADIENT_STEP);
-                // The albedo follows the normal.
-                if own > 1e-12 && albedo[c] > 0.0 {
-                    let share = sum_of_products(&column, &along) / own;
-                    column
-                        .iter_mut()
-                        .zip(&base[c])
-                        .for_each(|(column, base)| *column -= share * base);
-                }
-                column
-            })
-        });
-        NormalDerivatives {
-            albedo,
-            base,
-            seen,
-            jacobian,
-        }
+    /// The mean residual of the best normals near those of other fits.
+    pub(crate) fn cost(&self, all: &[CurveStatistics], near: &[PixelFit]) -> f64 {
+        let least = |(statistics, fit): (&CurveStatistics, &PixelFit)| {
+            let start = (self.residual(statistics, fit.normal), fit.normal);
+            let (residual, _) = self.downhill(statistics, start, [FIRST_STEP, ROUGH_STEP]);
+            residual.min(1.0)
+        };
+        let costs: Vec<f64> = all.par_iter().zip(near).map(least).collect();
+        costs.iter().sum::<f64>() / all.len().max(1) as f64
     }
 
     /// The residual of a normal.
@@ -232,20 +171,6 @@ impl<'a> Search<'a> {
     }
 }
 
-fn sum(
-    base: &[f64; COEFFICIENTS],
-    albedo: f64,
-    gloss: &[f64; COEFFICIENTS],
-) -> [f64; COEFFICIENTS] {
-    std::array::from_fn(|i| albedo * base[i] + gloss[i])
-}
-
-/// Puts one of less cost in its place, and the last one out.
-fn insert(best: &mut [(f64, [f64; 3]); REFINED], one: (f64, [f64; 3])) {
-    best[REFINED - 1] = one;
-    best.sort_by(|a, b| a.0.total_cmp(&b.0));
-}
-
 /// The best normals of all pixels: near those of other fits, or anywhere.
 pub(crate) fn search_all(
     model: &ShadingModel,
@@ -266,10 +191,4 @@ pub(crate) fn search_all(
             }
         })
         .collect()
-}
-
-/// The residual of the curves, the mean over the pixels.
-pub(crate) fn cost(fits: &[PixelFit]) -> f64 {
-    let sum: f64 = fits.iter().map(|fit| fit.residual.min(1.0)).sum();
-    sum / fits.len().max(1) as f64
 }

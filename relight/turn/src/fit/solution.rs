@@ -1,13 +1,13 @@
 //! Normals, albedo and light of a solved turn.
 
 use relight_core::image::{Linear, Planes, Rgb};
-use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
+use relight_core::render::mirror_reflectance;
 use relight_core::statistics::median;
+use serde::Serialize;
 
-use crate::fit::residuals::residuals;
 use crate::fit::search::PixelFit;
-use crate::model::frame::{Elevation, TableFrame};
-use crate::model::lighting::TableLight;
+use crate::model::frame::Elevation;
 use crate::model::material::MaterialKind;
 use crate::model::shading::ShadingModel;
 use crate::observe::conditioning::Conditioning;
@@ -31,6 +31,26 @@ pub struct TurnSolution {
     /// The light, where it was measured.
     pub(crate) measured: Option<ShLight>,
     pub(crate) conditioning: Conditioning,
+    /// None where the object has none.
+    pub(crate) gloss: Option<FoundGloss>,
+}
+
+/// Specular reflectance and smoothness of the whole object, as the render layers take them; of metal of an albedo of 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct FoundGloss {
+    pub(crate) reflectance: f32,
+    pub(crate) smoothness: f32,
+}
+
+impl FoundGloss {
+    /// Of a surface that faces the viewer and reflects this part of even light.
+    pub(crate) fn new(part: f64, smoothness: f64) -> Self {
+        let smoothness = smoothness as f32;
+        Self {
+            reflectance: mirror_reflectance(part as f32, smoothness),
+            smoothness,
+        }
+    }
 }
 
 impl TurnSolution {
@@ -68,26 +88,16 @@ impl TurnSolution {
         curves.map(|pixel| [self.expected_errors[pixel].to_degrees() as f32])
     }
 
-    /// The part of the model's light over the whole turn that a pixel does not have, 0 to 1.
-    pub(crate) fn shadow(&self, curves: &TurnCurves) -> Planes<1> {
-        curves.map(|pixel| {
-            let residuals = residuals(curves, pixel, &self.fits[pixel], &self.model);
-            let missing = residuals
-                .iter()
-                .flatten()
-                .map(|residual| (-residual).max(0.0));
-            [(missing.sum::<f64>() / residuals.len().max(1) as f64).min(1.0) as f32]
-        })
-    }
-
-    /// The light.
-    pub(crate) const fn light(&self) -> &TableLight {
-        &self.model.light
-    }
-
-    /// The camera over the table.
-    pub(crate) const fn frame(&self) -> &TableFrame {
-        &self.model.frame
+    /// The light to order 2, in the viewer's frame at the table's angle 0.
+    ///
+    /// # Errors
+    /// Where a term is not finite.
+    pub(crate) fn light(&self) -> Result<ShLight, LightError> {
+        let light = match &self.measured {
+            Some(measured) => measured.clone(),
+            None => self.model.light()?,
+        };
+        Ok(light.with_order(Order::TWO))
     }
 
     /// What the object is taken for.

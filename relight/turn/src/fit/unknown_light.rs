@@ -10,7 +10,7 @@ use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts, all_statis
 use crate::fit::environment::fit_model;
 use crate::fit::photo_albedo::mean_albedo;
 use crate::fit::search::PixelFit;
-use crate::fit::solution::TurnSolution;
+use crate::fit::solution::{FoundGloss, TurnSolution};
 use crate::model::directions::unit;
 use crate::model::frame::{Elevation, TableFrame};
 use crate::model::material::MaterialKind;
@@ -21,6 +21,8 @@ use crate::observe::curves::TurnCurves;
 
 /// Mean error of normals over what the network expects. Measured: (docs/results/turns.md).
 const CALIBRATION: f64 = 1.14;
+/// Smoothness (exponent of the lobe) of metal in unknown light, which no turn determines. By convention.
+const METAL_SMOOTHNESS: f64 = 60.0;
 
 /// What the network of turns says of a turn, with the light that goes with it. The albedo is the mean of what it answers and
 /// of what the network of photographs has `seen`.
@@ -36,13 +38,14 @@ pub(crate) fn solve_by_network(
 ) -> Result<TurnSolution, TurnError> {
     let conditioning = Conditioning::of(curves);
     if let Some(advice) = conditioning.verdict.exposure_advice() {
-        return Err(TurnError::Frames(advice.to_owned()));
+        return Err(TurnError::Refused(advice.to_owned()));
     }
     let normals: Vec<[f64; 3]> = curves.pixels_of(found.normals.planes()).map(unit).collect();
     let mut albedo = mean_albedo(curves, &found.albedo, seen);
     let statistics = all_statistics(curves);
     let frame = TableFrame::new(elevation);
-    let model = fit_model(&statistics, &normals, &albedo, &frame, material);
+    let all: Vec<&CurveStatistics> = statistics.iter().collect();
+    let model = fit_model(&all, &normals, &albedo, &frame, material);
     let (model, factors) = normalised(model.ok_or(TurnError::NoLight)?, &normals);
     for albedo in &mut albedo {
         *albedo = [0, 1, 2].map(|c| albedo[c] * factors[c]);
@@ -63,6 +66,8 @@ pub(crate) fn solve_by_network(
         elevation,
         measured: None,
         conditioning,
+        // What metal shows is all that is known of the light: it may be blurred or not.
+        gloss: (material == MaterialKind::Metal).then(|| FoundGloss::new(1.0, METAL_SMOOTHNESS)),
     };
     solution.conditioning = conditioning.by_network(solution.expected_error_deg());
     Ok(solution)
@@ -81,10 +86,8 @@ fn normalised(mut model: ShadingModel, normals: &[[f64; 3]]) -> (ShadingModel, [
         let mean = sum / normals.len() as f64;
         if mean > 1e-12 { mean } else { 1.0 }
     });
-    let parts = factors.map(|factor| 1.0 / factor);
-    model.light = model.light.times(parts);
-    if model.material == MaterialKind::Metal {
-        model.gloss = model.gloss.times(parts);
+    for light in [&mut model.diffuse, &mut model.gloss] {
+        *light = light.scaled(|_, channel| 1.0 / factors[channel]);
     }
     (model, factors)
 }
@@ -110,7 +113,7 @@ mod tests {
     use super::*;
     use crate::TurnVerdict;
     use crate::observe::curves::CurveBuilder;
-    use crate::test_turns::{TAKE, ball, elevation, environment, film, knowing, metal_ball, off};
+    use crate::tests::{TAKE, ball, elevation, environment, film, knowing, metal_ball, off};
     use relight_core::image::Extent;
 
     #[test]
@@ -124,7 +127,7 @@ mod tests {
         assert!(off(&surface, &found.normals(&curves)) < 0.1);
         assert!((found.expected_error_deg() - 10.0 * CALIBRATION).abs() < 1e-3);
         assert_eq!(found.verdict(), TurnVerdict::Good);
-        let coefficients = found.light().to_viewer(found.frame()).unwrap();
+        let coefficients = found.light().unwrap();
         for c in 0..3 {
             let scale = light.coefficients()[0][c] / coefficients.coefficients()[0][c];
             for (a, b) in coefficients.coefficients().iter().zip(light.coefficients()) {

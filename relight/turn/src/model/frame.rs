@@ -4,7 +4,7 @@ use relight_core::light::Rotation;
 use relit_data::rig::CAMERA_ELEVATIONS_DEG;
 use serde::Serialize;
 
-use crate::setting_error::SettingError;
+use crate::error::TurnError;
 
 /// Elevation where none is known, degrees. By convention of the rig.
 const USUAL_DEG: f64 = 18.0;
@@ -50,10 +50,10 @@ impl Elevation {
     /// An elevation that was measured, degrees.
     ///
     /// # Errors
-    /// [`SettingError`] beyond 0 to 89 degrees.
-    pub fn given(degrees: f64) -> Result<Self, SettingError> {
+    /// [`TurnError::Setting`] beyond 0 to 89 degrees.
+    pub fn given(degrees: f64) -> Result<Self, TurnError> {
         if !CAMERA_ELEVATIONS_DEG.contains(&degrees) {
-            return Err(SettingError {
+            return Err(TurnError::Setting {
                 what: "the elevation",
                 value: degrees,
                 allowed: "0 to 89 degrees",
@@ -69,8 +69,8 @@ impl Elevation {
     /// The elevation of the rig, as a session has it, degrees.
     ///
     /// # Errors
-    /// [`SettingError`] beyond 0 to 89 degrees.
-    pub fn of_rig(degrees: f64) -> Result<Self, SettingError> {
+    /// [`TurnError::Setting`] beyond 0 to 89 degrees.
+    pub fn of_rig(degrees: f64) -> Result<Self, TurnError> {
         Ok(Self {
             source: FactSource::Rig,
             ..Self::given(degrees)?

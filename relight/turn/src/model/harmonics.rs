@@ -24,14 +24,3 @@ pub(crate) struct HarmonicTerm {
     pub(crate) coefficient: usize,
     pub(crate) parts: [f64; 2],
 }
-
-/// The values of the harmonics at an angle of the table, radians.
-pub(crate) fn basis_at(angle: f64) -> [f64; COEFFICIENTS] {
-    let mut basis = [1.0; COEFFICIENTS];
-    for harmonic in 1..=HARMONICS {
-        let (sin, cos) = (harmonic as f64 * angle).sin_cos();
-        basis[2 * harmonic - 1] = cos;
-        basis[2 * harmonic] = -sin;
-    }
-    basis
-}

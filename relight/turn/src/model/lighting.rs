@@ -1,163 +1,224 @@
-//! Light of order 2 in the table's frame, as it acts on the curve of a pixel.
+//! Light in the table's frame, as it acts on the curve of a pixel: along its normal, or along what it reflects.
 
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
-use relight_core::light::{LightError, Order, ShLight};
+use relight_core::light::{LightError, ShLight};
+use relight_core::render::cosine_lobe;
 
-use crate::model::frame::TableFrame;
-use crate::model::gloss::{GlossLight, MIRROR};
-use crate::model::harmonics::{COEFFICIENTS, HarmonicTerm, LAMBERTIAN_COEFFICIENTS};
+use crate::model::harmonics::{COEFFICIENTS, GLOSS_ORDER, HarmonicTerm};
 
 /// Terms of a channel's light.
-pub(crate) const TERMS: usize = 9;
+pub(crate) const TERMS: usize = (GLOSS_ORDER + 1) * (GLOSS_ORDER + 1);
 
-/// Bands of the light that a Lambertian surface shows.
-pub(crate) const LAMBERTIAN_BANDS: usize = 3;
+/// The first of them: those that a Lambertian surface shows but for little.
+pub(crate) const LAMBERTIAN_TERMS: usize = LAMBERTIAN_BANDS * LAMBERTIAN_BANDS;
 
-/// What each term of [`TableLight`] is of a coefficient of the spherical harmonics: its index and factor.
-/// The factors are those of the cosine lobe, pi, 2 pi / 3 and pi / 4, times those of the polynomials.
-const OF_COEFFICIENTS: [(usize, f64); TERMS] = {
-    const Y0: f64 = 0.282_094_791_773_878_14;
-    const Y1: f64 = 0.488_602_511_902_919_9;
-    const Y20: f64 = 0.315_391_565_252_520_05;
-    const Y21: f64 = 1.092_548_430_592_079_2;
-    const Y22: f64 = 0.546_274_215_296_039_6;
-    const A1: f64 = 2.0 * PI / 3.0;
-    const A2: f64 = PI / 4.0;
-    [
-        (0, PI * Y0),
-        (2, A1 * Y1),
-        (6, A2 * Y20),
-        (3, A1 * Y1),
-        (1, -A1 * Y1),
-        (7, A2 * Y21),
-        (5, -A2 * Y21),
-        (8, A2 * Y22),
-        (4, -A2 * Y22),
-    ]
-};
+const LAMBERTIAN_BANDS: usize = 3;
 
-/// The irradiance of the environment light on a normal, while the table turns: with the normal (x, y, z) in the
-/// table's frame and q = x + i y,
+/// Reflectance of a dielectric at normal incidence, 0 to 1; at a glancing angle it is 1. By convention, for an index of
+/// refraction of 1.5.
+pub(crate) const HEAD_ON: f64 = 0.04;
+
+/// What white metal shows of a light, over the sum of its terms times the light's coefficients: as bright as a
+/// Lambertian white surface in even light, π times it, and the terms are √(4π) times the harmonics.
+pub(crate) const MIRROR: f64 = 0.886_226_925_452_758;
+
+/// Light around an object, in the table's frame. In the direction r it shows over the table's angle t, with q = r_x + i r_y,
 ///
-/// `E(t) = e + f z + g (3 z² - 1) + Re((a + b z) q e^(i t)) + Re(d q² e^(2 i t))`.
+/// `S(t) = Re Σ_lm s_lm P_lm(r_z) q^m e^(i m t)`.
 ///
-/// The terms of each channel are e, f, g, Re a, Im a, Re b, Im b, Re d, Im d.
+/// `P_lm` is the m-th derivative of Legendre's polynomial l, with the factor that makes it a spherical harmonic. A diffuse
+/// surface shows it along its normal, blurred by the cosine; gloss along r = 2 (n·v) n - v, to which the viewer's direction is
+/// reflected, blurred by the lobe: each a factor for each l. Of each channel, the terms of band l are Re s_l0, Re s_l1,
+/// Im s_l1, Re s_l2 and so on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TableLight {
     terms: [[f64; TERMS]; 3],
 }
 
 impl TableLight {
-    /// The light of these terms, one list a channel.
+    /// Darkness.
+    pub(crate) const NONE: Self = Self {
+        terms: [[0.0; TERMS]; 3],
+    };
+
+    /// The light of these terms.
     pub(crate) const fn new(terms: [[f64; TERMS]; 3]) -> Self {
         Self { terms }
     }
 
-    /// The first nine coefficients of a light in the viewer's frame at the table's angle 0.
-    pub(crate) fn from_viewer(light: &ShLight, frame: &TableFrame) -> Self {
-        let light = light.with_order(Order::TWO).rotated(&frame.rotation());
-        let coefficients = light.coefficients();
-        let terms = [0, 1, 2]
-            .map(|channel| OF_COEFFICIENTS.map(|(at, factor)| factor * coefficients[at][channel]));
+    /// A light in the table's frame, up to [`GLOSS_ORDER`].
+    pub(crate) fn of(light: &ShLight) -> Self {
+        let mut terms = [[0.0; TERMS]; 3];
+        for at in 0..light.coefficients().len().min(TERMS) {
+            let (coefficient, sign) = of_term(at);
+            for (channel, terms) in terms.iter_mut().enumerate() {
+                terms[at] = sign * light.coefficients()[coefficient][channel];
+            }
+        }
         Self { terms }
-    }
-
-    /// The light of which a mirror shows this.
-    ///
-    /// # Errors
-    /// Where a term is not finite.
-    pub(crate) fn of_mirror(shown: &GlossLight) -> Result<Self, LightError> {
-        let light = shown.light()?;
-        let coefficients = light.coefficients();
-        let factor = |channel: usize| {
-            OF_COEFFICIENTS.map(|(at, factor)| factor * coefficients[at][channel] / MIRROR)
-        };
-        Ok(Self::new([0, 1, 2].map(factor)))
     }
 
     /// The same as coefficients in the table's frame.
     ///
     /// # Errors
     /// Where a term is not finite.
-    pub(crate) fn coefficients(&self) -> Result<ShLight, LightError> {
+    pub(crate) fn light(&self) -> Result<ShLight, LightError> {
         let mut coefficients = vec![[0.0; 3]; TERMS];
-        for (term, (at, factor)) in OF_COEFFICIENTS.into_iter().enumerate() {
-            coefficients[at] = [0, 1, 2].map(|channel| self.terms[channel][term] / factor);
+        for at in 0..TERMS {
+            let (coefficient, sign) = of_term(at);
+            coefficients[coefficient] = [0, 1, 2].map(|c| sign * self.terms[c][at]);
         }
         ShLight::new(coefficients)
     }
 
-    /// The same as coefficients in the viewer's frame, at the table's angle 0.
-    ///
-    /// # Errors
-    /// Where a term is not finite.
-    pub(crate) fn to_viewer(self, frame: &TableFrame) -> Result<ShLight, LightError> {
-        Ok(self.coefficients()?.rotated(&frame.rotation().inverse()))
-    }
-
-    /// The terms of each channel.
-    pub(crate) const fn terms(&self) -> &[[f64; TERMS]; 3] {
-        &self.terms
-    }
-
-    /// The same light with each channel times a factor.
-    pub(crate) fn times(mut self, factors: [f64; 3]) -> Self {
-        for (terms, factor) in self.terms.iter_mut().zip(factors) {
-            terms.iter_mut().for_each(|term| *term *= factor);
+    /// The same with the terms of each band and channel times a factor.
+    pub(crate) fn scaled(mut self, factor: impl Fn(usize, usize) -> f64) -> Self {
+        for (channel, terms) in self.terms.iter_mut().enumerate() {
+            for (at, term) in terms.iter_mut().enumerate() {
+                *term *= factor(at.isqrt(), channel);
+            }
         }
         self
     }
 
-    /// The irradiance on a normal in the table's frame, as factors of 1, cos t, -sin t, cos 2t, -sin 2t, and
-    /// 0 for the other harmonics.
-    pub(crate) fn harmonics(&self, normal: [f64; 3]) -> [[f64; COEFFICIENTS]; 3] {
-        let [x, y, z] = normal;
-        let (x2, y2) = (x * x - y * y, 2.0 * x * y);
-        let square = 3.0 * z * z - 1.0;
-        self.terms
-            .each_ref()
-            .map(|[e, f, g, ar, ai, br, bi, dr, di]| {
-                let (re, im) = (ar + br * z, ai + bi * z);
-                let mut harmonics = [0.0; COEFFICIENTS];
-                harmonics[..LAMBERTIAN_COEFFICIENTS].copy_from_slice(&[
-                    e + f * z + g * square,
-                    re * x - im * y,
-                    re * y + im * x,
-                    dr * x2 - di * y2,
-                    dr * y2 + di * x2,
-                ]);
-                harmonics
-            })
+    /// What a white Lambertian surface shows of the light along its normal: its irradiance.
+    pub(crate) fn irradiance(self) -> Self {
+        self.scaled(|l, _| MIRROR * cosine_lobe(l) / PI)
+    }
+
+    /// The light of which a white Lambertian surface shows this, as far as it shows it well.
+    pub(crate) fn of_irradiance(self) -> Self {
+        self.scaled(|l, _| {
+            if l < LAMBERTIAN_BANDS {
+                PI / (MIRROR * cosine_lobe(l))
+            } else {
+                0.0
+            }
+        })
+    }
+
+    /// Whether it is dark.
+    pub(crate) fn is_none(&self) -> bool {
+        *self == Self::NONE
+    }
+
+    /// What a pixel of these terms shows of it, as factors of 1, cos t, -sin t, cos 2t, -sin 2t and so on.
+    pub(crate) fn harmonics(&self, terms: &[HarmonicTerm]) -> [[f64; COEFFICIENTS]; 3] {
+        let mut harmonics = [[0.0; COEFFICIENTS]; 3];
+        for (at, term) in terms.iter().enumerate() {
+            for (harmonics, terms) in harmonics.iter_mut().zip(&self.terms) {
+                harmonics[term.coefficient] += terms[at] * term.parts[0];
+                harmonics[term.coefficient + 1] += terms[at] * term.parts[1];
+            }
+        }
+        harmonics
     }
 }
 
-/// What each term of the light contributes to the harmonics of a normal in the table's frame.
-pub(crate) fn lambertian_terms([x, y, z]: [f64; 3]) -> [HarmonicTerm; TERMS] {
-    let (x2, y2) = (x * x - y * y, 2.0 * x * y);
-    let term = |coefficient, a, b| HarmonicTerm {
-        coefficient,
-        parts: [a, b],
-    };
-    [
-        term(0, 1.0, 0.0),
-        term(0, z, 0.0),
-        term(0, 3.0 * z * z - 1.0, 0.0),
-        term(1, x, y),
-        term(1, -y, x),
-        term(1, x * z, y * z),
-        term(1, -y * z, x * z),
-        term(3, x2, y2),
-        term(3, -y2, x2),
-    ]
+/// Which coefficient of a light a term stands for, and with which sign.
+const fn of_term(at: usize) -> (usize, f64) {
+    let l = at.isqrt();
+    let (middle, k) = (l * (l + 1), at - l * l);
+    if k % 2 == 1 {
+        (middle + k.div_ceil(2), 1.0)
+    } else {
+        (middle - k / 2, if k == 0 { 1.0 } else { -1.0 })
+    }
 }
+
+/// The part of the light that is reflected, by Schlick's formula.
+fn reflectance(facing: f64) -> f64 {
+    HEAD_ON + (1.0 - HEAD_ON) * (1.0 - facing.clamp(0.0, 1.0)).powi(5)
+}
+
+/// What each term of a light contributes to the harmonics of a pixel's gloss. `facing` is n·v.
+pub(crate) fn gloss_terms(facing: f64, reflected: [f64; 3]) -> [HarmonicTerm; TERMS] {
+    terms_of(reflectance(facing), reflected)
+}
+
+/// What it contributes in a direction of the table's frame.
+pub(crate) fn terms_along(direction: [f64; 3]) -> [HarmonicTerm; TERMS] {
+    terms_of(1.0, direction)
+}
+
+fn terms_of(part: f64, [x, y, z]: [f64; 3]) -> [HarmonicTerm; TERMS] {
+    let legendre = derivatives(z);
+    let mut terms = [HarmonicTerm {
+        coefficient: 0,
+        parts: [0.0; 2],
+    }; TERMS];
+    let (mut re, mut im) = (1.0, 0.0);
+    for m in 0..=GLOSS_ORDER {
+        for l in m..=GLOSS_ORDER {
+            let value = part * legendre[l][m];
+            let [a, b] = [value * re, value * im];
+            if m == 0 {
+                terms[l * l].parts = [a, 0.0];
+            } else {
+                let coefficient = 2 * m - 1;
+                terms[l * l + 2 * m - 1] = HarmonicTerm {
+                    coefficient,
+                    parts: [a, b],
+                };
+                terms[l * l + 2 * m] = HarmonicTerm {
+                    coefficient,
+                    parts: [-b, a],
+                };
+            }
+        }
+        (re, im) = (re * x - im * y, re * y + im * x);
+    }
+    terms
+}
+
+/// The m-th derivative of Legendre's polynomial l at z, for each l and m up to l, times its scale.
+fn derivatives(z: f64) -> [[f64; GLOSS_ORDER + 1]; GLOSS_ORDER + 1] {
+    let mut values = [[0.0; GLOSS_ORDER + 1]; GLOSS_ORDER + 1];
+    // P_00 = 1, P_lm = (2 l - 1) P_(l-1)(m-1) + P_(l-2)m, and l P_l0 = (2 l - 1) z P_(l-1)0 - (l - 1) P_(l-2)0.
+    values[0][0] = 1.0;
+    for l in 1..=GLOSS_ORDER {
+        let odd = (2 * l - 1) as f64;
+        for m in 0..=l {
+            let two_before = if l > 1 { values[l - 2][m] } else { 0.0 };
+            values[l][m] = if m > 0 {
+                odd * values[l - 1][m - 1] + two_before
+            } else {
+                (odd * z * values[l - 1][0] - (l - 1) as f64 * two_before) / l as f64
+            };
+        }
+    }
+    for (row, scales) in values.iter_mut().zip(SCALES.iter()) {
+        for (value, scale) in row.iter_mut().zip(scales) {
+            *value *= scale;
+        }
+    }
+    values
+}
+
+/// The root of (2 l + 1) (l - m)! / (l + m)!, twice that for m above 0, for each l and m up to l.
+static SCALES: LazyLock<[[f64; GLOSS_ORDER + 1]; GLOSS_ORDER + 1]> = LazyLock::new(|| {
+    let mut scales = [[0.0; GLOSS_ORDER + 1]; GLOSS_ORDER + 1];
+    for (l, row) in scales.iter_mut().enumerate() {
+        for (m, scale) in row.iter_mut().enumerate().take(l + 1) {
+            let ratio: f64 = (l - m + 1..=l + m).map(|k| k as f64).product();
+            let twice = if m == 0 { 1.0 } else { 2.0 };
+            *scale = (twice * (2 * l + 1) as f64 / ratio).sqrt();
+        }
+    }
+    scales
+});
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Elevation;
+    use crate::model::frame::TableFrame;
+    use crate::model::shading::ShadingModel;
+    use crate::tests::basis_at;
+    use crate::{Elevation, MaterialKind};
     use relight_core::image::{Extent, Planes};
-    use relight_core::light::{Direction, Normals, Rotation};
+    use relight_core::light::{Direction, Normals, Order, Rotation};
     use relight_core::render::{DiffuseForm, DiffuseLayer};
 
     fn light() -> ShLight {
@@ -168,23 +229,17 @@ mod tests {
     #[test]
     fn the_curve_of_a_normal_is_its_shading_under_the_turning_light() {
         let frame = TableFrame::new(Elevation::given(23.0).unwrap());
-        let table = TableLight::from_viewer(&light(), &frame);
+        let table = TableLight::of(&light().rotated(&frame.rotation())).irradiance();
         let (sin, cos) = 23.0_f64.to_radians().sin_cos();
         let axis = Direction::new(0.0, cos, sin).unwrap();
         let normal = Direction::new(0.3, -0.2, 0.7).unwrap().components();
-        let harmonics = table.harmonics(frame.to_table(normal));
+        let harmonics = table.harmonics(&terms_along(frame.to_table(normal)));
         for angle in [0.0_f64, 0.4, 1.9, 4.4] {
             let turned = light().rotated(&Rotation::about(axis, -angle));
             let map = Normals::new(Planes::filled(Extent::new(1, 1), normal.map(|v| v as f32)));
             let layer = DiffuseLayer::new(&turned, DiffuseForm::Irradiance);
             let shading = layer.shading(&map).planes().pixel(0, 0);
-            let basis = [
-                1.0,
-                angle.cos(),
-                -angle.sin(),
-                (2.0 * angle).cos(),
-                -(2.0 * angle).sin(),
-            ];
+            let basis = basis_at(angle);
             for (shading, harmonics) in shading.into_iter().zip(harmonics) {
                 let value: f64 = basis.iter().zip(harmonics).map(|(a, b)| a * b).sum();
                 assert!(
@@ -196,33 +251,67 @@ mod tests {
     }
 
     #[test]
-    fn light_comes_back_from_the_table_s_frame() {
+    fn light_comes_back_from_what_is_seen_of_it() {
         let frame = TableFrame::new(Elevation::given(40.0).unwrap());
-        let table = TableLight::from_viewer(&light(), &frame);
-        let back = table.to_viewer(&frame).unwrap();
-        for (a, b) in back.coefficients().iter().zip(light().coefficients()) {
-            assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9));
+        let table = TableLight::of(&light().rotated(&frame.rotation()));
+        let model = |material| ShadingModel {
+            frame,
+            diffuse: table.irradiance(),
+            gloss: table.scaled(|_, _| MIRROR),
+            material,
+        };
+        for material in [MaterialKind::Diffuse, MaterialKind::Metal] {
+            let back = model(material).light().unwrap();
+            for (a, b) in back.coefficients().iter().zip(light().coefficients()) {
+                assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9));
+            }
         }
-    }
-
-    fn part(term: HarmonicTerm, coefficient: usize) -> f64 {
-        let at = coefficient.checked_sub(term.coefficient);
-        at.and_then(|at| term.parts.get(at).copied()).unwrap_or(0.0)
     }
 
     #[test]
-    fn harmonics_are_the_sum_of_their_terms() {
-        let table = TableLight::from_viewer(&light(), &TableFrame::new(Elevation::assumed()));
-        let normal = [0.48, -0.6, 0.64];
-        let terms = lambertian_terms(normal);
-        for (channel, harmonics) in table.harmonics(normal).iter().enumerate() {
-            for (coefficient, value) in harmonics.iter().enumerate() {
-                let parts = table.terms()[channel].iter().zip(terms);
-                let sum: f64 = parts
-                    .map(|(light, term)| light * part(term, coefficient))
-                    .sum();
-                assert!((sum - value).abs() < 1e-12);
+    fn white_metal_is_as_bright_as_a_lambertian_white_surface_in_even_light() {
+        let frame = TableFrame::new(Elevation::assumed());
+        let even = TableLight::of(&ShLight::even(Order::TWO, [1.0; 3]));
+        for material in [MaterialKind::Diffuse, MaterialKind::Metal] {
+            let model = ShadingModel {
+                frame,
+                diffuse: even.irradiance(),
+                gloss: even.scaled(|_, _| MIRROR),
+                material,
+            };
+            let shown = model.harmonics([0.48, 0.36, 0.8]).base[1];
+            assert!((shown[0] - PI).abs() < 1e-6, "{material:?} {shown:?}");
+        }
+    }
+
+    #[test]
+    fn terms_of_one_band_have_the_same_sum_of_squares_everywhere() {
+        // The addition theorem: that sum is 2 l + 1 on the whole sphere, at every angle of the table.
+        for direction in [[0.6, 0.48, 0.64], [0.0, -0.8, -0.6], [0.28, 0.96, 0.0]] {
+            let terms = gloss_terms(1.0, direction);
+            for l in 0..=GLOSS_ORDER {
+                for angle in [0.0_f64, 1.3] {
+                    let sum: f64 = terms[l * l..(l + 1) * (l + 1)]
+                        .iter()
+                        .map(|term| {
+                            let m = term.coefficient.div_ceil(2) as f64;
+                            let (sin, cos) = (m * angle).sin_cos();
+                            (term.parts[0] * cos - term.parts[1] * sin).powi(2)
+                        })
+                        .sum();
+                    let expected = HEAD_ON * HEAD_ON * (2 * l + 1) as f64;
+                    assert!((sum / expected - 1.0).abs() < 1e-9, "{l}: {sum}");
+                }
             }
         }
+    }
+
+    #[test]
+    fn gloss_shows_little_head_on_and_all_at_a_glancing_angle() {
+        let mut terms = [[0.0; TERMS]; 3];
+        terms[1][0] = 2.0;
+        let gloss = TableLight::new(terms);
+        let shown = |facing| gloss.harmonics(&gloss_terms(facing, [1.0, 0.0, 0.0]))[1][0];
+        assert!((shown(0.0) - 2.0).abs() < 1e-12 && (shown(1.0) - 0.08).abs() < 1e-12);
     }
 }

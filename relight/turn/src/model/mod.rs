@@ -2,9 +2,7 @@
 
 pub(crate) mod directions;
 pub(crate) mod frame;
-pub(crate) mod gloss;
 pub(crate) mod harmonics;
-pub(crate) mod known_light;
 pub(crate) mod lighting;
 pub(crate) mod material;
 pub(crate) mod shading;

@@ -6,6 +6,7 @@
 
 use std::f32::consts::TAU;
 
+use num_complex::Complex32;
 use relight_photo::nets::{LOG_MEANS, TURN_INPUTS};
 use serde::Serialize;
 
@@ -72,49 +73,11 @@ pub struct NetworkTurn<'a> {
 }
 
 /// A harmonic of the three channels.
-type Harmonic = [Complex; 3];
+type Harmonic = [Complex32; 3];
 
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Complex {
-    re: f32,
-    im: f32,
-}
-
-impl Complex {
-    fn at(phase: f32) -> Self {
-        let (im, re) = phase.sin_cos();
-        Self { re, im }
-    }
-
-    fn times(self, other: Self) -> Self {
-        Self {
-            re: self.re * other.re - self.im * other.im,
-            im: self.re * other.im + self.im * other.re,
-        }
-    }
-
-    fn scaled(self, factor: f32) -> Self {
-        Self {
-            re: self.re * factor,
-            im: self.im * factor,
-        }
-    }
-
-    fn plus(self, other: Self) -> Self {
-        Self {
-            re: self.re + other.re,
-            im: self.im + other.im,
-        }
-    }
-
-    fn length(self) -> f32 {
-        self.re.hypot(self.im)
-    }
-
-    /// The same direction, no longer than this.
-    fn up_to(self, most: f32) -> Self {
-        self.scaled((most / self.length().max(1e-9)).min(1.0))
-    }
+/// The same direction, no longer than this.
+fn up_to(value: Complex32, most: f32) -> Complex32 {
+    value * (most / value.norm().max(1e-9)).min(1.0)
 }
 
 /// The planes of the network, [`TURN_INPUTS`] of side x side values, 0 outside the object.
@@ -129,11 +92,11 @@ pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32>
         for &c in channels {
             let of = |k: usize| channel(&harmonic[k], c);
             let square = (0..turn.pixels.len())
-                .map(|k| of(k).length().powi(2))
+                .map(|k| of(k).norm().powi(2))
                 .sum::<f32>();
             let effective = (square / turn.pixels.len().max(1) as f32).sqrt() + 1e-4;
             whole.push(effective.ln() / 1.5 + 1.0);
-            let value = |k: usize| of(k).scaled(1.0 / effective).up_to(LARGEST_VALUE);
+            let value = |k: usize| up_to(of(k) * (1.0 / effective), LARGEST_VALUE);
             planes.push(|k| value(k).re);
             planes.push(|k| value(k).im);
         }
@@ -189,19 +152,19 @@ fn over_mean(means: &[[f32; 3]]) -> ([f32; 3], Vec<[f32; 3]>) {
 }
 
 /// A channel, or with the number 3 the mean of all.
-fn channel(harmonic: &Harmonic, c: usize) -> Complex {
+fn channel(harmonic: &Harmonic, c: usize) -> Complex32 {
     if c < 3 {
         return harmonic[c];
     }
     let [r, g, b] = *harmonic;
-    r.plus(g).plus(b).scaled(1.0 / 3.0)
+    (r + g + b) * (1.0 / 3.0)
 }
 
-fn mean_of(harmonic: &[Harmonic], c: usize) -> Complex {
+fn mean_of(harmonic: &[Harmonic], c: usize) -> Complex32 {
     let sum = harmonic
         .iter()
-        .fold(Complex::default(), |sum, one| sum.plus(one[c]));
-    sum.scaled(1.0 / harmonic.len().max(1) as f32)
+        .fold(Complex32::default(), |sum, one| sum + one[c]);
+    sum * (1.0 / harmonic.len().max(1) as f32)
 }
 
 /// Harmonics over means.
@@ -219,12 +182,9 @@ impl Ratios {
         let ratio = |m: usize, k: usize| {
             [0, 1, 2].map(|c| {
                 let curve = &turn.curves[k];
-                let value = Complex {
-                    re: curve[2 * m + 1][c],
-                    im: curve[2 * m + 2][c],
-                };
+                let value = Complex32::new(curve[2 * m + 1][c], curve[2 * m + 2][c]);
                 let over = means[k][c] * of_all[c];
-                value.scaled(1.0 / over).up_to(LARGEST_RATIO)
+                up_to(value * (1.0 / over), LARGEST_RATIO)
             })
         };
         let harmonics = (0..HARMONICS)
@@ -240,11 +200,11 @@ impl Ratios {
             .zip(&self.means)
             .map(|(harmonic, mean)| {
                 [0, 1, 2]
-                    .map(|c| harmonic[c].scaled(mean[c] / (mean[c] + DARK)))
+                    .map(|c| harmonic[c] * (mean[c] / (mean[c] + DARK)))
                     .into_iter()
-                    .fold(Complex::default(), Complex::plus)
+                    .fold(Complex32::default(), |sum, one| sum + one)
             });
-        let sum = weighted.fold(Complex::default(), Complex::plus);
+        let sum = weighted.fold(Complex32::default(), |sum, one| sum + one);
         sum.im.atan2(sum.re)
     }
 
@@ -261,10 +221,10 @@ impl Ratios {
         let harmonics = self.harmonics.iter().enumerate();
         harmonics
             .map(|(m, pixels)| {
-                let back = Complex::at(-phase * (m + 1) as f32);
+                let back = Complex32::cis(-phase * (m + 1) as f32);
                 pixels
                     .iter()
-                    .map(|one| one.map(|value| value.times(back)))
+                    .map(|one| one.map(|value| value * back))
                     .collect()
             })
             .collect()
@@ -365,15 +325,9 @@ mod tests {
         let angle = 1.234_f32;
         for curve in &mut other {
             for m in 1..=HARMONICS {
-                let back = Complex::at(angle * m as f32);
+                let back = Complex32::cis(angle * m as f32);
                 let [re, im] = [curve[2 * m - 1], curve[2 * m]];
-                let turned = [0, 1, 2].map(|c| {
-                    let value = Complex {
-                        re: re[c],
-                        im: im[c],
-                    };
-                    value.times(back)
-                });
+                let turned = [0, 1, 2].map(|c| Complex32::new(re[c], im[c]) * back);
                 curve[2 * m - 1] = turned.map(|value| value.re);
                 curve[2 * m] = turned.map(|value| value.im);
             }

@@ -84,14 +84,8 @@ impl NetworkNormal {
     }
 }
 
-/// What the network says of a cell.
-#[derive(Debug, Clone, Copy)]
-struct Cell {
-    /// The normal and the logarithm of its expected chord.
-    normal: [f32; 4],
-    /// The logarithm of albedo over the curve's mean.
-    albedo: [f32; 3],
-}
+/// What the network says of a cell: the normal, the logarithm of its expected chord, and that of albedo over the curve's mean.
+type Cell = [f32; 7];
 
 type Cells = Vec<Option<Cell>>;
 
@@ -170,10 +164,8 @@ impl TurnNetwork {
             let at = pixel as usize;
             let answer = [0, 1, 2, 3].map(|c| value(0, c, at).unwrap_or(0.0));
             let [x, y, z] = NetworkNormal::of_answer(answer).normal;
-            cells[at] = Some(Cell {
-                normal: [x, y, z, answer[3]],
-                albedo: [0, 1, 2].map(|c| value(1, c, at).unwrap_or(0.0)),
-            });
+            let [r, g, b] = [0, 1, 2].map(|c| value(1, c, at).unwrap_or(0.0));
+            cells[at] = Some([x, y, z, answer[3], r, g, b]);
         }
         Ok(cells)
     }
@@ -188,11 +180,8 @@ fn mean_of_looks(seen: &Cells, in_mirror: &Cells) -> Cells {
             let Some(other) = in_mirror[mirrored] else {
                 return Some(one);
             };
-            let ([x, y, z, error], [x2, y2, z2, error2]) = (one.normal, other.normal);
-            Some(Cell {
-                normal: [x - x2, y + y2, z + z2, (error + error2) / 2.0],
-                albedo: [0, 1, 2].map(|c| (one.albedo[c] + other.albedo[c]) / 2.0),
-            })
+            let sign = |i: usize| if i == 0 { -1.0 } else { 1.0 };
+            Some(std::array::from_fn(|i| (one[i] + sign(i) * other[i]) / 2.0))
         })
         .collect()
 }
@@ -201,7 +190,7 @@ fn mean_error(cells: &Cells) -> f32 {
     let errors = cells
         .iter()
         .flatten()
-        .map(|cell| NetworkNormal::of_answer(cell.normal).expected_error_deg);
+        .map(|&[x, y, z, chord, ..]| NetworkNormal::of_answer([x, y, z, chord]).expected_error_deg);
     let (sum, count) = errors.fold((0.0, 0.0), |(sum, count), error| (sum + error, count + 1.0));
     sum / f32::max(count, 1.0)
 }
@@ -213,35 +202,18 @@ fn spread(
     cells: &Cells,
     figures: NetworkFigures,
 ) -> TurnPrediction {
-    let normals: Vec<Option<[f32; 4]>> = cells
-        .iter()
-        .map(|cell| Some(cell.as_ref()?.normal))
-        .collect();
-    let albedo: Vec<Option<[f32; 3]>> = cells
-        .iter()
-        .map(|cell| Some(cell.as_ref()?.albedo))
-        .collect();
     let width = curves.extent().width;
-    let places = || {
-        curves
-            .places()
-            .iter()
-            .map(|&place| (place % width, place / width))
-    };
-    let answers: Vec<NetworkNormal> = places()
-        .map(|(x, y)| {
-            let answer = crop.at(&normals, x, y);
-            NetworkNormal::of_answer(answer.unwrap_or([0.0, 0.0, 1.0, 0.0]))
-        })
+    let places = curves.places().iter();
+    let answers: Vec<Cell> = places
+        .map(|&place| crop.at(cells, place % width, place / width))
+        .map(|answer| answer.unwrap_or([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
         .collect();
+    let normal = |&[x, y, z, chord, ..]: &Cell| NetworkNormal::of_answer([x, y, z, chord]);
     // What the network adds is smooth, so that the albedo is as fine as the frame.
-    let albedo: Vec<[f32; 3]> = places()
-        .zip(log_means(&mean_light(curves)))
-        .map(|((x, y), mean)| {
-            let more = crop.at(&albedo, x, y).unwrap_or_default();
-            [0, 1, 2].map(|c| (mean[c] + more[c]).exp())
-        })
+    let albedo: Vec<[f32; 3]> = (answers.iter().zip(log_means(&mean_light(curves))))
+        .map(|(more, mean)| [0, 1, 2].map(|c| (mean[c] + more[4 + c]).exp()))
         .collect();
+    let answers: Vec<NetworkNormal> = answers.iter().map(normal).collect();
     TurnPrediction {
         normals: Normals::new(curves.map(|pixel| answers[pixel].normal)),
         expected_errors: curves.map(|pixel| [answers[pixel].expected_error_deg]),

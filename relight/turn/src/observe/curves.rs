@@ -8,7 +8,6 @@ use relit_data::image_stats::SATURATED_VALUE;
 
 use crate::error::TurnError;
 use crate::model::harmonics::{COEFFICIENTS, HARMONICS};
-use crate::observe::exposure::{ExposureStep, ExposureWatch};
 
 /// Parts into which the turn is divided. Derived: a part of 5 degrees is narrow beside the harmonics, and its own
 /// mean of them is kept, so that dividing loses nothing.
@@ -19,21 +18,15 @@ const CLIPPED_VALUE: f32 = SATURATED_VALUE;
 /// Least share of the frames of a part, 0 to 1, in which a channel is not clipped. By hand: the mean of fewer would
 /// be that of the darker ones.
 const LEAST_UNCLIPPED: f32 = 0.95;
-/// Relative difference up to which exposures of the frames of a part count as equal. By hand.
-const SAME_EXPOSURE: f64 = 0.01;
 /// Least number of parts with frames. Derived: five Fourier coefficients of a Lambertian curve, and three to spare.
 const LEAST_PARTS: usize = 8;
-/// Least share of the pixels of a block, 0 to 1, that have to be unclipped. By hand: the mean of fewer would be too
-/// dark.
-const LEAST_OF_BLOCK: f32 = 0.9;
 /// Least gap between parts with frames that is not covered, in usual gaps. By hand.
 const HOLE: f64 = 3.0;
 
 /// What is wrong with frames of which nothing is left.
 pub(crate) const NOTHING: &str = "no frame has a pixel under the mask";
 
-/// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Of each frame it keeps the light of a few pixels,
-/// about a kilobyte; beyond that its memory does not grow with the number of frames.
+/// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Its memory does not grow with the number of frames.
 #[derive(Debug)]
 pub(crate) struct CurveBuilder {
     extent: Extent,
@@ -44,16 +37,13 @@ pub(crate) struct CurveBuilder {
     /// Pixel by pixel, in it part by part: sum of light and number of frames that are not clipped.
     sums: Vec<[f32; 3]>,
     counts: Vec<[u16; 3]>,
-    watch: ExposureWatch,
-    frames: usize,
+    frames: u32,
 }
 
 /// The frames of a part of the turn.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Part {
     frames: u32,
-    /// Which frames, in the order in which they came.
-    members: Vec<usize>,
     harmonics: [f64; COEFFICIENTS - 1],
 }
 
@@ -64,7 +54,6 @@ pub struct TurnCurves {
     extent: Extent,
     places: Vec<usize>,
     frames: u32,
-    steps: Vec<ExposureStep>,
     /// The mean of 1, cos t, -sin t, cos 2t, -sin 2t and so on over each part's frames.
     harmonics: Vec<[f64; COEFFICIENTS]>,
     /// The middle of each part, radians.
@@ -84,7 +73,7 @@ impl CurveBuilder {
             .filter(|&at| mask[at] >= 0.5)
             .collect();
         if places.is_empty() {
-            return Err(TurnError::Frames(NOTHING.to_owned()));
+            return Err(TurnError::Refused(NOTHING.to_owned()));
         }
         let cells = places.len() * PARTS;
         Ok(Self {
@@ -94,7 +83,6 @@ impl CurveBuilder {
             parts: vec![Part::default(); PARTS],
             sums: vec![[0.0; 3]; cells],
             counts: vec![[0; 3]; cells],
-            watch: ExposureWatch::default(),
             frames: 0,
         })
     }
@@ -113,7 +101,7 @@ impl CurveBuilder {
         if extent != self.extent || planes.iter().any(|plane| plane.len() != extent.pixels()) {
             let [found, expected] =
                 [extent, self.extent].map(|size| format!("{} x {}", size.width, size.height));
-            return Err(TurnError::Frames(format!(
+            return Err(TurnError::Refused(format!(
                 "a frame has {found} pixels where {expected} are needed"
             )));
         }
@@ -121,9 +109,7 @@ impl CurveBuilder {
             return Ok(());
         }
         let part = (angle_deg.rem_euclid(360.0) / 360.0 * PARTS as f64) as usize % PARTS;
-        self.watch
-            .push(angle_deg, &self.places, planes, self.clipped);
-        self.parts[part].add(angle_deg.to_radians(), self.frames);
+        self.parts[part].add(angle_deg.to_radians());
         self.frames += 1;
         for (pixel, &at) in self.places.iter().enumerate() {
             let cell = pixel * PARTS + part;
@@ -145,17 +131,11 @@ impl CurveBuilder {
     pub(crate) fn finish(self) -> Result<TurnCurves, TurnError> {
         let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
         if seen.len() < LEAST_PARTS {
-            return Err(TurnError::Frames(format!(
+            return Err(TurnError::Refused(format!(
                 "{} different angles were found: five terms a pixel need at least {LEAST_PARTS}, spread over the turn",
                 seen.len()
             )));
         }
-        let (steps, exposures) = self.watch.finish();
-        let exposures: Vec<Option<f64>> = self
-            .parts
-            .iter()
-            .map(|part| part.exposure(&exposures))
-            .collect();
         let cells = || {
             self.places
                 .iter()
@@ -163,25 +143,21 @@ impl CurveBuilder {
                 .flat_map(|(pixel, _)| seen.iter().map(move |part| pixel * PARTS + part))
         };
         let mean = |cell: usize| {
-            let exposure = exposures[cell % PARTS].unwrap_or(1.0) as f32;
-            [0, 1, 2]
-                .map(|c| self.sums[cell][c] / f32::from(self.counts[cell][c].max(1)) / exposure)
+            [0, 1, 2].map(|c| self.sums[cell][c] / f32::from(self.counts[cell][c].max(1)))
         };
         let values = cells().map(mean).collect();
         let weights = cells()
             .map(|cell| {
                 let frames = self.parts[cell % PARTS].frames as f32;
                 self.counts[cell].map(|count| {
-                    let is_seen = f32::from(count) >= LEAST_UNCLIPPED * frames
-                        && exposures[cell % PARTS].is_some();
+                    let is_seen = f32::from(count) >= LEAST_UNCLIPPED * frames;
                     f32::from(u8::from(is_seen))
                 })
             })
             .collect();
         Ok(TurnCurves {
             extent: self.extent,
-            frames: self.frames as u32,
-            steps,
+            frames: self.frames,
             harmonics: seen.iter().map(|&at| self.parts[at].harmonics()).collect(),
             angles: seen
                 .iter()
@@ -195,24 +171,13 @@ impl CurveBuilder {
 }
 
 impl Part {
-    fn add(&mut self, angle: f64, frame: usize) {
+    fn add(&mut self, angle: f64) {
         self.frames += 1;
-        self.members.push(frame);
         for harmonic in 1..=HARMONICS {
             let (sin, cos) = (harmonic as f64 * angle).sin_cos();
             self.harmonics[2 * harmonic - 2] += cos;
             self.harmonics[2 * harmonic - 1] -= sin;
         }
-    }
-
-    /// The exposure of its frames; none where they are not all the same.
-    fn exposure(&self, of_frames: &[f64]) -> Option<f64> {
-        let all = || self.members.iter().map(|&frame| of_frames[frame]);
-        let (least, most) = (
-            all().fold(f64::INFINITY, f64::min),
-            all().fold(0.0, f64::max),
-        );
-        (most <= least * (1.0 + SAME_EXPOSURE)).then_some(most)
     }
 
     fn harmonics(&self) -> [f64; COEFFICIENTS] {
@@ -240,11 +205,6 @@ impl TurnCurves {
     #[must_use]
     pub const fn frames(&self) -> u32 {
         self.frames
-    }
-
-    /// Where the exposure changed. The curves are as if it had not: they have the exposure of most frames.
-    pub(crate) fn exposure_steps(&self) -> &[ExposureStep] {
-        &self.steps
     }
 
     /// In how many parts of the turn there are frames.
@@ -363,59 +323,22 @@ impl TurnCurves {
         other
     }
 
-    /// The curves of blocks of `side` x `side` pixels, of those that are mostly under the mask; of an object
-    /// that fills no block, of all that it touches.
-    pub(crate) fn reduced(&self, side: usize) -> Self {
-        let extent = Extent::new(
-            self.extent.width.div_ceil(side),
-            self.extent.height.div_ceil(side),
-        );
-        let mut members: Vec<Vec<usize>> = vec![Vec::new(); extent.pixels()];
-        for (pixel, &at) in self.places.iter().enumerate() {
-            let (x, y) = (at % self.extent.width, at / self.extent.width);
-            members[y / side * extent.width + x / side].push(pixel);
-        }
-        let is_full = |block: &&usize| 2 * members[**block].len() >= side * side;
-        let all: Vec<usize> = (0..members.len())
-            .filter(|&block| !members[block].is_empty())
-            .collect();
-        let full: Vec<usize> = all.iter().filter(is_full).copied().collect();
-        let places = if full.is_empty() { all } else { full };
-        let mut reduced = Self {
-            extent,
-            frames: self.frames,
-            steps: self.steps.clone(),
-            harmonics: self.harmonics.clone(),
-            angles: self.angles.clone(),
-            values: Vec::with_capacity(places.len() * self.parts()),
-            weights: Vec::with_capacity(places.len() * self.parts()),
-            places,
+    /// The curves of some of the pixels, by their places.
+    pub(crate) fn only(&self, is_wanted: impl Fn(usize) -> bool) -> Self {
+        let mut some = Self {
+            places: Vec::new(),
+            values: Vec::new(),
+            weights: Vec::new(),
+            ..self.clone()
         };
-        for &block in &reduced.places {
-            for part in 0..self.harmonics.len() {
-                let (value, weight) = self.mean(&members[block], part);
-                reduced.values.push(value);
-                reduced.weights.push(weight);
+        for (pixel, &place) in self.places.iter().enumerate() {
+            if is_wanted(place) {
+                some.places.push(place);
+                some.values.extend(self.values(pixel));
+                some.weights.extend(self.weights(pixel));
             }
         }
-        reduced
-    }
-
-    /// The mean light of pixels in a part of the turn, and how much it counts.
-    fn mean(&self, pixels: &[usize], part: usize) -> ([f32; 3], [f32; 3]) {
-        let (mut sum, mut weights) = ([0.0; 3], [0.0; 3]);
-        for &pixel in pixels {
-            let (value, weight) = (self.values(pixel)[part], self.weights(pixel)[part]);
-            for channel in 0..3 {
-                sum[channel] += weight[channel] * value[channel];
-                weights[channel] += weight[channel];
-            }
-        }
-        // A block of which a pixel clips is too dark by the mean of the others: it does not count.
-        let least = LEAST_OF_BLOCK * pixels.len() as f32;
-        let mean = [0, 1, 2].map(|c| sum[c] / weights[c].max(f32::MIN_POSITIVE));
-        let weight = weights.map(|weight| if weight >= least { 1.0 } else { 0.0 });
-        (mean, weight)
+        some
     }
 }
 

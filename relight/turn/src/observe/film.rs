@@ -37,7 +37,7 @@ pub(crate) fn film(
     let mut movie = MovieReader::open(&recording.video, FrameTiming::Each)?;
     let angles: HashMap<u64, f64> = turn.sources.iter().copied().collect();
     let mut likeness = Likeness::new(turn);
-    let mut ball = ProbeBuilder::new(probe)?;
+    let mut ball = ProbeBuilder::new(probe);
     let (mut number, mut done) = (0, 0);
     while let Some(frame) = movie.frame()? {
         if let Some(&angle) = angles.get(&number) {
@@ -48,18 +48,12 @@ pub(crate) fn film(
         }
         number += 1;
     }
-    let other = |why: String| TurnError::OtherVideo {
-        path: recording.video.clone(),
-        why,
-    };
+    let other = |why: &str| Err(TurnError::other_video(&recording.video, why));
     if done == 0 {
-        return Err(other(format!(
-            "none of the turn's frames is among its {number}"
-        )));
+        return other(&format!("none of the turn's frames is among its {number}"));
     }
     if !likeness.is_same() {
-        let why = "its frames do not show what those of the shard do";
-        return Err(other(why.to_owned()));
+        return other("its frames do not show what those of the shard do");
     }
     Ok(ball)
 }
@@ -77,13 +71,11 @@ fn check_session(recording: &Recording, origin: Option<&TurnOrigin>) -> Result<(
     if recording.id == origin.session || is_video {
         return Ok(());
     }
-    Err(TurnError::OtherVideo {
-        path: recording.video.clone(),
-        why: format!(
-            "the shard was made from the session {}, and this is of {}",
-            origin.session, recording.id
-        ),
-    })
+    let why = format!(
+        "the shard was made from the session {}, and this is of {}",
+        origin.session, recording.id
+    );
+    Err(TurnError::other_video(&recording.video, &why))
 }
 
 /// Whether a ball stands free of the object's mask.
@@ -112,7 +104,7 @@ fn check_mask(given: ProbePlace, turn: &ReadTurn) -> Result<(), TurnError> {
         return Ok(());
     }
     Err(TurnError::BallInMask {
-        given,
+        given: given.to_string(),
         percent: 100.0 * part.min(1.0),
     })
 }

@@ -2,11 +2,13 @@
 
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
+use relight_core::image::Planes;
 use relight_core::light::{Direction, Order, ShLight, basis};
 
 use crate::error::TurnError;
 use crate::model::directions::reflected;
 use crate::model::frame::TableFrame;
+use crate::observe::curves::TurnCurves;
 
 /// Rows of the panorama, from the table's axis upwards to downwards. By hand: about 6 degrees, finer than order 6
 /// shows.
@@ -31,6 +33,23 @@ impl MirrorPanorama {
         }
     }
 
+    /// What a ball of these normals shows. What is clipped in it counts as white.
+    pub(crate) fn of(curves: &TurnCurves, normals: &Planes<3>, frame: TableFrame) -> Self {
+        let white = curves.clipped_value();
+        let mut panorama = Self::new(frame);
+        for (pixel, normal) in curves.pixels_of(normals).enumerate() {
+            let parts = curves.values(pixel).iter().zip(curves.weights(pixel));
+            for ((value, weight), &angle) in parts.zip(curves.angles()) {
+                let light = [0, 1, 2].map(|c| match weight[c] > 0.0 {
+                    true => f64::from(value[c]),
+                    false => white,
+                });
+                panorama.add(angle, normal, light);
+            }
+        }
+        panorama
+    }
+
     /// Adds what a normal of the ball shows at an angle of the table, radians.
     pub(crate) fn add(&mut self, angle: f64, normal: [f64; 3], light: [f64; 3]) {
         let cell = self.cell(angle, normal);
@@ -52,7 +71,7 @@ impl MirrorPanorama {
     }
 
     /// Where the direction is that a normal of the ball shows.
-    pub(crate) fn cell(&self, angle: f64, normal: [f64; 3]) -> usize {
+    fn cell(&self, angle: f64, normal: [f64; 3]) -> usize {
         let [x, y, z] = self.frame.to_table(reflected(normal));
         let azimuth = y.atan2(x) + angle;
         let column = (azimuth.rem_euclid(TAU) / TAU * COLUMNS as f64) as usize % COLUMNS;

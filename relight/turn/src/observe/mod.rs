@@ -2,11 +2,9 @@
 
 pub(crate) mod conditioning;
 pub(crate) mod curves;
-pub(crate) mod exposure;
 pub(crate) mod film;
 pub(crate) mod mirror_panorama;
 pub(crate) mod probe;
 pub(crate) mod probe_place;
 pub(crate) mod reading;
-pub(crate) mod surroundings;
 pub(crate) mod verdict;

@@ -1,23 +1,18 @@
-//! A ball on the table, diffuse grey or chrome, which measures the light.
+//! A ball on the table, diffuse grey or chrome, which measures the light, and what the picture shows at and around it.
 
 use std::fmt;
 
 use relight_core::image::{Extent, Planes, Rgb, Srgb};
-use relight_core::light::{Normals, YUp};
 
 use crate::error::TurnError;
-use crate::model::frame::{Elevation, TableFrame};
-use crate::observe::curves::CurveBuilder;
-use crate::observe::mirror_panorama::MirrorPanorama;
+use crate::model::frame::Elevation;
+use crate::observe::curves::{CurveBuilder, NOTHING, TurnCurves};
 use crate::observe::probe_place::ProbePlace;
-use crate::observe::surroundings::Surroundings;
-use crate::setting_error::SettingError;
 
-/// Side of the square to which the ball is brought, pixels. By hand.
-const SIDE: usize = 48;
-/// Share of the ball's radius that is looked at, 0 to 1. By hand: the rim also shows the background and reflects
-/// it.
-const RADIUS_SHARE: f32 = 0.92;
+/// Pixels along the diameter of the given circle. By hand.
+pub(crate) const ACROSS: usize = 24;
+/// Width and height of the square that is looked at, pixels. By hand: 1.75 radii to each side.
+const SIDE: usize = 42;
 
 /// What a ball is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,36 +34,21 @@ pub(crate) struct Probe {
     pub(crate) elevation: Elevation,
 }
 
-/// Gathers what a ball shows over a turn.
+/// Gathers what the picture shows at and around a ball over a turn.
 #[derive(Debug)]
 pub(crate) struct ProbeBuilder {
     pub(crate) probe: Probe,
-    pub(crate) normals: Normals<YUp>,
-    pub(crate) builder: CurveBuilder,
-    pub(crate) panorama: MirrorPanorama,
     /// From the first frame on.
-    pub(crate) surroundings: Option<Surroundings>,
+    builder: Option<CurveBuilder>,
 }
 
 impl ProbeBuilder {
     /// For a ball at a place.
-    ///
-    /// # Errors
-    /// None for a ball.
-    pub(crate) fn new(probe: Probe) -> Result<Self, TurnError> {
-        let extent = Extent::new(SIDE, SIDE);
-        let mask = Planes::from_fn(extent, |x, y| {
-            let from_middle = |at: usize| 2.0 * (at as f32 + 0.5) / SIDE as f32 - 1.0;
-            let inside = from_middle(x).hypot(from_middle(y)) < RADIUS_SHARE;
-            [f32::from(u8::from(inside))]
-        });
-        Ok(Self {
+    pub(crate) const fn new(probe: Probe) -> Self {
+        Self {
             probe,
-            normals: Normals::sphere(SIDE).masked(&mask)?,
-            builder: CurveBuilder::new(extent, mask.plane(0))?,
-            panorama: MirrorPanorama::new(TableFrame::new(probe.elevation)),
-            surroundings: None,
-        })
+            builder: None,
+        }
     }
 
     /// Takes up a frame at an angle of the table, degrees.
@@ -76,46 +56,55 @@ impl ProbeBuilder {
     /// # Errors
     /// [`TurnError::Setting`] where the ball is not in it.
     pub(crate) fn push(&mut self, angle_deg: f64, frame: &Rgb<Srgb>) -> Result<(), TurnError> {
-        let planes = frame.planes();
-        let place = self.probe.place;
-        if !place.is_within(planes.extent()) {
-            return Err(TurnError::Setting(SettingError {
+        let (picture, place) = (frame.planes(), self.probe.place);
+        if !place.is_within(picture.extent()) {
+            return Err(TurnError::Setting {
                 what: "the radius of the ball",
                 value: place.radius,
                 allowed: "so small that all of the ball is in the picture",
-            }));
+            });
         }
-        let surroundings = match &mut self.surroundings {
-            Some(surroundings) => surroundings,
-            none => none.insert(Surroundings::new(place, planes.extent())?),
+        let builder = match &mut self.builder {
+            Some(builder) => builder,
+            none => none.insert(builder(place, picture.extent())?),
         };
-        surroundings.push(angle_deg, planes)?;
-        let ball = Planes::from_fn(Extent::new(SIDE, SIDE), |x, y| {
-            light_at(place, planes, x, y)
+        let pixel = 2.0 * place.radius / ACROSS as f64;
+        let extent = Extent::new(SIDE, SIDE);
+        let shown = Planes::from_fn(extent, |x, y| {
+            let at = place.in_picture(middle_of(y * SIDE + x));
+            place.mean_light(picture, at, pixel)
         });
-        self.add_to_panorama(angle_deg, &ball);
-        self.builder.push(angle_deg, ball.extent(), ball.planes())
+        builder.push(angle_deg, extent, shown.planes())
     }
 
-    /// Adds what the ball shows were it a mirror.
-    fn add_to_panorama(&mut self, angle_deg: f64, ball: &Planes<3>) {
-        if !angle_deg.is_finite() {
-            return;
-        }
-        let [x, y, z] = self.normals.planes().planes();
-        for at in (0..z.len()).filter(|&at| z[at] > 0.0) {
-            let normal = [x[at], y[at], z[at]].map(f64::from);
-            let value = ball.planes().map(|plane| f64::from(plane[at]));
-            self.panorama.add(angle_deg.to_radians(), normal, value);
-        }
+    /// The curves of the square.
+    ///
+    /// # Errors
+    /// Where the frames tell too little.
+    pub(crate) fn curves(self) -> Result<TurnCurves, TurnError> {
+        let nothing = || TurnError::Refused(NOTHING.to_owned());
+        self.builder.ok_or_else(nothing)?.finish()
     }
 }
 
-/// The light at a pixel of the square that the ball fills.
-fn light_at(place: ProbePlace, planes: &Planes<3>, x: usize, y: usize) -> [f32; 3] {
-    let from = |at: usize| (2 * at + 1) as f64 / SIDE as f64 - 1.0;
-    let pixel = 2.0 * place.radius / SIDE as f64;
-    place.mean_light(planes, place.in_picture([from(x), -from(y)]), pixel)
+/// For the pixels of the square that are in pictures of this size.
+fn builder(place: ProbePlace, picture: Extent) -> Result<CurveBuilder, TurnError> {
+    let mask: Vec<f32> = (0..SIDE * SIDE)
+        .map(|at| {
+            let [x, y] = place.in_picture(middle_of(at));
+            let is_in = |at: f64, size: usize| at > 0.0 && at < size as f64;
+            f32::from(u8::from(
+                is_in(x, picture.width) && is_in(y, picture.height),
+            ))
+        })
+        .collect();
+    CurveBuilder::new(Extent::new(SIDE, SIDE), &mask)
+}
+
+/// The middle of a pixel of the square, in radii from the ball's middle: to the right and up.
+pub(crate) fn middle_of(at: usize) -> [f64; 2] {
+    let from = |at: usize| (2.0 * at as f64 + 1.0 - SIDE as f64) / ACROSS as f64;
+    [from(at % SIDE), -from(at / SIDE)]
 }
 
 impl fmt::Display for ProbeBall {

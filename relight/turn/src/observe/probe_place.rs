@@ -4,7 +4,7 @@ use std::fmt;
 
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 
-use crate::setting_error::SettingError;
+use crate::error::TurnError;
 
 /// Least width of a pixel that counts as covered, pixels. Numerical: one that is only touched, by rounding, is not.
 const LEAST_COVER: f64 = 1e-6;
@@ -29,10 +29,10 @@ impl ProbePlace {
     /// A ball with its middle at `x`, `y`.
     ///
     /// # Errors
-    /// [`SettingError`] where the radius is less than 4 pixels or a number is not finite.
-    pub fn new([x, y]: [f64; 2], radius: f64) -> Result<Self, SettingError> {
+    /// [`TurnError::Setting`] where the radius is less than 4 pixels or a number is not finite.
+    pub fn new([x, y]: [f64; 2], radius: f64) -> Result<Self, TurnError> {
         if !(x.is_finite() && y.is_finite() && radius.is_finite() && radius >= 4.0) {
-            return Err(SettingError {
+            return Err(TurnError::Setting {
                 what: "the radius of the ball",
                 value: radius,
                 allowed: "at least 4 pixels, and its middle a place in the picture",

@@ -224,7 +224,7 @@ impl Reader {
         let has_angles = self.has_angles.unwrap_or(true);
         let indices = self.last_index as u64 + 1;
         if !has_angles && indices > self.frames.into() {
-            return Err(TurnError::Frames(format!(
+            return Err(TurnError::Refused(format!(
                 "the frames have no angles, and only {} of at least {indices} of the turn are there: without angles, a turn \
                  has to be whole",
                 self.frames
@@ -246,7 +246,7 @@ impl Reader {
 }
 
 fn nothing() -> TurnError {
-    TurnError::Frames(NOTHING.to_owned())
+    TurnError::Refused(NOTHING.to_owned())
 }
 
 /// Which frame of its turn it is: by its record, or by its key, which ends in the index.

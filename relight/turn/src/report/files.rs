@@ -4,13 +4,11 @@ use std::path::Path;
 
 use relight_core::files::{ResultFolder, write_png};
 use relight_core::image::{Depth, Extent};
-use relight_photo::files::MovieWriter;
-use relight_photo::files::{bright, write_light};
+use relight_photo::files::write_light;
 use relit_data::durable::write_whole;
 use serde_json::{Value, json};
 
 use crate::error::TurnError;
-use crate::report::movie::write_movie;
 use crate::report::sheet::{contact_sheet, grey};
 use crate::solving::SolvedTurn;
 
@@ -18,19 +16,16 @@ use crate::solving::SolvedTurn;
 const FIGURES: &str = "turn.json";
 /// The object as a file that can be lit.
 const OBJECT: &str = "object.relit";
-const MOVIE: &str = "relit.mp4";
 
 /// What is written beside the figures.
-const FILES: [&str; 10] = [
+const FILES: [&str; 8] = [
     "normal.png",
     "albedo.png",
     "shading.png",
-    "shadow.png",
     "confidence.png",
     "mask.png",
     "light.txt",
     "contact.png",
-    MOVIE,
     OBJECT,
 ];
 
@@ -49,22 +44,16 @@ pub struct TurnFiles<'a> {
     pub solved: &'a SolvedTurn,
     /// Where the light is from: a file's name, or none where it was found.
     pub light_source: Option<&'a str>,
-    /// Whether to write the video.
-    pub has_movie: bool,
 }
 
 impl TurnFiles<'_> {
-    /// Whether results, and a video, may be written to the folder `out`: it is not there, empty, or holds earlier results and
+    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and
     /// nothing else.
     ///
     /// # Errors
-    /// Where it holds something else, or cannot be read or written, or where no video can be.
-    pub fn check(out: &Path, has_movie: bool) -> Result<(), TurnError> {
-        RESULTS.check(out)?;
-        if has_movie {
-            MovieWriter::check()?;
-        }
-        Ok(())
+    /// Where it holds something else, or cannot be read or written.
+    pub fn check(out: &Path) -> Result<(), TurnError> {
+        Ok(RESULTS.check(out)?)
     }
 
     /// Writes all files into the folder `out`, which appears when they are there; an earlier result in it is
@@ -89,24 +78,18 @@ impl TurnFiles<'_> {
             "albedo": write_light(&path("albedo.png"), &albedo)?,
             "shading": write_light(&path("shading.png"), &shading)?,
         });
-        let shadow = solution.shadow(curves);
         for (name, plane) in [
-            ("shadow.png", &shadow),
             ("confidence.png", &solution.confidence(curves)),
             ("mask.png", &turn.mask),
         ] {
             write_png(&path(name), grey(plane).planes(), Depth::Eight)?;
         }
-        let light = solution.light().to_viewer(solution.frame())?;
+        let light = solution.light()?;
         light.write(&path("light.txt"))?;
-        let sheet = contact_sheet(turn, solution, &shadow, (&surface, &light))?;
+        let sheet = contact_sheet(turn, solution, (&surface, &light))?;
         write_png(&path("contact.png"), &sheet, Depth::Eight)?;
         solution.captured_object(turn)?.write(&path(OBJECT))?;
-        if self.has_movie {
-            let white = bright(albedo.planes(), &turn.mask);
-            write_movie(&path(MOVIE), &surface, white)?;
-        }
-        let figures = self.figures(&white)?;
+        let figures = self.figures(&white);
         let text = format!("{figures:#}\n");
         let path = path(FIGURES);
         write_whole(&path, text.as_bytes()).map_err(TurnError::write(&path))?;
@@ -114,7 +97,7 @@ impl TurnFiles<'_> {
     }
 
     /// What `turn.json` holds. `white`: the light that the largest value of a file stands for.
-    fn figures(&self, white: &Value) -> Result<Value, TurnError> {
+    fn figures(&self, white: &Value) -> Value {
         let SolvedTurn {
             turn,
             solution,
@@ -123,14 +106,7 @@ impl TurnFiles<'_> {
         } = self.solved;
         let curves = &turn.curves;
         let Extent { width, height } = curves.extent();
-        let gloss = solution.gloss(curves)?.map(|gloss| {
-            json!({
-                "reflectance": gloss.reflectance,
-                "smoothness": gloss.smoothness,
-                "residual": gloss.residual,
-            })
-        });
-        Ok(json!({
+        json!({
             "schema": SCHEMA,
             "software": format!("relight {}", env!("CARGO_PKG_VERSION")),
             "turn": turn.name,
@@ -149,9 +125,8 @@ impl TurnFiles<'_> {
             "network": network,
             "residual": solution.residual(),
             "expected_error_deg": solution.expected_error_deg(),
-            "gloss": gloss,
-            "exposure_steps": curves.exposure_steps(),
+            "gloss": solution.gloss,
             "white": white,
-        }))
+        })
     }
 }

@@ -1,7 +1,6 @@
 //! What is written of a solved turn.
 
 pub(crate) mod files;
-pub(crate) mod movie;
 pub(crate) mod object;
 pub(crate) mod sheet;
 pub(crate) mod warnings;

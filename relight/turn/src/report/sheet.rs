@@ -15,11 +15,10 @@ const TILE: usize = 256;
 /// Pictures in a row. By convention.
 const COLUMNS: usize = 4;
 
-/// One sheet: a frame, normals, albedo and shading; shadow, confidence, and a ball in the light.
+/// One sheet: a frame, normals, albedo and shading; confidence, and a ball in the light.
 pub(crate) fn contact_sheet(
     turn: &ReadTurn,
     solution: &TurnSolution,
-    shadow: &Planes<1>,
     (surface, light): (&Surface, &ShLight),
 ) -> Result<Planes<3>, TurnError> {
     let curves = &turn.curves;
@@ -50,7 +49,6 @@ pub(crate) fn contact_sheet(
         plain(&surface.normals().to_colours()),
         lit(solution.albedo(curves).planes()),
         lit(shading.planes()),
-        plain(grey(shadow).planes()),
         plain(grey(&solution.confidence(curves)).planes()),
         ball_tile,
     ];

@@ -238,9 +238,12 @@ impl<'a, 'b> TarCheck<'a, 'b> {
 
     fn note_displaced(&mut self) {
         let sample_at = |position: u32| self.order.get(position as usize / Part::ALL.len());
-        let mut samples: Vec<u32> = displaced(&self.positions)
-            .into_iter()
-            .filter_map(|position| sample_at(position).copied())
+        let mut ascending = self.positions.clone();
+        ascending.sort_unstable();
+        let places = self.positions.iter().zip(&ascending);
+        let mut samples: Vec<u32> = places
+            .filter(|(found, expected)| found != expected)
+            .filter_map(|(&position, _)| sample_at(position).copied())
             .collect();
         samples.sort_unstable();
         samples.dedup();
@@ -296,53 +299,5 @@ fn check_members(check: &SessionCheck<'_>, sample: &SampleMembers) -> CheckedMem
         index: sample.index,
         problems,
         record,
-    }
-}
-
-/// The smallest set of values whose removal leaves the rest ascending: those outside a longest
-/// ascending subsequence.
-fn displaced(values: &[u32]) -> Vec<u32> {
-    // `tails[k]` is the position of the smallest value that ends an ascending run of k + 1 values.
-    let mut tails: Vec<usize> = Vec::new();
-    let mut before: Vec<Option<usize>> = Vec::with_capacity(values.len());
-    let at = |position: usize| values.get(position).copied().unwrap_or_default();
-    for (position, &value) in values.iter().enumerate() {
-        let length = tails.partition_point(|&tail| at(tail) < value);
-        before.push(
-            length
-                .checked_sub(1)
-                .and_then(|last| tails.get(last).copied()),
-        );
-        match tails.get_mut(length) {
-            Some(tail) => *tail = position,
-            None => tails.push(position),
-        }
-    }
-    let mut ascending = vec![false; values.len()];
-    let mut position = tails.last().copied();
-    while let Some(here) = position {
-        if let Some(slot) = ascending.get_mut(here) {
-            *slot = true;
-        }
-        position = before.get(here).copied().flatten();
-    }
-    values
-        .iter()
-        .zip(ascending)
-        .filter(|(_, kept)| !kept)
-        .map(|(&value, _)| value)
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_what_was_moved_is_displaced() {
-        assert!(displaced(&[]).is_empty());
-        assert!(displaced(&[0, 1, 2, 5, 6]).is_empty());
-        assert_eq!(displaced(&[0, 4, 2, 3, 1, 5]), [4, 1]);
-        assert_eq!(displaced(&[3, 0, 1, 2]), [3]);
     }
 }

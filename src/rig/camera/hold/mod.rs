@@ -5,106 +5,88 @@
 //! controls and reads them back. The names are those that `v4l2-ctl` prints; the kernel renamed
 //! several in 5.17, and both names are known.
 
-use std::fmt;
-
 use relit_data::causes::with_causes;
 
-use super::{Camera, CameraError, Control, ControlId, ControlKind};
+use super::{Camera, CameraError, Control, ControlKind};
 
 /// A property of the picture that must not change during a turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Aspect {
-    /// The exposure time.
-    Exposure,
-    /// The sensor's gain.
-    Gain,
-    /// The white balance.
-    WhiteBalance,
-    /// The focus.
-    Focus,
-    /// The filter against flicker of lamps.
-    PowerLine,
-    /// The frame rate, which some cameras lower in the dark.
-    FrameRate,
-    /// The correction for light from behind.
-    Backlight,
-}
-
-impl Aspect {
-    /// All of them, in the order in which they are set.
-    pub const ALL: [Self; 7] = [
-        Self::FrameRate,
-        Self::Exposure,
-        Self::Gain,
-        Self::WhiteBalance,
-        Self::Focus,
-        Self::PowerLine,
-        Self::Backlight,
-    ];
-
+struct Aspect {
+    name: &'static str,
     /// Controls that switch its automatic, and how each is set to manual.
-    fn switches(self) -> &'static [(&'static str, Manual)] {
-        match self {
-            Self::Exposure => &[
-                ("auto_exposure", Manual::MenuItem(1, "manual")),
-                ("exposure_auto", Manual::MenuItem(1, "manual")),
-                ("exposure_mode", Manual::Locked),
-            ],
-            Self::Gain => &[
-                ("gain_automatic", Manual::Off),
-                ("gain_auto", Manual::Off),
-                ("autogain", Manual::Off),
-            ],
-            Self::WhiteBalance => &[
-                ("white_balance_automatic", Manual::Off),
-                ("white_balance_temperature_auto", Manual::Off),
-                ("auto_white_balance", Manual::Off),
-                ("white_balance_mode", Manual::Locked),
-            ],
-            Self::Focus => &[
-                ("focus_automatic_continuous", Manual::Off),
-                ("focus_auto", Manual::Off),
-                ("focus_mode", Manual::Locked),
-            ],
-            Self::FrameRate => &[
-                ("exposure_dynamic_framerate", Manual::Off),
-                ("exposure_auto_priority", Manual::Off),
-            ],
-            Self::PowerLine | Self::Backlight => &[],
-        }
-    }
-
+    switches: &'static [(&'static str, Manual)],
     /// Controls that hold its value; of the names in one group, the first that exists is used.
-    fn values(self) -> &'static [&'static [&'static str]] {
-        match self {
-            Self::Exposure => &[&["exposure_time_absolute", "exposure_absolute", "exposure"]],
-            Self::Gain => &[&["gain", "analogue_gain"]],
-            Self::WhiteBalance => &[
-                &["white_balance_temperature"],
-                &["red_balance"],
-                &["blue_balance"],
-            ],
-            Self::Focus => &[&["focus_absolute"]],
-            Self::PowerLine => &[&["power_line_frequency"]],
-            Self::Backlight => &[&["backlight_compensation"]],
-            Self::FrameRate => &[],
-        }
-    }
+    values: &'static [&'static [&'static str]],
+    /// Whether a camera without controls of it may change it by itself.
+    is_needed: bool,
 }
 
-impl fmt::Display for Aspect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Exposure => "exposure",
-            Self::Gain => "gain",
-            Self::WhiteBalance => "white balance",
-            Self::Focus => "focus",
-            Self::PowerLine => "power-line filter",
-            Self::FrameRate => "frame rate",
-            Self::Backlight => "backlight compensation",
-        })
-    }
-}
+/// All of them, in the order in which they are set.
+const ASPECTS: [Aspect; 7] = [
+    // Some cameras lower the frame rate in the dark.
+    Aspect {
+        name: "frame rate",
+        switches: &[
+            ("exposure_dynamic_framerate", Manual::Off),
+            ("exposure_auto_priority", Manual::Off),
+        ],
+        values: &[],
+        is_needed: false,
+    },
+    Aspect {
+        name: "exposure",
+        switches: &[
+            ("auto_exposure", Manual::MenuItem(1, "manual")),
+            ("exposure_auto", Manual::MenuItem(1, "manual")),
+        ],
+        values: &[&["exposure_time_absolute", "exposure_absolute", "exposure"]],
+        is_needed: true,
+    },
+    Aspect {
+        name: "gain",
+        switches: &[
+            ("gain_automatic", Manual::Off),
+            ("gain_auto", Manual::Off),
+            ("autogain", Manual::Off),
+        ],
+        values: &[&["gain", "analogue_gain"]],
+        is_needed: true,
+    },
+    Aspect {
+        name: "white balance",
+        switches: &[
+            ("white_balance_automatic", Manual::Off),
+            ("white_balance_temperature_auto", Manual::Off),
+            ("auto_white_balance", Manual::Off),
+        ],
+        values: &[
+            &["white_balance_temperature"],
+            &["red_balance"],
+            &["blue_balance"],
+        ],
+        is_needed: true,
+    },
+    Aspect {
+        name: "focus",
+        switches: &[
+            ("focus_automatic_continuous", Manual::Off),
+            ("focus_auto", Manual::Off),
+        ],
+        values: &[&["focus_absolute"]],
+        is_needed: true,
+    },
+    Aspect {
+        name: "power-line filter",
+        switches: &[],
+        values: &[&["power_line_frequency"]],
+        is_needed: true,
+    },
+    Aspect {
+        name: "backlight compensation",
+        switches: &[],
+        values: &[&["backlight_compensation"]],
+        is_needed: false,
+    },
+];
 
 /// How a switch is set to manual.
 #[derive(Debug, Clone, Copy)]
@@ -113,8 +95,6 @@ enum Manual {
     /// A menu's item: its index in the kernel's interface, which must be offered, or a word in
     /// its label.
     MenuItem(i64, &'static str),
-    /// A menu's first item, which holds the value that the automatic has found.
-    Locked,
 }
 
 /// Values to hold instead of the camera's current ones, in the controls' own units.
@@ -128,20 +108,20 @@ pub struct ManualValues {
     pub white_balance: Option<i64>,
     /// Focus.
     pub focus: Option<i64>,
-    /// Power-line filter: 0 off, 1 for 50 Hz, 2 for 60 Hz. Off when not given: with a fixed
-    /// exposure it can only interfere.
-    pub power_line: Option<i64>,
 }
 
 impl ManualValues {
-    fn of(&self, name: &str, aspect: Aspect) -> Option<i64> {
-        match aspect {
-            Aspect::Exposure => self.exposure,
-            Aspect::Gain => self.gain,
-            Aspect::WhiteBalance if name == "white_balance_temperature" => self.white_balance,
-            Aspect::Focus => self.focus,
-            Aspect::PowerLine => Some(self.power_line.unwrap_or(0)),
-            Aspect::WhiteBalance | Aspect::Backlight | Aspect::FrameRate => None,
+    /// The value that a control is to have.
+    fn of(&self, control: &Control) -> Option<i64> {
+        match control.name.as_str() {
+            "exposure_time_absolute" | "exposure_absolute" | "exposure" => self.exposure,
+            "gain" | "analogue_gain" => self.gain,
+            "white_balance_temperature" => self.white_balance,
+            "focus_absolute" => self.focus,
+            // Off: with a fixed exposure the filter can only interfere.
+            "power_line_frequency" => Some(0),
+            "backlight_compensation" => Some(control.minimum),
+            _ => None,
         }
     }
 }
@@ -149,17 +129,17 @@ impl ManualValues {
 /// One control to set.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ControlSetting {
-    /// The property that it holds.
-    pub aspect: Aspect,
+    /// The property of the picture that it holds.
+    pub aspect: &'static str,
     /// The control.
-    pub id: ControlId,
+    pub id: u32,
     /// Its name.
     pub name: String,
     /// The value.
     pub value: i64,
 }
 
-/// Which controls to set so that every [`Aspect`] is held, and which are missing.
+/// Which controls to set so that nothing of the picture changes by itself, and which are missing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ManualPlan {
     /// In this order: first all automatics off, then the values, which automatics would refuse.
@@ -190,21 +170,15 @@ impl ManualPlan {
     pub fn new(controls: &[Control], wanted: &ManualValues) -> Self {
         let mut plan = Self::default();
         let mut values = Vec::new();
-        for aspect in Aspect::ALL {
+        for aspect in &ASPECTS {
             let before = plan.missing.len();
             let switched = plan.switch_off(controls, aspect);
-            let locked = matches!(switched, Some(Manual::Locked));
-            let held = plan.hold(controls, wanted, aspect, &mut values) || locked;
-            if aspect == Aspect::FrameRate || aspect == Aspect::Backlight {
-                // A camera without these has a fixed rate and no correction: none is missing.
-                continue;
-            }
-            if plan.missing.len() == before && !held {
+            let held = plan.hold(controls, wanted, aspect, &mut values);
+            if aspect.is_needed && plan.missing.len() == before && !held {
+                let name = aspect.name;
                 plan.missing.push(match switched {
-                    Some(_) => {
-                        format!("the camera's {aspect} can be switched to manual, but not set")
-                    }
-                    None => format!("the camera has no control of its {aspect}"),
+                    true => format!("the camera's {name} can be switched to manual, but not set"),
+                    false => format!("the camera has no control of its {name}"),
                 });
             }
         }
@@ -216,11 +190,10 @@ impl ManualPlan {
     /// and value of each, as text.
     pub fn without(&self, wanted: &ManualValues) -> Vec<String> {
         let asked = [
-            (Aspect::Exposure, wanted.exposure),
-            (Aspect::Gain, wanted.gain),
-            (Aspect::WhiteBalance, wanted.white_balance),
-            (Aspect::Focus, wanted.focus),
-            (Aspect::PowerLine, wanted.power_line),
+            ("exposure", wanted.exposure),
+            ("gain", wanted.gain),
+            ("white balance", wanted.white_balance),
+            ("focus", wanted.focus),
         ];
         let planned = |aspect, value| {
             let mut steps = self.steps.iter();
@@ -234,20 +207,21 @@ impl ManualPlan {
             .collect()
     }
 
-    /// Plans the switches of an aspect; returns the last one that can be set.
-    fn switch_off(&mut self, controls: &[Control], aspect: Aspect) -> Option<Manual> {
-        let mut switched = None;
-        for &(name, manual) in aspect.switches() {
+    /// Plans the switches of an aspect; true if there is one that can be set.
+    fn switch_off(&mut self, controls: &[Control], aspect: &Aspect) -> bool {
+        let mut switched = false;
+        for &(name, manual) in aspect.switches {
             let Some(control) = find(controls, name) else {
                 continue;
             };
             match manual.value(control) {
                 Some(value) if may_be_set(control) => {
                     self.steps.push(step(aspect, control, value));
-                    switched = Some(manual);
+                    switched = true;
                 }
                 _ => self.missing.push(format!(
-                    "the camera's {aspect} cannot be switched to manual: {name} does not allow it"
+                    "the camera's {} cannot be switched to manual: {name} does not allow it",
+                    aspect.name
                 )),
             }
         }
@@ -259,26 +233,23 @@ impl ManualPlan {
         &mut self,
         controls: &[Control],
         wanted: &ManualValues,
-        aspect: Aspect,
+        aspect: &Aspect,
         steps: &mut Vec<ControlSetting>,
     ) -> bool {
         let mut held = false;
-        for names in aspect.values() {
+        for names in aspect.values {
             let Some(control) = names.iter().find_map(|name| find(controls, name)) else {
                 continue;
             };
             if !may_be_set(control) {
                 self.missing.push(format!(
-                    "the camera's {aspect} cannot be set: {} may not be written now",
-                    control.name
+                    "the camera's {} cannot be set: {} may not be written now",
+                    aspect.name, control.name
                 ));
                 continue;
             }
-            let value = match (aspect, wanted.of(&control.name, aspect)) {
-                (_, Some(value)) => value,
-                (Aspect::Backlight, None) => control.minimum,
-                (_, None) => control.value.unwrap_or(control.default),
-            };
+            let current = control.value.unwrap_or(control.default);
+            let value = wanted.of(control).unwrap_or(current);
             steps.push(step(aspect, control, nearest(control, value)));
             held = true;
         }
@@ -341,7 +312,7 @@ fn drift_between(before: &[Control], after: &[Control]) -> Vec<ControlDrift> {
         .collect()
 }
 
-fn moved(name: &str, id: ControlId, should: i64, controls: &[Control]) -> Option<ControlDrift> {
+fn moved(name: &str, id: u32, should: i64, controls: &[Control]) -> Option<ControlDrift> {
     let control = controls.iter().find(|control| control.id == id);
     let is = control.and_then(|control| control.value);
     (is != Some(should)).then(|| ControlDrift {
@@ -362,11 +333,11 @@ impl Manual {
                 .map(|item| item.index),
             (Self::MenuItem(index, _), _) => in_range(control, index),
             // Some switches are menus whose first item is manual.
-            (Self::Off | Self::Locked, ControlKind::Menu(items)) => items
+            (Self::Off, ControlKind::Menu(items)) => items
                 .iter()
                 .find(|item| item.index == 0)
                 .map(|item| item.index),
-            (Self::Off | Self::Locked, _) => in_range(control, 0),
+            (Self::Off, _) => in_range(control, 0),
         }
     }
 }
@@ -386,9 +357,9 @@ fn may_be_set(control: &Control) -> bool {
     !control.flags.read_only && !control.flags.grabbed
 }
 
-fn step(aspect: Aspect, control: &Control, value: i64) -> ControlSetting {
+fn step(aspect: &Aspect, control: &Control, value: i64) -> ControlSetting {
     ControlSetting {
-        aspect,
+        aspect: aspect.name,
         id: control.id,
         name: control.name.clone(),
         value,

@@ -2,10 +2,9 @@
 //! It is tried out under Linux, where the library uses V4L2 itself.
 //!
 //! The library has neither frame counters nor time stamps of the monotonic clock: frames carry the
-//! time at which this program got them. Controls are those that the library can set; on macOS most
-//! cameras have few or none.
+//! time at which this program got them. Their controls are not used: most cameras have none there, and none that
+//! holds an exposure.
 
-mod controls;
 mod worker;
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -16,14 +15,12 @@ use ::nokhwa::utils::{
     CameraFormat, CameraIndex, FrameFormat, RequestedFormat, RequestedFormatType, Resolution,
 };
 use ::nokhwa::{Camera as Library, NokhwaError, nokhwa_check, nokhwa_initialize};
-use relit_data::causes::with_causes;
 use relit_video::PixelFormat;
 
-use self::controls::ControlNumbers;
 use self::worker::{FrameResult, Worker};
 use super::{
-    Camera, CameraAddress, CameraError, Control, ControlFault, ControlId, DeviceInfo, Fourcc,
-    Frame, GrantedMode, Mode, ModeRequest, Rate, Rates, Sizes,
+    Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode, Rate,
+    Rates, Sizes,
 };
 
 /// Longest wait for the user's permission to use the camera.
@@ -36,8 +33,6 @@ pub(super) struct NokhwaCamera {
     info: DeviceInfo,
     worker: Worker,
     frames: Option<Receiver<FrameResult>>,
-    /// `None` if the library cannot list them.
-    controls: Option<ControlNumbers>,
 }
 
 /// Cameras that the library finds; what one of them offers shows when it is opened.
@@ -90,17 +85,11 @@ impl NokhwaCamera {
         })?;
         let mut info = describe(number, name);
         info.modes = gathered(&formats);
-        let mut camera = Self {
+        Ok(Self {
             info,
             worker,
             frames: None,
-            controls: Some(ControlNumbers::default()),
-        };
-        if let Err(error) = camera.controls() {
-            camera.info.problems.push(with_causes(&error));
-            camera.controls = None;
-        }
-        Ok(camera)
+        })
     }
 
     fn device(&self) -> String {
@@ -131,33 +120,17 @@ impl Camera for NokhwaCamera {
     }
 
     fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
-        let Some(numbers) = &mut self.controls else {
-            return Ok(Vec::new());
-        };
-        let doing = "its controls were read";
-        let listed = self
-            .worker
-            .ask(doing, |owner| controls::list(&owner.library));
-        Ok(numbers.controls(&listed?))
+        Ok(Vec::new())
     }
 
-    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError> {
-        let known = self.controls.as_ref().and_then(|numbers| numbers.known(id));
-        let known = known.ok_or_else(|| CameraError::Control {
+    fn set_control(&mut self, _: u32, _: i64) -> Result<i64, CameraError> {
+        Err(CameraError::Unsupported {
             device: self.device(),
-            control: id,
-            doing: format!("set to {value}"),
-            fault: ControlFault::Unknown,
-            source: None,
-        })?;
-        let doing = "a control was set";
-        let set = self.worker.ask(doing, move |owner| {
-            controls::set(&mut owner.library, known, value)
-        });
-        Ok(set?.unwrap_or(value))
+            what: "its controls are set by the system".to_owned(),
+        })
     }
 
-    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
+    fn start(&mut self, want: &CameraMode) -> Result<CameraMode, CameraError> {
         self.stop()?;
         let format = want.fourcc.pixel_format().and_then(library_format);
         let format = format.ok_or_else(|| CameraError::format(self.device(), want.fourcc))?;
@@ -168,12 +141,12 @@ impl Camera for NokhwaCamera {
             owner.start(wanted, sender)
         })?;
         self.frames = Some(frames);
-        Ok(GrantedMode {
+        Ok(CameraMode {
             // The stream is of a format that has one.
             fourcc: fourcc(found.format()).unwrap_or(want.fourcc),
             width: found.width(),
             height: found.height(),
-            rate: Rate::new(found.frame_rate(), 1),
+            rate: Rate::new(found.frame_rate(), 1).unwrap_or(want.rate),
         })
     }
 

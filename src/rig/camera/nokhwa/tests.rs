@@ -9,8 +9,7 @@ use std::sync::mpsc::SyncSender;
 use ::nokhwa::Buffer;
 use ::nokhwa::camera_traits::CaptureBackendTrait;
 use ::nokhwa::utils::{
-    ApiBackend, CameraControl, CameraInfo, ControlValueDescription, ControlValueSetter,
-    FrameFormat, KnownCameraControl,
+    ApiBackend, CameraControl, CameraInfo, ControlValueSetter, FrameFormat, KnownCameraControl,
 };
 
 use proptest::collection::vec;
@@ -19,8 +18,8 @@ use proptest::prelude::*;
 use super::worker::jpeg_length;
 use super::*;
 use crate::camera::Mode;
-use crate::camera::hold::{ManualPlan, ManualValues};
 use crate::clock::Clock;
+use relit_data::causes::with_causes;
 use relit_data::session::FrameClock;
 
 const TIMEOUT: Duration = Duration::from_secs(20);
@@ -33,18 +32,10 @@ enum Step {
     Panic,
 }
 
-/// How the library answers when its controls are listed.
-#[derive(Clone)]
-enum Controls {
-    These(Vec<CameraControl>),
-    Panic,
-}
-
 struct Scripted {
     info: CameraInfo,
     format: CameraFormat,
     steps: Receiver<Step>,
-    controls: Controls,
 }
 
 fn refused(what: &str) -> NokhwaError {
@@ -95,34 +86,18 @@ impl CaptureBackendTrait for Scripted {
     fn set_frame_format(&mut self, _: FrameFormat) -> Result<(), NokhwaError> {
         Ok(())
     }
-    fn camera_control(&self, wanted: KnownCameraControl) -> Result<CameraControl, NokhwaError> {
-        let controls = self.camera_controls()?;
-        let mut controls = controls.into_iter();
-        let found = controls.find(|control| control.control() == wanted);
-        found.ok_or_else(|| refused("no such control"))
+    fn camera_control(&self, _: KnownCameraControl) -> Result<CameraControl, NokhwaError> {
+        Err(refused("not asked"))
     }
     fn camera_controls(&self) -> Result<Vec<CameraControl>, NokhwaError> {
-        match &self.controls {
-            Controls::These(controls) => Ok(controls.clone()),
-            Controls::Panic => panic!("a kind of control that the library does not know"),
-        }
+        Err(refused("not asked"))
     }
     fn set_camera_control(
         &mut self,
-        wanted: KnownCameraControl,
-        value: ControlValueSetter,
+        _: KnownCameraControl,
+        _: ControlValueSetter,
     ) -> Result<(), NokhwaError> {
-        let Controls::These(controls) = &mut self.controls else {
-            return Err(refused("no controls"));
-        };
-        let set = match value {
-            ControlValueSetter::EnumValue(value) => mode(wanted, value),
-            ControlValueSetter::Integer(value) => number(wanted, value),
-            _ => return Err(refused("another kind of value")),
-        };
-        controls.retain(|control| control.control() != wanted);
-        controls.push(set);
-        Ok(())
+        Err(refused("not asked"))
     }
     fn open_stream(&mut self) -> Result<(), NokhwaError> {
         Ok(())
@@ -149,28 +124,8 @@ impl CaptureBackendTrait for Scripted {
     }
 }
 
-fn mode(control: KnownCameraControl, value: i64) -> CameraControl {
-    let description = ControlValueDescription::Enum {
-        value,
-        possible: vec![0, 2],
-        default: 2,
-    };
-    CameraControl::new(control, "a mode".to_owned(), description, vec![], true)
-}
-
-fn number(control: KnownCameraControl, value: i64) -> CameraControl {
-    let description = ControlValueDescription::IntegerRange {
-        min: 0,
-        max: 100,
-        value,
-        step: 1,
-        default: 50,
-    };
-    CameraControl::new(control, "Gain".to_owned(), description, vec![], true)
-}
-
 /// A camera, and the sender of what its library does.
-fn camera(controls: Controls) -> (NokhwaCamera, SyncSender<Step>) {
+fn camera() -> (NokhwaCamera, SyncSender<Step>) {
     let (script, steps) = sync_channel(0);
     let camera = NokhwaCamera::with_library(3, move || {
         let index = CameraIndex::Index(3);
@@ -178,7 +133,6 @@ fn camera(controls: Controls) -> (NokhwaCamera, SyncSender<Step>) {
             info: CameraInfo::new("Scripted", "", "", index.clone()),
             format: CameraFormat::new(Resolution::new(640, 480), FrameFormat::MJPEG, 30),
             steps,
-            controls,
         };
         Ok(Library::with_custom(
             index,
@@ -190,7 +144,7 @@ fn camera(controls: Controls) -> (NokhwaCamera, SyncSender<Step>) {
 }
 
 fn started() -> (NokhwaCamera, SyncSender<Step>) {
-    let (mut camera, script) = camera(Controls::These(Vec::new()));
+    let (mut camera, script) = camera();
     let request = "GREY:2x1@25".parse().unwrap();
     let granted = camera.start(&request).unwrap();
     assert_eq!(granted.differences(&request), [] as [&str; 0]);
@@ -213,7 +167,7 @@ fn frames_come_without_a_counter_and_with_the_time_of_their_arrival() {
 
 #[test]
 fn of_a_whole_buffer_only_the_jpeg_is_taken() {
-    let (mut camera, script) = camera(Controls::These(Vec::new()));
+    let (mut camera, script) = camera();
     camera.start(&"MJPG:640x480@30".parse().unwrap()).unwrap();
     let jpeg = [0xff, 0xd8, 0xff, 0xda, 0, 2, 5, 0xff, 0xd9];
     let before = [4, 0xff, 0xd9, 0, 0];
@@ -290,48 +244,13 @@ fn a_library_that_panics_is_an_unplugged_camera() {
         let error = camera.next_frame(TIMEOUT).unwrap_err();
         assert!(matches!(error, CameraError::Unplugged { .. }), "{error}");
     }
-    let error = camera.controls().unwrap_err();
+    let error = camera.start(&"GREY:2x1@25".parse().unwrap()).unwrap_err();
     assert!(matches!(error, CameraError::Unplugged { .. }), "{error}");
 }
 
 #[test]
-fn modes_of_exposure_are_locked_and_values_held() {
-    let listed = vec![
-        mode(KnownCameraControl::Exposure, 2),
-        mode(KnownCameraControl::WhiteBalance, 2),
-        number(KnownCameraControl::Gain, 40),
-    ];
-    let (mut camera, _script) = camera(Controls::These(listed));
-    let plan = ManualPlan::new(&camera.controls().unwrap(), &ManualValues::default());
-    let steps: Vec<(&str, i64)> = plan
-        .steps
-        .iter()
-        .map(|step| (step.name.as_str(), step.value))
-        .collect();
-    let wanted = [
-        ("exposure_mode", 0),
-        ("white_balance_mode", 0),
-        ("gain", 40),
-    ];
-    assert_eq!(steps, wanted);
-    let missing = plan.missing.clone();
-    assert_eq!(missing.len(), 2, "focus and power line: {missing:?}");
-    assert_eq!(plan.apply(&mut camera).unwrap(), []);
-    let unknown = camera.set_control(ControlId(77), 1).unwrap_err();
-    assert!(unknown.to_string().contains("no such control"), "{unknown}");
-}
-
-#[test]
-fn a_camera_whose_controls_cannot_be_listed_has_none_and_says_so() {
-    let (mut camera, _script) = camera(Controls::Panic);
-    assert_eq!(camera.controls().unwrap(), []);
-    let problems = camera.info().problems.join("; ");
-    assert!(problems.contains("does not know"), "{problems}");
-}
-
-#[test]
 fn what_a_camera_offers_has_the_format_that_is_set() {
-    let (camera, _script) = camera(Controls::These(Vec::new()));
+    let (camera, _script) = camera();
     let shown: Vec<String> = camera.info().modes.iter().map(Mode::to_string).collect();
     assert_eq!(shown, ["MJPG 640x480, 30 frames/s"]);
     assert_eq!(camera.info().name, "Scripted");

@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use super::timeline::Timeline;
 use crate::camera::{
-    CameraAddress, Control, ControlFlags, ControlId, ControlKind, DeviceInfo, GrantedMode,
-    MenuItem, Mode, Rate, Rates, Sizes,
+    CameraAddress, CameraMode, Control, ControlFlags, ControlKind, DeviceInfo, MenuItem, Mode,
+    Rate, Rates, Sizes,
 };
 use relit_data::session::{Manifest, Recording};
 use relit_video::Video;
@@ -21,7 +21,7 @@ pub(super) fn describe(
     address: CameraAddress,
     recording: &Recording,
     video: &Video,
-    mode: &GrantedMode,
+    mode: &CameraMode,
 ) -> DeviceInfo {
     let camera = recording.manifest.as_ref().map(|manifest| &manifest.camera);
     let notices = recording
@@ -39,9 +39,7 @@ pub(super) fn describe(
         modes: vec![Mode {
             fourcc: mode.fourcc,
             sizes: Sizes::One(mode.width, mode.height),
-            rates: mode
-                .rate
-                .map_or(Rates::Unknown, |rate| Rates::List(vec![rate])),
+            rates: Rates::List(vec![mode.rate]),
         }],
         problems: notices.chain(damage).collect(),
     }
@@ -62,7 +60,7 @@ pub(super) fn controls(manifest: &Manifest) -> Vec<Control> {
                 _ => return None,
             };
             Some(Control {
-                id: ControlId(id),
+                id: id,
                 name: name.clone(),
                 kind,
                 minimum: value,

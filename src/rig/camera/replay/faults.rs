@@ -4,7 +4,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::CameraError;
-use crate::camera::{Frame, GrantedMode, ReplayAddress, ReplayFaults};
+use crate::camera::{CameraMode, Frame, ReplayAddress, ReplayFaults};
 use relit_video::PixelFormat;
 
 /// Makes damaged frames and frames of another size.
@@ -16,7 +16,7 @@ pub(super) struct FaultInjector {
 }
 
 impl FaultInjector {
-    pub(super) fn new(address: &ReplayAddress, mode: &GrantedMode) -> Result<Self, CameraError> {
+    pub(super) fn new(address: &ReplayAddress, mode: &CameraMode) -> Result<Self, CameraError> {
         let faults = address.faults.clone();
         let other_size = match faults.resize {
             None => Vec::new(),
@@ -43,7 +43,7 @@ impl FaultInjector {
 }
 
 /// A grey picture of half the width and height; `None` if the format or size has none.
-fn half_size(mode: &GrantedMode) -> Option<Vec<u8>> {
+fn half_size(mode: &CameraMode) -> Option<Vec<u8>> {
     let (width, height) = (mode.width / 2, mode.height / 2);
     if width == 0 || height == 0 {
         return None;

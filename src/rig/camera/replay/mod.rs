@@ -22,8 +22,8 @@ use self::faults::FaultInjector;
 use self::source::{Delivery, Source};
 use self::timeline::{Moment, Timeline};
 use super::{
-    Camera, CameraAddress, CameraError, Control, ControlId, DeviceInfo, Fourcc, Frame, GrantedMode,
-    Mode, ModeRequest, ReplayAddress,
+    Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode,
+    ReplayAddress,
 };
 use crate::clock::Clock;
 use relit_data::session::{FrameClock, Recording};
@@ -35,7 +35,7 @@ pub(super) struct ReplayCamera {
     address: ReplayAddress,
     video: Arc<Video>,
     delivery: Delivery,
-    mode: GrantedMode,
+    mode: CameraMode,
     timeline: Timeline,
     frame_clock: FrameClock,
     controls: Vec<Control>,
@@ -65,11 +65,14 @@ impl ReplayCamera {
         let timeline = Timeline::new(recording.frames.as_ref(), video.frames());
         let (width, height) = delivery.size(&video);
         let manifest = recording.manifest.as_ref();
-        let mode = GrantedMode {
+        let mode = CameraMode {
             fourcc: Fourcc::of(delivery.format),
             width,
             height,
-            rate: rate(manifest, &timeline),
+            rate: rate(manifest, &timeline).ok_or_else(|| CameraError::Replay {
+                path: address.path.clone(),
+                why: "it has no usable frame rate: replay another recording".to_owned(),
+            })?,
         };
         let device = CameraAddress::Replay(address.clone());
         Ok(Self {
@@ -101,14 +104,14 @@ impl Camera for ReplayCamera {
         Ok(self.controls.clone())
     }
 
-    fn set_control(&mut self, _: ControlId, _: i64) -> Result<i64, CameraError> {
+    fn set_control(&mut self, _: u32, _: i64) -> Result<i64, CameraError> {
         Err(CameraError::Unsupported {
             device: self.info.address.to_string(),
             what: "a recording's controls stand as they were recorded".to_owned(),
         })
     }
 
-    fn start(&mut self, _: &ModeRequest) -> Result<GrantedMode, CameraError> {
+    fn start(&mut self, _: &CameraMode) -> Result<CameraMode, CameraError> {
         self.playing = None;
         self.playing = Some(Playing {
             source: self.delivery.open(&self.video)?,

@@ -17,7 +17,7 @@ fn fixture(name: &str) -> PathBuf {
     root.join("../../fixtures").join(name)
 }
 
-fn request() -> ModeRequest {
+fn request() -> CameraMode {
     "MJPG:480x360@30".parse().unwrap()
 }
 

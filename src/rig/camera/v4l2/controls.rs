@@ -6,9 +6,7 @@ use rustix::io::Errno;
 use v4l::v4l_sys as sys;
 
 use super::device::{Device, unplugged};
-use crate::camera::{
-    CameraError, Control, ControlFault, ControlFlags, ControlId, ControlKind, MenuItem, snake_case,
-};
+use crate::camera::{CameraError, Control, ControlFlags, ControlKind, MenuItem, snake_case};
 
 /// Most controls that are read of a device, and most items of a menu, in case a faulty driver's list
 /// does not end.
@@ -60,7 +58,7 @@ impl Device {
             .flat_map(|byte| byte.to_ne_bytes())
             .collect();
         Ok(Some(Control {
-            id: ControlId(raw.id),
+            id: raw.id,
             name: snake_case(&super::ioctl::text(&name)),
             kind,
             minimum: raw.minimum,
@@ -109,7 +107,7 @@ impl Device {
         Ok(items)
     }
 
-    pub(super) fn set_control(&self, id: ControlId, value: i64) -> Result<i64, CameraError> {
+    pub(super) fn set_control(&self, id: u32, value: i64) -> Result<i64, CameraError> {
         let setting = || format!("set to {value}");
         let failed = |error| self.control_error(id, setting(), None, error);
         let Some((raw, kind)) = self.look_up(id).map_err(failed)? else {
@@ -117,7 +115,7 @@ impl Device {
                 device: self.name(),
                 control: id,
                 doing: setting(),
-                fault: ControlFault::Unknown,
+                fault: "the camera has no such control".to_owned(),
                 source: None,
             });
         };
@@ -125,42 +123,44 @@ impl Device {
         let write_only = raw.flags & sys::V4L2_CTRL_FLAG_WRITE_ONLY != 0;
         let has_value = kind != ControlKind::Button && !write_only;
         let taken = Some(taken_values(&raw, kind));
-        let set = self.node.set_value(id.0, wide, value);
+        let set = self.node.set_value(id, wide, value);
         set.map_err(|error| self.control_error(id, setting(), taken, error))?;
         if !has_value {
             return Ok(value);
         }
-        let read = self.node.value(id.0, wide);
+        let read = self.node.value(id, wide);
         read.map_err(|error| self.control_error(id, "read back".to_owned(), None, error))
     }
 
     /// A control of one number, with any flags; `None` if there is none.
-    fn look_up(
-        &self,
-        id: ControlId,
-    ) -> io::Result<Option<(sys::v4l2_query_ext_ctrl, ControlKind)>> {
-        let Some(raw) = self.node.control(id.0)? else {
+    fn look_up(&self, id: u32) -> io::Result<Option<(sys::v4l2_query_ext_ctrl, ControlKind)>> {
+        let Some(raw) = self.node.control(id)? else {
             return Ok(None);
         };
         Ok(self.kind_of(&raw)?.map(|kind| (raw, kind)))
     }
 
-    /// `taken`: the fault if the driver rejects the value itself.
+    /// `taken`: what it takes, if the driver rejects the value itself.
     fn control_error(
         &self,
-        control: ControlId,
+        control: u32,
         doing: String,
-        taken: Option<ControlFault>,
+        taken: Option<String>,
         error: io::Error,
     ) -> CameraError {
         let device = self.name();
         let fault = match (Errno::from_io_error(&error), taken) {
             (Some(Errno::NODEV), _) => return unplugged(device, error),
-            (Some(Errno::ACCESS | Errno::PERM), _) => ControlFault::Locked,
-            (Some(Errno::BUSY), _) => ControlFault::Busy,
+            (Some(Errno::ACCESS | Errno::PERM), _) => {
+                "it is read-only, or an automatic controls it: switch that off first".to_owned()
+            }
+            (Some(Errno::BUSY), _) => {
+                "it is held while the camera streams, or by another program: stop that first"
+                    .to_owned()
+            }
             // A value that does not fit into 32 bits never reaches the driver.
             (Some(Errno::RANGE | Errno::INVAL) | None, Some(taken)) => taken,
-            _ => ControlFault::Driver,
+            _ => "the driver refuses".to_owned(),
         };
         CameraError::Control {
             device,
@@ -172,16 +172,14 @@ impl Device {
     }
 }
 
-/// The fault that names the values which a control takes.
-fn taken_values(raw: &sys::v4l2_query_ext_ctrl, kind: ControlKind) -> ControlFault {
+/// Which values a control takes, in words.
+fn taken_values(raw: &sys::v4l2_query_ext_ctrl, kind: ControlKind) -> String {
     match kind {
         ControlKind::Menu(items) => {
-            ControlFault::NoItem(items.iter().map(|item| item.index).collect())
+            let items: Vec<String> = items.iter().map(|item| item.index.to_string()).collect();
+            format!("it takes one of {}", items.join(", "))
         }
-        _ => ControlFault::Range {
-            minimum: raw.minimum,
-            maximum: raw.maximum,
-        },
+        _ => format!("it takes values from {} to {}", raw.minimum, raw.maximum),
     }
 }
 
@@ -199,26 +197,30 @@ mod tests {
             path: "/dev/video9".into(),
         };
         let error = |error: io::Error| {
-            let taken = Some(ControlFault::NoItem(vec![0, 9]));
-            device.control_error(ControlId(7), "set to 10".to_owned(), taken, error)
+            let taken = Some("it takes one of 0, 9".to_owned());
+            device.control_error(7, "set to 10".to_owned(), taken, error)
         };
         let fault = |errno: Errno| match error(errno.into()) {
             CameraError::Control { fault, .. } => fault,
             other => panic!("{other}"),
         };
-        assert!(matches!(fault(Errno::ACCESS), ControlFault::Locked));
-        assert!(matches!(fault(Errno::BUSY), ControlFault::Busy));
-        assert!(matches!(fault(Errno::RANGE), ControlFault::NoItem(_)));
-        assert!(matches!(fault(Errno::IO), ControlFault::Driver));
+        for (errno, words) in [
+            (Errno::ACCESS, "read-only"),
+            (Errno::BUSY, "held while the camera streams"),
+            (Errno::RANGE, "takes one of"),
+            (Errno::IO, "the driver refuses"),
+        ] {
+            let found = fault(errno);
+            assert!(found.contains(words), "{errno}: {found}");
+        }
         let unplugged = error(Errno::NODEV.into());
         assert!(matches!(unplugged, CameraError::Unplugged { .. }));
         let too_wide = error(io::ErrorKind::InvalidInput.into());
         let words = "control 0x00000007 of /dev/video9 cannot be set to 10: it takes one of 0, 9";
         assert_eq!(too_wide.to_string(), words);
-        let unknown = device.set_control(ControlId(7), 1).unwrap_err();
-        let fault = ControlFault::Unknown;
+        let unknown = device.set_control(7, 1).unwrap_err();
         assert!(
-            unknown.to_string().ends_with(&fault.to_string()),
+            unknown.to_string().ends_with("no such control"),
             "{unknown}"
         );
     }

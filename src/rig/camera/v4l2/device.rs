@@ -8,7 +8,7 @@ use rustix::io::Errno;
 use v4l::v4l_sys as sys;
 
 use super::ioctl::{Identity, Node};
-use super::{holders, modes};
+use super::modes;
 use crate::camera::{CameraAddress, CameraError, DeviceInfo, Mode};
 
 /// A node and its name, for errors.
@@ -138,13 +138,7 @@ pub(super) fn unplugged(device: String, source: io::Error) -> CameraError {
 
 fn in_use(path: &Path, source: io::Error) -> CameraError {
     let device = path.display().to_string();
-    let holders = holders::of(path)
-        .unwrap_or_else(|| format!("another program (`sudo fuser {device}` names it)"));
-    CameraError::InUse {
-        device,
-        holders,
-        source,
-    }
+    CameraError::InUse { device, source }
 }
 
 fn open_error(path: &Path, error: io::Error) -> CameraError {

@@ -2,7 +2,6 @@
 
 mod controls;
 mod device;
-mod holders;
 mod ioctl;
 mod listing;
 mod modes;
@@ -13,9 +12,7 @@ use std::time::Duration;
 
 use self::device::Device;
 use self::stream::Stream;
-use super::{
-    Camera, CameraError, Control, ControlId, DeviceInfo, Frame, GrantedMode, Mode, ModeRequest,
-};
+use super::{Camera, CameraError, CameraMode, Control, DeviceInfo, Frame, Mode};
 
 pub(super) use listing::list;
 
@@ -50,11 +47,11 @@ impl Camera for V4l2Camera {
         self.device.controls()
     }
 
-    fn set_control(&mut self, id: ControlId, value: i64) -> Result<i64, CameraError> {
+    fn set_control(&mut self, id: u32, value: i64) -> Result<i64, CameraError> {
         self.device.set_control(id, value)
     }
 
-    fn start(&mut self, want: &ModeRequest) -> Result<GrantedMode, CameraError> {
+    fn start(&mut self, want: &CameraMode) -> Result<CameraMode, CameraError> {
         // The driver takes no new format while it has buffers. An error of stopping shows again in the
         // next call.
         let _ = self.stop();

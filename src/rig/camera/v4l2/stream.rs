@@ -8,9 +8,7 @@ use v4l::v4l_sys as sys;
 use super::device::{Device, unplugged};
 use super::ioctl::Mapping;
 use crate::camera::frame::without_padding;
-use crate::camera::{
-    CameraError, Fourcc, Frame, GrantedMode, ModeRequest, Rate, SequenceUnwrapper,
-};
+use crate::camera::{CameraError, CameraMode, Fourcc, Frame, Rate, SequenceUnwrapper};
 use crate::clock::Clock;
 use relit_data::session::FrameClock;
 use relit_video::PixelFormat;
@@ -28,16 +26,14 @@ pub(super) struct Stream {
     layout: sys::v4l2_pix_format,
     format: PixelFormat,
     buffers: Vec<Mapping>,
-    /// Buffers that the driver did not accept; they are queued again later.
-    idle: Vec<u32>,
     counter: SequenceUnwrapper,
 }
 
 impl Stream {
     pub(super) fn start(
         device: &Device,
-        want: &ModeRequest,
-    ) -> Result<(Self, GrantedMode), CameraError> {
+        want: &CameraMode,
+    ) -> Result<(Self, CameraMode), CameraError> {
         let layout = device
             .node
             .set_format(want.fourcc.code(), want.width, want.height)
@@ -58,18 +54,17 @@ impl Stream {
             layout,
             format,
             buffers: Vec::new(),
-            idle: Vec::new(),
             counter: SequenceUnwrapper::default(),
         };
         if let Err(error) = stream.run(device) {
             stream.release(device);
             return Err(device.error("its stream was started", error));
         }
-        let granted = GrantedMode {
+        let granted = CameraMode {
             fourcc,
             width: layout.width,
             height: layout.height,
-            rate,
+            rate: rate.unwrap_or(want.rate),
         };
         Ok((stream, granted))
     }
@@ -106,13 +101,12 @@ impl Stream {
         timeout: Duration,
     ) -> Result<Frame, CameraError> {
         let start = Instant::now();
-        self.offer_idle(device)?;
         loop {
             let left = timeout.saturating_sub(start.elapsed()).min(LONGEST_WAIT);
             let broken = device.node.wait(left);
             let broken = broken.map_err(|error| device.stream_error("waited for", error))?;
             match device.node.dequeue() {
-                Ok(filled) => return Ok(self.take(device, filled)),
+                Ok(filled) => return self.take(device, filled),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
                     if broken {
                         return Err(device.stream_error("waited for", error));
@@ -137,7 +131,7 @@ impl Stream {
     }
 
     /// Copies a filled buffer's frame and queues the buffer again at once.
-    fn take(&mut self, device: &Device, filled: sys::v4l2_buffer) -> Frame {
+    fn take(&mut self, device: &Device, filled: sys::v4l2_buffer) -> Result<Frame, CameraError> {
         let arrived_us = Clock::monotonic().now_us();
         // An unknown index is a fault of the driver; the frame is then empty.
         let data = usize::try_from(filled.index)
@@ -145,10 +139,8 @@ impl Stream {
             .and_then(|index| self.buffers.get(index))
             .map(|buffer| buffer.copy(filled.bytesused as usize))
             .unwrap_or_default();
-        // The frame is delivered even if the driver does not accept its buffer now.
-        if device.node.queue(filled.index).is_err() {
-            self.idle.push(filled.index);
-        }
+        let queued = device.node.queue(filled.index);
+        queued.map_err(|error| device.stream_error("given its buffer back", error))?;
         let (t_us, clock) = stamp(filled.flags, filled.timestamp, arrived_us);
         let sys::v4l2_pix_format { width, height, .. } = self.layout;
         let stride = self.layout.bytesperline as usize;
@@ -156,7 +148,7 @@ impl Stream {
             Some((row, rows)) => without_padding(data, stride, row, rows),
             None => data,
         };
-        Frame {
+        Ok(Frame {
             fourcc: Fourcc::from_code(self.layout.pixelformat),
             width,
             height,
@@ -165,26 +157,7 @@ impl Stream {
             t_us,
             clock,
             flagged: filled.flags & sys::V4L2_BUF_FLAG_ERROR != 0,
-        }
-    }
-
-    /// Queues the buffers that the driver did not accept before.
-    fn offer_idle(&mut self, device: &Device) -> Result<(), CameraError> {
-        let mut last = None;
-        self.idle.retain(|&index| {
-            device
-                .node
-                .queue(index)
-                .map_err(|error| last = Some(error))
-                .is_err()
-        });
-        match last {
-            // Without a single queued buffer, there would never be a frame.
-            Some(error) if self.idle.len() >= self.buffers.len() => {
-                Err(device.stream_error("given its buffers", error))
-            }
-            _ => Ok(()),
-        }
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! What can be wrong with a take, frame by frame and as a whole.
 
-use super::timing::{Evidence, MissingFrames, TimingAnomaly};
+use super::timing::{MissingFrames, TimingAnomaly};
 use crate::camera::FrameFault;
 
 /// Something wrong with a take. Frames are given by their index among the delivered frames of the
@@ -57,8 +57,7 @@ impl Finding {
     pub(super) fn text(&self, n: usize) -> String {
         match self {
             Self::Missing(missing) => {
-                let (frames, evidence) = (frames(missing.count), in_words(missing.evidence));
-                format!("{frames} missing before frame {n}, {evidence}")
+                format!("{} missing before frame {n}", frames(missing.count))
             }
             Self::QueueFull(_) => {
                 format!("the disk was too slow: a frame was dropped before frame {n}")
@@ -74,15 +73,6 @@ impl Finding {
             Self::Anomaly(anomaly) => anomaly.to_string(),
             Self::Settings(what) => what.clone(),
         }
-    }
-}
-
-fn in_words(evidence: Evidence) -> &'static str {
-    match evidence {
-        Evidence::Both => "by the driver's counter and the time stamps",
-        Evidence::Counter => "by the driver's counter",
-        Evidence::Time => "by the time stamps",
-        Evidence::TimeAgainstCounter => "by the time stamps, though the driver did not count them",
     }
 }
 

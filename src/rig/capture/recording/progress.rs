@@ -31,8 +31,9 @@ pub(super) type Shared = Waitable<State>;
 /// stamps the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
-    from_us: i64,
-    to_us: i64,
+    pub(super) from_us: i64,
+    /// When it is over.
+    pub to_us: i64,
 }
 
 impl Window {
@@ -44,17 +45,5 @@ impl Window {
             from_us,
             to_us: from_us.saturating_add(us.max(1)),
         }
-    }
-
-    /// When it begins, microseconds.
-    #[must_use]
-    pub fn from_us(self) -> i64 {
-        self.from_us
-    }
-
-    /// When it is over, microseconds.
-    #[must_use]
-    pub fn to_us(self) -> i64 {
-        self.to_us
     }
 }

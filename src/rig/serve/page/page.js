@@ -1,6 +1,6 @@
 // The page beside the rig: shows the state as it comes and gives the rig its commands. All text from the
 // rig goes in as text, never as markup.
-import { ask, follow, give } from "./link.js";
+import { follow, give } from "./link.js";
 import { startPreview } from "./preview.js";
 import { make } from "./elements.js";
 import { showProcessing, startProcessing } from "./process.js";
@@ -39,7 +39,7 @@ function say(sentence) {
   $("message").hidden = !sentence;
 }
 
-const resting = () => state.phase === "idle" || state.phase === "waiting-for-object";
+const resting = () => state.phase === "idle";
 
 function show(next) {
   // Events and answers to commands come by two ways: an old state must not replace a newer one.
@@ -50,7 +50,6 @@ function show(next) {
   showTake();
   showGo();
   showFaults();
-  showQueue();
   showTable();
   showCamera();
   showDisk();
@@ -121,7 +120,7 @@ function showTake() {
   const take = state.last_take;
   $("last").hidden = !take || alarmed();
   // Where the big button captures it again, there is no second one.
-  $("again").hidden = take?.verdict !== "tolerated" || !["start", "next"].includes(state.advice.button.action);
+  $("again").hidden = take?.verdict !== "tolerated" || state.advice.button.action !== "start";
   if (!take) return;
   const words = make("b", { text: VERDICTS[take.verdict] ?? take.verdict, className: take.verdict === "clean" ? "good" : "bad" });
   const rest = `: ${take.frames} frames, ${take.dropped} dropped, ${take.session}.${take.reason ? ` ${take.reason}` : ""}`;
@@ -140,8 +139,7 @@ function wrongName(object) {
 const ACTIONS = {
   stop: () => ({ command: "stop" }),
   reset: () => ({ command: "reset" }),
-  next: (object) => ({ command: "next", object }),
-  again: (object) => ({ command: "start", object, meter: false }),
+  again: (object) => ({ command: "start", object }),
 };
 
 /** What the big button does now: as the rig advises, with the name that stands in the field. */
@@ -153,7 +151,7 @@ function action() {
   if (names) {
     if (!typed) return { text: "Name the object" };
     if (wrongName(typed)) return { text: "Another name, please" };
-    return { text: `Start ${typed}`, command: { command: "start", object: typed, meter: $("meter").checked } };
+    return { text: `Start ${typed}`, command: { command: "start", object: typed } };
   }
   return { text, stop: action === "stop", command: ACTIONS[action]?.(object) };
 }
@@ -163,7 +161,6 @@ function showName() {
   $("wrong-name").textContent = why;
   $("wrong-name").hidden = !why;
   $("object").setAttribute("aria-invalid", Boolean(why));
-  $("enqueue").disabled = Boolean(why);
 }
 
 function showGo() {
@@ -182,27 +179,6 @@ function showFaults() {
   const lines = faults.slice(0, 10).map(({ what }) => what);
   const same = [...$("fault-list").children].map((line) => line.textContent);
   if (lines.join("\n") !== same.join("\n")) $("fault-list").replaceChildren(...lines.map((text) => make("li", { text })));
-}
-
-function showQueue() {
-  const waiting = state.phase === "waiting-for-object";
-  $("queue").hidden = state.queue.length === 0;
-  // Where the big button captures it, there is no second one.
-  $("next").hidden = !resting() || alarmed() || state.advice.button.action === "next";
-  $("next").disabled = !["start", "again", "next"].includes(state.advice.button.action);
-  $("next").textContent = `${state.queue[0]} stands on the table: capture`;
-  // An object stays in the queue until its take is usable.
-  const captured = !resting() && state.object === state.queue[0];
-  const key = JSON.stringify([state.queue, waiting, captured]);
-  if ($("queue").dataset.key === key) return;
-  $("queue").dataset.key = key;
-  const lines = state.queue.map((object, place) => {
-    const remove = make("button", { type: "button", text: "Remove", ariaLabel: `Take ${object} out of the queue` });
-    remove.addEventListener("click", () => order({ command: "dequeue", place, object }));
-    const text = place === 0 && captured ? `${object} (being captured)` : object;
-    return make("li", {}, make("span", { text }), remove);
-  });
-  $("queue-list").replaceChildren(...lines);
 }
 
 function showTable() {
@@ -269,18 +245,11 @@ function showDisk() {
   $("disk").hidden = !resting() && !wrong;
 }
 
-const SETTINGS = ["size", "fps", "degrees_per_second", "max_dropped", "retries"];
-
 function showSettings() {
   const { settings } = state;
   $("devices").textContent = [settings.camera, settings.turntable, settings.root].filter(Boolean).join(" · ");
-  const form = $("settings");
-  $("settings-set").disabled = !resting();
-  if (form.contains(document.activeElement) || form.dataset.changed) return;
-  for (const name of SETTINGS) {
-    const value = name === "size" ? settings.size?.join("x") : settings[name];
-    form.elements[name].value = value ?? "";
-  }
+  const { size, fps, degrees_per_second: speed, max_dropped: dropped, retries } = settings;
+  $("settings").textContent = `${size?.join(" × ") ?? "largest frames"} · ${fps} frames/s · ${speed}°/s · ${dropped} frames may be missing · a bad take is repeated ${retries} times`;
 }
 
 function showLog() {
@@ -311,8 +280,7 @@ async function refresh() {
   // Without a folder there is no list, and that is said already.
   if (state?.disk_fault) return sayOfList("");
   try {
-    await listSessions();
-    const names = await ask("/api/v1/objects");
+    const names = await listSessions();
     $("objects").replaceChildren(...names.map((value) => make("option", { value })));
     sayOfList("");
   } catch (problem) {
@@ -331,38 +299,15 @@ $("object-form").addEventListener("submit", (event) => {
   event.preventDefault();
   $("object").blur();
 });
-$("meter").addEventListener("change", showGo);
 $("go").addEventListener("click", () => {
   const { command } = action();
   if (command) order(command);
 });
-$("enqueue").addEventListener("click", async () => {
-  const object = $("object").value.trim();
-  if (!object) return $("object").focus();
-  if (await order({ command: "enqueue", object })) {
-    $("object").value = "";
-    showGo();
-  }
-});
-$("next").addEventListener("click", () => order({ command: "next", object: state.queue[0] }));
 $("home").addEventListener("click", () => order({ command: "home" }));
 $("again").addEventListener("click", () => {
   // The object is what follows the time in a session's name.
   const object = state.last_take.session.replace(/^\d{8}T\d{6}Z-/, "");
-  order({ command: "start", object, meter: false });
-});
-$("settings").addEventListener("input", () => ($("settings").dataset.changed = "yes"));
-$("settings").addEventListener("submit", async (event) => {
-  event.preventDefault();
-  const { elements } = $("settings");
-  const command = { command: "configure" };
-  const size = elements.size.value.trim();
-  command.size = size ? size.split("x").map(Number) : null;
-  for (const name of SETTINGS.slice(1)) {
-    if (elements[name].value !== "") command[name] = elements[name].valueAsNumber;
-  }
-  if (await order(command)) delete $("settings").dataset.changed;
-  document.activeElement?.blur();
+  order({ command: "start", object });
 });
 document.addEventListener("pointerdown", unmute);
 document.addEventListener("sessions-changed", refresh);

@@ -1,12 +1,12 @@
 // What is made of sessions: the steps of the session in the player, the jobs, and the settings. The work is done by
-// other programs of the rig's computer; where they are missing, their commands are shown.
+// other programs of the rig's computer.
 import { ask, request } from "./link.js";
 import { make } from "./elements.js";
 
 const $ = (id) => document.getElementById(id);
 const path = (id) => `/api/v1/sessions/${encodeURIComponent(id)}`;
-const STEPS = { mask: "Making the mask", check: "Checking the mask", extract: "Extracting", verify: "Verifying the data set" };
-const DONE = { mask: "Mask", check: "Check", extract: "Extraction", verify: "Verification" };
+const STEPS = { mask: "Making the mask", check: "Checking the mask", extract: "Extracting" };
+const DONE = { mask: "Mask", check: "Check", extract: "Extraction" };
 const ORIGINS = { turn: "made by the turn", hints: "drawn by hand", hand: "from another program" };
 const STATUS = { waiting: "waits", running: "", held: "held until the rig rests", ending: "ends" };
 
@@ -30,7 +30,7 @@ async function order(method, where, body) {
   }
 }
 
-export const isMissing = (step) => !processing || !(step === "extract" || step === "verify" ? processing.has_extract_program : processing.has_mask_program);
+export const isMissing = (step) => !processing || !(step === "extract" ? processing.has_extract_program : processing.has_mask_program);
 const jobOf = (id) => processing?.jobs.find(({ session }) => session === id);
 
 /** How a session stands, in words and with a class: for the list and its days. */
@@ -53,7 +53,7 @@ export function showSteps(detail, say) {
   const old = "of an earlier mask";
   if (!check) step("check", "not checked", "");
   else if (!check.is_current) step("check", old, "warn");
-  else step("check", { fits: "fits", drifts: "the object moves" }[check.verdict] ?? check.verdict, check.verdict === "fits" ? "good" : "warn", check.reasons);
+  else step("check", check.verdict, check.verdict === "fits" ? "good" : "warn", check.reasons);
   if (!extraction) step("extract", "not extracted", "");
   else if (!extraction.is_current) step("extract", old, "warn");
   else step("extract", `${extraction.samples} samples, ${extraction.verdict}`, extraction.verdict === "good" && !extraction.is_lossy ? "good" : "warn", extraction.reasons);
@@ -61,8 +61,6 @@ export function showSteps(detail, say) {
   $("check-page").href = `${path(detail.id)}/check.html`;
   $("report-page").hidden = !extraction;
   $("report-page").href = `${path(detail.id)}/report.html`;
-  $("mask-command").textContent = detail.commands.mask;
-  $("extract-command").textContent = detail.commands.extract;
   showJob();
   begin();
 }
@@ -106,7 +104,6 @@ function showJob() {
   $("make-mask").textContent = results.mask ? "Anew" : "By the turn";
   const finished = results.stage === "extracted";
   $("make-all").hidden = finished || !canMask || !canExtract;
-  $("by-hand").hidden = !isMissing("mask") && !isMissing("extract");
 }
 
 /** A bar that knows how far things are, or that something is being done. */
@@ -131,36 +128,31 @@ export function showProcessing(next, ended) {
 }
 
 function showSettings() {
-  const { when_done: whenDone, dataset, dataset_folder: folder } = processing;
+  const { when_done: whenDone, dataset_folder: folder } = processing;
   $("when-done").checked = whenDone;
   $("when-done").disabled = isMissing("mask");
-  if (document.activeElement !== $("dataset")) $("dataset").value = dataset;
   $("dataset-folder").textContent = folder;
-  $("verify").disabled = isMissing("verify") || processing.jobs.some(({ step }) => step === "verify");
   const missing = [isMissing("mask") && "relit-mask", isMissing("extract") && "relit-extract"].filter(Boolean);
   $("missing").hidden = missing.length === 0;
-  $("missing").textContent = `${missing.join(" and ")} ${missing.length > 1 ? "are" : "is"} not installed on the rig’s computer. Install the package relit there, or take the sessions to another computer: each session shows its commands.`;
+  $("missing").textContent = `${missing.join(" and ")} ${missing.length > 1 ? "are" : "is"} not installed on the rig’s computer. Install the package relit there, or take the sessions to another computer.`;
 }
 
 function showQueue() {
   const lines = processing.jobs.map((job) => {
-    const cancel = make("button", { type: "button", text: "Cancel", disabled: job.status === "ending", ariaLabel: `Cancel: ${STEPS[job.step]} ${job.session ?? ""}` });
+    const cancel = make("button", { type: "button", text: "Cancel", disabled: job.status === "ending", ariaLabel: `Cancel: ${STEPS[job.step]} ${job.session}` });
     cancel.addEventListener("click", () => order("DELETE", `/api/v1/processing/jobs/${job.number}`));
     const bar = make("progress", { max: 1 });
     advance(bar, job);
     const text = [STEPS[job.step], STATUS[job.status]].filter(Boolean).join(": ");
-    return make("li", {}, make("span", {}, make("b", { text: job.session?.replace(/^\d{8}T\d{6}Z-/, "") ?? processing.dataset }), make("small", { text }), bar), cancel);
+    return make("li", {}, make("span", {}, make("b", { text: job.session.replace(/^\d{8}T\d{6}Z-/, "") }), make("small", { text }), bar), cancel);
   });
   $("jobs").replaceChildren(...lines);
-  const last = processing.finished.findLast(({ step }) => step === "verify");
-  $("verified").textContent = last ? `Verification: ${last.what}` : "";
-  $("verified").className = last ? (last.outcome === "good" ? "good" : "bad") : "quiet";
 }
 
 /** Forgets the session: the player is closed, and what it opens with next is not known yet. */
 export function hideSteps() {
   shown = null;
-  for (const part of ["job", "job-failed", "make-all", "check-page", "report-page", "by-hand"]) $(part).hidden = true;
+  for (const part of ["job", "job-failed", "make-all", "check-page", "report-page"]) $(part).hidden = true;
   for (const button of ["make-mask", "edit-mask", "make-check", "make-extract"]) $(button).disabled = true;
   for (const name of ["mask", "check", "extract"]) step(name, "…", "");
 }
@@ -190,31 +182,6 @@ export function startProcessing(say) {
     tell = say;
     configure({ when_done: $("when-done").checked });
   });
-  $("dataset-form").addEventListener("submit", (event) => {
-    event.preventDefault();
-    tell = say;
-    configure({ dataset: $("dataset").value.trim() });
-    $("dataset").blur();
-  });
-  $("verify").addEventListener("click", () => {
-    tell = say;
-    order("POST", "/api/v1/processing/verify");
-  });
-  for (const button of document.querySelectorAll("[data-copy]")) {
-    button.addEventListener("click", () => copy(button));
-  }
-}
-
-/** Copies a command; where the browser allows that only to pages of https, it is selected. */
-async function copy(button) {
-  const text = $(button.dataset.copy);
-  try {
-    await navigator.clipboard.writeText(text.textContent);
-    button.textContent = "Copied";
-  } catch {
-    getSelection().selectAllChildren(text);
-    button.textContent = "Selected";
-  }
 }
 
 /** The session as it is now. */

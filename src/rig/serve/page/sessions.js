@@ -79,7 +79,7 @@ function grouped() {
   return [...days];
 }
 
-/** Fills the list anew, or with `before` goes on with older ones. */
+/** Fills the list anew, or with `before` goes on with older ones; gives the names of the objects in it. */
 export async function listSessions(before) {
   const query = before ? `&before=${encodeURIComponent(before)}` : "";
   const sessions = await ask(`/api/v1/sessions?limit=${PART}${query}`);
@@ -88,6 +88,7 @@ export async function listSessions(before) {
   $("more").hidden = sessions.length < PART;
   $("more").onclick = () => listSessions(sessions.at(-1).id).catch(() => {});
   if (!before) await listTrash();
+  return [...new Set(listed.map(({ object }) => object))];
 }
 
 /** What was put away, each with the way back. */
@@ -130,9 +131,6 @@ async function play(session) {
   $("player-when").textContent = when(session);
   $("player-video").href = `${path(session.id)}/video`;
   $("player-tar").href = `${path(session.id)}.tar`;
-  const day = dayOf(session);
-  $("player-day").hidden = !day;
-  $("player-day").href = `/api/v1/sessions.tar?day=${day}`;
   showRemarks(session);
   outline.hidden = true;
   $("player-outline").textContent = "";
@@ -152,9 +150,7 @@ async function play(session) {
     if (shown !== mine) return;
     showSteps(detail, complain);
     Object.assign(shown, { times: detail.times_s, angles: detail.angles_deg });
-    const gaps = detail.gaps.map(({ before, missing }) => `${missing} dropped before frame ${before}`);
-    const faults = detail.manifest.faults.map(({ what }) => what);
-    $("player-notes").append(...[...gaps, ...faults].map((text) => make("li", { text })));
+    $("player-notes").append(...detail.manifest.faults.map(({ what }) => make("li", { text: what })));
     place();
     showMask(mine, detail.has_mask);
   } catch (problem) {

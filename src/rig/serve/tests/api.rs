@@ -11,7 +11,7 @@ fn the_state_is_what_the_monitor_holds() {
     serving.rig.monitor.update(|state| {
         state.phase = Phase::MovingBack;
         state.table.angle_deg = Some(12.5);
-        state.queue = vec!["mug".to_owned()];
+        state.object = Some("mug".to_owned());
     });
     serving.rig.monitor.fault(7, "the table does not answer");
     let mut events = begin(&serving, "/api/v1/events");
@@ -22,64 +22,35 @@ fn the_state_is_what_the_monitor_holds() {
     let state = state.json();
     assert_eq!(state["phase"], "moving-back");
     assert_eq!(state["table"]["angle_deg"], 12.5);
-    assert_eq!(state["queue"][0], "mug");
+    assert_eq!(state["object"], "mug");
     assert_eq!(state["faults"][0]["what"], "the table does not answer");
 }
 
 #[test]
 fn a_command_reaches_the_rig_and_its_answer_is_the_state_after_it() {
     let serving = Serving::start();
-    let answer = serving.command(r#"{"command":"start","object":"mug","meter":true}"#);
+    let answer = serving.command(r#"{"command":"start","object":"mug"}"#);
     assert_eq!(answer.status, 202);
     assert_eq!(answer.json()["phase"], "recording");
     assert_eq!(serving.get("/api/v1/state").json()["object"], "mug");
     for body in [
-        r#"{"command":"enqueue","object":"bust"}"#,
-        r#"{"command":"dequeue","place":0}"#,
-        r#"{"command":"next"}"#,
-        r#"{"command":"unlock"}"#,
         r#"{"command":"reset"}"#,
-        r#"{"command":"configure","size":[1280,720],"fps":30,"max_dropped":2}"#,
         r#"{"command":"set-control","name":"gain","value":-3}"#,
         r#"{"command":"stop"}"#,
     ] {
         assert_eq!(serving.command(body).status, 202, "{body}");
     }
     let told = serving.rig.told.lock().unwrap();
-    let object = || "mug".to_owned();
+    let object = "mug".to_owned();
+    assert_eq!(told[0], Command::Start { object });
     assert_eq!(
-        told[0],
-        Command::Start {
-            object: object(),
-            meter: true
-        }
-    );
-    assert_eq!(
-        told[7],
+        told[2],
         Command::SetControl {
             name: "gain".to_owned(),
             value: -3
         }
     );
     assert_eq!(told.last(), Some(&Command::Stop));
-}
-
-#[test]
-fn a_frame_size_is_set_taken_back_by_null_and_kept_where_it_is_left_out() {
-    let serving = Serving::start();
-    for (field, wanted) in [
-        (r#","size":[640,480]"#, Some(Some((640, 480)))),
-        (r#","size":null"#, Some(None)),
-        ("", None),
-    ] {
-        let answer = serving.command(&format!(r#"{{"command":"configure"{field}}}"#));
-        assert_eq!(answer.status, 202);
-        let told = serving.rig.told.lock().unwrap();
-        let Some(Command::Configure { size, .. }) = told.last() else {
-            panic!("{told:?}");
-        };
-        assert_eq!(*size, wanted);
-    }
 }
 
 #[test]
@@ -112,7 +83,7 @@ fn what_is_no_command_does_not_reach_the_rig() {
         r#"{"command":"explode"}"#,
         r#"{"command":"start"}"#,
         r#"{"command":"start","object":"mug","speed":9}"#,
-        r#"{"command":"dequeue","place":-1}"#,
+        r#"{"command":"jog","degrees":"far"}"#,
         r#"{"command":"stop"} {"command":"stop"}"#,
     ] {
         let refused = serving.command(body);
@@ -155,8 +126,8 @@ fn events_tell_the_state_at_once_then_its_changes_and_beat_between() {
     serving
         .rig
         .monitor
-        .update(|state| state.phase = Phase::Metering);
-    assert!(events.until("\n\n").contains(r#""phase":"metering""#));
+        .update(|state| state.phase = Phase::Starting);
+    assert!(events.until("\n\n").contains(r#""phase":"starting""#));
     assert!(events.until("\n\n").contains("event: beat"));
 }
 

@@ -53,7 +53,6 @@ fn furnish(serving: &Serving) {
         state.free_bytes = 41_300_000_000;
         state.needed_bytes = 910_000_000;
         state.frames_wanted = TURN;
-        state.queue = vec!["teapot".to_owned(), "bust".to_owned()];
         state.table.present = true;
         state.table.state = "Idle".to_owned();
         state.table.angle_deg = Some(0.0);

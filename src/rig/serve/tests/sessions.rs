@@ -91,13 +91,7 @@ fn one_session_is_told_with_each_frames_time_and_angle() {
     assert_eq!(detail["times_s"].as_array().unwrap().len(), frames);
     assert_eq!(detail["angles_deg"].as_array().unwrap().len(), frames);
     assert_eq!(detail["times_s"][0], 0.0);
-    let gaps = detail["gaps"].as_array().unwrap();
-    let missing: u64 = gaps
-        .iter()
-        .map(|gap| gap["missing"].as_u64().unwrap())
-        .sum();
-    assert_eq!(Some(missing), detail["dropped"].as_u64());
-    assert!(missing > 0);
+    assert!(detail["dropped"].as_u64() > Some(0));
 }
 
 #[test]
@@ -142,56 +136,16 @@ fn any_frame_of_a_turn_is_served_as_a_picture() {
 }
 
 #[test]
-fn the_video_is_served_whole_and_in_parts() {
+fn the_video_is_served_for_download() {
     let serving = Serving::start();
     serving.hold(&[COW]);
     let bytes = fs::read(serving.root.path().join(COW).join("video.mkv")).unwrap();
-    let size = bytes.len();
-    let video = path(COW, "/video");
-    let whole = serving.get(&video);
-    assert_eq!(
-        (whole.status, whole.header("accept-ranges")),
-        (200, Some("bytes"))
-    );
-    assert_eq!(whole.body, bytes);
-    assert!(
-        whole
-            .header("content-disposition")
-            .unwrap()
-            .ends_with("cow-short.mkv")
-    );
-    let tag = whole.header("etag").unwrap().to_owned();
-    let part = |headers: &[&str]| serving.ask("GET", &video, headers, b"");
-    let middle = part(&["Range: bytes=1000-300999", &format!("If-Range: {tag}")]);
-    assert_eq!(middle.status, 206);
-    let told = format!("bytes 1000-300999/{size}");
-    assert_eq!(middle.header("content-range"), Some(told.as_str()));
-    assert_eq!(middle.body, bytes[1000..301_000]);
-    assert_eq!(part(&["Range: bytes=-7"]).body, bytes[size - 7..]);
-    let beyond = part(&[&format!("Range: bytes={size}-")]);
-    assert_eq!(beyond.status, 416);
-    assert_eq!(beyond.header("content-type"), Some("application/json"));
-    assert_eq!(
-        beyond.header("content-range"),
-        Some(format!("bytes */{size}").as_str())
-    );
-    let stale = part(&["Range: bytes=0-1", "If-Range: \"older\""]);
-    assert_eq!((stale.status, stale.body.len()), (200, size));
-}
-
-#[test]
-fn objects_are_suggested_newest_first_each_once() {
-    let serving = Serving::start();
-    serving.hold(&[COW, BUST]);
-    let again = serving.root.path().join("20261121T080000Z-cow-short");
-    fs::create_dir(&again).unwrap();
-    fs::copy(
-        serving.root.path().join(COW).join("session.json"),
-        again.join("session.json"),
-    )
-    .unwrap();
-    let objects = serving.get("/api/v1/objects").json();
-    assert_eq!(objects, serde_json::json!(["cow-short", "bust-short"]));
+    let video = serving.get(&path(COW, "/video"));
+    let size = bytes.len().to_string();
+    assert_eq!(video.header("content-length"), Some(size.as_str()));
+    assert!(video.status == 200 && video.body == bytes);
+    let name = video.header("content-disposition").unwrap();
+    assert!(name.ends_with("cow-short.mkv"), "{name}");
 }
 
 #[test]
@@ -284,51 +238,13 @@ fn a_session_comes_as_a_tar_file_that_unpacks_to_a_session() {
 }
 
 #[test]
-fn a_tar_file_that_broke_off_goes_on_where_it_ended() {
+fn a_session_that_is_being_recorded_is_not_sent() {
     let serving = Serving::start();
-    serving.hold(&[COW]);
-    let ask = |headers: &[&str]| serving.ask("GET", &path(COW, ".tar"), headers, b"");
-    let whole = ask(&[]);
-    let etag = whole.header("etag").unwrap().to_owned();
-    // In a header, in a file, in its padding, at the end.
-    for from in [100, 512, 700, 100_000, whole.body.len() - 1] {
-        let rest = ask(&[
-            &format!("Range: bytes={from}-"),
-            &format!("If-Range: {etag}"),
-        ]);
-        assert_eq!(rest.status, 206);
-        let range = format!("bytes {from}-{}/{}", whole.body.len() - 1, whole.body.len());
-        assert_eq!(rest.header("content-range"), Some(range.as_str()));
-        assert!(rest.body == whole.body[from..], "{from}");
-    }
-    assert_eq!(ask(&["Range: bytes=5-8"]).body, whole.body[5..=8]);
-    let end = ask(&["Range: bytes=-7"]);
-    assert_eq!(end.body, whole.body[whole.body.len() - 7..]);
-    assert_eq!(ask(&["Range: bytes=999999999999-"]).status, 416);
-    assert_eq!(ask(&["Range: bytes=0-1,4-5"]).status, 416);
-    // What has changed since is sent from the start.
-    fs::write(serving.root.path().join(COW).join("mask.png"), b"a mask").unwrap();
-    let changed = ask(&["Range: bytes=100-", &format!("If-Range: {etag}")]);
-    assert_eq!(changed.status, 200);
-    assert!(changed.body.len() > whole.body.len());
-}
-
-#[test]
-fn all_sessions_of_a_day_come_as_one_tar_file() {
-    let serving = Serving::start();
-    serving.hold(&[COW, BUST, DROPPED]);
+    serving.hold(&[DROPPED]);
     let manifest = serving.root.path().join(DROPPED).join("session.json");
     let text = fs::read_to_string(&manifest).unwrap();
     fs::write(&manifest, text.replace("\"complete\"", "\"recording\"")).unwrap();
     assert_eq!(serving.get(&path(DROPPED, ".tar")).status, 409);
-    let answer = serving.get("/api/v1/sessions.tar?day=20261120");
-    assert_eq!(answer.status, 200);
-    let to = tempfile::tempdir().unwrap();
-    let names = unpack(&answer.body, to.path());
-    assert_eq!(names.len(), 6, "{names:?}");
-    assert!(names[0].starts_with(COW) && names[3].starts_with(BUST));
-    assert_eq!(serving.get("/api/v1/sessions.tar?day=20261121").status, 404);
-    assert_eq!(serving.get("/api/v1/sessions.tar?day=../2026").status, 400);
     assert_eq!(serving.get("/api/v1/sessions/nothing.tar").status, 404);
 }
 

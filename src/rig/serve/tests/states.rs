@@ -27,8 +27,6 @@ struct Row {
     /// The speed that is set, degrees a second.
     #[serde(default = "usual_speed")]
     speed: f64,
-    #[serde(default)]
-    queue: Vec<String>,
     /// The last take's session, and whether it was aborted, and why.
     last: Option<(String, Option<String>)>,
     headline: String,
@@ -113,16 +111,14 @@ impl Default for Disk {
     }
 }
 
-const PHASES: [Phase; 9] = [
+const PHASES: [Phase; 7] = [
     Phase::Idle,
     Phase::Preflight,
-    Phase::Metering,
     Phase::MovingBack,
     Phase::Starting,
     Phase::Recording,
     Phase::Unwinding,
     Phase::Checking,
-    Phase::WaitingForObject,
 ];
 
 fn rows() -> Vec<PathBuf> {
@@ -151,7 +147,6 @@ fn set(serving: &Serving, row: Row) {
         state.table.fault = row.table.fault;
         (state.free_bytes, state.needed_bytes) = (row.disk.free, row.disk.needed);
         state.disk_fault = row.disk.fault;
-        state.queue = row.queue;
         state.last_take = row.last.map(|(session, aborted)| TakeSummary {
             session,
             verdict: match aborted {

@@ -4,18 +4,19 @@
 //! monitors a motion in progress, and brings the table to a standstill when something goes wrong.
 //! It knows nothing of turns.
 
+mod fault;
 mod motion;
 mod position_report;
 mod stop;
 #[cfg(test)]
 mod tests;
 
-use super::Alarm;
-use super::error::MotionFault;
+use super::codes::Alarm;
 use super::wire::{
-    ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ReplyTimeout, RestartCause,
-    SendError, WireEvent,
+    ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ReplyTimeout, SendError,
+    WireEvent,
 };
+pub use fault::MotionFault;
 pub(crate) use motion::{Motion, MotionGoal};
 pub(crate) use position_report::{ControllerTraits, PositionReport};
 pub(crate) use stop::{Stop, StopOutcome};
@@ -24,6 +25,8 @@ pub(crate) use stop::{Stop, StopOutcome};
 const STOPPING_POLL_US: i64 = 50_000;
 /// Interval of reports while somebody waits for one, microseconds.
 const WANTED_POLL_US: i64 = 100_000;
+/// What the rig's firmware calls a restart that the host asked for.
+const HOST_RESET: &str = "host";
 /// Limit of recorded reports: an hour at 15 per second.
 const MOST_RECORDED: usize = 54_000;
 
@@ -35,7 +38,6 @@ pub(crate) struct Supervisor {
     answer: Option<(u64, LineOutcome)>,
     last_report: Option<PositionReport>,
     confirmed: bool,
-    work_zero: Option<f64>,
     /// Machine position of the angle 0, degrees; `None` if it is unknown.
     zero_deg: Option<f64>,
     /// The angle 0 was known until the controller restarted.
@@ -69,7 +71,6 @@ impl Supervisor {
             answer: None,
             last_report: None,
             confirmed: false,
-            work_zero: None,
             zero_deg: None,
             restarted: false,
             rest_deg: None,
@@ -369,10 +370,7 @@ impl Supervisor {
     }
 
     fn on_report(&mut self, now_us: i64, poll: &Poll) {
-        self.work_zero = poll.report.work_zero.or(self.work_zero);
-        let Some(report) = PositionReport::of(poll, self.work_zero, &self.traits) else {
-            return;
-        };
+        let report = PositionReport::of(poll, &self.traits);
         self.confirmed = self
             .last_report
             .is_some_and(|before| before.confirms(&report));
@@ -467,12 +465,11 @@ impl Supervisor {
         self.settled = true;
     }
 
-    fn on_reset(&mut self, now_us: i64, cause: Option<RestartCause>) {
+    fn on_reset(&mut self, now_us: i64, cause: Option<String>) {
         self.restarts += 1;
         self.alarm = None;
         self.emergency_stop = false;
-        self.work_zero = None;
-        let asked_for = matches!(cause, None | Some(RestartCause::Host));
+        let asked_for = cause.as_deref().is_none_or(|cause| cause == HOST_RESET);
         let stop = self.stop.as_mut().filter(|stop| stop.outcome().is_none());
         let kept = stop.is_some_and(|stop| stop.on_reset(now_us)) && asked_for;
         if !kept {

@@ -1,8 +1,7 @@
 //! Monitoring a motion: whether it goes on, and where it ends.
 
-use super::{ControllerTraits, PositionReport};
-use crate::turntable::Alarm;
-use crate::turntable::error::MotionFault;
+use super::{ControllerTraits, MotionFault, PositionReport};
+use crate::turntable::codes::Alarm;
 use crate::turntable::wire::ControllerState;
 
 /// Longest silence of a controller in motion, microseconds.
@@ -93,12 +92,7 @@ impl Motion {
                 })
             }
             ControllerState::Idle => self.on_idle(report, target_deg, stands_us, traits),
-            ControllerState::Held
-            | ControllerState::Holding
-            | ControllerState::Door
-            | ControllerState::DoorMoving
-            | ControllerState::Sleep
-            | ControllerState::Tool => Some(MotionFault::Held),
+            ControllerState::Held | ControllerState::Holding => Some(MotionFault::Held),
             ControllerState::Alarm => Some(MotionFault::Alarm(
                 alarm.unwrap_or(Alarm::unknown(traits.family)),
             )),

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::turntable::family::Family;
-use crate::turntable::wire::{ControllerState, Pins, Poll, Position};
+use crate::turntable::wire::{ControllerState, Pins, Poll};
 
 /// Rounding error of a printed position, degrees.
 const PRINTED_DEG: f64 = 0.002;
@@ -30,30 +30,22 @@ pub(crate) struct PositionReport {
 }
 
 impl PositionReport {
-    /// Converts a report; `None` if its position is relative to a zero that is not known yet.
-    pub(super) fn of(
-        poll: &Poll,
-        work_zero: Option<f64>,
-        traits: &ControllerTraits,
-    ) -> Option<PositionReport> {
+    /// Converts a report.
+    pub(super) fn of(poll: &Poll, traits: &ControllerTraits) -> PositionReport {
         let report = poll.report;
-        let units = match report.position {
-            Position::Machine(at) => at,
-            Position::Work(at) => at + work_zero?,
-        };
-        Some(PositionReport {
+        PositionReport {
             state: report.state,
             alarm: report.alarm,
             homed: report.homed,
-            machine_deg: units * traits.degrees_per_unit,
-            speed: report.feed.unwrap_or(0.0) * traits.degrees_per_unit / 60.0,
+            machine_deg: report.position,
+            speed: report.feed.unwrap_or(0.0) / 60.0,
             chip_us: report.chip_us.filter(|_| traits.stamps),
             battery_v: report.battery_v,
             pins: report.pins,
             asked_us: poll.asked_us,
             came_us: poll.came_us,
             certain: poll.certain,
-        })
+        }
     }
 
     /// Whether the next report agrees with this one. In motion, positions differ.
@@ -68,8 +60,6 @@ impl PositionReport {
 pub(crate) struct ControllerTraits {
     /// Whose alarms it reports.
     pub(crate) family: Family,
-    /// Degrees in one unit of its reports.
-    pub(crate) degrees_per_unit: f64,
     /// Interval of reports in motion.
     pub(crate) poll: Duration,
     /// Whether its reports carry the chip's time.

@@ -146,13 +146,7 @@ impl Stop {
             (Step::Braking | Step::Checking, state) if state.may_move() => self.standing = None,
             (Step::Braking, state) if self.stands(report) => {
                 // Only a reset leads out of these, and it discards what is left of the motion.
-                let waits = matches!(
-                    state,
-                    ControllerState::Held
-                        | ControllerState::Door
-                        | ControllerState::Tool
-                        | ControllerState::Unknown
-                );
+                let waits = matches!(state, ControllerState::Held | ControllerState::Unknown);
                 if self.unsettled || waits {
                     self.stood_at = Some(report.machine_deg);
                     self.reset(now_us, true, wire);

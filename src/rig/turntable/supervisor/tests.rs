@@ -7,7 +7,6 @@ use crate::turntable::family::Family;
 
 const TRAITS: ControllerTraits = ControllerTraits {
     family: Family::GrblHal,
-    degrees_per_unit: 1.0,
     poll: Duration::from_millis(67),
     stamps: true,
     reports_homing: true,
@@ -192,21 +191,6 @@ fn a_motion_that_takes_too_long_is_late() {
     bench.report("Run", 80.0, 1);
     bench.pass(500);
     assert_eq!(bench.supervisor.fault(), Some(&MotionFault::Late));
-}
-
-#[test]
-fn work_positions_count_once_their_zero_is_known_and_inches_are_converted() {
-    let mut bench = Bench::new();
-    bench.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0>");
-    assert!(bench.supervisor.last_report().is_none());
-    bench.hear("<Idle|WPos:1.000,0.000,0.000|FS:0,0|WCO:2.000,0.000,0.000>");
-    assert_eq!(bench.supervisor.last_report().unwrap().machine_deg, 3.0);
-    bench.supervisor.set_traits(ControllerTraits {
-        degrees_per_unit: 25.4,
-        ..TRAITS
-    });
-    bench.hear("<Idle|MPos:1.000,0.000,0.000|FS:0,0>");
-    assert_eq!(bench.supervisor.last_report().unwrap().machine_deg, 25.4);
 }
 
 #[test]

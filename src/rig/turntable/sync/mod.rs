@@ -39,61 +39,12 @@ const CLOCK_FLOOR_US: f64 = 200.0;
 /// Period after which the chip's time stamps wrap around, microseconds.
 const WRAP_US: f64 = 4_294_967_296.0;
 
-/// Why the reports do not determine the angles.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum TrackError {
-    /// Too few reports.
-    #[error(
-        "only {polls} reports fall into the part at constant speed, and {needed} are needed: check the serial line"
-    )]
-    TooFew {
-        /// Their number.
-        polls: usize,
-        /// The number needed.
-        needed: usize,
-    },
-    /// The reports leave gaps.
-    #[error(
-        "the reports cover {percent:.0} % of the part at constant speed: check the serial line"
-    )]
-    Gaps {
-        /// Per cent.
-        percent: f64,
-    },
-    /// The reports do not lie on a line.
-    #[error("{}: the table did not turn evenly, or the serial line is bad", uneven(*.outliers, *.polls))]
-    Uneven {
-        /// Number of reports off the line.
-        outliers: usize,
-        /// Number of all reports.
-        polls: usize,
-    },
-    /// The chip's clock is wrong.
-    #[error(
-        "the controller's clock runs {factor:.4} times as fast as the host's: its firmware is made for another crystal"
-    )]
-    Clock {
-        /// Chip seconds per second of the host.
-        factor: f64,
-    },
-    /// The speed is wrong.
-    #[error(
-        "the table turned at {measured:.4} degrees/s instead of {planned:.4}: check $100, $110 and the microsteps"
-    )]
-    Speed {
-        /// Measured by the reports, degrees/s.
-        measured: f64,
-        /// Planned, degrees/s.
-        planned: f64,
-    },
-}
-
 fn uneven(outliers: usize, polls: usize) -> String {
-    match outliers * 2 > polls {
+    let found = match outliers * 2 > polls {
         true => format!("the {polls} reports lie on no straight line"),
         false => format!("{outliers} of {polls} reports lie off the line of the others"),
-    }
+    };
+    format!("{found}: the table did not turn evenly, or the serial line is bad")
 }
 
 /// The table's angle over time, in the part of a turn at constant speed: a straight line.
@@ -166,8 +117,8 @@ impl Track {
     /// The track of a turn that was interrupted, up to its last report.
     ///
     /// # Errors
-    /// [`TrackError`] if there are too few reports, or they do not lie on a line of the planned speed.
-    fn of_part(reports: &[JournaledReport], expected: &JournaledTurn) -> Result<Self, TrackError> {
+    /// Why not, if there are too few reports, or they do not lie on a line of the planned speed.
+    fn of_part(reports: &[JournaledReport], expected: &JournaledTurn) -> Result<Self, String> {
         let points = points(reports, expected);
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Err(too_few(&points, LEAST_OF_PART));
@@ -221,10 +172,7 @@ impl Point {
 }
 
 /// Fits the track of a turn to its reports.
-pub(crate) fn fit(
-    reports: &[PositionReport],
-    expected: &JournaledTurn,
-) -> Result<Track, TrackError> {
+pub(crate) fn fit(reports: &[PositionReport], expected: &JournaledTurn) -> Result<Track, String> {
     let timed = |report: &PositionReport| self::timed(report, expected);
     let reports: Vec<_> = reports.iter().filter_map(timed).collect();
     let points = points(&reports, expected);
@@ -233,7 +181,7 @@ pub(crate) fn fit(
     checked_track(&points, expected, &fitted)
 }
 
-fn by_the_reports(points: &[Point], expected: &JournaledTurn) -> Result<Fitted, TrackError> {
+fn by_the_reports(points: &[Point], expected: &JournaledTurn) -> Result<Fitted, String> {
     match points.iter().all(|point| point.chip_us.is_some()) {
         true => by_the_chip(points, expected),
         false => Ok(by_the_middle(points, expected)),
@@ -244,17 +192,16 @@ fn checked_track(
     points: &[Point],
     expected: &JournaledTurn,
     fitted: &Fitted,
-) -> Result<Track, TrackError> {
+) -> Result<Track, String> {
     if fitted.outliers as f64 > points.len() as f64 * MOST_OUTLIERS {
-        return Err(TrackError::Uneven {
-            outliers: fitted.outliers,
-            polls: points.len(),
-        });
+        return Err(uneven(fitted.outliers, points.len()));
     }
     let measured = fitted.line.slope * 1e6;
     let planned = expected.degrees_per_second * sign(expected);
     if (measured / planned - 1.0).abs() > MOST_OFF {
-        return Err(TrackError::Speed { measured, planned });
+        return Err(format!(
+            "the table turned at {measured:.4} degrees/s instead of {planned:.4}: check $100, $110 and the microsteps"
+        ));
     }
     Ok(track(points, expected, fitted))
 }
@@ -277,12 +224,14 @@ fn points(reports: &[JournaledReport], expected: &JournaledTurn) -> Vec<Point> {
     reports.iter().map(point).collect()
 }
 
-fn too_few(points: &[Point], needed: usize) -> TrackError {
-    let polls = points.len();
-    TrackError::TooFew { polls, needed }
+fn too_few(points: &[Point], needed: usize) -> String {
+    format!(
+        "only {} reports fall into the part at constant speed, and {needed} are needed: check the serial line",
+        points.len()
+    )
 }
 
-fn enough(points: &[Point], expected: &JournaledTurn) -> Result<(), TrackError> {
+fn enough(points: &[Point], expected: &JournaledTurn) -> Result<(), String> {
     if points.len() < LEAST_POLLS {
         return Err(too_few(points, LEAST_POLLS));
     }
@@ -290,9 +239,10 @@ fn enough(points: &[Point], expected: &JournaledTurn) -> Result<(), TrackError> 
     let covered = angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min);
     let cover = covered / (expected.to_deg - expected.from_deg).abs();
     if cover < LEAST_COVER {
-        return Err(TrackError::Gaps {
-            percent: cover * 100.0,
-        });
+        return Err(format!(
+            "the reports cover {:.0} % of the part at constant speed: check the serial line",
+            cover * 100.0
+        ));
     }
     Ok(())
 }
@@ -325,7 +275,7 @@ fn on_line(points: &[Point], expected: &JournaledTurn, line: Line) -> Fitted {
     }
 }
 
-fn by_the_chip(points: &[Point], expected: &JournaledTurn) -> Result<Fitted, TrackError> {
+fn by_the_chip(points: &[Point], expected: &JournaledTurn) -> Result<Fitted, String> {
     let stamps = unwrapped(points);
     let angles: Vec<_> = stamps
         .iter()
@@ -351,7 +301,9 @@ fn by_the_chip(points: &[Point], expected: &JournaledTurn) -> Result<Fitted, Tra
     let clocks = line::robust(&host, CLOCK_FLOOR_US);
     let factor = clocks.line.slope.recip();
     if !(1.0 - MOST_OFF..=1.0 + MOST_OFF).contains(&factor) {
-        return Err(TrackError::Clock { factor });
+        return Err(format!(
+            "the controller's clock runs {factor:.4} times as fast as the host's: its firmware is made for another crystal"
+        ));
     }
     Ok(Fitted {
         line: by_chip.line.over(&clocks.line),

@@ -184,42 +184,27 @@ fn a_track_counts_its_reports() {
 #[test]
 fn turns_without_a_track_are_distinguished_by_their_cause() {
     let reports = USUAL.reports(1);
-    let few = fit(&reports[200..210], &EXPECTED);
-    assert_eq!(
-        few,
-        Err(TrackError::TooFew {
-            polls: 10,
-            needed: 12
-        })
-    );
-    assert!(matches!(
-        fit(&reports[..400], &EXPECTED),
-        Err(TrackError::Gaps { .. })
-    ));
+    let fails = |reports: &[PositionReport], expected: &JournaledTurn, why: &str| {
+        let error = fit(reports, expected).unwrap_err();
+        assert!(error.contains(why), "{error}");
+    };
+    fails(&reports[200..210], &EXPECTED, "only 10 reports");
+    fails(&reports[..400], &EXPECTED, "the reports cover");
     let fast = JournaledTurn {
         degrees_per_second: 7.6,
         ..EXPECTED
     };
-    assert!(matches!(
-        fit(&reports, &fast),
-        Err(TrackError::Speed { .. })
-    ));
+    fails(&reports, &fast, "instead of 7.6");
     let mad = Turn {
         wrong: 0.4,
         ..USUAL
     };
-    assert!(matches!(
-        fit(&mad.reports(1), &EXPECTED),
-        Err(TrackError::Uneven { .. })
-    ));
+    fails(&mad.reports(1), &EXPECTED, "off the line of the others");
     let mut stamped = USUAL.reports(1);
     for report in &mut stamped {
         report.chip_us = report.chip_us.map(|us| us / 2);
     }
-    assert!(matches!(
-        fit(&stamped, &EXPECTED),
-        Err(TrackError::Clock { .. })
-    ));
+    fails(&stamped, &EXPECTED, "the controller's clock");
 }
 
 #[test]
@@ -272,10 +257,7 @@ proptest! {
 
 #[test]
 fn reports_that_lie_on_no_line_are_not_compared_with_others() {
-    let text = |outliers| {
-        let polls = 98;
-        TrackError::Uneven { outliers, polls }.to_string()
-    };
+    let text = |outliers| uneven(outliers, 98);
     assert!(text(30).starts_with("30 of 98 reports lie off the line of the others"));
     assert!(text(98).starts_with("the 98 reports lie on no straight line"));
 }

@@ -2,28 +2,19 @@
 //! or `$Errors/Verbose` is on, which some versions have on by default.
 
 /// The words, with Grbl's number.
-const TEXTS: [(&str, u8); 24] = [
-    ("expected gcode", 1),
-    ("bad gcode number format", 2),
-    ("bad number format", 2),
+const TEXTS: [(&str, u8); 15] = [
     ("invalid $ statement", 3),
     ("invalid statement", 3),
-    ("negative value", 4),
     ("setting disabled", 5),
     ("homing not enabled", 5),
     ("no homing/cycle defined", 5),
     ("command requires idle state", 8),
     ("gcode cannot be executed in lock or alarm", 9),
     ("soft limit error", 10),
-    ("line too long", 11),
     ("max step rate exceeded", 12),
     ("check door", 13),
     ("max travel exceeded", 15),
-    ("invalid jog command", 16),
     ("unsupported gcode command", 20),
-    ("gcode undefined feed rate", 22),
-    ("gcode unsupported coordinate system", 29),
-    ("gcode invalid target", 33),
     ("check startup pins", 40),
     ("system reset", 18),
     ("configuration is invalid", 152),

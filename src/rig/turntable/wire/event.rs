@@ -1,6 +1,6 @@
 //! The events of the protocol's state machine, and the outcomes of lines.
 
-use super::message::{Message, RestartCause};
+use super::message::Message;
 use super::polling::Poll;
 
 /// An event from the controller.
@@ -15,8 +15,8 @@ pub enum WireEvent {
     },
     /// A status report.
     Status(Poll),
-    /// The controller has restarted.
-    Reset(Option<RestartCause>),
+    /// The controller has restarted; why, if it says so.
+    Reset(Option<String>),
     /// An alarm with its number.
     Alarm(u8),
 }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use super::checksum::{Sealed, seal, unseal};
 use super::event::{Counts, LineFault, LineOutcome, SendError, WireEvent};
 use super::lines::{LineReader, Piece};
-use super::message::{Message, RestartCause, parse};
+use super::message::{Message, parse};
 use super::pending::{Due, Pending, ReplyTimeout};
 use super::polling::Polling;
 use super::realtime;
@@ -225,7 +225,7 @@ impl Machine {
         }
         let awaited = self.pending.as_ref().and_then(|line| line.seq);
         match parse(line) {
-            Some(Message::Banner(banner)) => self.reset(banner.cause),
+            Some(Message::Banner(cause)) => self.reset(cause),
             Some(Message::Error { code, seq }) if code == NO_SESSION && seq == awaited => {
                 self.reset(None);
             }
@@ -249,7 +249,7 @@ impl Machine {
                 let poll = self.polling.answered(report, first_us);
                 self.events.push_back(WireEvent::Status(poll));
             }
-            Message::Banner(banner) => self.reset(banner.cause),
+            Message::Banner(cause) => self.reset(cause),
             other => match &mut self.pending {
                 Some(pending) => pending.keep(now_us, other),
                 None => self.counts.messages += 1,
@@ -325,7 +325,7 @@ impl Machine {
     }
 
     /// Notes that the controller has restarted: it answers no earlier line and takes plain lines.
-    fn reset(&mut self, cause: Option<RestartCause>) {
+    fn reset(&mut self, cause: Option<String>) {
         self.fail(LineFault::Restarted);
         self.lines.clear();
         self.session = Session::Plain;

@@ -25,10 +25,10 @@ mod tests;
 
 pub use event::{Counts, LineFault, LineOutcome, SendError, WireEvent};
 pub use machine::Machine;
-pub use message::{Banner, Message, RestartCause, parse};
+pub use message::{Message, parse};
 pub use pending::ReplyTimeout;
 pub use polling::Poll;
-pub use status::{ControllerState, Pins, Position, StatusReport};
+pub use status::{ControllerState, Pins, StatusReport};
 
 /// Real-time commands: single bytes that the controller takes out of the stream anywhere; never part
 /// of a line.

@@ -13,7 +13,7 @@ pub enum ControllerState {
     Idle,
     /// Executing G-code.
     Run,
-    /// Feed hold, at rest (`Hold:0`).
+    /// Feed hold, at rest (`Hold:0`), or what else waits for a person: an open door, a tool change, sleep.
     Held,
     /// Feed hold, still ramping down (`Hold:1`).
     Holding,
@@ -25,15 +25,6 @@ pub enum ControllerState {
     Alarm,
     /// Check mode: parses G-code without moving.
     Check,
-    /// The safety door is open, or was, and the table rests (`Door:0`, `Door:1`). A table has none,
-    /// but a stock board can report it.
-    Door,
-    /// The same, and the table ramps down or moves on again.
-    DoorMoving,
-    /// Asleep until a reset.
-    Sleep,
-    /// Waits for a tool change (grblHAL).
-    Tool,
     /// A state that this program does not know.
     Unknown,
 }
@@ -48,7 +39,6 @@ impl ControllerState {
                 | ControllerState::Holding
                 | ControllerState::Jog
                 | ControllerState::Home
-                | ControllerState::DoorMoving
         )
     }
 
@@ -61,16 +51,12 @@ impl ControllerState {
         Some(match (name, sub.unwrap_or(0)) {
             ("Idle", _) => ControllerState::Idle,
             ("Run", _) => ControllerState::Run,
-            ("Hold", 0) => ControllerState::Held,
-            ("Hold", _) => ControllerState::Holding,
+            ("Hold", 0) | ("Door", 0 | 1) | ("Sleep" | "Tool", _) => ControllerState::Held,
+            ("Hold" | "Door", _) => ControllerState::Holding,
             ("Jog", _) => ControllerState::Jog,
             ("Home", _) => ControllerState::Home,
             ("Alarm", _) => ControllerState::Alarm,
             ("Check", _) => ControllerState::Check,
-            ("Door", 0 | 1) => ControllerState::Door,
-            ("Door", _) => ControllerState::DoorMoving,
-            ("Sleep", _) => ControllerState::Sleep,
-            ("Tool", _) => ControllerState::Tool,
             _ => ControllerState::Unknown,
         })
     }
@@ -87,22 +73,9 @@ impl fmt::Display for ControllerState {
             ControllerState::Home => "Home",
             ControllerState::Alarm => "Alarm",
             ControllerState::Check => "Check",
-            ControllerState::Door => "Door:0",
-            ControllerState::DoorMoving => "Door:2",
-            ControllerState::Sleep => "Sleep",
-            ControllerState::Tool => "Tool",
             ControllerState::Unknown => "Unknown",
         })
     }
-}
-
-/// A position in the controller's unit, in either of Grbl's two forms.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Position {
-    /// From machine zero.
-    Machine(f64),
-    /// From the zero of the work coordinates.
-    Work(f64),
 }
 
 /// Input pins that are active.
@@ -132,8 +105,8 @@ pub struct StatusReport {
     pub state: ControllerState,
     /// The alarm's number, where the state comes with it (`Alarm:11`).
     pub alarm: Option<u8>,
-    /// The table's position.
-    pub position: Position,
+    /// The table's position from machine zero, degrees.
+    pub position: f64,
     /// Speed, the controller's unit per minute.
     pub feed: Option<f64>,
     /// Microseconds of the chip's clock at the moment of the position; wraps. Only the rig's firmware
@@ -143,8 +116,6 @@ pub struct StatusReport {
     pub battery_v: Option<f64>,
     /// Active pins.
     pub pins: Pins,
-    /// Machine position of the work coordinates' zero.
-    pub work_zero: Option<f64>,
     /// Whether the controller counts itself as homed (grblHAL's `H:`).
     pub homed: Option<bool>,
 }
@@ -175,7 +146,6 @@ impl StatusReport {
             chip_us: read.chip_us,
             battery_v: read.battery_v,
             pins: read.pins,
-            work_zero: read.work_zero,
             homed: read.homed,
         })
     }
@@ -183,12 +153,11 @@ impl StatusReport {
 
 #[derive(Default)]
 struct Fields {
-    position: Option<Position>,
+    position: Option<f64>,
     feed: Option<f64>,
     chip_us: Option<u32>,
     battery_v: Option<f64>,
     pins: Pins,
-    work_zero: Option<f64>,
     homed: Option<bool>,
 }
 
@@ -196,10 +165,8 @@ impl Fields {
     /// Reads a field; `None` if one that decides where the table is is damaged or repeated.
     fn take(&mut self, name: &str, value: &str) -> Option<()> {
         match name {
-            "MPos" => once(&mut self.position, Position::Machine(first(value)?))?,
-            "WPos" => once(&mut self.position, Position::Work(first(value)?))?,
+            "MPos" => once(&mut self.position, first(value)?)?,
             "FS" | "F" => once(&mut self.feed, first(value)?)?,
-            "WCO" => once(&mut self.work_zero, first(value)?)?,
             "T" => self.chip_us = whole(value),
             "Bat" => self.battery_v = decimal(value),
             "Pn" => self.pins = Pins::from_letters(value),

@@ -59,24 +59,12 @@ pub(crate) struct Arguments {
     /// Width and height of the picture that shows a part of a panorama.
     #[arg(long, value_name = "W,H", value_parser = size, conflicts_with = "scene")]
     size: Option<[u32; 2]>,
-    /// How many degrees the picture's longer side shows [default: 60].
-    #[arg(long, value_name = "DEGREES", value_parser = number, conflicts_with = "scene")]
-    field: Option<f64>,
-    /// How many degrees the camera looks down into a panorama [default: 10].
-    #[arg(long, value_name = "DEGREES", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
-    down: Option<f64>,
-    /// How many degrees the camera looks down on the ground of the objects [default: 20, in a panorama as it is seen there].
-    #[arg(long, value_name = "DEGREES", value_parser = number, conflicts_with = "scene")]
-    tilt: Option<f64>,
     /// Leave brightness, white balance and grain of the objects as they are.
     #[arg(long, conflicts_with = "scene")]
     no_match: bool,
     /// How the colour of the light is shown [default: light].
     #[arg(long, value_parser = one_of(WHITE_BALANCES), conflicts_with = "scene")]
     white_balance: Option<WhiteBalance>,
-    /// Brightness of a panorama and its light in stops, from that which is found.
-    #[arg(long, value_name = "STOPS", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
-    exposure: Option<f64>,
     /// Turn the light about the vertical first, from the viewer to the right, and a panorama behind the objects with it.
     #[arg(long, value_name = "DEGREES", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
     turned: Option<f64>,
@@ -129,9 +117,6 @@ struct LightArguments {
         conflicts_with = "scene"
     )]
     lamp: Option<String>,
-    /// The light that falls on an object of the background, of which this is the mask.
-    #[arg(long, value_name = "MASK", conflicts_with = "scene")]
-    light_object: Option<PathBuf>,
 }
 
 impl Arguments {
@@ -208,20 +193,20 @@ impl Arguments {
         let scene = SceneDescription {
             background: self.into.clone().unwrap_or_default(),
             size: self.size.unwrap_or([1280, 960]),
-            field: self.field.unwrap_or(60.0),
-            down: self.down.unwrap_or(10.0),
-            tilt: self.tilt,
+            field: 60.0,
+            down: 10.0,
+            tilt: None,
             light: LightDescription {
                 panorama,
                 lamp: self.light.lamp.clone(),
                 ambient: None,
                 coefficients,
-                object: self.light.light_object.clone(),
+                object: None,
                 turn: self.turned.unwrap_or(0.0),
             },
             matches: !self.no_match,
             white_balance: self.white_balance.unwrap_or(WhiteBalance::Light),
-            exposure: self.exposure.unwrap_or(0.0) as f32,
+            exposure: 0.0,
             objects,
         };
         scene.check()?;

@@ -17,7 +17,7 @@ use crate::values::{Choices, one_of};
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight turn 20261120T093015Z-mug.tar -o mug
-      a turn in unknown light: mug/normal.png, albedo.png, light.txt, object.relit, relit.mp4 ...
+      a turn in unknown light: mug/normal.png, albedo.png, light.txt, object.relit ...
   relight turn mug.tar --elevation 18 --rotation counter-clockwise -o mug
       the turn of a bare clip: its data set does not say how the rig is built
   relight turn mug.tar --light light.txt -o mug
@@ -60,9 +60,6 @@ pub(crate) struct Arguments {
     /// The object's material.
     #[arg(long, value_name = "KIND", value_parser = one_of(MATERIALS), default_value = "diffuse")]
     material: MaterialKind,
-    /// Do not write the video, which needs the program ffmpeg.
-    #[arg(long)]
-    pub(super) no_video: bool,
 }
 
 impl Arguments {

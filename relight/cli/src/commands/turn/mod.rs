@@ -14,12 +14,11 @@ use crate::commands::CommandResult;
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let start = Instant::now();
-    TurnFiles::check(&arguments.output, !arguments.no_video)?;
+    TurnFiles::check(&arguments.output)?;
     let solved = solve(arguments, console)?;
     let figures = TurnFiles {
         solved: &solved,
         light_source: light_source(arguments, &solved).as_deref(),
-        has_movie: !arguments.no_video,
     }
     .write(&arguments.output)?;
     let (seconds, reading_seconds) = (start.elapsed().as_secs_f64(), solved.reading.as_secs_f64());

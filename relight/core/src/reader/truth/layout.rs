@@ -4,8 +4,6 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::entry::{Entry, Part, Role, name_of};
-use super::scenes;
 use crate::image::Transfer;
 use crate::reader::OpenError;
 use crate::reader::listing::listed;
@@ -27,31 +25,38 @@ pub enum TruthLayout {
     /// `<number>/{image,mask,normal,albedo,shading,highlight}.png`, `light.txt` and `sample.json`. The
     /// image is taken as sRGB; the camera's own response is close to it.
     Synth,
-    /// The part of LIME (Meka et al. 2018) that the paper's warm-up reads: the files of
-    /// `Input_Masked`, `Normal` and `Mask`, paired in the order of their names; also of `Albedo` and
-    /// `Shading` where those folders are. Assumed, as no description is published: input and albedo
-    /// are sRGB, shading is linear, normals are y down as in the paper's colour figure.
-    Lime,
-    /// ARAP (Bonneel et al. 2017), one folder: the pictures `<scene>.<ext>` or `<scene>_light<n>.<ext>`, beside each
-    /// `<name>_albedo.<ext>` (of the picture, or of the scene for all its lights) and perhaps `<name>_shading.<ext>` and
-    /// `<name>_mask.png`. HDR and EXR are linear, PNG and JPEG sRGB. Without a mask the whole picture counts, as far as its
-    /// albedo is known; without a shading that is picture over albedo.
-    Arap,
-    /// Stanford-ORB (Kuang et al. 2023), single images: the test pictures of `blender_HDR/<scene>`, else of `blender_LDR`
-    /// (sRGB), with their masks, and of `ground_truth/<scene>` the normals and the albedo (PNG: sRGB). All are brought to
-    /// 512 x 512 pixels, at which that benchmark measures. Normals are taken as the camera's of Blender: x right, y up.
-    Orb,
 }
 
-/// How a file of normals holds its axes.
+/// What a file is of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum NormalFile {
-    /// Red is x, green is y up.
-    YUp,
-    /// Red is x, green is y down.
-    YDown,
-    /// Red is y down, green is x.
-    RedDownGreenRight,
+pub(super) enum Role {
+    Image,
+    Diffuse,
+    Normals,
+    NormalsValid,
+    Albedo,
+    Shading,
+    Highlight,
+    Mask,
+    Light,
+    /// The largest values that `shading` and `highlight` stand for.
+    Whites,
+}
+
+/// A file of a sample.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Part {
+    pub(super) role: Role,
+    pub(super) path: PathBuf,
+    /// Whether the sample is damaged without it.
+    pub(super) required: bool,
+}
+
+/// A sample's name and files.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Entry {
+    pub(super) name: String,
+    pub(super) parts: Vec<Part>,
 }
 
 const MIT: [(Role, &str, bool); 8] = [
@@ -85,24 +90,9 @@ const SYNTH: [(Role, &str, bool); 8] = [
     (Role::Whites, "sample.json", true),
 ];
 
-const LIME: [(Role, &str, bool); 5] = [
-    (Role::Mask, "Mask", true),
-    (Role::Image, "Input_Masked", true),
-    (Role::Normals, "Normal", true),
-    (Role::Albedo, "Albedo", false),
-    (Role::Shading, "Shading", false),
-];
-
 impl TruthLayout {
     /// All layouts.
-    pub const ALL: [Self; 6] = [
-        Self::Synth,
-        Self::Mit,
-        Self::Janner,
-        Self::Lime,
-        Self::Arap,
-        Self::Orb,
-    ];
+    pub const ALL: [Self; 3] = [Self::Synth, Self::Mit, Self::Janner];
 
     /// The name on the command line.
     #[must_use]
@@ -111,9 +101,6 @@ impl TruthLayout {
             Self::Synth => "synth",
             Self::Mit => "mit",
             Self::Janner => "janner",
-            Self::Lime => "lime",
-            Self::Arap => "arap",
-            Self::Orb => "orb",
         }
     }
 
@@ -121,27 +108,14 @@ impl TruthLayout {
         match self {
             Self::Synth | Self::Mit => "folders with a mask.png each",
             Self::Janner => "files <n>_mask.png, or folders of such",
-            Self::Lime => "folders Input_Masked, Normal and Mask",
-            Self::Arap => "pictures with a file <name>_albedo beside them",
-            Self::Orb => "folders blender_HDR (or blender_LDR) and ground_truth",
         }
     }
 
     /// How the values of this file stand for light.
     pub(super) const fn transfer(self, role: Role) -> Transfer {
         match (self, role) {
-            (Self::Lime | Self::Orb, Role::Image | Role::Albedo)
-            | (Self::Synth, Role::Image)
-            | (Self::Arap, Role::Image | Role::Albedo | Role::Shading) => Transfer::Srgb,
+            (Self::Synth, Role::Image) => Transfer::Srgb,
             _ => Transfer::Linear,
-        }
-    }
-
-    pub(super) const fn normal_file(self) -> NormalFile {
-        match self {
-            Self::Synth | Self::Mit | Self::Arap | Self::Orb => NormalFile::YUp,
-            Self::Janner => NormalFile::RedDownGreenRight,
-            Self::Lime => NormalFile::YDown,
         }
     }
 
@@ -150,23 +124,7 @@ impl TruthLayout {
             Self::Synth => folders(root, &SYNTH),
             Self::Mit => folders(root, &MIT),
             Self::Janner => janner(root),
-            Self::Lime => lime(root),
-            Self::Arap => scenes::arap(root),
-            Self::Orb => scenes::orb(root),
         }
-    }
-
-    /// The width and height to which larger pictures are brought.
-    pub(super) const fn measured_side(self) -> Option<usize> {
-        match self {
-            Self::Orb => Some(512),
-            _ => None,
-        }
-    }
-
-    /// Whether a picture of its own without highlights is lacking, and that with them stands for it.
-    pub(super) const fn has_one_picture(self) -> bool {
-        matches!(self, Self::Arap | Self::Orb)
     }
 }
 
@@ -224,45 +182,12 @@ fn numbered(folder: &Path, prefix: &str) -> Result<Vec<Entry>, OpenError> {
         .collect())
 }
 
-fn lime(root: &Path) -> Result<Vec<Entry>, OpenError> {
-    let masks = listed(&root.join("Mask"), Path::is_file)?;
-    let entry = |path: &PathBuf| Entry {
-        name: path
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
-        parts: Vec::new(),
-    };
-    let mut entries: Vec<Entry> = masks.iter().map(entry).collect();
-    for (role, name, required) in LIME {
-        let folder = root.join(name);
-        if !required && !folder.is_dir() {
-            continue;
-        }
-        let files = listed(&folder, Path::is_file)?;
-        if files.len() != entries.len() {
-            let fault = format!(
-                "has {} files and {} has {}: they cannot be paired",
-                files.len(),
-                root.join("Mask").display(),
-                entries.len()
-            );
-            return Err(OpenError::Content {
-                path: folder,
-                fault,
-            });
-        }
-        for (entry, path) in entries.iter_mut().zip(files) {
-            let required = true;
-            entry.parts.push(Part {
-                role,
-                path,
-                required,
-            });
-        }
-    }
-    Ok(entries)
+/// The last part of a path.
+fn name_of(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
 }
 
 fn parts(known: &[(Role, &str, bool)], path: impl Fn(&str) -> PathBuf) -> Vec<Part> {

@@ -1,19 +1,48 @@
 //! Images with their ground truth.
 
-mod entry;
 mod layout;
-mod npy;
 mod read;
-mod sample;
-mod scenes;
 
 use std::path::Path;
 
-use super::{DamagedSample, OpenError, SampleId, Source};
-use entry::Entry;
+use super::{DamagedSample, OpenError};
+use crate::image::{Extent, Linear, Planes, Rgb};
+use crate::light::{Normals, ShLight, YUp};
+use layout::Entry;
 
 pub use layout::TruthLayout;
-pub use sample::TruthSample;
+
+/// An image and its ground truth. A data set has some of these parts and lacks others;
+/// all that are there have the size of the mask.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TruthSample {
+    /// Its name within the set; parts of it are separated by `/`.
+    pub name: String,
+    /// 1 where the object is, 0 elsewhere.
+    pub mask: Planes<1>,
+    /// What a camera sees.
+    pub image: Option<Rgb<Linear>>,
+    /// The same without highlights: albedo times shading.
+    pub diffuse: Option<Rgb<Linear>>,
+    /// Normals, where they are known.
+    pub normals: Option<Normals<YUp>>,
+    /// The diffuse reflectance, up to a scale.
+    pub albedo: Option<Rgb<Linear>>,
+    /// The light that falls on the surface, up to a scale.
+    pub shading: Option<Rgb<Linear>>,
+    /// The highlights, in the image's units.
+    pub highlight: Option<Rgb<Linear>>,
+    /// The light of the scene.
+    pub light: Option<ShLight>,
+}
+
+impl TruthSample {
+    /// Width and height.
+    #[must_use]
+    pub const fn extent(&self) -> Extent {
+        self.mask.extent()
+    }
+}
 
 /// A folder of images with their ground truth.
 pub struct TruthSet {
@@ -69,31 +98,5 @@ impl TruthSet {
             sample: entry.name.clone(),
             fault,
         })
-    }
-}
-
-/// All samples are of one turn, to be drawn as [`Draw::Mixed`](super::Draw::Mixed).
-impl Source for TruthSet {
-    type Batch = Vec<TruthSample>;
-
-    fn turns(&self) -> Vec<u32> {
-        vec![u32::try_from(self.entries.len()).unwrap_or(u32::MAX)]
-    }
-
-    fn batch(
-        &self,
-        samples: &[SampleId],
-        spare: Option<Self::Batch>,
-    ) -> (Self::Batch, Vec<DamagedSample>) {
-        let mut batch = spare.unwrap_or_default();
-        batch.clear();
-        let mut damage = Vec::new();
-        for id in samples {
-            match self.load(id.position as usize) {
-                Ok(sample) => batch.push(sample),
-                Err(damaged) => damage.push(damaged),
-            }
-        }
-        (batch, damage)
     }
 }

@@ -6,12 +6,10 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::entry::{Entry, Part, Role};
-use super::layout::{NormalFile, TruthLayout};
-use super::npy;
-use super::sample::TruthSample;
+use super::TruthSample;
+use super::layout::{Entry, Part, Role, TruthLayout};
 use crate::files::read_planes;
-use crate::image::{Extent, ImageError, Linear, Planes, Rgb, check_extent};
+use crate::image::{ImageError, Linear, Planes, Rgb, check_extent};
 use crate::light::{Normals, ShLight, YDown, YUp};
 use crate::reader::SampleFault;
 use relit_data::text;
@@ -21,19 +19,11 @@ pub(super) fn sample(entry: &Entry, layout: TruthLayout) -> Result<TruthSample, 
     let whites = parts.whites()?;
     let image = parts.colour(Role::Image, 1.0)?;
     let albedo = parts.colour(Role::Albedo, 1.0)?;
-    let mut shading = parts.colour(Role::Shading, whites.shading)?;
-    let mut mask = parts.binary(Role::Mask)?;
-    if layout == TruthLayout::Arap
-        && let (Some(image), Some(albedo)) = (&image, &albedo)
-    {
-        check_extent("albedo", albedo.planes().extent(), image.planes().extent())?;
-        mask.get_or_insert_with(|| known(albedo.planes()));
-        shading.get_or_insert_with(|| quotient(image.planes(), albedo.planes()));
-    }
+    let shading = parts.colour(Role::Shading, whites.shading)?;
+    let mask = parts.binary(Role::Mask)?;
     let mask = mask.ok_or_else(|| SampleFault::missing("mask"))?;
     let diffuse = match parts.colour(Role::Diffuse, 1.0)? {
         Some(diffuse) => Some(diffuse),
-        None if layout.has_one_picture() => image.clone(),
         None => product(albedo.as_ref(), shading.as_ref())?,
     };
     let sample = TruthSample {
@@ -67,33 +57,9 @@ impl Parts<'_> {
     /// The image in a file of which the largest value stands for `white`.
     fn colour(&self, role: Role, white: f32) -> Result<Option<Rgb<Linear>>, SampleFault> {
         let transfer = self.layout.transfer(role);
-        if let Some(planes) = self.array(role)? {
-            return Ok(Some(Rgb::new(self.measured(planes))));
-        }
         let image = self.read(role, |path| Rgb::<Linear>::read(path, transfer))?;
         let scaled = |image: Rgb<Linear>| image.into_planes().map(|value| value * white);
-        Ok(image.map(|image| Rgb::new(self.measured(scaled(image)))))
-    }
-
-    /// The numbers in a file of NumPy, where the part is one.
-    fn array(&self, role: Role) -> Result<Option<Planes<3>>, SampleFault> {
-        let path = self.path(role);
-        let Some(path) = path.filter(|path| path.extension().is_some_and(|e| e == "npy")) else {
-            return Ok(None);
-        };
-        let bytes = fs::read(path).map_err(SampleFault::read(path))?;
-        let planes = npy::planes(&bytes);
-        planes.map(Some).map_err(SampleFault::numbers(path))
-    }
-
-    /// The picture at the size at which the data set is measured.
-    fn measured<const C: usize>(&self, planes: Planes<C>) -> Planes<C> {
-        match self.layout.measured_side() {
-            Some(side) if planes.extent().width > side && planes.extent().height > side => {
-                planes.resized(Extent::new(side, side))
-            }
-            _ => planes,
-        }
+        Ok(image.map(|image| Rgb::new(scaled(image))))
     }
 
     fn whites(&self) -> Result<Whites, SampleFault> {
@@ -126,13 +92,10 @@ impl Parts<'_> {
     }
 
     fn normals(&self) -> Result<Option<Normals<YUp>>, SampleFault> {
-        let file = self.layout.normal_file();
-        if let Some(planes) = self.array(Role::Normals)? {
-            // Where a mesh is not seen, some files hold no numbers.
-            let finite = planes.map(|value| if value.is_finite() { value } else { 0.0 });
-            return Ok(Some(Normals::new(self.measured(finite))));
-        }
-        let normals = self.read(Role::Normals, |path| read_normals(path, file))?;
+        let normals = self.read(Role::Normals, |path| match self.layout {
+            TruthLayout::Janner => read_turned_normals(path),
+            _ => Normals::<YUp>::read(path),
+        })?;
         match (normals, self.binary(Role::NormalsValid)?) {
             (Some(normals), Some(valid)) => only_where(&normals, &valid).map(Some),
             (normals, _) => Ok(normals),
@@ -145,7 +108,7 @@ impl Parts<'_> {
             let (planes, _) = read_planes(path)?;
             let extent = planes.extent();
             let [plane, _, _] = planes.into_planes();
-            let plane = self.measured(Planes::from_planes(extent, [plane])?);
+            let plane = Planes::from_planes(extent, [plane])?;
             Ok(plane.map(|value| f32::from(u8::from(value >= 0.5))))
         })
     }
@@ -173,30 +136,6 @@ impl Parts<'_> {
     }
 }
 
-/// 1 where albedo is known: where it is not black.
-fn known(albedo: &Planes<3>) -> Planes<1> {
-    let extent = albedo.extent();
-    Planes::from_fn(extent, |x, y| {
-        let pixel = albedo.pixel(x, y);
-        let is_known = pixel.iter().all(|v| v.is_finite()) && pixel.iter().any(|&v| v > 0.0);
-        [f32::from(u8::from(is_known))]
-    })
-}
-
-/// Least albedo by which a picture is divided, in parts of the brightest.
-const LEAST_ALBEDO: f32 = 1e-3;
-
-/// A picture over its albedo.
-fn quotient(image: &Planes<3>, albedo: &Planes<3>) -> Rgb<Linear> {
-    let values = albedo.planes().into_iter().flatten();
-    let brightest = values.fold(0.0_f32, |a, &b| a.max(b));
-    let least = (LEAST_ALBEDO * brightest).max(f32::MIN_POSITIVE);
-    Rgb::new(Planes::from_fn(image.extent(), |x, y| {
-        let (light, albedo) = (image.pixel(x, y), albedo.pixel(x, y));
-        [0, 1, 2].map(|c| light[c] / albedo[c].max(least))
-    }))
-}
-
 /// Albedo times shading.
 fn product(
     albedo: Option<&Rgb<Linear>>,
@@ -219,18 +158,13 @@ fn product(
     Ok(Some(Rgb::new(planes)))
 }
 
-fn read_normals(path: &Path, file: NormalFile) -> Result<Normals<YUp>, ImageError> {
-    Ok(match file {
-        NormalFile::YUp => Normals::<YUp>::read(path)?,
-        NormalFile::YDown => Normals::<YDown>::read(path)?.flipped(),
-        NormalFile::RedDownGreenRight => {
-            let (colours, _) = read_planes(path)?;
-            let extent = colours.extent();
-            let [down, right, viewer] = colours.into_planes();
-            let colours = Planes::from_planes(extent, [right, down, viewer])?;
-            Normals::<YDown>::from_colours(colours).flipped()
-        }
-    })
+/// Normals whose red is y down and whose green is x.
+fn read_turned_normals(path: &Path) -> Result<Normals<YUp>, ImageError> {
+    let (colours, _) = read_planes(path)?;
+    let extent = colours.extent();
+    let [down, right, viewer] = colours.into_planes();
+    let colours = Planes::from_planes(extent, [right, down, viewer])?;
+    Ok(Normals::<YDown>::from_colours(colours).flipped())
 }
 
 /// The normals without those where `valid` is 0.

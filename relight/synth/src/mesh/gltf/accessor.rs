@@ -1,10 +1,7 @@
 //! Numbers in the buffers of a glTF file.
 
-use super::document::{Accessor, SparseItems};
+use super::document::Accessor;
 use super::file::File;
-
-/// Most items of numbers that stand nowhere in the file: they are zeros.
-const MOST_ZEROS: usize = 20_000_000;
 
 /// Types of the numbers.
 const I8: u32 = 5120;
@@ -24,7 +21,7 @@ impl File<'_> {
     /// Whether the items of an accessor stand in the file.
     pub(super) fn has_items(&self, number: usize) -> bool {
         let accessor = self.document.accessors.get(number);
-        accessor.is_some_and(|one| one.buffer_view.is_some() || one.sparse.is_some())
+        accessor.is_some_and(|one| one.buffer_view.is_some())
     }
 
     /// Whether positions may be whole numbers.
@@ -56,21 +53,9 @@ impl File<'_> {
         if self.of_kind(number, "VEC3").is_ok() {
             return self.numbers(number, true);
         }
-        let all = self.weights(number)?.into_iter();
-        Ok(all.map(|[r, g, b, _]| [r, g, b]).collect())
-    }
-
-    /// Weights of joints.
-    pub(super) fn weights(&self, number: usize) -> Result<Vec<[f32; 4]>, String> {
         self.of_kind(number, "VEC4")?;
-        self.numbers(number, true)
-    }
-
-    pub(super) fn matrices(&self, number: usize) -> Result<Vec<[f32; 16]>, String> {
-        if self.of_kind(number, "MAT4")?.component_type != F32 {
-            return Err(of_another_kind(number));
-        }
-        self.numbers(number, false)
+        let all: Vec<[f32; 4]> = self.numbers(number, true)?;
+        Ok(all.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
     }
 
     /// Numbers of vertices.
@@ -78,12 +63,6 @@ impl File<'_> {
         self.of_kind(number, "SCALAR")?;
         let all: Vec<[u32; 1]> = self.items(number, index)?;
         Ok(all.into_flattened())
-    }
-
-    /// Numbers of joints.
-    pub(super) fn joints(&self, number: usize) -> Result<Vec<[u32; 4]>, String> {
-        self.of_kind(number, "VEC4")?;
-        self.items(number, index)
     }
 
     fn of_kind(&self, number: usize, kind: &str) -> Result<&Accessor, String> {
@@ -117,15 +96,36 @@ impl File<'_> {
         })
     }
 
-    /// The items of an accessor, each of N numbers; those that it changes are changed.
+    /// The items of an accessor, each of N numbers.
     fn items<T: Copy + Default, const N: usize>(
         &self,
         number: usize,
         read: impl Fn(u32, &[u8]) -> Option<T>,
     ) -> Result<Vec<[T; N]>, String> {
         let accessor = self.accessor(number)?;
-        let kind = accessor.component_type;
+        if accessor.sparse.is_some() {
+            return Err(format!(
+                "accessor {number} is sparse, which is not read: save it with all its items"
+            ));
+        }
+        let (kind, count) = (accessor.component_type, accessor.count);
         let size = size(kind).ok_or_else(|| of_another_kind(number))?;
+        let view = accessor.buffer_view;
+        let view = view.ok_or_else(|| format!("accessor {number} has no buffer view"))?;
+        let stride = self.document.buffer_views.get(view);
+        let stride = stride.and_then(|view| view.byte_stride).unwrap_or(0);
+        let stride = stride.max(size * N);
+        // The last item need not be followed by its padding.
+        let length = match count.checked_sub(1) {
+            Some(before) => stride
+                .checked_mul(before)
+                .and_then(|all| all.checked_add(size * N)),
+            None => Some(0),
+        };
+        let end = length.and_then(|length| accessor.byte_offset.checked_add(length));
+        let bytes = self.view(view)?;
+        let bytes = end.and_then(|end| bytes.get(accessor.byte_offset..end));
+        let bytes = bytes.ok_or_else(|| format!("accessor {number} reaches beyond its buffer"))?;
         let item = |bytes: &[u8]| {
             let mut values = [T::default(); N];
             for (value, bytes) in values.iter_mut().zip(bytes.chunks(size)) {
@@ -133,77 +133,8 @@ impl File<'_> {
             }
             Ok(values)
         };
-        let beyond = |why: Option<String>| {
-            why.unwrap_or_else(|| format!("accessor {number} reaches beyond its buffer"))
-        };
-        let count = accessor.count;
-        let mut all = match accessor.buffer_view {
-            Some(view) => {
-                let stride = self
-                    .document
-                    .buffer_views
-                    .get(view)
-                    .and_then(|view| view.byte_stride);
-                let placed = Placed {
-                    view,
-                    offset: accessor.byte_offset,
-                    stride: stride.unwrap_or(size * N).max(size * N),
-                };
-                let bytes = self.placed(placed, size * N, count).map_err(beyond)?;
-                bytes.map(item).collect::<Result<Vec<_>, String>>()?
-            }
-            None if count > MOST_ZEROS => return Err(beyond(None)),
-            None => vec![[T::default(); N]; count],
-        };
-        let Some(sparse) = &accessor.sparse else {
-            return Ok(all);
-        };
-        let tight = |items: &SparseItems, size: usize| Placed {
-            view: items.buffer_view,
-            offset: items.byte_offset,
-            stride: size,
-        };
-        let index_kind = sparse.indices.component_type.unwrap_or_default();
-        let index_size = self::size(index_kind).ok_or_else(|| of_another_kind(number))?;
-        let indices = self.placed(tight(&sparse.indices, index_size), index_size, sparse.count);
-        let values = self.placed(tight(&sparse.values, size * N), size * N, sparse.count);
-        for (place, bytes) in indices.map_err(beyond)?.zip(values.map_err(beyond)?) {
-            let place = index(index_kind, place).ok_or_else(|| of_another_kind(number))?;
-            let changed = all.get_mut(place as usize);
-            *changed
-                .ok_or_else(|| format!("accessor {number} changes item {place} of {count}"))? =
-                item(bytes)?;
-        }
-        Ok(all)
+        bytes.chunks(stride).map(item).collect()
     }
-
-    /// Items of `size` bytes; all of them lie within their buffer. None where they do not.
-    fn placed(
-        &self,
-        at: Placed,
-        size: usize,
-        count: usize,
-    ) -> Result<impl Iterator<Item = &[u8]>, Option<String>> {
-        let within = self.view(at.view).map_err(Some)?;
-        // The last item need not be followed by its padding.
-        let length = at.stride.checked_mul(count.saturating_sub(1));
-        let length =
-            length.and_then(|length| length.checked_add(size.min(size.saturating_mul(count))));
-        let end = length.and_then(|length| at.offset.checked_add(length));
-        let bytes = end.and_then(|end| within.get(at.offset..end)).ok_or(None)?;
-        Ok(bytes
-            .chunks(at.stride)
-            .filter_map(move |item| item.get(..size)))
-    }
-}
-
-/// Where items stand.
-#[derive(Clone, Copy)]
-struct Placed {
-    view: usize,
-    offset: usize,
-    /// Bytes from one to the next.
-    stride: usize,
 }
 
 fn size(kind: u32) -> Option<usize> {

@@ -16,7 +16,6 @@ pub(super) struct Document {
     pub(super) scenes: Vec<Scene>,
     pub(super) nodes: Vec<Node>,
     pub(super) meshes: Vec<Mesh>,
-    pub(super) skins: Vec<Skin>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<View>,
     pub(super) buffers: Vec<Buffer>,
@@ -42,8 +41,7 @@ pub(super) struct Scene {
 pub(super) struct Node {
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
-    pub(super) skin: Option<usize>,
-    pub(super) weights: Vec<f32>,
+    pub(super) skin: Option<IgnoredAny>,
     pub(super) matrix: Option<[f32; 16]>,
     pub(super) translation: Option<[f32; 3]>,
     pub(super) rotation: Option<[f32; 4]>,
@@ -54,7 +52,6 @@ pub(super) struct Node {
 #[serde(default)]
 pub(super) struct Mesh {
     pub(super) primitives: Vec<Primitive>,
-    pub(super) weights: Vec<f32>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -64,15 +61,7 @@ pub(super) struct Primitive {
     pub(super) indices: Option<usize>,
     pub(super) material: Option<usize>,
     pub(super) mode: Option<u32>,
-    pub(super) targets: Vec<BTreeMap<String, usize>>,
     pub(super) extensions: BTreeMap<String, IgnoredAny>,
-}
-
-#[derive(Debug, Default, Deserialize)]
-#[serde(rename_all = "camelCase", default)]
-pub(super) struct Skin {
-    pub(super) joints: Vec<usize>,
-    pub(super) inverse_bind_matrices: Option<usize>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -87,24 +76,7 @@ pub(super) struct Accessor {
     pub(super) count: usize,
     #[serde(rename = "type")]
     pub(super) kind: String,
-    pub(super) sparse: Option<Sparse>,
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Sparse {
-    pub(super) count: usize,
-    pub(super) indices: SparseItems,
-    pub(super) values: SparseItems,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct SparseItems {
-    pub(super) buffer_view: usize,
-    #[serde(default)]
-    pub(super) byte_offset: usize,
-    /// Of indices.
-    pub(super) component_type: Option<u32>,
+    pub(super) sparse: Option<IgnoredAny>,
 }
 
 #[derive(Debug, Deserialize)]

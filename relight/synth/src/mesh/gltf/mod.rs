@@ -1,5 +1,5 @@
 //! glTF 2.0 files: JSON with its buffers beside it or inside, or one binary file. Positions, texture coordinates and colours
-//! of triangles are read, placed as the scene's nodes and the skeletons at rest say, and their materials with pictures.
+//! of triangles are read, placed as the scene's nodes say, and their materials with pictures.
 //!
 //! Read here and not by a library: the one that is maintained refuses valid files for what is not needed of them, and ends the
 //! program at some that are not.
@@ -16,9 +16,8 @@ use std::path::Path;
 
 use glam::{Mat4, Vec2, Vec3};
 
-use self::document::{Mesh, Node, Primitive};
+use self::document::{Node, Primitive};
 use self::file::{File, not_read};
-use self::nodes::Placements;
 use super::raw::{RawMesh, RawTriangle};
 use super::{MOST_TRIANGLES, too_large};
 
@@ -32,16 +31,12 @@ const DRACO: &str = "KHR_draco_mesh_compression";
 /// All triangles of the default scene as one surface.
 pub(super) fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
     let file = File::parsed(path, bytes)?;
-    let placements = Placements::of(&file.document)?;
     let mut reader = Reader {
         file: &file,
-        placements: &placements,
         raw: RawMesh::default(),
     };
-    for &(number, placed) in &placements.nodes {
-        if let Some(node) = file.document.nodes.get(number) {
-            reader.node(node, placed)?;
-        }
+    for (node, placed) in nodes::placed(&file.document)? {
+        reader.node(node, placed)?;
     }
     let mut raw = reader.raw;
     raw.materials.all = materials::read(&file, &raw.materials.used(), &mut raw.left_out);
@@ -50,7 +45,6 @@ pub(super) fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
 
 struct Reader<'a> {
     file: &'a File<'a>,
-    placements: &'a Placements,
     raw: RawMesh,
 }
 
@@ -63,23 +57,17 @@ impl Reader<'_> {
         let mesh = meshes
             .get(number)
             .ok_or_else(|| format!("it names mesh {number} of {}", meshes.len()))?;
-        let joints = match node.skin {
-            Some(skin) => self.placements.joints(self.file, skin)?,
-            None => None,
-        };
+        let bound = "its skeletons are not read: what they carry lies as it was modelled";
+        if node.skin.is_some() && !self.raw.left_out.iter().any(|what| what == bound) {
+            self.raw.left_out.push(bound.to_owned());
+        }
         for primitive in &mesh.primitives {
-            self.primitive(primitive, (node, mesh), placed, joints.as_deref())?;
+            self.primitive(primitive, placed)?;
         }
         Ok(())
     }
 
-    fn primitive(
-        &mut self,
-        primitive: &Primitive,
-        (node, mesh): (&Node, &Mesh),
-        placed: Mat4,
-        joints: Option<&[Mat4]>,
-    ) -> Result<(), String> {
+    fn primitive(&mut self, primitive: &Primitive, placed: Mat4) -> Result<(), String> {
         let mode = primitive.mode.unwrap_or(TRIANGLES);
         if !matches!(mode, TRIANGLES | TRIANGLE_STRIP | TRIANGLE_FAN) {
             return Ok(());
@@ -89,19 +77,10 @@ impl Reader<'_> {
         if primitive.extensions.contains_key(DRACO) && !self.file.has_items(accessor) {
             return Err(not_read(DRACO));
         }
-        let weights = [&node.weights, &mesh.weights];
-        let weights = weights.into_iter().find(|all| !all.is_empty());
-        let weights = weights.map_or(&[][..], Vec::as_slice);
-        let positions = self.morphed(accessor, primitive, weights)?;
-        let bound = match joints {
-            Some(joints) => self.bound(primitive, &positions, joints)?,
-            None => None,
-        };
-        let is_mirrored = bound.is_none() && placed.determinant() < 0.0;
-        let positions = bound.unwrap_or_else(|| {
-            let moved = positions.iter().map(|&p| placed.transform_point3(p));
-            moved.collect()
-        });
+        let positions = self.file.vectors(accessor)?.into_iter();
+        let positions: Vec<Vec3> = positions
+            .map(|position| placed.transform_point3(position.into()))
+            .collect();
         let count = positions.len();
         let order = match primitive.indices {
             Some(accessor) => self.file.indices(accessor)?,
@@ -113,70 +92,12 @@ impl Reader<'_> {
         let first = self.raw.positions.len() as u32;
         self.raw.positions.extend(positions);
         let mut triangles = triangles(mode, &order);
-        if is_mirrored {
+        if placed.determinant() < 0.0 {
             triangles
                 .iter_mut()
                 .for_each(|[_, b, c]| std::mem::swap(b, c));
         }
         self.push(primitive, first, &triangles)
-    }
-
-    /// The positions of a part with the displacements that it has from the start.
-    fn morphed(
-        &self,
-        accessor: usize,
-        primitive: &Primitive,
-        weights: &[f32],
-    ) -> Result<Vec<Vec3>, String> {
-        let positions = self.file.vectors(accessor)?;
-        let mut positions: Vec<Vec3> = positions.into_iter().map(Vec3::from).collect();
-        for (target, &weight) in primitive.targets.iter().zip(weights) {
-            let Some(&accessor) = target.get("POSITION").filter(|_| weight != 0.0) else {
-                continue;
-            };
-            let moves = self.file.vectors(accessor)?;
-            for (position, by) in positions.iter_mut().zip(moves) {
-                *position += weight * Vec3::from(by);
-            }
-        }
-        Ok(positions)
-    }
-
-    /// The positions of a part where the joints to which they are bound carry them; none of a part that is not bound.
-    fn bound(
-        &self,
-        primitive: &Primitive,
-        positions: &[Vec3],
-        joints: &[Mat4],
-    ) -> Result<Option<Vec<Vec3>>, String> {
-        let mut sums = vec![Mat4::ZERO; positions.len()];
-        for set in 0.. {
-            let named = |kind: &str| primitive.attributes.get(&format!("{kind}_{set}"));
-            let (Some(&numbers), Some(&weights)) = (named("JOINTS"), named("WEIGHTS")) else {
-                if set == 0 {
-                    return Ok(None);
-                }
-                break;
-            };
-            let (numbers, weights) = (self.file.joints(numbers)?, self.file.weights(weights)?);
-            for (sum, (numbers, weights)) in sums.iter_mut().zip(numbers.iter().zip(weights)) {
-                for (&joint, weight) in numbers.iter().zip(weights).filter(|(_, one)| *one != 0.0) {
-                    let joint = joints.get(joint as usize);
-                    *sum +=
-                        *joint.ok_or("a vertex is bound to a joint that is not there")? * weight;
-                }
-            }
-        }
-        let carried = positions.iter().zip(&sums).map(|(&position, sum)| {
-            // The weights' sum is 1 but for rounding; 0 where a vertex is not bound.
-            let carried = *sum * position.extend(1.0);
-            if carried.w > 0.0 {
-                carried.truncate() / carried.w
-            } else {
-                position
-            }
-        });
-        Ok(Some(carried.collect()))
     }
 
     /// Adds triangles of vertices from `first` on, with what the part says of their corners.

@@ -3,65 +3,28 @@
 use glam::{Mat4, Quat, Vec3};
 
 use super::document::{Document, Node};
-use super::file::File;
 
 /// Most nodes that are visited; more are a circle.
 const MOST_NODES: usize = 100_000;
 
-/// The nodes of the default scene, in its order.
-pub(super) struct Placements {
-    /// By their numbers, each with its placement in the scene.
-    pub(super) nodes: Vec<(usize, Mat4)>,
-    /// For each node of the file, where the scene has it.
-    of: Vec<Option<Mat4>>,
-}
-
-impl Placements {
-    pub(super) fn of(document: &Document) -> Result<Self, String> {
-        let count = document.nodes.len();
-        let mut placements = Self {
-            nodes: Vec::new(),
-            of: vec![None; count],
-        };
-        let roots = roots(document);
-        let mut waiting: Vec<(usize, Mat4)> =
-            roots.iter().map(|&root| (root, Mat4::IDENTITY)).collect();
-        waiting.reverse();
-        while let Some((number, parent)) = waiting.pop() {
-            let node = document.nodes.get(number);
-            let node = node.ok_or_else(|| format!("it names node {number} of {count}"))?;
-            if placements.nodes.len() + waiting.len() + node.children.len() > MOST_NODES {
-                return Err("its nodes go in a circle, or there are too many".to_owned());
-            }
-            let placed = parent * local(node);
-            placements.nodes.push((number, placed));
-            placements.of[number] = Some(placed);
-            waiting.extend(node.children.iter().rev().map(|&child| (child, placed)));
+/// The nodes of the default scene in its order, each with its placement.
+pub(super) fn placed(document: &Document) -> Result<Vec<(&Node, Mat4)>, String> {
+    let count = document.nodes.len();
+    let mut placed = Vec::new();
+    let mut waiting: Vec<(usize, Mat4)> = (roots(document).into_iter().rev())
+        .map(|root| (root, Mat4::IDENTITY))
+        .collect();
+    while let Some((number, parent)) = waiting.pop() {
+        let node = document.nodes.get(number);
+        let node = node.ok_or_else(|| format!("it names node {number} of {count}"))?;
+        if placed.len() + waiting.len() + node.children.len() > MOST_NODES {
+            return Err("its nodes go in a circle, or there are too many".to_owned());
         }
-        Ok(placements)
+        let place = parent * local(node);
+        placed.push((node, place));
+        waiting.extend(node.children.iter().rev().map(|&child| (child, place)));
     }
-
-    /// What carries the vertices that are bound to each joint of a skin; none where the scene has not all joints.
-    pub(super) fn joints(&self, file: &File<'_>, skin: usize) -> Result<Option<Vec<Mat4>>, String> {
-        let skins = &file.document.skins;
-        let skin = skins
-            .get(skin)
-            .ok_or_else(|| format!("it names skin {skin} of {}", skins.len()))?;
-        let inverse = match skin.inverse_bind_matrices {
-            Some(accessor) => file.matrices(accessor)?,
-            None => Vec::new(),
-        };
-        let inverse = inverse.iter().map(Mat4::from_cols_array);
-        let inverse = inverse.chain(std::iter::repeat(Mat4::IDENTITY));
-        let placed = skin
-            .joints
-            .iter()
-            .map(|&joint| self.of.get(joint).copied().flatten());
-        let carried = placed
-            .zip(inverse)
-            .map(|(placed, inverse)| Some(placed? * inverse));
-        Ok(carried.collect())
-    }
+    Ok(placed)
 }
 
 /// The uppermost nodes of the default scene; of a file without scenes, those that are no other's child.

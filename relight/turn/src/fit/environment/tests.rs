@@ -1,4 +1,4 @@
-use crate::test_turns::{SOLVED, ball, elevation, environment};
+use crate::tests::{SOLVED, ball, elevation, environment};
 use crate::{MaterialKind, TableFrame, fit_turn_light};
 
 #[test]

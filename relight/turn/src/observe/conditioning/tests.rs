@@ -1,6 +1,6 @@
 use crate::TurnVerdict;
 use crate::observe::conditioning::Conditioning;
-use crate::test_turns::{SOLVED, TAKE, Take, ball, environment, even_environment, film, solve};
+use crate::tests::{SOLVED, TAKE, Take, ball, environment, even_environment, film, solve};
 use relight_core::light::ShLight;
 
 #[test]

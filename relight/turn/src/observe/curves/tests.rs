@@ -7,7 +7,7 @@ use crate::observe::curves::CurveBuilder;
 fn turns_without_frames_or_angles_are_refused_by_what_is_wrong() {
     let extent = Extent::new(4, 4);
     let empty = CurveBuilder::new(extent, &[0.0; 16]);
-    assert!(matches!(empty, Err(TurnError::Frames(_))));
+    assert!(matches!(empty, Err(TurnError::Refused(_))));
     let builder = || CurveBuilder::new(extent, &[1.0; 16]).unwrap();
     let grey = [0.3; 16];
     let mut few = builder();
@@ -17,7 +17,7 @@ fn turns_without_frames_or_angles_are_refused_by_what_is_wrong() {
     let refused = few.finish().unwrap_err().to_string();
     assert!(refused.starts_with("1 different angles"), "{refused}");
     let other = builder().push(0.0, Extent::new(8, 2), [&grey; 3]);
-    assert!(matches!(other, Err(TurnError::Frames(_))));
+    assert!(matches!(other, Err(TurnError::Refused(_))));
     let mut lost = builder();
     lost.push(f64::NAN, extent, [&grey; 3]).unwrap();
     lost.push(f64::INFINITY, extent, [&grey; 3]).unwrap();

@@ -1,4 +1,4 @@
-use crate::test_turns::{SIDE, SOLVED};
+use crate::tests::{SIDE, SOLVED};
 
 #[test]
 fn a_turn_becomes_an_object_whose_edge_has_its_own_colour() {

@@ -1,6 +1,6 @@
 use relit_data::rig::RotationDirection;
 
-use crate::test_turns::{
+use crate::tests::{
     SOLVED, TAKE, ball, environment, even_environment, expecting, film, read, solve, solved,
 };
 use crate::{FactSource, ReadTurn, SolvedTurn, TableRotation};

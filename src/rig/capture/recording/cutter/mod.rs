@@ -51,7 +51,7 @@ impl TurnCount {
         Self {
             expected,
             exposures: Vec::new(),
-            missing: gaps(&[], expected, &[]),
+            missing: gaps(&[], expected),
             anomalies: Vec::new(),
             counts: false,
         }
@@ -111,7 +111,7 @@ impl Cutter {
 
     /// Takes the next frame; returns what is to be recorded now.
     pub(super) fn push(&mut self, frame: Arc<Frame>) -> Vec<TurnFrame> {
-        let Some(window) = self.window.filter(|window| frame.t_us >= window.from_us()) else {
+        let Some(window) = self.window.filter(|window| frame.t_us >= window.from_us) else {
             self.before = Some(stamp_of(&frame));
             self.pre_roll.push(frame, self.is_key);
             return Vec::new();
@@ -124,13 +124,13 @@ impl Cutter {
             selected = self.frames_to_decode_first(&frame);
         }
         let hold = (1.5e6 / self.fps) as i64;
-        if frame.t_us >= window.to_us().saturating_add(hold) {
+        if frame.t_us >= window.to_us.saturating_add(hold) {
             self.done = true;
             return selected;
         }
         let delivered = Some(self.stamps.len());
         self.stamps.push(stamp_of(&frame));
-        let near_end = frame.t_us >= window.to_us().saturating_sub(hold);
+        let near_end = frame.t_us >= window.to_us.saturating_sub(hold);
         let next = TurnFrame { frame, delivered };
         if near_end || !self.held.is_empty() {
             self.held.push_back(next);
@@ -182,17 +182,17 @@ impl Cutter {
         let nominal = 1e6 / self.fps;
         let measured = all.len() >= FEWEST_FOR_RATE;
         let period = if measured { timing.period_us } else { nominal };
-        let length = (window.to_us() as f64 - window.from_us() as f64) / period;
+        let length = (window.to_us as f64 - window.from_us as f64) / period;
         let expected = length.round().max(1.0) as u64;
         let Some(&first) = timing.exposures.get(lead) else {
             return TurnCount::without_frames(expected);
         };
         // Exposures of the turn before its first frame.
         let due = timing.start_us + period * first as f64;
-        let late = (due - window.from_us() as f64) / period;
+        let late = (due - window.from_us as f64) / period;
         let skipped = match self.before {
             // Only those between both can be missing.
-            Some(before) if before.t_us < window.from_us() => {
+            Some(before) if before.t_us < window.from_us => {
                 (late as u64).min(first.saturating_sub(1))
             }
             Some(_) => late as u64,
@@ -206,7 +206,7 @@ impl Cutter {
             .collect();
         let anomalies = timing.anomalies.iter();
         TurnCount {
-            missing: gaps(&exposures, expected, &timing.evidence[lead..]),
+            missing: gaps(&exposures, expected),
             anomalies: anomalies
                 .filter_map(|anomaly| anomaly.counted_from(lead, exposures.len()))
                 .collect(),

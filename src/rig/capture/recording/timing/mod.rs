@@ -31,19 +31,6 @@ pub(crate) struct FrameStamp {
     pub t_us: i64,
 }
 
-/// What shows that frames are missing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Evidence {
-    /// Counter and time stamps.
-    Both,
-    /// The counter; the time stamps are too irregular.
-    Counter,
-    /// The time stamps; the counter stands still or the camera has none.
-    Time,
-    /// The time stamps, against the counter: see [`TimingAnomaly::Contradiction`].
-    TimeAgainstCounter,
-}
-
 /// Frames that were exposed and not delivered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct MissingFrames {
@@ -53,8 +40,6 @@ pub(crate) struct MissingFrames {
     pub count: u64,
     /// The delivered frame that comes after them, from 0.
     pub before: usize,
-    /// What shows it.
-    pub evidence: Evidence,
 }
 
 /// What the stamps of a row of frames show.
@@ -68,8 +53,6 @@ pub(crate) struct FrameTiming {
     pub counts: bool,
     /// For each delivered frame the number of its exposure; the first is 0, and they grow.
     pub exposures: Vec<u64>,
-    /// For each delivered frame what shows that frames are missing before it.
-    pub evidence: Vec<Evidence>,
     /// What does not fit.
     pub anomalies: Vec<TimingAnomaly>,
 }
@@ -97,9 +80,6 @@ impl FrameTiming {
             period_us: found.line.period,
             start_us: first as f64 + found.line.start,
             counts,
-            evidence: (0..stamps.len())
-                .map(|at| evidence(&found, counts, at))
-                .collect(),
             exposures: found.exposures,
             anomalies: found.anomalies,
         }
@@ -140,31 +120,16 @@ fn wrong_rates(found: &Numbering, agreed: f64) -> Vec<TimingAnomaly> {
         .collect()
 }
 
-/// What shows gaps before frame `at`.
-fn evidence(found: &Numbering, counts: bool, at: usize) -> Evidence {
-    match (found.by_time, found.agreed.get(at)) {
-        _ if at == 0 || !counts => Evidence::Time,
-        (false, _) => Evidence::Counter,
-        (true, Some(false)) => Evidence::TimeAgainstCounter,
-        (true, _) => Evidence::Both,
-    }
-}
-
 /// The exposures up to, but not with, `end` that are none of the delivered frames', in order.
-/// `evidence`: for each frame what shows a gap before it; the time stamps show one behind the last.
-pub(crate) fn gaps(exposures: &[u64], end: u64, evidence: &[Evidence]) -> Vec<MissingFrames> {
+pub(crate) fn gaps(exposures: &[u64], end: u64) -> Vec<MissingFrames> {
     let mut due = 0;
     let mut missing = Vec::new();
-    let end = (exposures.len(), end, Evidence::Time);
-    let frames = exposures.iter().zip(evidence).enumerate();
-    let frames = frames.map(|(before, (&exposure, &evidence))| (before, exposure, evidence));
-    for (before, exposure, evidence) in frames.chain([end]) {
+    for (before, &exposure) in exposures.iter().chain([&end]).enumerate() {
         if exposure > due {
             missing.push(MissingFrames {
                 exposure: due,
                 count: exposure - due,
                 before,
-                evidence,
             });
         }
         due = exposure.saturating_add(1);

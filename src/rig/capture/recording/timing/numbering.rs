@@ -18,11 +18,6 @@ pub(super) struct Numbering {
     pub(super) line: Line,
     /// For each frame its exposure; the first is 0, and they grow.
     pub(super) exposures: Vec<u64>,
-    /// For each frame, whether counter and stamps agree on what lies before it; empty where they
-    /// agree everywhere or only one of them is used.
-    pub(super) agreed: Vec<bool>,
-    /// False where the stamps are too irregular.
-    pub(super) by_time: bool,
     /// What does not fit.
     pub(super) anomalies: Vec<TimingAnomaly>,
 }
@@ -84,17 +79,12 @@ impl Numbering {
         Self {
             line,
             exposures: growing(numbers),
-            agreed: Vec::new(),
-            by_time: true,
             anomalies,
         }
     }
 
     fn irregular(line: Line, numbers: &[i64]) -> Self {
-        Self {
-            by_time: false,
-            ..Self::by_stamps(line, numbers, vec![TimingAnomaly::Irregular])
-        }
+        Self::by_stamps(line, numbers, vec![TimingAnomaly::Irregular])
     }
 
     /// Where counter and stamps differ somewhere: the stamps decide, unless one is off alone.
@@ -103,14 +93,12 @@ impl Numbering {
         let offsets: Vec<i64> = pairs.map(|(timed, counted)| timed - counted).collect();
         let steady: Vec<i64> = (0..offsets.len()).map(|at| vote(&offsets, at)).collect();
         let mut anomalies = Vec::new();
-        let mut agreed = vec![true; counted.len()];
         for at in 0..counted.len() {
             if offsets[at] != steady[at] {
                 let off = offsets[at] - steady[at];
                 anomalies.push(TimingAnomaly::OddTime { frame: at, off });
             }
             if at > 0 && steady[at] != steady[at - 1] {
-                agreed[at] = false;
                 let grown = counted[at] - counted[at - 1];
                 anomalies.push(TimingAnomaly::Contradiction {
                     before: at,
@@ -122,10 +110,7 @@ impl Numbering {
         let pairs = counted.iter().zip(&steady);
         let numbers: Vec<i64> = pairs.map(|(counted, steady)| counted + steady).collect();
         let line = Line::through(&numbers, times).unwrap_or(fit.line);
-        Self {
-            agreed,
-            ..Self::by_stamps(line, &numbers, anomalies)
-        }
+        Self::by_stamps(line, &numbers, anomalies)
     }
 }
 

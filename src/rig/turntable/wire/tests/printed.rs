@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::turntable::wire::number::LONGEST;
-use crate::turntable::wire::{Message, Position, StatusReport};
+use crate::turntable::wire::{Message, StatusReport};
 
 impl fmt::Display for Message {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -12,15 +12,13 @@ impl fmt::Display for Message {
             Message::Error { code, seq } => write!(f, "error:{code}{}", numbered(*seq)),
             Message::Alarm(code) => write!(f, "ALARM:{code}"),
             Message::Status(report) => report.fmt(f),
-            Message::Banner(banner) => f.write_str(&banner.text),
+            Message::Banner(None) => f.write_str("Grbl 1.1h ['$' for help]"),
+            Message::Banner(Some(cause)) => write!(f, "Grbl 1.1h ['$' for help] [reset: {cause}]"),
             Message::Version { version, note } => write!(f, "[VER:{version}:{note}]"),
-            Message::Build { letters, sizes } if sizes.is_empty() => write!(f, "[OPT:{letters}]"),
-            Message::Build { letters, sizes } => write!(f, "[OPT:{letters},{sizes}]"),
-            Message::Note(text) => write!(f, "[MSG:{text}]"),
+            Message::Build { letters } => write!(f, "[OPT:{letters},8,128]"),
             Message::Info { tag, text } => write!(f, "[{tag}:{text}]"),
             Message::Setting { number, value } => write!(f, "${number}={}", shown(*value, 3)),
-            Message::TextSetting { number, text } => write!(f, "${number}={text}"),
-            Message::Startup(text) => write!(f, ">{text}"),
+            Message::Other => f.write_str(">G21:ok"),
         }
     }
 }
@@ -35,10 +33,7 @@ impl fmt::Display for StatusReport {
         if let Some(code) = self.alarm {
             write!(f, ":{code}")?;
         }
-        match self.position {
-            Position::Machine(at) => write!(f, "|MPos:{},0.000,0.000", shown(at, 3))?,
-            Position::Work(at) => write!(f, "|WPos:{},0.000,0.000", shown(at, 3))?,
-        }
+        write!(f, "|MPos:{},0.000,0.000", shown(self.position, 3))?;
         if let Some(feed) = self.feed {
             write!(f, "|FS:{feed},0")?;
         }
@@ -53,9 +48,6 @@ impl fmt::Display for StatusReport {
             (true, false) => f.write_str("|Pn:X")?,
             (false, true) => f.write_str("|Pn:R")?,
             (true, true) => f.write_str("|Pn:XR")?,
-        }
-        if let Some(zero) = self.work_zero {
-            write!(f, "|WCO:{},0.000,0.000", shown(zero, 3))?;
         }
         if let Some(homed) = self.homed {
             write!(f, "|H:{}", u8::from(homed))?;

@@ -1,0 +1,619 @@
+//! Views in a light, on the device: shading, highlight and albedo of each photograph of a batch, as
+//! `batch x channels x side x side`, before there is a camera.
+//!
+//! ```text
+//! shading   = (E(n) - Σ blocked_lm L_lm)  +  Σ_lamps v (n . l)  +  mean albedo Σ bounced_lm L_lm
+//! highlight = s Σ_lamps v (n . h)^α  +  (8 s / (α + 1)) (n . e) L_blurred(mirrored)
+//! ```
+//!
+//! E is the irradiance of the room on an open surface (Ramamoorthi and Hanrahan 2001), L the room, v the visible part of a lamp.
+//! Smooth functions of a direction are drawn into small maps once a photograph, and looked up at each pixel.
+
+use std::f64::consts::PI;
+
+use relight_core::light::{Direction, Order, basis};
+use relight_core::render::cosine_lobe;
+use relight_synth::{PhotoPlan, PhotoView};
+use tch::{Device, Kind, Tensor};
+
+use super::view_pool::ViewPool;
+use crate::error::TrainError;
+
+/// Rows of a map of directions, from +y to -y; columns go once around, the first and the last are the same.
+const ROWS: usize = 25;
+const COLUMNS: usize = 49;
+/// Albedo is kept in this range.
+const ALBEDO: (f64, f64) = (0.01, 0.95);
+/// How sharp the edges of a print are.
+const PRINT_EDGE: f64 = 15.0;
+/// Bilinear interpolation, and the border's values beyond the border, as `grid_sampler` counts them.
+const BILINEAR: i64 = 0;
+const BORDER: i64 = 1;
+
+/// A photograph that is to be made: the view's place in the pool, and all else.
+#[derive(Debug, Clone)]
+pub(super) struct PlannedPhoto {
+    pub(super) place: usize,
+    pub(super) plan: PhotoPlan,
+}
+
+/// Harmonics on a map of directions.
+#[derive(Debug)]
+pub(super) struct DirectionMaps {
+    /// `directions x coefficients`.
+    radiance: Tensor,
+    /// The same after the cosine's lobe.
+    irradiance: Tensor,
+    bands: Vec<f64>,
+}
+
+/// A batch in its light.
+#[derive(Debug)]
+pub(super) struct Lit {
+    /// 1 on the object, 1 channel.
+    pub(super) mask: Tensor,
+    /// Unit normals.
+    pub(super) normals: Tensor,
+    /// Linear albedo.
+    pub(super) albedo: Tensor,
+    /// Irradiance.
+    pub(super) shading: Tensor,
+    /// Highlight.
+    pub(super) highlight: Tensor,
+}
+
+impl DirectionMaps {
+    pub(super) fn new(device: Device) -> Result<Self, TrainError> {
+        let order = PhotoView::ORDER;
+        let lobes: Vec<f64> = (0..order.coefficients())
+            .map(|at| cosine_lobe(at.isqrt()))
+            .collect();
+        let harmonics: Vec<f64> = (0..ROWS * COLUMNS)
+            .flat_map(|at| harmonics_at(order, at / COLUMNS, at % COLUMNS))
+            .collect();
+        let radiance = Tensor::f_from_slice(&harmonics)?
+            .f_reshape([(ROWS * COLUMNS) as i64, lobes.len() as i64])?;
+        let irradiance = radiance.f_mul(&Tensor::f_from_slice(&lobes)?)?;
+        let place = |of: Tensor| of.f_to_kind(Kind::Float)?.f_to_device(device);
+        Ok(Self {
+            radiance: place(radiance)?,
+            irradiance: place(irradiance)?,
+            bands: (0..lobes.len()).map(|at| at.isqrt() as f64).collect(),
+        })
+    }
+
+    /// The irradiance of lights (`batch x coefficients x 3`) on surfaces of these unit normals.
+    fn irradiance(&self, lights: &Tensor, normals: &Tensor) -> Result<Tensor, TrainError> {
+        look_up(&self.irradiance.f_matmul(lights)?, normals)
+    }
+
+    /// The radiance of lights from these directions, each light blurred by a Gaussian on the sphere of a standard deviation in
+    /// radians.
+    fn radiance(
+        &self,
+        lights: &Tensor,
+        towards: &Tensor,
+        blurs: &[f32],
+    ) -> Result<Tensor, TrainError> {
+        let left: Vec<f32> = blurs
+            .iter()
+            .flat_map(|&blur| {
+                let square = f64::from(blur * blur);
+                let left = move |&l: &f64| (-0.5 * l * (l + 1.0) * square).exp() as f32;
+                self.bands.iter().map(left)
+            })
+            .collect();
+        let left = Tensor::f_from_slice(&left)?
+            .f_reshape([blurs.len() as i64, self.bands.len() as i64, 1])?
+            .f_to_device(lights.device())?;
+        look_up(&self.radiance.f_matmul(&lights.f_mul(&left)?)?, towards)
+    }
+}
+
+/// The harmonics at a cell of a map.
+fn harmonics_at(order: Order, row: usize, column: usize) -> Vec<f64> {
+    let polar = PI * row as f64 / (ROWS - 1) as f64;
+    let around = PI * (2.0 * column as f64 / (COLUMNS - 1) as f64 - 1.0);
+    let [x, y, z] = [
+        polar.sin() * around.sin(),
+        polar.cos(),
+        polar.sin() * around.cos(),
+    ];
+    Direction::new(x, y, z).map_or_else(Vec::new, |at| basis(order, at))
+}
+
+/// Values of maps (`batch x directions x 3`) at unit vectors (`batch x 3 x side x side`).
+fn look_up(maps: &Tensor, at: &Tensor) -> Result<Tensor, TrainError> {
+    let maps = maps
+        .f_transpose(1, 2)?
+        .f_reshape([-1, 3, ROWS as i64, COLUMNS as i64])?;
+    let axis = |axis: i64| at.f_select(1, axis);
+    let row = axis(1)?
+        .f_clamp(-1.0, 1.0)?
+        .f_acos()?
+        .f_mul_scalar(2.0 / PI)?
+        .f_add_scalar(-1.0)?;
+    let column = axis(0)?.f_atan2(&axis(2)?)?.f_mul_scalar(1.0 / PI)?;
+    let grid = Tensor::f_stack(&[column, row], -1)?;
+    Ok(maps.f_grid_sampler(&grid, BILINEAR, BORDER, true)?)
+}
+
+impl Lit {
+    /// Lights photographs of views.
+    pub(super) fn new(
+        pool: &ViewPool,
+        maps: &DirectionMaps,
+        photos: &[PlannedPhoto],
+    ) -> Result<Self, TrainError> {
+        let places: Vec<usize> = photos.iter().map(|photo| photo.place).collect();
+        let base = pool.base(&places)?;
+        let part = |from: usize, count: usize| base.f_narrow(1, from as i64, count as i64);
+        let mask = part(PhotoView::MASK, 1)?;
+        let finish = pool.finishes(photos.iter().map(|one| (one.place, one.plan.finish)))?;
+        let normals = finish.f_narrow(1, 0, 3)?;
+        let own_points = part(PhotoView::OBJECT_POINTS, 3)?;
+        let printed = printed(pool, photos, &own_points, finish.f_narrow(1, 3, 3)?)?;
+        let albedo = recoloured(photos, &printed)?.f_mul(&mask)?;
+
+        let device = base.device();
+        let rooms = lights(photos, |plan| &plan.room, device)?;
+        let all = lights(photos, |plan| &plan.light, device)?;
+        let coefficients = PhotoView::ORDER.coefficients();
+        let blocked = of_light(&rooms, &part(PhotoView::BLOCKED, coefficients)?)?;
+        let open = maps.irradiance(&rooms, &normals)?;
+        let mut lit = Self {
+            shading: open.f_sub(&blocked)?.f_clamp_min(0.0)?,
+            highlight: albedo.f_zeros_like()?,
+            mask,
+            normals,
+            albedo,
+        };
+        let points = part(PhotoView::POINTS, 3)?;
+        let eye = part(PhotoView::TOWARDS_EYE, 3)?;
+        lit.add_lamps(pool, photos, &points, &eye)?;
+        let bounced = of_light(&all, &part(PhotoView::BOUNCED, all.size()[1] as usize)?)?;
+        lit.add_bounce(photos, &bounced)?;
+        lit.add_mirrored(maps, photos, &rooms, &eye, &part(PhotoView::MIRRORS, 1)?)?;
+        lit.shading = lit.shading.f_mul(&lit.mask)?;
+        lit.highlight = lit.highlight.f_mul(&lit.mask)?;
+        Ok(lit)
+    }
+
+    /// What the surface sends to the camera.
+    pub(super) fn image(&self) -> Result<Tensor, TrainError> {
+        Ok(self.albedo.f_mul(&self.shading)?.f_add(&self.highlight)?)
+    }
+
+    /// The light of lamps, diffuse and as highlights.
+    fn add_lamps(
+        &mut self,
+        pool: &ViewPool,
+        photos: &[PlannedPhoto],
+        points: &Tensor,
+        eye: &Tensor,
+    ) -> Result<(), TrainError> {
+        // Each lit lamp with the number of its photograph.
+        let lit: Vec<(usize, &PlannedPhoto, usize)> = photos
+            .iter()
+            .enumerate()
+            .flat_map(|(at, photo)| (0..photo.plan.lamps.len()).map(move |k| (at, photo, k)))
+            .collect();
+        if lit.is_empty() {
+            return Ok(());
+        }
+        let device = points.device();
+        let of = |values: Vec<f32>| columns(&values, lit.len(), device);
+        let lamp = |&(_, photo, k): &(usize, &PlannedPhoto, usize)| {
+            pool.lamps()[photo.place][photo.plan.lamps[k].lamp]
+        };
+        let centre = of(lit.iter().flat_map(|one| lamp(one).centre).collect())?;
+        let irradiance = of(lit
+            .iter()
+            .flat_map(|(_, photo, k)| photo.plan.lamps[*k].irradiance)
+            .collect())?;
+        let seen = lit
+            .iter()
+            .map(|(_, photo, k)| (photo.place, photo.plan.lamps[*k].lamp));
+        let visible = pool.visibility(seen)?;
+        let whose = indices(lit.iter().map(|(at, ..)| *at), device)?;
+
+        let normals = self.normals.f_index_select(0, &whose)?;
+        let way = centre.f_sub(&points.f_index_select(0, &whose)?)?;
+        let square = dot(&way, &way)?.f_clamp_min(1e-6)?;
+        let towards = way.f_mul(&square.f_rsqrt()?)?;
+        let distance = dot(&centre, &centre)?;
+        let aim = centre.f_mul(&distance.f_rsqrt()?)?;
+        // A round area that faces the origin, as bright as its irradiance there says.
+        let falloff = dot(&towards, &aim)?
+            .f_clamp_min(0.0)?
+            .f_mul(&distance)?
+            .f_div(&square)?;
+        let cosine = dot(&normals, &towards)?.f_clamp_min(0.0)?;
+        let arriving = irradiance.f_mul(&visible.f_mul(&falloff)?)?;
+        let _ = self
+            .shading
+            .f_index_add_(0, &whose, &arriving.f_mul(&cosine)?)?;
+
+        let glossy: Vec<usize> = (0..lit.len())
+            .filter(|&k| lit[k].1.plan.gloss.is_some())
+            .collect();
+        if glossy.is_empty() {
+            return Ok(());
+        }
+        let lobes: Vec<(f32, [f32; 3])> = glossy
+            .iter()
+            .filter_map(|&k| {
+                let gloss = lit[k].1.plan.gloss?;
+                Some(lamp_lobe(
+                    gloss.exponent,
+                    gloss.reflectance,
+                    lamp(&lit[k]).half_angle,
+                ))
+            })
+            .collect();
+        let exponents = lobes.iter().map(|(exponent, _)| *exponent).collect();
+        let exponents: Vec<f32> = exponents;
+        let exponent = columns(&exponents, glossy.len(), device)?;
+        let strengths: Vec<f32> = lobes.iter().flat_map(|(_, strength)| *strength).collect();
+        let strength = columns(&strengths, glossy.len(), device)?;
+        let chosen = indices(glossy.iter().copied(), device)?;
+        let pick = |of: &Tensor| of.f_index_select(0, &chosen);
+        let whose = whose.f_index_select(0, &chosen)?;
+        let half = unit(&pick(&towards)?.f_add(&eye.f_index_select(0, &whose)?)?)?;
+        let lobe = dot(&pick(&normals)?, &half)?
+            .f_clamp_min(1e-6)?
+            .f_pow(&exponent)?
+            .f_mul(&pick(&cosine)?.f_gt(0.0)?)?;
+        let highlight = pick(&arriving)?.f_mul(&lobe)?.f_mul(&strength)?;
+        let _ = self.highlight.f_index_add_(0, &whose, &highlight)?;
+        Ok(())
+    }
+
+    /// The light that the object throws onto itself.
+    fn add_bounce(&mut self, photos: &[PlannedPhoto], bounced: &Tensor) -> Result<(), TrainError> {
+        let bounce: Vec<f32> = photos.iter().flat_map(|one| one.plan.bounce).collect();
+        let bounce = columns(&bounce, photos.len(), bounced.device())?;
+        let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
+        let mean = over(&self.albedo)?.f_div(&over(&self.mask)?.f_clamp_min(1.0)?)?;
+        let light = bounced.f_clamp_min(0.0)?.f_mul(&mean.f_mul(&bounce)?)?;
+        self.shading = self.shading.f_add(&light)?;
+        Ok(())
+    }
+
+    /// Highlights of the room.
+    fn add_mirrored(
+        &mut self,
+        maps: &DirectionMaps,
+        photos: &[PlannedPhoto],
+        rooms: &Tensor,
+        eye: &Tensor,
+        mirrors: &Tensor,
+    ) -> Result<(), TrainError> {
+        let device = rooms.device();
+        let glossy: Vec<(usize, f32, [f32; 3])> = photos
+            .iter()
+            .enumerate()
+            .filter_map(|(at, one)| {
+                let gloss = one.plan.gloss?;
+                Some((at, gloss.exponent, gloss.reflectance))
+            })
+            .collect();
+        if glossy.is_empty() {
+            return Ok(());
+        }
+        let whose = indices(glossy.iter().map(|(at, ..)| *at), device)?;
+        let pick = |of: &Tensor| of.f_index_select(0, &whose);
+        let (normals, eye) = (pick(&self.normals)?, pick(eye)?);
+        let facing = dot(&normals, &eye)?.f_clamp_min(0.0)?;
+        let mirrored = unit(&normals.f_mul(&facing.f_mul_scalar(2.0)?)?.f_sub(&eye)?)?;
+        let blurs: Vec<f32> = glossy.iter().map(|(_, e, _)| 2.0 / e.sqrt()).collect();
+        let strengths: Vec<f32> = glossy
+            .iter()
+            .flat_map(|(_, exponent, s)| s.map(|s| 8.0 * s / (exponent + 1.0)))
+            .collect();
+        let strength = columns(&strengths, glossy.len(), device)?;
+        let seen = maps
+            .radiance(&pick(rooms)?, &mirrored, &blurs)?
+            .f_clamp_min(0.0)?
+            .f_mul(&facing.f_mul(&pick(mirrors)?)?)?
+            .f_mul(&strength)?;
+        let _ = self.highlight.f_index_add_(0, &whose, &seen)?;
+        Ok(())
+    }
+}
+
+/// The exponent and the strength of a highlight of a lamp that is seen under an angle: a Gaussian for the lobe and one for the
+/// lamp, whose variance in the half vector is a sixteenth of the square of its half angle.
+fn lamp_lobe(exponent: f32, reflectance: [f32; 3], half_angle: f32) -> (f32, [f32; 3]) {
+    let broadened = 1.0 / (1.0 / exponent + half_angle * half_angle / 16.0);
+    (broadened, reflectance.map(|s| s * broadened / exponent))
+}
+
+/// Albedo with the prints of those photographs that have one.
+fn printed(
+    pool: &ViewPool,
+    photos: &[PlannedPhoto],
+    own_points: &Tensor,
+    mut albedo: Tensor,
+) -> Result<Tensor, TrainError> {
+    let device = albedo.device();
+    let prints: Vec<_> = photos
+        .iter()
+        .enumerate()
+        .filter_map(|(at, one)| Some((at, one.place, one.plan.print?)))
+        .collect();
+    if prints.is_empty() {
+        return Ok(albedo);
+    }
+    let whose = indices(prints.iter().map(|(at, ..)| *at), device)?;
+    let others = prints
+        .iter()
+        .map(|(_, place, print)| (*place, print.finish));
+    let other = pool.finishes(others)?.f_narrow(1, 3, 3)?;
+    let count = prints.len() as i64;
+    let waves: Vec<f32> = prints
+        .iter()
+        .flat_map(|(.., print)| print.waves.into_iter().flatten())
+        .collect();
+    let waves = Tensor::f_from_slice(&waves)?
+        .f_reshape([count, 3, 4])?
+        .f_to_device(device)?;
+    let points = own_points.f_index_select(0, &whose)?;
+    let side = points.size()[2];
+    let phases = waves
+        .f_narrow(2, 0, 3)?
+        .f_bmm(&points.f_reshape([count, 3, -1])?)?
+        .f_add(&waves.f_narrow(2, 3, 1)?)?;
+    let sum = phases
+        .f_sin()?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+        .f_reshape([count, 1, side, side])?;
+    let levels: Vec<f32> = prints.iter().map(|(.., print)| print.level).collect();
+    let share = sum
+        .f_sub(&columns(&levels, prints.len(), device)?)?
+        .f_mul_scalar(PRINT_EDGE)?
+        .f_sigmoid()?;
+    let ground = albedo.f_index_select(0, &whose)?;
+    let mixed = ground.f_lerp_tensor(&other, &share.f_expand_as(&other)?)?;
+    Ok(albedo.f_index_copy_(0, &whose, &mixed)?)
+}
+
+/// Albedo in other colours.
+fn recoloured(photos: &[PlannedPhoto], albedo: &Tensor) -> Result<Tensor, TrainError> {
+    let (count, device) = (photos.len() as i64, albedo.device());
+    let of = |values: Vec<f32>| columns(&values, photos.len(), device);
+    // Column by column: the transpose of what a matrix of rows is.
+    let mixes: Vec<f32> = photos
+        .iter()
+        .flat_map(|one| one.plan.recolour.into_iter().flatten())
+        .collect();
+    let mixes = Tensor::f_from_slice(&mixes)?
+        .f_reshape([count, 3, 3])?
+        .f_transpose(1, 2)?
+        .f_to_device(device)?;
+    let contrast = of(photos.iter().map(|one| one.plan.contrast).collect())?;
+    let plain = of(photos.iter().flat_map(|one| one.plan.plain).collect())?;
+    let is_plain = photos.iter().map(|one| one.plan.plain != [0.0; 3]);
+    let is_plain = of(is_plain.map(|is| f32::from(u8::from(is))).collect())?.f_gt(0.5)?;
+    let mixed = mixes
+        .f_bmm(&albedo.f_reshape([count, 3, -1])?)?
+        .f_reshape(albedo.size())?
+        .f_clamp(ALBEDO.0, ALBEDO.1)?
+        .f_pow(&contrast)?
+        .f_clamp(ALBEDO.0, ALBEDO.1)?;
+    Ok(plain.f_where_self(&is_plain, &mixed)?)
+}
+
+/// `Σ_lm transfer_lm L_lm`: lights `batch x coefficients x 3`, transfer `batch x coefficients x side x side`.
+fn of_light(lights: &Tensor, transfer: &Tensor) -> Result<Tensor, TrainError> {
+    let size = transfer.size();
+    let flat = transfer.f_reshape([size[0], size[1], -1])?;
+    Ok(lights
+        .f_transpose(1, 2)?
+        .f_bmm(&flat)?
+        .f_reshape([size[0], 3, size[2], size[3]])?)
+}
+
+/// Lights as `batch x coefficients x 3`.
+fn lights<'a>(
+    photos: &'a [PlannedPhoto],
+    of: impl Fn(&'a PhotoPlan) -> &'a [[f32; 3]],
+    device: Device,
+) -> Result<Tensor, TrainError> {
+    let values: Vec<f32> = photos
+        .iter()
+        .flat_map(|photo| of(&photo.plan).as_flattened().iter().copied())
+        .collect();
+    Ok(Tensor::f_from_slice(&values)?
+        .f_reshape([photos.len() as i64, -1, 3])?
+        .f_to_device(device)?)
+}
+
+/// Numbers of each of `count` photographs, as `count x numbers x 1 x 1`.
+pub(super) fn columns(values: &[f32], count: usize, device: Device) -> Result<Tensor, TrainError> {
+    Ok(Tensor::f_from_slice(values)?
+        .f_reshape([count as i64, -1, 1, 1])?
+        .f_to_device(device)?)
+}
+
+/// Indices as a tensor.
+pub(super) fn indices(
+    of: impl Iterator<Item = usize>,
+    device: Device,
+) -> Result<Tensor, TrainError> {
+    let of: Vec<i64> = of.map(|at| at as i64).collect();
+    Ok(Tensor::f_from_slice(&of)?.f_to_device(device)?)
+}
+
+/// Dot products over the channels.
+fn dot(a: &Tensor, b: &Tensor) -> Result<Tensor, TrainError> {
+    Ok(a.f_mul(b)?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?)
+}
+
+/// Vectors at length 1.
+fn unit(of: &Tensor) -> Result<Tensor, TrainError> {
+    Ok(of.f_mul(&dot(of, of)?.f_clamp_min(1e-12)?.f_rsqrt()?)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relight_synth::{Folders, Library, PhotoViewRecipe, Rooms, made_panoramas};
+
+    const SIZE: usize = 32;
+
+    /// Three views and six photographs, two of each.
+    fn photographs() -> (ViewPool, Vec<PlannedPhoto>, Vec<PhotoView>) {
+        let library = Library::read(&Folders::default()).unwrap();
+        let recipe = PhotoViewRecipe {
+            seed: 4,
+            size: SIZE as u32,
+            rays: 64,
+        };
+        let views: Vec<PhotoView> = (0..3).map(|number| recipe.cast(&library, number)).collect();
+        let mut pool = ViewPool::new(3, recipe.size, Device::Cpu).unwrap();
+        for (place, view) in views.iter().enumerate() {
+            pool.put(place, view.clone()).unwrap();
+        }
+        let made = made_panoramas().unwrap();
+        let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
+        let rooms = Rooms::new(&panoramas, 2, 1);
+        let photos = (0..24)
+            .map(|seed| {
+                let place = seed as usize % 3;
+                let plan = PhotoPlan::draw(seed, &views[place].lamps, &rooms);
+                PlannedPhoto { place, plan }
+            })
+            .collect();
+        (pool, photos, views)
+    }
+
+    /// Shading and highlight of one pixel, by the formulas, number by number.
+    fn by_formula(view: &PhotoView, plan: &PhotoPlan, pixel: usize) -> ([f64; 3], [f64; 3]) {
+        let area = SIZE * SIZE;
+        let of = |plane: usize| f64::from(view.base[plane * area + pixel]);
+        let three = |plane: usize| [0, 1, 2].map(|c| of(plane + c));
+        let finish = plan.finish * PhotoView::FINISH_PLANES;
+        let normal = [0, 1, 2].map(|c| f64::from(view.finishes[(finish + c) * area + pixel]));
+        let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let unit = |a: [f64; 3]| a.map(|x| x / dot(a, a).sqrt());
+        let at = |direction: [f64; 3]| {
+            let [x, y, z] = direction;
+            basis(PhotoView::ORDER, Direction::new(x, y, z).unwrap())
+        };
+        let (eye, harmonics) = (three(PhotoView::TOWARDS_EYE), at(normal));
+        let (mut shading, mut highlight) = ([0.0; 3], [0.0; 3]);
+        for (k, room) in plan.room.iter().enumerate() {
+            let part = harmonics[k] * cosine_lobe(k.isqrt()) - of(PhotoView::BLOCKED + k);
+            (0..3).for_each(|c| shading[c] += part * f64::from(room[c]));
+        }
+        shading = shading.map(|value| value.max(0.0));
+        for lit in &plan.lamps {
+            let lamp = view.lamps[lit.lamp];
+            let centre = lamp.centre.map(f64::from);
+            let way = [0, 1, 2].map(|c| centre[c] - of(PhotoView::POINTS + c));
+            let (towards, square) = (unit(way), dot(way, way));
+            let falloff = dot(towards, unit(centre)).max(0.0) * dot(centre, centre) / square;
+            let visible = f64::from(view.visibility[lit.lamp * area + pixel]) * falloff;
+            let cosine = dot(normal, towards).max(0.0);
+            for c in 0..3 {
+                let arriving = f64::from(lit.irradiance[c]) * visible;
+                shading[c] += arriving * cosine;
+                let Some(gloss) = plan.gloss.filter(|_| cosine > 0.0) else {
+                    continue;
+                };
+                let (exponent, strength) =
+                    lamp_lobe(gloss.exponent, gloss.reflectance, lamp.half_angle);
+                let half = unit([0, 1, 2].map(|c| towards[c] + eye[c]));
+                let lobe = dot(normal, half).max(1e-6).powf(f64::from(exponent));
+                highlight[c] += arriving * lobe * f64::from(strength[c]);
+            }
+        }
+        if let Some(gloss) = plan.gloss {
+            let facing = dot(normal, eye).max(0.0);
+            let mirrored = at(unit([0, 1, 2].map(|c| 2.0 * facing * normal[c] - eye[c])));
+            let blur = 4.0 / f64::from(gloss.exponent);
+            for c in 0..3 {
+                let seen: f64 = (0..plan.room.len())
+                    .map(|k| {
+                        let l = k.isqrt() as f64;
+                        let left = (-0.5 * l * (l + 1.0) * blur).exp();
+                        left * mirrored[k] * f64::from(plan.room[k][c])
+                    })
+                    .sum();
+                let strength =
+                    8.0 * f64::from(gloss.reflectance[c]) / f64::from(gloss.exponent + 1.0);
+                highlight[c] += seen.max(0.0) * facing * of(PhotoView::MIRRORS) * strength;
+            }
+        }
+        (shading, highlight)
+    }
+
+    #[test]
+    fn tensors_light_views_as_the_formulas_do_one_by_one() {
+        let (pool, mut photos, views) = photographs();
+        for photo in &mut photos {
+            photo.plan.bounce = [0.0; 3];
+        }
+        let maps = DirectionMaps::new(Device::Cpu).unwrap();
+        let lit = Lit::new(&pool, &maps, &photos).unwrap();
+        let (mut off, mut sum) = ([0.0; 2], [0.0; 2]);
+        for (at, photo) in photos.iter().enumerate() {
+            let view = &views[photo.place];
+            for pixel in (0..SIZE * SIZE)
+                .filter(|&p| f32::from(view.base[p]) > 0.5)
+                .step_by(5)
+            {
+                let expected = by_formula(view, &photo.plan, pixel);
+                for (kind, (tensor, expected)) in
+                    [(&lit.shading, expected.0), (&lit.highlight, expected.1)]
+                        .into_iter()
+                        .enumerate()
+                {
+                    for (c, expected) in expected.into_iter().enumerate() {
+                        let (y, x) = ((pixel / SIZE) as i64, (pixel % SIZE) as i64);
+                        let found = tensor.double_value(&[at as i64, c as i64, y, x]);
+                        off[kind] += (found - expected).abs();
+                        sum[kind] += expected;
+                    }
+                }
+            }
+        }
+        assert!(off[0] < 0.01 * sum[0], "shading: {off:?} of {sum:?}");
+        assert!(off[1] < 0.03 * sum[1], "highlight: {off:?} of {sum:?}");
+    }
+
+    #[test]
+    fn a_photograph_is_lit_alike_whatever_else_is_in_its_batch() {
+        let (pool, photos, _) = photographs();
+        let maps = DirectionMaps::new(Device::Cpu).unwrap();
+        let all = Lit::new(&pool, &maps, &photos).unwrap();
+        for (at, photo) in photos.iter().enumerate() {
+            let one = Lit::new(&pool, &maps, std::slice::from_ref(photo)).unwrap();
+            for (one, all) in [
+                (one.image().unwrap(), all.image().unwrap()),
+                (one.shading, all.shading.shallow_clone()),
+            ] {
+                let apart = one.get(0) - all.get(at as i64);
+                assert!(apart.abs().max().double_value(&[]) < 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn light_that_bounces_makes_hollows_brighter_and_nothing_darker() {
+        let (pool, mut photos, _) = photographs();
+        let maps = DirectionMaps::new(Device::Cpu).unwrap();
+        let shading = |photos: &[PlannedPhoto]| Lit::new(&pool, &maps, photos).unwrap().shading;
+        photos
+            .iter_mut()
+            .for_each(|photo| photo.plan.bounce = [0.0; 3]);
+        let without = shading(&photos);
+        photos
+            .iter_mut()
+            .for_each(|photo| photo.plan.bounce = [1.0; 3]);
+        let more = shading(&photos) - without;
+        assert!(more.min().double_value(&[]) > -1e-5 && more.max().double_value(&[]) > 0.01);
+    }
+}

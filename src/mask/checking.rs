@@ -1,0 +1,326 @@
+//! A mask held against what the turn of its recording shows: is its shape that of the object?
+
+use std::path::{Path, PathBuf};
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use image::codecs::jpeg::JpegEncoder;
+use image::{GrayImage, RgbImage};
+use relit_data::mask::{MaskPicture, size_hint};
+use relit_data::session::{MASK_FILE, Recording};
+use relit_grabcut::{Effort, MaskCheck, MaskError, ShapeCheck, TURN_FRAMES, preview};
+use relit_video::Video;
+use serde::Serialize;
+
+use super::files::{read_if_exists, write};
+use super::sampling::sampled;
+use super::{MaskFiles, MaskRecord, MaskingError};
+
+/// The schema of the record.
+const CHECK_SCHEMA: &str = "relit.mask-check/1";
+/// JPEG quality of the frame on the page, 1 to 100.
+const QUALITY: u8 = 85;
+
+const STYLE: &str = "body{font:16px/1.4 system-ui,sans-serif;max-width:56rem;margin:1rem auto;padding:0 1rem;color:#1b1e24}\
+h1{font-size:1.2rem}.verdict{font-weight:700}.fits{color:#13703a}.unknown{color:#96550a}.wrong{color:#b3261e}img{width:100%}";
+
+/// Whether a mask fits its recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MaskVerdict {
+    /// It does.
+    Fits,
+    /// Its shape is not that of the object.
+    Wrong,
+    /// Hardly anything moves in the video: it does not show what the object is.
+    Unknown,
+}
+
+impl MaskVerdict {
+    /// In a word, and in a sentence.
+    #[must_use]
+    pub const fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Fits => ("fits", "the mask fits"),
+            Self::Wrong => ("wrong", "the mask is not that of the object"),
+            Self::Unknown => ("unknown", "nothing can be said about the mask"),
+        }
+    }
+}
+
+/// Everything that was found about a mask.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MaskReport {
+    /// Whether it fits.
+    pub verdict: MaskVerdict,
+    /// Why not, one sentence each; empty if it fits.
+    pub reasons: Vec<String>,
+    /// The mask's shape; none if hardly anything moves in the video.
+    pub shape: Option<ShapeCheck>,
+}
+
+impl MaskReport {
+    fn of(shape: Option<ShapeCheck>) -> Self {
+        let (verdict, reasons) = match shape.as_ref().map(ShapeCheck::faults) {
+            Some(faults) if faults.is_empty() => (MaskVerdict::Fits, faults),
+            Some(faults) => (MaskVerdict::Wrong, faults),
+            None => {
+                let why = "hardly anything moves in the video, so that it does not show what the object is: look at mask-preview.png";
+                (MaskVerdict::Unknown, vec![why.to_owned()])
+            }
+        };
+        Self {
+            verdict,
+            reasons,
+            shape,
+        }
+    }
+}
+
+/// What the record of a check holds.
+#[derive(Serialize)]
+struct CheckRecord<'a> {
+    schema: &'static str,
+    recording: &'a str,
+    /// BLAKE3 of the mask's file: the check of another mask says nothing about this one.
+    mask_blake3: String,
+    #[serde(flatten)]
+    report: &'a MaskReport,
+}
+
+/// A report that was written.
+#[derive(Debug, Clone)]
+pub struct CheckOutput {
+    /// The recording's id.
+    pub recording: String,
+    /// The report.
+    pub report: MaskReport,
+    /// The page: `NAME-check.html` in the session folder, or beside the mask where the recording is a bare video.
+    pub page: PathBuf,
+}
+
+/// Holds a recording's mask (`mask`, or else the one in the session folder) against what its turn shows, and
+/// writes a page and a record about it.
+///
+/// # Errors
+/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Recording`] around the cause.
+pub fn check_mask(input: &Path, mask: Option<&Path>) -> Result<CheckOutput, MaskingError> {
+    let recording = Recording::open(input)?;
+    let checked = check_recording(&recording, mask);
+    let (report, page) = checked.map_err(MaskingError::of(&recording))?;
+    Ok(CheckOutput {
+        recording: recording.id,
+        report,
+        page,
+    })
+}
+
+fn check_recording(
+    recording: &Recording,
+    mask: Option<&Path>,
+) -> Result<(MaskReport, PathBuf), MaskingError> {
+    let folder = recording.folder.clone().unwrap_or_default();
+    let files = MaskFiles::of(&mask.map_or_else(|| folder.join(MASK_FILE), Path::to_owned))?;
+    let (picture, png) = read_mask(&files.mask)?;
+    let video = Video::open(&recording.video)?;
+    check_size(&files.mask, picture.size(), &video)?;
+    let image = object_of(&files.mask, &picture)?;
+    let frame = video.frame(source_frame(&files, &video)?)?;
+    let turn = sampled(&video, image.dimensions(), &video.spread(TURN_FRAMES))?;
+    let check = MaskCheck::new(&image, &turn.statistics)?;
+    let report = MaskReport::of(check.shape(&frame, Effort::Fine)?);
+    let page = page(&recording.id, &report, &preview(&frame, &image))?;
+    let [page_file, record_file] = check_files(&files, recording);
+    let record = record(&recording.id, &report, &png, &record_file)?;
+    write(&page_file, page.as_bytes())?;
+    write(&record_file, &record)?;
+    Ok((report, page_file))
+}
+
+/// The picture of the mask, and its file.
+fn read_mask(path: &Path) -> Result<(MaskPicture, Vec<u8>), MaskingError> {
+    let bytes = std::fs::read(path).map_err(MaskingError::io(path, "read"))?;
+    let image = relit_data::still::decode(&bytes);
+    let image = image.map_err(|error| MaskingError::unusable("mask", path, &error))?;
+    Ok((MaskPicture::of_image(&image), bytes))
+}
+
+/// What the mask marks: 255, and 0 elsewhere.
+fn object_of(path: &Path, picture: &MaskPicture) -> Result<GrayImage, MaskingError> {
+    let object = picture.object();
+    let object =
+        object.map_err(|fault| MaskingError::unusable("mask", path, &format!("it {fault}")))?;
+    let levels = object.inside.iter().map(|&inside| u8::from(inside) * 255);
+    let (width, height) = picture.size();
+    Ok(GrayImage::from_raw(width, height, levels.collect()).unwrap_or_default())
+}
+
+fn check_size(path: &Path, mask: (u32, u32), video: &Video) -> Result<(), MaskingError> {
+    let facts = video.facts();
+    let (width, height) = mask;
+    if (width, height) == (facts.width, facts.height) {
+        return Ok(());
+    }
+    let hint = size_hint((width, height), (facts.width, facts.height));
+    let why = format!(
+        "it is {width} x {height} pixels and the frames are {} x {}{}",
+        facts.width,
+        facts.height,
+        hint.map(|hint| format!("; {hint}")).unwrap_or_default()
+    );
+    Err(MaskingError::unusable("mask", path, &why))
+}
+
+/// The frame on which the mask was made, if its record says so and the video has it.
+fn source_frame(files: &MaskFiles, video: &Video) -> Result<u64, MaskingError> {
+    let record = read_if_exists(&files.record)?;
+    let record = record.and_then(|bytes| MaskRecord::from_json(&bytes).ok());
+    let frame = record.map_or(0, |record| record.source.frame);
+    Ok(match usize::try_from(frame) {
+        Ok(at) if at < video.frames().len() => frame,
+        _ => 0,
+    })
+}
+
+/// The page and the record: `NAME-check.html` and `NAME-check.json` in the session folder, so that one mask can be held
+/// against several sessions, or beside the mask.
+fn check_files(files: &MaskFiles, recording: &Recording) -> [PathBuf; 2] {
+    ["-check.html", "-check.json"].map(|ending| {
+        let mut name = files.mask.file_stem().unwrap_or_default().to_owned();
+        name.push(ending);
+        match &recording.folder {
+            Some(folder) => folder.join(name),
+            None => files.mask.with_file_name(name),
+        }
+    })
+}
+
+/// The record of a check, as it is written; `png` is the mask's file.
+fn record(
+    recording: &str,
+    report: &MaskReport,
+    png: &[u8],
+    path: &Path,
+) -> Result<Vec<u8>, MaskingError> {
+    let record = CheckRecord {
+        schema: CHECK_SCHEMA,
+        recording,
+        mask_blake3: blake3::hash(png).to_hex().to_string(),
+        report,
+    };
+    let json = serde_json::to_vec_pretty(&record);
+    let mut bytes = json.map_err(|error| MaskingError::io(path, "written")(error.into()))?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// The page: verdict, reasons, and the mask on its frame. One file without scripts that loads nothing.
+fn page(id: &str, report: &MaskReport, shown: &RgbImage) -> Result<String, MaskingError> {
+    let (class, word) = report.verdict.words();
+    let word = format!("{}{}", word[..1].to_uppercase(), &word[1..]);
+    let id = escaped(id);
+    let reasons: String = report
+        .reasons
+        .iter()
+        .map(|reason| format!("<li>{}</li>", escaped(reason)))
+        .collect();
+    let mut jpeg = Vec::new();
+    let what = "a frame";
+    JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
+        .encode_image(shown)
+        .map_err(|source| MaskError::Encode { what, source })?;
+    Ok(format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
+        <title>The mask of {id}</title><style>{STYLE}</style></head><body>\n<h1>The mask of {id}</h1>\n\
+        <p class=\"verdict {class}\">{word}.</p>\n<ul>{reasons}</ul>\n\
+        <img alt=\"The mask's outline on its frame\" src=\"data:image/jpeg;base64,{}\"></body></html>\n",
+        STANDARD.encode(jpeg)
+    ))
+}
+
+fn escaped(text: &str) -> String {
+    let text = text.replace('&', "&amp;");
+    text.replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relit_data::geometry::Rect;
+    use relit_grabcut::DoubtfulRegion;
+
+    fn shape() -> ShapeCheck {
+        ShapeCheck {
+            area_px: 10_000,
+            outline: 0.8,
+            outline_of_turn: 0.8,
+            contradicted: false,
+            leaks: Vec::new(),
+            missing: Vec::new(),
+            holes: Vec::new(),
+        }
+    }
+
+    fn region(px: u64) -> Vec<DoubtfulRegion> {
+        let bounds = Rect::new(1, 2, 30, 40);
+        vec![DoubtfulRegion { px, bounds }]
+    }
+
+    #[test]
+    fn each_verdict_has_its_reason() {
+        let fits = MaskReport::of(Some(shape()));
+        assert_eq!((fits.verdict, fits.reasons.len()), (MaskVerdict::Fits, 0));
+        for (changed, word) in [
+            (
+                ShapeCheck {
+                    leaks: region(500),
+                    ..shape()
+                },
+                "background in the mask",
+            ),
+            (
+                ShapeCheck {
+                    missing: region(500),
+                    ..shape()
+                },
+                "object outside",
+            ),
+            (
+                ShapeCheck {
+                    holes: region(500),
+                    ..shape()
+                },
+                "holes",
+            ),
+            (
+                ShapeCheck {
+                    outline: 0.5,
+                    ..shape()
+                },
+                "does not follow",
+            ),
+        ] {
+            let found = MaskReport::of(Some(changed));
+            assert_eq!(found.verdict, MaskVerdict::Wrong, "{word}");
+            assert_eq!(found.reasons.len(), 1, "{word}");
+            assert!(found.reasons[0].contains(word), "{}", found.reasons[0]);
+        }
+        let unknown = MaskReport::of(None);
+        assert_eq!(
+            (unknown.verdict, unknown.reasons.len()),
+            (MaskVerdict::Unknown, 1)
+        );
+    }
+
+    #[test]
+    fn a_mask_that_follows_what_moves_better_than_the_turn_is_not_blamed() {
+        let shape = ShapeCheck {
+            outline: 0.9,
+            leaks: region(900),
+            ..shape()
+        };
+        assert_eq!(MaskReport::of(Some(shape)).verdict, MaskVerdict::Fits);
+    }
+}
