@@ -2,7 +2,7 @@
 
 use tch::{Device, Kind, Tensor};
 
-use super::lit::{PlannedPhoto, columns, indices};
+use super::lit::{PlannedPhoto, columns, indices, upload};
 use crate::error::TrainError;
 use relight_synth::{PhotoCamera, stream};
 
@@ -47,10 +47,10 @@ impl NoiseTiles {
     }
 
     /// One tile for each seed.
-    fn of(&self, seeds: &[u64]) -> Result<Tensor, TrainError> {
+    fn of(&self, seeds: &[u64], kind: Kind) -> Result<Tensor, TrainError> {
         let device = self.0.device();
         let chosen = indices(seeds.iter().map(|seed| *seed as usize % TILES), device)?;
-        Ok(self.0.f_index_select(0, &chosen)?.f_to_kind(Kind::Float)?)
+        Ok(self.0.f_index_select(0, &chosen)?.f_to_kind(kind)?)
     }
 }
 
@@ -70,9 +70,9 @@ pub(super) fn photograph(
     let cameras: Vec<&PhotoCamera> = photos.iter().map(|photo| &photo.plan.camera).collect();
     let device = image.device();
     let balance: Vec<f32> = cameras.iter().flat_map(|camera| camera.balance).collect();
-    let balance = columns(&balance, cameras.len(), device)?;
+    let balance = columns(&balance, cameras.len(), image)?;
     let levels: Vec<f32> = cameras.iter().map(|camera| camera.level).collect();
-    let levels = columns(&levels, cameras.len(), device)?;
+    let levels = columns(&levels, cameras.len(), image)?;
     let brightest = percentile(&image.f_mul(&balance)?, mask)?;
     let gain = balance.f_mul(&levels.f_div(&brightest)?)?;
     let light = image.f_mul(&gain)?;
@@ -88,7 +88,11 @@ pub(super) fn photograph(
     let is_noisy = |camera: &PhotoCamera| camera.read_noise > 0.0 || camera.shot_noise > 0.0;
     let light = changed(&light, &cameras, is_noisy, |light, chosen| {
         let seeds: Vec<u64> = chosen.iter().map(|&at| seeds[at]).collect();
-        noisy(light, &tiles.of(&seeds)?, &picked(&cameras, chosen))
+        noisy(
+            light,
+            &tiles.of(&seeds, light.kind())?,
+            &picked(&cameras, chosen),
+        )
     })?;
     let light = light.f_clamp(0.0, 1.0)?;
     let values = changed(
@@ -104,7 +108,7 @@ pub(super) fn photograph(
             .iter()
             .map(|one| 1.0 / one.gamma.unwrap_or(1.0))
             .collect();
-        Ok(light.f_pow(&columns(&powers, powers.len(), device)?)?)
+        Ok(light.f_pow(&columns(&powers, powers.len(), light)?)?)
     })?;
     let values = values.f_mul_scalar(255.0)?.f_round()?;
     let values = changed(
@@ -123,7 +127,7 @@ pub(super) fn photograph(
         |values, chosen| {
             let powers = picked(&cameras, chosen);
             let powers: Vec<f32> = powers.iter().map(|one| one.gamma.unwrap_or(1.0)).collect();
-            Ok(values.f_pow(&columns(&powers, powers.len(), device)?)?)
+            Ok(values.f_pow(&columns(&powers, powers.len(), values)?)?)
         },
     )?;
     Ok(Photographed {
@@ -193,9 +197,7 @@ fn blurred(light: &Tensor, mask: &Tensor, cameras: &[&PhotoCamera]) -> Result<Te
     };
     let kernels: Vec<f32> = cameras.iter().flat_map(|camera| kernel(camera)).collect();
     let (count, width) = (cameras.len() as i64, 2 * REACH + 1);
-    let kernels = Tensor::f_from_slice(&kernels)?
-        .f_reshape([count, 1, 1, width])?
-        .f_to_device(light.device())?;
+    let kernels = upload(&kernels, &[count, 1, 1, width], light)?;
     let smooth = |of: &Tensor, planes: i64| -> Result<Tensor, tch::TchError> {
         let size = of.size();
         let flat = of.f_reshape([1, count * planes, size[2], size[3]])?;
@@ -213,7 +215,7 @@ fn blurred(light: &Tensor, mask: &Tensor, cameras: &[&PhotoCamera]) -> Result<Te
 fn noisy(light: &Tensor, noise: &Tensor, cameras: &[&PhotoCamera]) -> Result<Tensor, TrainError> {
     let of = |value: fn(&PhotoCamera) -> f32| {
         let values: Vec<f32> = cameras.iter().map(|camera| value(camera)).collect();
-        columns(&values, cameras.len(), light.device())
+        columns(&values, cameras.len(), light)
     };
     let shot = of(|camera| camera.shot_noise)?.f_mul(&light.f_clamp_min(0.0)?.f_sqrt()?)?;
     let deviation = shot.f_add(&of(|camera| camera.read_noise)?)?;
@@ -277,7 +279,7 @@ mod tests {
     #[test]
     fn the_noise_has_no_bias_and_the_deviation_of_the_camera() {
         let tiles = NoiseTiles::new(64, 3, Device::Cpu).unwrap();
-        let noise = tiles.of(&[5, 9]).unwrap();
+        let noise = tiles.of(&[5, 9], Kind::Float).unwrap();
         assert!(noise.mean(Kind::Float).double_value(&[]).abs() < 0.02);
         assert!((noise.std(true).double_value(&[]) - 1.0).abs() < 0.02);
         let [one, other] = [0, 1].map(|at| noise.get(at));

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use tch::{Kind, Tensor};
+use tch::Tensor;
 
-use super::lit::columns;
+use super::lit::{columns, upload};
 use crate::error::TrainError;
 use relight_synth::PhotoCamera;
 
@@ -54,7 +54,7 @@ pub(super) fn compressed(values: &Tensor, cameras: &[&PhotoCamera]) -> Result<Te
         .iter()
         .map(|camera| f32::from(u8::from(camera.jpeg.is_some_and(|(_, halved)| halved))))
         .collect();
-    let is_halved = columns(&halved, cameras.len(), values.device())?.f_gt(0.5)?;
+    let is_halved = columns(&halved, cameras.len(), values)?.f_gt(0.5)?;
     let colour = coarse.f_where_self(&is_halved, &rounded(&fine, &table)?)?;
     let all = Tensor::f_cat(&[luminance, colour], 1)?;
     Ok(mixed(&all, &FROM_YCC)?.f_round()?.f_clamp(0.0, 255.0)?)
@@ -62,9 +62,7 @@ pub(super) fn compressed(values: &Tensor, cameras: &[&PhotoCamera]) -> Result<Te
 
 /// Channels mixed by the rows of a matrix.
 fn mixed(of: &Tensor, rows: &[f32; 9]) -> Result<Tensor, TrainError> {
-    let weights = Tensor::f_from_slice(rows)?
-        .f_reshape([3, 3, 1, 1])?
-        .f_to_device(of.device())?;
+    let weights = upload(rows, &[3, 3, 1, 1], of)?;
     Ok(of.f_conv2d(&weights, None::<&Tensor>, [1], [0], [1], 1)?)
 }
 
@@ -82,9 +80,7 @@ fn steps(cameras: &[&PhotoCamera], table: &[f32; 64], like: &Tensor) -> Result<T
             table.map(|step| ((step * scale + 50.0) / 100.0).floor().clamp(1.0, 255.0))
         })
         .collect();
-    Ok(Tensor::f_from_slice(&values)?
-        .f_reshape([cameras.len() as i64, 1, 1, 1, SIDE, SIDE])?
-        .f_to_device(like.device())?)
+    upload(&values, &[cameras.len() as i64, 1, 1, 1, SIDE, SIDE], like)
 }
 
 /// Planes whose blocks' cosines are rounded to these steps.
@@ -118,13 +114,14 @@ fn cosines(like: &Tensor) -> Result<Tensor, TrainError> {
     let values: Vec<f64> = (0..64).map(value).collect();
     Ok(Tensor::f_from_slice(&values)?
         .f_reshape([SIDE, SIDE])?
-        .f_to_kind(Kind::Float)?
+        .f_to_kind(like.kind())?
         .f_to_device(like.device())?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tch::Kind;
 
     fn camera(quality: u8, halved: bool) -> PhotoCamera {
         PhotoCamera {

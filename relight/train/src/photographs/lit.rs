@@ -63,7 +63,7 @@ pub(super) struct Lit {
 }
 
 impl DirectionMaps {
-    pub(super) fn new(device: Device) -> Result<Self, TrainError> {
+    pub(super) fn new(kind: Kind, device: Device) -> Result<Self, TrainError> {
         let order = PhotoView::ORDER;
         let lobes: Vec<f64> = (0..order.coefficients())
             .map(|at| cosine_lobe(at.isqrt()))
@@ -74,7 +74,7 @@ impl DirectionMaps {
         let radiance = Tensor::f_from_slice(&harmonics)?
             .f_reshape([(ROWS * COLUMNS) as i64, lobes.len() as i64])?;
         let irradiance = radiance.f_mul(&Tensor::f_from_slice(&lobes)?)?;
-        let place = |of: Tensor| of.f_to_kind(Kind::Float)?.f_to_device(device);
+        let place = |of: Tensor| of.f_to_kind(kind)?.f_to_device(device);
         Ok(Self {
             radiance: place(radiance)?,
             irradiance: place(irradiance)?,
@@ -103,9 +103,8 @@ impl DirectionMaps {
                 self.bands.iter().map(left)
             })
             .collect();
-        let left = Tensor::f_from_slice(&left)?
-            .f_reshape([blurs.len() as i64, self.bands.len() as i64, 1])?
-            .f_to_device(lights.device())?;
+        let shape = [blurs.len() as i64, self.bands.len() as i64, 1];
+        let left = upload(&left, &shape, lights)?;
         look_up(&self.radiance.f_matmul(&lights.f_mul(&left)?)?, towards)
     }
 }
@@ -155,9 +154,8 @@ impl Lit {
         let printed = printed(pool, photos, &own_points, finish.f_narrow(1, 3, 3)?)?;
         let albedo = recoloured(photos, &printed)?.f_mul(&mask)?;
 
-        let device = base.device();
-        let rooms = lights(photos, |plan| &plan.room, device)?;
-        let all = lights(photos, |plan| &plan.light, device)?;
+        let rooms = lights(photos, |plan| &plan.room, &base)?;
+        let all = lights(photos, |plan| &plan.light, &base)?;
         let coefficients = PhotoView::ORDER.coefficients();
         let blocked = of_light(&rooms, &part(PhotoView::BLOCKED, coefficients)?)?;
         let open = maps.irradiance(&rooms, &normals)?;
@@ -202,7 +200,7 @@ impl Lit {
             return Ok(());
         }
         let device = points.device();
-        let of = |values: Vec<f32>| columns(&values, lit.len(), device);
+        let of = |values: Vec<f32>| columns(&values, lit.len(), points);
         let lamp = |&(_, photo, k): &(usize, &PlannedPhoto, usize)| {
             pool.lamps()[photo.place][photo.plan.lamps[k].lamp]
         };
@@ -253,9 +251,9 @@ impl Lit {
             .collect();
         let exponents = lobes.iter().map(|(exponent, _)| *exponent).collect();
         let exponents: Vec<f32> = exponents;
-        let exponent = columns(&exponents, glossy.len(), device)?;
+        let exponent = columns(&exponents, glossy.len(), points)?;
         let strengths: Vec<f32> = lobes.iter().flat_map(|(_, strength)| *strength).collect();
-        let strength = columns(&strengths, glossy.len(), device)?;
+        let strength = columns(&strengths, glossy.len(), points)?;
         let chosen = indices(glossy.iter().copied(), device)?;
         let pick = |of: &Tensor| of.f_index_select(0, &chosen);
         let whose = whose.f_index_select(0, &chosen)?;
@@ -272,7 +270,7 @@ impl Lit {
     /// The light that the object throws onto itself.
     fn add_bounce(&mut self, photos: &[PlannedPhoto], bounced: &Tensor) -> Result<(), TrainError> {
         let bounce: Vec<f32> = photos.iter().flat_map(|one| one.plan.bounce).collect();
-        let bounce = columns(&bounce, photos.len(), bounced.device())?;
+        let bounce = columns(&bounce, photos.len(), bounced)?;
         let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
         let mean = over(&self.albedo)?.f_div(&over(&self.mask)?.f_clamp_min(1.0)?)?;
         let light = bounced.f_clamp_min(0.0)?.f_mul(&mean.f_mul(&bounce)?)?;
@@ -311,7 +309,7 @@ impl Lit {
             .iter()
             .flat_map(|(_, exponent, s)| s.map(|s| 8.0 * s / (exponent + 1.0)))
             .collect();
-        let strength = columns(&strengths, glossy.len(), device)?;
+        let strength = columns(&strengths, glossy.len(), rooms)?;
         let seen = maps
             .radiance(&pick(rooms)?, &mirrored, &blurs)?
             .f_clamp_min(0.0)?
@@ -355,9 +353,7 @@ fn printed(
         .iter()
         .flat_map(|(.., print)| print.waves.into_iter().flatten())
         .collect();
-    let waves = Tensor::f_from_slice(&waves)?
-        .f_reshape([count, 3, 4])?
-        .f_to_device(device)?;
+    let waves = upload(&waves, &[count, 3, 4], own_points)?;
     let points = own_points.f_index_select(0, &whose)?;
     let side = points.size()[2];
     let phases = waves
@@ -370,7 +366,7 @@ fn printed(
         .f_reshape([count, 1, side, side])?;
     let levels: Vec<f32> = prints.iter().map(|(.., print)| print.level).collect();
     let share = sum
-        .f_sub(&columns(&levels, prints.len(), device)?)?
+        .f_sub(&columns(&levels, prints.len(), own_points)?)?
         .f_mul_scalar(PRINT_EDGE)?
         .f_sigmoid()?;
     let ground = albedo.f_index_select(0, &whose)?;
@@ -380,17 +376,14 @@ fn printed(
 
 /// Albedo in other colours.
 fn recoloured(photos: &[PlannedPhoto], albedo: &Tensor) -> Result<Tensor, TrainError> {
-    let (count, device) = (photos.len() as i64, albedo.device());
-    let of = |values: Vec<f32>| columns(&values, photos.len(), device);
+    let count = photos.len() as i64;
+    let of = |values: Vec<f32>| columns(&values, photos.len(), albedo);
     // Column by column: the transpose of what a matrix of rows is.
     let mixes: Vec<f32> = photos
         .iter()
         .flat_map(|one| one.plan.recolour.into_iter().flatten())
         .collect();
-    let mixes = Tensor::f_from_slice(&mixes)?
-        .f_reshape([count, 3, 3])?
-        .f_transpose(1, 2)?
-        .f_to_device(device)?;
+    let mixes = upload(&mixes, &[count, 3, 3], albedo)?.f_transpose(1, 2)?;
     let contrast = of(photos.iter().map(|one| one.plan.contrast).collect())?;
     let plain = of(photos.iter().flat_map(|one| one.plan.plain).collect())?;
     let is_plain = photos.iter().map(|one| one.plan.plain != [0.0; 3]);
@@ -418,22 +411,26 @@ fn of_light(lights: &Tensor, transfer: &Tensor) -> Result<Tensor, TrainError> {
 fn lights<'a>(
     photos: &'a [PlannedPhoto],
     of: impl Fn(&'a PhotoPlan) -> &'a [[f32; 3]],
-    device: Device,
+    like: &Tensor,
 ) -> Result<Tensor, TrainError> {
     let values: Vec<f32> = photos
         .iter()
         .flat_map(|photo| of(&photo.plan).as_flattened().iter().copied())
         .collect();
-    Ok(Tensor::f_from_slice(&values)?
-        .f_reshape([photos.len() as i64, -1, 3])?
-        .f_to_device(device)?)
+    upload(&values, &[photos.len() as i64, -1, 3], like)
 }
 
-/// Numbers of each of `count` photographs, as `count x numbers x 1 x 1`.
-pub(super) fn columns(values: &[f32], count: usize, device: Device) -> Result<Tensor, TrainError> {
+/// Numbers of each of `count` photographs, as `count x numbers x 1 x 1`, on the device and of the kind of another tensor.
+pub(super) fn columns(values: &[f32], count: usize, like: &Tensor) -> Result<Tensor, TrainError> {
+    upload(values, &[count as i64, -1, 1, 1], like)
+}
+
+/// Numbers as a tensor on the device and of the kind of another one.
+pub(super) fn upload(values: &[f32], shape: &[i64], like: &Tensor) -> Result<Tensor, TrainError> {
     Ok(Tensor::f_from_slice(values)?
-        .f_reshape([count as i64, -1, 1, 1])?
-        .f_to_device(device)?)
+        .f_reshape(shape)?
+        .f_to_device(like.device())?
+        .f_to_kind(like.kind())?)
 }
 
 /// Indices as a tensor.
@@ -472,7 +469,7 @@ mod tests {
             rays: 64,
         };
         let views: Vec<PhotoView> = (0..3).map(|number| recipe.cast(&library, number)).collect();
-        let mut pool = ViewPool::new(3, recipe.size, Device::Cpu).unwrap();
+        let mut pool = ViewPool::new(3, recipe.size, (Kind::Float, Device::Cpu)).unwrap();
         for (place, view) in views.iter().enumerate() {
             pool.put(place, view.clone()).unwrap();
         }
@@ -556,7 +553,7 @@ mod tests {
         for photo in &mut photos {
             photo.plan.bounce = [0.0; 3];
         }
-        let maps = DirectionMaps::new(Device::Cpu).unwrap();
+        let maps = DirectionMaps::new(Kind::Float, Device::Cpu).unwrap();
         let lit = Lit::new(&pool, &maps, &photos).unwrap();
         let (mut off, mut sum) = ([0.0; 2], [0.0; 2]);
         for (at, photo) in photos.iter().enumerate() {
@@ -587,7 +584,7 @@ mod tests {
     #[test]
     fn a_photograph_is_lit_alike_whatever_else_is_in_its_batch() {
         let (pool, photos, _) = photographs();
-        let maps = DirectionMaps::new(Device::Cpu).unwrap();
+        let maps = DirectionMaps::new(Kind::Float, Device::Cpu).unwrap();
         let all = Lit::new(&pool, &maps, &photos).unwrap();
         for (at, photo) in photos.iter().enumerate() {
             let one = Lit::new(&pool, &maps, std::slice::from_ref(photo)).unwrap();
@@ -604,7 +601,7 @@ mod tests {
     #[test]
     fn light_that_bounces_makes_hollows_brighter_and_nothing_darker() {
         let (pool, mut photos, _) = photographs();
-        let maps = DirectionMaps::new(Device::Cpu).unwrap();
+        let maps = DirectionMaps::new(Kind::Float, Device::Cpu).unwrap();
         let shading = |photos: &[PlannedPhoto]| Lit::new(&pool, &maps, photos).unwrap().shading;
         photos
             .iter_mut()

@@ -164,7 +164,7 @@ impl Photographs {
             let lit = Lit::new(&open.pool, &open.maps, &photos)?;
             let noise = (&open.noise, seeds.as_slice());
             let photographed = photograph(&lit.image()?, &lit.mask, &photos, noise)?;
-            truth::truth(&lit, &photographed, &photos, symmetry, self.kind)
+            truth::truth(&lit, &photographed, &photos, symmetry)
         })?;
         self.open = Some(open);
         Ok(batch)
@@ -181,7 +181,7 @@ impl Photographs {
         };
         let device = self.resources.device;
         let views = self.data.views.div_ceil(of) as usize + 1;
-        let pool = ViewPool::new(views, self.data.size, device)?;
+        let pool = ViewPool::new(views, self.data.size, (self.kind, device))?;
         Ok(OpenPool {
             loader: ViewLoader::start(
                 &self.source,
@@ -190,7 +190,7 @@ impl Photographs {
                 self.resources.workers,
                 stop,
             )?,
-            maps: DirectionMaps::new(device)?,
+            maps: DirectionMaps::new(self.kind, device)?,
             noise: NoiseTiles::new(pool.side(), self.seed, device)?,
             pool,
         })

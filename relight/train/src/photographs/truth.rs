@@ -3,10 +3,10 @@
 use relight_core::render::cosine_lobe;
 use relight_photo::decompose::{LOG_FLOOR, MOST_LIGHT};
 use relight_photo::nets::LIGHT_OUTPUTS;
-use tch::{Kind, Tensor};
+use tch::Tensor;
 
 use super::camera::{Photographed, percentile};
-use super::lit::{Lit, PlannedPhoto};
+use super::lit::{Lit, PlannedPhoto, upload};
 use crate::error::TrainError;
 use crate::sample::TruthBatch;
 use crate::symmetry::Symmetry;
@@ -20,7 +20,6 @@ pub(super) fn truth(
     photographed: &Photographed,
     photos: &[PlannedPhoto],
     symmetry: Symmetry,
-    kind: Kind,
 ) -> Result<TruthBatch, TrainError> {
     let mask = &lit.mask;
     let over = |of: &Tensor, dims: &[i64]| of.f_sum_dim_intlist(dims, true, None);
@@ -41,7 +40,7 @@ pub(super) fn truth(
         .f_mean_dim([1_i64].as_slice(), true, None)?
         .f_div(&white)?;
 
-    let seen = |of: &Tensor| seen_in(of, symmetry)?.f_to_kind(kind);
+    let seen = |of: &Tensor| seen_in(of, symmetry);
     let normals = turned_normals(&lit.normals.f_mul(mask)?, symmetry)?;
     Ok(TruthBatch {
         input: seen(&encoded(&picture, mask)?)?,
@@ -51,7 +50,7 @@ pub(super) fn truth(
         albedo: seen(&lit.albedo)?,
         normals: seen(&normals)?,
         highlight: seen(&shown)?,
-        light: light(photos, &photographed.gain, &mean, symmetry)?.f_to_kind(kind)?,
+        light: light(photos, &photographed.gain, &mean, symmetry)?,
     })
 }
 
@@ -90,9 +89,7 @@ fn light(
         .iter()
         .flat_map(|one| one.plan.light.as_flattened().iter().copied())
         .collect();
-    let lights = Tensor::f_from_slice(&values)?
-        .f_reshape([count, LIGHT_OUTPUTS as i64, 3])?
-        .f_to_device(gain.device())?;
+    let lights = upload(&values, &[count, LIGHT_OUTPUTS as i64, 3], gain)?;
     let grey = lights.f_mul(&gain.f_reshape([count, 1, 3])?)?.f_mean_dim(
         [2_i64].as_slice(),
         false,

@@ -9,6 +9,8 @@ use relight_synth::{PhotoView, ViewLamp};
 #[derive(Debug)]
 pub(super) struct ViewPool {
     side: i64,
+    /// The type of what is computed of them.
+    kind: Kind,
     /// `views x PhotoView::BASE x side x side`, as all others in half precision.
     base: Tensor,
     /// `(views x FINISHES) x FINISH_PLANES x side x side`.
@@ -20,8 +22,12 @@ pub(super) struct ViewPool {
 }
 
 impl ViewPool {
-    /// Room for so many views of a size.
-    pub(super) fn new(views: usize, size: u32, device: Device) -> Result<Self, TrainError> {
+    /// Room for so many views of a size; what is computed of them is of a kind.
+    pub(super) fn new(
+        views: usize,
+        size: u32,
+        (kind, device): (Kind, Device),
+    ) -> Result<Self, TrainError> {
         let (count, side) = (views as i64, i64::from(size));
         let zeros = |each: usize, planes: usize| -> Result<Tensor, tch::TchError> {
             let shape = [count * each as i64, planes as i64, side, side];
@@ -29,6 +35,7 @@ impl ViewPool {
         };
         Ok(Self {
             side,
+            kind,
             base: zeros(1, PhotoView::BASE)?,
             finishes: zeros(PhotoView::FINISHES, PhotoView::FINISH_PLANES)?,
             visibility: zeros(PhotoView::LAMPS, 1)?,
@@ -91,6 +98,6 @@ impl ViewPool {
     fn chosen(&self, of: &Tensor, at: impl Iterator<Item = usize>) -> Result<Tensor, TrainError> {
         let at: Vec<i64> = at.map(|at| at as i64).collect();
         let at = Tensor::f_from_slice(&at)?.f_to_device(of.device())?;
-        Ok(of.f_index_select(0, &at)?.f_to_kind(Kind::Float)?)
+        Ok(of.f_index_select(0, &at)?.f_to_kind(self.kind)?)
     }
 }
