@@ -19,7 +19,7 @@ use crate::observe::conditioning::Conditioning;
 use crate::observe::curves::TurnCurves;
 
 /// Number of pixels on which the gloss is fitted. By hand.
-const PIXELS: usize = 500;
+const PIXELS: usize = 1000;
 /// How strongly gloss reflects, over a smooth dielectric. By hand: up to 16, because light by a dark grey ball is in small
 /// units.
 const STRENGTHS: [f64; 8] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
@@ -138,11 +138,7 @@ impl Finish {
         };
         let tried = strengths.iter();
         let tried = tried.flat_map(|&strength| BLURS.map(|blur| Lobe { strength, blur }));
-        let first = Lobe {
-            strength: strengths[0],
-            ..Lobe::SMOOTH
-        };
-        let mut best = (f64::INFINITY, first);
+        let mut best = (f64::INFINITY, Lobe::SMOOTH);
         self.try_all(tried, &some, &mut best);
         for round in 1..=REFINED {
             let (part, around) = (0.5_f64.powi(round), best.1);
@@ -169,10 +165,8 @@ impl Finish {
         statistics: &[CurveStatistics],
         best: &mut (f64, Lobe),
     ) {
-        let near = search_all(&self.model(best.1), statistics, None);
-        best.0 = f64::INFINITY;
         for lobe in lobes {
-            let cost = Search::new(&self.model(lobe)).cost(statistics, &near);
+            let cost = Search::new(&self.model(lobe)).cost(statistics);
             if cost < best.0 {
                 *best = (cost, lobe);
             }

@@ -17,7 +17,16 @@ const ROUGH_STEP: f64 = 0.01;
 /// Step at which a refinement ends, radians. Numerical.
 const LAST_STEP: f64 = 2e-4;
 /// Where a step may lead.
-const AROUND: [[f64; 2]; 4] = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+const AROUND: [[f64; 2]; 8] = [
+    [1.0, 0.0],
+    [-1.0, 0.0],
+    [0.0, 1.0],
+    [0.0, -1.0],
+    [0.7, 0.7],
+    [-0.7, 0.7],
+    [0.7, -0.7],
+    [-0.7, -0.7],
+];
 /// Step of the finite differences of the Hessian, radians. By hand.
 const HESSIAN_STEP: f64 = 0.06;
 /// Least eigenvalue of the Hessian: at a border of what is allowed it need not be positive. Numerical.
@@ -123,14 +132,10 @@ impl<'a> Search<'a> {
         (least, normal)
     }
 
-    /// The mean residual of the best normals near those of other fits.
-    pub(crate) fn cost(&self, all: &[CurveStatistics], near: &[PixelFit]) -> f64 {
-        let least = |(statistics, fit): (&CurveStatistics, &PixelFit)| {
-            let start = (self.residual(statistics, fit.normal), fit.normal);
-            let (residual, _) = self.downhill(statistics, start, [FIRST_STEP, ROUGH_STEP]);
-            residual.min(1.0)
-        };
-        let costs: Vec<f64> = all.par_iter().zip(near).map(least).collect();
+    /// The mean residual of the best candidates of all pixels.
+    pub(crate) fn cost(&self, all: &[CurveStatistics]) -> f64 {
+        let least = |statistics: &CurveStatistics| self.anywhere(statistics).residual.min(1.0);
+        let costs: Vec<f64> = all.par_iter().map(least).collect();
         costs.iter().sum::<f64>() / all.len().max(1) as f64
     }
 
