@@ -87,7 +87,7 @@ impl Identity {
             steps_per_degree: positive(100, "its steps per degree ($100)")?,
             max_degrees_per_second: positive(110, "its fastest speed ($110)")? / 60.0,
             acceleration: positive(120, "its acceleration ($120)")?,
-            limits: settings.limits(extras)?,
+            limits: settings.limits(offers_extras(about))?,
             // grblHAL's setting is a set of bits, of which the first switches homing on.
             homing: settings.get(22).is_some_and(|value| value % 2.0 == 1.0),
             lease_s: extras.then(|| settings.get(60)).flatten(),
@@ -135,7 +135,8 @@ impl GrblSettings {
         self.get(number).is_some_and(|value| value != 0.0)
     }
 
-    fn limits(&self, extras: bool) -> Result<(f64, f64), TurntableError> {
+    /// How far the table may turn in each direction; `offers_extras`: whether the firmware is the rig's own.
+    fn limits(&self, offers_extras: bool) -> Result<(f64, f64), TurntableError> {
         let reach_deg = match self.is_on(20) {
             true => self
                 .positive(130)
@@ -143,7 +144,7 @@ impl GrblSettings {
             false => TRAVEL_DEG,
         };
         // Stock Grbl's soft limits reach from the far end of the axis to machine zero.
-        let stock = self.is_on(20) && !extras;
+        let stock = self.is_on(20) && !offers_extras;
         Ok((-reach_deg, if stock { 0.0 } else { reach_deg }))
     }
 }
