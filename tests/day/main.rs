@@ -29,7 +29,7 @@ fn main() -> ExitCode {
         a_day_goes_by_taps_from_an_empty_table_to_a_verified_data_set_and_the_next_object,
         trouble::what_is_not_there_is_named_by_headline_and_button,
         trouble::the_emergency_stop_comes_first_and_the_aborted_object_after_it,
-        where_the_programs_are_missing_a_session_shows_its_commands,
+        where_the_programs_are_missing_the_page_says_so_and_offers_nothing,
     ];
     let long = trial("a_day_of_whole_turns", chromium::find, a_day_of_whole_turns);
     trials.push(long.with_ignored_flag(true));
@@ -48,38 +48,17 @@ fn a_day_of_whole_turns(browser: PathBuf) {
     Day::begin(&rig, Phone::open(&browser, &rig.url, "day")).go_through();
 }
 
-fn where_the_programs_are_missing_a_session_shows_its_commands(browser: PathBuf) {
+fn where_the_programs_are_missing_the_page_says_so_and_offers_nothing(browser: PathBuf) {
     let rig = Rig::start_without_programs(&SHORT_TURN);
-    let session = rig.hold_recorded();
+    rig.hold_recorded();
     let mut phone = Phone::open(&browser, &rig.url, "alone");
     phone.wait_text("#missing", "relit-mask and relit-extract are not installed");
     phone.wait_for("document.getElementById('when-done').disabled");
     phone.tap("#sessions li button");
-    phone.wait_text("#mask-command", "relit-mask ");
-    let folder = rig.sessions().join(&session);
-    let shown = |phone: &mut Phone, id: &str| phone.text(id);
-    assert_eq!(
-        shown(&mut phone, "#mask-command"),
-        format!("relit-mask {} --auto", folder.display())
-    );
-    assert_eq!(
-        shown(&mut phone, "#extract-command"),
-        format!(
-            "relit-extract {} -o {}",
-            folder.display(),
-            rig.dataset().display()
-        )
-    );
+    phone.wait_for("document.getElementById('make-mask').checkVisibility()");
     for button in ["make-mask", "edit-mask", "make-check", "make-extract"] {
         let expression = format!("document.getElementById('{button}').disabled");
         assert_eq!(phone.value(&expression), true, "{button}");
     }
-    for command in ["mask", "extract"] {
-        let button = format!("[data-copy={command}-command]");
-        phone.tap(&button);
-        phone.wait_for(&format!(
-            "['Copied', 'Selected'].includes(document.querySelector('{button}').textContent)"
-        ));
-    }
-    phone.see("commands");
+    phone.see("without-programs");
 }
