@@ -20,6 +20,8 @@ use crate::observe::curves::TurnCurves;
 
 /// Number of pixels on which the gloss is fitted. By hand.
 const PIXELS: usize = 1000;
+/// Of these, every so manieth tells which lobe is about right. By hand.
+const ROUGHLY: usize = 4;
 /// How strongly gloss reflects, over a smooth dielectric. By hand: up to 16, because light by a dark grey ball is in small
 /// units.
 const STRENGTHS: [f64; 8] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
@@ -139,9 +141,11 @@ impl Finish {
         let tried = strengths.iter();
         let tried = tried.flat_map(|&strength| BLURS.map(|blur| Lobe { strength, blur }));
         let mut best = (f64::INFINITY, Lobe::SMOOTH);
-        self.try_all(tried, &some, &mut best);
+        let few: Vec<CurveStatistics> = some.iter().step_by(ROUGHLY).copied().collect();
+        self.try_all(tried, &few, &mut best);
         for round in 1..=REFINED {
             let (part, around) = (0.5_f64.powi(round), best.1);
+            best.0 = f64::INFINITY;
             let steps = [-part, 0.0, part];
             let stronger = if strengths.len() > 1 {
                 &steps[..]
