@@ -43,7 +43,7 @@ impl Simulated {
 
     /// Starts a jog in a process of its own, and waits until the table moves.
     fn jog(&self, words: &[&str]) -> Child {
-        let jog = Command::new(PROGRAM)
+        let mut jog = Command::new(PROGRAM)
             .args(["turntable", "--turntable"])
             .arg(format!("serial:{}", self.port().display()))
             .arg("jog")
@@ -58,6 +58,8 @@ impl Simulated {
             }
             std::thread::sleep(Duration::from_millis(100));
         }
+        jog.kill().unwrap();
+        jog.wait().unwrap();
         panic!("the table never moved");
     }
 }

@@ -61,7 +61,7 @@ pub(super) fn claim(port: &Path, folder: &Path) -> Result<LockFile, TurntableErr
 pub(super) fn has_open(pid: u32, port: &Path, folder: &Path) -> bool {
     let lock = fs::metadata(port)
         .map(|device| lock_of(&device, folder))
-        .and_then(|lock| fs::metadata(lock));
+        .and_then(fs::metadata);
     let files = fs::read_dir(format!("/proc/{pid}/fd"));
     let (Ok(lock), Ok(files)) = (lock, files) else {
         return false;

@@ -514,7 +514,7 @@ mod tests {
             let falloff = dot(towards, unit(centre)).max(0.0) * dot(centre, centre) / square;
             let visible = f64::from(view.visibility[lit.lamp * area + pixel]) * falloff;
             let cosine = dot(normal, towards).max(0.0);
-            for c in 0..3 {
+            for (c, highlight) in highlight.iter_mut().enumerate() {
                 let arriving = f64::from(lit.irradiance[c]) * visible;
                 shading[c] += arriving * cosine;
                 let Some(gloss) = plan.gloss.filter(|_| cosine > 0.0) else {
@@ -524,14 +524,14 @@ mod tests {
                     lamp_lobe(gloss.exponent, gloss.reflectance, lamp.half_angle);
                 let half = unit([0, 1, 2].map(|c| towards[c] + eye[c]));
                 let lobe = dot(normal, half).max(1e-6).powf(f64::from(exponent));
-                highlight[c] += arriving * lobe * f64::from(strength[c]);
+                *highlight += arriving * lobe * f64::from(strength[c]);
             }
         }
         if let Some(gloss) = plan.gloss {
             let facing = dot(normal, eye).max(0.0);
             let mirrored = at(unit([0, 1, 2].map(|c| 2.0 * facing * normal[c] - eye[c])));
             let blur = 4.0 / f64::from(gloss.exponent);
-            for c in 0..3 {
+            for (c, highlight) in highlight.iter_mut().enumerate() {
                 let seen: f64 = (0..plan.room.len())
                     .map(|k| {
                         let l = k.isqrt() as f64;
@@ -541,7 +541,7 @@ mod tests {
                     .sum();
                 let strength =
                     8.0 * f64::from(gloss.reflectance[c]) / f64::from(gloss.exponent + 1.0);
-                highlight[c] += seen.max(0.0) * facing * of(PhotoView::MIRRORS) * strength;
+                *highlight += seen.max(0.0) * facing * of(PhotoView::MIRRORS) * strength;
             }
         }
         (shading, highlight)

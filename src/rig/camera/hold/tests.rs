@@ -11,7 +11,7 @@ fn control(name: &str, kind: ControlKind, range: (i64, i64), value: i64) -> Cont
         id.wrapping_mul(31).wrapping_add(byte.into())
     });
     Control {
-        id: id,
+        id,
         name: name.to_owned(),
         kind,
         minimum: range.0,

@@ -60,7 +60,7 @@ pub(super) fn controls(manifest: &Manifest) -> Vec<Control> {
                 _ => return None,
             };
             Some(Control {
-                id: id,
+                id,
                 name: name.clone(),
                 kind,
                 minimum: value,
