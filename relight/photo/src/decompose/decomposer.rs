@@ -1,5 +1,6 @@
 //! From a picture under a mask to its layers and its light.
 
+#[cfg(feature = "files")]
 use std::path::Path;
 
 use super::answer::{Engine, MapsNet, Scales, Whole, to_maps};
@@ -12,7 +13,9 @@ use super::other::OtherNormals;
 use super::strips::{Enlargement, LayerPlan};
 use crate::nets::{Inference, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
-use relight_core::light::{Normals, NormalsFrame, ShLight, YUp};
+#[cfg(feature = "files")]
+use relight_core::light::NormalsFrame;
+use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer};
 use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};

@@ -5,6 +5,10 @@
 
 mod answer;
 mod compose;
+#[cfg_attr(
+    not(feature = "files"),
+    allow(dead_code, reason = "other networks for normals come from files")
+)]
 mod convention;
 mod crop;
 mod decomposer;
@@ -13,6 +17,10 @@ mod error;
 mod gloss;
 mod light;
 mod mask;
+#[cfg_attr(
+    not(feature = "files"),
+    allow(dead_code, reason = "other networks for normals come from files")
+)]
 mod other;
 mod photo;
 mod strips;

@@ -157,7 +157,7 @@ impl SceneSetting {
     /// The objects in this setting, from back to front.
     ///
     /// # Errors
-    /// As [`InsertScene::new`].
+    /// Whatever is wrong with an object or the background.
     pub fn scene<'a>(&self, objects: Vec<SceneObject<'a>>) -> Result<InsertScene<'a>, InsertError> {
         let light = (self.projected.clone(), self.around.clone());
         InsertScene::new(self.extent, light, self.tilt, self.matching, objects)
