@@ -149,8 +149,9 @@ fn assert_same(a: &Path, b: &Path, net: &str) {
                 .iter()
                 .fold(0.0_f32, |most, v| most.max(v.abs()));
             for (a, b) in tensor.values().iter().zip(other.values()) {
+                // Steps of Adam are 1e-5 long here, also along gradients that nearly cancel: a millionth of a step may differ.
                 assert!(
-                    (a - b).abs() <= 2e-7 * largest + 1e-12,
+                    (a - b).abs() <= 2e-7 * largest + 1e-10,
                     "{part}{name}: {a} {b}, the largest {largest}"
                 );
                 compared += 1;
