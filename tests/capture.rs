@@ -370,7 +370,7 @@ fn dropped_frames_are_listed_at_their_index_and_make_a_take_unusable_beyond_what
         assert_eq!(take.index().gaps().len(), 2);
         let faults = take.faults();
         assert!(faults[0].starts_with("2 frames missing before frame 40"));
-        assert!(faults[1].starts_with("1 frame missing before frame 78,"));
+        assert!(faults[1].starts_with("1 frame missing before frame 78"));
         if tolerated {
             take.check_verdict(Verdict::Tolerated);
             assert_eq!(take.summary.reason.as_deref(), Some(faults[0]));

@@ -34,6 +34,7 @@ mod chip;
 mod faults;
 mod ground_truth;
 mod model;
+mod openings;
 mod options;
 mod simulated_table;
 mod terminal;
@@ -139,13 +140,11 @@ fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &A
     while !stop.load(Ordering::Relaxed) {
         let now_us = clock.now_us();
         let mut model = table.model();
-        let capacity = model.capacity().min(LARGEST);
-        let was_closed = terminal.is_closed();
-        let received = terminal.read(buffer.get_mut(..capacity).unwrap_or_default());
-        // A port that is closed and opened again between two looks counts as open all the time.
-        if was_closed && !terminal.is_closed() {
+        for _ in 0..terminal.opened() {
             model.open(now_us);
         }
+        let capacity = model.capacity().min(LARGEST);
+        let received = terminal.read(buffer.get_mut(..capacity).unwrap_or_default());
         model.receive(now_us, received);
         let output = model.take_output(now_us, usize::MAX);
         drop(model);

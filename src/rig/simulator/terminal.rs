@@ -10,10 +10,12 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::SimulatorError;
+use super::openings::Openings;
 
 /// The chip's end of the serial line.
 pub(super) struct Terminal {
     line: OwnedFd,
+    openings: Openings,
     path: PathBuf,
     /// No process has the port open.
     closed: bool,
@@ -45,8 +47,10 @@ impl Terminal {
         modes.make_raw();
         tcsetattr(&port, OptionalActions::Now, &modes).map_err(failed("set up"))?;
         drop(port);
+        let openings = Openings::watch(&path).map_err(failed("watch"))?;
         Ok(Terminal {
             line,
+            openings,
             path,
             closed: true,
         })
@@ -57,9 +61,9 @@ impl Terminal {
         &self.path
     }
 
-    /// Whether no process has the port open, by the last read.
-    pub(super) fn is_closed(&self) -> bool {
-        self.closed
+    /// How many times the port was opened since the last call.
+    pub(super) fn opened(&mut self) -> u64 {
+        self.openings.count(self.closed)
     }
 
     /// Reads what the host has written, up to the size of the buffer.
