@@ -128,7 +128,7 @@ fn a_dark_turn_and_a_white_one_are_wrongly_exposed() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2))]
+    #![proptest_config(ProptestConfig::with_cases(4))]
 
     #[test]
     fn where_the_turn_starts_changes_nothing_but_the_light_s_angle(first_deg in -400.0_f64..400.0) {
