@@ -11,7 +11,7 @@ TARGET := $(or $(CARGO_TARGET_DIR),target)
 PROGRAMS := -p relit-capture -p relit-mask -p relit-extract
 
 # Parts of the programs that nobody needs to make shards; lint and tests look at them too.
-EXTRAS := --features relit-rig/nokhwa,relit-mask/opencv
+EXTRAS := --features relit-capture/nokhwa,relit-mask/opencv
 
 # The recorded session of a whole turn, which the demonstration replays as a camera.
 SESSION := 20261120T093015Z-cow
@@ -99,7 +99,7 @@ test-slurm: setup ## Extract as an array job on a real Slurm, started on this ma
 
 test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, with an S3 server on this machine
 	cargo test --locked -p relit-extract --features object-store --lib objects
-	cargo test --locked -p relit-extract --features object-store --test objects
+	cargo test --locked -p relit-extract --features object-store --test program objects
 	cargo build --locked -p relit-extract --features object-store
 	tests/objects/s3 $(TARGET)/debug/relit-extract $(abspath $(OBJECTS_VENV))/bin/python
 

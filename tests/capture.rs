@@ -15,19 +15,19 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use relit_camera::{
+    Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode,
+    Rates, open,
+};
+use relit_capture::capture::{End, Recorder, RecordingPlan, Window, salvage, salvage_session};
+use relit_capture::preview::Preview;
+use relit_capture::state::{Monitor, TakeSummary, Verdict};
+use relit_clock::Clock;
 use relit_data::session::{
     CameraFacts, FrameClock, FrameIndex, Manifest, Recording, SoftwareFacts, Status, VideoFacts,
 };
 use relit_data::shard::{Dataset, ImageSize};
 use relit_extract::{ExtractOptions, extract};
-use relit_rig::camera::{
-    Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode,
-    Rates, open,
-};
-use relit_rig::capture::{End, Recorder, RecordingPlan, Window, salvage, salvage_session};
-use relit_rig::clock::Clock;
-use relit_rig::preview::Preview;
-use relit_rig::state::{Monitor, TakeSummary, Verdict};
 use relit_tests::{ffmpeg, packets};
 use relit_video::{PixelFormat, StreamFormat, Video};
 

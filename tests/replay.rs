@@ -8,7 +8,8 @@ use std::process::{Command, ExitCode, Output};
 
 use relit_data::session::{FrameIndex, Recording};
 use relit_data::shard::{Dataset, FrameRecord, ShardReader};
-use relit_test_support::trials::{self, free_trial};
+use relit_tests::program;
+use relit_tests::trials::{self, free_trial};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -36,7 +37,7 @@ struct FrameTruth {
 }
 
 fn fixtures() -> Vec<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures");
     let mut found: Vec<PathBuf> = fs::read_dir(root)
         .unwrap()
         .map(|entry| entry.unwrap().path())
@@ -53,7 +54,7 @@ fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> T {
 }
 
 fn run(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+    Command::new(program("relit-extract"))
         .args(arguments)
         .output()
         .unwrap()

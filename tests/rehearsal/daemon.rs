@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use relit_capture::capture::{CaptureError, Settings};
+use relit_capture::command::{Command, Refused, Rig};
+use relit_capture::daemon::Daemon;
+use relit_capture::state::{Phase, RigState, Verdict};
 use relit_data::session::{Manifest, SessionWriter};
-use relit_rig::capture::{CaptureError, Settings};
-use relit_rig::command::{Command, Refused, Rig};
-use relit_rig::daemon::Daemon;
-use relit_rig::state::{Phase, RigState, Verdict};
 
 use crate::support::{SHORT, fixture};
 

@@ -6,13 +6,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use relit_camera::{
+    self as camera, Camera, CameraError, CameraMode, Control, DeviceInfo, Frame, Mode,
+};
+use relit_capture::capture::{CaptureError, Settings, Stopped};
+use relit_capture::state::{Phase, TakeSummary, Verdict};
 use relit_data::causes::with_causes;
 use relit_data::session::{Status, recordings};
-use relit_rig::camera::{self, Camera, CameraError, CameraMode, Control, DeviceInfo, Frame, Mode};
-use relit_rig::capture::{CaptureError, Settings, Stopped};
-use relit_rig::simulator::{SimulatedPort, SimulatedTable, SimulatorOptions};
-use relit_rig::state::{Phase, TakeSummary, Verdict};
-use relit_rig::turntable::{self, Port, Table};
+use relit_turntable::simulator::{SimulatedPort, SimulatedTable, SimulatorOptions};
+use relit_turntable::{self as turntable, Port, Table};
 
 use crate::support::{Rehearsal, SHORT};
 

@@ -6,11 +6,11 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
+use relit_capture::capture::salvage;
+use relit_clock::Clock;
 use relit_data::session::{FrameEntry, Recording, Status, recordings};
 use relit_data::shard::{Dataset, ImageSize};
 use relit_extract::{ExtractOptions, extract};
-use relit_rig::capture::salvage;
-use relit_rig::clock::Clock;
 
 use crate::support::{Rehearsal, SHORT, fixture};
 use rustix::process::{Pid, Signal, kill_process};

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use relit_data::session::Recording;
-use relit_rig::capture::{
+use relit_capture::capture::{
     CaptureContext, CaptureError, Captured, Equipment, Settings, StopRequest, capture,
 };
-use relit_rig::clock::Participant;
-use relit_rig::simulator::SimulatedTable;
-use relit_rig::state::{Monitor, TakeSummary};
+use relit_capture::state::{Monitor, TakeSummary};
+use relit_clock::Participant;
+use relit_data::session::Recording;
+use relit_turntable::simulator::SimulatedTable;
 
 /// A whole turn, H.264 out of order, which a replay delivers as raw pictures.
 pub(crate) const TURN: &str = "20261120T093015Z-cow";

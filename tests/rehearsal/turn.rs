@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use relit_capture::state::Verdict;
 use relit_data::session::Status;
 use relit_data::shard::ImageSize;
 use relit_extract::{ExtractOptions, extract};
-use relit_rig::state::Verdict;
 use relit_video::{Muxer, PixelFormat, StreamFormat, Video};
 
 use crate::support::{Rehearsal, SHORT, TURN, fixture};

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use relit_rig::camera::{self, Camera};
-use relit_rig::clock::Clock;
+use relit_camera::{self as camera, Camera};
+use relit_clock::Clock;
 
 pub(crate) const VIVID: &str = "v4l2:/dev/video0";
 const DRIVER: &str = "/sys/bus/platform/drivers/vivid";

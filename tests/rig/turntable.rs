@@ -4,7 +4,7 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use relit_rig::turntable::{Port, SerialPort};
+use relit_turntable::{Port, SerialPort};
 
 const LINE: &str = "/dev/ttyS1";
 /// Between two questions: one that comes while the controller starts is lost.

@@ -8,7 +8,9 @@
 )]
 
 pub mod chromium;
+pub mod disc;
 pub mod editor_canvas;
+pub mod firmware;
 mod programs;
 pub mod trials;
 

@@ -1,6 +1,6 @@
 //! Alarms, holds, resets and the lease.
 
-use crate::support::Table;
+use relit_test_support::firmware::Table;
 
 #[test]
 fn a_target_beyond_the_soft_limit_stops_the_table_and_locks_it() {

@@ -1,6 +1,6 @@
 //! Checked lines: what is damaged, lost or repeated never moves the table.
 
-use crate::support::Table;
+use relit_test_support::firmware::Table;
 use rig_firmware::crc::Crc;
 
 fn sum(text: &str) -> String {

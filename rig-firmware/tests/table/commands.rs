@@ -1,6 +1,6 @@
 //! What each command does and says.
 
-use crate::support::{FakeBoard, Table};
+use relit_test_support::firmware::{FakeBoard, Table};
 use rig_firmware::board::ResetCause;
 
 #[test]

@@ -1,6 +1,6 @@
 //! Every error number that a line can get.
 
-use crate::support::Table;
+use relit_test_support::firmware::Table;
 
 #[test]
 fn each_wrong_line_gets_its_number_and_moves_nothing() {

@@ -1,6 +1,6 @@
 //! Homing finds the same step every time.
 
-use crate::support::Table;
+use relit_test_support::firmware::Table;
 
 /// A table with homing on, whose index is active from one position to before another.
 fn table(index: (i32, i32), inverted: bool) -> Table {

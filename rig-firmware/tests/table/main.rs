@@ -6,9 +6,6 @@
     reason = "a panic is how a test tells"
 )]
 
-#[path = "../support/mod.rs"]
-mod support;
-
 mod alarms;
 mod checked;
 mod commands;

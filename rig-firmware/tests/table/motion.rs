@@ -1,6 +1,6 @@
 //! Motion as the motor sees it: the times of the step pulses.
 
-use crate::support::{Edge, Table, extremes};
+use relit_test_support::firmware::{Edge, Table, extremes};
 
 const STEPS_PER_DEGREE: f64 = 88.889;
 const ACCELERATION: f64 = 36.0 * STEPS_PER_DEGREE;

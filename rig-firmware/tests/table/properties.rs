@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use crate::support::{Edge, Table, extremes};
+use relit_test_support::firmware::{Edge, Table, extremes};
 
 const ACCELERATION: f64 = 36.0 * 88.889;
 

@@ -1,6 +1,6 @@
 //! Settings in the EEPROM: kept, checked, and safe against a supply that goes away.
 
-use crate::support::{FakeBoard, Table};
+use relit_test_support::firmware::{FakeBoard, Table};
 
 /// The values after a restart, and what the start said.
 fn restart(mut board: FakeBoard) -> (Table, Vec<String>) {

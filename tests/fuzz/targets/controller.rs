@@ -8,12 +8,8 @@
     reason = "a fuzz target reports by a panic"
 )]
 
-#[allow(dead_code, reason = "the firmware's own tests use the rest")]
-#[path = "../../../rig-firmware/tests/support/mod.rs"]
-mod support;
-
 use libfuzzer_sys::fuzz_target;
-use support::Table;
+use relit_test_support::firmware::Table;
 
 /// More would only take longer.
 const LONGEST: usize = 1024;

@@ -1,0 +1,79 @@
+//! What keeps a turn from being captured, each with the way out.
+
+use std::io;
+
+use super::recording::RecordingError;
+use relit_camera::CameraError;
+use relit_turntable::TurntableError;
+use relit_turntable::lockfile::LockError;
+use relit_turntable::simulator;
+
+/// Why there is no capture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CaptureError {
+    /// Something was not as it has to be before the table turns.
+    #[error("the capture was not begun: {0}")]
+    Refused(String),
+    /// The camera.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The table.
+    #[error(transparent)]
+    Turntable(#[from] TurntableError),
+    /// Somebody asked for it.
+    #[error("the capture was stopped")]
+    Stopped(#[from] Stopped),
+    /// The recording.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The simulated table.
+    #[error(transparent)]
+    Simulator(#[from] simulator::SimulatorError),
+    /// Something is not there at the moment; what, and what to do.
+    #[error("{0}")]
+    Missing(String),
+    /// Another process has the camera or the folder, or that cannot be known.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// The recording ended before the turn, or long after it.
+    #[error("the recording did not end with the turn")]
+    NotWithTheTurn,
+    /// A part of the machine could not be had.
+    #[error("{what} could not be {doing}")]
+    System {
+        /// What was worked on.
+        what: String,
+        /// What was to be done, as a participle.
+        doing: &'static str,
+        /// The system's answer.
+        source: io::Error,
+    },
+}
+
+impl CaptureError {
+    /// That `what` could not be `doing`, a participle: for `map_err`.
+    pub fn system(what: impl Into<String>, doing: &'static str) -> impl FnOnce(io::Error) -> Self {
+        let what = what.into();
+        move |source| Self::System {
+            what,
+            doing,
+            source,
+        }
+    }
+
+    pub(crate) fn no_camera() -> Self {
+        Self::Missing("there is no camera at the moment: plug it in".to_owned())
+    }
+}
+
+/// Who asked for the stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Stopped {
+    /// A person.
+    #[error("somebody asked for it")]
+    Person,
+    /// The program is to end.
+    #[error("the program was told to end")]
+    Shutdown,
+}

@@ -1,0 +1,177 @@
+//! Which of a camera's modes to record in.
+
+use std::fmt;
+
+use super::error::CaptureError;
+use relit_camera::{CameraMode, Fourcc, Mode, Rate, Rates};
+
+/// Formats from the one that is preferred: what the camera compresses by frames comes first.
+const PREFERRED: [Fourcc; 5] = [
+    Fourcc::MJPG,
+    Fourcc::H264,
+    Fourcc::YUYV,
+    Fourcc::NV12,
+    Fourcc::RGB3,
+];
+/// Rates that differ by less count as the same, frames a second: 29.97 is asked for as 30.
+const SAME_RATE: f64 = 0.05;
+
+/// What is preferred of a camera's mode; what is not given is chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModePreference {
+    /// Pixel format.
+    pub fourcc: Option<Fourcc>,
+    /// Frame width and height, pixels.
+    pub size: Option<(u32, u32)>,
+    /// Frames a second.
+    pub fps: f64,
+}
+
+impl Default for ModePreference {
+    fn default() -> Self {
+        Self {
+            fourcc: None,
+            size: None,
+            fps: 30.0,
+        }
+    }
+}
+
+impl fmt::Display for ModePreference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.fourcc {
+            Some(fourcc) => write!(f, "{fourcc}")?,
+            None => f.write_str("any format")?,
+        }
+        match self.size {
+            Some((width, height)) => write!(f, " {width}x{height}")?,
+            None => f.write_str(" of any size")?,
+        }
+        write!(f, " at {} frames/s", self.fps)
+    }
+}
+
+impl ModePreference {
+    /// The mode to ask the camera for: of those that are as preferred the largest, and of those the
+    /// one whose frames take the least space.
+    ///
+    /// # Errors
+    /// [`CaptureError::Refused`] with what there is.
+    pub fn choose(&self, modes: &[Mode]) -> Result<CameraMode, CaptureError> {
+        let requests = modes.iter().filter_map(|mode| self.of(mode));
+        let rank = |fourcc: Fourcc| PREFERRED.iter().position(|&known| known == fourcc);
+        requests
+            .min_by_key(|request| {
+                let pixels = u64::from(request.width) * u64::from(request.height);
+                let rank = rank(request.fourcc).unwrap_or(PREFERRED.len());
+                (std::cmp::Reverse(pixels), rank)
+            })
+            .ok_or_else(|| {
+                let offered: Vec<String> = modes.iter().map(Mode::to_string).collect();
+                CaptureError::Refused(format!(
+                    "the camera does not offer {self}; it offers {}",
+                    first_of(&offered)
+                ))
+            })
+    }
+
+    fn of(&self, mode: &Mode) -> Option<CameraMode> {
+        if self.fourcc.is_some_and(|fourcc| fourcc != mode.fourcc) {
+            return None;
+        }
+        let (width, height) = match self.size {
+            Some((width, height)) if !mode.sizes.contains(width, height) => return None,
+            Some(size) => size,
+            None => mode.sizes.largest(),
+        };
+        Some(CameraMode {
+            fourcc: mode.fourcc,
+            width,
+            height,
+            rate: self.rate(&mode.rates)?,
+        })
+    }
+
+    fn rate(&self, rates: &Rates) -> Option<Rate> {
+        match rates {
+            Rates::List(rates) => {
+                let distance = |rate: &Rate| (rate.per_second() - self.fps).abs();
+                let nearest = rates.iter().copied();
+                let nearest = nearest.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+                (distance(&nearest) < SAME_RATE).then_some(nearest)
+            }
+            Rates::Range { slowest, fastest } => {
+                let rate = Rate::from_per_second(self.fps)?;
+                let (low, high) = (slowest.per_second(), fastest.per_second());
+                (low - SAME_RATE..=high + SAME_RATE)
+                    .contains(&self.fps)
+                    .then_some(rate)
+            }
+            Rates::Unknown => Rate::from_per_second(self.fps),
+        }
+    }
+}
+
+/// The first of a long list.
+fn first_of(offered: &[String]) -> String {
+    const MOST: usize = 12;
+    match offered.len() {
+        0 => "nothing that can be recorded".to_owned(),
+        n if n > MOST => format!("{} and {} more", offered[..MOST].join("; "), n - MOST),
+        _ => offered.join("; "),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relit_camera::Sizes;
+
+    fn mode(fourcc: Fourcc, width: u32, height: u32, rates: &[u32]) -> Mode {
+        Mode {
+            fourcc,
+            sizes: Sizes::One(width, height),
+            rates: Rates::List(
+                rates
+                    .iter()
+                    .filter_map(|&rate| Rate::new(rate, 1))
+                    .collect(),
+            ),
+        }
+    }
+
+    #[test]
+    fn the_largest_mode_at_the_rate_is_chosen_and_compressed_ones_before_raw_ones() {
+        let modes = [
+            mode(Fourcc::YUYV, 1920, 1080, &[5, 30]),
+            mode(Fourcc::MJPG, 1920, 1080, &[30, 60]),
+            mode(Fourcc::MJPG, 3840, 2160, &[15]),
+        ];
+        let chosen = ModePreference::default().choose(&modes).unwrap();
+        assert_eq!(chosen.to_string(), "MJPG:1920x1080@30");
+        let preference = ModePreference {
+            fourcc: Some(Fourcc::YUYV),
+            ..ModePreference::default()
+        };
+        assert_eq!(preference.choose(&modes).unwrap().fourcc, Fourcc::YUYV);
+        let preference = ModePreference {
+            fps: 15.0,
+            ..ModePreference::default()
+        };
+        assert_eq!(preference.choose(&modes).unwrap().width, 3840);
+    }
+
+    #[test]
+    fn a_wish_that_no_mode_fulfils_is_told_with_what_there_is() {
+        let modes = [mode(Fourcc::MJPG, 640, 480, &[25])];
+        let error = ModePreference::default()
+            .choose(&modes)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("any format of any size at 30 frames/s"),
+            "{error}"
+        );
+        assert!(error.contains("MJPG 640x480, 25 frames/s"), "{error}");
+    }
+}

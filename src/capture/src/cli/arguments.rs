@@ -1,0 +1,229 @@
+//! The command line, and what it asks for.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use relit_camera::hold::ManualValues;
+use relit_camera::{CameraAddress, Fourcc};
+use relit_capture::capture::{ModePreference, Settings};
+use relit_capture::serve::ListenAddress;
+use relit_turntable as turntable;
+
+use super::turntable_arguments::{
+    SIMULATE_EXAMPLES, SimulateArguments, TURNTABLE_EXAMPLES, TurntableArguments,
+};
+
+const EXAMPLES: &str = "\
+Examples:
+  relit-capture devices
+      cameras with their modes and controls, and the turntable's port
+  relit-capture record --object mug --camera v4l2:/dev/video0 --turntable serial:
+      one turn of the object on the table, as a session folder in ./sessions
+  relit-capture record --object mug --camera 'replay:fixtures/20261120T093015Z-cow?loop=1' --turntable sim:
+      a rehearsal without hardware
+  relit-capture serve --camera v4l2:/dev/video0 --turntable serial:
+      the rig as a page for a browser
+  relit-capture turntable status
+      what the table at the only controller plugged in is doing
+
+Addresses: --camera v4l2:/dev/video0 | nokhwa:0 | replay:PATH, --turntable serial:/dev/ttyUSB0 | serial: | sim: | none.
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
+
+/// Record turns of objects on a turntable as session folders.
+#[derive(Parser)]
+#[command(name = "relit-capture", version, after_help = EXAMPLES)]
+pub(crate) struct CommandLine {
+    #[command(subcommand)]
+    pub(crate) verb: Verb,
+    /// Print JSON lines on standard output, for machines.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Verb {
+    /// List cameras with their modes and controls, and the turntable's port.
+    #[command(after_help = "Example:\n  relit-capture devices --json")]
+    Devices,
+    /// Capture one turn of the object on the table.
+    #[command(
+        after_help = "Example:\n  relit-capture record --object mug --turntable serial: --exposure 100"
+    )]
+    Record(Box<RecordArguments>),
+    /// Measure once which way the table turns, and note how high the camera looks down; sessions carry both.
+    #[command(
+        after_help = "Example:\n  relit-capture calibrate --turntable serial: --elevation 18"
+    )]
+    Calibrate(Box<CalibrateArguments>),
+    /// Serve the rig: a page for a phone or a browser, and an interface for scripts.
+    #[command(
+        after_help = "Example:\n  relit-capture serve --turntable serial: --listen 0.0.0.0:8420"
+    )]
+    Serve(Box<ServeArguments>),
+    /// Look at the turntable, or move it.
+    #[command(after_help = TURNTABLE_EXAMPLES)]
+    Turntable(TurntableArguments),
+    /// Run a turntable without hardware: the firmware on a pseudoterminal.
+    #[command(after_help = SIMULATE_EXAMPLES)]
+    Simulate(SimulateArguments),
+}
+
+#[derive(Args)]
+pub(crate) struct RecordArguments {
+    /// The object's name, as it goes into the session's: letters, digits, '-', '_', '.'.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) object: String,
+    /// Do not ask before the table turns.
+    #[arg(long)]
+    pub(crate) yes: bool,
+    #[command(flatten)]
+    pub(crate) rig: RigArguments,
+}
+
+#[derive(Args)]
+pub(crate) struct CalibrateArguments {
+    /// How high the camera looks down on the table, degrees: 0 from the side [default: as noted before].
+    #[arg(long, value_name = "DEGREES", value_parser = elevation)]
+    pub(crate) elevation: Option<f64>,
+    /// Do not ask before the table turns.
+    #[arg(long)]
+    pub(crate) yes: bool,
+    #[command(flatten)]
+    pub(crate) rig: RigArguments,
+}
+
+#[derive(Args)]
+pub(crate) struct ServeArguments {
+    /// Address and port to listen on; a port alone is this machine's own, which no other reaches.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8420")]
+    pub(crate) listen: ListenAddress,
+    /// A file that holds the token, which only its owner and its group can read. Where there is none,
+    /// it is made with a random token [default: a new one at each start, where other machines can reach the
+    /// address].
+    #[arg(long, value_name = "FILE")]
+    pub(crate) token_file: Option<PathBuf>,
+    /// A name under which clients reach this machine, such as rig.local; may be given several times.
+    #[arg(long = "name", value_name = "NAME")]
+    pub(crate) names: Vec<String>,
+    /// The folder in which data sets are made, where relit-mask and relit-extract are installed [default: the
+    /// one that holds --root].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) datasets: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) rig: RigArguments,
+}
+
+#[derive(Args)]
+pub(crate) struct RigArguments {
+    /// The folder in which session folders are made.
+    #[arg(long, value_name = "DIR", default_value = "sessions")]
+    root: PathBuf,
+    /// The camera's address.
+    #[arg(long, value_name = "ADDRESS", default_value = "v4l2:/dev/video0")]
+    camera: CameraAddress,
+    /// The turntable's address.
+    #[arg(long, value_name = "ADDRESS", default_value = "serial:")]
+    turntable: turntable::TurntableAddress,
+    /// Speed of the turn, degrees a second.
+    #[arg(long, value_name = "SPEED", default_value_t = 7.2, value_parser = speed)]
+    degrees_per_second: f64,
+    /// Frames a second.
+    #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
+    fps: f64,
+    /// Frame size, such as 1920x1080 [default: the largest at that rate].
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
+    size: Option<(u32, u32)>,
+    /// Pixel format: MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer [default: compressed before raw].
+    #[arg(long, value_name = "FORMAT", value_parser = fourcc)]
+    fourcc: Option<Fourcc>,
+    /// Exposure to hold, in the camera's own units [default: as it is].
+    #[arg(long, value_name = "VALUE")]
+    exposure: Option<i64>,
+    /// Gain to hold [default: as it is].
+    #[arg(long, value_name = "VALUE")]
+    gain: Option<i64>,
+    /// White balance to hold, kelvin [default: as it is].
+    #[arg(long, value_name = "KELVIN")]
+    white_balance: Option<i64>,
+    /// Focus to hold [default: as it is].
+    #[arg(long, value_name = "VALUE")]
+    focus: Option<i64>,
+    /// Frames that may be missing or damaged in a take.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    max_dropped: u64,
+    /// How often a take that came out bad is repeated; the bad ones are kept.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=100))]
+    retries: u32,
+}
+
+impl From<RigArguments> for Settings {
+    fn from(line: RigArguments) -> Self {
+        let mut settings = Self::new(line.root, line.camera, line.turntable);
+        settings.mode = ModePreference {
+            fourcc: line.fourcc,
+            size: line.size,
+            fps: line.fps,
+        };
+        settings.wanted = ManualValues {
+            exposure: line.exposure,
+            gain: line.gain,
+            white_balance: line.white_balance,
+            focus: line.focus,
+        };
+        settings.degrees_per_second = line.degrees_per_second;
+        settings.max_dropped = line.max_dropped;
+        settings.retries = line.retries;
+        settings.commit = option_env!("RELIT_COMMIT").unwrap_or_default().to_owned();
+        settings
+    }
+}
+
+fn fourcc(text: &str) -> Result<Fourcc, String> {
+    let known = || "give four characters such as MJPG, H264 or YUYV".to_owned();
+    let fourcc = Fourcc(text.as_bytes().try_into().map_err(|_| known())?);
+    match fourcc.pixel_format() {
+        Some(_) => Ok(fourcc),
+        None => Err(format!("{text} frames cannot be recorded: {}", known())),
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| text.parse().ok().filter(|&pixels: &u32| pixels > 0);
+    let sides = text.split_once('x');
+    sides
+        .and_then(|(width, height)| Some((side(width)?, side(height)?)))
+        .ok_or_else(|| format!("{text:?} is no size: write it as 1920x1080"))
+}
+
+fn figure(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (low..=high).contains(&value) => Ok(value),
+        _ => Err(format!("give {what} from {low} to {high}")),
+    }
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    figure(text, 0.1, 360.0, "degrees a second")
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    figure(text, 1.0, 1000.0, "frames a second")
+}
+
+fn elevation(text: &str) -> Result<f64, String> {
+    figure(text, 0.0, 89.0, "degrees")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_written_with_an_x() {
+        assert_eq!(size("1920x1080"), Ok((1920, 1080)));
+        for text in ["", "1920", "0x5", "axb", "1920x1080x3"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! `relit-capture calibrate`: the constants of a rig, for a person or a machine.
+
+use relit_capture::capture::{
+    CaptureError, Equipment, Settings, StopRequest, Stopped, measure_rotation, read_facts,
+    write_facts,
+};
+use relit_console::{Console, Event, Outcome};
+use relit_turntable::TurntableAddress;
+
+use super::arguments::CalibrateArguments;
+use super::environment::at_end;
+use super::recording::{agreed, make_root};
+
+pub(crate) fn run(console: Console, asked: CalibrateArguments) -> Result<Outcome, CaptureError> {
+    let settings: Settings = asked.rig.into();
+    let root = settings.root.clone();
+    let _made = make_root(&settings)?;
+    let mut facts = read_facts(&root)?.unwrap_or_default();
+    facts.camera_elevation_deg = asked.elevation.or(facts.camera_elevation_deg);
+    if settings.turntable != TurntableAddress::None {
+        if !asked.yes && !agreed(console, &settings)? {
+            return Ok(Outcome::Wrong);
+        }
+        let _camera = settings.lock_camera()?;
+        let mut equipment = Equipment::new(settings)?;
+        let stop = StopRequest::new(&equipment.clock());
+        let ending = stop.clone();
+        at_end(move || ending.ask(Stopped::Shutdown))
+            .map_err(CaptureError::system("the signals", "listened to"))?;
+        facts.rotation = Some(measure_rotation(&mut equipment, &stop)?);
+    }
+    write_facts(&root, &facts)?;
+    let rotation = facts.rotation.map(|rotation| rotation.to_string());
+    let elevation = facts.camera_elevation_deg;
+    console.say(
+        &format!(
+            "the table turns {}; the camera looks down by {}",
+            rotation
+                .as_deref()
+                .unwrap_or("in a direction that is not measured"),
+            elevation.map_or("an angle that is not given".to_owned(), |degrees| format!(
+                "{degrees} degrees"
+            ))
+        ),
+        &Event::Calibrated {
+            rotation,
+            camera_elevation_deg: elevation,
+        },
+    );
+    Ok(Outcome::Whole)
+}

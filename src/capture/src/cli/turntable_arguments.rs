@@ -1,0 +1,94 @@
+//! The command line of the verbs that need no camera: `turntable` and `simulate`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use relit_turntable::TurntableAddress;
+
+pub(crate) const TURNTABLE_EXAMPLES: &str = "\
+Examples:
+  relit-capture turntable status
+      what the table at the only controller plugged in is doing
+  relit-capture turntable --turntable serial:/dev/ttyUSB0 home
+      find the index, or make zero of where the table stands
+  relit-capture turntable jog -90
+      turn by 90 degrees, back
+  relit-capture turntable jog --home 45
+      find zero, then turn to 45 degrees
+  relit-capture turntable stop
+      stop it; a capture that has the table is ended
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
+
+pub(crate) const SIMULATE_EXAMPLES: &str = "\
+Examples:
+  relit-capture simulate --link /tmp/table
+      then, beside it: relit-capture turntable --turntable serial:/tmp/table status
+  relit-capture simulate --fault drop=0.01,flip=0.005 --fault reset@12.5s
+      a bad line, and a controller that restarts
+
+Faults: drop=SHARE flip=SHARE duplicate=SHARE merge=SHARE delay=SHARE:TIME of bytes or lines, with
+`to.` or `from.` before them for one direction; reset@TIME and stall@TIME; estop@TIME
+or estop@TIME:TIME presses the emergency stop, for good or for so long.";
+
+#[derive(Args)]
+pub(crate) struct TurntableArguments {
+    /// The table: serial:/dev/ttyUSB0, or serial: (the only controller plugged in).
+    #[arg(long, value_name = "ADDRESS", default_value = "serial:", global = true)]
+    pub(crate) turntable: TurntableAddress,
+    #[command(subcommand)]
+    pub(crate) action: Action,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Action {
+    /// Show what the table is doing.
+    Status,
+    /// Find the index; without an index sensor, count from where the table stands.
+    Home,
+    /// Turn by so many degrees, negative for back, and wait until it is done.
+    Jog {
+        /// Degrees from here.
+        #[arg(value_name = "DEGREES", allow_negative_numbers = true, value_parser = degrees)]
+        degrees: f64,
+        /// Degrees a second; by default as fast as is gentle.
+        #[arg(long, value_name = "DEGREES_PER_SECOND", value_parser = degrees)]
+        speed: Option<f64>,
+        /// Home the table first: where opening the port resets the controller, a table with an index
+        /// (`$22=1`) is locked each time.
+        #[arg(long)]
+        home: bool,
+    },
+    /// Slow the table down to a stop and drop what it had to do; a program of the toolkit that has it is ended.
+    Stop,
+    /// Release the lock after an alarm.
+    Unlock,
+}
+
+#[derive(Args)]
+pub(crate) struct SimulateArguments {
+    /// Make PATH a second name of the port.
+    #[arg(long, value_name = "PATH")]
+    pub(crate) link: Option<PathBuf>,
+    /// How many times faster than real time it runs.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
+    pub(crate) speed: f64,
+    /// What goes wrong, such as drop=0.01 or reset@12.5s; may be given again.
+    #[arg(long, value_name = "FAULT")]
+    pub(crate) fault: Vec<String>,
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|degrees: &f64| degrees.is_finite());
+    number.ok_or_else(|| "give degrees as a number, such as 90 or -12.5".to_owned())
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|factor: &f64| factor.is_finite() && (0.01..=100.0).contains(factor))
+        .ok_or_else(|| "a speed is a number from 0.01 to 100".to_owned())
+}

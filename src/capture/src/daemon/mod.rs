@@ -1,0 +1,202 @@
+//! The rig as a daemon: it takes commands, and one thread that has camera and table carries them out.
+//!
+//! What is to be done, and what a stop means, is decided by the `dispatcher`; the `worker` does it, and keeps
+//! pictures and state fresh in between. Commands are checked where they
+//! are given. When the daemon is dropped, a take under way is aborted and closed, the table stands, and
+//! the thread has ended.
+
+mod dispatcher;
+mod idle;
+mod worker;
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+use crate::capture::{CaptureError, Equipment, Settings, preflight, salvage};
+use crate::command::{Command, Refused, Rig};
+use crate::preview::Preview;
+use crate::state::{Monitor, RigState};
+use dispatcher::{Dispatcher, Job};
+use relit_clock::{Clock, JoinHandle};
+use relit_turntable::lockfile::LockFile;
+use relit_turntable::simulator::SimulatedTable;
+use worker::Worker;
+
+/// Farthest that a table is turned by one command, degrees.
+const FARTHEST_JOG: f64 = 800.0;
+
+/// A rig that takes commands until it is dropped.
+#[derive(Debug)]
+pub struct Daemon {
+    dispatcher: Arc<Dispatcher>,
+    root: PathBuf,
+    simulator: Option<SimulatedTable>,
+    worker: Mutex<Option<JoinHandle<()>>>,
+    _locks: (LockFile, Option<LockFile>),
+}
+
+impl Daemon {
+    /// Takes folder and camera for this process, salvages sessions whose recorder died, and starts
+    /// the worker, which opens camera and table, and keeps trying while they are not there.
+    ///
+    /// # Errors
+    /// [`CaptureError::Lock`] where another daemon has them, [`CaptureError::Refused`] for speeds that do not fit, or what
+    /// the system answers.
+    pub fn start(settings: Settings) -> Result<Self, CaptureError> {
+        // The lock of the folder is a file in it: nothing is left there where the camera is another's.
+        let camera = settings.lock_camera()?;
+        let locks = (LockFile::of_root(&settings.root)?, camera);
+        let root = settings.root.clone();
+        let shown = settings.shown();
+        let equipment = Equipment::for_viewers(settings)?;
+        let dispatcher = Arc::new(Dispatcher::new(equipment.clock()));
+        let show = |state: &mut RigState| state.settings = shown;
+        dispatcher.monitor().update(show);
+        report_salvaged(&root, &equipment.clock(), dispatcher.monitor())?;
+        let thread = |source| CaptureError::system("a thread", "started")(source);
+        let preview = Preview::start(dispatcher.monitor().clone()).map_err(thread)?;
+        let clock = equipment.clock();
+        let simulator = equipment.simulator().cloned();
+        let mut worker = Worker::new(equipment, Arc::clone(&dispatcher), preview);
+        let worker = spawn(&clock, &dispatcher, move || worker.run()).map_err(thread)?;
+        Ok(Self {
+            dispatcher,
+            root,
+            simulator,
+            worker: Mutex::new(Some(worker)),
+            _locks: locks,
+        })
+    }
+
+    /// The simulated table, if there is one: whoever rehearses with it presses its emergency stop.
+    pub fn simulator(&self) -> Option<&SimulatedTable> {
+        self.simulator.as_ref()
+    }
+
+    /// Aborts what is under way, stops the table, and comes back when all of it is done. Does nothing
+    /// the second time.
+    pub fn end(&self) {
+        self.dispatcher.end();
+        let worker = self.lock_worker().take();
+        if let Some(worker) = worker {
+            // A panic in there was reported by the thread itself, and its table was stopped.
+            let _ = worker.join();
+        }
+    }
+
+    fn lock_worker(&self) -> MutexGuard<'_, Option<JoinHandle<()>>> {
+        self.worker.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Rig for Daemon {
+    fn command(&self, command: Command) -> Result<(), Refused> {
+        let dispatcher = &self.dispatcher;
+        // A name that cannot be is the better answer than a camera that is away.
+        if let Command::Start { object } = &command {
+            check_object(object)?;
+        }
+        if let Command::Jog { degrees } = command {
+            check_jog(degrees)?;
+        }
+        command.check(&dispatcher.monitor().state())?;
+        match command {
+            Command::Start { object } => dispatcher.submit(Job::Capture(object)),
+            Command::Stop => {
+                dispatcher.stop();
+                Ok(())
+            }
+            Command::Home => dispatcher.submit(Job::Home),
+            Command::Jog { degrees } => dispatcher.submit(Job::Jog(degrees)),
+            Command::Reset => dispatcher.submit(Job::ResetTable),
+            Command::SetControl { name, value } => {
+                dispatcher.submit(Job::SetControl { name, value })
+            }
+        }
+    }
+
+    fn monitor(&self) -> &Monitor {
+        self.dispatcher.monitor()
+    }
+
+    fn is_running(&self) -> bool {
+        let worker = self.lock_worker();
+        worker.as_ref().is_some_and(|worker| !worker.is_finished())
+    }
+
+    fn root(&self) -> &Path {
+        &self.root
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// Starts the worker's thread.
+fn spawn(
+    clock: &Clock,
+    dispatcher: &Arc<Dispatcher>,
+    work: impl FnOnce() + Send + 'static,
+) -> io::Result<JoinHandle<()>> {
+    let panic_report = PanicReport(Arc::clone(dispatcher));
+    clock.spawn("relit-rig", move || {
+        let _panic_report = panic_report;
+        work();
+    })
+}
+
+/// Shows that the worker failed, and refuses further commands, where its thread panicked.
+struct PanicReport(Arc<Dispatcher>);
+
+impl Drop for PanicReport {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.fail();
+        }
+    }
+}
+
+fn check_jog(degrees: f64) -> Result<(), Refused> {
+    match degrees.is_finite() && degrees.abs() <= FARTHEST_JOG {
+        true => Ok(()),
+        false => Err(Refused::Invalid(format!(
+            "the table cannot be turned by {degrees} degrees"
+        ))),
+    }
+}
+
+fn check_object(object: &str) -> Result<(), Refused> {
+    preflight::check_object(object).map_err(Refused::Invalid)
+}
+
+/// Salvages what an earlier run left, and shows what came of it.
+fn report_salvaged(root: &Path, clock: &Clock, monitor: &Monitor) -> Result<(), CaptureError> {
+    for found in salvage(root)? {
+        monitor.fault(clock.now_us(), found.to_string());
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_worker_that_panics_leaves_a_fault_and_takes_no_more_commands() {
+        let clock = Clock::virtual_time();
+        let dispatcher = Arc::new(Dispatcher::new(clock.clone()));
+        let worker = spawn(&clock, &dispatcher, || {
+            std::panic::resume_unwind(Box::new(()));
+        });
+        assert!(worker.unwrap().join().is_err());
+        let faults = dispatcher.monitor().state().faults;
+        assert!(faults[0].what.contains("failed"), "{faults:?}");
+        let refused = dispatcher.submit(Job::Home);
+        assert!(matches!(refused, Err(Refused::Unavailable(_))));
+    }
+}

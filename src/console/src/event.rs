@@ -1,0 +1,194 @@
+//! The JSON lines of the toolkit's programs, each an object with the name of its event. The same type is
+//! printed by the programs and read by the rig, which runs some of them; `docs/json-lines.md` has an example
+//! of each line.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// A line for a machine. Values that only their program knows the type of are left as JSON.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+#[allow(missing_docs, reason = "docs/json-lines.md explains the fields")]
+pub enum Event {
+    // Every program.
+    Warning {
+        message: String,
+    },
+    Error {
+        message: String,
+        /// The input that it concerns, of several.
+        input: Option<String>,
+    },
+    Progress {
+        #[serde(default)]
+        what: String,
+        done: u64,
+        /// 0: not counted yet.
+        of: u64,
+    },
+    Check(Check),
+    Done(Done),
+    // relit-capture
+    Camera {
+        address: String,
+        name: String,
+        driver: String,
+        bus: String,
+        modes: Vec<String>,
+        controls: Vec<Value>,
+        problems: Vec<String>,
+    },
+    Turntable {
+        addresses: Vec<String>,
+    },
+    Phase {
+        phase: Value,
+    },
+    Serving {
+        url: String,
+        address: String,
+    },
+    Ready {
+        port: String,
+        speed: f64,
+    },
+    Ended,
+    Calibrated {
+        rotation: Option<String>,
+        camera_elevation_deg: Option<f64>,
+    },
+    Status(Value),
+    Homed(Value),
+    Jogged(Value),
+    Stopped(Value),
+    Unlocked(Value),
+    // relit-mask
+    Mask {
+        #[serde(default)]
+        recording: String,
+        #[serde(default)]
+        mask: String,
+        #[serde(default)]
+        record: String,
+        #[serde(default)]
+        preview: String,
+        #[serde(default)]
+        source: Value,
+        #[serde(default)]
+        result: Value,
+        #[serde(default)]
+        warnings: Vec<String>,
+    },
+    Editor {
+        address: String,
+        url: String,
+    },
+    // relit-extract
+    Task {
+        task: String,
+    },
+    Extracted {
+        session: Value,
+    },
+    Skipped {
+        id: String,
+        lossy: bool,
+        #[serde(default)]
+        misfit: bool,
+    },
+    LeftOut {
+        #[serde(default)]
+        input: String,
+        message: String,
+    },
+    Problem {
+        #[serde(default)]
+        file: String,
+        sample: Option<String>,
+        message: String,
+    },
+    Verified {
+        #[serde(default)]
+        out: String,
+        #[serde(default)]
+        sessions: u64,
+        #[serde(default)]
+        shards: u64,
+        #[serde(default)]
+        samples: u64,
+        #[serde(default)]
+        problems: u64,
+    },
+    Merged {
+        out: String,
+        sessions: u64,
+        samples: u64,
+        tasks: u64,
+    },
+    Session(Value),
+    Stats(Value),
+    Described {
+        output: String,
+    },
+}
+
+/// Something was checked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+#[allow(missing_docs, reason = "docs/json-lines.md explains the fields")]
+pub enum Check {
+    /// A mask, by `relit-mask check`.
+    Mask {
+        #[serde(default)]
+        recording: String,
+        #[serde(default)]
+        page: String,
+        report: Value,
+    },
+    /// The rig before a turn, by `relit-capture record`.
+    Rig {
+        what: String,
+        good: bool,
+        found: String,
+    },
+}
+
+/// A program has come to its end.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+#[allow(missing_docs, reason = "docs/json-lines.md explains the fields")]
+pub enum Done {
+    /// `relit-capture record`.
+    Capture { session: String, take: Value },
+    /// `relit-extract`.
+    Extraction {
+        out: String,
+        extracted: u64,
+        lossy: u64,
+        misfits: u64,
+        skipped: u64,
+        left_out: u64,
+        failed: u64,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
+
+    use super::*;
+    use crate::json_of;
+
+    #[test]
+    fn the_manuals_lines_are_read_and_printed_as_they_stand_there() {
+        let manual = include_str!("../../../docs/json-lines.md");
+        let lines = manual.lines().filter_map(|line| line.strip_prefix("    {"));
+        let mut count = 0;
+        for line in lines.map(|rest| format!("{{{rest}")) {
+            let event: Event = serde_json::from_str(&line).unwrap();
+            assert_eq!(json_of(&event), line);
+            count += 1;
+        }
+        assert_eq!(count, 31);
+    }
+}

@@ -1,0 +1,7 @@
+//! `relit-extract`: turns recordings into training shards of masked frames, joins, verifies and sums them up.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}

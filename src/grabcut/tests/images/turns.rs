@@ -1,0 +1,183 @@
+//! Masks by the turn of objects with holes, handles, dark parts and parts in shade, and what their check says.
+
+use image::{GrayImage, RgbImage};
+use relit_grabcut::{Effort, Hints, MaskCheck, TurnFrames, TurnStatistics};
+
+use super::turn_scene::{Scene, TROUBLES, Trouble, scene};
+use super::{by_seeds, segment_turn};
+use relit_test_support::disc::{HEIGHT, WIDTH, in_disc, seeds_image};
+
+/// Small enough to be made on the fly.
+const SMALL: (u32, u32) = (176, 132);
+/// Seeds of the tests; others were used to choose constants.
+const SEED: u64 = 4_000;
+
+/// Intersection over union.
+fn iou(mask: &GrayImage, truth: &GrayImage) -> f64 {
+    let pairs = || {
+        let pixels = mask.pixels().zip(truth.pixels());
+        pixels.map(|(mask, truth)| (mask.0[0] >= 128, truth.0[0] >= 128))
+    };
+    let both = pairs().filter(|(mask, truth)| *mask && *truth).count();
+    both as f64 / pairs().filter(|(mask, truth)| *mask || *truth).count() as f64
+}
+
+/// The share of the critical part of which the mask is right.
+fn right_there(mask: &GrayImage, scene: &Scene) -> f64 {
+    let pixels = mask
+        .pixels()
+        .zip(scene.truth.pixels())
+        .zip(scene.critical.pixels());
+    let critical: Vec<bool> = pixels
+        .filter(|(_, critical)| critical.0[0] > 0)
+        .map(|((mask, truth), _)| (mask.0[0] >= 128) == (truth.0[0] >= 128))
+        .collect();
+    critical.iter().filter(|right| **right).count() as f64 / critical.len() as f64
+}
+
+/// Intersection over union, and the share of the critical part that is right.
+fn figures(trouble: Trouble, size: (u32, u32), frames: usize, seed: u64) -> (f64, f64) {
+    let scene = scene(trouble, size, frames, seed);
+    let mask = segment_turn(&scene.frames[0], &scene.statistics(), &Hints::default());
+    let mask = mask.unwrap().image;
+    if let Some(folder) = std::env::var_os("RELIT_LOOK") {
+        let folder = std::path::Path::new(&folder);
+        mask.save(folder.join(format!("{trouble:?}-{seed}.png")))
+            .unwrap();
+        scene.frames[0]
+            .save(folder.join(format!("{trouble:?}-{seed}-frame.png")))
+            .unwrap();
+    }
+    (iou(&mask, &scene.truth), right_there(&mask, &scene))
+}
+
+#[test]
+fn holes_stay_open_and_dark_and_shaded_parts_stay_in() {
+    let found = TROUBLES.map(|trouble| (trouble, figures(trouble, SMALL, 24, SEED)));
+    let wrong = |(iou, right): (f64, f64)| iou < 0.96 || right < 0.95;
+    assert!(
+        !found.iter().any(|(_, figures)| wrong(*figures)),
+        "{found:.3?}"
+    );
+}
+
+/// `RELIT_LOOK=FOLDER cargo test --release -p relit-grabcut --test images -- --ignored --nocapture larger`
+#[test]
+#[ignore = "minutes: the figures of docs/results/masks.md"]
+fn larger_turns_are_measured() {
+    for trouble in TROUBLES {
+        for seed in [9_001, 9_002, 9_003] {
+            let (iou, right) = figures(trouble, (640, 480), 32, seed);
+            println!(
+                "{trouble:?} {seed}: IoU {iou:.4}, critical part {:.1} %",
+                100.0 * right
+            );
+        }
+    }
+}
+
+#[test]
+fn the_check_sees_a_hole_in_the_object_that_the_turns_own_mask_may_have_too() {
+    let scene = scene(Trouble::Shade, SMALL, 24, SEED);
+    let turn = scene.statistics();
+    let mut holed = scene.truth.clone();
+    for (mask, critical) in holed.pixels_mut().zip(scene.critical.pixels()) {
+        if critical.0[0] > 0 {
+            mask.0[0] = 0;
+        }
+    }
+    let shape = |mask: &GrayImage| {
+        let check = MaskCheck::new(mask, &turn).unwrap();
+        check
+            .shape(&scene.frames[0], Effort::Fine)
+            .unwrap()
+            .unwrap()
+    };
+    let found = shape(&holed);
+    assert_eq!(found.holes.len(), 1, "{found:?}");
+    assert!(!found.faults().is_empty());
+    assert!(
+        shape(&scene.truth).faults().is_empty(),
+        "{:?}",
+        shape(&scene.truth)
+    );
+}
+
+#[test]
+fn a_true_mask_is_not_blamed_whatever_the_object() {
+    let faults = |trouble: Trouble| {
+        let scene = scene(trouble, SMALL, 24, SEED + 1);
+        let turn = scene.statistics();
+        let check = MaskCheck::new(&scene.truth, &turn).unwrap();
+        let shape = check
+            .shape(&scene.frames[0], Effort::Fine)
+            .unwrap()
+            .unwrap();
+        (trouble, shape.faults())
+    };
+    let found = [Trouble::LowHandle, Trouble::TwoHoles, Trouble::OpenShade].map(faults);
+    assert!(
+        found.iter().all(|(_, faults)| faults.is_empty()),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn a_stroke_over_the_opening_of_a_handle_is_told() {
+    let scene = scene(Trouble::Handle, SMALL, 24, SEED);
+    let turn = scene.statistics();
+    let marks = GrayImage::from_fn(SMALL.0, SMALL.1, |x, y| {
+        let critical = scene.critical.get_pixel(x, y).0[0] > 0;
+        image::Luma([if critical { 255 } else { 128 }])
+    });
+    let seeds = by_seeds(marks);
+    let told = segment_turn(&scene.frames[0], &turn, &seeds)
+        .unwrap()
+        .warnings;
+    assert!(
+        told.iter().any(|text| text.contains("a hole of")),
+        "{told:?}"
+    );
+    let plain = segment_turn(&scene.frames[0], &turn, &Hints::default()).unwrap();
+    assert!(plain.warnings.is_empty(), "{:?}", plain.warnings);
+}
+
+/// A disc with a pattern of its own that stands still before stripes that move.
+fn still_disc() -> Vec<RgbImage> {
+    let level = |x: u32, y: u32, at: u32| {
+        let (u, v) = (f64::from(x), f64::from(y));
+        let pattern = 25.0 * (u * 0.5).sin() * (v * 0.4 + u * 0.1).cos();
+        match in_disc(x, y) {
+            true => (180.0 + pattern) as u8,
+            false => 30 + 40 * ((x + 5 * at) / 10 % 4) as u8,
+        }
+    };
+    let frame = |at| RgbImage::from_fn(WIDTH, HEIGHT, |x, y| image::Rgb([level(x, y, at); 3]));
+    (0..24).map(frame).collect()
+}
+
+#[test]
+fn background_in_a_mask_object_outside_and_holes_are_found_by_what_they_show() {
+    let frames = still_disc();
+    let mut turn = TurnFrames::new(WIDTH, HEIGHT);
+    frames.iter().for_each(|frame| turn.push(frame));
+    let turn = TurnStatistics::new(&turn);
+    let shape = |inside: &dyn Fn(u32, u32) -> bool| {
+        let mask = seeds_image(|x, y| if inside(x, y) { 255 } else { 0 });
+        let check = MaskCheck::new(&mask, &turn).unwrap();
+        check.shape(&frames[0], Effort::Fine).unwrap().unwrap()
+    };
+    let right = shape(&in_disc);
+    assert!(right.faults().is_empty(), "{right:?}");
+    let beside = |x, y| (70..85).contains(&x) && (20..40).contains(&y);
+    let leaking = shape(&|x, y| in_disc(x, y) || beside(x, y));
+    assert!(leaking.leaks.iter().any(|part| part.px > 60), "{leaking:?}");
+    let half = shape(&|x, y| in_disc(x, y) && x < 52);
+    assert!(half.missing.iter().any(|part| part.px > 60), "{half:?}");
+    let hole = |x: u32, y: u32| (f64::from(x) - 46.0).hypot(f64::from(y) - 32.0) <= 6.0;
+    let holed = shape(&|x, y| in_disc(x, y) && !hole(x, y));
+    assert!(holed.holes.iter().any(|part| part.px > 60), "{holed:?}");
+    for wrong in [leaking, half, holed] {
+        assert!(!wrong.faults().is_empty(), "{wrong:?}");
+    }
+}

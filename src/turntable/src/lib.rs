@@ -1,0 +1,109 @@
+//! The turntable: a client of Grbl 1.1's serial interface that verifies everything.
+//!
+//! ```text
+//! bytes <- port <- link (a thread) -> wire (lines, answers) -> supervisor (state, stops)
+//!                                                  table, turn, plan, sync -> angles over time
+//! ```
+//!
+//! It works with a stock Grbl 1.1 board on which one millimetre of X is one degree, with Grbl's
+//! relatives grblHAL, FluidNC and Grbl_ESP32, and with the rig's own firmware. Of the latter it uses the extras that `$I` offers: reports with the chip's
+//! time, lines with number and checksum, and a lease that stops the table when the host falls
+//! silent.
+//!
+//! A line counts as done only when its own answer has come, a motion only when the table was
+//! reported at rest at its target. Anything else (a restart, an alarm, silence, a hold that this
+//! program did not ask for, a table that stands still or in another place) ends the motion with
+//! that reason and stops the table. A position that may be lost has to be homed again.
+//!
+//! ```
+//! use relit_clock::Clock;
+//! use relit_turntable::simulator::{SimulatedTable, SimulatorOptions};
+//! use relit_turntable::{Table, TableOptions, TurnPlan};
+//!
+//! # fn main() -> Result<(), relit_turntable::TurntableError> {
+//! let clock = Clock::virtual_time();
+//! let _participant = clock.take_part();
+//! let simulated = SimulatedTable::new(&SimulatorOptions {
+//!     clock: clock.clone(),
+//!     ..SimulatorOptions::default()
+//! });
+//! let options = TableOptions {
+//!     clock,
+//!     ..TableOptions::default()
+//! };
+//! // A real one: `Table::open_serial(Path::new("/dev/ttyUSB0"), &options)`.
+//! let table = Table::open(simulated.open(), &options)?;
+//! table.home()?;
+//! let plan = TurnPlan::new(table.identity(), &table.status()?, 7.2, 360.0)?;
+//! let track = table.start_turn(plan)?.wait_end()?;
+//! let (from_us, to_us) = track.constant_us();
+//! assert!(track.angle_at(to_us) > track.angle_at(from_us));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A [`simulator`] stands for the table where there is none. This crate knows nothing of cameras and sessions. Its client
+//! shares no code with the firmware, which the simulator runs: both sides implement the published interface.
+
+mod address;
+mod codes;
+mod error;
+mod family;
+mod grbl_client;
+mod greeting;
+mod homing;
+mod identity;
+mod link;
+pub mod lockfile;
+mod plan;
+mod port;
+pub mod simulator;
+mod status;
+mod supervisor;
+mod sync;
+#[cfg(test)]
+mod tests;
+mod turn;
+pub mod wire;
+
+use std::path::PathBuf;
+
+use relit_clock::Clock;
+
+pub use address::{SimulatedAddress, TurntableAddress, find_serial};
+pub use codes::Alarm;
+pub use error::TurntableError;
+pub use family::Family;
+pub use grbl_client::Table;
+pub use homing::Homed;
+pub use identity::Identity;
+pub(crate) use plan::MARGIN_DEG;
+pub use plan::TurnPlan;
+pub use port::{Port, SerialPort};
+pub use status::TableStatus;
+pub use supervisor::MotionFault;
+pub use sync::Track;
+pub use turn::{FinishedTurn, Turn};
+pub use wire::{ControllerState, Counts, LineFault, SendError};
+
+/// How a table is opened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableOptions {
+    /// The clock of all waits and time stamps. A simulated table needs the clock of its simulator.
+    pub clock: Clock,
+    /// Folder for the lock of a port's owner: one that every program on the machine agrees on, such as [`lockfile::standard_folder`].
+    pub runtime_folder: PathBuf,
+    /// Whether to use what the rig's firmware offers beyond Grbl. If false, it is treated as a stock
+    /// board.
+    pub extras: bool,
+}
+
+impl Default for TableOptions {
+    fn default() -> Self {
+        Self {
+            clock: Clock::monotonic(),
+            runtime_folder: lockfile::standard_folder(),
+            extras: true,
+        }
+    }
+}

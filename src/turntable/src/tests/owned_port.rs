@@ -1,0 +1,123 @@
+//! One process has a port, and says so to others.
+
+use std::io::{Read, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use serialport::{SerialPort as _, TTYPort};
+
+use crate::lockfile::tests::accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
+use crate::tests::fake_grbl::FakeGrbl;
+use crate::{Table, TableOptions, TurntableError};
+use relit_clock::Clock;
+
+/// A fake controller at a pseudoterminal.
+struct Terminal {
+    path: PathBuf,
+    quit: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    runtime: tempfile::TempDir,
+    // Kept open, so that the other end sees no hang-up between two openings.
+    _slave: TTYPort,
+}
+
+impl Terminal {
+    fn new() -> Terminal {
+        let (mut master, slave) = TTYPort::pair().unwrap();
+        master.set_timeout(Duration::from_millis(1)).unwrap();
+        let path = PathBuf::from(slave.name().unwrap());
+        let quit = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&quit);
+        let thread = thread::spawn(move || {
+            let (clock, mut fake_grbl) = (Clock::monotonic(), FakeGrbl::new(true));
+            let mut buffer = [0; 256];
+            while !flag.load(Ordering::Acquire) {
+                let count = master.read(&mut buffer).unwrap_or(0);
+                fake_grbl.advance(clock.now_us());
+                fake_grbl.take(&buffer[..count]);
+                master.write_all(&fake_grbl.give()).unwrap();
+            }
+        });
+        Terminal {
+            path,
+            quit,
+            thread: Some(thread),
+            runtime: tempfile::tempdir().unwrap(),
+            _slave: slave,
+        }
+    }
+
+    fn open(&self) -> Result<Table, TurntableError> {
+        let options = TableOptions {
+            runtime_folder: self.runtime.path().to_owned(),
+            ..TableOptions::default()
+        };
+        Table::open_serial(&self.path, &options)
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        self.quit.store(true, Ordering::Release);
+        self.thread.take().unwrap().join().unwrap();
+    }
+}
+
+#[test]
+fn a_port_has_one_owner_until_it_is_closed() {
+    let terminal = Terminal::new();
+    let table = terminal.open().unwrap();
+    match terminal.open().map(|_| ()) {
+        Err(TurntableError::Owned { pid, .. }) => assert_eq!(pid, std::process::id()),
+        other => panic!("{other:?}"),
+    }
+    drop(table);
+    assert!(terminal.open().is_ok());
+}
+
+#[test]
+fn a_folder_that_others_can_write_in_is_not_used() {
+    use std::os::unix::fs::PermissionsExt;
+    let terminal = Terminal::new();
+    let open = std::fs::Permissions::from_mode(0o777);
+    std::fs::set_permissions(terminal.runtime.path(), open).unwrap();
+    assert!(matches!(
+        terminal.open().map(|_| ()),
+        Err(TurntableError::Lock(_))
+    ));
+}
+
+#[test]
+fn an_operator_is_told_of_a_service_and_an_outsider_opens_nothing() {
+    let terminal = Terminal::new();
+    if !share(terminal.runtime.path()) {
+        return;
+    }
+    std::os::unix::fs::chown(&terminal.path, Some(SERVICE), None).unwrap();
+    let _table = as_user(SERVICE, || terminal.open()).unwrap();
+    as_user(OPERATOR, || {
+        let opened = terminal.open().map(|_| ());
+        assert!(
+            matches!(opened, Err(TurntableError::Owned { .. })),
+            "{opened:?}"
+        );
+    });
+    as_user(OUTSIDER, || {
+        let opened = terminal.open().map(|_| ());
+        assert!(matches!(opened, Err(TurntableError::Lock(_))), "{opened:?}");
+    });
+}
+
+#[test]
+fn a_missing_port_is_named_in_the_error() {
+    let options = TableOptions::default();
+    let path = PathBuf::from("/dev/there-is-no-such-port");
+    let error = Table::open_serial(&path, &options).map(|_| ()).unwrap_err();
+    assert!(
+        error.to_string().contains("/dev/there-is-no-such-port"),
+        "{error}"
+    );
+}
