@@ -297,9 +297,10 @@ struct Unpluggable {
 
 impl Unpluggable {
     fn check(&self) -> io::Result<()> {
-        match self.unplugged.load(Ordering::Relaxed) {
-            true => Err(io::ErrorKind::BrokenPipe.into()),
-            false => Ok(()),
+        if self.unplugged.load(Ordering::Relaxed) {
+            Err(io::ErrorKind::BrokenPipe.into())
+        } else {
+            Ok(())
         }
     }
 }

@@ -99,9 +99,10 @@ impl Words {
         };
         let x = x.thousandths().ok_or(Error::InvalidTarget)?;
         let relative = modal.relative && self.one_shot != Some(OneShot::Machine);
-        Ok(Some(match relative {
-            true => Target::Relative(x),
-            false => Target::Absolute(x),
+        Ok(Some(if relative {
+            Target::Relative(x)
+        } else {
+            Target::Absolute(x)
         }))
     }
 

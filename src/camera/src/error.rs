@@ -9,9 +9,10 @@ use relit_data::session;
 use relit_video as video;
 
 /// How a user gets the right to use cameras.
-const PERMITTING: &str = match cfg!(target_os = "linux") {
-    true => "add the user to the group `video` and log in again",
-    false => "let this program use the camera in the system's privacy settings",
+const PERMITTING: &str = if cfg!(target_os = "linux") {
+    "add the user to the group `video` and log in again"
+} else {
+    "let this program use the camera in the system's privacy settings"
 };
 
 /// Why a camera could not be found, set, or read. The system's error is the `source`:

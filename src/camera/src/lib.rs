@@ -91,12 +91,9 @@ fn open_nokhwa(number: u32) -> Result<Box<dyn Camera>, CameraError> {
 fn open_nokhwa(number: u32) -> Result<Box<dyn Camera>, CameraError> {
     Err(CameraError::Unsupported {
         device: CameraAddress::Nokhwa(number).to_string(),
-        what: match cfg!(feature = "nokhwa") {
-            true => "nokhwa has no cameras on this system; give a recording as replay:PATH",
-            false => {
+        what: if cfg!(feature = "nokhwa") { "nokhwa has no cameras on this system; give a recording as replay:PATH" } else { 
                 "this program was built without it; build it with the feature `nokhwa`, or give v4l2:/dev/video0"
-            }
-        }
+             }
         .to_owned(),
     })
 }

@@ -171,9 +171,10 @@ impl Clock {
 }
 
 fn usable(factor: f64) -> f64 {
-    match factor.is_finite() && factor > 0.0 {
-        true => factor,
-        false => 1.0,
+    if factor.is_finite() && factor > 0.0 {
+        factor
+    } else {
+        1.0
     }
 }
 

@@ -21,8 +21,9 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         report.samples,
         report.problems.len()
     );
-    Ok(match report.problems.is_empty() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::FAILURE,
+    Ok(if report.problems.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
     })
 }

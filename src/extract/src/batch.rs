@@ -175,11 +175,12 @@ impl Run<'_> {
         let job = Job::open(&local, options)?;
         let id = job.id().to_owned();
         if let Some(other) = self.names.get(&folded(&id)) {
-            return Err(match *other == id {
-                true => ExtractError::Refused(format!(
+            return Err(if *other == id {
+                ExtractError::Refused(format!(
                     "another recording of this call is also named {id}: extract them into different folders, or rename one"
-                )),
-                false => name_alike(&id, other),
+                ))
+            } else {
+                name_alike(&id, other)
             });
         }
         self.names.insert(folded(&id), id);

@@ -133,9 +133,12 @@ impl Job {
         observer: &dyn Observer,
     ) -> Result<(SessionEntry, Vec<ShardEntry>), ExtractError> {
         let plan = Plan::new(&self.video, self.recording.frames.as_ref(), options.frames);
-        let mut plan = plan.map_err(|error| match self.is_aborted() {
-            true => error.of_an_aborted_capture(),
-            false => error,
+        let mut plan = plan.map_err(|error| {
+            if self.is_aborted() {
+                error.of_an_aborted_capture()
+            } else {
+                error
+            }
         })?;
         self.check_turn(&plan, options.partial)?;
         let samples = u32::try_from(plan.selection.frames.len()).unwrap_or(options.frames);
@@ -279,11 +282,12 @@ impl Job {
         match &manifest.turntable {
             Some(table) if !plan.has_angles() && manifest.status != Status::Complete => {
                 let covered_deg = plan.seconds() * table.degrees_per_second;
-                match covered_deg < TURN_DEG - TURN_TOLERANCE_DEG {
-                    true => Err(ExtractError::TooLittle(format!(
+                if covered_deg < TURN_DEG - TURN_TOLERANCE_DEG {
+                    Err(ExtractError::TooLittle(format!(
                         "the frames cover about {covered_deg:.0} of 360 degrees, and their angles are not known: record it again, or give the video file itself to spread the frames over time"
-                    ))),
-                    false => Ok(()),
+                    )))
+                } else {
+                    Ok(())
                 }
             }
             _ => Ok(()),

@@ -38,9 +38,12 @@ pub enum RecordingOutcome {
 impl RecordingOutcome {
     /// The outcome, of which some errors are no failures.
     pub(super) fn of(result: Result<Self, ExtractError>) -> Self {
-        result.unwrap_or_else(|error| match error.leaves_out() {
-            true => Self::LeftOut(error),
-            false => Self::Failed(error),
+        result.unwrap_or_else(|error| {
+            if error.leaves_out() {
+                Self::LeftOut(error)
+            } else {
+                Self::Failed(error)
+            }
         })
     }
 }

@@ -133,9 +133,10 @@ mod tests {
     fn room(object: impl Fn(usize, usize) -> bool) -> Vec<[f32; 5]> {
         let feature = |at: usize| {
             let (x, y) = (at % 40, at / 40);
-            match object(x, y) {
-                true => [20.0, 5.0, 5.0, 2.0, 1.0],
-                false => [10.0 + y as f32 * 0.3, 0.0, 1.0, 5.0, 2.0],
+            if object(x, y) {
+                [20.0, 5.0, 5.0, 2.0, 1.0]
+            } else {
+                [10.0 + y as f32 * 0.3, 0.0, 1.0, 5.0, 2.0]
             }
         };
         (0..40 * 30).map(feature).collect()

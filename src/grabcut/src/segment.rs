@@ -208,11 +208,12 @@ pub fn clean_cut(
 fn initial(hints: &Hints, size: (u32, u32)) -> Result<InitialLabels, MaskError> {
     let initial = InitialLabels::new(hints, size)?;
     // Marks of the background alone cut nothing out of a frame; a turn may do without those of the object.
-    match initial.labels.iter().any(|label| label.is_object()) {
-        true => Ok(initial),
-        false => Err(MaskError::Hints(
+    if initial.labels.iter().any(|label| label.is_object()) {
+        Ok(initial)
+    } else {
+        Err(MaskError::Hints(
             "no hint says where the object is: give a rectangle, or seeds with some of the object painted white".to_owned(),
-        )),
+        ))
     }
 }
 
@@ -251,13 +252,15 @@ fn by_hints(
     };
     let energy = CutEnergy::new(frame, rect);
     let energy = |mask: &Mask| energy.of(&Bitmap::of_mask(&mask.image));
-    let margin = match fills(plain.statistics.bounding_box, rect) {
-        true => MARGIN,
-        false => 0.0,
+    let margin = if fills(plain.statistics.bounding_box, rect) {
+        MARGIN
+    } else {
+        0.0
     };
-    match energy(&plain) - energy(&ranked) <= margin {
-        true => Ok(plain),
-        false => Ok(ranked),
+    if energy(&plain) - energy(&ranked) <= margin {
+        Ok(plain)
+    } else {
+        Ok(ranked)
     }
 }
 
@@ -308,9 +311,10 @@ fn finish(
 
 fn check_size((width, height): (u32, u32)) -> Result<(), MaskError> {
     let pixels = u64::from(width) * u64::from(height);
-    match width.min(height) >= MIN_SIDE && pixels <= MAX_PIXELS {
-        true => Ok(()),
-        false => Err(MaskError::FrameSize { width, height }),
+    if width.min(height) >= MIN_SIDE && pixels <= MAX_PIXELS {
+        Ok(())
+    } else {
+        Err(MaskError::FrameSize { width, height })
     }
 }
 

@@ -41,9 +41,10 @@ impl ShapeCheck {
             let px: u64 = regions.iter().map(|region| region.px).sum();
             px as f64 / self.area_px as f64
         };
-        let most_background = match self.follows_what_moves() {
-            true => MOSTLY_BACKGROUND,
-            false => SOMETHING_ELSE,
+        let most_background = if self.follows_what_moves() {
+            MOSTLY_BACKGROUND
+        } else {
+            SOMETHING_ELSE
         };
         share(&self.leaks) > most_background
             || share(&self.missing) + share(&self.holes) > SOMETHING_ELSE

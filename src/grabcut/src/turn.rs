@@ -117,9 +117,10 @@ impl TurnStatistics {
 
     /// That there are enough frames.
     pub(super) fn check(&self) -> Result<(), MaskError> {
-        match self.frames >= MIN_TURN_FRAMES {
-            true => Ok(()),
-            false => Err(MaskError::FewFrames { found: self.frames }),
+        if self.frames >= MIN_TURN_FRAMES {
+            Ok(())
+        } else {
+            Err(MaskError::FewFrames { found: self.frames })
         }
     }
 
@@ -423,9 +424,12 @@ pub(super) fn segment(
 /// the share of the rest that is taken for background at first.
 fn known(hints: &Hints, size: (u32, u32)) -> Result<(Vec<Label>, f64), MaskError> {
     let border = ring(size, BORDER);
-    let open = |at: usize| match border(at) {
-        true => Label::Background,
-        false => Label::ProbablyObject,
+    let open = |at: usize| {
+        if border(at) {
+            Label::Background
+        } else {
+            Label::ProbablyObject
+        }
     };
     let initial = InitialLabels::new(hints, size)?;
     let labels = initial.labels.into_iter().enumerate();

@@ -78,11 +78,10 @@ impl fmt::Display for Alarm {
             None if self.emergency_stop => return f.write_str(EMERGENCY),
             None => f.write_str("the controller is locked: unlock or home it")?,
         }
-        match self.emergency_stop && self.code != self.family.emergency_stop_alarm() {
-            true => {
-                f.write_str("; the emergency stop was pressed: release it, then reset the table")
-            }
-            false => Ok(()),
+        if self.emergency_stop && self.code != self.family.emergency_stop_alarm() {
+            f.write_str("; the emergency stop was pressed: release it, then reset the table")
+        } else {
+            Ok(())
         }
     }
 }

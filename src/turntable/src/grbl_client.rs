@@ -325,9 +325,10 @@ impl Table {
         }
         let status = self.status()?;
         let still_locked = status.alarm.is_some_and(Alarm::is_emergency_stop);
-        match still_locked {
-            true => Err(TurntableError::EmergencyStop),
-            false => Ok(status),
+        if still_locked {
+            Err(TurntableError::EmergencyStop)
+        } else {
+            Ok(status)
         }
     }
 
@@ -399,9 +400,10 @@ impl Drop for Table {
 
 /// An error while the emergency stop is pressed.
 pub(super) fn require_released(status: &TableStatus) -> Result<(), TurntableError> {
-    match status.emergency_stop {
-        true => Err(TurntableError::EmergencyStop),
-        false => Ok(()),
+    if status.emergency_stop {
+        Err(TurntableError::EmergencyStop)
+    } else {
+        Ok(())
     }
 }
 

@@ -216,13 +216,12 @@ fn settings(link: &Link, extras: bool) -> Result<GrblSettings, TurntableError> {
         }
         last = Some(settings);
     }
-    Err(TurntableError::NotReported(match missing.is_empty() {
-        true => "its settings (`$$`) twice the same".to_owned(),
-        false => {
-            let missing: Vec<_> = missing.iter().map(|n| format!("${n}")).collect();
-            let missing = missing.join(", ");
-            format!("{missing}, which a table needs on its X axis")
-        }
+    Err(TurntableError::NotReported(if missing.is_empty() {
+        "its settings (`$$`) twice the same".to_owned()
+    } else {
+        let missing: Vec<_> = missing.iter().map(|n| format!("${n}")).collect();
+        let missing = missing.join(", ");
+        format!("{missing}, which a table needs on its X axis")
     }))
 }
 

@@ -137,11 +137,11 @@ impl GrblSettings {
 
     /// How far the table may turn in each direction; `offers_extras`: whether the firmware is the rig's own.
     fn limits(&self, offers_extras: bool) -> Result<(f64, f64), TurntableError> {
-        let reach_deg = match self.is_on(20) {
-            true => self
-                .positive(130)
-                .ok_or_else(|| not_reported("its soft limit ($130)"))?,
-            false => TRAVEL_DEG,
+        let reach_deg = if self.is_on(20) {
+            self.positive(130)
+                .ok_or_else(|| not_reported("its soft limit ($130)"))?
+        } else {
+            TRAVEL_DEG
         };
         // Stock Grbl's soft limits reach from the far end of the axis to machine zero.
         let stock = self.is_on(20) && !offers_extras;

@@ -70,9 +70,10 @@ impl H264 {
         }
         // Between pictures, a byte stream can have packets without any.
         let data = packet.data().unwrap_or_default();
-        match self.byte_stream.has_picture(data) {
-            true => Contents::Picture,
-            false => Contents::Hidden,
+        if self.byte_stream.has_picture(data) {
+            Contents::Picture
+        } else {
+            Contents::Hidden
         }
     }
 }

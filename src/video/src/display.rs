@@ -45,9 +45,10 @@ impl Display {
             },
         };
         // A photograph's ratio is the resolution for printing.
-        let ratio = match is_photograph(input) {
-            true => Rational::new(1, 1),
-            false => pixel_ratio(input, stream, picture),
+        let ratio = if is_photograph(input) {
+            Rational::new(1, 1)
+        } else {
+            pixel_ratio(input, stream, picture)
         };
         let pixel = pixel_shape(ratio);
         if pixel.is_none() && ratio.numerator() > 0 && ratio.numerator() != ratio.denominator() {

@@ -26,9 +26,10 @@ impl Video {
         };
         let keys = self.key_frames().iter().copied();
         let keys: Vec<u64> = keys.filter(|number| !damaged(number)).collect();
-        match keys.len() < count {
-            true => self.spread(count),
-            false => evenly(&keys, count),
+        if keys.len() < count {
+            self.spread(count)
+        } else {
+            evenly(&keys, count)
         }
     }
 

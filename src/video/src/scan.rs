@@ -84,9 +84,10 @@ impl Video {
         let mut refused = 0;
         let (ordered, numbering) = if packets.are_pictures || !needs_decoding(stamps) {
             let ordered = Ordered::from(stamps, time_base, rate);
-            let numbering = match ordered.stamps_are_unique() {
-                true => Numbering::Stamps,
-                false => Numbering::Packets,
+            let numbering = if ordered.stamps_are_unique() {
+                Numbering::Stamps
+            } else {
+                Numbering::Packets
             };
             (ordered, numbering)
         } else {

@@ -143,9 +143,12 @@ pub(super) fn first_frame(
         stream,
         decoder,
         |_| true,
-        |frame| match is_whole(frame) {
-            true => Found::This,
-            false => Found::Earlier,
+        |frame| {
+            if is_whole(frame) {
+                Found::This
+            } else {
+                Found::Earlier
+            }
         },
     )
 }

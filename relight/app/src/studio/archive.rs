@@ -148,9 +148,10 @@ fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>,
         .take(MOST_BYTES + 1)
         .read_to_end(&mut content)
         .map_err(|fault| damaged(&fault))?;
-    match content.len() as u64 > MOST_BYTES {
-        true => refused(TOO_LARGE),
-        false => Ok(content),
+    if content.len() as u64 > MOST_BYTES {
+        refused(TOO_LARGE)
+    } else {
+        Ok(content)
     }
 }
 

@@ -166,9 +166,10 @@ fn library(arguments: &LibraryArguments, console: Console) -> CommandResult {
         console.warn_with(&text, &event);
     }
     report_library(out, &summary, console);
-    Ok(match summary.faults.is_empty() {
-        true => Outcome::Whole,
-        false => Outcome::Incomplete,
+    Ok(if summary.faults.is_empty() {
+        Outcome::Whole
+    } else {
+        Outcome::Incomplete
     })
 }
 
@@ -209,9 +210,10 @@ fn synthesise(arguments: &SampleArguments, console: Console) -> CommandResult {
         textures: arguments.textures.clone(),
         panoramas: arguments.panoramas.clone(),
     };
-    let part = match arguments.validation {
-        true => Library::validation,
-        false => Library::training,
+    let part = if arguments.validation {
+        Library::validation
+    } else {
+        Library::training
     };
     let (library, outcome) = read_library(&folders, part, console)?;
     if arguments.albedo.is_some() {

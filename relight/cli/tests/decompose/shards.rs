@@ -25,9 +25,12 @@ pub(crate) fn write_shard(folder: &Path) -> PathBuf {
 }
 
 fn sample(index: u32, saturated: f64) -> Sample {
-    let image = RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match is_inside(x, y) {
-        true => *object(0).get_pixel(x, y),
-        false => Pixel([0; 3]),
+    let image = RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        if is_inside(x, y) {
+            *object(0).get_pixel(x, y)
+        } else {
+            Pixel([0; 3])
+        }
     });
     let mut measures = MaskSpans::of(&mask())
         .measure(&image, SATURATION_LEVEL)

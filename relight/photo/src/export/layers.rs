@@ -85,12 +85,13 @@ fn encode(
 fn heights(object: &CapturedObject) -> Vec<f32> {
     let extent = object.extent();
     let longest = extent.width.max(extent.height);
-    let grid = match longest > LONGEST {
-        true => relight_core::image::Extent::new(
+    let grid = if longest > LONGEST {
+        relight_core::image::Extent::new(
             (extent.width * LONGEST / longest).max(1),
             (extent.height * LONGEST / longest).max(1),
-        ),
-        false => extent,
+        )
+    } else {
+        extent
     };
     let inside: Vec<bool> = object
         .alpha()

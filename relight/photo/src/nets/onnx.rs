@@ -230,9 +230,10 @@ impl Writer {
 
     fn write_upsample(&mut self, input: &str, output: &str, align_corners: bool) {
         let scales = self.constant(&format!("{output}.scales"), &[4], &[1.0, 1.0, 2.0, 2.0]);
-        let corners = match align_corners {
-            true => "align_corners",
-            false => "half_pixel",
+        let corners = if align_corners {
+            "align_corners"
+        } else {
+            "half_pixel"
         };
         let inputs = vec![input.to_owned(), String::new(), scales];
         let attributes = vec![

@@ -90,9 +90,10 @@ impl Candidates {
 
 /// The files below a folder, or the file itself.
 fn files_of(path: &Path) -> Result<Vec<PathBuf>, SynthError> {
-    match path.is_file() {
-        true => Ok(vec![path.to_owned()]),
-        false => files_below(path),
+    if path.is_file() {
+        Ok(vec![path.to_owned()])
+    } else {
+        files_below(path)
     }
 }
 

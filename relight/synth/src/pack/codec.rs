@@ -171,9 +171,12 @@ pub(super) fn encode_mesh(raw: &RawMesh) -> Result<(PackedMesh, Vec<u8>, Picture
         corners.extend(raw.triangles[triangle].map(|vertex| vertices.number(vertex)));
         let lies = raw.texture.get(triangle).copied().unwrap_or(NO_TEXTURE);
         // 0 is no place at all.
-        placed.extend(lies.map(|place| match place.is_finite() {
-            true => 1 + coordinates.number(texture.number(place.to_array())),
-            false => 0,
+        placed.extend(lies.map(|place| {
+            if place.is_finite() {
+                1 + coordinates.number(texture.number(place.to_array()))
+            } else {
+                0
+            }
         }));
     }
     let mut bytes = Vec::new();

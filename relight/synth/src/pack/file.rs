@@ -184,9 +184,10 @@ fn meshes(archive: &Archive<'_>, catalogue: &Catalogue) -> Result<Vec<(String, M
     let numbered = catalogue.pictures.par_iter().enumerate();
     let pictures: Vec<(Arc<TextureImage>, PictureKind)> = numbered
         .map(|(number, &is_colours)| {
-            let kind = match is_colours {
-                true => PictureKind::Colours,
-                false => PictureKind::Numbers,
+            let kind = if is_colours {
+                PictureKind::Colours
+            } else {
+                PictureKind::Numbers
             };
             let bytes = archive.part(&picture_name(number))?;
             let image = TextureImage::unpacked(&bytes, kind, LONGEST_PICTURE as u32);

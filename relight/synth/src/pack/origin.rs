@@ -55,15 +55,14 @@ impl Origins {
     fn folder(&mut self, folder: &Path) -> Result<Option<&Origin>, SynthError> {
         if !self.read.contains_key(folder) {
             let path = folder.join(ORIGIN);
-            let origin = match path.is_file() {
-                true => {
-                    let text = fs::read_to_string(&path).map_err(SynthError::read(&path))?;
-                    let origin = toml::from_str(&text).map_err(|fault| {
-                        SynthError::unusable(&path, format!("cannot be used: {fault}"))
-                    });
-                    Some(origin?)
-                }
-                false => None,
+            let origin = if path.is_file() {
+                let text = fs::read_to_string(&path).map_err(SynthError::read(&path))?;
+                let origin = toml::from_str(&text).map_err(|fault| {
+                    SynthError::unusable(&path, format!("cannot be used: {fault}"))
+                });
+                Some(origin?)
+            } else {
+                None
             };
             self.read.insert(folder.to_owned(), origin);
         }

@@ -40,9 +40,12 @@ impl MirrorPanorama {
         for (pixel, normal) in curves.pixels_of(normals).enumerate() {
             let parts = curves.values(pixel).iter().zip(curves.weights(pixel));
             for ((value, weight), &angle) in parts.zip(curves.angles()) {
-                let light = [0, 1, 2].map(|c| match weight[c] > 0.0 {
-                    true => f64::from(value[c]),
-                    false => white,
+                let light = [0, 1, 2].map(|c| {
+                    if weight[c] > 0.0 {
+                        f64::from(value[c])
+                    } else {
+                        white
+                    }
                 });
                 panorama.add(angle, normal, light);
             }

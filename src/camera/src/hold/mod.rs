@@ -176,9 +176,10 @@ impl ManualPlan {
             let held = plan.hold(controls, wanted, aspect, &mut values);
             if aspect.is_needed && plan.missing.len() == before && !held {
                 let name = aspect.name;
-                plan.missing.push(match switched {
-                    true => format!("the camera's {name} can be switched to manual, but not set"),
-                    false => format!("the camera has no control of its {name}"),
+                plan.missing.push(if switched {
+                    format!("the camera's {name} can be switched to manual, but not set")
+                } else {
+                    format!("the camera has no control of its {name}")
                 });
             }
         }

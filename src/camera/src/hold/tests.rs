@@ -273,12 +273,13 @@ impl Camera for Answers {
         panic!("only the controls are asked")
     }
     fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
-        match self.1 {
-            true => Ok(self.0.clone()),
-            false => Err(CameraError::Unplugged {
+        if self.1 {
+            Ok(self.0.clone())
+        } else {
+            Err(CameraError::Unplugged {
                 device: "/dev/video9".to_owned(),
                 source: Some(std::io::Error::from_raw_os_error(19)),
-            }),
+            })
         }
     }
     fn set_control(&mut self, _: u32, value: i64) -> Result<i64, CameraError> {

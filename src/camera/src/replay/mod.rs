@@ -153,9 +153,10 @@ impl ReplayCamera {
             let position = earlier.saturating_add(taken.number);
             let reached = |at: Option<u64>| at.is_some_and(|at| at <= position);
             let moment = self.timeline.moment(taken.number, playing.round);
-            let due_us = match reached(self.address.faults.stall) {
-                true => i64::MAX,
-                false => playing.start_us.saturating_add(moment.since_first_us),
+            let due_us = if reached(self.address.faults.stall) {
+                i64::MAX
+            } else {
+                playing.start_us.saturating_add(moment.since_first_us)
             };
             self.clock.sleep_until(due_us.min(deadline_us));
             if due_us > deadline_us {

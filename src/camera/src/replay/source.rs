@@ -53,9 +53,10 @@ impl Delivery {
 
     /// Width and height of the delivered frames; decoded frames are rotated for display.
     pub(super) fn size(self, video: &Video) -> (u32, u32) {
-        match self.decoded {
-            false => video.coded_size(),
-            true => (video.facts().width, video.facts().height),
+        if self.decoded {
+            (video.facts().width, video.facts().height)
+        } else {
+            video.coded_size()
         }
     }
 

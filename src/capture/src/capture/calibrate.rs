@@ -114,9 +114,10 @@ pub fn measure_rotation(
     let back = stop.over(table, || table.jog(-sign * JOG_DEG, None));
     stop.explain(back)?;
     let to_the_right = background.moves_to_the_right()? == (sign > 0.0);
-    Ok(match to_the_right {
-        true => RotationDirection::CounterClockwise,
-        false => RotationDirection::Clockwise,
+    Ok(if to_the_right {
+        RotationDirection::CounterClockwise
+    } else {
+        RotationDirection::Clockwise
     })
 }
 

@@ -55,9 +55,10 @@ impl Equipment {
     }
 
     fn at_speed(settings: Settings, speed: f64) -> Result<Self, CaptureError> {
-        let clock = match settings.is_rehearsal() {
-            true => Clock::at_speed(speed),
-            false => Clock::monotonic(),
+        let clock = if settings.is_rehearsal() {
+            Clock::at_speed(speed)
+        } else {
+            Clock::monotonic()
         };
         let simulator = match &settings.turntable {
             TurntableAddress::Simulated(address) => Some(SimulatedTable::new(&SimulatorOptions {

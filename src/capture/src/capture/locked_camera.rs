@@ -102,15 +102,14 @@ impl LockedCamera {
 }
 
 fn require_kept(moved: Vec<ControlDrift>) -> Result<(), CaptureError> {
-    match moved.is_empty() {
-        true => Ok(()),
-        false => {
-            let moved: Vec<String> = moved.iter().map(ControlDrift::to_string).collect();
-            Err(CaptureError::Refused(format!(
-                "the camera does not keep its settings: {}; close other programs that use it, or give values that it takes",
-                moved.join(", ")
-            )))
-        }
+    if moved.is_empty() {
+        Ok(())
+    } else {
+        let moved: Vec<String> = moved.iter().map(ControlDrift::to_string).collect();
+        Err(CaptureError::Refused(format!(
+            "the camera does not keep its settings: {}; close other programs that use it, or give values that it takes",
+            moved.join(", ")
+        )))
     }
 }
 
@@ -152,11 +151,12 @@ fn settings_check(plan: &ManualPlan) -> Check {
     let held: Vec<String> = steps
         .map(|step| format!("{} {}", step.name, step.value))
         .collect();
-    match held.is_empty() {
-        true => Check::noted(
+    if held.is_empty() {
+        Check::noted(
             "camera settings",
             "the camera has no settings that could be held",
-        ),
-        false => Check::passed("camera settings", held.join(", ")),
+        )
+    } else {
+        Check::passed("camera settings", held.join(", "))
     }
 }

@@ -47,21 +47,23 @@ pub(crate) fn free_bytes(root: &Path) -> Result<u64, CaptureError> {
 
 /// Checks that the time of day is one in which this program can run.
 pub(super) fn check_clock(now: Timestamp) -> Result<Check, CaptureError> {
-    match now.as_second() < EARLIEST {
-        true => Err(CaptureError::Refused(format!(
+    if now.as_second() < EARLIEST {
+        Err(CaptureError::Refused(format!(
             "the system's clock says {now}, before this program was written: set it, or the session's name would be wrong"
-        ))),
-        false => Ok(Check::passed("clock", format!("{now:.0}"))),
+        )))
+    } else {
+        Ok(Check::passed("clock", format!("{now:.0}")))
     }
 }
 
 /// Checks that an object's name can be part of a session's.
 pub(crate) fn check_object(name: &str) -> Result<(), String> {
-    match is_session_name(name) && name.len() <= LONGEST_OBJECT {
-        true => Ok(()),
-        false => Err(format!(
+    if is_session_name(name) && name.len() <= LONGEST_OBJECT {
+        Ok(())
+    } else {
+        Err(format!(
             "{name:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most {LONGEST_OBJECT} bytes"
-        )),
+        ))
     }
 }
 
@@ -92,15 +94,16 @@ pub(super) fn ready_table(table: &Table) -> Result<Vec<Check>, CaptureError> {
     if status.restarted && !table.identity().homing {
         return Err(TurntableError::NotHomed.into());
     }
-    checks.push(match status.homed {
-        true => Check::passed("table's zero", "known"),
-        false => match table.home()? {
+    checks.push(if status.homed {
+        Check::passed("table's zero", "known")
+    } else {
+        match table.home()? {
             Homed::Index => Check::passed("table's zero", "found at its index"),
             Homed::WhereItStands => Check::noted(
                 "table's zero",
                 "taken where the table stood: it has no index",
             ),
-        },
+        }
     });
     Ok(checks)
 }

@@ -162,11 +162,12 @@ impl Drop for PanicReport {
 }
 
 fn check_jog(degrees: f64) -> Result<(), Refused> {
-    match degrees.is_finite() && degrees.abs() <= FARTHEST_JOG {
-        true => Ok(()),
-        false => Err(Refused::Invalid(format!(
+    if degrees.is_finite() && degrees.abs() <= FARTHEST_JOG {
+        Ok(())
+    } else {
+        Err(Refused::Invalid(format!(
             "the table cannot be turned by {degrees} degrees"
-        ))),
+        )))
     }
 }
 

@@ -190,9 +190,10 @@ impl ProcessingQueue {
         };
         // What was done before the cancel arrived is done.
         let stopped = is_cancelled && end.outcome == ProcessingOutcome::Failed;
-        let (outcome, what) = match stopped {
-            true => (ProcessingOutcome::Cancelled, "it was cancelled"),
-            false => (end.outcome, end.what.as_str()),
+        let (outcome, what) = if stopped {
+            (ProcessingOutcome::Cancelled, "it was cancelled")
+        } else {
+            (end.outcome, end.what.as_str())
         };
         self.remember(entry.clone(), step, outcome, what);
         entry.work.steps.remove(0);

@@ -135,9 +135,10 @@ impl SentFile {
     /// length, which ends the connection.
     fn open(&self) -> io::Result<impl Read + use<>> {
         let now = Self::of(self.path.clone())?;
-        match (now.bytes, now.modified_s) == (self.bytes, self.modified_s) {
-            true => Ok(File::open(&self.path)?.take(self.bytes)),
-            false => Err(io::Error::other("the file has changed since")),
+        if (now.bytes, now.modified_s) == (self.bytes, self.modified_s) {
+            Ok(File::open(&self.path)?.take(self.bytes))
+        } else {
+            Err(io::Error::other("the file has changed since"))
         }
     }
 }
@@ -197,9 +198,12 @@ fn attachment(session: &str, ending: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_' | b'.');
     let name: String = session
         .bytes()
-        .map(|byte| match plain(byte) {
-            true => char::from(byte).to_string(),
-            false => format!("%{byte:02X}"),
+        .map(|byte| {
+            if plain(byte) {
+                char::from(byte).to_string()
+            } else {
+                format!("%{byte:02X}")
+            }
         })
         .collect();
     format!("attachment; filename*=UTF-8''{name}.{ending}")

@@ -77,9 +77,10 @@ pub(super) async fn cancel(
     let number: u64 = number.parse().map_err(|_| none())?;
     let processing = present(processing)?;
     let cancelled = permits.run(Work::Command, move || Ok(processing.cancel(number)));
-    match cancelled.await? {
-        true => Ok(StatusCode::NO_CONTENT),
-        false => Err(none()),
+    if cancelled.await? {
+        Ok(StatusCode::NO_CONTENT)
+    } else {
+        Err(none())
     }
 }
 

@@ -160,9 +160,10 @@ fn mask_state(record: Option<Value>) -> MaskState {
     };
     let is_hinted = given("rect") || given("seeds") || given("strokes");
     MaskState {
-        origin: match is_hinted || !given("turn_frames") {
-            true => MaskOrigin::Hints,
-            false => MaskOrigin::Turn,
+        origin: if is_hinted || !given("turn_frames") {
+            MaskOrigin::Hints
+        } else {
+            MaskOrigin::Turn
         },
         warnings: texts(&record["warnings"]),
     }

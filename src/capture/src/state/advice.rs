@@ -208,9 +208,10 @@ impl RigState {
     /// What keeps the table from moving, other than that there is to be none; its lock apart, which homing lifts.
     #[must_use]
     pub fn obstacle_to_motion(&self) -> Option<Obstacle> {
-        match self.table.emergency_stop || !self.table.locked {
-            true => self.obstacle_of_table(),
-            false => None,
+        if self.table.emergency_stop || !self.table.locked {
+            self.obstacle_of_table()
+        } else {
+            None
         }
     }
 

@@ -283,9 +283,10 @@ impl YuvDecoding {
             9 => (0.2627, 0.0593),
             _ => return Err(ColourFault::Matrix(numbered(matrix))),
         };
-        let (luma, chroma) = match full_range {
-            true => ([0.0, 65535.0], 65535.0),
-            false => ([4096.0, 219.0 * 256.0], 224.0 * 256.0),
+        let (luma, chroma) = if full_range {
+            ([0.0, 65535.0], 65535.0)
+        } else {
+            ([4096.0, 219.0 * 256.0], 224.0 * 256.0)
         };
         Ok(Self {
             luma,

@@ -79,9 +79,10 @@ impl<'a> Levels<'a> {
         if self.counts.len() <= MAX_LABELS && self.has_labels(&even, highest) {
             return Err(labels(even.into_keys()));
         }
-        match self.is_photograph(lowest, highest) {
-            true => Err(MaskFault::Photograph),
-            false => Ok(half),
+        if self.is_photograph(lowest, highest) {
+            Err(MaskFault::Photograph)
+        } else {
+            Ok(half)
         }
     }
 

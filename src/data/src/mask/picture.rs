@@ -57,9 +57,10 @@ impl MaskPicture {
         let count = size.0 as usize * size.1 as usize;
         let at = |plane: &[f32], k: usize| plane.get(k).copied().unwrap_or_default();
         let is_eight_bits = |plane: &&[f32]| plane.iter().all(|&value| is_of_eight_bits(value));
-        let white = match colours.iter().chain(&alpha).all(is_eight_bits) {
-            true => u16::from(u8::MAX),
-            false => u16::MAX,
+        let white = if colours.iter().chain(&alpha).all(is_eight_bits) {
+            u16::from(u8::MAX)
+        } else {
+            u16::MAX
         };
         let level = |value: f32| match white {
             u16::MAX => sixteen_bits(value),
@@ -168,9 +169,10 @@ impl MaskPicture {
         if let Some(label) = colours.only_label() {
             let inside: Vec<bool> = self.colours.iter().map(|c| *c == label).collect();
             // A saturated colour is also bright: nothing needs to be said of it.
-            let basis = match self.is_bright(brightest(&label)) {
-                true => MaskBasis::Brightness,
-                false => MaskBasis::Label(format!("the colour {}", colours.name(label))),
+            let basis = if self.is_bright(brightest(&label)) {
+                MaskBasis::Brightness
+            } else {
+                MaskBasis::Label(format!("the colour {}", colours.name(label)))
             };
             return Ok(ObjectPixels { inside, basis });
         }
@@ -186,9 +188,10 @@ impl MaskPicture {
     fn by_levels(&self, levels: &[u16]) -> Result<ObjectPixels, MaskFault> {
         let found = Levels::new(levels, self.white, self.width);
         let threshold = found.threshold()?;
-        let basis = match self.is_bright(threshold) {
-            true => MaskBasis::Brightness,
-            false => MaskBasis::Label(format!("the value {threshold}")),
+        let basis = if self.is_bright(threshold) {
+            MaskBasis::Brightness
+        } else {
+            MaskBasis::Label(format!("the value {threshold}"))
         };
         Ok(ObjectPixels {
             inside: levels.iter().map(|&level| level >= threshold).collect(),

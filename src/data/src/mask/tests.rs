@@ -37,9 +37,10 @@ fn two(inside: u8, outside: u8) -> GrayImage {
 /// A picture of a shaded ball before a backdrop, with colours.
 fn photograph(x: u32, y: u32) -> [u8; 3] {
     let shade = (1.0 - distance(x, y) / 40.0).clamp(0.0, 1.0);
-    match is_inside(x, y) {
-        true => [230.0, 150.0, 90.0].map(|c: f64| (c * shade) as u8),
-        false => [120 + (x / 2) as u8, 130, 140 - (y / 2) as u8],
+    if is_inside(x, y) {
+        [230.0, 150.0, 90.0].map(|c: f64| (c * shade) as u8)
+    } else {
+        [120 + (x / 2) as u8, 130, 140 - (y / 2) as u8]
     }
 }
 
@@ -314,9 +315,12 @@ fn a_photograph_is_no_mask() {
     assert_photograph(before(255));
     let depth = grey(|x, y| (2 * x + y) as u8);
     assert_photograph(depth);
-    let normals = RgbImage::from_fn(WIDE, HIGH, |x, y| match is_inside(x, y) {
-        true => Rgb([(x * 3) as u8, 255 - (y * 3) as u8, 220]),
-        false => Rgb([0; 3]),
+    let normals = RgbImage::from_fn(WIDE, HIGH, |x, y| {
+        if is_inside(x, y) {
+            Rgb([(x * 3) as u8, 255 - (y * 3) as u8, 220])
+        } else {
+            Rgb([0; 3])
+        }
     });
     assert_photograph(normals);
 }

@@ -241,9 +241,10 @@ impl<R: Read> TarReader<R> {
         let read = (&mut self.source).take(bytes).read_to_end(&mut data);
         self.offset += data.len() as u64;
         read.map_err(|source| self.unread(source))?;
-        match (data.len() as u64) < bytes {
-            true => Err(ShardError::ShardTruncated(self.offset)),
-            false => Ok(data),
+        if (data.len() as u64) < bytes {
+            Err(ShardError::ShardTruncated(self.offset))
+        } else {
+            Ok(data)
         }
     }
 

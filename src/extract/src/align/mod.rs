@@ -423,9 +423,10 @@ fn fit_all(
         .into_par_iter()
         .map_init(Gradients::default, |gradients, at| {
             gradients.take(&planes[at]);
-            let start = match search {
-                true => template.search(gradients, reach),
-                false => shifts[at],
+            let start = if search {
+                template.search(gradients, reach)
+            } else {
+                shifts[at]
             };
             let fit = template.fit(gradients, start, reach, still);
             fit.map_or(shifts[at], |fit| fit.shift)

@@ -44,9 +44,10 @@ impl Region {
                 .get(y.saturating_sub(down)..(y + down + 1).min(last));
             let near = near.unwrap_or_default().iter();
             let hull = near.fold(0..0, |all, row| joined(&all, row));
-            match hull.is_empty() {
-                true => hull,
-                false => hull.start.saturating_sub(across)..(hull.end + across).min(self.width),
+            if hull.is_empty() {
+                hull
+            } else {
+                hull.start.saturating_sub(across)..(hull.end + across).min(self.width)
             }
         };
         Self {

@@ -42,8 +42,9 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
     );
     let mut sessions = merged.dataset.sessions.iter();
     let is_flawed = sessions.any(|session| session.lossy || session.has_misfit());
-    Ok(match is_flawed || !merged.left_out.is_empty() {
-        true => Outcome::Incomplete,
-        false => Outcome::Whole,
+    Ok(if is_flawed || !merged.left_out.is_empty() {
+        Outcome::Incomplete
+    } else {
+        Outcome::Whole
     })
 }

@@ -100,13 +100,14 @@ impl Bucket {
         if matches!(error, object_store::Error::NotFound { .. }) || answered("404") {
             return not_there(&url);
         }
-        ExtractError::Refused(match is_refused || answered("403") || answered("401") {
-            true => format!(
+        ExtractError::Refused(if is_refused || answered("403") || answered("401") {
+            format!(
                 "{url} may not be {doing}: check the credentials in the environment and what they allow"
-            ),
-            false => format!(
+            )
+        } else {
+            format!(
                 "{url} could not be {doing}: {why}; what was finished is there, run again with --resume"
-            ),
+            )
         })
     }
 

@@ -29,9 +29,10 @@ pub(crate) fn extract(
         }
     }
     let folder = temporary()?;
-    let target = match is_url(out) {
-        true => Some(Target::open(out, folder.path(), options.task)?),
-        false => None,
+    let target = if is_url(out) {
+        Some(Target::open(out, folder.path(), options.task)?)
+    } else {
+        None
     };
     let local = target
         .as_ref()
@@ -284,9 +285,10 @@ impl Target {
         self.describe()?;
         for file in files {
             let place = self.folder.join(file);
-            let removed = match place.is_dir() {
-                true => fs::remove_dir_all(&place),
-                false => fs::remove_file(&place),
+            let removed = if place.is_dir() {
+                fs::remove_dir_all(&place)
+            } else {
+                fs::remove_file(&place)
             };
             removed.map_err(ExtractError::io("removed", &place))?;
         }

@@ -21,12 +21,13 @@ pub(super) fn check(url: &Path) -> Result<(), ExtractError> {
     let text = url.to_string_lossy();
     let rest = text.split_once("://").map_or("", |(_, rest)| rest);
     let host = rest.split('/').next().unwrap_or_default();
-    match host.contains('@') || rest.contains('?') {
-        true => Err(ExtractError::Refused(format!(
+    if host.contains('@') || rest.contains('?') {
+        Err(ExtractError::Refused(format!(
             "{} is given with credentials or a query: they belong into the environment",
             without_credentials(&text)
-        ))),
-        false => Ok(()),
+        )))
+    } else {
+        Ok(())
     }
 }
 

@@ -400,13 +400,14 @@ mod tests {
             let x = f64::from(x) - f64::from(APRON) - dx;
             let y = f64::from(y) - f64::from(APRON) - dy;
             let far = (x + 0.5 - centre).hypot(y + 0.5 - centre);
-            match far < 0.42 * f64::from(width) {
-                false => opaque([255; 3]),
-                true => opaque([
+            if far < 0.42 * f64::from(width) {
+                opaque([
                     (120.0 + 60.0 * (0.15 * x).sin()) as u8,
                     (120.0 + 60.0 * (0.12 * y).cos()) as u8,
                     90,
-                ]),
+                ])
+            } else {
+                opaque([255; 3])
             }
         })
     }

@@ -218,9 +218,10 @@ fn smooth(t: f64) -> f64 {
 fn level(light: f64) -> f64 {
     let light = light.clamp(0.0, 1.0);
     255.0
-        * match light <= 0.003_130_8 {
-            true => 12.92 * light,
-            false => 1.055 * light.powf(1.0 / 2.4) - 0.055,
+        * if light <= 0.003_130_8 {
+            12.92 * light
+        } else {
+            1.055 * light.powf(1.0 / 2.4) - 0.055
         }
 }
 

@@ -147,9 +147,10 @@ fn still_disc() -> Vec<RgbImage> {
     let level = |x: u32, y: u32, at: u32| {
         let (u, v) = (f64::from(x), f64::from(y));
         let pattern = 25.0 * (u * 0.5).sin() * (v * 0.4 + u * 0.1).cos();
-        match in_disc(x, y) {
-            true => (180.0 + pattern) as u8,
-            false => 30 + 40 * ((x + 5 * at) / 10 % 4) as u8,
+        if in_disc(x, y) {
+            (180.0 + pattern) as u8
+        } else {
+            30 + 40 * ((x + 5 * at) / 10 % 4) as u8
         }
     };
     let frame = |at| RgbImage::from_fn(WIDTH, HEIGHT, |x, y| image::Rgb([level(x, y, at); 3]));

@@ -17,9 +17,10 @@ fn turn(folder: &Path) {
         let luma = |x: u32, y: u32| {
             let (x, y) = (f64::from(x), f64::from(y));
             let pattern = 25.0 * (x * 0.5).sin() * (y * 0.4 + x * 0.1).cos();
-            match (x - 48.0).hypot(y - 32.0) <= 18.0 {
-                true => (180.0 + pattern) as u8,
-                false => 30 + 40 * ((x as u32 + 5 * at) / 10 % 4) as u8,
+            if (x - 48.0).hypot(y - 32.0) <= 18.0 {
+                (180.0 + pattern) as u8
+            } else {
+                30 + 40 * ((x as u32 + 5 * at) / 10 % 4) as u8
             }
         };
         bytes.extend_from_slice(b"FRAME\n");

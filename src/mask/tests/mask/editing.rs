@@ -68,9 +68,10 @@ impl Editing {
     pub(crate) fn ask(&self, method: &str, path: &str, lines: &[&str], body: &str) -> Answer {
         let mut socket = TcpStream::connect(&self.address).unwrap();
         socket.set_read_timeout(Some(LONG)).unwrap();
-        let host = match lines.iter().any(|line| line.starts_with("Host:")) {
-            true => String::new(),
-            false => format!("Host: {}\r\n", self.address),
+        let host = if lines.iter().any(|line| line.starts_with("Host:")) {
+            String::new()
+        } else {
+            format!("Host: {}\r\n", self.address)
         };
         let lines: String = lines.iter().map(|line| format!("{line}\r\n")).collect();
         let length = body.len();

@@ -9,9 +9,10 @@ use super::support::{code, read, relit_mask, said, video};
 /// A disc of this radius on grey.
 fn picture(radius: f64) -> RgbImage {
     RgbImage::from_fn(96, 72, |x, y| {
-        match (f64::from(x) - 48.0).hypot(f64::from(y) - 36.0) < radius {
-            true => Rgb([220, 120, 40]),
-            false => Rgb([40 + ((x * 7 + y * 3) % 6) as u8; 3]),
+        if (f64::from(x) - 48.0).hypot(f64::from(y) - 36.0) < radius {
+            Rgb([220, 120, 40])
+        } else {
+            Rgb([40 + ((x * 7 + y * 3) % 6) as u8; 3])
         }
     })
 }

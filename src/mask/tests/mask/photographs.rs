@@ -16,9 +16,10 @@ const HEIGHT: u32 = 80;
 /// A disc near the upper left corner, on grey that is not quite even.
 fn displayed() -> RgbImage {
     RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
-        match (f64::from(x) - 35.0).hypot(f64::from(y) - 30.0) < 16.0 {
-            true => Rgb([220, 120, 40]),
-            false => Rgb([40 + ((x * 7 + y * 3) % 6) as u8; 3]),
+        if (f64::from(x) - 35.0).hypot(f64::from(y) - 30.0) < 16.0 {
+            Rgb([220, 120, 40])
+        } else {
+            Rgb([40 + ((x * 7 + y * 3) % 6) as u8; 3])
         }
     })
 }

@@ -238,9 +238,12 @@ fn a_frame_beyond_the_end_is_reported_with_the_last_one() {
 pub(crate) fn turn_video() -> Vec<u8> {
     let mut bytes = format!("YUV4MPEG2 W{WIDTH} H{HEIGHT} F30:1 Ip A1:1 C444\n").into_bytes();
     for at in 0..16 {
-        let luma = |x: u32, y: u32| match in_disc(x, y) {
-            true => 200 + ((x + y) % 3) as u8,
-            false => 30 + 60 * ((x + 5 * at) / 10 % 4) as u8,
+        let luma = |x: u32, y: u32| {
+            if in_disc(x, y) {
+                200 + ((x + y) % 3) as u8
+            } else {
+                30 + 60 * ((x + 5 * at) / 10 % 4) as u8
+            }
         };
         bytes.extend_from_slice(b"FRAME\n");
         bytes.extend((0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| luma(x, y))));

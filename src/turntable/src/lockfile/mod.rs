@@ -201,9 +201,10 @@ fn open(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     let file = options
         .custom_flags(flags.bits().cast_signed())
         .open(path)?;
-    match file.metadata()?.is_file() {
-        true => Ok(file),
-        false => Err(io::Error::other("it is not a plain file")),
+    if file.metadata()?.is_file() {
+        Ok(file)
+    } else {
+        Err(io::Error::other("it is not a plain file"))
     }
 }
 

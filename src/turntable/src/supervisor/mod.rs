@@ -397,9 +397,10 @@ impl Supervisor {
         let Some(motion) = self.motion.as_mut().filter(|_| self.fault.is_none()) else {
             return;
         };
-        let fault = match displaced {
-            true => Some(MotionFault::Restarted(None)),
-            false => motion.on_report(&report, alarm, &self.traits),
+        let fault = if displaced {
+            Some(MotionFault::Restarted(None))
+        } else {
+            motion.on_report(&report, alarm, &self.traits)
         };
         if let Some(fault) = fault {
             self.fail(now_us, fault);

@@ -149,13 +149,14 @@ impl Motion {
         let moved = self
             .moved_at
             .is_some_and(|at| at.abs() > traits.tolerance_deg());
-        Some(match at_zero && moved {
-            true => MotionFault::Restarted(None),
-            false => MotionFault::Astray {
+        Some(if at_zero && moved {
+            MotionFault::Restarted(None)
+        } else {
+            MotionFault::Astray {
                 state: ControllerState::Idle,
                 machine_deg: report.machine_deg,
                 target_deg,
-            },
+            }
         })
     }
 

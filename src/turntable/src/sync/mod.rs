@@ -40,9 +40,10 @@ const CLOCK_FLOOR_US: f64 = 200.0;
 const WRAP_US: f64 = 4_294_967_296.0;
 
 fn uneven(outliers: usize, polls: usize) -> String {
-    let found = match outliers * 2 > polls {
-        true => format!("the {polls} reports lie on no straight line"),
-        false => format!("{outliers} of {polls} reports lie off the line of the others"),
+    let found = if outliers * 2 > polls {
+        format!("the {polls} reports lie on no straight line")
+    } else {
+        format!("{outliers} of {polls} reports lie off the line of the others")
     };
     format!("{found}: the table did not turn evenly, or the serial line is bad")
 }
@@ -128,9 +129,10 @@ impl Track {
         }
         let until_us = last.asked_us;
         let is_short = last.asked_us - first.asked_us < SHORT_US || points.len() < LEAST_POLLS;
-        let fitted = match is_short {
-            true => by_the_plan(&points, expected),
-            false => by_the_reports(&points, expected)?,
+        let fitted = if is_short {
+            by_the_plan(&points, expected)
+        } else {
+            by_the_reports(&points, expected)?
         };
         let mut track = checked_track(&points, expected, &fitted)?;
         // What came after the last report is not known: the table may have been stopped.
@@ -182,9 +184,10 @@ pub(crate) fn fit(reports: &[PositionReport], expected: &JournaledTurn) -> Resul
 }
 
 fn by_the_reports(points: &[Point], expected: &JournaledTurn) -> Result<Fitted, String> {
-    match points.iter().all(|point| point.chip_us.is_some()) {
-        true => by_the_chip(points, expected),
-        false => Ok(by_the_middle(points, expected)),
+    if points.iter().all(|point| point.chip_us.is_some()) {
+        by_the_chip(points, expected)
+    } else {
+        Ok(by_the_middle(points, expected))
     }
 }
 

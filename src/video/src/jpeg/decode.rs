@@ -27,9 +27,10 @@ const CACHED: usize = 32;
 
 /// The first byte of a buffer at which the library writes into the caches; less than [`CACHED`].
 fn cached_start(buffer: *const u8) -> usize {
-    match buffer.addr().is_multiple_of(CACHED) {
-        true => CACHED / 2,
-        false => 0,
+    if buffer.addr().is_multiple_of(CACHED) {
+        CACHED / 2
+    } else {
+        0
     }
 }
 

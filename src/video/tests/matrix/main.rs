@@ -294,9 +294,10 @@ fn reference(folder: &Path, file: &str) -> Reference {
     let (width, height) = dimensions(folder, file);
     let planes = |arguments: &str| ffmpeg(folder, &arguments.split(' ').collect::<Vec<_>>());
     let rgb = is_rgb(folder, file);
-    let raw = match rgb {
-        true => planes(&arguments.replace("extractplanes=y", "format=gray")),
-        false => planes(&arguments),
+    let raw = if rgb {
+        planes(&arguments.replace("extractplanes=y", "format=gray"))
+    } else {
+        planes(&arguments)
     };
     let depth = if raw.len() % (2 * width * height) == 0 && is_deep(folder, file) {
         2

@@ -23,9 +23,12 @@ pub(super) fn read(
         left_out,
     };
     let numbered = file.document.materials.iter().enumerate();
-    let material = |(number, one)| match used.contains(&number) {
-        true => pictures.material(one),
-        false => MeshMaterial::default(),
+    let material = |(number, one)| {
+        if used.contains(&number) {
+            pictures.material(one)
+        } else {
+            MeshMaterial::default()
+        }
     };
     numbered.map(material).collect()
 }

@@ -70,12 +70,13 @@ impl CameraThread {
             }
             Err(CameraError::Timeout { .. }) => {
                 let waited = Duration::from_micros(now_us.abs_diff(*last_us));
-                match waited >= self.stall {
-                    true => Err(End::Failed(format!(
+                if waited >= self.stall {
+                    Err(End::Failed(format!(
                         "the camera gave no frame for {:.1} s: check its cable",
                         waited.as_secs_f64()
-                    ))),
-                    false => Ok(()),
+                    )))
+                } else {
+                    Ok(())
                 }
             }
             Err(CameraError::EndOfRecording { .. }) => Err(End::Failed(
@@ -118,9 +119,10 @@ impl CameraThread {
         for frame in frames {
             self.enqueue(frame, Instant::now() + self.queue_wait)?;
         }
-        match self.cutter.is_done() {
-            true => Err(End::Over),
-            false => Ok(()),
+        if self.cutter.is_done() {
+            Err(End::Over)
+        } else {
+            Ok(())
         }
     }
 

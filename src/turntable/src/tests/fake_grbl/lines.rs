@@ -54,9 +54,10 @@ impl FakeGrbl {
     fn carry_out(&mut self, block: &str) -> String {
         match block {
             "$I" => {
-                let about = match self.rig {
-                    true => &["[VER:1.1h.20190830:]", "[OPT:NHtcl,8,128]"],
-                    false => self.dialect.about(),
+                let about = if self.rig {
+                    &["[VER:1.1h.20190830:]", "[OPT:NHtcl,8,128]"]
+                } else {
+                    self.dialect.about()
                 };
                 about.iter().for_each(|line| self.say(line));
                 // A radio's state, which changes.

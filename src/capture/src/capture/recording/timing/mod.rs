@@ -71,9 +71,10 @@ impl FrameTiming {
             .map(|stamp| stamp.t_us.saturating_sub(first) as f64)
             .collect();
         let counts = counts(stamps);
-        let mut found = match counts {
-            true => Numbering::by_both(&counted(stamps), &times, nominal),
-            false => Numbering::by_time(&times, nominal),
+        let mut found = if counts {
+            Numbering::by_both(&counted(stamps), &times, nominal)
+        } else {
+            Numbering::by_time(&times, nominal)
         };
         found.anomalies.extend(wrong_rates(&found, fps));
         Self {

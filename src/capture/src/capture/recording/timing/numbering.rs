@@ -44,9 +44,10 @@ impl Numbering {
 
     /// Without a usable counter.
     pub(super) fn by_time(times: &[f64], nominal: f64) -> Self {
-        let fit = match times.len() >= FEWEST_FOR_FIT {
-            true => PeriodFit::find(times, nominal),
-            false => Some(PeriodFit::of_few(times, nominal)),
+        let fit = if times.len() >= FEWEST_FOR_FIT {
+            PeriodFit::find(times, nominal)
+        } else {
+            Some(PeriodFit::of_few(times, nominal))
         };
         let Some(PeriodFit { line, mut numbers }) = fit else {
             let numbers: Vec<i64> = (0..times.len() as i64).collect();
