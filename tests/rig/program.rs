@@ -13,11 +13,11 @@ use relit_data::session::{Manifest, Recording};
 use serde_json::Value;
 
 /// Long enough for an emulated machine whose host is busy.
-const LONGEST_WAIT: Duration = Duration::from_secs(240);
+const MAX_WAIT: Duration = Duration::from_secs(240);
 /// Where a capture's standard error goes, among its sessions.
 const STDERR: &str = "stderr.txt";
 /// More lines than a capture prints.
-const MOST_LINES: usize = 4096;
+const MAX_LINES: usize = 4096;
 /// What any capture here is asked for.
 const ALWAYS: [&str; 7] = [
     "record",
@@ -77,7 +77,7 @@ impl Running {
             .spawn()
             .unwrap();
         let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-        let (tell, events) = sync_channel(MOST_LINES);
+        let (tell, events) = sync_channel(MAX_LINES);
         thread::spawn(move || {
             for line in lines.map_while(Result::ok) {
                 // Nobody listens any more when the test is over.
@@ -97,7 +97,7 @@ impl Running {
 
     /// Waits until the frames of the turn are being recorded, and then some.
     pub(crate) fn until_recording(&mut self) {
-        let until = Instant::now() + LONGEST_WAIT;
+        let until = Instant::now() + MAX_WAIT;
         while !self
             .seen
             .iter()
@@ -114,7 +114,7 @@ impl Running {
 
     /// Waits for the end.
     pub(crate) fn end(mut self) -> Ended {
-        let until = Instant::now() + LONGEST_WAIT;
+        let until = Instant::now() + MAX_WAIT;
         let status = loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 break status;

@@ -10,7 +10,7 @@ const LINE: &str = "/dev/ttyS1";
 /// Between two questions: one that comes while the controller starts is lost.
 const ASKED_EVERY: Duration = Duration::from_secs(1);
 /// How long a report may take.
-const LONGEST_WAIT: Duration = Duration::from_secs(20);
+const MAX_WAIT: Duration = Duration::from_secs(20);
 
 /// Asks the controller twice, and checks that the table stands; gives its state.
 pub(crate) fn stands() -> String {
@@ -25,7 +25,7 @@ pub(crate) fn stands() -> String {
 
 /// State and position of one status report.
 fn report(port: &mut SerialPort) -> (String, String) {
-    let until = Instant::now() + LONGEST_WAIT;
+    let until = Instant::now() + MAX_WAIT;
     let mut text = String::new();
     while Instant::now() < until {
         port.write(b"?").unwrap();

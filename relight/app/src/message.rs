@@ -2,14 +2,14 @@
 //! the parts without gaps. By convention the first is JSON.
 
 /// The most parts of a message.
-const MOST_PARTS: usize = 256;
+const MAX_PARTS: usize = 256;
 /// Bytes of an integer.
 const WORD: usize = 4;
 
 /// Bytes are no message: they end before it does or go on behind it, or it has no parts or very many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the message is damaged: its bytes are not 1 to {MOST_PARTS} parts of the lengths that it states"
+    "the message is damaged: its bytes are not 1 to {MAX_PARTS} parts of the lengths that it states"
 )]
 pub struct MessageFault;
 
@@ -41,7 +41,7 @@ pub fn pack(parts: &[&[u8]]) -> Vec<u8> {
 /// Where the bytes are no message.
 pub fn unpack(message: &[u8]) -> Result<Vec<&[u8]>, MessageFault> {
     let (count, mut rest) = word(message)?;
-    if !(1..=MOST_PARTS).contains(&count) {
+    if !(1..=MAX_PARTS).contains(&count) {
         return Err(MessageFault);
     }
     let mut lengths = Vec::with_capacity(count);

@@ -103,7 +103,7 @@ fn fitted_shading(sample: &TruthSample, mask: &[bool]) -> Result<Vec<f32>, EvalE
         .fold((0, 0.0_f64), |(count, sum), (&value, _)| {
             (count + 1, sum + f64::from(value))
         });
-    let least = (sum / f64::from(count.max(1)) * LEAST_SHADING) as f32;
+    let least = (sum / f64::from(count.max(1)) * MIN_SHADING) as f32;
     for value in &mut found {
         *value = value.max(least);
     }
@@ -111,7 +111,7 @@ fn fitted_shading(sample: &TruthSample, mask: &[bool]) -> Result<Vec<f32>, EvalE
 }
 
 /// The least shading of the oracle, as a fraction of the mean.
-const LEAST_SHADING: f64 = 0.2;
+const MIN_SHADING: f64 = 0.2;
 
 /// SMSE and LMSE of albedo and shading, and their means, by both conventions, for each baseline and each prediction (parts
 /// `albedo` and `shading`). Of a set that does not know its shading, of albedo alone.

@@ -23,7 +23,7 @@ pub(super) const AMBIENT_RAYS: u32 = 16;
 /// Part of the objects that are meshes, where there are any.
 const MESHES: f32 = 0.25;
 /// Least part of the picture that an object covers, where another view of it covers more.
-const LEAST_COVER: f32 = 0.12;
+const MIN_COVER: f32 = 0.12;
 /// Views that are drawn at most until one covers as much.
 const DRAWS: usize = 4;
 
@@ -148,7 +148,7 @@ impl Recipe {
             ObjectSource::Mesh { .. } => None,
             ObjectSource::Shape { kind, .. } => Some(*kind),
         };
-        let least = (LEAST_COVER * (self.size * self.size) as f32) as usize;
+        let least = (MIN_COVER * (self.size * self.size) as f32) as usize;
         let mut draw = || {
             let pose = Pose::draw(random, kind);
             let projection = Projection::draw(random);

@@ -12,7 +12,7 @@ use super::SynthError;
 use relight_core::image::{ColourImage, ColourSpace, Extent, Linear, Srgb};
 
 /// Longest side of a mesh's own pictures in memory: larger ones are made smaller.
-const LONGEST_SIDE: usize = 1024;
+const MAX_SIDE: usize = 1024;
 
 /// Quality of the JPEG of a mesh's picture in a packed library, 1 to 100.
 const JPEG_QUALITY: u8 = 88;
@@ -121,7 +121,7 @@ impl TextureImage {
         let see_through = see_through(&image);
         Ok(Self {
             see_through,
-            ..Self::reduced(&image.into_rgb8(), kind, LONGEST_SIDE)
+            ..Self::reduced(&image.into_rgb8(), kind, MAX_SIDE)
         })
     }
 
@@ -137,7 +137,7 @@ impl TextureImage {
         limits.max_image_height = Some(longest);
         reader.limits(limits);
         let image = reader.decode()?.into_rgb8();
-        Ok(Self::reduced(&image, kind, LONGEST_SIDE))
+        Ok(Self::reduced(&image, kind, MAX_SIDE))
     }
 
     /// The picture as a JPEG of which no side is longer than `longest`.

@@ -13,7 +13,7 @@ const FLOOR: f64 = 0.02;
 /// Pixels along a side over which the brightest place is a mean.
 const AROUND: i64 = 5;
 /// Darkness beyond this counts no more: a factor of e^2.
-const MOST: f64 = 2.0;
+const MAX_DARKNESS: f64 = 2.0;
 
 /// The darkness of a batch, `batch x 1 x height x width`.
 #[derive(Debug)]
@@ -39,7 +39,7 @@ impl Darkness {
         let sum = paint.f_add(&shadow)?;
         Ok(Self {
             paint: paint.f_div(&sum.f_add_scalar(1e-4)?)?,
-            weight: sum.f_clamp_max(MOST)?.f_mul(mask)?,
+            weight: sum.f_clamp_max(MAX_DARKNESS)?.f_mul(mask)?,
         })
     }
 

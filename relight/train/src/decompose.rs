@@ -9,7 +9,7 @@ use super::error::TrainError;
 use super::losses::{Mean, chord, gradient, relative_distance, scale_invariant, windowed};
 use super::sample::TruthBatch;
 use super::terms::LossTerms;
-use relight_photo::decompose::{HIGHLIGHT_OFFSET, LEAST_FACING, LOG_LUMINANCE, LOG_SHADING};
+use relight_photo::decompose::{HIGHLIGHT_OFFSET, LOG_LUMINANCE, LOG_SHADING, MIN_FACING};
 
 /// Added to shading before its logarithm is taken.
 const SHADING_FLOOR: f64 = 0.03;
@@ -64,7 +64,7 @@ impl AnsweredTensors {
         let part = |from: i64, count: i64| answer.f_narrow(1, from, count);
         let facing = part(2, 1)?
             .f_softplus()?
-            .f_add_scalar(f64::from(LEAST_FACING))?;
+            .f_add_scalar(f64::from(MIN_FACING))?;
         let normals = Tensor::f_cat(&[part(0, 2)?, facing], 1)?;
         let length = normals
             .f_square()?

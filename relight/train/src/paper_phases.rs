@@ -31,7 +31,7 @@ const DARKEST: f64 = 1e-5;
 /// Keeps a division by nothing from being one.
 const TINY: f64 = 1e-6;
 /// Shading below this is not divided by.
-const LEAST_SHADING: f64 = 0.02;
+const MIN_SHADING: f64 = 0.02;
 
 /// A phase of the paper's training.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -303,7 +303,7 @@ pub(crate) fn reflectance(
     let coefficients = light_of(light, &diffuse, mask)?;
     let shading = diffuse_shading(&normals, &coefficients, DiffuseForm::Released)?;
     Ok(diffuse
-        .f_div(&shading.f_clamp_min(LEAST_SHADING)?)?
+        .f_div(&shading.f_clamp_min(MIN_SHADING)?)?
         .f_clamp(0.0, 1.0)?)
 }
 

@@ -118,7 +118,7 @@ impl TurnViews {
 }
 
 /// The least albedo whose logarithm is learned.
-const LEAST_ALBEDO: f32 = 0.002;
+const MIN_ALBEDO: f32 = 0.002;
 
 /// Mostly the phase by which turns are looked at first.
 fn phase_of(seed: u64) -> PhaseHypothesis {
@@ -157,7 +157,7 @@ impl Planes {
                 normals[axis * area + at] = value;
             }
             for (channel, value) in drawn.albedo[k].to_array().into_iter().enumerate() {
-                log_albedo[channel * area + at] = value.max(LEAST_ALBEDO).ln();
+                log_albedo[channel * area + at] = value.max(MIN_ALBEDO).ln();
             }
         }
         Self {

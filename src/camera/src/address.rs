@@ -12,7 +12,7 @@ const FASTEST: f64 = 1000.0;
 const NO_SCHEME: &str = "write v4l2:/dev/video0, nokhwa:0 or replay:PATH";
 const NO_PATH: &str = "a device is named by its path, such as /dev/video0";
 /// Most frames in a list.
-const MOST_FRAMES: usize = 10_000;
+const MAX_FRAMES: usize = 10_000;
 
 /// Which camera is meant: `v4l2:/dev/video0`, `nokhwa:0`, or `replay:PATH` with options as
 /// `replay:PATH?speed=0&drop=7,8`. Options begin at the last question mark.
@@ -180,10 +180,10 @@ fn parse_switch(text: &str) -> Option<bool> {
 fn parse_frames(text: &str) -> Option<BTreeSet<u64>> {
     let frames: BTreeSet<u64> = text
         .split(',')
-        .take(MOST_FRAMES + 1)
+        .take(MAX_FRAMES + 1)
         .map(|number| number.parse().ok())
         .collect::<Option<_>>()?;
-    (frames.len() <= MOST_FRAMES).then_some(frames)
+    (frames.len() <= MAX_FRAMES).then_some(frames)
 }
 
 /// The address without options.

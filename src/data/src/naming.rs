@@ -2,7 +2,7 @@
 
 /// Longest name of a session, bytes. A file name can have 255, and a temporary name adds two numbers
 /// and two extensions.
-const LONGEST: usize = 120;
+const MAX_LENGTH: usize = 120;
 
 /// Names that Windows keeps for devices, whatever extension follows.
 const DEVICES: [&str; 4] = ["aux", "con", "nul", "prn"];
@@ -15,7 +15,7 @@ const NUMBERED_DEVICES: [&str; 2] = ["com", "lpt"];
 #[must_use]
 pub fn is_session_name(name: &str) -> bool {
     !name.is_empty()
-        && name.len() <= LONGEST
+        && name.len() <= MAX_LENGTH
         && !name.starts_with('.')
         && !name.ends_with('.')
         && !is_device(name)
@@ -28,7 +28,7 @@ pub fn is_session_name(name: &str) -> bool {
 #[cfg(feature = "files")]
 pub(crate) fn not_a_name(name: &str) -> String {
     format!(
-        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most {LONGEST} bytes, neither starting nor ending with '.', and no device's name of Windows such as con"
+        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most {MAX_LENGTH} bytes, neither starting nor ending with '.', and no device's name of Windows such as con"
     )
 }
 
@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn names_that_are_no_plain_part_of_a_path_are_refused() {
-        let longest = "x".repeat(LONGEST);
+        let longest = "x".repeat(MAX_LENGTH);
         for name in [
             "20261120T093015Z-mug",
             "Ölkanne.v2",
@@ -68,7 +68,7 @@ mod tests {
         ] {
             assert!(is_session_name(name), "{name}");
         }
-        let too_long = "ä".repeat(LONGEST / 2 + 1);
+        let too_long = "ä".repeat(MAX_LENGTH / 2 + 1);
         for name in [
             "",
             ".",

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 
 /// Below this [`modulation`], the median over an object, the environment light is too even: what varies over the turn hardly stands
 /// out of the noise.
-pub const LEAST_MODULATION: f64 = 0.08;
+pub const MIN_MODULATION: f64 = 0.08;
 /// Fewest angles that tell two harmonics.
-const LEAST_SAMPLES: usize = 8;
+const MIN_SAMPLES: usize = 8;
 /// Light of which nothing can be said, 0 to 1.
 const DARK: f64 = 1e-5;
 
@@ -30,7 +30,7 @@ const DARK: f64 = 1e-5;
 pub fn modulation(light: &[(f64, f64)]) -> Option<f64> {
     let count = light.len() as f64;
     let mean = light.iter().map(|(_, value)| value).sum::<f64>() / count;
-    if light.len() < LEAST_SAMPLES || !mean.is_finite() || mean <= DARK {
+    if light.len() < MIN_SAMPLES || !mean.is_finite() || mean <= DARK {
         return None;
     }
     let energy = |harmonic: f64| {

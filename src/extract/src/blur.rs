@@ -5,38 +5,38 @@
 //! back: the table turns by a quarter of a degree between two frames. And where a lamp flickers, the
 //! brightness changes with it. So a frame is blurred if its sharpness is below that of the sharp frames before
 //! it and of those after it, both as measured and relative to the squared brightness, by more than
-//! [`LEAST_DROP`] and more than the turn's usual change from frame to frame.
+//! [`MIN_DROP`] and more than the turn's usual change from frame to frame.
 
 use std::collections::VecDeque;
 
 use relit_data::shard::FrameRecord;
 
 /// Fewest frames of a whole turn with which blur is measured: between fewer, the light moves too far.
-const LEAST_FRAMES: usize = 300;
+const MIN_FRAMES: usize = 300;
 /// Sharp frames on each side with which a frame is compared.
 const AROUND: usize = 12;
 /// Fewest of them.
-const LEAST_AROUND: usize = 4;
+const MIN_AROUND: usize = 4;
 /// A blur is at least such a drop of the sharpness, base-2 logarithm.
-const LEAST_DROP: f64 = 0.45;
+const MIN_DROP: f64 = 0.45;
 /// And so many times the usual change from frame to frame.
 const BEYOND_USUAL: f64 = 6.0;
 /// Longest blur, as a part of the turn: what lasts longer may be the light.
-const LONGEST_PART: usize = 30;
+const MAX_PART: usize = 30;
 
 /// How much less sharp than its surroundings a frame is, where it is blurred, base-2 logarithm to a
 /// thousandth. `frames` are the turn's frames in order, each once; a whole turn would have `whole_turn` of them.
 pub(super) fn blurs(frames: &[&FrameRecord], whole_turn: usize) -> Vec<Option<f64>> {
     let levels: Vec<Level> = frames.iter().map(|record| Level::of(record)).collect();
-    if whole_turn < LEAST_FRAMES {
+    if whole_turn < MIN_FRAMES {
         return vec![None; frames.len()];
     }
     let changes = levels
         .windows(2)
         .map(|pair| (pair[1].raw - pair[0].raw).abs());
     let usual = median(changes.collect()).unwrap_or_default();
-    let limit = LEAST_DROP.max(BEYOND_USUAL * usual);
-    let longest = (whole_turn / LONGEST_PART).max(1);
+    let limit = MIN_DROP.max(BEYOND_USUAL * usual);
+    let longest = (whole_turn / MAX_PART).max(1);
     let before = drops(levels.iter(), limit, longest);
     let mut after = drops(levels.iter().rev(), limit, longest);
     after.reverse();
@@ -67,7 +67,7 @@ impl Level {
 
     /// How far it is below the median of others, by the smaller of the two measures.
     fn below(self, others: &VecDeque<Self>) -> Option<f64> {
-        let others = Some(others).filter(|others| others.len() >= LEAST_AROUND)?;
+        let others = Some(others).filter(|others| others.len() >= MIN_AROUND)?;
         let raw = median(others.iter().map(|level| level.raw).collect())? - self.raw;
         let relative = median(others.iter().map(|level| level.relative).collect())?;
         Some(raw.min(relative - self.relative))

@@ -9,13 +9,13 @@ use std::collections::{BTreeMap, HashMap};
 use super::Alignment;
 
 /// The registered frames on both sides are at most so many frames apart.
-const MOST_APART: u64 = 40;
+const MAX_APART: u64 = 40;
 /// Frames on each side whose middle place is one of the predictions.
 const AROUND: u64 = 24;
 /// Fewest frames on which a prediction is tried.
-const LEAST_TRIED: usize = 30;
+const MIN_TRIED: usize = 30;
 /// A shift that is more uncertain is not taken, pixels.
-const MOST_UNCERTAIN: f64 = 1.0;
+const MAX_UNCERTAIN: f64 = 1.0;
 
 /// A shift that was not measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +56,7 @@ impl ShiftCourse {
         let (&before, _) = self.registered.range(..frame).next_back()?;
         let (&after, _) = self.registered.range(frame + 1..).next()?;
         let gap = (frame - before, after - frame);
-        if after - before > MOST_APART {
+        if after - before > MAX_APART {
             return None;
         }
         let ways: [Prediction; 2] = [straight, middle];
@@ -67,7 +67,7 @@ impl ShiftCourse {
         });
         tried
             .min_by(|a, b| a.uncertainty.total_cmp(&b.uncertainty))
-            .filter(|found| found.uncertainty <= MOST_UNCERTAIN)
+            .filter(|found| found.uncertainty <= MAX_UNCERTAIN)
     }
 
     /// How much a prediction errs on frames whose shift was measured.
@@ -77,7 +77,7 @@ impl ShiftCourse {
             Some((x - shift[0]).powi(2) + (y - shift[1]).powi(2))
         };
         let squares: Vec<f64> = self.registered.iter().filter_map(square).collect();
-        let enough = squares.len() >= LEAST_TRIED;
+        let enough = squares.len() >= MIN_TRIED;
         enough.then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     }
 }

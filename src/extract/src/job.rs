@@ -35,7 +35,7 @@ const MAX_REPORTED: usize = 8;
 /// Frames in which shifts are learnt, spread over the turn.
 const ALIGN_FRAMES: usize = 36;
 /// Fewest key frames that do for that.
-const LEAST_KEY_FRAMES: usize = 20;
+const MIN_KEY_FRAMES: usize = 20;
 /// Largest crop, pixels: each thread needs memory for a few images of this size.
 const MAX_CROP_PIXELS: u64 = 1 << 26;
 
@@ -476,7 +476,7 @@ impl Job {
 fn frames_to_align(chosen: &[u64], keys: &[u64], of_mask: Option<u64>) -> (Vec<u64>, u64) {
     let is_key = |number: &u64| keys.binary_search(number).is_ok();
     let alone: Vec<u64> = chosen.iter().copied().filter(is_key).collect();
-    let few = alone.len() < LEAST_KEY_FRAMES;
+    let few = alone.len() < MIN_KEY_FRAMES;
     let from = if few { chosen } else { &alone };
     let mut frames: Vec<u64> = (0..ALIGN_FRAMES)
         .filter_map(|k| from.get(k * from.len() / ALIGN_FRAMES))

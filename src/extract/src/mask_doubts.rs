@@ -17,7 +17,7 @@ use super::object::LARGE;
 /// Frames that are looked at.
 const FRAMES: usize = 12;
 /// Frames are halved until they have at most so many pixels.
-const MOST_PIXELS: u64 = 310_000;
+const MAX_PIXELS: u64 = 310_000;
 
 /// One sentence for each thing that is worth a warning about a mask, and how much the mask does not fit.
 type MaskDoubts = (Vec<String>, Option<MaskMisfit>);
@@ -83,7 +83,7 @@ fn halvings((width, height): (u32, u32)) -> u32 {
     let too_large = |by: &u32| {
         let (width, height) = (width >> by, height >> by);
         let pixels = u64::from(width) * u64::from(height);
-        pixels > MOST_PIXELS && width.min(height) >= 2 * MIN_SIDE
+        pixels > MAX_PIXELS && width.min(height) >= 2 * MIN_SIDE
     };
     (0..).take_while(too_large).count() as u32
 }

@@ -13,7 +13,7 @@ use super::blur::blurs;
 /// Samples on each side with which a step is compared.
 const AROUND: usize = 12;
 /// A step is at least this large, stops.
-const LEAST_STEP: f64 = 0.1;
+const MIN_STEP: f64 = 0.1;
 /// And so many times the median change around it, which is the light's.
 const BEYOND_LIGHT: f64 = 6.0;
 /// Linear light, of all channels together, below which nothing is compared: steps of 8 bits are large there.
@@ -128,7 +128,7 @@ fn exposure_steps(frames: &[&FrameRecord]) -> Vec<Option<f64>> {
         let mut usual: Vec<f64> = changes.get(around)?.iter().map(|c| c.abs()).collect();
         usual.sort_unstable_by(f64::total_cmp);
         let middle = usual.get(usual.len() / 2)?;
-        let is_step = change.abs() > LEAST_STEP.max(BEYOND_LIGHT * middle);
+        let is_step = change.abs() > MIN_STEP.max(BEYOND_LIGHT * middle);
         is_step.then_some((1000.0 * change).round() / 1000.0)
     };
     changes.iter().enumerate().map(step).collect()

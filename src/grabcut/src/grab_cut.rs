@@ -18,9 +18,9 @@ pub(super) const SMOOTHNESS: f32 = 50.0;
 /// Integer capacity of one unit of cost.
 const UNIT: f32 = 256.0;
 /// The largest cost of a pixel, far above any sum of smoothness around it.
-const MOST_COST: f32 = 4000.0;
+const MAX_COST: f32 = 4000.0;
 /// Most pixels from which a model learns, and over which the contrast is averaged.
-const MOST_SAMPLES: usize = 120_000;
+const MAX_SAMPLES: usize = 120_000;
 
 /// The half of the directions that lead to later pixels.
 pub(super) const DIRECTIONS_AHEAD: [usize; 4] = [4, 5, 6, 7];
@@ -224,7 +224,7 @@ fn check_sides(labels: &[Label]) -> Result<(), MaskError> {
 /// The factor that makes the average contrast 1/2.
 pub(super) fn contrast_scale<const D: usize, F: Field<D>>(field: &F) -> f32 {
     let (width, height) = field.size();
-    let step = (width * height).div_ceil(MOST_SAMPLES).max(1);
+    let step = (width * height).div_ceil(MAX_SAMPLES).max(1);
     let (mut sum, mut count) = (0.0, 0_u32);
     for at in (0..width * height).step_by(step) {
         for direction in DIRECTIONS_AHEAD {
@@ -303,7 +303,7 @@ impl<'a> OpenCut<'a> {
         for (node, &at) in self.active.iter().enumerate() {
             let at = at as usize;
             let ratio = models.log_ratio(&field.feature(at)) + field.evidence(at);
-            let own = (ratio.clamp(-MOST_COST, MOST_COST) * UNIT) as i32;
+            let own = (ratio.clamp(-MAX_COST, MAX_COST) * UNIT) as i32;
             let terminal = own + self.border[node];
             self.graph
                 .change(node as u32, terminal - self.terminals[node]);
@@ -359,7 +359,7 @@ fn samples<const D: usize, F: Field<D>>(
 ) -> Vec<[f32; D]> {
     let wanted = |&at: &usize| wanted(labels[at]);
     let all = (0..labels.len()).filter(wanted).count();
-    let step = all.div_ceil(MOST_SAMPLES).max(1);
+    let step = all.div_ceil(MAX_SAMPLES).max(1);
     let taken = (0..labels.len()).filter(wanted).step_by(step);
     taken.map(|at| field.feature(at)).collect()
 }

@@ -19,7 +19,7 @@ const COARSEST_PX: usize = 200_000;
 /// Half the width of the band, pixels of the finer image: the coarse edge is uncertain by 2.
 const BAND: usize = 3;
 /// Where a cut finds one side alone at this smoothness too, there is none.
-const LEAST_SMOOTHNESS: f32 = SMOOTHNESS / 8.0;
+const MIN_SMOOTHNESS: f32 = SMOOTHNESS / 8.0;
 
 /// Where the first colour models come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,7 +130,7 @@ fn begin_smooth(
     loop {
         let cut = start(field, labels, first, smoothness);
         match cut {
-            Err(MaskError::Empty | MaskError::Everything) if smoothness > LEAST_SMOOTHNESS => {
+            Err(MaskError::Empty | MaskError::Everything) if smoothness > MIN_SMOOTHNESS => {
                 labels.copy_from_slice(&known);
                 smoothness /= 2.0;
             }

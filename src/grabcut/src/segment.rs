@@ -19,7 +19,7 @@ const FILLED_OF_FRAME: f64 = 0.01;
 /// Over a turn highlights move: only specks are filled.
 const FILLED_OF_TURN: f64 = 0.001;
 /// The turn's outline has at least this share of the strength of the hints' one.
-const LEAST_OF_HINTS: f32 = 0.85;
+const MIN_OF_HINTS: f32 = 0.85;
 /// A cut reaches a side of the rectangle if it comes within this share of the way to the other.
 const REACHES: f64 = 0.04;
 /// By how much a cut has to be better than that of GrabCut's own start where that reaches all sides of the rectangle, in
@@ -277,7 +277,7 @@ fn fills(found: Rect, rect: Rect) -> bool {
 fn misled(turn: &TurnStatistics, by_turn: &Bitmap, by_hints: &Mask) -> Option<String> {
     let by_hints = Bitmap::of_mask(&by_hints.image);
     let (of_turn, of_hints) = (turn.outline(by_turn), turn.outline(&by_hints));
-    (of_turn < LEAST_OF_HINTS * of_hints).then(|| {
+    (of_turn < MIN_OF_HINTS * of_hints).then(|| {
         format!(
             "its outline follows what moves less well ({of_turn:.2}) than that of the hints alone ({of_hints:.2})"
         )

@@ -4,11 +4,11 @@ use super::{DoubtfulRegion, ShapeCheck};
 
 /// Parts of the mask that are background, of the object that are not in it, or holes in it may have this
 /// share of its area, where all of the turn is looked at.
-const MOST_REGION: f64 = 0.01;
+const MAX_REGION: f64 = 0.01;
 /// The same of a look at a few frames, which takes shadows for parts of the object.
-const MOST_REGION_OF_A_LOOK: f64 = 0.03;
+const MAX_REGION_OF_A_LOOK: f64 = 0.03;
 /// The mask's outline follows what moves at least so well, compared with the turn's own.
-const LEAST_OUTLINE: f32 = 0.85;
+const MIN_OUTLINE: f32 = 0.85;
 /// Where it follows it better than the turn's own, differences are the turn's mistakes.
 const BETTER_OUTLINE: f32 = 1.05;
 /// A mask of which more is wrong, as a share of its area, is that of something else.
@@ -24,13 +24,13 @@ impl ShapeCheck {
     /// at as a whole.
     #[must_use]
     pub fn faults(&self) -> Vec<String> {
-        faults(self, MOST_REGION)
+        faults(self, MAX_REGION)
     }
 
     /// [`Self::faults`] of a turn of which only a few frames were looked at.
     #[must_use]
     pub fn faults_at_a_look(&self) -> Vec<String> {
-        faults(self, MOST_REGION_OF_A_LOOK)
+        faults(self, MAX_REGION_OF_A_LOOK)
     }
 
     /// Whether the mask is that of another object or recording, rather than one with a flaw: much of it is background,
@@ -51,7 +51,7 @@ impl ShapeCheck {
     }
 
     fn follows_what_moves(&self) -> bool {
-        self.outline >= LEAST_OUTLINE * self.outline_of_turn
+        self.outline >= MIN_OUTLINE * self.outline_of_turn
     }
 }
 

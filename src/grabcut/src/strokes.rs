@@ -12,7 +12,7 @@ use super::{MaskError, Seeds};
 /// Coordinates and radii are smaller, pixels.
 const FARTHEST: f32 = 1e5;
 /// Most pixels that all strokes together touch, doubled ones counted each time.
-const MOST_WORK: u64 = 1 << 31;
+const MAX_WORK: u64 = 1 << 31;
 
 /// What a stroke does to the pixels that it covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -95,7 +95,7 @@ impl Strokes {
             return Err(MaskError::sizes(base.size(), size));
         }
         let work: u64 = self.0.iter().map(|stroke| work(stroke, size)).sum();
-        if work > MOST_WORK {
+        if work > MAX_WORK {
             let why = "the strokes cover too many pixels: paint with fewer or smaller ones";
             return Err(MaskError::Hints(why.to_owned()));
         }

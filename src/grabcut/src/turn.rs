@@ -27,7 +27,7 @@ pub const MIN_TURN_FRAMES: usize = 4;
 /// Frames that are sampled of a turn.
 pub const TURN_FRAMES: usize = 32;
 /// Frames are halved until they have at most so many pixels.
-const MOST_PIXELS: usize = 600_000;
+const MAX_PIXELS: usize = 600_000;
 /// And once more for the first cut, until they have at most so many.
 const COARSE_PIXELS: usize = 100_000;
 /// Share of the frame's shorter side that is background at each border.
@@ -37,9 +37,9 @@ const RING: f64 = 0.06;
 /// Share of the pixels within the ring that is taken for background at first.
 const SHARE: f64 = 0.7;
 /// The rows' ends are of use at first if they leave at least this share of the open pixels.
-const LEAST_LEFT: f64 = 0.01;
+const MIN_LEFT: f64 = 0.01;
 /// And at most this.
-const MOST_LEFT: f64 = 0.7;
+const MAX_LEFT: f64 = 0.7;
 /// Weight of the average colour against that of the current one.
 const COLOUR_WEIGHT: f32 = 1.0 / 3.0;
 /// Weight of the logarithms of the changes.
@@ -50,7 +50,7 @@ const CONSTANT_WEIGHT: f32 = 0.25;
 /// A smaller change of the brightness, in L, is noise.
 const STILL: f32 = 1.0;
 /// A larger contrast counts as this.
-const MOST_CONTRAST: f32 = 100.0;
+const MAX_CONTRAST: f32 = 100.0;
 
 /// Frames of a turn, all of one size, reduced to what the statistics need.
 #[derive(Debug, Clone)]
@@ -75,7 +75,7 @@ impl TurnFrames {
             return;
         }
         let mut small = None;
-        while pixels(small.as_ref().unwrap_or(frame)) > MOST_PIXELS {
+        while pixels(small.as_ref().unwrap_or(frame)) > MAX_PIXELS {
             small = Some(half_image(small.as_ref().unwrap_or(frame)));
         }
         self.frames.push(small.unwrap_or_else(|| frame.clone()));
@@ -222,7 +222,7 @@ impl TurnField {
                 };
                 let constant = squared_distance(&mean[at], &mean[next]);
                 let all = difference[at][to] / many - (1.0 - CONSTANT_WEIGHT) * constant;
-                all.clamp(0.0, MOST_CONTRAST)
+                all.clamp(0.0, MAX_CONTRAST)
             })
         };
         let features: Vec<[f32; 5]> = (0..count).map(feature).collect();
@@ -290,7 +290,7 @@ impl TurnField {
         let left = pixels
             .filter(|(label, alike)| open(label) && !**alike)
             .count() as f64;
-        if left < LEAST_LEFT * all || left > MOST_LEFT * all {
+        if left < MIN_LEFT * all || left > MAX_LEFT * all {
             return false;
         }
         for (label, &alike) in labels.iter_mut().zip(self.backdrop.bits()) {

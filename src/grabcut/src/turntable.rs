@@ -3,17 +3,17 @@
 use super::bitmap::{Bitmap, Connectivity};
 
 /// Largest average brightness, as a feature.
-const MOST_LIGHT: f32 = 50.0 / 3.0;
+const MAX_LIGHT: f32 = 50.0 / 3.0;
 /// Largest average chroma, as a feature.
-const MOST_CHROMA: f32 = 14.0 / 3.0;
+const MAX_CHROMA: f32 = 14.0 / 3.0;
 /// Largest change of the brightness, as a feature.
-const MOST_CHANGE: f32 = 7.5;
+const MAX_CHANGE: f32 = 7.5;
 /// A contrast of so many times the median of what is dark and below is structure.
 const STRUCTURE: f32 = 3.0;
 /// And at least and at most so much.
 const STRUCTURE_BOUNDS: (f32, f32) = (0.3, 30.0);
 /// The table covers at least this share of the frame.
-const LEAST: f64 = 0.01;
+const MIN_PART: f64 = 0.01;
 /// It comes as near to the lower border as this share of the height, or is this share of the width wide.
 const FOOT: f64 = 0.03;
 const WIDE: f64 = 0.5;
@@ -49,7 +49,7 @@ pub(super) fn find_turntable(
     let (width, height) = size;
     let dark = |at: usize| {
         let [light, a, b, change, _] = features[at];
-        light < MOST_LIGHT && a.hypot(b) < MOST_CHROMA && change < MOST_CHANGE
+        light < MAX_LIGHT && a.hypot(b) < MAX_CHROMA && change < MAX_CHANGE
     };
     let below = height * 2 / 3 * width..width * height;
     let below = below.filter(|&at| dark(at)).map(|at| contrast[at]);
@@ -69,7 +69,7 @@ pub(super) fn find_turntable(
         .iter()
         .enumerate()
         .max_by_key(|&(at, count)| (count, std::cmp::Reverse(at)));
-    let least = (width * height) as f64 * LEAST;
+    let least = (width * height) as f64 * MIN_PART;
     let lowest = lowest
         .map(|(at, _)| at)
         .filter(|&at| components.list[at].area as f64 >= least)

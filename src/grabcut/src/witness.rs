@@ -14,7 +14,7 @@ const ORDER: usize = 2;
 /// Their cosines and sines.
 const WAVES: usize = 2 * ORDER;
 /// With fewer frames a curve has no residual.
-const LEAST_FRAMES: usize = 2 * (WAVES + 1);
+const MIN_FRAMES: usize = 2 * (WAVES + 1);
 /// Added to a luminance, 0..=1, of which the logarithm is taken: noise counts little below.
 const DARK: f32 = 0.01;
 /// Residual variance by noise.
@@ -45,7 +45,7 @@ pub(super) struct Curves {
 impl Curves {
     /// Of `frames` frames, spread evenly over the turn, of `pixels` pixels.
     pub(super) fn new(frames: usize, pixels: usize) -> Self {
-        let pixels = if frames < LEAST_FRAMES { 0 } else { pixels };
+        let pixels = if frames < MIN_FRAMES { 0 } else { pixels };
         Self {
             frames,
             sum: vec![[0.0; WAVES + 2]; pixels],

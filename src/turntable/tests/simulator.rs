@@ -18,7 +18,7 @@ use relit_turntable::simulator::{
 use serialport::TTYPort;
 
 /// The longest that anything takes on the table's clock.
-const LONGEST: Duration = Duration::from_secs(120);
+const MAX_WAIT: Duration = Duration::from_secs(120);
 
 /// A simulated table on virtual time and a host at its port.
 struct Bench {
@@ -59,7 +59,7 @@ impl Bench {
 
     /// Listens until the table says this, and gives what it said up to there.
     fn until(&mut self, text: &str) -> String {
-        let end_us = self.clock.after(LONGEST);
+        let end_us = self.clock.after(MAX_WAIT);
         while self.clock.now_us() < end_us {
             if let Some(at) = self.heard.find(text) {
                 let rest = self.heard.split_off(at + text.len());
@@ -87,7 +87,7 @@ impl Bench {
 
     /// Asks for status reports until one begins like this.
     fn wait(&mut self, state: &str) -> String {
-        let end_us = self.clock.after(LONGEST);
+        let end_us = self.clock.after(MAX_WAIT);
         while self.clock.now_us() < end_us {
             self.say("?");
             let report = self.until(">\r\n");

@@ -19,7 +19,7 @@ use super::{DecodeFault, VideoError, open_input};
 use relit_data::geometry::Rect;
 
 /// Packets that are read in search of one frame: more than lie between two key frames.
-const MOST_PACKETS: usize = 600;
+const MAX_PACKETS: usize = 600;
 
 /// The first picture of a video that can be decoded. Unlike [`Video::open`] it reads no further, so
 /// that the time it takes does not grow with the file.
@@ -170,7 +170,7 @@ fn search(
     judge: impl Fn(&frame::Video) -> Found,
 ) -> Option<frame::Video> {
     let (mut begun, mut ended) = (false, false);
-    for _ in 0..MOST_PACKETS {
+    for _ in 0..MAX_PACKETS {
         // A packet that is read into again would keep the memory of what it held.
         let mut packet = Packet::empty();
         match packet.read(input) {

@@ -28,7 +28,7 @@ pub const GRACE: Duration = Duration::from_secs(1);
 /// Threads of a page's server that carry requests; work has its own.
 const PAGE_THREADS: usize = 2;
 /// Header lines of a request.
-const MOST_HEADERS: usize = 64;
+const MAX_HEADERS: usize = 64;
 /// Bytes of a request's head, and of an answer that wait to be sent beyond the piece at hand.
 const BUFFER: usize = 64 * 1024;
 /// Pause after the system refused a connection, mostly for want of file descriptors.
@@ -209,7 +209,7 @@ async fn converse(socket: TcpStream, router: Router, limits: ConnectionLimits, s
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(limits.head)
-        .max_headers(MOST_HEADERS)
+        .max_headers(MAX_HEADERS)
         .max_buf_size(BUFFER)
         .serve_connection(
             TokioIo::new(Box::pin(stream)),

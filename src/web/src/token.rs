@@ -17,7 +17,7 @@ const LENGTHS: std::ops::RangeInclusive<usize> = 16..=128;
 pub struct Token(String);
 
 /// Longest file that can hold a token, bytes.
-const LONGEST_FILE: u64 = 256;
+const MAX_FILE_LENGTH: u64 = 256;
 /// Permissions that a token's file must not give: to others any, to its group writing.
 const FORBIDDEN: u32 = 0o027;
 /// What is wrong with a text that is no token.
@@ -52,7 +52,7 @@ impl Token {
             )));
         }
         let mut text = String::new();
-        file.take(LONGEST_FILE)
+        file.take(MAX_FILE_LENGTH)
             .read_to_string(&mut text)
             .map_err(failed)?;
         // Editors of Windows begin a file with a byte order mark.

@@ -12,12 +12,12 @@ use libfuzzer_sys::fuzz_target;
 use relit_test_support::firmware::Table;
 
 /// More would only take longer.
-const LONGEST: usize = 1024;
+const MAX_LENGTH: usize = 1024;
 
 fuzz_target!(|bytes: &[u8]| {
     let mut table = Table::new();
     let mut accepted = false;
-    for piece in bytes.chunks(16).take(LONGEST / 16) {
+    for piece in bytes.chunks(16).take(MAX_LENGTH / 16) {
         let before = table.board.turned;
         let heard = table.say(piece);
         accepted |= heard.iter().any(|line| line.starts_with("ok"));

@@ -13,7 +13,7 @@ use relit_video::{Truncation, find_truncation};
 /// The id of the element that a Matroska file begins with.
 const EBML: [u8; 4] = [0x1A, 0x45, 0xDF, 0xA3];
 /// Longest header of an element.
-const LONGEST_HEADER: usize = 12;
+const MAX_HEADER_LENGTH: usize = 12;
 
 fuzz_target!(|bytes: &[u8]| match search(bytes) {
     Some(cut) => {
@@ -22,7 +22,7 @@ fuzz_target!(|bytes: &[u8]| match search(bytes) {
             assert!(holder.element_at < cut.element_at && holder.missing.is_some());
         }
     }
-    None if bytes.len() > LONGEST_HEADER && starts_as_matroska(bytes) => {
+    None if bytes.len() > MAX_HEADER_LENGTH && starts_as_matroska(bytes) => {
         let cut = search(&bytes[..bytes.len() - 1]).expect("a byte is missing");
         assert!(cut.missing.is_none_or(|missing| missing == 1));
     }

@@ -7,12 +7,12 @@ use libfuzzer_sys::fuzz_target;
 use relight_photo::nets::{ExternalPart, OnnxSignature, with_external_weights};
 
 /// Longest part of another file that is made up, bytes.
-const LONGEST: u64 = 1 << 16;
+const MAX_LENGTH: u64 = 1 << 16;
 
 fuzz_target!(|bytes: &[u8]| {
     let _ = OnnxSignature::read(bytes);
     let made_up = |part: &ExternalPart| match part.length {
-        0..=LONGEST => Ok(vec![1; part.length as usize]),
+        0..=MAX_LENGTH => Ok(vec![1; part.length as usize]),
         _ => Err(String::new()),
     };
     if let Ok(Some(whole)) = with_external_weights(bytes, made_up) {

@@ -20,7 +20,7 @@ use super::page_scene::ObjectFiles;
 /// The description's entry.
 const SCENE: &str = "scene.toml";
 /// The most that an archive unpacks to, bytes.
-const MOST_BYTES: u64 = 256_000_000;
+const MAX_BYTES: u64 = 256_000_000;
 const TOO_LARGE: &str = "the archive is too large: it holds more than 256 MB";
 
 /// The files of a scene by their names in an archive.
@@ -118,7 +118,7 @@ impl SceneFiles {
             }
             let content = entry(&mut archive, &name)?;
             all += content.len() as u64;
-            if all > MOST_BYTES {
+            if all > MAX_BYTES {
                 return refused(TOO_LARGE);
             }
             files.entries.insert(name, content);
@@ -145,10 +145,10 @@ fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>,
     };
     let mut content = Vec::new();
     found
-        .take(MOST_BYTES + 1)
+        .take(MAX_BYTES + 1)
         .read_to_end(&mut content)
         .map_err(|fault| damaged(&fault))?;
-    if content.len() as u64 > MOST_BYTES {
+    if content.len() as u64 > MAX_BYTES {
         refused(TOO_LARGE)
     } else {
         Ok(content)

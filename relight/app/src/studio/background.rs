@@ -14,7 +14,7 @@ use super::request::BackgroundRequest;
 use crate::scenery::Scenery;
 
 /// The most columns of a panorama.
-const MOST_COLUMNS: usize = 1024;
+const MAX_COLUMNS: usize = 1024;
 /// The size of a panorama's little picture.
 const THUMBNAIL: Extent = Extent::new(96, 48);
 /// The mean brightness in which it is shown.
@@ -127,7 +127,7 @@ impl StudioBackground {
         let is_float = opened.image.stored().samples == Samples::Float;
         let own_file = opened.bytes;
         let mut panorama = Panorama::new(opened.image.into_light())?;
-        let columns = width.min(MOST_COLUMNS) / 2 * 2;
+        let columns = width.min(MAX_COLUMNS) / 2 * 2;
         let wanted = Extent::new(columns, columns / 2);
         let is_of_size = wanted == Extent::new(width, height);
         if !is_of_size {

@@ -39,7 +39,7 @@ use page_scene::{ObjectFiles, PageScene};
 use request::{FileFormat, Request};
 
 /// The most objects of a scene.
-const MOST_OBJECTS: usize = 12;
+const MAX_OBJECTS: usize = 12;
 /// The size of a panorama's picture where nothing is said.
 const PANORAMA_PICTURE: [u32; 2] = [1280, 960];
 
@@ -160,7 +160,7 @@ impl Studio {
 
     fn opened(&mut self, number: u32, object: StudioObject) -> Result<Answer, Refusal> {
         let others = self.objects.0.keys().filter(|&&key| key != number).count();
-        if others >= MOST_OBJECTS {
+        if others >= MAX_OBJECTS {
             return refused(format!(
                 "there are {others} objects already, and a scene has at most that many: remove one first"
             ));
@@ -279,8 +279,8 @@ impl Studio {
 
     fn import(&mut self, archive: &[u8]) -> Result<Answer, Refusal> {
         let (described, files) = SceneFiles::unpacked(archive)?;
-        if described.objects.len() > MOST_OBJECTS {
-            return refused(format!("a scene has at most {MOST_OBJECTS} objects"));
+        if described.objects.len() > MAX_OBJECTS {
+            return refused(format!("a scene has at most {MAX_OBJECTS} objects"));
         }
         let background_name = described.background.to_string_lossy();
         let content = files.content(&described.background)?.clone();

@@ -17,9 +17,9 @@ use super::error::{Refusal, refused};
 use super::pixels::{levels, on_screen, opaque, shown, stored, without_alpha};
 
 /// Larger photographs are made smaller: the page keeps several, on a phone.
-pub(super) const MOST_PIXELS: usize = 2_000_000;
+pub(super) const MAX_PIXELS: usize = 2_000_000;
 /// Photographs that would take too much memory while they are decoded.
-const MOST_READ: usize = 100_000_000;
+const MAX_READ: usize = 100_000_000;
 /// How errors name the mask of a photograph.
 const MASK: &str = "mask.png";
 /// The height of an object of which the scene is shown while it is worked on, pixels.
@@ -310,18 +310,18 @@ impl OpenedFile {
             extent.is_some_and(|Extent { width, height }| width.saturating_mul(height) <= most)
         };
         if let Some(Extent { width, height }) = extent
-            && !has_at_most(MOST_READ)
+            && !has_at_most(MAX_READ)
         {
             return refused(format!(
                 "{name} has {width} x {height} pixels: at most {} million are read",
-                MOST_READ / 1_000_000
+                MAX_READ / 1_000_000
             ));
         }
         // What says that it is small is not decoded to see whether it is.
-        let smaller = if has_at_most(MOST_PIXELS) {
+        let smaller = if has_at_most(MAX_PIXELS) {
             None
         } else {
-            ReducedFile::of(path, &bytes, MOST_PIXELS, transfer)?
+            ReducedFile::of(path, &bytes, MAX_PIXELS, transfer)?
         };
         let reduced = smaller.is_some();
         let (name, bytes, transfer) = match smaller {

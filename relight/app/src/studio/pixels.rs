@@ -54,14 +54,14 @@ struct SrgbTable {
 
 impl SrgbTable {
     /// Below, sRGB in 8 bits is 0.
-    const LEAST: f32 = 1.0 / 8192.0;
+    const MIN_VALUE: f32 = 1.0 / 8192.0;
     /// The bits of a number that the table does not look at.
     const REST: u32 = 23 - 9;
 
     fn get() -> &'static Self {
         static TABLE: OnceLock<SrgbTable> = OnceLock::new();
         TABLE.get_or_init(|| {
-            let first = Self::LEAST.to_bits() >> Self::REST;
+            let first = Self::MIN_VALUE.to_bits() >> Self::REST;
             let last = 1.0_f32.to_bits() >> Self::REST;
             let middle = 1 << (Self::REST - 1);
             let of = |step: u32| {
@@ -80,8 +80,8 @@ impl SrgbTable {
             return OPAQUE;
         }
         // What is no number is black.
-        if value >= Self::LEAST {
-            let step = (value.to_bits() >> Self::REST) - (Self::LEAST.to_bits() >> Self::REST);
+        if value >= Self::MIN_VALUE {
+            let step = (value.to_bits() >> Self::REST) - (Self::MIN_VALUE.to_bits() >> Self::REST);
             return self.bytes[step as usize];
         }
         0

@@ -19,7 +19,7 @@ use crate::photos::{NetworkArguments, PhotoArguments, name_lost, outcome};
 use crate::values::{NORMALS_Y, one_of};
 
 /// Each photograph takes its memory, gigabytes where it is large.
-const MOST_SIDE_BY_SIDE: usize = 4;
+const MAX_SIDE_BY_SIDE: usize = 4;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -145,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     };
     let side_by_side = arguments
         .threads
-        .unwrap_or_else(|| rayon::current_num_threads().min(MOST_SIDE_BY_SIDE));
+        .unwrap_or_else(|| rayon::current_num_threads().min(MAX_SIDE_BY_SIDE));
     let whole = parallel::jobs(inputs, side_by_side, decompose);
     let lost = whole.iter().filter(|is_whole| !**is_whole).count();
     bar.finish_and_clear();

@@ -12,9 +12,9 @@ pub const CAPTURED_OBJECT_SCHEMA: &str = "relight.asset/1";
 /// The entry that describes the others.
 pub(super) const MANIFEST: &str = "asset.json";
 /// The longest side of an object, pixels.
-const MOST_SIDE: usize = 8192;
+const MAX_SIDE: usize = 8192;
 /// The most pixels of an object.
-const MOST_PIXELS: usize = 1 << 24;
+const MAX_PIXELS: usize = 1 << 24;
 
 /// `asset.json`.
 #[derive(Debug, Serialize, Deserialize)]
@@ -31,11 +31,11 @@ pub(super) struct Manifest {
 /// Refuses sizes that no file has.
 pub(super) fn check_size(extent: Extent) -> Result<(), CapturedObjectError> {
     let Extent { width, height } = extent;
-    let sides = 1..=MOST_SIDE;
-    if sides.contains(&width) && sides.contains(&height) && width * height <= MOST_PIXELS {
+    let sides = 1..=MAX_SIDE;
+    if sides.contains(&width) && sides.contains(&height) && width * height <= MAX_PIXELS {
         return Ok(());
     }
     Err(CapturedObjectError::Content(format!(
-        "{width} x {height} pixels are not from 1 x 1 to {MOST_SIDE} a side and {MOST_PIXELS} in all"
+        "{width} x {height} pixels are not from 1 x 1 to {MAX_SIDE} a side and {MAX_PIXELS} in all"
     )))
 }

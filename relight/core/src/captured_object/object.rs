@@ -33,7 +33,7 @@ pub struct CapturedObject {
 
 impl CapturedObject {
     /// The largest file that is read, bytes.
-    pub const MOST_BYTES: u64 = 1 << 29;
+    pub const MAX_BYTES: u64 = 1 << 29;
 
     /// An object of these maps. Coverage and confidence are brought to 0 to 1, what is not a number to 0.
     ///

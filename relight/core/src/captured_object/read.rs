@@ -13,7 +13,7 @@ use crate::light::{Normals, YUp};
 use crate::render::{Gloss, Surface};
 
 /// The longest `asset.json`, bytes.
-const MOST_MANIFEST: u64 = 1 << 16;
+const MAX_MANIFEST: u64 = 1 << 16;
 /// The most bytes that decoding a map may take beside the map itself.
 const DECODER: u64 = 1 << 20;
 /// Bytes of a map, at most, for each pixel: an incompressible image of four channels of 16 bits.
@@ -29,10 +29,10 @@ impl CapturedObject {
     /// Where it is no captured object that this program knows.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, CapturedObjectError> {
         let length = bytes.len() as u64;
-        if length > Self::MOST_BYTES {
+        if length > Self::MAX_BYTES {
             return Err(CapturedObjectError::Content(format!(
                 "it has {length} bytes, and at most {} are read",
-                Self::MOST_BYTES
+                Self::MAX_BYTES
             )));
         }
         let mut archive = ZipArchive::new(Cursor::new(bytes))?;
@@ -52,7 +52,7 @@ impl CapturedObject {
 }
 
 fn manifest(archive: &mut Archive<'_>) -> Result<Manifest, CapturedObjectError> {
-    let json = entry(archive, MANIFEST, MOST_MANIFEST)?;
+    let json = entry(archive, MANIFEST, MAX_MANIFEST)?;
     let schema: Schema =
         serde_json::from_slice(&json).map_err(CapturedObjectError::entry(MANIFEST))?;
     if schema.schema != CAPTURED_OBJECT_SCHEMA {

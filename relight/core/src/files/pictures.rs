@@ -197,7 +197,7 @@ impl CapturedObject {
     pub fn read(path: &Path) -> Result<Self, CapturedObjectError> {
         let read = CapturedObjectError::file(path, "cannot be read");
         let mut content = Vec::new();
-        let mut file = File::open(path).map_err(&read)?.take(Self::MOST_BYTES + 1);
+        let mut file = File::open(path).map_err(&read)?.take(Self::MAX_BYTES + 1);
         file.read_to_end(&mut content).map_err(&read)?;
         let is_none = CapturedObjectError::file(path, "is no object that relight can light");
         Self::from_bytes(&content).map_err(is_none)

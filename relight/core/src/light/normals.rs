@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 use crate::image::{Extent, ImageError, Planes, check_extent};
 
 /// Vectors shorter than this stand for no surface: a map's background, however it was encoded.
-const SHORTEST: f32 = 0.1;
+const MIN_LENGTH: f32 = 0.1;
 
 /// Which way y points in a normal map. [`YUp`] or [`YDown`].
 pub trait YAxis: Copy + Debug + Send + Sync + 'static {
@@ -66,7 +66,7 @@ impl<Y: YAxis> Normals<Y> {
         let [x, y, z] = planes.planes_mut();
         for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
             let length = (*x * *x + *y * *y + *z * *z).sqrt();
-            let is_surface = length >= SHORTEST && length.is_finite();
+            let is_surface = length >= MIN_LENGTH && length.is_finite();
             [*x, *y, *z] = [*x, *y, *z].map(|v| if is_surface { v / length } else { 0.0 });
         }
         Self {

@@ -12,7 +12,7 @@ pub struct Gloss {
 }
 
 /// The least smoothness: lower values are raised to it.
-const LEAST_SMOOTHNESS: f32 = 0.01;
+const MIN_SMOOTHNESS: f32 = 0.01;
 
 impl Gloss {
     /// The gloss of these maps.
@@ -27,7 +27,7 @@ impl Gloss {
         )?;
         Ok(Self {
             reflectance,
-            smoothness: smoothness.map(|alpha| alpha.max(LEAST_SMOOTHNESS)),
+            smoothness: smoothness.map(|alpha| alpha.max(MIN_SMOOTHNESS)),
         })
     }
 
@@ -36,7 +36,7 @@ impl Gloss {
     pub fn even(extent: Extent, reflectance: [f32; 3], smoothness: f32) -> Self {
         Self {
             reflectance: Planes::filled(extent, reflectance),
-            smoothness: Planes::filled(extent, [smoothness.max(LEAST_SMOOTHNESS)]),
+            smoothness: Planes::filled(extent, [smoothness.max(MIN_SMOOTHNESS)]),
         }
     }
 

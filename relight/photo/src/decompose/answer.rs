@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::crop::{enlarged, inside, reduced};
-use super::encoding::{AnsweredMaps, EncodedPicture, LEAST_FACING};
+use super::encoding::{AnsweredMaps, EncodedPicture, MIN_FACING};
 use super::light::PredictedLight;
 use crate::nets::{Inference, NetError};
 use relight_core::image::{Extent, ImageError, Part, Planes};
@@ -150,7 +150,7 @@ pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<AnsweredMaps,
         for (channel, values) in row.into_iter().enumerate() {
             let change: fn(f32) -> f32 = match channel {
                 // Two scales together can turn a normal away: what is seen faces the viewer.
-                2 => |z| z.max(LEAST_FACING),
+                2 => |z| z.max(MIN_FACING),
                 3..7 => f32::exp,
                 7 => |value| value.max(0.0),
                 8 => |value| value.clamp(0.0, 1.0),

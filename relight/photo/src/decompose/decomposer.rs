@@ -22,7 +22,7 @@ use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
 use relit_data::mask::size_hint;
 
 /// Most pixels of a photograph: 16 million take 1.3 GB of memory, so these more than 5 GB.
-pub const MOST_PIXELS: usize = 64_000_000;
+pub const MAX_PIXELS: usize = 64_000_000;
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;
 /// By how much normals are tilted further before light is fitted to them: the network's are a little flatter than the true ones.
@@ -221,7 +221,7 @@ impl Decomposer {
     /// of the picture that are negative or no numbers count as black.
     ///
     /// # Errors
-    /// Where the mask has another size or is empty, the picture is black under it or has more than [`MOST_PIXELS`], or the
+    /// Where the mask has another size or is empty, the picture is black under it or has more than [`MAX_PIXELS`], or the
     /// network fails.
     pub fn decompose(
         &self,
@@ -369,9 +369,9 @@ impl CutObject {
 
 /// Whether there is memory for the layers of so many pixels.
 pub(super) fn check_size(extent: Extent) -> Result<(), DecomposeError> {
-    if extent.width.saturating_mul(extent.height) > MOST_PIXELS {
+    if extent.width.saturating_mul(extent.height) > MAX_PIXELS {
         return Err(DecomposeError::Photo(format!(
-            "the photograph has {} x {} pixels, and at most {MOST_PIXELS} are decomposed: make the photograph smaller",
+            "the photograph has {} x {} pixels, and at most {MAX_PIXELS} are decomposed: make the photograph smaller",
             extent.width, extent.height
         )));
     }

@@ -9,13 +9,13 @@ use relight_core::statistics::above_part;
 /// Part of the pixels that are darker than the encoded picture's white.
 const WHITE_PERCENTILE: f64 = 0.99;
 /// Encoded light is cut off here, in whites.
-pub const MOST_LIGHT: f32 = 1.5;
+pub const MAX_LIGHT: f32 = 1.5;
 /// Keeps the logarithm of black finite.
 pub const LOG_FLOOR: f32 = 0.01;
 /// Range of the answered logarithm of shading.
 pub const LOG_SHADING: (f32, f32) = (-6.0, 3.0);
 /// Least part of a normal along the line of sight, before its length is made 1.
-pub const LEAST_FACING: f32 = 0.02;
+pub const MIN_FACING: f32 = 0.02;
 /// By how much an answer of 0 stands for a small highlight.
 pub const HIGHLIGHT_OFFSET: f32 = 3.5;
 
@@ -57,7 +57,7 @@ impl EncodedPicture {
         let pixels = inside.len();
         let mut values = vec![0.0; INPUTS * pixels];
         for at in (0..pixels).filter(|&at| inside[at]) {
-            let light = [red[at], green[at], blue[at]].map(|v| (v / white).clamp(0.0, MOST_LIGHT));
+            let light = [red[at], green[at], blue[at]].map(|v| (v / white).clamp(0.0, MAX_LIGHT));
             let encoded = encode_pixel(light.map(|v| if v.is_nan() { 0.0 } else { v }));
             for (channel, value) in encoded.into_iter().enumerate() {
                 values[channel * pixels + at] = value;
@@ -153,7 +153,7 @@ fn white(picture: &Planes<3>, inside: &[bool]) -> f32 {
 }
 
 fn normal([x, y, z]: [f32; 3]) -> [f32; 3] {
-    let z = softplus(z) + LEAST_FACING;
+    let z = softplus(z) + MIN_FACING;
     let length = (x * x + y * y + z * z).sqrt();
     [x, y, z].map(|v| v / length)
 }

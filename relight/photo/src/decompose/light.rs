@@ -12,7 +12,7 @@ const STIFFNESS: f64 = 1e-3;
 const STIFFNESS_TO_PREDICTION: f64 = 1e-2;
 /// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
 /// a light that is negative in most directions.
-const MOST_ONE_SIDED: f64 = 2.5;
+const MAX_ONE_SIDED: f64 = 2.5;
 /// How often the light is fitted with four times the stiffness, at most.
 const STIFFER_FITS: usize = 8;
 /// The coefficients that change sign in the mirror image, left and right: those that are odd in x.
@@ -97,7 +97,7 @@ pub(super) fn light_of_shading(
 /// Whether band 1 is longer than that of any light; it is grey, so that one channel says it.
 fn is_too_one_sided(light: &ShLight) -> bool {
     let [mean, a, b, c] = [0, 1, 2, 3].map(|at: usize| light.coefficients()[at][1]);
-    (a * a + b * b + c * c).sqrt() > MOST_ONE_SIDED * mean
+    (a * a + b * b + c * c).sqrt() > MAX_ONE_SIDED * mean
 }
 
 #[cfg(test)]

@@ -31,11 +31,11 @@ pub use crop::CropSquare;
 #[cfg(feature = "files")]
 pub(crate) use decomposer::in_colour;
 pub use decomposer::{
-    DecomposeOptions, Decomposer, Decomposition, MOST_PIXELS, SpecularGate, WORKING_SIDE,
+    DecomposeOptions, Decomposer, Decomposition, MAX_PIXELS, SpecularGate, WORKING_SIDE,
 };
 pub use encoding::{AnsweredMaps, EncodedPicture};
 pub use encoding::{
-    HIGHLIGHT_OFFSET, LEAST_FACING, LOG_FLOOR, LOG_LUMINANCE, LOG_SHADING, MASK, MOST_LIGHT,
+    HIGHLIGHT_OFFSET, LOG_FLOOR, LOG_LUMINANCE, LOG_SHADING, MASK, MAX_LIGHT, MIN_FACING,
 };
 pub use error::DecomposeError;
 pub use gloss::FittedGloss;

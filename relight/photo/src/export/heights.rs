@@ -8,7 +8,7 @@ use relight_core::light::{Normals, YUp};
 use crate::insert::HeightSolver;
 
 /// Normals that face the viewer less than this count as if they did so much: the rim is as steep as can be seen.
-const LEAST_FACING: f32 = 0.12;
+const MIN_FACING: f32 = 0.12;
 /// Rounds of the solver for each pixel of the longer side: what is left of the residual is e^-17.
 const ROUNDS: usize = 4;
 
@@ -23,7 +23,7 @@ pub(super) fn integrated(normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
     assert_eq!(inside.len(), extent.pixels());
     let longest = extent.width.max(extent.height);
     let solver = HeightSolver {
-        least_facing: LEAST_FACING,
+        least_facing: MIN_FACING,
         // The best for waves as long as the grid, whose ends are free.
         relaxation: 2.0 / (1.0 + PI / (SQRT_2 * longest as f32)),
         rounds: ROUNDS * longest,

@@ -16,7 +16,7 @@ use super::ExportError;
 use super::heights::integrated;
 
 /// The longest side at which heights are found, pixels: larger maps have them enlarged.
-const LONGEST: usize = 512;
+const MAX_SIDE: usize = 512;
 
 /// The content of the file.
 ///
@@ -85,10 +85,10 @@ fn encode(
 fn heights(object: &CapturedObject) -> Vec<f32> {
     let extent = object.extent();
     let longest = extent.width.max(extent.height);
-    let grid = if longest > LONGEST {
+    let grid = if longest > MAX_SIDE {
         relight_core::image::Extent::new(
-            (extent.width * LONGEST / longest).max(1),
-            (extent.height * LONGEST / longest).max(1),
+            (extent.width * MAX_SIDE / longest).max(1),
+            (extent.height * MAX_SIDE / longest).max(1),
         )
     } else {
         extent

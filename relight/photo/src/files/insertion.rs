@@ -17,7 +17,7 @@ use crate::insert::{
 };
 
 /// The most frames of a video in which a panorama turns.
-const MOST_FRAMES: f64 = 100_000.0;
+const MAX_FRAMES: f64 = 100_000.0;
 
 /// What an object is made of.
 #[derive(Debug)]
@@ -238,7 +238,7 @@ impl<'a> Insertion<'a> {
 impl InsertionOutput<'_> {
     fn turn_frames(&self) -> u32 {
         let frames = (self.seconds * f64::from(self.frames_per_second)).round();
-        frames.clamp(1.0, MOST_FRAMES) as u32
+        frames.clamp(1.0, MAX_FRAMES) as u32
     }
 }
 

@@ -18,7 +18,7 @@ const TURNS: RangeInclusive<f64> = -3600.0..=3600.0;
 /// What a channel is multiplied with.
 const TINTS: RangeInclusive<f64> = 0.0..=1000.0;
 /// The most objects of a scene.
-pub(super) const MOST_OBJECTS: usize = 100;
+pub(super) const MAX_OBJECTS: usize = 100;
 
 /// A picture that objects are put into, and all about them.
 ///
@@ -189,7 +189,7 @@ impl SceneDescription {
             object.check(number + 1)?;
         }
         match self.objects.len() {
-            1..=MOST_OBJECTS => Ok(()),
+            1..=MAX_OBJECTS => Ok(()),
             count => Err(InsertError::Objects(count)),
         }
     }

@@ -1,6 +1,6 @@
 //! Why an object cannot be relit or inserted.
 
-use super::description::MOST_OBJECTS;
+use super::description::MAX_OBJECTS;
 use crate::decompose::DecomposeError;
 use relight_core::captured_object::CapturedObjectError;
 use relight_core::image::ImageError;
@@ -36,7 +36,7 @@ pub enum InsertError {
     #[error("{0}")]
     Input(String),
     /// A scene has a number of objects that cannot be.
-    #[error("there are {0} objects: give [[object]] 1 to {MOST_OBJECTS} times")]
+    #[error("there are {0} objects: give [[object]] 1 to {MAX_OBJECTS} times")]
     Objects(usize),
     /// A captured object cannot be read.
     #[error(transparent)]

@@ -23,9 +23,9 @@ const FINE: f32 = 0.75;
 /// Deviations below this are those of rounding to 8 bits: nothing is to be told of how fine they are.
 const ROUNDING: f32 = 2e-3;
 /// The part of the squares that have to show nothing but grain, so that it is known.
-const LEAST_PART: f64 = 0.02;
+const MIN_PART: f64 = 0.02;
 /// The most grain that a camera makes.
-const MOST_GRAIN: f32 = 0.06;
+const MAX_GRAIN: f32 = 0.06;
 
 /// What a background asks of the objects that are put into it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,12 +111,12 @@ pub(super) fn grain(picture: &Planes<3>, alpha: Option<&Planes<1>>) -> f32 {
             }
         }
     }
-    if (deviations.len() as f64) < LEAST_PART * squares as f64 {
+    if (deviations.len() as f64) < MIN_PART * squares as f64 {
         return 0.0;
     }
     above_part(deviations, SMOOTHEST_PART)
         .unwrap_or(0.0)
-        .min(MOST_GRAIN)
+        .min(MAX_GRAIN)
 }
 
 /// The deviation in a square of so many pixels a side, of which the first has this column and row; the pixels about it are read too.

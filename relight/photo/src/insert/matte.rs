@@ -6,10 +6,10 @@ use relight_core::image::{Extent, Planes};
 /// How far a matte may lie from the mask where colours say otherwise: on the mask's edge, and at the band's ends.
 const GEOMETRY_DEVIATIONS: (f32, f32) = (0.25, 0.12);
 /// The deviation of colours that counts where they do not vary at all, as a part of them.
-const LEAST_DEVIATION: f32 = 0.08;
+const MIN_DEVIATION: f32 = 0.08;
 /// The most by which it may, whatever the colours say: a mask is rarely wrong by more than its edge is soft, and a bite out of the
 /// object is seen at once.
-const MOST_FROM_MASK: f32 = 0.4;
+const MAX_FROM_MASK: f32 = 0.4;
 /// The weight of what lies near the edge, where nothing from further inside or outside is near.
 const EDGE_WEIGHT: f32 = 1e-3;
 /// The part of the variance nearby that colours have about that of the nearest place.
@@ -235,7 +235,7 @@ fn mixed(
 /// The least variance that colours of these sides have.
 fn least(object: [f32; 3], around: [f32; 3]) -> f32 {
     let sum: f32 = (0..3).map(|c| object[c].abs() + around[c].abs()).sum();
-    let deviation = LEAST_DEVIATION * (sum / 6.0 + LEAST_DEVIATION);
+    let deviation = MIN_DEVIATION * (sum / 6.0 + MIN_DEVIATION);
     deviation * deviation
 }
 
@@ -262,8 +262,8 @@ impl Mixture {
             .sum();
         let length: f32 = difference.iter().map(|d| d * d).sum();
         let prior = 1.0 / self.prior_variance();
-        let least = (self.geometry - MOST_FROM_MASK).max(0.0);
-        let most = (self.geometry + MOST_FROM_MASK).min(1.0);
+        let least = (self.geometry - MAX_FROM_MASK).max(0.0);
+        let most = (self.geometry + MAX_FROM_MASK).min(1.0);
         let next = |alpha: f32| {
             let variance = self.variance(alpha);
             let sum = along / variance + self.geometry * prior;

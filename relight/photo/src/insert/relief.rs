@@ -4,15 +4,15 @@ use relight_core::image::{Extent, Planes, beside};
 use relight_core::light::{Normals, YUp};
 
 /// The longest side of the grid on which heights are found, cells.
-const LONGEST: usize = 72;
+const MAX_SIDE: usize = 72;
 /// Normals that face the viewer less than this count as if they did so much: the rim is as steep as can be seen.
-const LEAST_FACING: f32 = 0.2;
+const MIN_FACING: f32 = 0.2;
 /// Rounds of successive over-relaxation. A round reaches all cells; so many join the ends of a grid.
 const ROUNDS: usize = 300;
 /// Its factor, for grids of this size.
 const RELAXATION: f32 = 1.9;
 /// Half the thickness that the flattest object has, cells.
-const LEAST_THICKNESS: f32 = 0.75;
+const MIN_THICKNESS: f32 = 0.75;
 /// The side of a block of cells, as a power of two.
 const BLOCK_BITS: u32 = 3;
 /// The side of a block, cells.
@@ -42,7 +42,7 @@ impl Relief {
     pub(super) fn new(normals: &Normals<YUp>, alpha: &Planes<1>) -> Option<Self> {
         let picture = normals.extent();
         let longest = picture.width.max(picture.height);
-        let scale = (LONGEST as f64 / longest as f64).min(1.0);
+        let scale = (MAX_SIDE as f64 / longest as f64).min(1.0);
         let side = |pixels: usize| ((pixels as f64 * scale).round() as usize).max(1);
         let extent = Extent::new(side(picture.width), side(picture.height));
         let inside: Vec<bool> = alpha
@@ -56,7 +56,7 @@ impl Relief {
         }
         let vectors = Normals::<YUp>::new(normals.planes().resized(extent)).completed(&inside);
         let solver = HeightSolver {
-            least_facing: LEAST_FACING,
+            least_facing: MIN_FACING,
             relaxation: RELAXATION,
             rounds: ROUNDS,
         };
@@ -64,7 +64,7 @@ impl Relief {
         let rim = rim_height(&heights, &inside, extent);
         let half = heights.iter().zip(&inside).map(|(&height, &inside)| {
             if inside {
-                (height - rim).max(LEAST_THICKNESS)
+                (height - rim).max(MIN_THICKNESS)
             } else {
                 0.0
             }
@@ -211,11 +211,11 @@ mod tests {
             [f32::from(u8::from(normals.planes().pixel(x, y)[2] > 0.0))]
         });
         let relief = Relief::new(&normals, &alpha).unwrap();
-        assert_eq!(relief.extent, Extent::new(LONGEST, LONGEST));
-        let radius = LONGEST as f32 / 2.0;
-        let middle = relief.half[LONGEST / 2 * LONGEST + LONGEST / 2];
+        assert_eq!(relief.extent, Extent::new(MAX_SIDE, MAX_SIDE));
+        let radius = MAX_SIDE as f32 / 2.0;
+        let middle = relief.half[MAX_SIDE / 2 * MAX_SIDE + MAX_SIDE / 2];
         assert!((middle / radius - 0.85).abs() < 0.15, "{middle}");
-        let beside = relief.half[LONGEST / 2 * LONGEST + LONGEST / 2 + LONGEST / 4];
+        let beside = relief.half[MAX_SIDE / 2 * MAX_SIDE + MAX_SIDE / 2 + MAX_SIDE / 4];
         assert!(beside < middle && beside > 0.6 * middle, "{beside}");
         assert_eq!(relief.half[0], 0.0);
     }
@@ -225,7 +225,7 @@ mod tests {
         let extent = Extent::new(50, 80);
         let flat = Normals::<YUp>::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
         let relief = Relief::new(&flat, &Planes::filled(extent, [1.0])).unwrap();
-        assert!(relief.half.iter().all(|&half| half == LEAST_THICKNESS));
+        assert!(relief.half.iter().all(|&half| half == MIN_THICKNESS));
         assert!(Relief::new(&flat, &Planes::zeros(extent)).is_none());
     }
 }

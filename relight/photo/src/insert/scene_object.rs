@@ -6,7 +6,7 @@ use super::placement::rows;
 use super::{InsertError, MaterialChange, ObjectDescription, Placement, Subject};
 
 /// How much an object may be enlarged.
-const MOST_GROWTH: f64 = 64.0;
+const MAX_GROWTH: f64 = 64.0;
 
 /// An object of a scene.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +51,7 @@ impl<'a> SceneObject<'a> {
             )));
         }
         let growth = height * extent.height as f64 / rows(alpha).len().max(1) as f64;
-        if growth > MOST_GROWTH {
+        if growth > MAX_GROWTH {
             return Err(wrong(format!(
                 "would be enlarged {growth:.0} times: give a larger photograph or a smaller height"
             )));

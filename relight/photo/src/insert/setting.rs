@@ -19,13 +19,13 @@ use crate::decompose::Photo;
 /// photographs.
 const WHITE: f32 = 1.4;
 /// The size of a panorama from which shadows are drawn, at most.
-const MOST_AROUND: Extent = Extent::new(512, 256);
+const MAX_AROUND: Extent = Extent::new(512, 256);
 /// The longer side of the picture of a panorama by which it is exposed, pixels.
 const LOOK: usize = 160;
 /// Photographs are brought to this much more than the size in which they are shown.
 const RESERVE: f64 = 1.25;
 /// The shortest that the longest side of a photograph is made, pixels.
-const SHORTEST: usize = 32;
+const MIN_SIDE: usize = 32;
 /// Ground that is looked down on in a photograph, degrees.
 const TILT: f64 = 20.0;
 /// The least and the most of a panorama's, degrees.
@@ -151,7 +151,7 @@ impl SceneSetting {
         let Extent { width, height } = photo.picture.planes().extent();
         let own = rows(&photo.mask).len().max(1) as f64;
         let longest = (width.max(height) as f64 * wanted / own).ceil() as usize;
-        photo.at_most(longest.max(SHORTEST))
+        photo.at_most(longest.max(MIN_SIDE))
     }
 
     /// The objects in this setting, from back to front.
@@ -177,8 +177,8 @@ fn shown(view: &PanoramaView, panorama: &Panorama, turn: f64, scale: [f32; 3]) -
 
 /// A panorama no larger than shadows need it: it is turned and looked at again and again.
 fn for_shadows(panorama: Panorama) -> Panorama {
-    if panorama.extent().width > MOST_AROUND.width {
-        panorama.resized(MOST_AROUND)
+    if panorama.extent().width > MAX_AROUND.width {
+        panorama.resized(MAX_AROUND)
     } else {
         panorama
     }

@@ -32,11 +32,11 @@ const LOOKS: i32 = 4;
 const FIXED_BITS: u32 = 16;
 const FIXED: f32 = (1 << FIXED_BITS) as f32;
 /// The least part of the light that is missed where it is gone: less than a step of 8 bits.
-const LEAST_SEEN: f32 = 0.002;
+const MIN_SEEN: f32 = 0.002;
 /// The least part of a direction along an axis.
-const LEAST_LEAN: f32 = 1e-6;
+const MIN_LEAN: f32 = 1e-6;
 /// Ground that is seen more edge-on than this is as if it were seen so, radians.
-const LEAST_TILT: f64 = 0.08;
+const MIN_TILT: f64 = 0.08;
 
 /// The ground's shadow around an object, in parts of the light that arrives there without it.
 #[derive(Debug, Clone)]
@@ -143,7 +143,7 @@ impl Shadow {
         let Extent { width, height } = self.arriving.extent();
         let is_seen = |x: usize, y: usize| {
             let kept = self.arriving.pixel(x, y).map(|arriving| 1.0 - arriving);
-            kept.into_iter().any(|kept| kept > LEAST_SEEN)
+            kept.into_iter().any(|kept| kept > MIN_SEEN)
         };
         let mut seen = [width..0, height..0];
         for y in 0..height {
@@ -180,7 +180,7 @@ impl Shadow {
 impl Ground {
     /// The ground that the shape stands on.
     fn under(relief: &Relief, tilt: f64) -> Self {
-        let (sin, cos) = tilt.clamp(LEAST_TILT, PI / 2.0).sin_cos();
+        let (sin, cos) = tilt.clamp(MIN_TILT, PI / 2.0).sin_cos();
         let up = [0.0, cos, sin];
         let width = relief.extent.width;
         let mut lowest: Vec<f64> = (0..relief.half.len())
@@ -356,8 +356,8 @@ fn rays(ground: &Ground, around: [[f32; 3]; 2], light: &Panorama) -> Vec<Vec<Ray
         // A ray along a side of the box leans a little: nothing is divided by 0.
         let leaning = towards.map(|part| {
             let part = part as f32;
-            if part.abs() < LEAST_LEAN {
-                LEAST_LEAN
+            if part.abs() < MIN_LEAN {
+                MIN_LEAN
             } else {
                 part
             }
@@ -555,7 +555,7 @@ mod tests {
             .chain((0..width).flat_map(|x| [[x, 0], [x, height - 1]]));
         for [x, y] in border {
             let kept = 1.0 - shadow.arriving.pixel(x, y)[0];
-            assert!(kept <= LEAST_SEEN, "{x} {y} {kept}");
+            assert!(kept <= MIN_SEEN, "{x} {y} {kept}");
         }
         let pattern = Planes::from_fn(Extent::new(40, 40), |x, y| {
             [(x % PATTERN + PATTERN * (y % PATTERN)) as f32; 3]

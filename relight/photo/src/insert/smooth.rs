@@ -38,7 +38,7 @@ pub(super) fn weighted_mean<const C: usize>(
     let all = blurred(weights, radius);
     for plane in sums.planes_mut() {
         for (value, weight) in plane.iter_mut().zip(all.plane(0)) {
-            *value = if *weight > LEAST_WEIGHT {
+            *value = if *weight > MIN_WEIGHT {
                 *value / weight
             } else {
                 0.0
@@ -49,7 +49,7 @@ pub(super) fn weighted_mean<const C: usize>(
 }
 
 /// Weights below this are rounding.
-const LEAST_WEIGHT: f32 = 1e-9;
+const MIN_WEIGHT: f32 = 1e-9;
 
 fn means_of_line(line: &mut [f32], radius: usize) {
     let mut sums = Vec::with_capacity(line.len() + 1);

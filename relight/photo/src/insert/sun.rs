@@ -8,12 +8,12 @@ const LOOK: usize = 256;
 /// Values from which on all channels are clipped.
 const CLIPPED: f32 = 0.92;
 /// The least of it, pixels, and the most, as a part of the picture: larger bright places are sky, windows and walls.
-const LEAST: usize = 3;
-const MOST: f64 = 0.03;
+const MIN_PIXELS: usize = 3;
+const MAX_PART: f64 = 0.03;
 /// The part of the rectangle around it that it fills at least; a disc fills 0.79.
 const FILLED: f64 = 0.55;
 /// The lower part of a picture shows what mirrors the sun.
-const LOWEST: f64 = 0.6;
+const MAX_HEIGHT: f64 = 0.6;
 /// The part of all that is clipped that it is at least.
 const SHARE: f64 = 0.5;
 
@@ -84,11 +84,11 @@ impl Spot {
 
     fn is_like_a_sun(&self, extent: Extent) -> bool {
         let [wide, high] = self.sides;
-        self.area >= LEAST as f64
-            && self.area <= MOST * extent.pixels() as f64
+        self.area >= MIN_PIXELS as f64
+            && self.area <= MAX_PART * extent.pixels() as f64
             && self.area >= FILLED * wide * high
             && (0.5..=2.0).contains(&(wide / high))
-            && self.middle[1] <= LOWEST * extent.height as f64
+            && self.middle[1] <= MAX_HEIGHT * extent.height as f64
     }
 
     /// The mean of the values on a ring so many times as wide as it.

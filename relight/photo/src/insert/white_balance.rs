@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{DiscLamp, InsertError, LightSource};
 
 /// The most by which a channel is changed: light of one colour alone cannot become white.
-const MOST: f64 = 8.0;
+const MAX_GAIN: f64 = 8.0;
 
 /// How the colour of new light is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
@@ -28,7 +28,9 @@ impl WhiteBalance {
         let mean = light.coefficients().first().copied().unwrap_or([1.0; 3]);
         let grey = mean.iter().sum::<f64>() / 3.0;
         match self {
-            Self::Auto if grey > 0.0 => mean.map(|c| (grey / c.max(grey / MOST)).max(1.0 / MOST)),
+            Self::Auto if grey > 0.0 => {
+                mean.map(|c| (grey / c.max(grey / MAX_GAIN)).max(1.0 / MAX_GAIN))
+            }
             _ => [1.0; 3],
         }
     }
@@ -103,7 +105,7 @@ mod tests {
         }
         let red = ShLight::even(Order::TWO, [1.0, 0.0, 0.0]);
         let tint = WhiteBalance::Auto.tint(&red);
-        assert!(tint.iter().all(|t| t.is_finite() && *t <= MOST));
+        assert!(tint.iter().all(|t| t.is_finite() && *t <= MAX_GAIN));
         assert_eq!(
             WhiteBalance::Auto.tint(&ShLight::dark(Order::TWO)),
             [1.0; 3]

@@ -6,7 +6,7 @@ use tract_onnx::pb::tensor_proto::DataLocation;
 use tract_onnx::pb::{GraphProto, ModelProto, NodeProto, TensorProto};
 
 /// Most bytes that a file may have with its weights: no protobuf message may be longer.
-const MOST_BYTES: usize = i32::MAX as usize;
+const MAX_BYTES: usize = i32::MAX as usize;
 
 /// Part of another file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,8 +46,8 @@ pub fn with_external_weights(
         let length = usize::try_from(part.length).ok();
         whole = length
             .and_then(|length| whole.checked_add(length))
-            .filter(|&whole| whole <= MOST_BYTES)
-            .ok_or_else(|| format!("with its weights it is longer than {MOST_BYTES} bytes"))?;
+            .filter(|&whole| whole <= MAX_BYTES)
+            .ok_or_else(|| format!("with its weights it is longer than {MAX_BYTES} bytes"))?;
         let values = read(&part)?;
         let found = values.len();
         if length != Some(found) {

@@ -12,7 +12,7 @@ use super::external::{ExternalPart, with_external_weights};
 use super::weights::Weights;
 
 /// Largest file of weights that is read, bytes: the released Light-Net has 554 MB.
-const MOST_BYTES: u64 = 2 << 30;
+const MAX_BYTES: u64 = 2 << 30;
 
 impl Weights {
     /// Reads a file; see [`Weights::from_bytes`].
@@ -25,7 +25,7 @@ impl Weights {
             path: path.to_owned(),
             fault,
         };
-        if bytes > MOST_BYTES {
+        if bytes > MAX_BYTES {
             return Err(wrong(format!("{bytes} bytes are too many")));
         }
         let bytes = fs::read(path).map_err(not_read(path))?;

@@ -22,7 +22,7 @@ const COSINE_RAYS: u32 = 32;
 /// Rays a pixel along the lobe of a highlight.
 const LOBE_RAYS: u32 = 16;
 /// Half vectors at right angles to the eye belong to no light.
-const LEAST_COSINE: f32 = 1e-4;
+const MIN_COSINE: f32 = 1e-4;
 
 /// The panoramas that there are, each with its coefficients.
 #[derive(Debug, Clone, Default)]
@@ -304,7 +304,7 @@ impl Point<'_> {
                 let half = around(part.powf(1.0 / (gloss.exponent + 1.0)), turn);
                 let along = half.dot(self.towards_eye);
                 let mirrored = half * (2.0 * along) - self.towards_eye;
-                (along > LEAST_COSINE).then(|| mirrored.normalize_or(self.normal))
+                (along > MIN_COSINE).then(|| mirrored.normalize_or(self.normal))
             })
         });
         lambertian.chain(glossy)
@@ -318,7 +318,7 @@ impl Point<'_> {
         };
         let half = (towards + self.towards_eye).normalize_or_zero();
         let along = half.dot(self.towards_eye);
-        if along <= LEAST_COSINE {
+        if along <= MIN_COSINE {
             return lambertian;
         }
         let lobe = gloss.lobe(self.normal, towards, self.towards_eye);

@@ -11,7 +11,7 @@ use crate::vectors::{direction, vector};
 use relight_core::light::{Order, Rotation, ShLight, basis};
 
 /// Most rays from a pixel to a lamp.
-pub(super) const MOST_RAYS: u32 = 64;
+pub(super) const MAX_RAYS: u32 = 64;
 /// Rays end this far before a lamp.
 const BEFORE: f32 = 1e-3;
 
@@ -70,7 +70,7 @@ impl SyntheticLamp {
         point: Vec3,
         turn: f32,
     ) -> impl Iterator<Item = LampRay> + use<> {
-        let (emitter, count) = (self.emitter, self.rays.clamp(1, MOST_RAYS));
+        let (emitter, count) = (self.emitter, self.rays.clamp(1, MAX_RAYS));
         let aim = self.emitter.towards();
         let (right, up) = aim.any_orthonormal_pair();
         (0..count).map(move |number| {
@@ -196,7 +196,7 @@ impl Emitter {
 impl LampShadows {
     /// The part of a lamp's rays that arrive at a covered pixel.
     pub(crate) fn visible_part(&self, pixel: usize, lamp: &SyntheticLamp) -> f32 {
-        self.open[pixel].count_ones() as f32 / lamp.rays.clamp(1, MOST_RAYS) as f32
+        self.open[pixel].count_ones() as f32 / lamp.rays.clamp(1, MAX_RAYS) as f32
     }
 
     /// Whether a ray arrives at a covered pixel.

@@ -22,7 +22,7 @@ use relit_data::file_names::has_extension;
 use relit_data::shard::Digest;
 
 /// Most triangles that a mesh may have.
-const MOST_TRIANGLES: usize = 20_000_000;
+const MAX_TRIANGLES: usize = 20_000_000;
 
 /// Faces that meet at a larger angle than this, radians, have an edge between them: 50 degrees.
 pub(super) const CREASE: f32 = 50.0 * std::f32::consts::PI / 180.0;
@@ -151,7 +151,7 @@ pub(super) fn blended([a, b, c]: [Vec2; 3], weights: [f32; 3]) -> Vec2 {
 
 fn check(raw: &RawMesh) -> Result<(), String> {
     let (count, triangles) = (raw.positions.len(), raw.triangles.len());
-    if triangles > MOST_TRIANGLES {
+    if triangles > MAX_TRIANGLES {
         return Err(too_large(triangles));
     }
     for (triangle, corners) in raw.triangles.iter().enumerate() {
@@ -174,7 +174,7 @@ fn check(raw: &RawMesh) -> Result<(), String> {
 }
 
 fn too_large(triangles: usize) -> String {
-    format!("it has {triangles} triangles, more than {MOST_TRIANGLES}")
+    format!("it has {triangles} triangles, more than {MAX_TRIANGLES}")
 }
 
 impl RawMesh {

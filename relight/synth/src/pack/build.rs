@@ -24,7 +24,7 @@ use crate::mesh::{CREASE, Mesh};
 use crate::texture::{PictureKind, TextureImage};
 
 /// Largest size of panoramas: larger ones are made smaller.
-const LARGEST_PANORAMA: Extent = Extent::new(512, 256);
+const MAX_PANORAMA: Extent = Extent::new(512, 256);
 /// The size at which two panoramas are compared, and how far they may be apart, in parts of their own variance.
 const THUMBNAIL: Extent = Extent::new(32, 16);
 const ALIKE: f32 = 0.02;
@@ -278,9 +278,9 @@ fn small_panorama(candidate: &Candidate) -> Result<Panorama, Reason> {
         let why = "its upper or lower end is black: it does not show everything around";
         return Err(Reason::Unreadable(why.to_owned()));
     }
-    let is_large = panorama.extent().width > LARGEST_PANORAMA.width;
+    let is_large = panorama.extent().width > MAX_PANORAMA.width;
     Ok(if is_large {
-        panorama.resized(LARGEST_PANORAMA)
+        panorama.resized(MAX_PANORAMA)
     } else {
         panorama
     })

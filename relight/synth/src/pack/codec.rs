@@ -16,7 +16,7 @@ use crate::texture::{PictureKind, TextureImage};
 /// Largest number of steps along each side of a box.
 const STEPS: f64 = 65535.0;
 /// Largest number of pixels along a side of a panorama.
-const LARGEST_PANORAMA: usize = 4096;
+const MAX_PANORAMA: usize = 4096;
 /// Bytes of a corner's colours and of a triangle's.
 const TRIANGLE_COLOURS: usize = 9;
 /// The exponent of RGBE is stored with this added, and its mantissa has 8 bits.
@@ -488,7 +488,7 @@ pub(super) fn encode_panorama(panorama: &Panorama) -> (PackedPanorama, Vec<u8>) 
 /// Where the bytes are not what the catalogue says.
 pub(super) fn decode_panorama(packed: PackedPanorama, bytes: &[u8]) -> Result<Panorama, String> {
     let PackedPanorama { width, height } = packed;
-    if !(8..=LARGEST_PANORAMA).contains(&width) || width != 2 * height {
+    if !(8..=MAX_PANORAMA).contains(&width) || width != 2 * height {
         return Err(format!("it has {width} x {height} pixels"));
     }
     let count = width * height;

@@ -21,9 +21,9 @@ use crate::texture::{PictureKind, TextureImage};
 const FORMAT: &str = "relight.library/1";
 const CATALOGUE: &str = "catalogue.json";
 /// Longest side of the pictures.
-pub(super) const LONGEST_PICTURE: usize = 256;
+pub(super) const MAX_PICTURE_SIDE: usize = 256;
 /// Most bytes of a part of the archive: more are damage.
-const MOST_BYTES: u64 = 1 << 25;
+const MAX_BYTES: u64 = 1 << 25;
 
 /// All that a library holds but the meshes, pictures and panoramas themselves.
 #[derive(Debug, Default, Serialize, Deserialize)]
@@ -190,7 +190,7 @@ fn meshes(archive: &Archive<'_>, catalogue: &Catalogue) -> Result<Vec<(String, M
                 PictureKind::Numbers
             };
             let bytes = archive.part(&picture_name(number))?;
-            let image = TextureImage::unpacked(&bytes, kind, LONGEST_PICTURE as u32);
+            let image = TextureImage::unpacked(&bytes, kind, MAX_PICTURE_SIDE as u32);
             let image = image.map_err(|fault| format!("picture {number}: {fault}"))?;
             Ok((Arc::new(image), kind))
         })
@@ -227,9 +227,9 @@ impl<'a> Archive<'a> {
         let part = part.map_err(|fault| format!("{name}: {fault}"))?;
         let mut bytes = Vec::new();
         // What it says of its size may be wrong: it is read piece by piece.
-        let read = part.take(MOST_BYTES + 1).read_to_end(&mut bytes);
+        let read = part.take(MAX_BYTES + 1).read_to_end(&mut bytes);
         read.map_err(|fault| format!("{name}: {fault}"))?;
-        if bytes.len() as u64 > MOST_BYTES {
+        if bytes.len() as u64 > MAX_BYTES {
             return Err(format!("{name} is too large"));
         }
         Ok(bytes)

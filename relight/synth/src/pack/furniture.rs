@@ -15,7 +15,7 @@ use crate::SynthError;
 const CATALOGUE: &str = "PluginFurnitureCatalog.properties";
 const LICENCE: &str = "LICENSE.TXT";
 /// Most bytes that an archive may unpack to.
-const MOST_BYTES: u64 = 4 << 30;
+const MAX_BYTES: u64 = 4 << 30;
 
 /// Licences by what their texts hold; the first that fits counts.
 const LICENCES: [(&str, &str); 9] = [
@@ -66,7 +66,7 @@ impl Furniture {
         let file = File::open(path).map_err(SynthError::read(path))?;
         let mut archive = ZipArchive::new(file).map_err(|fault| damaged(&fault))?;
         let size = archive.decompressed_size().unwrap_or_default();
-        if size > u128::from(MOST_BYTES) {
+        if size > u128::from(MAX_BYTES) {
             return Err(damaged(&format!("it unpacks to {size} bytes")));
         }
         let folder = TempDir::new().map_err(SynthError::write(path))?;

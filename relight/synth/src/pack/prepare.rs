@@ -9,18 +9,18 @@ use relit_data::shard::Digest;
 
 use super::candidates::Candidate;
 use super::codec::{PackedMesh, encode_mesh, snap};
-use super::file::LONGEST_PICTURE;
+use super::file::MAX_PICTURE_SIDE;
 use crate::mesh::RawMesh;
 use crate::texture::{PictureKind, TextureImage};
 
 /// Most triangles of an object: more are details that small pictures do not show.
-const MOST_TRIANGLES: usize = 30_000;
+const MAX_TRIANGLES: usize = 30_000;
 /// Thinner than this part of its size, an object is flat.
 const FLAT: f32 = 0.02;
 /// A picture of which more is see-through is cut out, as those of leaves,
 const CUT_OUT: f32 = 0.1;
 /// and an object is left out where such pictures cover more of its surface than this.
-const MOST_CUT_OUT: f32 = 0.05;
+const MAX_CUT_OUT: f32 = 0.05;
 /// Directions in which an object's thickness is measured: the normals of its largest triangles.
 const DIRECTIONS: usize = 48;
 
@@ -66,7 +66,7 @@ impl fmt::Display for Reason {
             Self::Flat => write!(f, "it is flat"),
             Self::CutOut => write!(f, "its pictures are cut out, which is not drawn"),
             Self::TooDense(count) => {
-                write!(f, "it has {count} triangles, more than {MOST_TRIANGLES}")
+                write!(f, "it has {count} triangles, more than {MAX_TRIANGLES}")
             }
             Self::Repeated(name) => write!(f, "it is the same as {name}"),
             Self::Excluded(why) => write!(f, "{why}"),
@@ -111,7 +111,7 @@ impl Prepared {
     }
 
     fn judged(mut raw: RawMesh) -> Result<Self, Reason> {
-        if raw.triangles.len() > MOST_TRIANGLES {
+        if raw.triangles.len() > MAX_TRIANGLES {
             return Err(Reason::TooDense(raw.triangles.len()));
         }
         if is_flat(&raw) {
@@ -124,7 +124,7 @@ impl Prepared {
         let missing = std::mem::take(&mut raw.left_out);
         let (mesh, bytes, pictures) = encode_mesh(&raw).map_err(Reason::Unreadable)?;
         let packed = |(image, kind): (Arc<TextureImage>, PictureKind)| {
-            let packed = image.packed(kind, LONGEST_PICTURE);
+            let packed = image.packed(kind, MAX_PICTURE_SIDE);
             let unreadable = |fault| Reason::Unreadable(format!("a picture of it: {fault}"));
             Ok::<_, Reason>((kind, packed.map_err(unreadable)?))
         };
@@ -218,5 +218,5 @@ fn is_cut_out(raw: &RawMesh) -> bool {
             cut_out += area;
         }
     }
-    cut_out > MOST_CUT_OUT * all
+    cut_out > MAX_CUT_OUT * all
 }

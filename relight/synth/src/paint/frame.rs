@@ -67,7 +67,7 @@ impl Frame {
 }
 
 /// Neighbours that a normal needs.
-const LEAST_NEIGHBOURS: usize = 8;
+const MIN_NEIGHBOURS: usize = 8;
 
 /// The direction in which the points within `radius` of `origin` vary least, up to its sign. None where there are too
 /// few of them.
@@ -81,7 +81,7 @@ fn normal_of_neighbours(points: &[Vec3], origin: Vec3, radius: f32) -> Option<Ve
         .filter(near)
         .copied()
         .collect();
-    if around.len() < LEAST_NEIGHBOURS {
+    if around.len() < MIN_NEIGHBOURS {
         return None;
     }
     let mean = around.iter().sum::<Vec3>() / around.len() as f32;

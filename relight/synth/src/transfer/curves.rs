@@ -10,7 +10,7 @@ use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS, TRANSFER_ORDER, band, cosine_band
 /// Harmonics of the table's angle that are computed.
 const HARMONICS: usize = 6;
 /// A colour of less than this is black. Numerical.
-const LEAST_ALBEDO: f32 = 1e-3;
+const MIN_ALBEDO: f32 = 1e-3;
 /// Terms of a curve: its mean, then real and imaginary part of each harmonic.
 pub(super) const CURVE_COEFFICIENTS: usize = 2 * HARMONICS + 1;
 
@@ -94,7 +94,7 @@ impl RadianceTransfer {
             .collect();
         let mean_albedo = finish.albedo.iter().sum::<Vec3>() / finish.albedo.len().max(1) as f32;
         let highlight = if material.is_tinted {
-            mean_albedo / mean_albedo.max_element().max(LEAST_ALBEDO)
+            mean_albedo / mean_albedo.max_element().max(MIN_ALBEDO)
         } else {
             Vec3::ONE
         };

@@ -29,7 +29,7 @@ const CLIPPED: f32 = 0.3;
 /// Part of the turns whose elevation is not known well, and how far it is off, degrees.
 const UNSURE: f32 = 0.5;
 const ELEVATION_ERROR_DEG: f32 = 4.0;
-const LARGEST_ELEVATION_ERROR_DEG: f32 = 8.0;
+const MAX_ELEVATION_ERROR_DEG: f32 = 8.0;
 /// Values of a curve at which clipping is looked at.
 const ANGLES: usize = 36;
 
@@ -78,7 +78,7 @@ impl DrawnTurn {
         drawn.add_noise(&mut random);
         if random.chance(UNSURE) {
             let error = (random.normal() * ELEVATION_ERROR_DEG)
-                .clamp(-LARGEST_ELEVATION_ERROR_DEG, LARGEST_ELEVATION_ERROR_DEG);
+                .clamp(-MAX_ELEVATION_ERROR_DEG, MAX_ELEVATION_ERROR_DEG);
             drawn.elevation = (view.elevation + error.to_radians()).max(0.0);
         }
         if random.chance(0.5) {

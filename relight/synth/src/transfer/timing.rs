@@ -18,7 +18,7 @@ const RIPPLE_DEG: f32 = 0.8;
 const JITTER_DEG: std::ops::Range<f32> = 0.05..1.0;
 /// Most gaps of a turn, and most angles in each.
 const GAPS: usize = 3;
-const LARGEST_GAP: usize = 6;
+const MAX_GAP: usize = 6;
 /// Ridge on the coefficients, as a part of the mean of the diagonal. Numerical.
 const RIDGE: f64 = 1e-6;
 
@@ -101,7 +101,7 @@ fn frame_angles(random: &mut Random) -> Vec<FrameAngle> {
     let mut is_there = [true; FRAMES];
     for _ in 0..random.count(0..GAPS + 1) {
         let first = random.index(FRAMES);
-        let gap = random.count(1..LARGEST_GAP + 1);
+        let gap = random.count(1..MAX_GAP + 1);
         (first..first + gap).for_each(|at| is_there[at % FRAMES] = false);
     }
     (0..FRAMES)

@@ -35,7 +35,7 @@ const GLOSSY: f32 = 0.7;
 /// Part of the glossy turns whose highlights clip.
 const CLIPPED: f32 = 0.5;
 /// How much brighter these become at most.
-const LONGEST_EXPOSURE: f32 = 3.0;
+const MAX_EXPOSURE: f32 = 3.0;
 
 /// A turn, ready to be rendered.
 pub(super) struct SimulatedTurn<'a> {
@@ -136,7 +136,7 @@ impl<'a> SimulatedTurn<'a> {
             .collect();
         let camera = CameraModel::plain().exposed(&images.concat(), level);
         self.description.camera = match clipped {
-            Some(part) => camera.clipping(&images, part, LONGEST_EXPOSURE),
+            Some(part) => camera.clipping(&images, part, MAX_EXPOSURE),
             None => camera,
         };
         self

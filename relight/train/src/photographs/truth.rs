@@ -1,7 +1,7 @@
 //! From lit and photographed views to what a network sees, and what it should answer.
 
 use relight_core::render::cosine_lobe;
-use relight_photo::decompose::{LOG_FLOOR, MOST_LIGHT};
+use relight_photo::decompose::{LOG_FLOOR, MAX_LIGHT};
 use relight_photo::nets::LIGHT_OUTPUTS;
 use tch::Tensor;
 
@@ -56,7 +56,7 @@ pub(super) fn truth(
 
 /// The input of the decomposing network, as [`relight_photo::decompose::EncodedPicture`] makes it one by one.
 pub(crate) fn encoded(picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
-    let light = picture.f_clamp(0.0, f64::from(MOST_LIGHT))?;
+    let light = picture.f_clamp(0.0, f64::from(MAX_LIGHT))?;
     let colour = light
         .f_pow_tensor_scalar(ENCODED)?
         .f_mul_scalar(2.0)?

@@ -8,8 +8,8 @@ use super::{ensure, within};
 use crate::error::TrainError;
 
 // Nobody trains more: these keep a slip of the pen from filling the memory.
-const MOST_SAMPLES: u64 = 1_000_000;
-const LARGEST_SIZE: u32 = 1024;
+const MAX_SAMPLES: u64 = 1_000_000;
+const MAX_SIZE: u32 = 1024;
 
 /// Of what photographs are made: the table `[data]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -74,18 +74,18 @@ impl DataSettings {
     /// # Errors
     /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        let is_right = (32..=LARGEST_SIZE).contains(&self.size) && self.size.is_multiple_of(32);
+        let is_right = (32..=MAX_SIZE).contains(&self.size) && self.size.is_multiple_of(32);
         ensure(
             is_right,
             "data.size",
             self.size,
             "a multiple of 32 up to 1024",
         )?;
-        within("data.views", self.views, 1..=MOST_SAMPLES)?;
-        within("data.new_views", self.new_views, 0..=MOST_SAMPLES)?;
+        within("data.views", self.views, 1..=MAX_SAMPLES)?;
+        within("data.new_views", self.new_views, 0..=MAX_SAMPLES)?;
         within("data.rays", self.rays, 16..=4096)?;
         within("data.variants", self.variants, 1..=1000)?;
-        within("data.validation", self.validation, 1..=MOST_SAMPLES)
+        within("data.validation", self.validation, 1..=MAX_SAMPLES)
     }
 
     /// Whether batches of this size can be drawn: the samples of one are of different views.
@@ -107,6 +107,6 @@ impl TurnSettings {
     /// # Errors
     /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        within("turns.groups", self.groups, 1..=MOST_SAMPLES)
+        within("turns.groups", self.groups, 1..=MAX_SAMPLES)
     }
 }

@@ -7,9 +7,9 @@ use crate::error::TrainError;
 use crate::model::ComputePrecision;
 
 // Nobody trains more: these keep a slip of the pen from filling the memory.
-const MOST_STEPS: u64 = 1_000_000_000;
-const LARGEST_BATCH: u64 = 4096;
-const MOST_MINUTES: f64 = 1e6;
+const MAX_STEPS: u64 = 1_000_000_000;
+const MAX_BATCH: u64 = 4096;
+const MAX_MINUTES: f64 = 1e6;
 
 /// How long and how fast a network learns: the table `[run]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -75,8 +75,8 @@ impl RunSettings {
     /// # Errors
     /// [`TrainError::Refused`] names the first that is not.
     pub fn check(&self) -> Result<(), TrainError> {
-        within("run.steps", self.steps, 1..=MOST_STEPS)?;
-        within("run.batch", self.batch, 1..=LARGEST_BATCH)?;
+        within("run.steps", self.steps, 1..=MAX_STEPS)?;
+        within("run.batch", self.batch, 1..=MAX_BATCH)?;
         positive("run.learning_rate", self.learning_rate)?;
         within("run.min_lr_ratio", self.min_lr_ratio, 0.0..=1.0)?;
         positive("run.max_grad_norm", self.max_grad_norm)?;
@@ -89,7 +89,7 @@ impl RunSettings {
         within(
             "run.checkpoint_minutes",
             self.checkpoint_minutes,
-            1e-3..=MOST_MINUTES,
+            1e-3..=MAX_MINUTES,
         )
     }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{ensure, within};
 use crate::error::TrainError;
 
-const MOST_VIEWS: u64 = 1_000_000;
+const MAX_VIEWS: u64 = 1_000_000;
 
 /// Views of objects on the table and rooms around them: the table `[data]` of `relight train turn`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -72,10 +72,10 @@ impl TransferSettings {
             self.size,
             "a multiple of 32 up to 512",
         )?;
-        within("data.views", self.views, 1..=MOST_VIEWS)?;
-        within("data.first_views", self.first_views, 1..=MOST_VIEWS)?;
-        within("data.validation", self.validation, 1..=MOST_VIEWS)?;
-        within("data.new_views", self.new_views, 0..=MOST_VIEWS)?;
+        within("data.views", self.views, 1..=MAX_VIEWS)?;
+        within("data.first_views", self.first_views, 1..=MAX_VIEWS)?;
+        within("data.validation", self.validation, 1..=MAX_VIEWS)?;
+        within("data.new_views", self.new_views, 0..=MAX_VIEWS)?;
         within("data.rays", self.rays, 16..=4096)?;
         within("data.coarse_part", self.coarse_part, 0.0..=1.0)?;
         within("data.variants", self.variants, 1..=1000)

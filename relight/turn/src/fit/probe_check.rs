@@ -21,9 +21,9 @@ const STEPS: [f64; 3] = [-1.0, 0.0, 1.0];
 /// How often the best is improved, each time by half the steps. By hand.
 const REFINED: i32 = 3;
 /// Largest residual of a grey ball by its own light, over that by an even light. By hand.
-const MOST_OF_GREY: f64 = 0.3;
+const MAX_OF_GREY: f64 = 0.3;
 /// The same of a chrome ball, of whose small windows the panorama keeps less. By hand.
-const MOST_OF_CHROME: f64 = 0.6;
+const MAX_OF_CHROME: f64 = 0.6;
 /// Largest part of the given circle's residual with which another one is the ball. By hand.
 const CLEARLY: f64 = 0.6;
 /// By how much its residual has to be less. By hand.
@@ -31,7 +31,7 @@ const LESS: f64 = 0.02;
 /// Least distance to the given circle, in radii. By hand: nearer ones measure nearly the same light.
 const APART: f64 = 0.08;
 /// Least share of a circle, 0 to 1, that has to be in the picture. By hand.
-const LEAST_INSIDE: f64 = 0.9;
+const MIN_INSIDE: f64 = 0.9;
 
 /// A circle, in radii from the middle that was given: to the right and up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,8 +93,8 @@ pub(crate) fn check(
 /// The largest residual of a ball by its own light.
 pub(crate) const fn most_residual(ball: ProbeBall) -> f64 {
     match ball {
-        ProbeBall::Grey => MOST_OF_GREY,
-        ProbeBall::Chrome => MOST_OF_CHROME,
+        ProbeBall::Grey => MAX_OF_GREY,
+        ProbeBall::Chrome => MAX_OF_CHROME,
     }
 }
 
@@ -151,7 +151,7 @@ impl Shown<'_> {
             .enumerate()
             .filter_map(|(pixel, &at)| Some((pixel, circle.normal(at)?)))
             .unzip();
-        if (pixels.len() as f64) < LEAST_INSIDE * wanted {
+        if (pixels.len() as f64) < MIN_INSIDE * wanted {
             return None;
         }
         match self.ball {

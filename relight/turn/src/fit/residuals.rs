@@ -10,12 +10,12 @@ use crate::model::shading::{PixelHarmonics, ShadingModel};
 use crate::observe::curves::TurnCurves;
 
 /// Least share of what is seen that the model is taken to fit, 0 to 1. By hand.
-const LEAST_MODEL: f64 = 0.1;
+const MIN_MODEL: f64 = 0.1;
 
 /// Residual whose weight is one quarter, in standard deviations. By hand.
 const WIDTH: f64 = 2.0;
 /// Least standard deviation, in parts of the pixel's mean light. By hand.
-const LEAST_DEVIATION: f64 = 0.01;
+const MIN_DEVIATION: f64 = 0.01;
 
 /// The light by which what is left of a pixel is measured: the model's mean over the turn, or a tenth of what is
 /// seen where that is more.
@@ -23,7 +23,7 @@ fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, model: &ShadingM
     let harmonics = model.harmonics(fit.normal);
     let predicted: f64 = (0..3).map(|c| fit.albedo[c] * harmonics.base[c][0]).sum();
     let seen: f64 = CurveStatistics::mean(curves, pixel).iter().sum();
-    (predicted.max(LEAST_MODEL * seen) / 3.0).max(1e-6)
+    (predicted.max(MIN_MODEL * seen) / 3.0).max(1e-6)
 }
 
 /// How much more light than the fit's each part of the turn has, the mean of the channels, over the
@@ -64,7 +64,7 @@ pub(crate) fn robust_weights(
     let Some(median) = upper_median(sizes) else {
         return vec![1.0; residuals.len()];
     };
-    let deviation = 1.4826 * median + LEAST_DEVIATION;
+    let deviation = 1.4826 * median + MIN_DEVIATION;
     let robust_weights = |residuals: &Option<f64>| {
         let size = residuals.unwrap_or(0.0) / (WIDTH * deviation);
         (1.0 / (1.0 + size * size).powi(2)) as f32

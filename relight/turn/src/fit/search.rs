@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts};
-use crate::model::directions::{LEAST_FACING, half_sphere, tangents, tilted};
+use crate::model::directions::{MIN_FACING, half_sphere, tangents, tilted};
 use crate::model::shading::{PixelHarmonics, ShadingModel};
 
 /// Candidates over the visible half sphere. By hand: about 7 degrees apart.
@@ -30,7 +30,7 @@ const AROUND: [[f64; 2]; 8] = [
 /// Step of the finite differences of the Hessian, radians. By hand.
 const HESSIAN_STEP: f64 = 0.06;
 /// Least eigenvalue of the Hessian: at a border of what is allowed it need not be positive. Numerical.
-const LEAST_CURVATURE: f64 = 1e-3;
+const MIN_CURVATURE: f64 = 1e-3;
 
 /// A pixel's answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,7 +122,7 @@ impl<'a> Search<'a> {
         while step > last {
             let axes = tangents(normal);
             let around = AROUND.map(|to| tilted(normal, axes, to.map(|part| step * part)));
-            let visible = around.into_iter().filter(|to| to[2] >= LEAST_FACING);
+            let visible = around.into_iter().filter(|to| to[2] >= MIN_FACING);
             let costs = visible.map(|to| (self.residual(statistics, to), to));
             match costs.min_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((cost, to)) if cost < least => (least, normal) = (cost, to),
@@ -170,7 +170,7 @@ impl<'a> Search<'a> {
         );
         let inverse: f64 = [half + rest, half - rest]
             .into_iter()
-            .map(|eigenvalue| 1.0 / eigenvalue.max(LEAST_CURVATURE))
+            .map(|eigenvalue| 1.0 / eigenvalue.max(MIN_CURVATURE))
             .sum();
         (2.0 * fit.residual / freedom * inverse).sqrt()
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 /// Least cosine between the normal of a visible surface and the direction to the viewer. Numerical.
-pub(crate) const LEAST_FACING: f64 = 0.02;
+pub(crate) const MIN_FACING: f64 = 0.02;
 
 /// Where the viewer's direction is reflected to.
 pub(crate) fn reflected([x, y, z]: [f64; 3]) -> [f64; 3] {
@@ -14,7 +14,7 @@ pub(crate) fn reflected([x, y, z]: [f64; 3]) -> [f64; 3] {
 pub(crate) fn half_sphere(count: usize) -> impl Iterator<Item = [f64; 3]> {
     let golden = PI * (3.0 - 5.0_f64.sqrt());
     (0..count).map(move |at| {
-        let z = 1.0 - (1.0 - LEAST_FACING) * (at as f64 + 0.5) / count as f64;
+        let z = 1.0 - (1.0 - MIN_FACING) * (at as f64 + 0.5) / count as f64;
         let (sin, cos) = (golden * at as f64).sin_cos();
         let radius = (1.0 - z * z).sqrt();
         [radius * cos, radius * sin, z]

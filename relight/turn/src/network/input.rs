@@ -20,15 +20,15 @@ const STRONG: usize = 2;
 const TERMS: usize = 2 * HARMONICS + 1;
 
 /// Least mean of a curve, in means over the object. By hand: below, harmonics are noise.
-const LEAST_MEAN: f32 = 0.002;
+const MIN_MEAN: f32 = 0.002;
 /// Largest harmonic, in means of the curve. Derived: of non-negative light it is at most 2.
-const LARGEST_RATIO: f32 = 1.5;
+const MAX_RATIO: f32 = 1.5;
 /// Largest harmonic, in effective values over the object. By hand.
-const LARGEST_VALUE: f32 = 4.0;
+const MAX_VALUE: f32 = 4.0;
 /// Pixels darker than this, in means over the object, count less for the phase of the light. By hand.
 const DARK: f32 = 0.1;
 /// Largest logarithm of a mean beside that of all. By hand.
-const LARGEST_LOG: f32 = 3.0;
+const MAX_LOG: f32 = 3.0;
 
 /// Which way the room is taken to be turned. The phase of the first harmonic says it, where that is strong; in a room
 /// that is bright on two opposite sides that of the second says it, up to half a turn.
@@ -96,7 +96,7 @@ pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32>
                 .sum::<f32>();
             let effective = (square / turn.pixels.len().max(1) as f32).sqrt() + 1e-4;
             whole.push(effective.ln() / 1.5 + 1.0);
-            let value = |k: usize| up_to(of(k) * (1.0 / effective), LARGEST_VALUE);
+            let value = |k: usize| up_to(of(k) * (1.0 / effective), MAX_VALUE);
             planes.push(|k| value(k).re);
             planes.push(|k| value(k).im);
         }
@@ -135,7 +135,7 @@ fn logarithms(means: &[[f32; 3]]) -> Vec<[f32; 3]> {
         let sum: f32 = means.iter().map(|mean| mean[c].ln()).sum();
         sum / means.len().max(1) as f32
     });
-    let most = LARGEST_LOG;
+    let most = MAX_LOG;
     let one = |mean: &[f32; 3]| [0, 1, 2].map(|c| (mean[c].ln() - middle[c]).clamp(-most, most));
     means.iter().map(one).collect()
 }
@@ -147,7 +147,7 @@ fn over_mean(means: &[[f32; 3]]) -> ([f32; 3], Vec<[f32; 3]>) {
         let sum: f32 = means.iter().map(|mean| mean[c].max(0.0)).sum();
         (sum / count).max(1e-9)
     });
-    let one = |mean: &[f32; 3]| [0, 1, 2].map(|c| (mean[c] / of_all[c]).max(LEAST_MEAN));
+    let one = |mean: &[f32; 3]| [0, 1, 2].map(|c| (mean[c] / of_all[c]).max(MIN_MEAN));
     (of_all, means.iter().map(one).collect())
 }
 
@@ -184,7 +184,7 @@ impl Ratios {
                 let curve = &turn.curves[k];
                 let value = Complex32::new(curve[2 * m + 1][c], curve[2 * m + 2][c]);
                 let over = means[k][c] * of_all[c];
-                up_to(value * (1.0 / over), LARGEST_RATIO)
+                up_to(value * (1.0 / over), MAX_RATIO)
             })
         };
         let harmonics = (0..HARMONICS)

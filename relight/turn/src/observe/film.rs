@@ -14,13 +14,13 @@ use crate::observe::probe_place::ProbePlace;
 use crate::observe::reading::{ReadTurn, TurnOrigin};
 
 /// Largest share of a ball that the mask may cover, 0 to 1. By hand: edges are not exact.
-const MOST_COVERED: f64 = 0.05;
+const MAX_COVERED: f64 = 0.05;
 /// Side of the blocks in which frames are compared, pixels of the shard. By hand: shifts of a few pixels hardly
 /// change them.
 const BLOCK: usize = 16;
 /// Relative difference of the light of blocks from which frames show something else. Measured: those of their own
 /// video differ by 0.01 to 0.02, by JPEG and scaling.
-const MOST_DIFFERENT: f64 = 0.12;
+const MAX_DIFFERENT: f64 = 0.12;
 
 /// Reads the ball in the video of a turn. `progress` is told how many of the turn's frames are done, and how many there are.
 ///
@@ -100,7 +100,7 @@ fn check_mask(given: ProbePlace, turn: &ReadTurn) -> Result<(), TurnError> {
         .map(|_| f64::from(crop.w) * f64::from(crop.h) / (width * height) as f64)
         .sum();
     let part = covered / (std::f64::consts::PI * given.radius * given.radius);
-    if part <= MOST_COVERED {
+    if part <= MAX_COVERED {
         return Ok(());
     }
     Err(TurnError::BallInMask {
@@ -162,7 +162,7 @@ impl<'a> Likeness<'a> {
 
     /// Whether at least half of the frames are alike; where none can be compared, nothing speaks against it.
     fn is_same(&self) -> bool {
-        median(self.differences.iter().copied()).unwrap_or(0.0) < MOST_DIFFERENT
+        median(self.differences.iter().copied()).unwrap_or(0.0) < MAX_DIFFERENT
     }
 }
 

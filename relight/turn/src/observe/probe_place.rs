@@ -7,7 +7,7 @@ use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 use crate::error::TurnError;
 
 /// Least width of a pixel that counts as covered, pixels. Numerical: one that is only touched, by rounding, is not.
-const LEAST_COVER: f64 = 1e-6;
+const MIN_COVER: f64 = 1e-6;
 
 /// Where a ball is in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,8 +63,8 @@ impl ProbePlace {
     pub(crate) fn mean_light(&self, planes: &Planes<3>, [x, y]: [f64; 2], size: f64) -> [f32; 3] {
         let range = |middle: f64| {
             // A pixel that is only touched, by rounding, is not covered.
-            let from = (middle - size / 2.0 + LEAST_COVER).max(0.0) as usize;
-            from..((middle + size / 2.0 - LEAST_COVER).ceil().max(0.0) as usize).max(from + 1)
+            let from = (middle - size / 2.0 + MIN_COVER).max(0.0) as usize;
+            from..((middle + size / 2.0 - MIN_COVER).ceil().max(0.0) as usize).max(from + 1)
         };
         let Extent { width, height } = planes.extent();
         let (mut sum, mut count) = ([0.0; 3], 0.0);

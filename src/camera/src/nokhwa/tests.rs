@@ -23,7 +23,7 @@ use relit_data::causes::with_causes;
 use relit_data::session::FrameClock;
 
 const TIMEOUT: Duration = Duration::from_secs(20);
-const LONGEST: Duration = Duration::from_millis(50);
+const MAX_DELAY: Duration = Duration::from_millis(50);
 
 /// What the library does when a frame is asked for.
 enum Step {
@@ -161,7 +161,7 @@ fn frames_come_without_a_counter_and_with_the_time_of_their_arrival() {
     assert_eq!((frame.fault(), frame.data), (None, vec![1, 2]));
     assert_eq!((frame.sequence, frame.clock), (None, FrameClock::Host));
     assert!((before..=after).contains(&frame.t_us));
-    let late = camera.next_frame(LONGEST).unwrap_err();
+    let late = camera.next_frame(MAX_DELAY).unwrap_err();
     assert!(matches!(late, CameraError::Timeout { .. }), "{late}");
 }
 
@@ -213,7 +213,7 @@ fn a_stream_is_stopped_and_started_again() {
     });
     camera.stop().unwrap();
     stopped.store(true, Ordering::Relaxed);
-    let error = camera.next_frame(LONGEST).unwrap_err();
+    let error = camera.next_frame(MAX_DELAY).unwrap_err();
     assert!(matches!(error, CameraError::NotStarted { .. }), "{error}");
     let script = last.join().unwrap();
     camera.start(&"GREY:2x1@30".parse().unwrap()).unwrap();

@@ -10,14 +10,14 @@ use crate::{CameraError, Control, ControlFlags, ControlKind, MenuItem, snake_cas
 
 /// Most controls that are read of a device, and most items of a menu, in case a faulty driver's list
 /// does not end.
-const MOST_CONTROLS: usize = 1024;
-const MOST_ITEMS: i64 = 256;
+const MAX_CONTROLS: usize = 1024;
+const MAX_ITEMS: i64 = 256;
 
 impl Device {
     pub(super) fn controls(&self) -> Result<Vec<Control>, CameraError> {
         let failed = |error| self.error("its controls were read", error);
         let (mut found, mut id) = (Vec::new(), 0);
-        for _ in 0..MOST_CONTROLS {
+        for _ in 0..MAX_CONTROLS {
             let Some(raw) = self.node.control_after(id).map_err(failed)? else {
                 break;
             };
@@ -94,7 +94,7 @@ impl Device {
     }
 
     fn items(&self, raw: &sys::v4l2_query_ext_ctrl, numbers: bool) -> io::Result<Vec<MenuItem>> {
-        let last = raw.maximum.min(raw.minimum.saturating_add(MOST_ITEMS));
+        let last = raw.maximum.min(raw.minimum.saturating_add(MAX_ITEMS));
         let mut items = Vec::new();
         for index in raw.minimum..=last {
             let Ok(number) = u32::try_from(index) else {

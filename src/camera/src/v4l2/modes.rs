@@ -8,7 +8,7 @@ use super::ioctl::Node;
 use crate::{Fourcc, Mode, Rate, Rates};
 
 /// Most entries that are read of a driver's list, in case a faulty driver's list does not end.
-const MOST_ENTRIES: u32 = 256;
+const MAX_ENTRIES: u32 = 256;
 
 /// Formats that can be recorded, with sizes and rates.
 pub(super) fn read(node: &Node) -> io::Result<Vec<Mode>> {
@@ -34,7 +34,7 @@ pub(super) fn read(node: &Node) -> io::Result<Vec<Mode>> {
 /// A driver's list from index 0 to its end.
 fn entries<T>(entry: impl Fn(u32) -> io::Result<Option<T>>) -> io::Result<Vec<T>> {
     let mut found = Vec::new();
-    for index in 0..MOST_ENTRIES {
+    for index in 0..MAX_ENTRIES {
         match entry(index)? {
             Some(entry) => found.push(entry),
             None => break,
@@ -86,6 +86,6 @@ mod tests {
     #[test]
     fn a_list_without_end_is_cut() {
         let endless = entries(|index| Ok(Some(index))).unwrap();
-        assert_eq!(endless.len(), MOST_ENTRIES as usize);
+        assert_eq!(endless.len(), MAX_ENTRIES as usize);
     }
 }

@@ -17,10 +17,10 @@ use relit_video::PixelFormat;
 /// anybody reading a frame.
 const BUFFERS: u32 = 8;
 /// Fewest with which a driver can fill one while others wait.
-const FEWEST_BUFFERS: usize = 2;
+const MIN_BUFFERS: usize = 2;
 
 /// Longest wait in one call; a longer one is made of several.
-const LONGEST_WAIT: Duration = Duration::from_secs(60);
+const MAX_WAIT: Duration = Duration::from_secs(60);
 
 pub(super) struct Stream {
     layout: sys::v4l2_pix_format,
@@ -76,7 +76,7 @@ impl Stream {
             self.buffers.push(device.node.map(index)?);
             device.node.queue(index)?;
         }
-        if self.buffers.len() < FEWEST_BUFFERS {
+        if self.buffers.len() < MIN_BUFFERS {
             return Err(io::Error::other(format!("it has only {count} buffers")));
         }
         device.node.stream_on()
@@ -102,7 +102,7 @@ impl Stream {
     ) -> Result<Frame, CameraError> {
         let start = Instant::now();
         loop {
-            let left = timeout.saturating_sub(start.elapsed()).min(LONGEST_WAIT);
+            let left = timeout.saturating_sub(start.elapsed()).min(MAX_WAIT);
             let broken = device.node.wait(left);
             let broken = broken.map_err(|error| device.stream_error("waited for", error))?;
             match device.node.dequeue() {

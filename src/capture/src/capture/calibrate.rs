@@ -27,9 +27,9 @@ const SPEED: f64 = 5.0;
 /// Width of the pictures that are compared, pixels: from one to the next the background moves by less than one.
 const WIDTH: u32 = 160;
 /// Least motion from a picture to the next that counts, pixels.
-const LEAST_SHIFT: f64 = 0.02;
+const MIN_SHIFT: f64 = 0.02;
 /// Fewest pictures that have to show a motion, and the part of them that has to agree.
-const FEWEST: usize = 8;
+const MIN_PICTURES: usize = 8;
 const AGREED: f64 = 0.8;
 
 /// What is known of the rig whose sessions lie in `root`; `None` where nothing was measured.
@@ -148,11 +148,11 @@ impl Background {
 
     fn moves_to_the_right(&self) -> Result<bool, CaptureError> {
         let shifts = self.shifts.iter().copied();
-        let moving = shifts.filter(|shift| shift.abs() >= LEAST_SHIFT);
+        let moving = shifts.filter(|shift| shift.abs() >= MIN_SHIFT);
         let (right, left): (Vec<f64>, Vec<f64>) = moving.partition(|shift| *shift > 0.0);
         let all = right.len() + left.len();
         let most = right.len().max(left.len());
-        if all < FEWEST || (most as f64) < AGREED * all as f64 {
+        if all < MIN_PICTURES || (most as f64) < AGREED * all as f64 {
             let unseen = "the camera does not see which way the table turns: leave something to see behind the object, and light on it";
             return Err(CaptureError::Refused(unseen.to_owned()));
         }

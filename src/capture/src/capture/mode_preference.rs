@@ -114,10 +114,14 @@ impl ModePreference {
 
 /// The first of a long list.
 fn first_of(offered: &[String]) -> String {
-    const MOST: usize = 12;
+    const MAX_LISTED: usize = 12;
     match offered.len() {
         0 => "nothing that can be recorded".to_owned(),
-        n if n > MOST => format!("{} and {} more", offered[..MOST].join("; "), n - MOST),
+        n if n > MAX_LISTED => format!(
+            "{} and {} more",
+            offered[..MAX_LISTED].join("; "),
+            n - MAX_LISTED
+        ),
         _ => offered.join("; "),
     }
 }

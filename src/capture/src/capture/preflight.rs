@@ -17,7 +17,7 @@ use relit_turntable::{Alarm, Homed, MARGIN_DEG, Table, TableStatus, TurnPlan, Tu
 /// What is added to the expected size of a take, as a fraction of it.
 const RESERVE: f64 = 0.2;
 /// Longest object name, bytes: a session's name has date and time before it.
-const LONGEST_OBJECT: usize = 80;
+const MAX_OBJECT_LENGTH: usize = 80;
 /// 2025-01-01, seconds since 1970.
 const EARLIEST: i64 = 1_735_689_600;
 
@@ -58,11 +58,11 @@ pub(super) fn check_clock(now: Timestamp) -> Result<Check, CaptureError> {
 
 /// Checks that an object's name can be part of a session's.
 pub(crate) fn check_object(name: &str) -> Result<(), String> {
-    if is_session_name(name) && name.len() <= LONGEST_OBJECT {
+    if is_session_name(name) && name.len() <= MAX_OBJECT_LENGTH {
         Ok(())
     } else {
         Err(format!(
-            "{name:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most {LONGEST_OBJECT} bytes"
+            "{name:?} cannot be an object's name: use letters, digits, '-', '_' and '.', at most {MAX_OBJECT_LENGTH} bytes"
         ))
     }
 }

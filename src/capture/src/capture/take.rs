@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use relit_data::causes::with_causes;
-use relit_data::turn_light::LEAST_MODULATION;
+use relit_data::turn_light::MIN_MODULATION;
 
 use super::calibrate::read_facts;
 use super::context::CaptureContext;
@@ -129,11 +129,11 @@ fn run_take(
 /// Whether a turn in this light tells normals and albedo, and trains networks on what changes.
 fn check_room(modulation: f64) -> Check {
     let percent = 100.0 * modulation;
-    if modulation < LEAST_MODULATION {
+    if modulation < MIN_MODULATION {
         let found = format!(
             "the room is too even: the object's light changes by {percent:.0} % over the turn, \
              where {:.0} % are needed to learn from it; turn on one lamp at the side, and capture the turn again",
-            100.0 * LEAST_MODULATION
+            100.0 * MIN_MODULATION
         );
         return Check::noted("light", found);
     }

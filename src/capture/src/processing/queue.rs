@@ -16,7 +16,7 @@ use crate::state::{
 };
 
 /// Jobs that can wait.
-const LONGEST: usize = 200;
+const MAX_WAITING: usize = 200;
 /// Ended jobs that are remembered.
 const REMEMBERED: usize = 30;
 
@@ -82,8 +82,8 @@ impl ProcessingQueue {
             let already = format!("{what} is being processed already: wait for it, or cancel it");
             return Err(Refused::Busy(already));
         }
-        if self.waiting.len() >= LONGEST {
-            let full = format!("{LONGEST} jobs wait already: let some of them end");
+        if self.waiting.len() >= MAX_WAITING {
+            let full = format!("{MAX_WAITING} jobs wait already: let some of them end");
             return Err(Refused::Busy(full));
         }
         self.numbers += 1;
@@ -400,7 +400,7 @@ mod tests {
     #[test]
     fn the_queue_has_an_end() {
         let mut queue = ProcessingQueue::default();
-        for n in 0..LONGEST {
+        for n in 0..MAX_WAITING {
             queue.submit(work(&n.to_string(), &[Mask])).unwrap();
         }
         let full = queue.submit(work("mug", &[Mask]));

@@ -22,7 +22,7 @@ use crate::processing::EditorTarget;
 /// Where the editor is served.
 pub(super) const PLACE: &str = "/edit/";
 /// Largest sketch: what the editor takes.
-const LARGEST_SKETCH: usize = 4 << 20;
+const MAX_SKETCH: usize = 4 << 20;
 /// Time in which a sketch has to come.
 const SKETCH: Duration = Duration::from_secs(20);
 /// Time in which the editor has to answer: it may look at the whole turn.
@@ -109,7 +109,7 @@ async fn inner_request(
     let uri: Uri = path
         .parse()
         .map_err(|_| Failure::bad("the editor has no such path"))?;
-    let body = timeout(SKETCH, to_bytes(body, LARGEST_SKETCH)).await;
+    let body = timeout(SKETCH, to_bytes(body, MAX_SKETCH)).await;
     let body = body.map_err(|_| {
         let error = "the drawing did not come in time";
         Failure::new(StatusCode::REQUEST_TIMEOUT, error)

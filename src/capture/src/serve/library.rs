@@ -17,7 +17,7 @@ use relit_data::session::{
 use relit_web::Failure;
 
 /// Longest note, characters.
-const LONGEST_NOTE: usize = 2000;
+const MAX_NOTE_LENGTH: usize = 2000;
 /// Summaries that are kept.
 const SUMMARIES: usize = 4096;
 
@@ -233,8 +233,8 @@ impl Library {
         note: Option<&str>,
         rating: Option<u8>,
     ) -> Result<(), Failure> {
-        if note.is_some_and(|note| note.chars().count() > LONGEST_NOTE) {
-            let error = format!("a note has at most {LONGEST_NOTE} characters");
+        if note.is_some_and(|note| note.chars().count() > MAX_NOTE_LENGTH) {
+            let error = format!("a note has at most {MAX_NOTE_LENGTH} characters");
             return Err(Failure::bad(error));
         }
         if rating.is_some_and(|rating| !(1..=5).contains(&rating)) {

@@ -20,7 +20,7 @@ use relit_web::Shutdown;
 use relit_web::{AccessPolicy, BodyLimit, Failure, Index, guard};
 
 /// Largest body of a request, bytes.
-const LARGEST_BODY: usize = 16 * 1024;
+const MAX_BODY: usize = 16 * 1024;
 
 /// What all requests share; each handler takes the parts that it needs.
 #[derive(Clone, FromRef)]
@@ -71,7 +71,7 @@ impl FromRef<App> for Index {
 impl FromRef<App> for BodyLimit {
     fn from_ref(app: &App) -> Self {
         Self {
-            bytes: LARGEST_BODY,
+            bytes: MAX_BODY,
             time: app.limits.body,
         }
     }

@@ -17,7 +17,7 @@ use relit_web::{Failure, JsonBody, QueryParams};
 
 /// Sessions in one answer, unless asked otherwise, and at most.
 const SESSIONS: usize = 100;
-const MOST_SESSIONS: usize = 1000;
+const MAX_SESSIONS: usize = 1000;
 /// Width of a frame in the player, unless asked otherwise, and what can be asked for; pixels.
 const WIDTH: u32 = 960;
 const WIDTHS: std::ops::RangeInclusive<u32> = 64..=1920;
@@ -41,7 +41,7 @@ pub(super) async fn list(
     State(permits): State<Arc<Permits>>,
     QueryParams(Part { before, limit, day }): QueryParams<Part>,
 ) -> Result<Json<Vec<SessionSummary>>, Failure> {
-    let most = limit.unwrap_or(SESSIONS).min(MOST_SESSIONS);
+    let most = limit.unwrap_or(SESSIONS).min(MAX_SESSIONS);
     let list = permits.run(Work::Listing, move || {
         library.list(before.as_deref(), day.as_deref(), most)
     });

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::text::unmarked;
 
 /// Largest plausible angle, degrees: some thousands of turns in either direction.
-const MOST_DEGREES: f64 = 1e6;
+const MAX_DEGREES: f64 = 1e6;
 
 /// One frame as it was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -102,7 +102,7 @@ impl FrameIndex {
             .filter(|entry| entry.angle_deg.is_none())
         {
             let found = angle(entry.t_us);
-            entry.angle_deg = found.filter(|angle| (-MOST_DEGREES..=MOST_DEGREES).contains(angle));
+            entry.angle_deg = found.filter(|angle| (-MAX_DEGREES..=MAX_DEGREES).contains(angle));
             any |= entry.angle_deg.is_some();
         }
         any
@@ -115,7 +115,7 @@ impl FrameIndex {
     pub fn push(&mut self, entry: FrameEntry) -> Result<(), String> {
         let (n, sequence, t_us) = (entry.n, entry.sequence, entry.t_us);
         let expected = self.entries.len() as u64;
-        let reaches = |angle: &f64| (-MOST_DEGREES..=MOST_DEGREES).contains(angle);
+        let reaches = |angle: &f64| (-MAX_DEGREES..=MAX_DEGREES).contains(angle);
         let last = self.entries.last();
         let what = if n != expected {
             format!("says n = {n}, but {expected} was expected")

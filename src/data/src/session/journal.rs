@@ -15,7 +15,7 @@ use crate::turn_motion::{JournaledReport, JournaledTurn};
 /// Name of the journal in a session folder.
 pub const JOURNAL_FILE: &str = "turn.jsonl";
 /// Most reports of one turn: an hour at 15 a second.
-const MOST_REPORTS: usize = 54_000;
+const MAX_REPORTS: usize = 54_000;
 
 /// A turn, and what the table reported of it so far.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +36,7 @@ impl TurnJournal {
         let reports = lines.map_while(|line| serde_json::from_slice(line).ok());
         Some(Self {
             turn,
-            reports: reports.take(MOST_REPORTS).collect(),
+            reports: reports.take(MAX_REPORTS).collect(),
         })
     }
 
@@ -77,7 +77,7 @@ impl JournalWriter {
 
     /// Adds a report. Those beyond the limit are left out.
     pub(super) fn add(&mut self, report: JournaledReport) -> io::Result<()> {
-        if self.journal.reports.len() < MOST_REPORTS {
+        if self.journal.reports.len() < MAX_REPORTS {
             self.append(&report)?;
             self.journal.reports.push(report);
         }

@@ -11,7 +11,7 @@ use super::{
 use crate::file_names::{composed, is_hidden, is_video};
 
 /// The longest name of a recording that is made from a file name, bytes.
-const LONGEST_ID: usize = 120;
+const MAX_ID_LENGTH: usize = 120;
 
 /// What a folder has that is a data set.
 const DATASET_FILE: &str = "dataset.json";
@@ -287,7 +287,7 @@ fn name_from(name: Option<&OsStr>) -> String {
             }
         })
         .collect();
-    while id.len() > LONGEST_ID {
+    while id.len() > MAX_ID_LENGTH {
         id.pop();
     }
     let kept = id.trim_end_matches('.').len();
@@ -297,7 +297,7 @@ fn name_from(name: Option<&OsStr>) -> String {
     }
     // It is empty, hidden, or the name of a device.
     let mut id = format!("_{}", id.trim_start_matches('.'));
-    while id.len() > LONGEST_ID {
+    while id.len() > MAX_ID_LENGTH {
         id.pop();
     }
     id

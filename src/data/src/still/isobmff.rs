@@ -4,7 +4,7 @@ use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage};
 
 /// Boxes of one file are no more.
-const MOST_BOXES: usize = 4096;
+const MAX_BOXES: usize = 4096;
 
 /// The orientation for display; none where the picture stands as it is stored, or the file cannot be read.
 pub(crate) fn orientation(bytes: &[u8]) -> Option<Orientation> {
@@ -66,7 +66,7 @@ fn boxes(mut rest: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
         rest = &rest[length..];
         Some((kind, content))
     };
-    std::iter::from_fn(next).take(MOST_BOXES)
+    std::iter::from_fn(next).take(MAX_BOXES)
 }
 
 fn find<'a>(bytes: &'a [u8], wanted: &[u8; 4]) -> Option<&'a [u8]> {

@@ -10,7 +10,7 @@ use crate::still::decode::reserve;
 use crate::still::{ColourError, StillError};
 
 /// Headers are no longer.
-const LONGEST_HEADER: usize = 65_536;
+const MAX_HEADER_LENGTH: usize = 65_536;
 
 /// What a header says.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,7 +87,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
 
 impl Header {
     fn read(bytes: &[u8]) -> Option<Self> {
-        let head = &bytes[..bytes.len().min(LONGEST_HEADER)];
+        let head = &bytes[..bytes.len().min(MAX_HEADER_LENGTH)];
         let (mut primaries, mut is_xyz, mut gains) = (None, false, [1.0; 3]);
         let mut at = 0;
         loop {

@@ -10,21 +10,21 @@ use super::structure::{Gradients, cubic};
 use super::template::{Template, TemplatePixel};
 
 /// Steps; fewer where it stands still.
-const MOST_STEPS: usize = 8;
+const MAX_STEPS: usize = 8;
 /// Largest step, pixels: beyond, the first order does not hold.
-const LONGEST_STEP: f64 = 1.0;
+const MAX_STEP: f64 = 1.0;
 /// Deviations at which a pixel's weight is a quarter.
 const OUTLIER: f32 = 1.5;
 /// The same for a rotation or growth, which the shift leaves in the residuals.
 const FAR_OUTLIER: f32 = 6.0;
 /// Fewest pixels from which a shift is measured.
-const LEAST_PIXELS: usize = 60;
+const MIN_PIXELS: usize = 60;
 /// Pixels from which a rotation and a growth are measured.
 const SIMILARITY_PIXELS: usize = 3000;
 /// Pixels that are looked at in a search.
 const SEARCH_PIXELS: usize = 1000;
 /// The object has structure in one direction only if the other has less than this part of its weight.
-const LEAST_CROSS: f64 = 1e-3;
+const MIN_CROSS: f64 = 1e-3;
 
 /// A shift that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,14 +77,14 @@ impl Template {
     ) -> Option<Fit> {
         let mut shift = start;
         let mut sums = self.sums(frame, shift);
-        for step in 1..=MOST_STEPS {
+        for step in 1..=MAX_STEPS {
             let [dx, dy] = sums.step()?;
             shift = [shift[0] - dx, shift[1] - dy];
             if shift[0].abs().max(shift[1].abs()) > reach {
                 return None;
             }
             // So small a last step changes nothing that the sums say.
-            if dx.abs().max(dy.abs()) < still || step == MOST_STEPS {
+            if dx.abs().max(dy.abs()) < still || step == MAX_STEPS {
                 break;
             }
             sums = self.sums(frame, shift);
@@ -259,7 +259,7 @@ impl Sums {
         let [xx, xy, yy, ..] = self.terms;
         let determinant = xx * yy - xy * xy;
         let size = xx + yy;
-        let enough = self.count >= LEAST_PIXELS && determinant > LEAST_CROSS * size * size;
+        let enough = self.count >= MIN_PIXELS && determinant > MIN_CROSS * size * size;
         enough.then_some(([xx, xy, yy], determinant))
     }
 
@@ -269,7 +269,7 @@ impl Sums {
         let [_, _, _, right, down, ..] = self.terms;
         let dx = (yy * right - xy * down) / determinant;
         let dy = (xx * down - xy * right) / determinant;
-        Some([dx, dy].map(|step| step.clamp(-LONGEST_STEP, LONGEST_STEP)))
+        Some([dx, dy].map(|step| step.clamp(-MAX_STEP, MAX_STEP)))
     }
 
     /// The standard deviation of the shift: the "sandwich" of the normal matrix and the scatter of the right side

@@ -31,15 +31,15 @@ use template::Template;
 /// A fit whose correlation is less is none.
 const MIN_CONFIDENCE: f64 = 0.3;
 /// Nor is one of less than this share of the turn's median: a part of an object that is turned fits somewhere, too.
-const LEAST_OF_MEDIAN: f64 = 0.6;
+const MIN_OF_MEDIAN: f64 = 0.6;
 /// Larger crops are halved until their longer side is at most this, pixels: what is gained beyond is little.
 const FINEST_SIDE: u32 = 640;
 /// Pictures are halved until their longer side is at most this, pixels.
 const COARSEST_SIDE: u32 = 128;
 /// Fewest pixels of the object at the coarsest scale.
-const LEAST_PIXELS: usize = 150;
+const MIN_PIXELS: usize = 150;
 /// Largest number of scales.
-const MOST_SCALES: usize = 6;
+const MAX_SCALES: usize = 6;
 /// Pixels at the object's outline that are left out, at the finest and at the other scales.
 const OUTLINE: [usize; 2] = [2, 1];
 /// Source pixels by which the mask's frame may lie beside the turn's middle and still be taken to lie there: as exactly as one
@@ -225,7 +225,7 @@ impl Aligner {
         let usable = found.get(reference)?.shift.is_some();
         let registered = found.iter().filter(|found| found.shift.is_some());
         let usual = middle(registered.map(|found| found.confidence).collect());
-        aligner.least_confidence = MIN_CONFIDENCE.max(LEAST_OF_MEDIAN * usual);
+        aligner.least_confidence = MIN_CONFIDENCE.max(MIN_OF_MEDIAN * usual);
         aligner.motion = Motion::of(&found, reference);
         usable.then_some(aligner)
     }
@@ -478,12 +478,12 @@ fn scales(mask: &GrayImage) -> Vec<Vec<bool>> {
     let full = |mask: &GrayImage| mask.as_raw().iter().map(|&m| m != 0).collect();
     let mut scales: Vec<Vec<bool>> = vec![eroded(full(mask), mask.dimensions(), OUTLINE[0])];
     let mut image = mask.clone();
-    while image.width().max(image.height()) > COARSEST_SIDE && scales.len() < MOST_SCALES {
+    while image.width().max(image.height()) > COARSEST_SIDE && scales.len() < MAX_SCALES {
         image = halved(&image);
         // Only what was object in all four pixels.
         let whole = image.as_raw().iter().map(|&m| m == 255).collect();
         let inner = eroded(whole, image.dimensions(), OUTLINE[1]);
-        if inner.iter().filter(|&&inside| inside).count() < LEAST_PIXELS {
+        if inner.iter().filter(|&&inside| inside).count() < MIN_PIXELS {
             break;
         }
         scales.push(inner);

@@ -12,7 +12,7 @@ use super::median::{LANES, Medians};
 use super::structure::{Plane, add_scaled, cubic};
 
 /// Pixels of a template; those that say most about a shift are kept.
-const MOST_PIXELS: usize = 4_000;
+const MAX_PIXELS: usize = 4_000;
 /// Side of the squares in whose order the pixels stand, so that neighbours are near each other.
 const TILE: u32 = 24;
 /// Rows of a template that a thread makes at a time.
@@ -104,15 +104,15 @@ fn information(pixel: &TemplatePixel) -> f32 {
 }
 
 fn keep_most_telling(pixels: &mut Vec<TemplatePixel>) {
-    if pixels.len() <= MOST_PIXELS {
+    if pixels.len() <= MAX_PIXELS {
         return;
     }
-    pixels.select_nth_unstable_by(MOST_PIXELS, |a, b| {
+    pixels.select_nth_unstable_by(MAX_PIXELS, |a, b| {
         information(b)
             .total_cmp(&information(a))
             .then((a.y, a.x).cmp(&(b.y, b.x)))
     });
-    pixels.truncate(MOST_PIXELS);
+    pixels.truncate(MAX_PIXELS);
 }
 
 /// Rows that are made together: of those above and below, which both need, few are made twice.

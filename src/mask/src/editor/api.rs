@@ -49,7 +49,7 @@ pub(super) const BODY: BodyLimit = BodyLimit {
     time: Duration::from_secs(20),
 };
 /// Widest picture of a frame that can be asked for, pixels.
-const WIDEST: u32 = 8192;
+const MAX_WIDTH: u32 = 8192;
 
 /// The record of the mask that was written.
 pub(super) type Accepted = Arc<Mutex<Option<MaskRecord>>>;
@@ -126,7 +126,7 @@ async fn frame(
     Path(number): Path<u64>,
     QueryParams(Width { width }): QueryParams<Width>,
 ) -> Result<Response, Failure> {
-    let width = width.unwrap_or(WIDEST).clamp(1, WIDEST);
+    let width = width.unwrap_or(MAX_WIDTH).clamp(1, MAX_WIDTH);
     let jpeg = app.work(move |session| session.jpeg(number, width)).await?;
     let headers = [
         (header::CONTENT_TYPE, "image/jpeg"),

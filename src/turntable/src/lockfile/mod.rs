@@ -21,7 +21,7 @@ const ROOT_LOCK: &str = ".relit-capture.lock";
 /// Where each account has a folder of its own; the second where there is no first.
 const PRIVATE_BASES: [&str; 2] = ["/run/lock", "/tmp"];
 /// Longest content that is read, bytes.
-const LONGEST: u64 = 20;
+const MAX_LENGTH: u64 = 20;
 
 /// Why a lock was not taken or could not be checked.
 #[derive(Debug, thiserror::Error)]
@@ -210,7 +210,7 @@ fn open(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
 
 fn pid_in(file: &File) -> Option<u32> {
     let mut text = String::new();
-    file.take(LONGEST).read_to_string(&mut text).ok()?;
+    file.take(MAX_LENGTH).read_to_string(&mut text).ok()?;
     text.trim().parse().ok()
 }
 

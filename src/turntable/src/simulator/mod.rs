@@ -135,15 +135,15 @@ impl Drop for Simulator {
 
 /// The thread: transfers bytes between table and pseudoterminal.
 fn carry(clock: &Clock, table: &SimulatedTable, mut terminal: Terminal, stop: &AtomicBool) {
-    const LARGEST: usize = 4096;
-    let mut buffer = [0; LARGEST];
+    const MAX_CHUNK: usize = 4096;
+    let mut buffer = [0; MAX_CHUNK];
     while !stop.load(Ordering::Relaxed) {
         let now_us = clock.now_us();
         let mut model = table.model();
         for _ in 0..terminal.opened() {
             model.open(now_us);
         }
-        let capacity = model.capacity().min(LARGEST);
+        let capacity = model.capacity().min(MAX_CHUNK);
         let received = terminal.read(buffer.get_mut(..capacity).unwrap_or_default());
         model.receive(now_us, received);
         let output = model.take_output(now_us, usize::MAX);

@@ -11,7 +11,7 @@ pub(super) const BYTE_TICKS: u64 = 174;
 /// Ticks per second.
 const TICKS_PER_SECOND: f64 = 2e6;
 /// Longest line that can be repeated, bytes.
-const LONGEST_LINE: usize = 256;
+const MAX_LINE_LENGTH: usize = 256;
 
 /// A byte with the tick at which its transmission ends.
 pub(super) type Timed = (u64, u8);
@@ -93,7 +93,7 @@ impl Wire {
             if self.random.hits(self.faults.duplicate) {
                 line.iter().for_each(|&byte| self.pass(byte, out));
             }
-        } else if self.line.len() >= LONGEST_LINE {
+        } else if self.line.len() >= MAX_LINE_LENGTH {
             self.line.clear();
         }
     }

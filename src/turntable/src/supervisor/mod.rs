@@ -28,7 +28,7 @@ const WANTED_POLL_US: i64 = 100_000;
 /// What the rig's firmware calls a restart that the host asked for.
 const HOST_RESET: &str = "host";
 /// Limit of recorded reports: an hour at 15 per second.
-const MOST_RECORDED: usize = 54_000;
+const MAX_RECORDED: usize = 54_000;
 
 /// The state of one table, and the wire to it.
 #[derive(Debug)]
@@ -377,7 +377,7 @@ impl Supervisor {
         self.last_report = Some(report);
         self.note_alarm(&report);
         if let Some(recorded) = &mut self.recorded
-            && recorded.len() < MOST_RECORDED
+            && recorded.len() < MAX_RECORDED
         {
             recorded.push(report);
         }

@@ -18,18 +18,18 @@ use super::wire::ControllerState;
 use line::{Fit, Line};
 
 /// Minimum number of reports.
-const LEAST_POLLS: usize = 12;
+const MIN_POLLS: usize = 12;
 /// Minimum number of reports of a turn that was interrupted.
-const LEAST_OF_PART: usize = 3;
+const MIN_OF_PART: usize = 3;
 /// Over a shorter time, microseconds, the planned speed is nearer to the truth than a measured one.
 const SHORT_US: f64 = 2e6;
 /// Minimum fraction of the angle at constant speed that the reports cover.
-const LEAST_COVER: f64 = 0.8;
+const MIN_COVER: f64 = 0.8;
 /// Largest fraction of outliers.
-const MOST_OUTLIERS: f64 = 0.25;
+const MAX_OUTLIERS: f64 = 0.25;
 /// Largest relative error of the chip's clock and of the speed: ceramic resonators are accurate to
 /// half a per cent.
-const MOST_OFF: f64 = 0.03;
+const MAX_OFF: f64 = 0.03;
 /// The turn is divided into so many parts, and the fastest answers of each are used.
 const PARTS: usize = 10;
 /// One in so many answers of a part counts as one of the fastest.
@@ -122,13 +122,13 @@ impl Track {
     fn of_part(reports: &[JournaledReport], expected: &JournaledTurn) -> Result<Self, String> {
         let points = points(reports, expected);
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
-            return Err(too_few(&points, LEAST_OF_PART));
+            return Err(too_few(&points, MIN_OF_PART));
         };
-        if points.len() < LEAST_OF_PART {
-            return Err(too_few(&points, LEAST_OF_PART));
+        if points.len() < MIN_OF_PART {
+            return Err(too_few(&points, MIN_OF_PART));
         }
         let until_us = last.asked_us;
-        let is_short = last.asked_us - first.asked_us < SHORT_US || points.len() < LEAST_POLLS;
+        let is_short = last.asked_us - first.asked_us < SHORT_US || points.len() < MIN_POLLS;
         let fitted = if is_short {
             by_the_plan(&points, expected)
         } else {
@@ -196,12 +196,12 @@ fn checked_track(
     expected: &JournaledTurn,
     fitted: &Fitted,
 ) -> Result<Track, String> {
-    if fitted.outliers as f64 > points.len() as f64 * MOST_OUTLIERS {
+    if fitted.outliers as f64 > points.len() as f64 * MAX_OUTLIERS {
         return Err(uneven(fitted.outliers, points.len()));
     }
     let measured = fitted.line.slope * 1e6;
     let planned = expected.degrees_per_second * sign(expected);
-    if (measured / planned - 1.0).abs() > MOST_OFF {
+    if (measured / planned - 1.0).abs() > MAX_OFF {
         return Err(format!(
             "the table turned at {measured:.4} degrees/s instead of {planned:.4}: check $100, $110 and the microsteps"
         ));
@@ -235,13 +235,13 @@ fn too_few(points: &[Point], needed: usize) -> String {
 }
 
 fn enough(points: &[Point], expected: &JournaledTurn) -> Result<(), String> {
-    if points.len() < LEAST_POLLS {
-        return Err(too_few(points, LEAST_POLLS));
+    if points.len() < MIN_POLLS {
+        return Err(too_few(points, MIN_POLLS));
     }
     let angles = || points.iter().map(|point| point.angle_deg);
     let covered = angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min);
     let cover = covered / (expected.to_deg - expected.from_deg).abs();
-    if cover < LEAST_COVER {
+    if cover < MIN_COVER {
         return Err(format!(
             "the reports cover {:.0} % of the part at constant speed: check the serial line",
             cover * 100.0
@@ -303,7 +303,7 @@ fn by_the_chip(points: &[Point], expected: &JournaledTurn) -> Result<Fitted, Str
         .collect();
     let clocks = line::robust(&host, CLOCK_FLOOR_US);
     let factor = clocks.line.slope.recip();
-    if !(1.0 - MOST_OFF..=1.0 + MOST_OFF).contains(&factor) {
+    if !(1.0 - MAX_OFF..=1.0 + MAX_OFF).contains(&factor) {
         return Err(format!(
             "the controller's clock runs {factor:.4} times as fast as the host's: its firmware is made for another crystal"
         ));

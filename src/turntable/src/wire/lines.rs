@@ -1,7 +1,7 @@
 //! Assembles lines from bytes, each with the arrival time of its first byte.
 
 /// Longest accepted line, bytes: a report of grblHAL with six axes and all its fields is shorter.
-const LONGEST: usize = 512;
+const MAX_LENGTH: usize = 512;
 
 /// The result of a line end.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl LineReader {
         if self.bytes.is_empty() && !self.is_noise {
             self.first_us = now_us;
         }
-        if !(b' '..=b'~').contains(&byte) || self.bytes.len() == LONGEST {
+        if !(b' '..=b'~').contains(&byte) || self.bytes.len() == MAX_LENGTH {
             self.is_noise = true;
         } else {
             self.bytes.push(byte);
@@ -82,7 +82,7 @@ mod tests {
     fn a_line_with_foreign_bytes_or_without_end_is_noise_as_a_whole() {
         let mut reader = LineReader::default();
         assert_eq!(read(&mut reader, 0, b"o\xffk\r\n"), [Piece::Noise]);
-        assert_eq!(read(&mut reader, 0, &[b'x'; LONGEST + 1]), []);
+        assert_eq!(read(&mut reader, 0, &[b'x'; MAX_LENGTH + 1]), []);
         assert_eq!(read(&mut reader, 0, b"\n\n"), [Piece::Noise]);
     }
 }

@@ -11,7 +11,7 @@ use super::polling::Polling;
 use super::realtime;
 
 /// Longest block, bytes: with number and checksum it fits into Grbl's line buffer of 80.
-const LONGEST_BLOCK: usize = 60;
+const MAX_BLOCK_LENGTH: usize = 60;
 /// Largest number of a checked line.
 const LAST_SEQ: u32 = 9_999_999;
 /// Number of consecutive well-formed lines without checksum that show that the controller has left
@@ -88,7 +88,7 @@ impl Machine {
         timeout: ReplyTimeout,
     ) -> Result<u64, SendError> {
         let plain = |b: u8| (b' '..=b'~').contains(&b) && !matches!(b, b'?' | b'!' | b'~' | b'*');
-        if block.len() > LONGEST_BLOCK || !block.bytes().all(plain) {
+        if block.len() > MAX_BLOCK_LENGTH || !block.bytes().all(plain) {
             return Err(SendError::Unsendable);
         }
         match self.session {

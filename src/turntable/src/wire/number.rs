@@ -1,14 +1,14 @@
 //! Numbers as Grbl writes them: digits, perhaps a sign and a point, no exponent.
 
 /// Longest accepted number: more digits are noise.
-pub(super) const LONGEST: usize = 16;
+pub(super) const MAX_LENGTH: usize = 16;
 
 /// A decimal number such as `-12.345`.
 pub(super) fn decimal(text: &str) -> Option<f64> {
     let digits = text.strip_prefix('-').unwrap_or(text);
     let (whole, fraction) = digits.split_once('.').unwrap_or((digits, "0"));
     let usable = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
-    if text.len() > LONGEST || !usable(whole) || !usable(fraction) {
+    if text.len() > MAX_LENGTH || !usable(whole) || !usable(fraction) {
         return None;
     }
     text.parse().ok()

@@ -32,7 +32,7 @@ pub struct Panorama {
 }
 
 /// Files of fewer rows are no panoramas.
-const LEAST_HEIGHT: usize = 4;
+const MIN_HEIGHT: usize = 4;
 
 impl Panorama {
     /// The panorama that an image of radiance shows.
@@ -67,9 +67,9 @@ impl Panorama {
             return Err(wrong(fault.to_owned()));
         }
         let Extent { width, height } = image.stored().planes.extent();
-        if width != 2 * height || height < LEAST_HEIGHT {
+        if width != 2 * height || height < MIN_HEIGHT {
             return Err(wrong(format!(
-                "has {width} x {height} pixels; a panorama is twice as wide as high, and at least {LEAST_HEIGHT} pixels high"
+                "has {width} x {height} pixels; a panorama is twice as wide as high, and at least {MIN_HEIGHT} pixels high"
             )));
         }
         Self::new(image.into_light()).map_err(|error| wrong(format!("is no panorama: {error}")))

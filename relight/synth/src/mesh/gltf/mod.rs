@@ -19,7 +19,7 @@ use glam::{Mat4, Vec2, Vec3};
 use self::document::{Node, Primitive};
 use self::file::{File, not_read};
 use super::raw::{RawMesh, RawTriangle};
-use super::{MOST_TRIANGLES, too_large};
+use super::{MAX_TRIANGLES, too_large};
 
 /// Kinds of primitives.
 const TRIANGLES: u32 = 4;
@@ -103,7 +103,7 @@ impl Reader<'_> {
     /// Adds triangles of vertices from `first` on, with what the part says of their corners.
     fn push(&mut self, part: &Primitive, first: u32, triangles: &[[u32; 3]]) -> Result<(), String> {
         let count = self.raw.triangles.len() + triangles.len();
-        if count > MOST_TRIANGLES {
+        if count > MAX_TRIANGLES {
             return Err(too_large(count));
         }
         let material = part

@@ -5,7 +5,7 @@ use glam::{Mat4, Quat, Vec3};
 use super::document::{Document, Node};
 
 /// Most nodes that are visited; more are a circle.
-const MOST_NODES: usize = 100_000;
+const MAX_NODES: usize = 100_000;
 
 /// The nodes of the default scene in its order, each with its placement.
 pub(super) fn placed(document: &Document) -> Result<Vec<(&Node, Mat4)>, String> {
@@ -17,7 +17,7 @@ pub(super) fn placed(document: &Document) -> Result<Vec<(&Node, Mat4)>, String> 
     while let Some((number, parent)) = waiting.pop() {
         let node = document.nodes.get(number);
         let node = node.ok_or_else(|| format!("it names node {number} of {count}"))?;
-        if placed.len() + waiting.len() + node.children.len() > MOST_NODES {
+        if placed.len() + waiting.len() + node.children.len() > MAX_NODES {
             return Err("its nodes go in a circle, or there are too many".to_owned());
         }
         let place = parent * local(node);

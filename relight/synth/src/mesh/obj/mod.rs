@@ -22,7 +22,7 @@ use crate::texture::{PictureKind, TextureImage};
 const NO_MATERIAL: [&str; 3] = ["", "none", "(null)"];
 
 /// Most files of materials that one statement may be read as.
-const MOST_LIBRARIES: usize = 32;
+const MAX_LIBRARIES: usize = 32;
 
 /// All parts of the file as one surface, with the materials of the `.mtl` files that it names.
 pub(super) fn parsed(path: &Path, bytes: &[u8]) -> Result<RawMesh, String> {
@@ -380,7 +380,7 @@ fn split(mesh: &Path, named: &str) -> Vec<Result<PathBuf, String>> {
                 .ends_with(".mtl")
         };
         let ends = spaces.map(|(at, _)| at).filter(is_name);
-        let ends: Vec<usize> = ends.take(MOST_LIBRARIES).chain([rest.len()]).collect();
+        let ends: Vec<usize> = ends.take(MAX_LIBRARIES).chain([rest.len()]).collect();
         let there = |&end: &usize| Some((end, by_name(mesh, &unquoted(&rest[..end]))?));
         let (end, library) = match ends.iter().rev().find_map(there) {
             Some((end, path)) => (end, Ok(path)),

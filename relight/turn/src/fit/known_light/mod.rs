@@ -32,7 +32,7 @@ const REFINED: i32 = 2;
 /// Distance between blurs that are tried around the best, radians. By hand.
 const BLUR_STEP: f64 = 0.15;
 /// Largest smoothness of gloss: sharper lobes look alike in a light of order 6. By hand.
-const MOST_SMOOTHNESS: f64 = 200.0;
+const MAX_SMOOTHNESS: f64 = 200.0;
 /// Rounds of robust weights. By hand.
 const ROBUST_ROUNDS: usize = 3;
 /// Quantile of the distances that measures the spread of albedos. By hand: spots of another colour count, a few
@@ -185,7 +185,7 @@ impl Finish {
         };
         // A half vector is off by half of what the light is.
         let smoothness = 4.0 / lobe.blur.powi(2);
-        (lobe.strength > 0.0).then(|| FoundGloss::new(part, smoothness.min(MOST_SMOOTHNESS)))
+        (lobe.strength > 0.0).then(|| FoundGloss::new(part, smoothness.min(MAX_SMOOTHNESS)))
     }
 }
 

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use relight_core::light::NormalEquations;
 use relight_core::statistics::median;
-use relit_data::turn_light::LEAST_MODULATION;
+use relit_data::turn_light::MIN_MODULATION;
 use serde::Serialize;
 
 use crate::model::directions::half_sphere;
@@ -14,20 +14,20 @@ use crate::observe::verdict::TurnVerdict;
 
 /// Largest share of the variation beyond the second harmonic, 0 to 1. By hand: above it the modulation is not that
 /// of a Lambertian surface.
-const MOST_BEYOND: f64 = 0.3;
+const MAX_BEYOND: f64 = 0.3;
 /// Least share of the pixels whose curves can be used, 0 to 1; with fewer the exposure was wrong. By hand.
-const LEAST_OBSERVABLE: f64 = 0.1;
+const MIN_OBSERVABLE: f64 = 0.1;
 /// Least mean light of a pixel that can be used, linear, of the three channels together. By hand: what is less is
 /// black.
-const LEAST_LIGHT: f64 = 1e-5;
+const MIN_LIGHT: f64 = 1e-5;
 /// Normals on which the modulation of a given light is measured. By hand.
 const NORMALS: usize = 100;
 /// Least coverage of a turn in unknown light, degrees. By hand: the network has seen gaps of up to 18 degrees, and up to
 /// three of them.
-const LEAST_COVERAGE_DEG: f64 = 330.0;
+const MIN_COVERAGE_DEG: f64 = 330.0;
 /// Largest median of the errors that are expected in unknown light, degrees. Measured: of 15 synthetic turns those below are off
 /// by 7 to 14 degrees, and those above by 14 to 22 (docs/results/turns.md).
-const MOST_EXPECTED_DEG: f64 = 15.0;
+const MAX_EXPECTED_DEG: f64 = 15.0;
 
 /// How well the light of the turn determines normals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -62,15 +62,15 @@ impl Conditioning {
         let clipped = pixels
             .iter()
             .filter(|observable| matches!(observable, PixelLight::Clipped));
-        let verdict = if (observable as f64) < LEAST_OBSERVABLE * pixels.len() as f64 {
+        let verdict = if (observable as f64) < MIN_OBSERVABLE * pixels.len() as f64 {
             if 2 * clipped.count() >= pixels.len() - observable {
                 TurnVerdict::Overexposed
             } else {
                 TurnVerdict::Underexposed
             }
-        } else if modulation < LEAST_MODULATION {
+        } else if modulation < MIN_MODULATION {
             TurnVerdict::TooEven
-        } else if beyond > MOST_BEYOND {
+        } else if beyond > MAX_BEYOND {
             TurnVerdict::NotLambertian
         } else {
             TurnVerdict::Good
@@ -87,9 +87,9 @@ impl Conditioning {
     /// The same in a light that is not known, where the network of turns expects such an error of its normals, degrees, the
     /// median.
     pub(crate) fn by_network(self, expected_error_deg: f64) -> Self {
-        let verdict = if self.coverage_deg < LEAST_COVERAGE_DEG {
+        let verdict = if self.coverage_deg < MIN_COVERAGE_DEG {
             TurnVerdict::PartOfTurn
-        } else if expected_error_deg > MOST_EXPECTED_DEG {
+        } else if expected_error_deg > MAX_EXPECTED_DEG {
             TurnVerdict::Uncertain
         } else {
             TurnVerdict::Good
@@ -100,7 +100,7 @@ impl Conditioning {
     /// Whether a light was given that is too even while the turn is not.
     pub(crate) fn is_given_at_odds(&self) -> bool {
         let given = self.given_modulation;
-        given.is_some_and(|given| given < LEAST_MODULATION) && self.modulation >= LEAST_MODULATION
+        given.is_some_and(|given| given < MIN_MODULATION) && self.modulation >= MIN_MODULATION
     }
 
     /// The same where the light was given, as an object shows it in this environment that blurs nothing: one that is
@@ -125,7 +125,7 @@ impl Conditioning {
             }
         });
         let modulation = median(modulations).unwrap_or(0.0);
-        let is_even = modulation < LEAST_MODULATION && self.verdict.is_fit();
+        let is_even = modulation < MIN_MODULATION && self.verdict.is_fit();
         Self {
             given_modulation: Some(modulation),
             verdict: if is_even {
@@ -175,7 +175,7 @@ fn of_pixel(curves: &TurnCurves, pixel: usize) -> PixelLight {
     }
     let harmonics: f64 = solution[1..].iter().map(|value| value * value).sum();
     let constant = solution[0];
-    if constant <= LEAST_LIGHT {
+    if constant <= MIN_LIGHT {
         return PixelLight::Black;
     }
     PixelLight::Curve {

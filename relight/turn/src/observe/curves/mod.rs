@@ -17,9 +17,9 @@ const PARTS: usize = 72;
 const CLIPPED_VALUE: f32 = SATURATED_VALUE;
 /// Least share of the frames of a part, 0 to 1, in which a channel is not clipped. By hand: the mean of fewer would
 /// be that of the darker ones.
-const LEAST_UNCLIPPED: f32 = 0.95;
+const MIN_UNCLIPPED: f32 = 0.95;
 /// Least number of parts with frames. Derived: five Fourier coefficients of a Lambertian curve, and three to spare.
-const LEAST_PARTS: usize = 8;
+const MIN_PARTS: usize = 8;
 /// Least gap between parts with frames that is not covered, in usual gaps. By hand.
 const HOLE: f64 = 3.0;
 
@@ -130,9 +130,9 @@ impl CurveBuilder {
     /// Where the frames do not tell two harmonics.
     pub(crate) fn finish(self) -> Result<TurnCurves, TurnError> {
         let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
-        if seen.len() < LEAST_PARTS {
+        if seen.len() < MIN_PARTS {
             return Err(TurnError::Refused(format!(
-                "{} different angles were found: five terms a pixel need at least {LEAST_PARTS}, spread over the turn",
+                "{} different angles were found: five terms a pixel need at least {MIN_PARTS}, spread over the turn",
                 seen.len()
             )));
         }
@@ -150,7 +150,7 @@ impl CurveBuilder {
             .map(|cell| {
                 let frames = self.parts[cell % PARTS].frames as f32;
                 self.counts[cell].map(|count| {
-                    let is_seen = f32::from(count) >= LEAST_UNCLIPPED * frames;
+                    let is_seen = f32::from(count) >= MIN_UNCLIPPED * frames;
                     f32::from(u8::from(is_seen))
                 })
             })

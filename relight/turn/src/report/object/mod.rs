@@ -14,7 +14,7 @@ use crate::observe::reading::ReadTurn;
 /// What a pixel beside another one contributes to its coverage, over the pixel itself. By hand: a deviation of 0.6 pixels.
 const EDGE: f32 = 0.25;
 /// Coverage below which a pixel is not part of the object, 0 to 1. By hand.
-const LEAST_ALPHA: f32 = 0.02;
+const MIN_ALPHA: f32 = 0.02;
 
 impl TurnSolution {
     /// The object as the render layers take it, with its gloss. Metal is black with a gloss
@@ -97,7 +97,7 @@ fn softened(mask: &Planes<1>) -> Planes<1> {
             }
         }
         let alpha = sum / weights;
-        [if alpha < LEAST_ALPHA { 0.0 } else { alpha }]
+        [if alpha < MIN_ALPHA { 0.0 } else { alpha }]
     })
 }
 

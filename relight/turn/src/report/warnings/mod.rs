@@ -7,7 +7,7 @@ use crate::model::frame::FactSource;
 use crate::solving::SolvedTurn;
 
 /// Residual of a given light, over the energy of the variation, from which it is not that of the turn. By hand.
-const MOST_RESIDUAL: f64 = 0.4;
+const MAX_RESIDUAL: f64 = 0.4;
 
 impl SolvedTurn {
     /// What a user should know of it.
@@ -32,7 +32,7 @@ impl SolvedTurn {
         warnings.extend(self.turn.damage.iter().cloned());
         warnings.extend(self.solution.verdict().advice().map(str::to_owned));
         let residual = self.solution.residual();
-        let is_bad = residual > MOST_RESIDUAL || residual.is_nan();
+        let is_bad = residual > MAX_RESIDUAL || residual.is_nan();
         if self.solution.conditioning.is_given_at_odds() {
             let odd = "the light that was given hardly changes over the turn, but what the object shows does: \
                        it is not the light of this turn";

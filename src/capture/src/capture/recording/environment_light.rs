@@ -10,7 +10,7 @@ use relit_video::{LiveDecoder, PixelFormat, StreamFormat, is_key};
 /// Blocks across and down the middle of the picture, where the object stands.
 const BLOCKS: u32 = 12;
 /// Most frames that are kept. When there are more, every other one is forgotten.
-const MOST_FRAMES: usize = 64;
+const MAX_FRAMES: usize = 64;
 /// From one frame that is looked at to the next, at first.
 const FIRST_STEP: usize = 8;
 
@@ -57,7 +57,7 @@ impl EnvironmentLight {
         let blocks = self.blocks(&rgb);
         self.samples.push(Sample { frame, blocks });
         self.next = frame + self.every;
-        if self.samples.len() >= MOST_FRAMES {
+        if self.samples.len() >= MAX_FRAMES {
             let mut keep = false;
             self.samples.retain(|_| {
                 keep = !keep;
@@ -156,7 +156,7 @@ mod tests {
         for frame in 0..5000 {
             light.add(frame, &[100; (SIDE * SIDE) as usize]);
         }
-        assert!((MOST_FRAMES / 2..MOST_FRAMES).contains(&light.samples.len()));
+        assert!((MAX_FRAMES / 2..MAX_FRAMES).contains(&light.samples.len()));
         let steps = light.samples.windows(2);
         assert!(
             steps

@@ -14,9 +14,9 @@ use relit_data::disk::DISK_FULL;
 use relit_data::session::{Fault, FrameEntry, TurnJournal};
 
 /// Largest angle that can be right, degrees.
-const MOST_DEGREES: f64 = 1e6;
+const MAX_DEGREES: f64 = 1e6;
 /// Most faults of one kind that the manifest lists.
-const MOST_LISTED: usize = 40;
+const MAX_LISTED: usize = 40;
 
 /// A recording that has ended, and whose session is not closed yet.
 pub struct Recorded {
@@ -249,9 +249,9 @@ impl Recorded {
         };
         let mut faults = Vec::new();
         for kind in findings.chunk_by(|one, other| one.place().0 == other.place().0) {
-            faults.extend(kind.iter().take(MOST_LISTED).map(fault));
-            if kind.len() > MOST_LISTED {
-                let what = format!("and {} more of this kind", kind.len() - MOST_LISTED);
+            faults.extend(kind.iter().take(MAX_LISTED).map(fault));
+            if kind.len() > MAX_LISTED {
+                let what = format!("and {} more of this kind", kind.len() - MAX_LISTED);
                 faults.push(Fault {
                     t_us: last_us,
                     what,
@@ -290,7 +290,7 @@ fn amended(
         Some(exposure) => lead_of(delivered) + exposure,
         None => entry.n,
     };
-    let possible = |angle: &f64| (-MOST_DEGREES..=MOST_DEGREES).contains(angle);
+    let possible = |angle: &f64| (-MAX_DEGREES..=MAX_DEGREES).contains(angle);
     FrameEntry {
         sequence,
         angle_deg: angle(entry.t_us).filter(possible),

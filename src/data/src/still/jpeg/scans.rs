@@ -6,10 +6,10 @@ use super::{EOI, SOS, is_frame, segment};
 /// Coefficients of a block.
 const BLOCK: usize = 64;
 /// Pictures have no more components, and no more scans.
-const MOST_COMPONENTS: u8 = 4;
-const MOST_SCANS: usize = 100;
+const MAX_COMPONENTS: u8 = 4;
+const MAX_SCANS: usize = 100;
 /// Blocks of which it is remembered where they are not zero.
-const MOST_BLOCKS: usize = 1 << 24;
+const MAX_BLOCKS: usize = 1 << 24;
 const DHT: u8 = 0xc4;
 const DRI: u8 = 0xdd;
 /// Sequential and progressive frames with Huffman's codes.
@@ -32,7 +32,7 @@ pub(super) fn end(bytes: &[u8]) -> Option<usize> {
             }
             SOS => {
                 scans += 1;
-                if scans > MOST_SCANS {
+                if scans > MAX_SCANS {
                     return None;
                 }
                 let frame: &mut Frame = frame.as_mut()?;
@@ -101,7 +101,7 @@ impl Frame {
             )))
         };
         let size = [side(3)?, side(1)?];
-        let count = *content.get(5).filter(|&&count| count <= MOST_COMPONENTS)?;
+        let count = *content.get(5).filter(|&&count| count <= MAX_COMPONENTS)?;
         let parts = content.get(6..6 + 3 * usize::from(count))?;
         let sampling = |part: &[u8]| [usize::from(part[1] >> 4), usize::from(part[1] & 15)];
         let parts = parts.chunks_exact(3);
@@ -132,7 +132,7 @@ impl Frame {
                 stride,
                 known: vec![
                     0;
-                    if is_progressive && count <= MOST_BLOCKS {
+                    if is_progressive && count <= MAX_BLOCKS {
                         count
                     } else {
                         0

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::wire::number::LONGEST;
+use crate::wire::number::MAX_LENGTH;
 use crate::wire::{Message, StatusReport};
 
 impl fmt::Display for Message {
@@ -60,7 +60,7 @@ impl fmt::Display for StatusReport {
 /// long.
 fn shown(value: f64, digits: usize) -> String {
     let usual = format!("{value:.digits$}");
-    if usual.len() <= LONGEST && usual.parse() == Ok(value) {
+    if usual.len() <= MAX_LENGTH && usual.parse() == Ok(value) {
         usual
     } else {
         value.to_string()

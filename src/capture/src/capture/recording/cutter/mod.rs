@@ -17,7 +17,7 @@ const PRE_ROLL_US: i64 = 4_000_000;
 /// Most bytes that wait.
 const PRE_ROLL_BYTES: usize = 96 << 20;
 /// Frames from which on the measured rate is used instead of the agreed one.
-const FEWEST_FOR_RATE: usize = 30;
+const MIN_FOR_RATE: usize = 30;
 
 /// Whether decoding can begin with a frame, by its data.
 pub(super) type IsKey = fn(&[u8]) -> bool;
@@ -180,7 +180,7 @@ impl Cutter {
         let lead = all.len() - self.stamps.len();
         let timing = FrameTiming::of(&all, self.fps);
         let nominal = 1e6 / self.fps;
-        let measured = all.len() >= FEWEST_FOR_RATE;
+        let measured = all.len() >= MIN_FOR_RATE;
         let period = if measured { timing.period_us } else { nominal };
         let length = (window.to_us as f64 - window.from_us as f64) / period;
         let expected = length.round().max(1.0) as u64;

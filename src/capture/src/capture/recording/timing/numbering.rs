@@ -10,7 +10,7 @@ const CONFIRMED: f64 = 0.47;
 /// Frames on each side that outvote one whose stamp is off by a whole period.
 const VOTERS: usize = 3;
 /// Fewest stamps from which a period is found.
-const FEWEST_FOR_FIT: usize = 8;
+const MIN_FOR_FIT: usize = 8;
 
 /// Exposure numbers of the delivered frames.
 pub(super) struct Numbering {
@@ -35,7 +35,7 @@ impl Numbering {
             return Self::by_stamps(line, counted, Vec::new());
         }
         let expected = median_period(counted, times).unwrap_or(nominal);
-        let enough = times.len() >= FEWEST_FOR_FIT;
+        let enough = times.len() >= MIN_FOR_FIT;
         match PeriodFit::find(times, expected).filter(|_| enough) {
             Some(fit) => Self::reconciled(counted, times, &fit),
             None => Self::irregular(line, counted),
@@ -44,7 +44,7 @@ impl Numbering {
 
     /// Without a usable counter.
     pub(super) fn by_time(times: &[f64], nominal: f64) -> Self {
-        let fit = if times.len() >= FEWEST_FOR_FIT {
+        let fit = if times.len() >= MIN_FOR_FIT {
             PeriodFit::find(times, nominal)
         } else {
             Some(PeriodFit::of_few(times, nominal))

@@ -12,7 +12,7 @@ const RANGE: f64 = 0.025;
 /// Cycles of drift over all stamps between one period tried and the next.
 const STEP_CYCLES: f64 = 0.25;
 /// Most periods tried.
-const MOST_STEPS: f64 = 4000.0;
+const MAX_STEPS: f64 = 4000.0;
 /// Length of the mean vector from which the fit is accepted. Stamps off by up to 40 % either way
 /// give sin(0.8 pi) / (0.8 pi) = 0.234, and random ones rarely more than this.
 const CERTAIN: f64 = 0.15;
@@ -81,7 +81,7 @@ impl PeriodFit {
 fn strongest(times: &[f64], expected: f64) -> (f64, (f64, f64)) {
     let span = times.iter().fold(0.0, |most: f64, &time| most.max(time));
     let cycles = span * expected * 2.0 * RANGE;
-    let steps = (cycles / STEP_CYCLES).clamp(8.0, MOST_STEPS).round();
+    let steps = (cycles / STEP_CYCLES).clamp(8.0, MAX_STEPS).round();
     let lowest = expected * (1.0 - RANGE);
     let step = expected * 2.0 * RANGE / steps;
     // Each stamp's vector turns by the same angle from one frequency to the next.
