@@ -56,7 +56,7 @@ fn set(text: &[u8]) -> Result<Dollar, Error> {
     let Some((number, [b'=', value @ ..])) = number::digits(text, 3) else {
         return Err(Error::InvalidStatement);
     };
-    let key = Key::of(number).ok_or(Error::InvalidStatement)?;
+    let key = Key::from_number(number).ok_or(Error::InvalidStatement)?;
     match number::parse(value) {
         Some((value, [])) => Ok(Dollar::Set(key, value)),
         _ => Err(Error::BadNumber),

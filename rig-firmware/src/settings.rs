@@ -136,7 +136,7 @@ impl Key {
     }
 
     /// The setting of a number.
-    pub(crate) fn of(number: u32) -> Option<Key> {
+    pub(crate) fn from_number(number: u32) -> Option<Key> {
         Key::ALL
             .into_iter()
             .find(|key| u32::from(key.number()) == number)
@@ -300,10 +300,10 @@ mod tests {
         assert_eq!(GrblSettings::from_values(defaults.values), Some(defaults));
         for (place, key) in Key::ALL.into_iter().enumerate() {
             assert_eq!(key as usize, place);
-            assert_eq!(Key::of(u32::from(key.number())), Some(key));
+            assert_eq!(Key::from_number(u32::from(key.number())), Some(key));
         }
-        assert_eq!(Key::of(6), None);
-        assert_eq!(Key::of(256), None);
+        assert_eq!(Key::from_number(6), None);
+        assert_eq!(Key::from_number(256), None);
     }
 
     #[test]

@@ -52,7 +52,7 @@ impl Store {
         if let (Some(refused), None) = (store, found) {
             // The checksum is right and the values are not: as another version left them.
             damaged = true;
-            store = Store::of(slots, !refused.second);
+            store = Store::from_slots(slots, !refused.second);
             found = store.and_then(|store| read(board, store.second));
         }
         let none = found.is_none();
@@ -73,14 +73,17 @@ impl Store {
 
     /// The slot that was written last.
     fn newest(slots: [Slot; 2]) -> Option<Store> {
-        match (Store::of(slots, false), Store::of(slots, true)) {
+        match (
+            Store::from_slots(slots, false),
+            Store::from_slots(slots, true),
+        ) {
             (Some(a), Some(b)) if (b.generation.wrapping_sub(a.generation) as i8) > 0 => Some(b),
             (a, b) => a.or(b),
         }
     }
 
     /// One slot, if it is whole.
-    fn of(slots: [Slot; 2], second: bool) -> Option<Store> {
+    fn from_slots(slots: [Slot; 2], second: bool) -> Option<Store> {
         match slots[usize::from(second)] {
             Slot::Whole { generation } => Some(Store { second, generation }),
             Slot::Blank | Slot::Damaged => None,

@@ -108,7 +108,7 @@ impl<'a> Day<'a> {
         phone.wait_so_long(READY, longest);
         phone.tap("[data-tool=object]");
         phone.see("editor");
-        let canvas = EditorCanvas::of(phone.page());
+        let canvas = EditorCanvas::find(phone.page());
         let stroke = [-12.0, 0.0, 12.0].map(|way| vec![canvas.at(x + way, y)]);
         phone.page().touch(&stroke);
         phone.wait_for("!document.getElementById('undo').disabled");

@@ -24,7 +24,7 @@ pub(crate) fn rows(document: &str) -> Vec<CrateFacts> {
             continue;
         };
         match &columns {
-            None => columns = Some(Columns::of(&cells)),
+            None => columns = Some(Columns::from_header(&cells)),
             Some(columns) => rows.extend(columns.read(&cells)),
         }
     }
@@ -84,7 +84,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(header: &[&str]) -> Self {
+    fn from_header(header: &[&str]) -> Self {
         let position = |title: &str| header.iter().position(|cell| *cell == title);
         Self {
             name: position("crate"),

@@ -13,7 +13,7 @@ pub struct EditorCanvas {
 
 impl EditorCanvas {
     /// Asks the page, once it shows the frame.
-    pub fn of(page: &mut Chromium) -> Self {
+    pub fn find(page: &mut Chromium) -> Self {
         page.wait_for("Boolean(document.getElementById('canvas')?.dataset.view)");
         let expression = "(() => { const box = canvas.getBoundingClientRect(); \
             const [scale, x, y] = canvas.dataset.view.split(' ').map(Number); \

@@ -36,7 +36,7 @@ impl Scenery {
     }
 
     /// That of this id.
-    pub(crate) fn of(id: &str) -> Option<Self> {
+    pub(crate) fn from_id(id: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|scenery| scenery.id == id)
     }
 
@@ -333,7 +333,7 @@ mod tests {
     fn each_has_a_name_of_its_own_and_is_found_by_its_id() {
         for scenery in Scenery::ALL {
             assert_eq!(
-                Scenery::of(scenery.id).map(|found| found.name),
+                Scenery::from_id(scenery.id).map(|found| found.name),
                 Some(scenery.name)
             );
             let names = Scenery::ALL
@@ -341,7 +341,7 @@ mod tests {
                 .filter(|other| other.name == scenery.name);
             assert_eq!(names.count(), 1);
         }
-        assert!(Scenery::of("moon").is_none());
+        assert!(Scenery::from_id("moon").is_none());
     }
 
     #[test]
@@ -358,14 +358,14 @@ mod tests {
 
     #[test]
     fn a_low_sun_is_warm_and_a_window_lights_from_the_left() {
-        let evening = Scenery::of("evening")
+        let evening = Scenery::from_id("evening")
             .unwrap()
             .panorama_of(SMALL)
             .unwrap()
             .project(Order::TWO);
         let [r, _, b] = evening.coefficients()[0];
         assert!(r > 1.5 * b, "{r} {b}");
-        let room = Scenery::of("room")
+        let room = Scenery::from_id("room")
             .unwrap()
             .panorama_of(SMALL)
             .unwrap()

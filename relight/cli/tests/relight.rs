@@ -55,7 +55,7 @@ impl Folder {
                 .unwrap();
         }
         let light = ShLight::even(Order::TWO, [0.5, 1.0, 2.0]);
-        let panorama = Panorama::of_light(&light, Extent::new(32, 16));
+        let panorama = Panorama::from_light(&light, Extent::new(32, 16));
         panorama.image().write_exr(&folder.path("sky.exr")).unwrap();
         let weights = Weights::initial(&decomposer(), 3);
         weights
@@ -149,7 +149,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
         [if x == 5 { f32::NAN } else { 0.5 }; 3]
     });
     write_exr(&folder.path("odd-sky.exr"), &sky).unwrap();
-    let black = Panorama::of_light(&ShLight::dark(Order::TWO), Extent::new(32, 16));
+    let black = Panorama::from_light(&ShLight::dark(Order::TWO), Extent::new(32, 16));
     black.image().write_exr(&folder.path("black.exr")).unwrap();
     fs::write(folder.path("text.txt"), "1 2 3\n1 2\n").unwrap();
     huge(&folder.path("huge.png"));

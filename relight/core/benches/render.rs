@@ -163,7 +163,7 @@ fn render(c: &mut Criterion<ProcessorTime>) {
 }
 
 fn project(c: &mut Criterion<ProcessorTime>) {
-    let panorama = Panorama::of_light(&light(6), Extent::new(512, 256));
+    let panorama = Panorama::from_light(&light(6), Extent::new(512, 256));
     let one = ThreadPoolBuilder::new()
         .num_threads(1)
         .build()

@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut seconds = [0.0; ORDERS.len()];
     for path in &paths {
         let panorama = Panorama::read(path)?;
-        let truth = Irradiance::of(&panorama);
+        let truth = Irradiance::from_panorama(&panorama);
         let light = panorama.project(Order::new(ORDERS[ORDERS.len() - 1])?);
         for (at, order) in ORDERS.into_iter().enumerate() {
             let light = light.with_order(Order::new(order)?);
@@ -70,7 +70,7 @@ struct Irradiance {
 }
 
 impl Irradiance {
-    fn of(panorama: &Panorama) -> Self {
+    fn from_panorama(panorama: &Panorama) -> Self {
         let planes = panorama.image().planes();
         let Extent { width, height } = planes.extent();
         let mut lights = Vec::with_capacity(width * height);

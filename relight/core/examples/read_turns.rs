@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let opened = start.elapsed().as_secs_f64();
 
     let streaming = Streaming {
-        plan: DrawPlan::of_turns(1),
+        plan: DrawPlan::from_turns(1),
         from: Cursor::default(),
         until_epoch: rounds,
         threads,

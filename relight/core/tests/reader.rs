@@ -46,7 +46,7 @@ fn picture(index: u32) -> RgbImage {
 
 fn sample(session: &str, index: u32) -> Sample {
     let image = picture(index);
-    let measures = MaskSpans::of(&mask())
+    let measures = MaskSpans::from_mask(&mask())
         .measure(&image, SATURATION_LEVEL)
         .unwrap();
     let whole = Rect::new(0, 0, WIDTH, HEIGHT);
@@ -74,7 +74,7 @@ type Item = Result<Drawn<TurnBatch>, DamagedBatch<Drawn<TurnBatch>>>;
 
 fn stream(turns: &Arc<Turns>, threads: usize, from: Cursor) -> Vec<Item> {
     let streaming = Streaming {
-        plan: DrawPlan::of_turns(5),
+        plan: DrawPlan::from_turns(5),
         from,
         until_epoch: 1,
         threads: NonZeroUsize::new(threads).unwrap(),
@@ -172,7 +172,7 @@ fn memory_that_is_given_back_leaves_no_trace() {
     let turns = open(dir.path());
     let expected = whole(stream(&turns, 1, Cursor::default()));
     let streaming = Streaming {
-        plan: DrawPlan::of_turns(5),
+        plan: DrawPlan::from_turns(5),
         from: Cursor::default(),
         until_epoch: 1,
         threads: NonZeroUsize::MIN,

@@ -77,7 +77,7 @@ impl Finish {
         Self {
             paint: Paint::own(possible(albedo / surface.len() as f32)),
             relief: None,
-            gloss: BlinnPhong::of_surface(surface),
+            gloss: BlinnPhong::from_surface(surface),
         }
     }
 
@@ -128,7 +128,7 @@ impl BlinnPhong {
     /// The highlights of a surface whose file says how rough it is; none of a dull one. The exponent is 2 / roughness^4 - 2
     /// (Karis 2013, "Specular BRDF Reference"), and as much brighter as it gathers light, (exponent + 8) / 8 (Hoffman 2013,
     /// "Background: Physics and Math of Shading").
-    fn of_surface(surface: &[OwnSurface]) -> Option<Self> {
+    fn from_surface(surface: &[OwnSurface]) -> Option<Self> {
         let mean = |of: fn(&OwnSurface) -> Vec3| {
             surface.iter().map(of).sum::<Vec3>() / surface.len().max(1) as f32
         };

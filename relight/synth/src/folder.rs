@@ -31,7 +31,7 @@ struct Origin {
 }
 
 impl Origin {
-    fn of(recipe: &Recipe, library: &Library) -> Self {
+    fn new(recipe: &Recipe, library: &Library) -> Self {
         let panoramas = &library.panoramas;
         let names = (0..panoramas.len()).filter_map(|number| panoramas.name(number));
         Self {
@@ -74,7 +74,7 @@ pub fn write_samples(
     progress: &(dyn Fn() + Sync),
 ) -> Result<SynthTally, SynthError> {
     recipe.check()?;
-    let folder = SampleFolder::open(out, &Origin::of(recipe, library))?;
+    let folder = SampleFolder::open(out, &Origin::new(recipe, library))?;
     let each = recipe.samples_an_object();
     let objects = count.div_ceil(each);
     (0..objects)

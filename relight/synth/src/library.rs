@@ -90,7 +90,7 @@ impl Library {
     /// # Errors
     /// Where a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
-        let packed = Contents::of(folders)?;
+        let packed = Contents::from_folders(folders)?;
         let (meshes, mut left_out) = match &folders.meshes {
             Some(path) if pack::is_packed(path) => (packed.meshes, Vec::new()),
             Some(folder) => read_meshes(folder)?,
@@ -191,10 +191,10 @@ impl Library {
         let pictures = self.pictures.par_iter().map(|picture| {
             let mut bytes = Vec::new();
             picture.write_to(&mut bytes);
-            format!("{}\n", Digest::of(&bytes))
+            format!("{}\n", Digest::hash(&bytes))
         });
         let pictures: Vec<String> = pictures.collect();
-        Digest::of([meshes.concat(), pictures.concat()].join("\n").as_bytes())
+        Digest::hash([meshes.concat(), pictures.concat()].join("\n").as_bytes())
     }
 
     /// The same without its meshes: all shapes are made.
@@ -212,7 +212,7 @@ impl Library {
 
 impl Contents {
     /// What is wanted of packed libraries that stand in place of folders; each is read once.
-    fn of(folders: &Folders) -> Result<Self, SynthError> {
+    fn from_folders(folders: &Folders) -> Result<Self, SynthError> {
         let packed = |path: &Option<PathBuf>| path.clone().filter(|path| pack::is_packed(path));
         let (meshes, panoramas) = (packed(&folders.meshes), packed(&folders.panoramas));
         let mut contents = Self::default();

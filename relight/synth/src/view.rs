@@ -92,7 +92,7 @@ impl Pose {
         let (mut scale, mut offset) = (0.5, Vec3::ZERO);
         // The perspective of the framed object is another one than that of the unframed.
         for _ in 0..8 {
-            let bounds = Bounds::of(&turned, |p| projection.project(p * scale + offset).0);
+            let bounds = Bounds::from_points(&turned, |p| projection.project(p * scale + offset).0);
             let extent = bounds.high - bounds.low;
             let correction = 2.0 * self.fill / extent.max_element().max(1e-6);
             scale *= correction;
@@ -115,7 +115,7 @@ struct Bounds {
 }
 
 impl Bounds {
-    fn of(points: &[Vec3], place: impl Fn(Vec3) -> Vec2) -> Self {
+    fn from_points(points: &[Vec3], place: impl Fn(Vec3) -> Vec2) -> Self {
         let mut bounds = Self {
             low: Vec2::INFINITY,
             high: Vec2::NEG_INFINITY,
@@ -155,7 +155,7 @@ mod tests {
     fn bounds(pose: &Pose, projection: Projection) -> Bounds {
         let mesh = ShapeKind::Lathe.build(3);
         let placement = pose.place(&mesh, projection);
-        Bounds::of(&mesh.positions, |p| {
+        Bounds::from_points(&mesh.positions, |p| {
             projection.project(placement.transform_point3(p)).0
         })
     }

@@ -46,7 +46,7 @@ impl AllReducedLosses {
     ///
     /// # Errors
     /// [`TrainError::Torch`], [`TrainError::ProcessLost`].
-    pub(super) fn of(
+    pub(super) fn new(
         losses: &StepLosses,
         stop: bool,
         group: &ProcessGroup,

@@ -47,7 +47,7 @@ impl AnsweredTensors {
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn of_outputs(input: &Tensor, outputs: &[Tensor]) -> Result<Self, TrainError> {
+    pub fn from_outputs(input: &Tensor, outputs: &[Tensor]) -> Result<Self, TrainError> {
         let head = |at: usize| outputs.get(at).map(Tensor::shallow_clone);
         Ok(Self {
             paint: head(1),

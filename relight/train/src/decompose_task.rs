@@ -84,7 +84,7 @@ impl TrainingTask for DecomposeTask {
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let batch = self.photographs.batch(step)?;
         let answer = self.learner.model.forward(&batch.input)?;
-        let answer = AnsweredTensors::of_outputs(&batch.input, &answer)?;
+        let answer = AnsweredTensors::from_outputs(&batch.input, &answer)?;
         Ok(StepLosses {
             terms: decompose_losses(&batch, &answer, &self.settings.loss)?,
             spreads: head_spreads(&batch, &answer)?,
@@ -96,7 +96,8 @@ impl TrainingTask for DecomposeTask {
         let (model, device) = (self.learner.averaged_model()?, self.resources.device);
         let (kind, mut sheet) = (model.precision().kind(), None);
         let figures = self.validation.figures(kind, device, |batch| {
-            let answer = AnsweredTensors::of_outputs(&batch.input, &model.forward(&batch.input)?)?;
+            let answer =
+                AnsweredTensors::from_outputs(&batch.input, &model.forward(&batch.input)?)?;
             if sheet.is_none() {
                 sheet = Some(validation_sheet(batch, &answer, SHOWN)?);
             }

@@ -222,7 +222,7 @@ impl<'a> Run<'a> {
             observer.damaged(self.step, damage);
         }
         let reduced = match &self.group {
-            Some(group) => AllReducedLosses::of(&losses, stop, group)?,
+            Some(group) => AllReducedLosses::new(&losses, stop, group)?,
             None => AllReducedLosses::alone(&losses)?,
         };
         // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.

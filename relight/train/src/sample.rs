@@ -74,7 +74,7 @@ impl TruthArrays {
         let truth = &mut values[(INPUTS + 3) * pixels..];
         fill_truth(sample, white, mean, truth, pixels);
         let light = sample.coefficients();
-        let light = PredictedLight::of_light(light, f64::from(mean));
+        let light = PredictedLight::from_light(light, f64::from(mean));
         Self {
             extent,
             values,

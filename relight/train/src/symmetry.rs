@@ -18,7 +18,7 @@ pub(crate) struct Symmetry {
 
 impl Symmetry {
     /// The one that the lowest three bits of a number say.
-    pub(crate) fn of_bits(bits: u64) -> Self {
+    pub(crate) fn from_bits(bits: u64) -> Self {
         Self {
             mirrored: bits & 1 == 1,
             upside_down: bits & 2 == 2,
@@ -100,7 +100,7 @@ mod tests {
             .map(|at| height((at % SIDE) as f32, (at / SIDE) as f32))
             .collect();
         for bits in 0..8 {
-            let symmetry = Symmetry::of_bits(bits);
+            let symmetry = Symmetry::from_bits(bits);
             let place = |at: usize| symmetry.source(extent, at % SIDE, at / SIDE);
             let seen: Vec<f32> = (0..SIDE * SIDE).map(|at| heights[place(at)]).collect();
             for (x, y) in [(2, 3), (4, 4), (6, 2)] {
@@ -129,7 +129,7 @@ mod tests {
             layer.shading(&normals).planes().plane(0)[0]
         };
         for bits in 0..8 {
-            let symmetry = Symmetry::of_bits(bits);
+            let symmetry = Symmetry::from_bits(bits);
             for normal in [[0.6, 0.8, 0.0], [-0.48, 0.64, 0.6], [0.0, -0.6, 0.8]] {
                 let seen = [0, 1, 2].map(|axis| {
                     let (from, sign) = symmetry.component(axis);
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn eight_numbers_are_eight_symmetries() {
-        let all: Vec<Symmetry> = (0..8).map(Symmetry::of_bits).collect();
+        let all: Vec<Symmetry> = (0..8).map(Symmetry::from_bits).collect();
         for (at, one) in all.iter().enumerate() {
             assert!(!all[..at].contains(one));
         }

@@ -62,7 +62,7 @@ impl TurnReader {
     /// [`TrainError::Data`].
     pub(crate) fn open(path: &Path, seed: u64) -> Result<Self, TrainError> {
         let turns = Arc::new(Turns::open(path, Encoding::Linear)?);
-        let (plan, cursor) = (DrawPlan::of_turns(seed), Cursor::default());
+        let (plan, cursor) = (DrawPlan::from_turns(seed), Cursor::default());
         Ok(Self {
             stream: start(&turns, plan, cursor)?,
             turns,

@@ -98,7 +98,7 @@ pub fn solve_turn(
     let rig = rig_of(shard, recording.as_ref());
     let elevation = match (options.elevation, rig.camera_elevation_deg) {
         (Some(given), _) => given,
-        (None, Some(degrees)) => Elevation::of_rig(degrees)?,
+        (None, Some(degrees)) => Elevation::from_rig(degrees)?,
         (None, None) => Elevation::assumed(),
     };
     let start = Instant::now();

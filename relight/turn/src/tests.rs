@@ -189,7 +189,7 @@ pub(crate) fn windows() -> ShLight {
 pub(crate) fn metal_ball() -> (Surface, ShLight, TurnCurves) {
     let (surface, light) = (ball(), windows());
     let table = TableFrame::new(elevation());
-    let shown = TableLight::of(&light.rotated(&table.rotation()));
+    let shown = TableLight::from_light(&light.rotated(&table.rotation()));
     let metal = ShadingModel {
         frame: table,
         diffuse: TableLight::NONE,

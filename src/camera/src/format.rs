@@ -35,7 +35,7 @@ impl Fourcc {
     }
 
     /// The code by which cameras offer a format.
-    pub fn of(format: PixelFormat) -> Self {
+    pub fn from_pixel_format(format: PixelFormat) -> Self {
         match format {
             PixelFormat::Mjpeg => Self::MJPG,
             PixelFormat::H264 => Self::H264,
@@ -58,7 +58,7 @@ impl Fourcc {
             self
         };
         let mut formats = PixelFormat::ALL.into_iter();
-        formats.find(|&format| Self::of(format) == usual)
+        formats.find(|&format| Self::from_pixel_format(format) == usual)
     }
 }
 

@@ -18,7 +18,7 @@ pub struct Participant {
 }
 
 impl Participant {
-    fn of(clock: &Clock) -> Self {
+    fn new(clock: &Clock) -> Self {
         Self {
             clock: clock.clone(),
             _not_send: PhantomData,
@@ -98,7 +98,7 @@ impl Clock {
         if let Some(scheduler) = self.scheduler() {
             scheduler.enter();
         }
-        Participant::of(self)
+        Participant::new(self)
     }
 
     /// Starts a participating thread. No time passes until it runs.
@@ -110,7 +110,7 @@ impl Clock {
         name: &str,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> io::Result<JoinHandle<T>> {
-        let expected = Expected::of(self);
+        let expected = Expected::new(self);
         let ended = Arc::new(Waitable::new(self, false));
         let end = SetAtEnd(Arc::clone(&ended));
         let thread = thread::Builder::new()
@@ -147,7 +147,7 @@ impl<'scope> Scope<'scope, '_> {
         name: &str,
         work: impl FnOnce() -> T + Send + 'scope,
     ) -> io::Result<ScopedJoinHandle<'scope, T>> {
-        let expected = Expected::of(&self.clock);
+        let expected = Expected::new(&self.clock);
         let ended = Arc::new(Waitable::new(&self.clock, false));
         *self.open.lock() += 1;
         let count = CountDown(Arc::clone(&self.open));
@@ -168,7 +168,7 @@ impl<'scope> Scope<'scope, '_> {
 struct Expected(Option<Clock>);
 
 impl Expected {
-    fn of(clock: &Clock) -> Self {
+    fn new(clock: &Clock) -> Self {
         if let Some(scheduler) = clock.scheduler() {
             scheduler.expect();
         }
@@ -181,7 +181,7 @@ impl Expected {
         if let Some(scheduler) = clock.scheduler() {
             scheduler.arrive();
         }
-        Some(Participant::of(&clock))
+        Some(Participant::new(&clock))
     }
 }
 

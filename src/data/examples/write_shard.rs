@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = OutputFolder::lock(&out)?;
     let settings = settings();
     let mask = mask();
-    let spans = MaskSpans::of(&mask);
+    let spans = MaskSpans::from_mask(&mask);
     let mut writer = ShardWriter::create(folder.path(), settings.layout, SESSION, SAMPLES, &mask)?;
     let mut records = Vec::new();
     for index in 0..SAMPLES {
@@ -105,13 +105,13 @@ fn entry(
             codec: "none".to_owned(),
             frames: u64::from(SAMPLES),
             bytes: 0,
-            blake3: Digest::of(b""),
+            blake3: Digest::hash(b""),
             colour_conversion: None,
             index_blake3: None,
         },
         mask: MaskInfo {
-            blake3: Digest::of(&stored_mask),
-            px: MaskSpans::of(mask).pixels(),
+            blake3: Digest::hash(&stored_mask),
+            px: MaskSpans::from_mask(mask).pixels(),
             bounding_box: Rect::new(0, 0, SIDE, SIDE),
         },
         selection: SamplingBasis::Angle,
@@ -121,7 +121,7 @@ fn entry(
         duplicates: 0,
         spec_net: records.iter().filter(|record| record.spec_net).count() as u32,
         lossy: false,
-        quality: SessionQuality::of(records, false, None),
+        quality: SessionQuality::from_records(records, false, None),
         warnings: Vec::new(),
         table: files.table.clone(),
         report: None,

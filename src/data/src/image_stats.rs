@@ -114,7 +114,7 @@ impl MaskSpans {
 
     /// The runs of `mask`, in which values of 128 and above are the object.
     #[must_use]
-    pub fn of(mask: &GrayImage) -> Self {
+    pub fn from_mask(mask: &GrayImage) -> Self {
         let (width, height) = mask.dimensions();
         let under: Vec<Vec<bool>> = mask
             .rows()
@@ -139,7 +139,7 @@ impl MaskSpans {
     /// use image::{GrayImage, Luma, RgbImage};
     /// use relit_data::image_stats::MaskSpans;
     ///
-    /// let spans = MaskSpans::of(&GrayImage::from_pixel(9, 6, Luma([255])));
+    /// let spans = MaskSpans::from_mask(&GrayImage::from_pixel(9, 6, Luma([255])));
     /// let seen = spans.within(0..9, 2..6);
     /// assert_eq!(seen.measure(&RgbImage::new(9, 6), 250).unwrap().mask_px, 36);
     /// ```
@@ -538,7 +538,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_figures_are_those_of_the_definition((image, mask) in images(), level in 100_u8..) {
-            let measured = MaskSpans::of(&mask).measure(&image, level).unwrap();
+            let measured = MaskSpans::from_mask(&mask).measure(&image, level).unwrap();
             prop_assert_eq!(measured, by_definition(&image, &mask, level));
         }
 
@@ -550,7 +550,7 @@ mod tests {
 
         #[test]
         fn pixels_outside_the_mask_have_no_influence((image, mask) in images()) {
-            let spans = MaskSpans::of(&mask);
+            let spans = MaskSpans::from_mask(&mask);
             let mut masked = image.clone();
             for (pixel, m) in masked.pixels_mut().zip(mask.pixels()) {
                 if m.0[0] == 0 {
@@ -569,7 +569,9 @@ mod tests {
             let mut image = RgbImage::new(6, 4);
             image.put_pixel(2, 1, Rgb([9; 3]));
             image.put_pixel(at.0, at.1, Rgb([0, 0, 1]));
-            let found = MaskSpans::of(&mask).first_lit_outside(&image).unwrap();
+            let found = MaskSpans::from_mask(&mask)
+                .first_lit_outside(&image)
+                .unwrap();
             assert_eq!(found, Some(at));
         }
     }
@@ -577,12 +579,12 @@ mod tests {
     #[test]
     fn a_flat_image_has_no_sharpness_and_an_empty_mask_no_figures() {
         let image = RgbImage::from_pixel(9, 9, Rgb([250, 251, 10]));
-        let full = MaskSpans::of(&GrayImage::from_pixel(9, 9, Luma([255])));
+        let full = MaskSpans::from_mask(&GrayImage::from_pixel(9, 9, Luma([255])));
         let measures = full.measure(&image, 250).unwrap();
         assert_eq!(measures.sharpness, 0.0);
         assert_eq!((measures.saturated_px, measures.saturated_any_px), (0, 81));
         assert_eq!(measures.mean_rgb, [250.0, 251.0, 10.0]);
-        let empty = MaskSpans::of(&GrayImage::new(9, 9))
+        let empty = MaskSpans::from_mask(&GrayImage::new(9, 9))
             .measure(&image, 250)
             .unwrap();
         assert_eq!((empty.mask_px, empty.saturated_fraction()), (0, 0.0));
@@ -606,10 +608,10 @@ mod tests {
 
     #[test]
     fn an_image_of_another_size_is_refused() {
-        let spans = MaskSpans::of(&GrayImage::new(4, 4));
+        let spans = MaskSpans::from_mask(&GrayImage::new(4, 4));
         assert!(spans.measure(&RgbImage::new(4, 5), 250).is_err());
         assert!(
-            MaskSpans::of(&GrayImage::new(0, 0))
+            MaskSpans::from_mask(&GrayImage::new(0, 0))
                 .measure(&RgbImage::new(0, 0), 0)
                 .is_ok()
         );

@@ -91,7 +91,7 @@
 //! let root = tempfile::tempdir()?;
 //! let folder = OutputFolder::lock(root.path())?;
 //! let mask = GrayImage::from_fn(8, 8, |x, _| Luma([if x < 4 { 255 } else { 0 }]));
-//! let spans = MaskSpans::of(&mask);
+//! let spans = MaskSpans::from_mask(&mask);
 //! let mut writer =
 //!     ShardWriter::create(folder.path(), settings.layout, SESSION, SAMPLES, &mask)?;
 //! let mut records = Vec::new();
@@ -121,12 +121,12 @@
 //!         codec: "mjpeg".to_owned(),
 //!         frames: u64::from(SAMPLES),
 //!         bytes: 5,
-//!         blake3: Digest::of(b"video"),
+//!         blake3: Digest::hash(b"video"),
 //!         colour_conversion: None,
 //!         index_blake3: None,
 //!     },
 //!     mask: MaskInfo {
-//!         blake3: Digest::of(b"mask"),
+//!         blake3: Digest::hash(b"mask"),
 //!         px: spans.pixels(),
 //!         bounding_box: Rect::new(0, 0, 4, 8),
 //!     },
@@ -137,7 +137,7 @@
 //!     duplicates: 0,
 //!     spec_net: 0,
 //!     lossy: false,
-//!     quality: SessionQuality::of(&records, false, None),
+//!     quality: SessionQuality::from_records(&records, false, None),
 //!     warnings: Vec::new(),
 //!     table: files.table,
 //!     report: None,

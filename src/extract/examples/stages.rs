@@ -56,12 +56,12 @@ fn timed<T>(total: &mut Duration, stage: impl FnOnce() -> T) -> T {
 fn measure(path: &Path, mask: &GrayImage, frames: u64, side: u32) -> Result<(), Error> {
     let [mut opened, mut hashed, mut looked, mut learnt] = [Duration::ZERO; 4];
     let video = timed(&mut opened, || Video::open(path))?;
-    timed(&mut hashed, || Digest::of_file(path))?;
+    timed(&mut hashed, || Digest::hash_file(path))?;
     timed(&mut looked, || mask_doubts(&video, mask, None))?;
     let object = bounding_box(mask).ok_or("the mask is empty")?;
     let crop = square_around(object, 0.05, (video.facts().width, video.facts().height));
     let crop_mask = cut(mask, crop);
-    let spans = MaskSpans::of(&crop_mask);
+    let spans = MaskSpans::from_mask(&crop_mask);
     let scaler = Scaler::new(crop_mask.clone(), Some(side))?;
 
     let count = video.frames().len() as u64;
@@ -72,7 +72,7 @@ fn measure(path: &Path, mask: &GrayImage, frames: u64, side: u32) -> Result<(), 
     let mut samples = Vec::new();
     for pending in video.read(&spread, 1)? {
         video.part(pending, crop, &mut part)?;
-        samples.push(AlignSample::of(CropView::whole(&part)));
+        samples.push(AlignSample::from_crop(CropView::whole(&part)));
     }
     let aligner = timed(&mut learnt, || Aligner::learn(&samples, 0, &crop_mask, 8.0));
     let aligner = aligner.ok_or("the object has too little structure")?;

@@ -119,7 +119,7 @@ pub(super) fn find(
         }
         match inside {
             Ok(inside) => found.extend(inside),
-            Err(error) => report(input, RecordingOutcome::of(Err(error.into()))),
+            Err(error) => report(input, RecordingOutcome::from_result(Err(error.into()))),
         }
     }
     found
@@ -152,7 +152,7 @@ impl Run<'_> {
     ) -> Result<(), ExtractError> {
         // What a panic leaves behind of this recording lies under temporary names.
         let extracted = panic::catch_unwind(AssertUnwindSafe(|| self.extract_one(recording)));
-        let outcome = RecordingOutcome::of(extracted.unwrap_or_else(|_| {
+        let outcome = RecordingOutcome::from_result(extracted.unwrap_or_else(|_| {
             let text = "a fault of the program, described above: please report it";
             Err(ExtractError::Refused(text.to_owned()))
         }));

@@ -27,7 +27,10 @@ const MAX_PART: usize = 30;
 /// How much less sharp than its surroundings a frame is, where it is blurred, base-2 logarithm to a
 /// thousandth. `frames` are the turn's frames in order, each once; a whole turn would have `whole_turn` of them.
 pub(super) fn blurs(frames: &[&FrameRecord], whole_turn: usize) -> Vec<Option<f64>> {
-    let levels: Vec<Level> = frames.iter().map(|record| Level::of(record)).collect();
+    let levels: Vec<Level> = frames
+        .iter()
+        .map(|record| Level::from_record(record))
+        .collect();
     if whole_turn < MIN_FRAMES {
         return vec![None; frames.len()];
     }
@@ -55,7 +58,7 @@ struct Level {
 }
 
 impl Level {
-    fn of(record: &FrameRecord) -> Self {
+    fn from_record(record: &FrameRecord) -> Self {
         let [red, green, blue] = record.mean_rgb;
         let luma = 0.299 * red + 0.587 * green + 0.114 * blue;
         let raw = record.sharpness.max(1e-9).log2();

@@ -229,7 +229,7 @@ impl Job {
         let records: Vec<FrameRecord> = taken.map(|(record, _)| record.clone()).collect();
         notices.extend(quality::notices(&findings));
         let lossy = notices.iter().any(Notice::is_loss);
-        let quality = SessionQuality::of(&records, lossy, part_of_turn(&plan));
+        let quality = SessionQuality::from_records(&records, lossy, part_of_turn(&plan));
         let quality = quality.with_mask(misfit);
         // Whatever can fail is done before the shard of an earlier run is replaced.
         let page = self.page(options, &records, &thumbnails, &notices, &quality)?;
@@ -316,7 +316,7 @@ impl Job {
             video: &self.video,
             crop,
             object: self.mask.bounding_box,
-            spans: MaskSpans::of(&crop_mask),
+            spans: MaskSpans::from_mask(&crop_mask),
             scaler: Scaler::new(crop_mask, side)?,
             saturation_level: options.saturation_level,
             align: None,
@@ -561,7 +561,7 @@ fn index_digest(recording: &Recording) -> Result<Option<Digest>, ExtractError> {
 }
 
 fn digest(path: &Path) -> Result<(u64, Digest), ExtractError> {
-    Digest::of_file(path).map_err(ExtractError::io("read", path))
+    Digest::hash_file(path).map_err(ExtractError::io("read", path))
 }
 
 /// Differences between the video and what manifest and index say about it.

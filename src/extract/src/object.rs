@@ -62,7 +62,7 @@ impl ObjectMask {
         let of_this_mask =
             |what: String| ExtractError::Refused(format!("the mask {} {what}", path.display()));
         let picture = still::decode(&bytes).map_err(|error| of_this_mask(with_causes(&error)))?;
-        let picture = MaskPicture::of_image(&picture);
+        let picture = MaskPicture::from_image(&picture);
         let size = picture.size();
         if size != frame && size != stored {
             let hint = size_hint(size, frame).unwrap_or("make the mask on a frame of this video");
@@ -85,7 +85,7 @@ impl ObjectMask {
                 *level = if *level < 128 { 0 } else { 255 };
             }
         }
-        let blake3 = Digest::of(&bytes);
+        let blake3 = Digest::hash(&bytes);
         let note = object
             .note(size.0)
             .map(|note| format!("the mask {} {note}", path.display()));
@@ -133,12 +133,12 @@ mod tests {
     fn the_frame_of_a_mask_is_read_from_its_own_record_only() {
         let folder = tempfile::tempdir().unwrap();
         let mask = folder.path().join("m.png");
-        let blake3 = Digest::of(b"mask");
+        let blake3 = Digest::hash(b"mask");
         assert_eq!(frame_of(&mask, &blake3), None);
         let record =
             format!(r#"{{"source": {{"frame": 7}}, "result": {{"mask_blake3": "{blake3}"}}}}"#);
         std::fs::write(mask.with_extension("json"), record).unwrap();
         assert_eq!(frame_of(&mask, &blake3), Some(7));
-        assert_eq!(frame_of(&mask, &Digest::of(b"another")), None);
+        assert_eq!(frame_of(&mask, &Digest::hash(b"another")), None);
     }
 }

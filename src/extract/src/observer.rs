@@ -37,7 +37,7 @@ pub enum RecordingOutcome {
 
 impl RecordingOutcome {
     /// The outcome, of which some errors are no failures.
-    pub(super) fn of(result: Result<Self, ExtractError>) -> Self {
+    pub(super) fn from_result(result: Result<Self, ExtractError>) -> Self {
         result.unwrap_or_else(|error| {
             if error.leaves_out() {
                 Self::LeftOut(error)

@@ -337,7 +337,7 @@ impl Stage<'_> {
             let number = pending.number();
             self.video.part(pending, self.crop, crop).ok()?;
             repeat_edge(crop, self.crop, self.frame());
-            Some((number, AlignSample::of(CropView::whole(crop))))
+            Some((number, AlignSample::from_crop(CropView::whole(crop))))
         };
         let mut samples: Vec<(u64, AlignSample)> = pool.install(|| {
             let samples = reader.par_bridge().map_init(RgbaImage::default, sample);
@@ -359,7 +359,7 @@ impl Stage<'_> {
             top,
         );
         repeat_edge(&mut crop, self.crop, self.frame());
-        Some((frame, AlignSample::of(CropView::whole(&crop))))
+        Some((frame, AlignSample::from_crop(CropView::whole(&crop))))
     }
 }
 

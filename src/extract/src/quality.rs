@@ -158,7 +158,7 @@ mod tests {
 
     fn found(levels: impl Iterator<Item = f64>) -> Vec<TurnFinding> {
         let records: Vec<FrameRecord> = (0..).zip(levels).map(|(n, l)| record(n, l)).collect();
-        let digest = |record: &FrameRecord| Digest::of(&record.index.to_le_bytes());
+        let digest = |record: &FrameRecord| Digest::hash(&record.index.to_le_bytes());
         let samples: Vec<_> = records.iter().map(|r| (r, digest(r))).collect();
         findings(&samples, samples.len() as u32)
     }
@@ -186,7 +186,7 @@ mod tests {
     fn a_picture_that_was_delivered_twice_is_found_and_a_duplicate_sample_is_not() {
         let mut records: Vec<FrameRecord> = (0..4).map(|n| record(n, 9.0)).collect();
         records[3].duplicate = true;
-        let image = |n: usize| Digest::of(&[[0, 1, 1, 1][n]]);
+        let image = |n: usize| Digest::hash(&[[0, 1, 1, 1][n]]);
         let samples: Vec<_> = records
             .iter()
             .enumerate()
@@ -210,7 +210,7 @@ mod tests {
                 record
             })
             .collect();
-        let digest = |record: &FrameRecord| Digest::of(&record.source_frame.to_le_bytes());
+        let digest = |record: &FrameRecord| Digest::hash(&record.source_frame.to_le_bytes());
         let samples: Vec<_> = records.iter().map(|r| (r, digest(r))).collect();
         assert_eq!(findings(&samples, 300), []);
     }

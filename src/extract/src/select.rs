@@ -45,7 +45,7 @@ impl TurnSpan {
     /// # Errors
     /// [`ExtractError::Refused`] without candidates, [`ExtractError::OneFrame`] with one,
     /// [`ExtractError::TableStands`] if the angle does not change.
-    pub(super) fn of(candidates: &[Candidate]) -> Result<Self, ExtractError> {
+    pub(super) fn from_candidates(candidates: &[Candidate]) -> Result<Self, ExtractError> {
         let (first, last) = match candidates {
             [] => return Err(no_frame_left()),
             [_] => return Err(ExtractError::OneFrame),
@@ -148,9 +148,9 @@ impl Selection {
     /// Chooses `samples` frames, evenly spread over a turn; fewer where the candidates cover a part of it.
     ///
     /// # Errors
-    /// As [`TurnSpan::of`].
+    /// As [`TurnSpan::from_candidates`].
     pub(super) fn choose(candidates: &[Candidate], samples: u32) -> Result<Self, ExtractError> {
-        Self::among(candidates, TurnSpan::of(candidates)?, samples)
+        Self::among(candidates, TurnSpan::from_candidates(candidates)?, samples)
     }
 
     /// Chooses `samples` frames, evenly spread over a given span.
@@ -391,7 +391,7 @@ mod tests {
     #[test]
     fn frames_lost_at_the_start_shift_no_other_sample() {
         let candidates = turned((0..150).map(|n| f64::from(n) * 2.4));
-        let span = TurnSpan::of(&candidates).unwrap();
+        let span = TurnSpan::from_candidates(&candidates).unwrap();
         let again = Selection::among(&candidates[10..], span, 150).unwrap();
         assert_eq!(again.frames[..10], [10; 10]);
         assert_eq!(again.frames[10..], (10..150).collect::<Vec<u64>>());

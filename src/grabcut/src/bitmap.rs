@@ -56,7 +56,7 @@ impl Bitmap {
     }
 
     /// The object of a mask: what is at least half white.
-    pub(super) fn of_mask(mask: &GrayImage) -> Self {
+    pub(super) fn from_mask(mask: &GrayImage) -> Self {
         let levels = mask.as_raw().iter();
         Self::new(mask.dimensions(), levels.map(|&level| level >= OBJECT_FROM))
     }

@@ -82,7 +82,7 @@ impl<'a> MaskCheck<'a> {
         if size != turn.full {
             return Err(MaskError::sizes(size, turn.full));
         }
-        let mask = Bitmap::of_mask(mask);
+        let mask = Bitmap::from_mask(mask);
         if mask.count() == 0 {
             return Err(MaskError::Empty);
         }
@@ -104,7 +104,7 @@ impl<'a> MaskCheck<'a> {
             Err(MaskError::Empty | MaskError::Everything | MaskError::FrameSize { .. }) => {
                 return Ok(None);
             }
-            own => Bitmap::of_mask(&own?.image),
+            own => Bitmap::from_mask(&own?.image),
         };
         let in_hole = self.mask.holes();
         let wide = NARROW * self.turn.factor();

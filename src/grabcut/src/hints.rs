@@ -30,7 +30,7 @@ pub enum Mark {
 }
 
 impl Mark {
-    fn of(pixel: [u8; 4]) -> Self {
+    fn from_pixel(pixel: [u8; 4]) -> Self {
         let [r, g, b, alpha] = pixel;
         if alpha < OPAQUE_FROM {
             Self::Unknown
@@ -69,7 +69,10 @@ impl Seeds {
     /// [`MaskError::Hints`] without any mark.
     pub fn from_image(image: &DynamicImage) -> Result<Self, MaskError> {
         let painted = image.to_rgba8();
-        let marks = painted.pixels().map(|pixel| Mark::of(pixel.0)).collect();
+        let marks = painted
+            .pixels()
+            .map(|pixel| Mark::from_pixel(pixel.0))
+            .collect();
         let coloured_px = count_coloured(&painted);
         Self::new(painted.dimensions(), marks, coloured_px)
     }
@@ -160,7 +163,7 @@ fn count_coloured(painted: &RgbaImage) -> u64 {
     let coloured = |pixel: &&image::Rgba<u8>| {
         let [r, g, b, alpha] = pixel.0;
         let spread = r.max(g).max(b) - r.min(g).min(b);
-        alpha >= OPAQUE_FROM && spread > COLOURED_FROM && Mark::of(pixel.0) == Mark::Unknown
+        alpha >= OPAQUE_FROM && spread > COLOURED_FROM && Mark::from_pixel(pixel.0) == Mark::Unknown
     };
     painted.pixels().filter(coloured).count() as u64
 }

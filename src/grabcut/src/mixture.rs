@@ -118,7 +118,7 @@ impl<const D: usize> Default for Moments<D> {
 }
 
 impl<const D: usize> Moments<D> {
-    fn of<'a>(samples: impl Iterator<Item = &'a [f32; D]>) -> Self {
+    fn from_samples<'a>(samples: impl Iterator<Item = &'a [f32; D]>) -> Self {
         let mut moments = Self::default();
         samples.for_each(|sample| moments.add(sample));
         moments
@@ -223,7 +223,7 @@ fn inverse<const D: usize>(lower: &[[f64; D]; D]) -> [[f64; D]; D] {
 /// The centres of `count` groups: the one with the largest spread is split until there are enough.
 fn split<const D: usize>(samples: &[[f32; D]], count: usize) -> Vec<[f32; D]> {
     let mut group = vec![0_usize; samples.len()];
-    let mut centres = vec![Moments::of(samples.iter()).mean()];
+    let mut centres = vec![Moments::from_samples(samples.iter()).mean()];
     while centres.len() < count {
         let moments = moments_of_groups(samples, &group, centres.len());
         let axes: Vec<_> = moments.iter().map(Moments::principal_axis).collect();

@@ -42,7 +42,7 @@ pub fn outline(mask: &GrayImage) -> Vec<Vec<[u32; 2]>> {
 
 fn sides(mask: &GrayImage) -> Sides {
     let (width, height) = (i64::from(mask.width()), i64::from(mask.height()));
-    let object = Bitmap::of_mask(mask);
+    let object = Bitmap::from_mask(mask);
     let inside = |x: i64, y: i64| {
         let within = (0..width).contains(&x) && (0..height).contains(&y);
         within && object.bits()[(y * width + x) as usize]

@@ -22,7 +22,7 @@ pub fn preview(frame: &RgbImage, mask: &GrayImage) -> RgbImage {
     if mask.dimensions() != size {
         return frame.clone();
     }
-    let object = Bitmap::of_mask(mask);
+    let object = Bitmap::from_mask(mask);
     let width = (size.0.min(size.1) / SIDE_PER_PX).max(2) as usize;
     let line = object.dilated(width);
     let outer_rim = line.dilated(1);

@@ -113,8 +113,8 @@ fn closed_opening(
     }
     let before = cut_unclosed(frame, turn, &fewer, settings, Effort::Fine).ok()?;
     let hole = newly_enclosed(
-        &Bitmap::of_mask(&before.image),
-        &Bitmap::of_mask(&mask.image),
+        &Bitmap::from_mask(&before.image),
+        &Bitmap::from_mask(&mask.image),
     )?;
     (hole.area as f64 >= OPENING * mask.statistics.area_px as f64).then_some(hole)
 }
@@ -194,7 +194,7 @@ pub fn clean_cut(
     settings: &SegmentSettings,
 ) -> Result<Mask, MaskError> {
     let size = cut.dimensions();
-    let raw = Bitmap::of_mask(cut);
+    let raw = Bitmap::from_mask(cut);
     match raw.count() {
         0 => return Err(MaskError::Empty),
         all if all == cut.as_raw().len() as u64 => return Err(MaskError::Everything),
@@ -251,7 +251,7 @@ fn by_hints(
         (plain, ranked) => return plain.or(ranked),
     };
     let energy = CutEnergy::new(frame, rect);
-    let energy = |mask: &Mask| energy.of(&Bitmap::of_mask(&mask.image));
+    let energy = |mask: &Mask| energy.of(&Bitmap::from_mask(&mask.image));
     let margin = if fills(plain.statistics.bounding_box, rect) {
         MARGIN
     } else {
@@ -275,7 +275,7 @@ fn fills(found: Rect, rect: Rect) -> bool {
 
 /// Why the turn's mask is worse than that of the hints alone; none if it is not.
 fn misled(turn: &TurnStatistics, by_turn: &Bitmap, by_hints: &Mask) -> Option<String> {
-    let by_hints = Bitmap::of_mask(&by_hints.image);
+    let by_hints = Bitmap::from_mask(&by_hints.image);
     let (of_turn, of_hints) = (turn.outline(by_turn), turn.outline(&by_hints));
     (of_turn < MIN_OF_HINTS * of_hints).then(|| {
         format!(

@@ -60,7 +60,7 @@ pub struct MaskReport {
 }
 
 impl MaskReport {
-    fn of(shape: Option<ShapeCheck>) -> Self {
+    fn from_shape(shape: Option<ShapeCheck>) -> Self {
         let (verdict, reasons) = match shape.as_ref().map(ShapeCheck::faults) {
             Some(faults) if faults.is_empty() => (MaskVerdict::Fits, faults),
             Some(faults) => (MaskVerdict::Wrong, faults),
@@ -107,7 +107,7 @@ pub struct CheckOutput {
 pub fn check_mask(input: &Path, mask: Option<&Path>) -> Result<CheckOutput, MaskingError> {
     let recording = Recording::open(input)?;
     let checked = check_recording(&recording, mask);
-    let (report, page) = checked.map_err(MaskingError::of(&recording))?;
+    let (report, page) = checked.map_err(MaskingError::in_recording(&recording))?;
     Ok(CheckOutput {
         recording: recording.id,
         report,
@@ -120,7 +120,8 @@ fn check_recording(
     mask: Option<&Path>,
 ) -> Result<(MaskReport, PathBuf), MaskingError> {
     let folder = recording.folder.clone().unwrap_or_default();
-    let files = MaskFiles::of(&mask.map_or_else(|| folder.join(MASK_FILE), Path::to_owned))?;
+    let files =
+        MaskFiles::from_mask_path(&mask.map_or_else(|| folder.join(MASK_FILE), Path::to_owned))?;
     let (picture, png) = read_mask(&files.mask)?;
     let video = Video::open(&recording.video)?;
     check_size(&files.mask, picture.size(), &video)?;
@@ -128,7 +129,7 @@ fn check_recording(
     let frame = video.frame(source_frame(&files, &video)?)?;
     let turn = sampled(&video, image.dimensions(), &video.spread(TURN_FRAMES))?;
     let check = MaskCheck::new(&image, &turn.statistics)?;
-    let report = MaskReport::of(check.shape(&frame, Effort::Fine)?);
+    let report = MaskReport::from_shape(check.shape(&frame, Effort::Fine)?);
     let page = page(&recording.id, &report, &preview(&frame, &image))?;
     let [page_file, record_file] = check_files(&files, recording);
     let record = record(&recording.id, &report, &png, &record_file)?;
@@ -142,7 +143,7 @@ fn read_mask(path: &Path) -> Result<(MaskPicture, Vec<u8>), MaskingError> {
     let bytes = std::fs::read(path).map_err(MaskingError::io(path, "read"))?;
     let image = relit_data::still::decode(&bytes);
     let image = image.map_err(|error| MaskingError::unusable("mask", path, &error))?;
-    Ok((MaskPicture::of_image(&image), bytes))
+    Ok((MaskPicture::from_image(&image), bytes))
 }
 
 /// What the mask marks: 255, and 0 elsewhere.
@@ -270,7 +271,7 @@ mod tests {
 
     #[test]
     fn each_verdict_has_its_reason() {
-        let fits = MaskReport::of(Some(shape()));
+        let fits = MaskReport::from_shape(Some(shape()));
         assert_eq!((fits.verdict, fits.reasons.len()), (MaskVerdict::Fits, 0));
         for (changed, word) in [
             (
@@ -302,12 +303,12 @@ mod tests {
                 "does not follow",
             ),
         ] {
-            let found = MaskReport::of(Some(changed));
+            let found = MaskReport::from_shape(Some(changed));
             assert_eq!(found.verdict, MaskVerdict::Wrong, "{word}");
             assert_eq!(found.reasons.len(), 1, "{word}");
             assert!(found.reasons[0].contains(word), "{}", found.reasons[0]);
         }
-        let unknown = MaskReport::of(None);
+        let unknown = MaskReport::from_shape(None);
         assert_eq!(
             (unknown.verdict, unknown.reasons.len()),
             (MaskVerdict::Unknown, 1)
@@ -321,6 +322,9 @@ mod tests {
             leaks: region(900),
             ..shape()
         };
-        assert_eq!(MaskReport::of(Some(shape)).verdict, MaskVerdict::Fits);
+        assert_eq!(
+            MaskReport::from_shape(Some(shape)).verdict,
+            MaskVerdict::Fits
+        );
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn with_strokes<'a>(
     let mut request = request.clone();
     if request.hints.is_empty() && request.turn == TurnRequest::None {
         // Nothing but the editor was asked for: it goes on where it stopped.
-        request.turn = TurnRequest::of(&record);
+        request.turn = TurnRequest::from_record(&record);
         request.frame = record.source.frame;
         let unusable = |fault| MaskingError::unusable("recipe", &files.record, &fault);
         request.hints = record.hints.hints().map_err(unusable)?;

@@ -106,7 +106,7 @@ impl MaskingError {
     }
 
     /// Names the recording that it is about.
-    pub(super) fn of(recording: &session::Recording) -> impl Fn(Self) -> Self + use<> {
+    pub(super) fn in_recording(recording: &session::Recording) -> impl Fn(Self) -> Self + use<> {
         let recording = recording.id.clone();
         move |source| Self::Recording {
             recording: recording.clone(),

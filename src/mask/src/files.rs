@@ -26,7 +26,7 @@ impl MaskFiles {
     ///
     /// # Errors
     /// [`MaskingError::OutputName`].
-    pub fn of(mask: &Path) -> Result<Self, MaskingError> {
+    pub fn from_mask_path(mask: &Path) -> Result<Self, MaskingError> {
         let is_png = mask
             .extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn record_and_preview_are_named_after_the_mask() {
-        let files = MaskFiles::of(Path::new("a/mug.v2.PNG")).unwrap();
+        let files = MaskFiles::from_mask_path(Path::new("a/mug.v2.PNG")).unwrap();
         assert_eq!(files.record, Path::new("a/mug.v2.json"));
         assert_eq!(files.preview, Path::new("a/mug.v2-preview.png"));
         assert_eq!(files.previous, Path::new("a/mug.v2-previous.json"));
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn the_name_of_a_mask_must_end_in_png() {
         for name in ["mask", "mask.jpg", "session.json", ".png", ""] {
-            let files = MaskFiles::of(Path::new(name));
+            let files = MaskFiles::from_mask_path(Path::new(name));
             assert!(matches!(files, Err(MaskingError::OutputName(_))), "{name}");
         }
     }
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn a_file_that_is_not_a_record_is_never_replaced() {
         let folder = tempfile::tempdir().unwrap();
-        let files = MaskFiles::of(&folder.path().join("session.png")).unwrap();
+        let files = MaskFiles::from_mask_path(&folder.path().join("session.png")).unwrap();
         fs::write(&files.record, r#"{"schema": "relit.session/1"}"#).unwrap();
         let result = check_replaceable(&files, true);
         assert!(matches!(result, Err(MaskingError::ForeignFile { .. })));
@@ -137,13 +137,13 @@ mod tests {
     fn the_folder_of_a_mask_is_made_and_a_file_in_its_place_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("masks").join("of").join("mug.png");
-        let made = make_folder(&MaskFiles::of(&path).unwrap()).unwrap();
+        let made = make_folder(&MaskFiles::from_mask_path(&path).unwrap()).unwrap();
         assert!(path.parent().unwrap().is_dir());
         drop(made);
         assert!(!folder.path().join("masks").exists());
-        let _made = make_folder(&MaskFiles::of(&path).unwrap()).unwrap();
+        let _made = make_folder(&MaskFiles::from_mask_path(&path).unwrap()).unwrap();
         fs::write(&path, "painted").unwrap();
-        let below = MaskFiles::of(&path.join("mug.png")).unwrap();
+        let below = MaskFiles::from_mask_path(&path.join("mug.png")).unwrap();
         let error = make_folder(&below).unwrap_err();
         assert!(error.to_string().contains("could not be made"), "{error}");
     }
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn a_mask_without_record_is_replaced_only_with_force() {
         let folder = tempfile::tempdir().unwrap();
-        let files = MaskFiles::of(&folder.path().join("mask.png")).unwrap();
+        let files = MaskFiles::from_mask_path(&folder.path().join("mask.png")).unwrap();
         assert!(check_replaceable(&files, false).is_ok());
         fs::write(&files.mask, "painted").unwrap();
         assert!(matches!(

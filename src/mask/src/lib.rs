@@ -24,7 +24,7 @@
 //!
 //! let recording = Path::new("../../fixtures/20261120T102000Z-bust-short");
 //! let folder = tempfile::tempdir()?;
-//! let files = MaskFiles::of(&folder.path().join("mask.png"))?;
+//! let files = MaskFiles::from_mask_path(&folder.path().join("mask.png"))?;
 //!
 //! // On the first frame, by a rectangle that contains the object.
 //! let hints = Hints::from(Rect::new(170, 20, 325, 390));

@@ -44,7 +44,7 @@ pub fn make_mask(
 ) -> Result<MaskOutput, MaskingError> {
     let recording = Recording::open(input)?;
     let made = mask_recording(&recording, output, request);
-    let (files, record, notice) = made.map_err(MaskingError::of(&recording))?;
+    let (files, record, notice) = made.map_err(MaskingError::in_recording(&recording))?;
     Ok(MaskOutput {
         recording: recording.id,
         files,
@@ -137,7 +137,9 @@ pub(super) fn files_of(
 ) -> Result<MaskFiles, MaskingError> {
     match output {
         Some(files) => Ok(files),
-        None => MaskFiles::of(&recording.folder.clone().unwrap_or_default().join(MASK_FILE)),
+        None => {
+            MaskFiles::from_mask_path(&recording.folder.clone().unwrap_or_default().join(MASK_FILE))
+        }
     }
 }
 
@@ -152,7 +154,7 @@ fn record_of(
     let mut warnings = mask.warnings.clone();
     let conversion = source.colour_conversion.as_ref();
     warnings.extend(conversion.map(|by| format!("the colours were converted: {by}")));
-    let software = MaskSoftware::of(request.engine);
+    let software = MaskSoftware::for_engine(request.engine);
     if let Some(Recipe { path, record }) = &request.recipe
         && record.result.mask_blake3 != result.mask_blake3
     {

@@ -129,7 +129,7 @@ impl MaskRecord {
 impl MaskSoftware {
     /// The versions on which a mask depends that this program makes by an engine.
     #[must_use]
-    pub fn of(engine: MaskEngine) -> Self {
+    pub fn for_engine(engine: MaskEngine) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             opencv: match engine {
@@ -219,7 +219,7 @@ mod tests {
         };
         MaskRecord {
             schema: MASK_SCHEMA.to_owned(),
-            software: MaskSoftware::of(MaskEngine::Relit),
+            software: MaskSoftware::for_engine(MaskEngine::Relit),
             source: SourceFrame {
                 video: "video.mkv".to_owned(),
                 frame: 3,

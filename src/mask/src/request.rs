@@ -36,7 +36,7 @@ pub(super) enum TurnRequest {
 
 impl TurnRequest {
     /// The frames by which a recorded mask was made.
-    pub(super) fn of(record: &MaskRecord) -> Self {
+    pub(super) fn from_record(record: &MaskRecord) -> Self {
         match record.hints.turn_frames.as_slice() {
             [] => Self::None,
             frames => Self::Frames(frames.to_vec()),
@@ -89,7 +89,7 @@ impl MaskRequest {
             read.map_err(|fault| MaskingError::unusable("recipe", path, &fault))?;
         let engine = record.engine;
         let request = Self {
-            turn: TurnRequest::of(&record),
+            turn: TurnRequest::from_record(&record),
             recipe: Some(Recipe {
                 path: path.to_owned(),
                 record: record.clone(),

@@ -75,7 +75,7 @@ fn to_srgb(video: &Video, frame: &mut RgbImage) -> Result<(), MaskingError> {
     }
     let path = video.path();
     let bytes = fs::read(path).map_err(MaskingError::io(path, "read"))?;
-    let colour = Colour::of_file(&bytes).map_err(|fault| {
+    let colour = Colour::from_file(&bytes).map_err(|fault| {
         let why = format!("it {fault}; convert it to sRGB");
         MaskingError::unusable("photograph", path, &why)
     })?;

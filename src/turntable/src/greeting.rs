@@ -206,7 +206,7 @@ fn settings(link: &Link, extras: bool) -> Result<GrblSettings, TurntableError> {
             }
             outcome => done(link, "$$", outcome)?,
         };
-        let settings = GrblSettings::of(&messages);
+        let settings = GrblSettings::from_messages(&messages);
         missing = settings.missing(extras);
         if !missing.is_empty() {
             continue;

@@ -105,7 +105,7 @@ pub(super) struct GrblSettings(BTreeMap<u16, f64>);
 
 impl GrblSettings {
     /// The settings among `messages`.
-    pub(super) fn of(messages: &[Message]) -> GrblSettings {
+    pub(super) fn from_messages(messages: &[Message]) -> GrblSettings {
         let setting = |message: &Message| match message {
             Message::Setting { number, value } => Some((*number, *value)),
             _ => None,

@@ -146,7 +146,7 @@ impl Link {
             }
             let report = supervisor.last_report()?;
             let fresh = report.asked_us.is_some_and(|us| us >= asked_us);
-            (fresh && supervisor.is_confirmed()).then(|| Ok(TableStatus::of(report, supervisor)))
+            (fresh && supervisor.is_confirmed()).then(|| Ok(TableStatus::new(report, supervisor)))
         });
         status.unwrap_or(Err(TurntableError::Silent {
             milliseconds: REPORT_WAIT.as_millis() as u64,

@@ -31,7 +31,7 @@ pub struct TableStatus {
 }
 
 impl TableStatus {
-    pub(super) fn of(report: &PositionReport, supervisor: &Supervisor) -> TableStatus {
+    pub(super) fn new(report: &PositionReport, supervisor: &Supervisor) -> TableStatus {
         let zero = supervisor.zero_deg();
         TableStatus {
             state: report.state,

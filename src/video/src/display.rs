@@ -26,7 +26,7 @@ pub(super) struct Display {
 
 impl Display {
     /// What a stream says of its pictures, or the first of them, which counts more; and remarks about it.
-    pub(super) fn of(
+    pub(super) fn from_frame(
         input: &Input,
         stream: &Stream<'_>,
         picture: Option<&frame::Video>,

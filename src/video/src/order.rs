@@ -39,7 +39,7 @@ pub(super) struct Stamp {
 }
 
 impl Stamp {
-    pub(super) fn of(packet: &Packet, codec: Id, inspector: &mut Inspector) -> Self {
+    pub(super) fn from_packet(packet: &Packet, codec: Id, inspector: &mut Inspector) -> Self {
         let data = packet.data().filter(|_| codec == Id::FFV1);
         let (contents, key) = inspector.inspect(packet);
         Self {

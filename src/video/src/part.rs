@@ -56,7 +56,7 @@ impl Video {
         }
         if let Some(jpeg) = pending.coded().filter(|_| self.track.is_plain_jpeg()) {
             let size = self.track.coded;
-            let rows = Rows::of(part, size, (region, needed), &mut seen);
+            let rows = Rows::new(part, size, (region, needed), &mut seen);
             let decoded = rows.and_then(|mut rows| {
                 let inside = rows.inside;
                 decode_part(jpeg, size, inside, &mut |row| rows.push(row)).ok()?;
@@ -68,7 +68,7 @@ impl Video {
             }
         }
         let picture = self.picture(pending)?;
-        let rows = Rows::of(part, picture.size(), (region, needed), &mut seen);
+        let rows = Rows::new(part, picture.size(), (region, needed), &mut seen);
         let converted = rows.and_then(|mut rows| {
             let inside = rows.inside;
             picture.direct_rgba(inside, &mut |row| rows.push(row))?;
@@ -98,7 +98,7 @@ struct Rows<'a, F> {
 
 impl<'a, F: FnMut(&RgbaImage, Range<u32>)> Rows<'a, F> {
     /// Everything is 0 where the region does not lie in the picture wholly; `None` if nothing of it does.
-    fn of(
+    fn new(
         part: &'a mut RgbaImage,
         size: (u32, u32),
         (region, needed): (Rect, Rect),

@@ -29,7 +29,7 @@ fn is_photograph_in_boxes(path: &Path) -> bool {
 pub(super) fn format_of(path: &Path) -> Option<Format> {
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
-    read.ok().and_then(|_| Format::of(&head))
+    read.ok().and_then(|_| Format::sniff(&head))
 }
 
 /// Whether FFmpeg would give another picture than the file shows, or none: of a raw file the small one for display, of a

@@ -75,7 +75,7 @@ impl Video {
         let stream = opened.input.stream(opened.stream);
         let stream = stream.ok_or_else(|| VideoError::no_video(path))?;
         let (time_base, rate) = (stream.time_base(), stream.avg_frame_rate());
-        let promised = Promised::of(&opened.input, &stream);
+        let promised = Promised::new(&opened.input, &stream);
         let (index, parameters) = (opened.stream, stream.parameters());
 
         let mut packets = read_through(&mut opened.input, index, &parameters);
@@ -280,7 +280,7 @@ fn read_through(input: &mut Input, stream: usize, parameters: &Parameters) -> Fo
             found.end_us = found.end_us.max(microseconds(end, base));
         }
         if packet.stream() == stream && packet.size() > 0 {
-            let stamp = Stamp::of(&packet, parameters.id(), &mut inspector);
+            let stamp = Stamp::from_packet(&packet, parameters.id(), &mut inspector);
             found.stamps.push(stamp);
         }
     }
@@ -294,7 +294,7 @@ struct Promised {
 
 impl Promised {
     #[allow(unsafe_code)]
-    fn of(input: &Input, stream: &Stream<'_>) -> Self {
+    fn new(input: &Input, stream: &Stream<'_>) -> Self {
         // SAFETY: the function reads the length of a live stream's index.
         let indexed = unsafe { ffi::avformat_index_get_entries_count(stream.as_ptr()) };
         let packets = match input.format().name() {

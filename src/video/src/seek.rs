@@ -89,7 +89,7 @@ impl Opened {
         let exif = exif_orientation(&self.input, path);
         let stream = self.input.stream(self.stream);
         let stream = stream.ok_or_else(|| VideoError::no_video(path))?;
-        let (display, notes) = Display::of(&self.input, &stream, first, exif);
+        let (display, notes) = Display::from_frame(&self.input, &stream, first, exif);
         Ok((colour, display, exif, notes))
     }
 }

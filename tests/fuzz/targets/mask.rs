@@ -33,7 +33,7 @@ fuzz_target!(|bytes: &[u8]| {
         _ => image::RgbaImage::from_raw(width, height, values).map(DynamicImage::from),
     };
     let picture = picture.expect("there are as many values as pixels need");
-    let picture = MaskPicture::of_image(&picture);
+    let picture = MaskPicture::from_image(&picture);
     assert_eq!(picture.size(), (width, height));
     match picture.object() {
         Ok(object) => {

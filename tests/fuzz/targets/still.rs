@@ -14,10 +14,10 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let _ = orientation(bytes);
     if let Ok(image) = decode(bytes) {
-        assert!(Format::of(bytes).is_none_or(|format| format.unread().is_none()));
+        assert!(Format::sniff(bytes).is_none_or(|format| format.unread().is_none()));
         drop(image);
     }
-    if let Ok(colour) = Colour::of_file(bytes) {
+    if let Ok(colour) = Colour::from_file(bytes) {
         let mut pixels = [0, 128, 255, 255, 1, 2];
         colour.to_srgb8(&mut pixels);
         let mut planes = [[0.0_f32, 1.0]; 3];

@@ -58,7 +58,7 @@ impl StudioBackground {
     pub(super) fn open(asked: &BackgroundRequest, bytes: &[u8]) -> Result<Self, Refusal> {
         match asked {
             BackgroundRequest::Panorama { id } => {
-                let scenery = Scenery::of(id);
+                let scenery = Scenery::from_id(id);
                 let none = || Refusal(format!("there is no panorama {id}"));
                 Ok(Self::made(scenery.ok_or_else(none)?)?)
             }
@@ -164,7 +164,7 @@ impl StudioBackground {
                 return Ok(background);
             }
         }
-        let is_radiance = matches!(Format::of(&bytes), Some(Format::Exr | Format::Radiance));
+        let is_radiance = matches!(Format::sniff(&bytes), Some(Format::Exr | Format::Radiance));
         let is_wide = relight_photo::decompose::stated_extent(&bytes)
             .is_some_and(|extent| extent.width == 2 * extent.height);
         if is_radiance && is_wide {

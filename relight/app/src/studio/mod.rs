@@ -116,7 +116,7 @@ impl Studio {
                 height,
             } => {
                 let pixels = part("pixels")?;
-                let opened = StudioObject::of_pixels(&name, [width, height], pixels)?;
+                let opened = StudioObject::from_pixels(&name, [width, height], pixels)?;
                 self.opened(object, opened)
             }
             Request::Mask {
@@ -286,7 +286,7 @@ impl Studio {
         let content = files.content(&described.background)?.clone();
         let background = StudioBackground::kept(&background_name, content)?;
         let numbers: Vec<u32> = (1..).take(described.objects.len()).collect();
-        let scene = PageScene::of(&described, &numbers)?;
+        let scene = PageScene::new(&described, &numbers)?;
         let mut objects = BTreeMap::new();
         for (described, &number) in described.objects.iter().zip(&numbers) {
             objects.insert(number, kept_object(described, &files)?);

@@ -65,7 +65,7 @@ impl StudioObject {
     pub(super) fn open(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         if is_captured(name) {
             let captured = CapturedObject::from_bytes(&bytes)?;
-            let subject = Subject::of_captured(&captured)?;
+            let subject = Subject::from_captured(&captured)?;
             return Ok(Self {
                 name: name.to_owned(),
                 file: bytes,
@@ -75,7 +75,7 @@ impl StudioObject {
             });
         }
         let opened = OpenedFile::read(name, bytes, None)?;
-        Self::of_file(opened, None)
+        Self::from_file(opened, None)
     }
 
     /// Opens a photograph with the mask that was kept with it.
@@ -93,10 +93,10 @@ impl StudioObject {
         let (mask, _) = image.object_mask(Path::new(MASK))?;
         let Extent { width, height } = mask.extent();
         let mask = GrayImage::from_raw(width as u32, height as u32, levels(&mask));
-        Self::of_file(opened, mask)
+        Self::from_file(opened, mask)
     }
 
-    fn of_file(opened: OpenedFile, mask: Option<GrayImage>) -> Result<Self, Refusal> {
+    fn from_file(opened: OpenedFile, mask: Option<GrayImage>) -> Result<Self, Refusal> {
         let mut object = Self {
             name: opened.name,
             file: opened.bytes,
@@ -118,7 +118,7 @@ impl StudioObject {
     ///
     /// # Errors
     /// Where the pixels are not as many as they should be.
-    pub(super) fn of_pixels(name: &str, size: [u32; 2], rgba: &[u8]) -> Result<Self, Refusal> {
+    pub(super) fn from_pixels(name: &str, size: [u32; 2], rgba: &[u8]) -> Result<Self, Refusal> {
         Self::open(&format!("{}.png", stem(name)), png_of(name, size, rgba)?)
     }
 
@@ -250,7 +250,7 @@ impl StudioObject {
         let longest = width.max(photo.mask.extent().height);
         let longest = (longest * PREVIEW_ROWS / rows).min(PREVIEW_SIDE);
         let photo = photo.clone().at_most(longest.max(PREVIEW_ROWS));
-        let subject = Subject::of_photo(&photo, decomposer, &DecomposeOptions::default())?;
+        let subject = Subject::from_photo(&photo, decomposer, &DecomposeOptions::default())?;
         if let Content::Photo(cut) = &mut self.content {
             cut.preview = Some(subject);
         }
@@ -280,7 +280,7 @@ impl StudioObject {
         }
         let photo = setting.reduced(described, self.photo()?.clone());
         let options = DecomposeOptions::default();
-        Ok(Subject::of_photo(&photo, decomposer, &options)?)
+        Ok(Subject::from_photo(&photo, decomposer, &options)?)
     }
 }
 
@@ -321,7 +321,7 @@ impl OpenedFile {
         let smaller = if has_at_most(MAX_PIXELS) {
             None
         } else {
-            ReducedFile::of(path, &bytes, MAX_PIXELS, transfer)?
+            ReducedFile::new(path, &bytes, MAX_PIXELS, transfer)?
         };
         let reduced = smaller.is_some();
         let (name, bytes, transfer) = match smaller {

@@ -96,15 +96,15 @@ impl PageScene {
     ///
     /// # Errors
     /// Where its light is one that the page has not.
-    pub(super) fn of(scene: &SceneDescription, numbers: &[u32]) -> Result<Self, Refusal> {
+    pub(super) fn new(scene: &SceneDescription, numbers: &[u32]) -> Result<Self, Refusal> {
         let objects = scene.objects.iter().zip(numbers);
         let mut rest = fields(scene)?;
         rest.retain(|name, _| !["background", "light", "object"].contains(&name.as_str()));
         Ok(Self {
             rest,
-            light: PageLight::of(&scene.light)?,
+            light: PageLight::new(&scene.light)?,
             objects: objects
-                .map(|(object, &number)| PageObject::of(object, number))
+                .map(|(object, &number)| PageObject::new(object, number))
                 .collect::<Result<_, _>>()?,
         })
     }
@@ -119,7 +119,7 @@ fn fields(of: &impl Serialize) -> Result<Map<String, Value>, Refusal> {
 }
 
 impl PageObject {
-    fn of(object: &ObjectDescription, number: u32) -> Result<Self, Refusal> {
+    fn new(object: &ObjectDescription, number: u32) -> Result<Self, Refusal> {
         let mut rest = fields(object)?;
         rest.retain(|name, _| !["photo", "mask", "transfer"].contains(&name.as_str()));
         Ok(Self {
@@ -147,7 +147,7 @@ impl PageLight {
         }
     }
 
-    fn of(light: &LightDescription) -> Result<Self, Refusal> {
+    fn new(light: &LightDescription) -> Result<Self, Refusal> {
         if light.panorama.is_some() || light.coefficients.is_some() {
             return refused(
                 "the page cannot open scenes with light from a file of its own: relight insert can",
@@ -203,7 +203,7 @@ mod tests {
             "lamp = \"-20,10,3200K,30\", ambient = 0.15, turn = -5.5",
         ] {
             let scene = parsed(light);
-            let page = PageScene::of(&scene, &[7]).unwrap();
+            let page = PageScene::new(&scene, &[7]).unwrap();
             assert_eq!(page.objects[0].object, 7);
             let files = ObjectFiles {
                 photo: "b.png".into(),
@@ -216,9 +216,9 @@ mod tests {
 
     #[test]
     fn a_lamp_without_colour_is_white() {
-        let page = PageScene::of(&parsed("lamp = \"60,30\""), &[1]).unwrap();
+        let page = PageScene::new(&parsed("lamp = \"60,30\""), &[1]).unwrap();
         assert_eq!(page.light.colour, "#ffffff");
-        let warm = PageScene::of(&parsed("lamp = \"60, 30, 10, 3200K\""), &[1]).unwrap();
+        let warm = PageScene::new(&parsed("lamp = \"60, 30, 10, 3200K\""), &[1]).unwrap();
         assert_eq!(
             (warm.light.colour.as_str(), warm.light.size),
             ("3200K", 10.0)
@@ -227,14 +227,14 @@ mod tests {
 
     #[test]
     fn light_that_the_page_has_not_is_refused_by_name() {
-        let refused = |light: &str| PageScene::of(&parsed(light), &[1]).unwrap_err().0;
+        let refused = |light: &str| PageScene::new(&parsed(light), &[1]).unwrap_err().0;
         assert!(refused("panorama = \"c.hdr\"").contains("a file of its own"));
         assert!(refused("object = \"m.png\"").contains("object of the background"));
     }
 
     #[test]
     fn numbers_out_of_range_are_refused() {
-        let mut page = PageScene::of(&parsed(""), &[1]).unwrap();
+        let mut page = PageScene::new(&parsed(""), &[1]).unwrap();
         page.rest.insert("field".to_owned(), 1e9.into());
         let described = page.described("a.jpg".into(), vec![ObjectFiles::default()]);
         assert!(described.is_err());

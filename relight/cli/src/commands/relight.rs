@@ -126,7 +126,7 @@ impl Arguments {
         if self.is_set() {
             return None;
         }
-        let wanted = match OutputKind::of(&self.output) {
+        let wanted = match OutputKind::from_path(&self.output) {
             Some(OutputKind::Movie(_)) if self.turn.is_none() => {
                 ".png, .jpg or .exr, or --turn DEGREES"
             }
@@ -229,7 +229,7 @@ impl Run<'_> {
             }
         };
         let start = Instant::now();
-        let subject = Subject::of_photo(&photo, &network.decomposer, &network.options)?;
+        let subject = Subject::from_photo(&photo, &network.decomposer, &network.options)?;
         let decomposed = start.elapsed().as_secs_f64();
         let own = LightSource::Coefficients(subject.light.clone());
         let source = self.light.as_ref().unwrap_or(&own);
@@ -238,7 +238,7 @@ impl Run<'_> {
         let exposure = arguments.exposure.exp2();
         let shot = Shot::new(&photo.picture, &subject, &light, backdrop, exposure)?;
         let start = Instant::now();
-        let frames = match OutputKind::of(&output) {
+        let frames = match OutputKind::from_path(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
             _ => {
                 let picture = shot.picture(arguments.turned.to_radians())?;

@@ -217,7 +217,7 @@ fn turn(arguments: &TurnArguments, console: Console) -> CommandResult {
 
 fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
     let own = &arguments.run;
-    let settings = PaperSettings::of_phase(phase, own.settings.as_deref())?;
+    let settings = PaperSettings::from_phase(phase, own.settings.as_deref())?;
     let run = settings.run.clone();
     train((settings, run), own, console, |settings, resources| {
         let inputs = PaperInputs {

@@ -32,7 +32,7 @@ fn sample(index: u32, saturated: f64) -> Sample {
             Pixel([0; 3])
         }
     });
-    let mut measures = MaskSpans::of(&mask())
+    let mut measures = MaskSpans::from_mask(&mask())
         .measure(&image, SATURATION_LEVEL)
         .unwrap();
     measures.saturated_px = (saturated * measures.mask_px as f64) as u64;

@@ -133,7 +133,7 @@ impl StoredImage {
     pub fn object_mask(&self, path: &Path) -> Result<(Planes<1>, Option<String>), ImageError> {
         let extent = self.planes.extent();
         let alpha = self.alpha.as_ref().map(|alpha| alpha.plane(0));
-        let picture = MaskPicture::of_planes(extent.sides().into(), self.planes.planes(), alpha);
+        let picture = MaskPicture::from_planes(extent.sides().into(), self.planes.planes(), alpha);
         let object = picture.object().map_err(|fault| ImageError::NotAMask {
             path: path.to_owned(),
             fault,

@@ -105,7 +105,7 @@ pub(super) fn colour_of(
         Some(Transfer::Linear) => Ok(Colour::LINEAR),
         Some(Transfer::Srgb) => Ok(Colour::SRGB),
         Some(Transfer::Gamma22) => Ok(Colour::GAMMA22),
-        None => Colour::of_file(bytes).map_err(|fault| ImageError::Colour {
+        None => Colour::from_file(bytes).map_err(|fault| ImageError::Colour {
             path: path.to_owned(),
             fault,
         }),

@@ -28,7 +28,7 @@ impl ReducedFile {
     ///
     /// # Errors
     /// Where it is no image of a known format, too large or cut off, or its colours cannot be converted.
-    pub fn of(
+    pub fn new(
         path: &Path,
         bytes: &[u8],
         most: usize,
@@ -129,8 +129,10 @@ mod tests {
     fn a_large_picture_is_made_as_small_as_it_has_to_be() {
         let path = Path::new("a.jpg");
         let file = encode_jpeg(path, &ramp(Extent::new(300, 200))).unwrap();
-        assert_eq!(ReducedFile::of(path, &file, 60_000, None).unwrap(), None);
-        let reduced = ReducedFile::of(path, &file, 15_000, None).unwrap().unwrap();
+        assert_eq!(ReducedFile::new(path, &file, 60_000, None).unwrap(), None);
+        let reduced = ReducedFile::new(path, &file, 15_000, None)
+            .unwrap()
+            .unwrap();
         assert_eq!(reduced.ending, "png");
         let image = StoredImage::from_bytes(path, &reduced.bytes).unwrap();
         assert_eq!(image.planes.extent(), Extent::new(150, 100));
@@ -146,7 +148,7 @@ mod tests {
         let path = Path::new("a.exr");
         let bright = ramp(Extent::new(40, 40)).map(|value| value * 7.0);
         let file = encode_exr(path, &bright).unwrap();
-        let reduced = ReducedFile::of(path, &file, 400, None).unwrap().unwrap();
+        let reduced = ReducedFile::new(path, &file, 400, None).unwrap().unwrap();
         assert_eq!(reduced.ending, "exr");
         let image = StoredImage::from_bytes(path, &reduced.bytes).unwrap();
         assert!(image.planes.pixel(19, 0)[0] > 6.0);
@@ -154,6 +156,6 @@ mod tests {
 
     #[test]
     fn what_is_no_picture_is_refused() {
-        assert!(ReducedFile::of(Path::new("a.png"), b"no picture", 1, None).is_err());
+        assert!(ReducedFile::new(Path::new("a.png"), b"no picture", 1, None).is_err());
     }
 }

@@ -35,7 +35,7 @@ impl ShLight {
     /// # Errors
     /// Where their number is not that of an order, or one is not finite.
     pub fn new(coefficients: Vec<[f64; 3]>) -> Result<Self, LightError> {
-        let order = Order::of_coefficients(coefficients.len())?;
+        let order = Order::from_coefficients(coefficients.len())?;
         if coefficients.iter().flatten().all(|value| value.is_finite()) {
             Ok(Self {
                 order,

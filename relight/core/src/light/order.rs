@@ -66,7 +66,7 @@ impl Order {
     }
 
     /// The order that has so many coefficients.
-    pub(super) fn of_coefficients(count: usize) -> Result<Self, LightError> {
+    pub(super) fn from_coefficients(count: usize) -> Result<Self, LightError> {
         let side = count.isqrt();
         if count == 0 || side * side != count {
             return Err(LightError::Coefficients(format!(

@@ -50,7 +50,7 @@ struct SufficientStatistics {
 }
 
 impl SufficientStatistics {
-    fn of(pairs: impl Iterator<Item = (f64, f64)>) -> Self {
+    fn from_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> Self {
         let mut statistics = Self::default();
         for (truth, estimate) in pairs {
             statistics.truth_truth += truth * truth;
@@ -90,7 +90,7 @@ impl Comparison<'_> {
         let statistics: Vec<SufficientStatistics> = self
             .channels
             .iter()
-            .map(|channel| SufficientStatistics::of(channel.under(self.mask)))
+            .map(|channel| SufficientStatistics::from_pairs(channel.under(self.mask)))
             .collect();
         let channels = self.channels.iter().zip(best_scales(fit, &statistics));
         let sum: f64 = channels
@@ -136,7 +136,7 @@ impl Comparison<'_> {
         let statistics: Vec<SufficientStatistics> = self
             .channels
             .iter()
-            .map(|&channel| SufficientStatistics::of(self.window(channel, corner, side)))
+            .map(|&channel| SufficientStatistics::from_pairs(self.window(channel, corner, side)))
             .collect();
         let scales = best_scales(fit, &statistics);
         for (((total, &channel), statistics), scale) in totals

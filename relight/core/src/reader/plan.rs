@@ -97,7 +97,7 @@ pub(super) struct Job {
 impl DrawPlan {
     /// Batches of 12 neighbours in shuffled order, as the paper draws them.
     #[must_use]
-    pub const fn of_turns(seed: u64) -> Self {
+    pub const fn from_turns(seed: u64) -> Self {
         Self {
             batch: 12,
             draw: Draw::Neighbours,
@@ -334,7 +334,7 @@ mod tests {
     #[test]
     fn a_batch_of_neighbours_is_a_run_of_one_turn_around_its_end() {
         let turns = [1500, 30];
-        for job in DrawPlan::of_turns(3).jobs(&turns, Cursor::default(), 1) {
+        for job in DrawPlan::from_turns(3).jobs(&turns, Cursor::default(), 1) {
             let turn = job.samples[0].turn;
             assert!(job.samples.len() == 12 || turn == 1 && job.samples.len() == 6);
             for pair in job.samples.windows(2) {
@@ -348,7 +348,7 @@ mod tests {
     fn batches_are_shuffled_over_turns_and_otherwise_in_each_epoch() {
         let epoch = |epoch| {
             drawn(
-                DrawPlan::of_turns(3),
+                DrawPlan::from_turns(3),
                 &[120; 8],
                 Cursor { epoch, sample: 0 },
                 epoch + 1,
@@ -378,7 +378,7 @@ mod tests {
         let endless = |rank, turns: &[u32]| {
             let plan = DrawPlan {
                 rank,
-                ..DrawPlan::of_turns(1)
+                ..DrawPlan::from_turns(1)
             };
             plan.jobs(turns, Cursor::default(), u64::MAX).next()
         };
@@ -389,7 +389,7 @@ mod tests {
 
     #[test]
     fn ranks_go_on_together_over_epochs_and_from_each_others_cursors() {
-        let whole = DrawPlan::of_turns(5);
+        let whole = DrawPlan::from_turns(5);
         // Five batches an epoch: three processes do not come out even.
         let turns = [30, 24];
         let jobs = |rank, from| {

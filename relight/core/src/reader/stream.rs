@@ -65,7 +65,7 @@ pub struct Drawn<B> {
 ///
 /// let turns = Arc::new(Turns::open(Path::new("data"), Encoding::Srgb)?);
 /// let streaming = Streaming {
-///     plan: DrawPlan::of_turns(1),
+///     plan: DrawPlan::from_turns(1),
 ///     from: Cursor::default(),
 ///     until_epoch: 3,
 ///     threads: NonZeroUsize::MIN,

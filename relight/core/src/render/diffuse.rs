@@ -90,7 +90,10 @@ impl DiffuseLayer {
             coefficients[0] = coefficients[0].map(f64::abs);
         }
         let (order, higher) = match form {
-            DiffuseForm::Irradiance => (light.order().max(Order::TWO), HigherBands::of(light)),
+            DiffuseForm::Irradiance => (
+                light.order().max(Order::TWO),
+                HigherBands::from_light(light),
+            ),
             DiffuseForm::Released => (Order::TWO, None),
         };
         Self {
@@ -138,8 +141,8 @@ impl DiffuseLayer {
 /// What each of the nine coefficients is multiplied with: Â_l Y_lm(n).
 #[inline(always)]
 pub(super) fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
-    let [c1, c2, c3, c4, c5] = C.map(T::of);
-    let two = T::of(2.0);
+    let [c1, c2, c3, c4, c5] = C.map(T::splat);
+    let two = T::splat(2.0);
     [
         c4,
         two * c2 * y,
@@ -155,7 +158,7 @@ pub(super) fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
 
 impl HigherBands {
     /// Those of a light; none where it has no even band beyond 2.
-    fn of(light: &ShLight) -> Option<Self> {
+    fn from_light(light: &ShLight) -> Option<Self> {
         if light.order().get() < 4 {
             return None;
         }
@@ -212,7 +215,7 @@ impl Kernel<3, 3> for DiffuseLayer {
     fn run(&self, weights: &mut Self::Scratch, normal: [Lanes; 3]) -> [Lanes; 3] {
         let terms = terms(normal);
         let surface = Lanes::surface(normal);
-        let ambient = Lanes::of(self.ambient());
+        let ambient = Lanes::splat(self.ambient());
         let mut shading = match &self.higher {
             Some(bands) => bands.visible.at_lanes(weights, normal),
             None => [Lanes::all(0.0); 3],
@@ -220,7 +223,7 @@ impl Kernel<3, 3> for DiffuseLayer {
         for (channel, shading) in shading.iter_mut().enumerate() {
             let mut sum = *shading;
             for (term, c) in terms.iter().zip(&self.coefficients) {
-                sum = sum + *term * Lanes::of(c[channel]);
+                sum = sum + *term * Lanes::splat(c[channel]);
             }
             *shading = (sum.at_least_zero() + ambient) * surface;
         }

@@ -30,7 +30,7 @@ pub(super) trait Number:
     type Constant: Copy;
 
     /// A constant.
-    fn of(value: f64) -> Self;
+    fn splat(value: f64) -> Self;
 
     /// A stored constant.
     fn constant(value: Self::Constant) -> Self;
@@ -45,7 +45,7 @@ impl Number for f64 {
     }
 
     #[inline(always)]
-    fn of(value: f64) -> Self {
+    fn splat(value: f64) -> Self {
         value
     }
 }
@@ -59,7 +59,7 @@ impl Number for Lanes {
     }
 
     #[inline(always)]
-    fn of(value: f64) -> Self {
+    fn splat(value: f64) -> Self {
         Self([value as f32; WIDTH])
     }
 }
@@ -245,7 +245,7 @@ mod tests {
 
         #[inline(always)]
         fn run(&self, (): &mut (), [a, b]: [Lanes; 2]) -> [Lanes; 1] {
-            [a * Lanes::of(2.0) + b]
+            [a * Lanes::splat(2.0) + b]
         }
     }
 

@@ -105,9 +105,9 @@ fn zonal<T: Number>(smoothness: T, lobe: &mut [T]) {
     for l in 0..lobe.len() {
         let degree = l as f64;
         lobe[l] = if l < 2 {
-            T::of(2.0 * PI) / (smoothness + T::of(degree + 1.0))
+            T::splat(2.0 * PI) / (smoothness + T::splat(degree + 1.0))
         } else {
-            lobe[l - 2] * (smoothness + T::of(2.0 - degree)) / (smoothness + T::of(degree + 1.0))
+            lobe[l - 2] * (smoothness + T::splat(2.0 - degree)) / (smoothness + T::splat(degree + 1.0))
         };
     }
 }

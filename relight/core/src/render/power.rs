@@ -67,9 +67,9 @@ impl Kernel<7, 3> for PowerLayer {
         let [mut r, mut g, mut b] = [Lanes::all(0.0); 3];
         for (term, c) in terms([x, y, z]).iter().zip(&self.coefficients) {
             let power = term.signed_power(smoothness);
-            r = r + power * Lanes::of(c[0]);
-            g = g + power * Lanes::of(c[1]);
-            b = b + power * Lanes::of(c[2]);
+            r = r + power * Lanes::splat(c[0]);
+            g = g + power * Lanes::splat(c[1]);
+            b = b + power * Lanes::splat(c[2]);
         }
         let surface = Lanes::surface([x, y, z]);
         [r * red * surface, g * green * surface, b * blue * surface]
@@ -88,8 +88,8 @@ const C: [f64; 5] = [
 /// Â_l Ŷ_lm(n): the paper's polynomials times the coefficients of the cosine lobe.
 #[inline(always)]
 fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
-    let [c0, c1, c2, c3, c4] = power_constants().map(T::of);
-    let [one, two, three, four] = [1.0, 2.0, 3.0, 4.0].map(T::of);
+    let [c0, c1, c2, c3, c4] = power_constants().map(T::splat);
+    let [one, two, three, four] = [1.0, 2.0, 3.0, 4.0].map(T::splat);
     let square = z * z;
     let odd = four * square * z - two * z;
     [

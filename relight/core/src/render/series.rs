@@ -61,8 +61,8 @@ fn sum<T: Number>(
     weights: &[T],
     [x, y, z]: [T; 3],
 ) -> [T; 3] {
-    let mut total = [T::of(0.0); 3];
-    let (mut cos, mut sin) = (T::of(1.0), T::of(0.0));
+    let mut total = [T::splat(0.0); 3];
+    let (mut cos, mut sin) = (T::splat(1.0), T::splat(0.0));
     let mut first = (1.0 / (4.0 * PI)).sqrt();
     for m in 0..=order.get() {
         if m > 0 {
@@ -83,8 +83,8 @@ fn sum<T: Number>(
 /// sin^m, which begins with `first`.
 #[inline(always)]
 fn sum_of_m<T: Number>(band: &[Term<T::Constant>], weights: &[T], first: f64, z: T) -> [[T; 3]; 2] {
-    let [mut plus, mut minus] = [[T::of(0.0); 3]; 2];
-    let (mut before, mut now) = (T::of(0.0), T::of(first));
+    let [mut plus, mut minus] = [[T::splat(0.0); 3]; 2];
+    let (mut before, mut now) = (T::splat(0.0), T::splat(first));
     for (term, factor) in band.iter().zip(weights) {
         if !term.is_dark {
             let weight = *factor * now;

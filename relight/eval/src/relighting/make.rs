@@ -75,7 +75,7 @@ impl RelightingRecipe {
             let panorama = number % library.panoramas.len();
             let turn = TAU * unit(&mut random);
             let name = library.panoramas.name(panorama).unwrap_or_default();
-            let lighting = Lighting::of_panorama(panorama, turn, IRRADIANCE, self.shadows);
+            let lighting = Lighting::from_panorama(panorama, turn, IRRADIANCE, self.shadows);
             (name.to_owned(), lighting)
         };
         (0..self.lights).map(lighting).collect()
@@ -113,7 +113,7 @@ impl Origin {
     /// The description of a set that is being made.
     const FILE: &str = "recipe.json";
 
-    fn of(recipe: &RelightingRecipe, library: &Library) -> Self {
+    fn new(recipe: &RelightingRecipe, library: &Library) -> Self {
         let panoramas = &library.panoramas;
         let names = (0..panoramas.len()).filter_map(|number| panoramas.name(number));
         Self {
@@ -165,7 +165,7 @@ pub fn make_relighting(
     recipe.synth().check()?;
     let lightings = recipe.lightings(library);
     make_folder(out)?;
-    Origin::of(recipe, library).describe(out)?;
+    Origin::new(recipe, library).describe(out)?;
     make_folder(&out.join("lights"))?;
     for (number, (_, lighting)) in lightings.iter().enumerate() {
         let path = light_file(out, number);

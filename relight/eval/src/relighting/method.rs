@@ -73,7 +73,7 @@ impl RelightMethod<'_> {
                 part,
             }),
             Self::Photograph(decomposer) => {
-                let photo = Photographed::of(set, object, part)?;
+                let photo = Photographed::new(set, object, part)?;
                 let mask = &photo.mask;
                 let subject =
                     Subject::new(&photo.picture, mask, Some(mask), decomposer, &photo.options);
@@ -91,7 +91,7 @@ impl RelightMethod<'_> {
                     picture,
                     mask,
                     options,
-                } = Photographed::of(set, object, part)?;
+                } = Photographed::new(set, object, part)?;
                 let found = decomposer.decompose(&picture, &mask, &options);
                 let found = found.map_err(EvalError::sample(&object.name, NOT_RELIT))?;
                 let white = mean_irradiance(&set.lights()[object.input]);
@@ -109,7 +109,7 @@ pub(super) struct Photographed {
 }
 
 impl Photographed {
-    fn of(set: &RelightingSet, object: &Object, part: Part) -> Result<Self, EvalError> {
+    fn new(set: &RelightingSet, object: &Object, part: Part) -> Result<Self, EvalError> {
         let image = set.image(object, object.input, part)?;
         let mask = object
             .mask

@@ -46,7 +46,7 @@ impl MapsNet for Engine {
             if output.shape().len() > 2 {
                 answer.maps.append(&mut output.into_values());
             } else {
-                answer.light = PredictedLight::of(output.values());
+                answer.light = PredictedLight::from_output(output.values());
             }
         }
         Ok(answer)

@@ -65,7 +65,7 @@ pub(super) struct LayerSums {
 
 impl LayerSums {
     /// The sums over a picture, or a strip of it, whose maps have a highlight that is possible.
-    pub(super) fn of(picture: &Planes<3>, mask: &[bool], maps: &AnsweredMaps) -> Self {
+    pub(super) fn from_maps(picture: &Planes<3>, mask: &[bool], maps: &AnsweredMaps) -> Self {
         let (s, h) = (maps.shading.plane(0), maps.highlight.plane(0));
         let mut sums = Self::default();
         for at in (0..mask.len()).filter(|&at| mask[at]) {
@@ -242,7 +242,7 @@ mod tests {
         } else {
             Planes::zeros(EXTENT)
         };
-        let sums = LayerSums::of(&picture, mask, &maps);
+        let sums = LayerSums::from_maps(&picture, mask, &maps);
         ComposedLayers::new(picture, mask, maps, &sums)
     }
 
@@ -269,7 +269,9 @@ mod tests {
             (picture, mask, maps)
         };
         let strips = [0, half.height].map(strip);
-        let sums = strips.iter().map(|(p, m, maps)| LayerSums::of(p, m, maps));
+        let sums = strips
+            .iter()
+            .map(|(p, m, maps)| LayerSums::from_maps(p, m, maps));
         let sums = sums.fold(LayerSums::default(), LayerSums::and);
         let mut residual = ResidualSums::default();
         for (number, (picture, mask, maps)) in strips.into_iter().enumerate() {
@@ -305,7 +307,7 @@ mod tests {
             highlight: Planes::zeros(EXTENT),
             ..maps
         };
-        let scale = LayerSums::of(&picture, &mask, &without).albedo_scale() as f32;
+        let scale = LayerSums::from_maps(&picture, &mask, &without).albedo_scale() as f32;
         for at in 0..EXTENT.pixels() {
             let s = layers.shading.plane(0)[at];
             let rest = picture.plane(1)[at] - layers.diffuse.plane(1)[at];

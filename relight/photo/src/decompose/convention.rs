@@ -87,7 +87,7 @@ impl Axes {
 
 impl Convention {
     /// How the network of this signature is used for pictures of `side` x `side` pixels, or why it cannot be.
-    pub(super) fn of(signature: &OnnxSignature, side: usize) -> Result<Self, String> {
+    pub(super) fn from_signature(signature: &OnnxSignature, side: usize) -> Result<Self, String> {
         if let Some(tokens) = signature.input("num_tokens") {
             return Self::moge(signature, tokens, side);
         }
@@ -201,7 +201,7 @@ mod tests {
             inputs: vec![picture("image", None, None), tokens.clone()],
             outputs: answers(&["points", "normal", "mask", "metric_scale"]),
         };
-        let found = Convention::of(&moge, 256).unwrap();
+        let found = Convention::from_signature(&moge, 256).unwrap();
         assert!(found.name.starts_with("MoGe-2"));
         assert_eq!((found.output, found.axes), (1, Axes::Camera));
         assert_eq!(found.extent, Extent::new(256, 256));
@@ -211,7 +211,7 @@ mod tests {
             inputs: vec![picture("pixel_values", Some(616), Some(1064))],
             outputs: answers(&["predicted_depth", "predicted_normal", "normal_confidence"]),
         };
-        let found = Convention::of(&metric3d, 256).unwrap();
+        let found = Convention::from_signature(&metric3d, 256).unwrap();
         assert!(found.name.starts_with("Metric3D"));
         assert_eq!((found.output, found.extent), (1, Extent::new(1064, 616)));
 
@@ -219,7 +219,10 @@ mod tests {
             inputs: vec![picture("input", Some(256), Some(256))],
             outputs: answers(&["normal"]),
         };
-        assert_eq!(Convention::of(&ours, 256).unwrap().axes, Axes::Viewer);
+        assert_eq!(
+            Convention::from_signature(&ours, 256).unwrap().axes,
+            Axes::Viewer
+        );
     }
 
     #[test]
@@ -228,7 +231,7 @@ mod tests {
             inputs: vec![picture("left", None, None), picture("right", None, None)],
             outputs: answers(&["depth"]),
         };
-        let fault = Convention::of(&two, 256).unwrap_err();
+        let fault = Convention::from_signature(&two, 256).unwrap_err();
         assert!(fault.contains("left, right"), "{fault}");
         let flat = OnnxSignature {
             inputs: vec![
@@ -237,7 +240,7 @@ mod tests {
             ],
             outputs: answers(&["points", "mask"]),
         };
-        let fault = Convention::of(&flat, 256).unwrap_err();
+        let fault = Convention::from_signature(&flat, 256).unwrap_err();
         assert!(fault.contains("points, mask"), "{fault}");
     }
 }

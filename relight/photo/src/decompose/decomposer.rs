@@ -170,14 +170,14 @@ impl Decomposer {
             }
         };
         let (fine, coarse) = parallel::join(fine, coarse);
-        let found = Self::of(fine?, coarse?);
+        let found = Self::from_nets(fine?, coarse?);
         Ok(Self {
             tells_paint: graph.outputs().iter().any(|output| output.name == "paint"),
             ..found
         })
     }
 
-    pub(super) fn of(fine: Box<dyn MapsNet>, coarse: Option<Box<dyn MapsNet>>) -> Self {
+    pub(super) fn from_nets(fine: Box<dyn MapsNet>, coarse: Option<Box<dyn MapsNet>>) -> Self {
         Self {
             scales: Scales { fine, coarse },
             tells_paint: false,

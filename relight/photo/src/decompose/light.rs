@@ -25,7 +25,7 @@ pub struct PredictedLight([f64; LIGHT_OUTPUTS]);
 
 impl PredictedLight {
     /// What the network answers; none where these are not so many numbers.
-    pub(super) fn of(answer: &[f32]) -> Option<Self> {
+    pub(super) fn from_output(answer: &[f32]) -> Option<Self> {
         let numbers: [f32; LIGHT_OUTPUTS] = answer.try_into().ok()?;
         let is_light = numbers.iter().all(|value| value.is_finite());
         is_light.then(|| Self(numbers.map(f64::from)))
@@ -34,7 +34,7 @@ impl PredictedLight {
     /// What the network should answer of the coefficients of a light, in which the mean shading of an object is `mean`,
     /// above 0.
     #[must_use]
-    pub fn of_light(coefficients: &[[f64; 3]; LIGHT_OUTPUTS], mean: f64) -> Self {
+    pub fn from_light(coefficients: &[[f64; 3]; LIGHT_OUTPUTS], mean: f64) -> Self {
         let irradiance = |at: usize| {
             let grey = coefficients[at].iter().sum::<f64>() / 3.0;
             cosine_lobe(at.isqrt()) * grey / mean
@@ -112,7 +112,7 @@ mod tests {
     const LOPSIDED: [f64; 9] = [1.0, 0.4, 0.3, 0.5, 0.1, -0.1, 0.05, 0.2, 0.15];
 
     fn lopsided(mean: f64) -> PredictedLight {
-        PredictedLight::of_light(&LOPSIDED.map(|c| [c; 3]), mean)
+        PredictedLight::from_light(&LOPSIDED.map(|c| [c; 3]), mean)
     }
 
     fn grey(shading: &[f32], extent: Extent) -> Rgb<Linear> {

@@ -30,7 +30,7 @@ impl OtherNormals {
             fault,
         };
         let signature = OnnxSignature::read(onnx).unwrap_or_default();
-        let convention = Convention::of(&signature, side).map_err(fault)?;
+        let convention = Convention::from_signature(&signature, side).map_err(fault)?;
         let Extent { width, height } = convention.extent;
         let size = (width, height);
         let net = Inference::from_onnx(path, onnx, 3, size, &convention.given)?;

@@ -95,7 +95,7 @@ impl Photo {
     ///
     /// # Errors
     /// Where the mask is empty.
-    pub fn of_frame(
+    pub fn from_frame(
         name: String,
         picture: Rgb<Linear>,
         mask: Planes<1>,

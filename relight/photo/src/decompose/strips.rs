@@ -120,7 +120,7 @@ impl LayerPlan<'_> {
             .collect();
         let sums = parallel::map(strips.len(), |at| {
             let (picture, mask, maps) = self.strip(maps, &strips[at])?;
-            Ok::<_, ImageError>(LayerSums::of(&picture, mask, &maps))
+            Ok::<_, ImageError>(LayerSums::from_maps(&picture, mask, &maps))
         });
         let mut all = LayerSums::default();
         for sums in sums {

@@ -154,8 +154,8 @@ fn the_coarse_scale_decides_the_shape_and_the_fine_one_what_is_finer() {
         mirror: false,
         ..DecomposeOptions::default()
     };
-    let one = Decomposer::of(fine(), None);
-    let both = Decomposer::of(fine(), Some(Box::new(coarse)));
+    let one = Decomposer::from_nets(fine(), None);
+    let both = Decomposer::from_nets(fine(), Some(Box::new(coarse)));
     let normals = |net: &Decomposer| net.decompose(&lines, &mask, &options).unwrap().normals;
     let (one, both) = (normals(&one), normals(&both));
     let mean_x = |of: &Normals<YUp>| {
@@ -179,7 +179,7 @@ fn the_coarse_scale_decides_the_shape_and_the_fine_one_what_is_finer() {
 fn the_gate_opens_where_more_than_five_percent_are_saturated() {
     let extent = Extent::new(40, 40);
     let mask = Planes::filled(extent, [1.0]);
-    let net = Decomposer::of(
+    let net = Decomposer::from_nets(
         Box::new(PixelNet {
             side: 32,
             pixel: |input: [f32; INPUTS]| {
@@ -270,7 +270,7 @@ fn fields_and_maps_are_the_same_but_for_the_mask() {
 
 #[test]
 fn a_square_that_is_far_larger_than_the_photograph_takes_no_memory() {
-    let net = Decomposer::of(
+    let net = Decomposer::from_nets(
         Box::new(PixelNet {
             side: 32,
             pixel: by_colour,
@@ -290,7 +290,7 @@ fn a_square_that_is_far_larger_than_the_photograph_takes_no_memory() {
 #[test]
 fn a_mask_that_is_empty_or_of_another_size_is_refused() {
     let extent = Extent::new(64, 64);
-    let net = Decomposer::of(
+    let net = Decomposer::from_nets(
         Box::new(PixelNet {
             side: 32,
             pixel: by_colour,

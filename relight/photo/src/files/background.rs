@@ -62,7 +62,7 @@ impl BackgroundFile {
 
 /// Whether a file is a picture of radiance that is twice as wide as high.
 fn is_panorama(bytes: &[u8]) -> bool {
-    let is_radiance = matches!(Format::of(bytes), Some(Format::Exr | Format::Radiance));
+    let is_radiance = matches!(Format::sniff(bytes), Some(Format::Exr | Format::Radiance));
     let is_wide = |extent: Extent| extent.width == 2 * extent.height;
     is_radiance && stated_extent(bytes).is_some_and(is_wide)
 }

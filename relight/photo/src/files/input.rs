@@ -221,7 +221,7 @@ fn use_of(path: PathBuf) -> Option<UnusedFile> {
     let file = fs::File::open(&path);
     // What cannot be read is known by its name alone.
     let _ = file.and_then(|file| file.take(HEAD).read_to_end(&mut head));
-    match Format::of(&head) {
+    match Format::sniff(&head) {
         Some(format) => {
             let (name, advice) = format.unread()?;
             let what = format!("is {name}, which is not read: {advice}");
@@ -331,7 +331,7 @@ fn read_frame(turns: &Turns, id: SampleId) -> Result<Photo, DecomposeError> {
     let [red, green, blue] = [0, 1, 2].map(|c| batch.images[c * pixels..][..pixels].to_vec());
     let frame = batch.frames.first();
     let record = frame.and_then(|frame| frame.record.as_ref());
-    Photo::of_frame(
+    Photo::from_frame(
         frame.map(|frame| within(&frame.key)).unwrap_or_default(),
         Rgb::new(Planes::from_planes(batch.extent, [red, green, blue])?),
         Planes::from_planes(batch.extent, [batch.masks])?,

@@ -133,16 +133,16 @@ impl<'a> Insertion<'a> {
         Ok(match source {
             InsertSource::Photo(photo) => {
                 let photo = self.setting.reduced(object, *photo);
-                Subject::of_photo(&photo, self.decomposer, &self.options)?
+                Subject::from_photo(&photo, self.decomposer, &self.options)?
             }
-            InsertSource::Captured(object) => Subject::of_captured(&object)?,
+            InsertSource::Captured(object) => Subject::from_captured(&object)?,
         })
     }
 
     /// How many frames are written; none where the background has as many as it has.
     #[must_use]
     pub fn frames(&self, output: &InsertionOutput<'_>) -> Option<u32> {
-        match (OutputKind::of(output.path), &self.background) {
+        match (OutputKind::from_path(output.path), &self.background) {
             (Some(OutputKind::Movie(_)), BackgroundFile::Movie(_)) => None,
             (Some(OutputKind::Movie(_)), _) => Some(output.turn_frames()),
             _ => Some(1),
@@ -159,7 +159,7 @@ impl<'a> Insertion<'a> {
         output: &InsertionOutput<'_>,
         written: impl FnMut(),
     ) -> Result<u32, InsertError> {
-        match OutputKind::of(output.path) {
+        match OutputKind::from_path(output.path) {
             Some(OutputKind::Movie(format)) => match &self.background {
                 BackgroundFile::Movie(_) => self.film_over(scene, output.path, format, written),
                 _ => self.film_turn(scene, output, format, written),

@@ -14,9 +14,9 @@ use super::MovieFormat;
 ///
 /// use relight_photo::files::{MovieFormat, OutputKind};
 ///
-/// assert_eq!(OutputKind::of(Path::new("cup.EXR")), Some(OutputKind::Exr));
-/// assert_eq!(OutputKind::of(Path::new("cup.mp4")), Some(OutputKind::Movie(MovieFormat::Mp4)));
-/// assert_eq!(OutputKind::of(Path::new("cup.tiff")), None);
+/// assert_eq!(OutputKind::from_path(Path::new("cup.EXR")), Some(OutputKind::Exr));
+/// assert_eq!(OutputKind::from_path(Path::new("cup.mp4")), Some(OutputKind::Movie(MovieFormat::Mp4)));
+/// assert_eq!(OutputKind::from_path(Path::new("cup.tiff")), None);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OutputKind {
@@ -33,7 +33,7 @@ pub enum OutputKind {
 impl OutputKind {
     /// What a file's ending asks for.
     #[must_use]
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn from_path(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         Some(match ending.as_str() {
             "png" => Self::Png,
@@ -52,7 +52,7 @@ impl OutputKind {
 /// # Errors
 /// Where the file cannot be written.
 pub fn write_picture(path: &Path, picture: &Rgb<Linear>) -> Result<(), ImageError> {
-    match OutputKind::of(path) {
+    match OutputKind::from_path(path) {
         Some(OutputKind::Exr) => picture.write_exr(path),
         Some(OutputKind::Jpeg) => write_jpeg(path, picture.clone().encode::<Srgb>().planes()),
         _ => picture.clone().encode::<Srgb>().write_png(path),

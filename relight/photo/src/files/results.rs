@@ -174,7 +174,10 @@ impl DecompositionFiles<'_> {
         ball(self.found)
             .encode::<Srgb>()
             .write_png(&folder.join("light-sphere.png"))?;
-        let panorama = Panorama::of_light(light, PANORAMA).image().planes().clone();
+        let panorama = Panorama::from_light(light, PANORAMA)
+            .image()
+            .planes()
+            .clone();
         Rgb::<Linear>::new(panorama.map(|value| value.max(0.0)))
             .write_exr(&folder.join("light-panorama.exr"))?;
         Ok(())

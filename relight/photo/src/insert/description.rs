@@ -253,7 +253,7 @@ impl ObjectDescription {
             tint: self.tint,
             gloss: self
                 .gloss
-                .map(|[part, smoothness]| ObjectGloss::of_part(part, smoothness)),
+                .map(|[part, smoothness]| ObjectGloss::from_part(part, smoothness)),
         }
     }
 

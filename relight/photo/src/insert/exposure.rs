@@ -27,7 +27,7 @@ pub struct PanoramaExposure {
 impl PanoramaExposure {
     /// The exposure in which one pixel in twenty of what is `seen` is brighter than 0.8, as far as objects in this light, where
     /// it is the same, are neither black nor bleached.
-    pub(super) fn of(seen: &Rgb<Linear>, light: Option<&ShLight>) -> Self {
+    pub(super) fn new(seen: &Rgb<Linear>, light: Option<&ShLight>) -> Self {
         let bright = above_part(seen.planes().brightest(), 1.0 - BRIGHTEST_PART);
         let wanted = match bright {
             Some(value) if value > 0.0 => BRIGHT / value,
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn one_pixel_in_twenty_is_brighter_than_four_fifths_whatever_the_picture_was() {
         for most in [0.8, 1.0, 1.5] {
-            let found = PanoramaExposure::of(&ramp(most), Some(&lamp(30.0)));
+            let found = PanoramaExposure::new(&ramp(most), Some(&lamp(30.0)));
             let shown = 0.95 * most * found.stops.exp2();
             assert!((shown / BRIGHT - 1.0).abs() < 0.03, "{most}: {found:?}");
             assert!(found.clipped < 0.05 && !found.for_objects, "{found:?}");
@@ -113,11 +113,11 @@ mod tests {
 
     #[test]
     fn an_object_against_the_light_is_not_black_and_one_in_a_dark_room_is_not_bleached() {
-        let behind = PanoramaExposure::of(&ramp(30.0), Some(&lamp(180.0)));
+        let behind = PanoramaExposure::new(&ramp(30.0), Some(&lamp(180.0)));
         assert!(behind.for_objects && behind.clipped > 0.1, "{behind:?}");
         let shown = facing(&lamp(180.0)) * behind.stops.exp2();
         assert!((shown / OBJECT.0 - 1.0).abs() < 1e-3);
-        let dark = PanoramaExposure::of(&ramp(0.01), Some(&lamp(0.0)));
+        let dark = PanoramaExposure::new(&ramp(0.01), Some(&lamp(0.0)));
         let shown = facing(&lamp(0.0)) * dark.stops.exp2();
         assert!(dark.for_objects && (shown / OBJECT.1 - 1.0).abs() < 1e-3);
     }

@@ -82,7 +82,7 @@ impl DiscLamp {
     /// Where `extent` has no pixels.
     #[must_use]
     pub fn panorama(&self, extent: Extent) -> Panorama {
-        let frame = Panorama::of_light(&ShLight::dark(Order::TWO), extent);
+        let frame = Panorama::from_light(&ShLight::dark(Order::TWO), extent);
         let (edge, towards) = (self.edge(), self.direction());
         let (radiance, even) = (self.radiance(), self.even());
         let places = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];

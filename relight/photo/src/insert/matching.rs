@@ -52,7 +52,7 @@ impl Matching {
     /// Looks at a background: how bright its bright places are, the colour of its light by shades of grey (Finlayson and Trezzi,
     /// 2004), and its grain where it is smoothest.
     #[must_use]
-    pub fn of(background: &Rgb<Linear>) -> Self {
+    pub fn from_background(background: &Rgb<Linear>) -> Self {
         Self {
             level: (bright(background) / BRIGHT).clamp(LEVELS.0, LEVELS.1),
             balance: balance(background),
@@ -199,13 +199,14 @@ mod tests {
         let picture = Rgb::new(Planes::from_fn(Extent::new(40, 40), |x, _| {
             [0.2, 0.18, 0.1].map(|v| v * x as f32 / 40.0)
         }));
-        let found = Matching::of(&picture);
+        let found = Matching::from_background(&picture);
         assert!((found.level - 0.19 / 0.8).abs() < 0.02, "{found:?}");
         assert!(
             found.balance[0] > 1.1 && found.balance[2] < 0.8,
             "{found:?}"
         );
-        let even = Matching::of(&Rgb::new(Planes::filled(Extent::new(40, 40), [0.8; 3])));
+        let even =
+            Matching::from_background(&Rgb::new(Planes::filled(Extent::new(40, 40), [0.8; 3])));
         assert_eq!(even, Matching::default());
     }
 }

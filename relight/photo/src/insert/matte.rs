@@ -55,9 +55,9 @@ impl Matte {
         let smooth = blurred(&blurred(mask, edge.div_ceil(2)), edge.div_ceil(2));
         let inside = share.clone().map(|s| f32::from(u8::from(s > 1.0 - 1e-4)));
         let outside = share.map(|s| f32::from(u8::from(s < 1e-4)));
-        let object = Neighbours::of(picture, &inside, mask, edge);
+        let object = Neighbours::new(picture, &inside, mask, edge);
         let beside = mask.clone().map(|m| 1.0 - m);
-        let around = Neighbours::of(picture, &outside, &beside, edge);
+        let around = Neighbours::new(picture, &outside, &beside, edge);
         let mut matte = Self {
             alpha: inside,
             foreground: picture.clone(),
@@ -90,7 +90,7 @@ impl Matte {
     /// # Panics
     /// Where alpha has another size.
     #[must_use]
-    pub(super) fn of_cut_out(picture: &Planes<3>, alpha: &Planes<1>) -> Self {
+    pub(super) fn from_cut_out(picture: &Planes<3>, alpha: &Planes<1>) -> Self {
         assert_eq!(picture.extent(), alpha.extent(), "size of alpha");
         let matte = Self {
             alpha: alpha.clone().map(|a| a.clamp(0.0, 1.0)),
@@ -139,7 +139,7 @@ struct SideColour {
 impl Neighbours {
     /// The colours of a `side` (1 on it, else 0), whose pixels `far` from the edge count. Where there are none, as in a handle or
     /// in the opening of it, those count that do not touch the edge.
-    fn of(picture: &Planes<3>, far: &Planes<1>, side: &Planes<1>, edge: usize) -> Self {
+    fn new(picture: &Planes<3>, far: &Planes<1>, side: &Planes<1>, edge: usize) -> Self {
         let reach = 2 * edge + 1;
         let near = blurred(side, 1);
         let mut weights = far.clone();
@@ -423,7 +423,7 @@ mod tests {
         let extent = Extent::new(8, 1);
         let picture = Planes::from_fn(extent, |x, _| [if x < 4 { 0.5 } else { 9.0 }; 3]);
         let alpha = Planes::from_fn(extent, |x, _| [[1.0, 1.0, 0.7, 0.2, 0.0, 0.0, 0.0, 0.0][x]]);
-        let matte = Matte::of_cut_out(&picture, &alpha);
+        let matte = Matte::from_cut_out(&picture, &alpha);
         assert_eq!(matte.alpha, alpha);
         assert_eq!(matte.foreground.pixel(4, 0), [0.5; 3]);
     }

@@ -124,7 +124,7 @@ pub(super) struct Foot {
 }
 
 impl Foot {
-    pub(super) fn of(alpha: &Planes<1>) -> Self {
+    pub(super) fn from_alpha(alpha: &Planes<1>) -> Self {
         Self {
             across: middle(alpha),
             down: rows(alpha).end as f64,

@@ -121,7 +121,7 @@ struct Cell {
 
 impl Cell {
     /// None where it has no neighbour.
-    fn of(at: usize, extent: Extent, inside: &[bool], slopes: &[[f32; 2]]) -> Option<Self> {
+    fn new(at: usize, extent: Extent, inside: &[bool], slopes: &[[f32; 2]]) -> Option<Self> {
         let (mut cell, mut count) = ([at as u32; 4], 0.0);
         let mut sum = 0.0;
         let sides = [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)];
@@ -169,7 +169,7 @@ impl HeightSolver {
         let slopes: Vec<[f32; 2]> = (0..inside.len()).map(slope).collect();
         let cells: Vec<Cell> = (0..inside.len())
             .filter(|&at| inside[at])
-            .filter_map(|at| Cell::of(at, extent, inside, &slopes))
+            .filter_map(|at| Cell::new(at, extent, inside, &slopes))
             .collect();
         let mut heights = vec![0.0_f32; inside.len()];
         for _ in 0..self.rounds {

@@ -74,7 +74,9 @@ impl SceneSetting {
         given: Option<LightSource>,
     ) -> Result<Self, InsertError> {
         let mut matching = match background {
-            SceneBackground::Picture(picture) if scene.matches => Matching::of(picture),
+            SceneBackground::Picture(picture) if scene.matches => {
+                Matching::from_background(picture)
+            }
             _ => Matching::default(),
         };
         if given.is_none() {
@@ -84,7 +86,7 @@ impl SceneSetting {
         if scene.white_balance == WhiteBalance::Auto
             && let SceneBackground::Picture(picture) = background
         {
-            matching.balance = Matching::of(picture).balance;
+            matching.balance = Matching::from_background(picture).balance;
         }
         let sun = match background {
             SceneBackground::Picture(picture) if given.is_none() => SeenSun::find(picture.planes()),
@@ -92,7 +94,9 @@ impl SceneSetting {
         };
         let light = given.unwrap_or_else(|| match background {
             SceneBackground::Panorama(panorama) => LightSource::Panorama(panorama.clone()),
-            SceneBackground::Picture(picture) => LightSource::of_picture(picture, scene.field, sun),
+            SceneBackground::Picture(picture) => {
+                LightSource::from_picture(picture, scene.field, sun)
+            }
         });
         let coefficients = light.light()?;
         let tint = scene.white_balance.tint(&coefficients);
@@ -201,7 +205,7 @@ fn exposed(
     );
     let seen = shown(&view, panorama, 0.0, scale);
     let found = if scene.matches {
-        PanoramaExposure::of(&seen, light)
+        PanoramaExposure::new(&seen, light)
     } else {
         PanoramaExposure::fixed(&seen, 0.0)
     };
@@ -234,7 +238,7 @@ mod tests {
 
     fn sky() -> Panorama {
         let even = ShLight::even(Order::TWO, [0.2, 0.4, 1.0]);
-        Panorama::of_light(&even, Extent::new(32, 16))
+        Panorama::from_light(&even, Extent::new(32, 16))
     }
 
     fn dusk() -> Rgb<Linear> {
@@ -270,7 +274,7 @@ mod tests {
     #[test]
     fn a_lamp_before_a_panorama_leaves_both_as_bright_as_they_are_wanted() {
         let bright = ShLight::even(Order::TWO, [40.0; 3]);
-        let panorama = Panorama::of_light(&bright, Extent::new(32, 16));
+        let panorama = Panorama::from_light(&bright, Extent::new(32, 16));
         let background = SceneBackground::Panorama(&panorama);
         let lamp = LightSource::Lamp("170,30".parse().unwrap());
         let scene = described("size = [200, 100]");
@@ -344,7 +348,7 @@ mod tests {
 
     #[test]
     fn light_that_is_none_is_refused() {
-        let black = Panorama::of_light(&ShLight::dark(Order::TWO), Extent::new(32, 16));
+        let black = Panorama::from_light(&ShLight::dark(Order::TWO), Extent::new(32, 16));
         let refused = SceneSetting::new(&described(""), SceneBackground::Panorama(&black), None);
         assert!(matches!(refused, Err(InsertError::Dark)));
     }
@@ -357,7 +361,7 @@ mod tests {
         let mask = Planes::from_fn(extent, |_, y| {
             [f32::from(u8::from((100..250).contains(&y)))]
         });
-        let photo = Photo::of_frame("a".into(), picture, mask, None).unwrap();
+        let photo = Photo::from_frame("a".into(), picture, mask, None).unwrap();
         let background = dusk();
         let setting =
             SceneSetting::new(&described(""), SceneBackground::Picture(&background), None);

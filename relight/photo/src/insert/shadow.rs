@@ -495,7 +495,7 @@ mod tests {
     #[test]
     fn even_light_leaves_a_shadow_at_the_contact_and_hardly_any_far_away() {
         let relief = ball();
-        let even = Panorama::of_light(
+        let even = Panorama::from_light(
             &relight_core::light::ShLight::even(relight_core::light::Order::TWO, [1.0; 3]),
             Extent::new(64, 32),
         );
@@ -568,7 +568,7 @@ mod tests {
 
     #[test]
     fn without_any_light_there_is_no_shadow() {
-        let dark = Panorama::of_light(
+        let dark = Panorama::from_light(
             &relight_core::light::ShLight::dark(relight_core::light::Order::TWO),
             Extent::new(64, 32),
         );

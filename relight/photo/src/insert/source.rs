@@ -44,7 +44,7 @@ impl LightSource {
         match self {
             Self::Panorama(panorama) => panorama.clone(),
             Self::Lamp(lamp) => lamp.panorama(DRAWN),
-            Self::Coefficients(light) => Panorama::of_light(light, DRAWN),
+            Self::Coefficients(light) => Panorama::from_light(light, DRAWN),
         }
     }
 }

@@ -22,7 +22,7 @@ impl Standing {
     fn new(alpha: &Planes<1>, fit: Fit) -> Self {
         let alpha = fit.apply(alpha);
         Self {
-            foot: Foot::of(&alpha),
+            foot: Foot::from_alpha(&alpha),
             fit,
             alpha,
             relief: OnceLock::new(),

@@ -85,14 +85,14 @@ impl Subject {
             ..*options
         };
         let found = decomposer.decompose(&foreground, &cut.mask, &options)?;
-        Self::of_parts(cut, &found)
+        Self::from_parts(cut, &found)
     }
 
     /// The object of a photograph with its mask.
     ///
     /// # Errors
     /// As [`Subject::new`].
-    pub fn of_photo(
+    pub fn from_photo(
         photo: &Photo,
         decomposer: &Decomposer,
         options: &DecomposeOptions,
@@ -112,7 +112,7 @@ impl Subject {
     ///
     /// # Errors
     /// Where it covers no pixel by a half.
-    pub fn of_captured(asset: &CapturedObject) -> Result<Self, InsertError> {
+    pub fn from_captured(asset: &CapturedObject) -> Result<Self, InsertError> {
         let (extent, surface) = (asset.extent(), asset.surface());
         let mask = asset.alpha().clone().map(|a| f32::from(u8::from(a >= 0.5)));
         let covered: Vec<usize> = (0..extent.pixels())
@@ -130,7 +130,7 @@ impl Subject {
         Ok(Self {
             place: [0, 0],
             photo: extent,
-            matte: Matte::of_cut_out(&albedo, asset.alpha()),
+            matte: Matte::from_cut_out(&albedo, asset.alpha()),
             normals: surface.normals().completed(&wanted),
             albedo,
             shading,
@@ -143,7 +143,7 @@ impl Subject {
     }
 
     /// The layers of a cut-out part, continued over its soft edge.
-    fn of_parts(cut: Cut, found: &Decomposition) -> Result<Self, InsertError> {
+    fn from_parts(cut: Cut, found: &Decomposition) -> Result<Self, InsertError> {
         let extent = cut.mask.extent();
         let known: Vec<bool> = cut.mask.plane(0).iter().map(|&m| m >= 0.5).collect();
         let covered = cut.matte.alpha.plane(0).iter();

@@ -39,7 +39,7 @@ impl SeenSun {
         let all: usize = spots.iter().map(Vec::len).sum();
         let largest = spots.into_iter().max_by_key(Vec::len)?;
         let share = largest.len() as f64 / all as f64;
-        let spot = Spot::of(&largest, small.extent());
+        let spot = Spot::new(&largest, small.extent());
         if share < SHARE || !spot.is_like_a_sun(small.extent()) {
             return None;
         }
@@ -63,7 +63,7 @@ struct Spot {
 }
 
 impl Spot {
-    fn of(pixels: &[usize], extent: Extent) -> Self {
+    fn new(pixels: &[usize], extent: Extent) -> Self {
         let line = |axis: usize| {
             pixels.iter().map(move |at| match axis {
                 0 => at % extent.width,

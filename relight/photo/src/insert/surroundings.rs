@@ -25,7 +25,7 @@ impl LightSource {
     ///
     /// It is a guess. What lights a scene is mostly beside the picture.
     #[must_use]
-    pub(super) fn of_picture(picture: &Rgb<Linear>, field: f64, sun: Option<SeenSun>) -> Self {
+    pub(super) fn from_picture(picture: &Rgb<Linear>, field: f64, sun: Option<SeenSun>) -> Self {
         let extent = picture.planes().extent();
         let radiance = picture.planes().clone().map(|v| {
             let v = if v.is_finite() { v.max(0.0) } else { 0.0 };
@@ -37,7 +37,7 @@ impl LightSource {
         let half = (field.clamp(1.0, 150.0) / 2.0).to_radians();
         // Half the angles that the picture shows across and down.
         let angles = [extent.width, extent.height].map(|side| half * side as f64 / longest);
-        let dark = Panorama::of_light(&ShLight::dark(relight_core::light::Order::TWO), MADE);
+        let dark = Panorama::from_light(&ShLight::dark(relight_core::light::Order::TWO), MADE);
         let mut planes = Planes::from_fn(MADE, |x, y| {
             let across = ((x as f64 + 0.5) / MADE.width as f64 - 0.5) * 2.0 * PI / angles[0];
             let down = ((y as f64 + 0.5) / MADE.height as f64 - 0.5) * PI / angles[1];
@@ -111,7 +111,7 @@ mod tests {
         let picture = Rgb::new(Planes::from_fn(Extent::new(90, 60), |x, y| {
             [0.1 + 0.5 * (x as f32 / 90.0) * (1.0 - y as f32 / 60.0); 3]
         }));
-        let source = LightSource::of_picture(&picture, 60.0, SeenSun::find(picture.planes()));
+        let source = LightSource::from_picture(&picture, 60.0, SeenSun::find(picture.planes()));
         let LightSource::Panorama(panorama) = &source else {
             panic!("a panorama")
         };
@@ -130,7 +130,7 @@ mod tests {
             [if from < 3.0 { 1.0 } else { glow as f32 }; 3]
         }));
         let LightSource::Panorama(panorama) =
-            LightSource::of_picture(&picture, 60.0, SeenSun::find(picture.planes()))
+            LightSource::from_picture(&picture, 60.0, SeenSun::find(picture.planes()))
         else {
             panic!("a panorama")
         };

@@ -136,7 +136,7 @@ fn a_tint_colours_and_gloss_adds_light() {
     });
     assert_eq!(red.plane(0), plain.plane(0));
     assert!(red.plane(1).iter().all(|&v| v == 0.0));
-    let gloss = Some(ObjectGloss::of_part(0.4, 30.0));
+    let gloss = Some(ObjectGloss::from_part(0.4, 30.0));
     let glossy = relit(&MaterialChange {
         gloss,
         ..MaterialChange::default()
@@ -205,7 +205,7 @@ fn captured_ball() -> CapturedObject {
 
 #[test]
 fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_where_a_lamp_is() {
-    let subject = Subject::of_captured(&captured_ball()).unwrap();
+    let subject = Subject::from_captured(&captured_ball()).unwrap();
     let none = MaterialChange::default();
     let even = subject.relit(&subject.light, &none).unwrap();
     for (found, wanted) in even.pixel(12, 20).into_iter().zip([0.6, 0.3, 0.1]) {
@@ -231,5 +231,5 @@ fn a_captured_object_that_covers_nothing_is_refused() {
     let nothing = Planes::zeros(ball.extent());
     let empty =
         CapturedObject::new("none", ball.surface().clone(), nothing.clone(), nothing).unwrap();
-    assert!(Subject::of_captured(&empty).is_err());
+    assert!(Subject::from_captured(&empty).is_err());
 }

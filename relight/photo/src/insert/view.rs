@@ -12,7 +12,7 @@ use relight_core::light::Panorama;
 /// use relight_photo::insert::PanoramaView;
 /// use relight_core::light::{Order, Panorama, ShLight};
 ///
-/// let sky = Panorama::of_light(&ShLight::even(Order::TWO, [0.2, 0.4, 1.0]), Extent::new(32, 16));
+/// let sky = Panorama::from_light(&ShLight::even(Order::TWO, [0.2, 0.4, 1.0]), Extent::new(32, 16));
 /// let seen = PanoramaView::new(Extent::new(40, 30), 50.0, 0.0).picture(&sky, 0.0);
 /// assert!((seen.planes().pixel(20, 15)[2] - 1.0).abs() < 1e-5);
 /// ```

@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn a_panorama_and_coefficients_are_balanced_too_and_one_colour_alone_does_not_become_white() {
         let blue = ShLight::even(Order::TWO, [0.2, 0.4, 1.0]);
-        let panorama = Panorama::of_light(&blue, Extent::new(32, 16));
+        let panorama = Panorama::from_light(&blue, Extent::new(32, 16));
         for source in [
             LightSource::Panorama(panorama),
             LightSource::Coefficients(blue),

@@ -34,8 +34,8 @@ impl OnnxSignature {
             |value: &ValueInfoProto| graph.initializer.iter().any(|w| w.name == value.name);
         let inputs = graph.input.iter().filter(|value| !is_weight(value));
         Some(Self {
-            inputs: inputs.map(OnnxValue::of).collect(),
-            outputs: graph.output.iter().map(OnnxValue::of).collect(),
+            inputs: inputs.map(OnnxValue::from_proto).collect(),
+            outputs: graph.output.iter().map(OnnxValue::from_proto).collect(),
         })
     }
 
@@ -53,7 +53,7 @@ impl OnnxSignature {
 }
 
 impl OnnxValue {
-    fn of(value: &ValueInfoProto) -> Self {
+    fn from_proto(value: &ValueInfoProto) -> Self {
         let kind = value.r#type.as_ref().and_then(|kind| kind.value.as_ref());
         let tensor = kind.map(|type_proto::Value::TensorType(tensor)| tensor);
         let shape = tensor.and_then(|tensor| tensor.shape.as_ref());

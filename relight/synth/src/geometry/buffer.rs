@@ -205,7 +205,7 @@ impl<'a> Posed<'a> {
     /// Adds what is seen of a triangle at a pixel; false where, by rounding, the pixel is missed.
     fn resolve(&self, number: u32, column: u32, row: u32, surface: &mut GBuffer) -> bool {
         let corners = self.mesh.triangles[number as usize];
-        let inside = Triangle::of(corners, &self.projected)
+        let inside = Triangle::new(corners, &self.projected)
             .and_then(|triangle| triangle.weights(column as usize, row as usize));
         let Some(inside) = inside else { return false };
         let weights = self.in_space(corners, inside);

@@ -29,7 +29,7 @@ pub(crate) struct Hit {
 impl Occluder {
     /// The mesh in its place.
     pub(crate) fn new(mesh: &Mesh, placement: Affine3A) -> Self {
-        Self::of(triangles(mesh, placement), usize::MAX)
+        Self::from_triangles(triangles(mesh, placement), usize::MAX)
     }
 
     /// The mesh in its place together with a disc (a turntable's plate) that is not seen.
@@ -37,11 +37,11 @@ impl Occluder {
         let mut all = triangles(mesh, placement);
         let plate = all.len();
         all.extend(disc.triangles());
-        Self::of(all, plate)
+        Self::from_triangles(all, plate)
     }
 
     /// The triangles from the number `plate` on are the plate's.
-    fn of(triangles: Vec<Triangle>, plate: usize) -> Self {
+    fn from_triangles(triangles: Vec<Triangle>, plate: usize) -> Self {
         let mut unused = Duration::ZERO;
         let tree = build_cwbvh_from_tris(&triangles, BvhBuildParams::fast_build(), &mut unused);
         let order = || tree.primitive_indices.iter().map(|&index| index as usize);

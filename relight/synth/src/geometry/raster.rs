@@ -25,7 +25,7 @@ pub(super) fn foremost(size: u32, vertices: &[Projected], triangles: &[[u32; 3]]
     let mut seen = vec![NOTHING; side * side];
     let mut nearest = vec![f32::NEG_INFINITY; side * side];
     for (number, &corners) in (0_u32..).zip(triangles) {
-        let Some(triangle) = Triangle::of(corners, vertices) else {
+        let Some(triangle) = Triangle::new(corners, vertices) else {
             continue;
         };
         let [columns, rows] = triangle.span(side);
@@ -56,7 +56,7 @@ pub(super) struct Triangle {
 
 impl Triangle {
     /// None where its picture has no area.
-    pub(super) fn of(corners: [u32; 3], vertices: &[Projected]) -> Option<Self> {
+    pub(super) fn new(corners: [u32; 3], vertices: &[Projected]) -> Option<Self> {
         let places = corners.map(|v| vertices[v as usize]);
         let lines = [0, 1, 2].map(|k| {
             let (from, to) = ((k + 1) % 3, (k + 2) % 3);

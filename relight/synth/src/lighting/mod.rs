@@ -52,7 +52,7 @@ pub struct Lighting {
 impl Lighting {
     /// A panorama by rays, at an angle about the vertical (radians); `irradiance` is the mean over all normals.
     #[must_use]
-    pub fn of_panorama(panorama: usize, turn: f64, irradiance: f32, has_shadows: bool) -> Self {
+    pub fn from_panorama(panorama: usize, turn: f64, irradiance: f32, has_shadows: bool) -> Self {
         let environment = Environment {
             panorama,
             rotation: *Rotation::about(Direction::UP, turn).matrix(),

@@ -135,7 +135,7 @@ impl Mesh {
         if let Some(materials) = &self.materials {
             materials.write_to(&mut bytes);
         }
-        Digest::of(&bytes)
+        Digest::hash(&bytes)
     }
 
     /// Texture coordinates for each corner of each triangle, where all of them have some.
@@ -276,9 +276,9 @@ fn keep<T>(items: &mut Vec<T>, marks: &[bool]) {
 fn corner_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease: f32) -> Vec<[Vec3; 3]> {
     let faces: Vec<Face> = triangles
         .iter()
-        .map(|corners| Face::of(corners.map(|v| positions[v as usize])))
+        .map(|corners| Face::new(corners.map(|v| positions[v as usize])))
         .collect();
-    let around = CornersAround::of(positions.len(), triangles);
+    let around = CornersAround::new(positions.len(), triangles);
     let least_cosine = crease.cos();
     triangles
         .iter()
@@ -305,7 +305,7 @@ struct Face {
 }
 
 impl Face {
-    fn of(corners: [Vec3; 3]) -> Self {
+    fn new(corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners;
         let angles = [0, 1, 2].map(|k| {
             let [here, next, last] = [k, (k + 1) % 3, (k + 2) % 3].map(|i| corners[i]);
@@ -326,7 +326,7 @@ struct CornersAround {
 }
 
 impl CornersAround {
-    fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+    fn new(vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let mut starts = vec![0_u32; vertices + 1];
         for vertex in triangles.iter().flatten() {
             starts[*vertex as usize + 1] += 1;

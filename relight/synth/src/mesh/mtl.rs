@@ -41,7 +41,7 @@ impl MtlMaterial {
 /// The materials of a file, in their order.
 pub(super) fn materials(text: &str) -> Vec<MtlMaterial> {
     let mut all: Vec<MtlMaterial> = Vec::new();
-    for (_, statement) in Statements::of(text) {
+    for (_, statement) in Statements::new(text) {
         let (key, rest) = keyword(&statement);
         if key.eq_ignore_ascii_case("newmtl") {
             all.push(MtlMaterial {

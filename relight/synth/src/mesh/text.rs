@@ -41,7 +41,7 @@ pub(super) struct Statements<'a> {
 }
 
 impl<'a> Statements<'a> {
-    pub(super) fn of(text: &'a str) -> Self {
+    pub(super) fn new(text: &'a str) -> Self {
         Self {
             rest: text,
             lines: 0,
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     fn statements(text: &str) -> Vec<(usize, String)> {
-        let all = Statements::of(text);
+        let all = Statements::new(text);
         all.map(|(line, text)| (line, text.into_owned())).collect()
     }
 

@@ -131,7 +131,7 @@ impl Building {
             self.rows.push(Row {
                 triangles: prepared.mesh.triangles,
                 note: prepared.missing.join("; "),
-                ..Row::of("object", entry)
+                ..Row::new("object", entry)
             });
             let faults = prepared.missing.iter().map(|what| LeftOut {
                 path: PathBuf::from(&entry.name),
@@ -163,7 +163,7 @@ impl Building {
                 Ok((panorama, thumbnail)) => {
                     thumbnails.push((entry.name.clone(), thumbnail));
                     let (packed, bytes) = encode_panorama(&panorama);
-                    self.rows.push(Row::of("panorama", entry));
+                    self.rows.push(Row::new("panorama", entry));
                     self.panoramas.push((entry.clone(), packed, bytes));
                 }
                 Err(reason) => self.leave_out("panorama", candidate, &reason),
@@ -188,7 +188,7 @@ impl Building {
         self.rows.push(Row {
             is_left_out: true,
             note: reason.to_string(),
-            ..Row::of(what, &candidate.entry)
+            ..Row::new(what, &candidate.entry)
         });
     }
 
@@ -214,7 +214,7 @@ impl Building {
         for (entry, mut prepared) in self.objects {
             self.summary.objects.push(entry.clone());
             let own = prepared.pictures.into_iter().map(|(kind, bytes)| {
-                let key = (kind, Digest::of(&bytes));
+                let key = (kind, Digest::hash(&bytes));
                 *numbers.entry(key).or_insert_with(|| {
                     parts.pictures.push((kind, bytes));
                     parts.pictures.len() - 1

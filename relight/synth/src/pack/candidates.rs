@@ -48,12 +48,12 @@ impl Candidates {
                     let archive = Furniture::open(&path)?;
                     candidates
                         .all
-                        .extend(archive.models().into_iter().map(Candidate::of_model));
+                        .extend(archive.models().into_iter().map(Candidate::from_model));
                     candidates.archives.push(archive);
                 } else if MESHES.includes(&path) {
                     candidates
                         .all
-                        .push(Candidate::of_file(folder, path, &mut origins)?);
+                        .push(Candidate::from_file(folder, path, &mut origins)?);
                 }
             }
             if candidates.all.len() == before {
@@ -77,7 +77,7 @@ impl Candidates {
                 if PANORAMAS.includes(&path) {
                     candidates
                         .all
-                        .push(Candidate::of_file(folder, path, &mut origins)?);
+                        .push(Candidate::from_file(folder, path, &mut origins)?);
                 }
             }
             if candidates.all.len() == before {
@@ -98,7 +98,7 @@ fn files_of(path: &Path) -> Result<Vec<PathBuf>, SynthError> {
 }
 
 impl Candidate {
-    fn of_model(model: Model) -> Self {
+    fn from_model(model: Model) -> Self {
         let entry = LibraryEntry {
             is_for_validation: is_for_validation(&model.name),
             name: model.name,
@@ -117,7 +117,7 @@ impl Candidate {
         }
     }
 
-    fn of_file(folder: &Path, path: PathBuf, origins: &mut Origins) -> Result<Self, SynthError> {
+    fn from_file(folder: &Path, path: PathBuf, origins: &mut Origins) -> Result<Self, SynthError> {
         let said = origins.of(folder, &path)?;
         let collection = folder.file_name().unwrap_or_default().to_string_lossy();
         let within = slashed(path.strip_prefix(folder).unwrap_or(&path));

@@ -69,7 +69,7 @@ pub(super) struct PackedPanorama {
 
 /// Moves positions to the nearest of 65536 places along each side of their box.
 pub(super) fn snap(positions: &mut [Vec3]) {
-    let grid = Grid::of(positions.iter().map(Vec3::to_array));
+    let grid = Grid::from_values(positions.iter().map(Vec3::to_array));
     for position in positions {
         *position = grid.value(grid.number(position.to_array())).into();
     }
@@ -83,7 +83,7 @@ struct Grid<const N: usize> {
 }
 
 impl<const N: usize> Grid<N> {
-    fn of(values: impl Iterator<Item = [f32; N]>) -> Self {
+    fn from_values(values: impl Iterator<Item = [f32; N]>) -> Self {
         let mut grid: Option<Self> = None;
         for value in values {
             let (low, high) = grid.map_or((value, value), |grid| (grid.low, grid.high));
@@ -155,10 +155,10 @@ pub(super) fn encode_mesh(raw: &RawMesh) -> Result<(PackedMesh, Vec<u8>, Picture
     };
     let mut order: Vec<usize> = (0..raw.triangles.len()).collect();
     order.sort_by_key(|triangle| own(triangle).unwrap_or(usize::MAX));
-    let grid = Grid::of(raw.positions.iter().map(Vec3::to_array));
+    let grid = Grid::from_values(raw.positions.iter().map(Vec3::to_array));
     let finite = |place: &&Vec2| place.is_finite();
     let places = raw.texture.iter().flatten().filter(finite);
-    let texture = Grid::of(places.map(Vec2::to_array));
+    let texture = Grid::from_values(places.map(Vec2::to_array));
 
     let (mut vertices, mut coordinates) = (Numbered::new(), Numbered::new());
     let (mut corners, mut placed) = (Vec::new(), Vec::new());

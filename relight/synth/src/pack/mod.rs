@@ -63,7 +63,7 @@ const UNKNOWN: &str = "unknown";
 /// Whether what has this name is for validation only: one of ten, by a hash of the name alone, so that it stays so in
 /// each library.
 fn is_for_validation(name: &str) -> bool {
-    let digest = Digest::of(name.as_bytes()).to_string();
+    let digest = Digest::hash(name.as_bytes()).to_string();
     let number = digest.get(..8).map(|text| u64::from_str_radix(text, 16));
     matches!(number, Some(Ok(number)) if number % VALIDATION == 0)
 }

@@ -34,7 +34,7 @@ impl RawMesh {
             return;
         };
         let occluder = Occluder::new(&shape, glam::Affine3A::IDENTITY);
-        let place = Placement::of(&self.positions);
+        let place = Placement::from_positions(&self.positions);
         for part in parts {
             if self.faces_inwards(&part, &occluder, &place) {
                 part.iter().for_each(|&triangle| self.turn(triangle));
@@ -158,7 +158,7 @@ struct Placement {
 }
 
 impl Placement {
-    fn of(positions: &[Vec3]) -> Self {
+    fn from_positions(positions: &[Vec3]) -> Self {
         let low = positions.iter().copied().reduce(Vec3::min);
         let high = positions.iter().copied().reduce(Vec3::max);
         let middle = low.zip(high).map_or(Vec3::ZERO, |(l, h)| l * 0.5 + h * 0.5);

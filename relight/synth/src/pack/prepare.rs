@@ -134,7 +134,7 @@ impl Prepared {
             mesh,
             bytes,
             pictures: pictures.into_iter().map(packed).collect::<Result<_, _>>()?,
-            digest: Digest::of(&shape),
+            digest: Digest::hash(&shape),
             missing,
         })
     }

@@ -22,7 +22,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    pub(super) fn of(kind: &'static str, entry: &LibraryEntry) -> Self {
+    pub(super) fn new(kind: &'static str, entry: &LibraryEntry) -> Self {
         Self {
             kind,
             entry: entry.clone(),

@@ -87,7 +87,7 @@ fn write_furniture(path: &Path) {
 fn write_panorama(path: &Path, towards: usize) {
     let mut coefficients = ShLight::even(Order::TWO, [1.0, 0.8, 0.6]);
     coefficients = coefficients.tinted([1.0 + towards as f64; 3]);
-    let panorama = Panorama::of_light(&coefficients, Extent::new(64, 32));
+    let panorama = Panorama::from_light(&coefficients, Extent::new(64, 32));
     let mut planes = panorama.image().planes().clone();
     for y in 0..32 {
         for x in 0..64 {

@@ -94,10 +94,10 @@ impl Paint {
     /// choose from.
     pub(super) fn draw(random: &mut Random, points: &[Vec3], pictures: usize) -> Self {
         let kind = AlbedoKind::draw(random);
-        Self::of_kind(random, kind, points, pictures)
+        Self::from_kind(random, kind, points, pictures)
     }
 
-    fn of_kind(random: &mut Random, kind: AlbedoKind, points: &[Vec3], pictures: usize) -> Self {
+    fn from_kind(random: &mut Random, kind: AlbedoKind, points: &[Vec3], pictures: usize) -> Self {
         if kind == AlbedoKind::Print {
             return Self::printed(random, points);
         }
@@ -244,7 +244,7 @@ mod tests {
         let mut random = Random::new(12);
         let (mut inked, mut neutral, mut covered) = (0, 0, 0.0);
         for _ in 0..200 {
-            let paint = Paint::of_kind(&mut random, AlbedoKind::Print, &points, 0);
+            let paint = Paint::from_kind(&mut random, AlbedoKind::Print, &points, 0);
             let albedo = paint.apply(&points, None, &[]);
             let grey = |a: &Vec3| a.element_sum() / 3.0;
             let lightest = albedo.iter().map(grey).fold(0.0, f32::max);

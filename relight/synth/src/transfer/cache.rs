@@ -92,7 +92,7 @@ impl TransferCache {
         // Numbers and texts: this cannot fail.
         let recipe = serde_json::to_string(&self.recipe).unwrap_or_default();
         let all = format!("{FORMAT} {recipe} {} {number}", self.library);
-        let hash = Digest::of(all.as_bytes()).to_string();
+        let hash = Digest::hash(all.as_bytes()).to_string();
         self.folder.join(format!("{hash}.transfer"))
     }
 }
@@ -118,7 +118,7 @@ fn encode(transfer: &RadianceTransfer) -> Vec<u8> {
         push_vectors(&mut bytes, &finish.normals);
         push_vectors(&mut bytes, &finish.albedo);
     }
-    let digest = Digest::of(&bytes).to_string();
+    let digest = Digest::hash(&bytes).to_string();
     bytes.extend(digest.as_bytes());
     bytes
 }
@@ -139,9 +139,9 @@ fn push_vectors(bytes: &mut Vec<u8>, vectors: &[Vec3]) {
 
 /// None where the bytes are not those of a whole file.
 fn decode(bytes: &[u8]) -> Option<RadianceTransfer> {
-    let digest_length = Digest::of(&[]).to_string().len();
+    let digest_length = Digest::hash(&[]).to_string().len();
     let (bytes, digest) = bytes.split_at_checked(bytes.len().checked_sub(digest_length)?)?;
-    if Digest::of(bytes).to_string().as_bytes() != digest {
+    if Digest::hash(bytes).to_string().as_bytes() != digest {
         return None;
     }
     let end = bytes.iter().position(|&byte| byte == b'\n')?;

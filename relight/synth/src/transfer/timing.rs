@@ -40,10 +40,10 @@ impl TableTiming {
     /// A turn's timing; none where its equations have no solution.
     pub(super) fn draw(random: &mut Random) -> Option<Self> {
         let angles = frame_angles(random);
-        Self::of(&angles)
+        Self::from_angles(&angles)
     }
 
-    fn of(angles: &[FrameAngle]) -> Option<Self> {
+    fn from_angles(angles: &[FrameAngle]) -> Option<Self> {
         let mut matrix = [[0.0; CURVE_COEFFICIENTS]; CURVE_COEFFICIENTS];
         // The equations take three columns at once.
         for first in (0..CURVE_COEFFICIENTS).step_by(3) {
@@ -145,7 +145,7 @@ mod tests {
                 is: angle,
             })
             .collect();
-        let seen = TableTiming::of(&angles).unwrap().seen(&curve());
+        let seen = TableTiming::from_angles(&angles).unwrap().seen(&curve());
         assert!(largest_difference(&seen, &curve()) < 1e-3);
     }
 
@@ -160,7 +160,7 @@ mod tests {
             })
             .collect();
         let before = curve();
-        let seen = TableTiming::of(&angles).unwrap().seen(&before);
+        let seen = TableTiming::from_angles(&angles).unwrap().seen(&before);
         let mut expected = before;
         for m in 1..=CURVE_COEFFICIENTS / 2 {
             let (sin, cos) = (m as f32 * off as f32).sin_cos();

@@ -125,7 +125,7 @@ fn write_turn(
     progress: &(dyn Fn() + Sync),
 ) -> Result<(SessionEntry, Vec<ShardEntry>), SynthError> {
     let mask = mask(turn.scene.buffer());
-    let spans = MaskSpans::of(&mask);
+    let spans = MaskSpans::from_mask(&mask);
     let frames = turn.description.frames;
     let layout = Layout::Webdataset;
     let mut writer = ShardWriter::create(folder.path(), layout, &turn.session, frames, &mask)?;
@@ -159,7 +159,7 @@ fn write_turn(
         object: turn.object.clone(),
         input: turn.input(),
         mask: MaskInfo {
-            blake3: Digest::of(&shard::encode_mask(&mask)?),
+            blake3: Digest::hash(&shard::encode_mask(&mask)?),
             px: spans.pixels(),
             bounding_box: bounding_box(&mask),
         },
@@ -170,7 +170,7 @@ fn write_turn(
         duplicates: 0,
         spec_net: spec_net as u32,
         lossy: false,
-        quality: SessionQuality::of(&records, false, None),
+        quality: SessionQuality::from_records(&records, false, None),
         warnings: Vec::new(),
         table: files.table,
         report: None,

@@ -165,7 +165,7 @@ impl<'a> SimulatedTurn<'a> {
             codec: "synthetic".to_owned(),
             frames: u64::from(self.description.frames),
             bytes: bytes.len() as u64,
-            blake3: Digest::of(&bytes),
+            blake3: Digest::hash(&bytes),
             colour_conversion: None,
             index_blake3: None,
         }

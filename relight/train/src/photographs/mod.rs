@@ -159,7 +159,7 @@ impl Photographs {
                 plan: PhotoPlan::draw(stream(seed, 1), &lamps[place], rooms),
             })
             .collect();
-        let symmetry = Symmetry::of_bits(stream(stream(self.seed, step), u64::MAX));
+        let symmetry = Symmetry::from_bits(stream(stream(self.seed, step), u64::MAX));
         let batch = no_grad(|| {
             let lit = Lit::new(&open.pool, &open.maps, &photos)?;
             let noise = (&open.noise, seeds.as_slice());

@@ -174,7 +174,7 @@ mod tests {
         let values: Vec<f32> = (0..48).map(|at| at as f32).collect();
         let planes = Tensor::from_slice(&values).reshape([1, 3, 4, 4]);
         for bits in 0..8 {
-            let symmetry = Symmetry::of_bits(bits);
+            let symmetry = Symmetry::from_bits(bits);
             let seen = |of: &Tensor| seen_in(of, symmetry).unwrap();
             let found = Vec::<f32>::try_from(seen(&planes).flatten(0, -1)).unwrap();
             let turned = turned_normals(&planes, symmetry).unwrap();

@@ -101,7 +101,7 @@ impl PaperSettings {
     ///
     /// # Errors
     /// As [`read_settings`].
-    pub fn of_phase(phase: PaperPhase, file: Option<&Path>) -> Result<Self, TrainError> {
+    pub fn from_phase(phase: PaperPhase, file: Option<&Path>) -> Result<Self, TrainError> {
         let mut settings: Self = file.map_or_else(|| Ok(Self::default()), read_settings)?;
         let table: toml::Table = file.map_or_else(|| Ok(toml::Table::new()), read_settings)?;
         let run = table.get("run");

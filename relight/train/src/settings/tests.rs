@@ -14,7 +14,7 @@ fn phase_settings(phase: PaperPhase, text: &str) -> Result<PaperSettings, TrainE
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("settings.toml");
     fs::write(&path, text).unwrap();
-    PaperSettings::of_phase(phase, Some(&path))
+    PaperSettings::from_phase(phase, Some(&path))
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn a_phase_has_its_own_learning_rate_where_none_is_named() {
         rate(PaperPhase::Joint, "[run]\nlearning_rate = 1e-3\n"),
         1e-3
     );
-    let without = PaperSettings::of_phase(PaperPhase::Light, None).unwrap();
+    let without = PaperSettings::from_phase(PaperPhase::Light, None).unwrap();
     assert_eq!(without.run.learning_rate, 1e-6);
 }
 

@@ -42,7 +42,7 @@ const fn pair(i: usize, j: usize) -> usize {
 }
 
 impl HarmonicProducts {
-    pub(crate) fn of(harmonics: &PixelHarmonics) -> Self {
+    pub(crate) fn from_harmonics(harmonics: &PixelHarmonics) -> Self {
         let mut products = Self {
             base: [[0.0; PAIRS]; 3],
             gloss: None,
@@ -214,7 +214,7 @@ impl CurveStatistics {
 
     /// The albedo that fits the curve best.
     pub(crate) fn albedo(&self, harmonics: &PixelHarmonics) -> [f64; 3] {
-        let products = HarmonicProducts::of(harmonics);
+        let products = HarmonicProducts::from_harmonics(harmonics);
         [0, 1, 2].map(|channel| self.share(channel, harmonics, &products).albedo())
     }
 
@@ -226,7 +226,7 @@ impl CurveStatistics {
         (to, spread): ([f64; 3], [f64; 3]),
         freedom: f64,
     ) -> [f64; 3] {
-        let products = HarmonicProducts::of(harmonics);
+        let products = HarmonicProducts::from_harmonics(harmonics);
         [0, 1, 2].map(|channel| {
             let share = self.share(channel, harmonics, &products);
             let noise = share.residual().max(0.0) / freedom;

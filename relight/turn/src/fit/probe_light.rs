@@ -62,7 +62,7 @@ impl ProbeBuilder {
             normal.unwrap_or_default().map(|value| value as f32)
         });
         let curves = around.only(|at| normals.pixel(at % width, at / width) != [0.0; 3]);
-        let looks = if Conditioning::of(&curves).beyond > SHARP {
+        let looks = if Conditioning::from_curves(&curves).beyond > SHARP {
             ProbeBall::Chrome
         } else {
             ProbeBall::Grey
@@ -85,7 +85,7 @@ impl ProbeBuilder {
                 fit_turn_light(&curves, &surface, MaterialKind::Diffuse, &frame)?
             }
             ProbeBall::Chrome => {
-                let light = MirrorPanorama::of(&curves, &normals, frame).light()?;
+                let light = MirrorPanorama::from_curves(&curves, &normals, frame).light()?;
                 light.rotated(&frame.rotation().inverse())
             }
         };

@@ -70,7 +70,7 @@ impl<'a> Search<'a> {
             Tried {
                 normal,
                 harmonics,
-                products: HarmonicProducts::of(&harmonics),
+                products: HarmonicProducts::from_harmonics(&harmonics),
             }
         });
         Self {
@@ -142,7 +142,7 @@ impl<'a> Search<'a> {
     /// The residual of a normal.
     pub(crate) fn residual(&self, statistics: &CurveStatistics, normal: [f64; 3]) -> f64 {
         let harmonics = self.model.harmonics(normal);
-        statistics.residual(&harmonics, &HarmonicProducts::of(&harmonics))
+        statistics.residual(&harmonics, &HarmonicProducts::from_harmonics(&harmonics))
     }
 
     /// How far the normal may lean before the residual grows by as much as it is: the standard deviation of

@@ -36,7 +36,7 @@ pub(crate) fn solve_by_network(
     elevation: Elevation,
     material: MaterialKind,
 ) -> Result<TurnSolution, TurnError> {
-    let conditioning = Conditioning::of(curves);
+    let conditioning = Conditioning::from_curves(curves);
     if let Some(advice) = conditioning.verdict.exposure_advice() {
         return Err(TurnError::Refused(advice.to_owned()));
     }
@@ -104,7 +104,7 @@ fn fit_of(model: &ShadingModel, normal: [f64; 3], statistics: &CurveStatistics) 
     PixelFit {
         normal,
         albedo: statistics.albedo(&harmonics),
-        residual: statistics.residual(&harmonics, &HarmonicProducts::of(&harmonics)),
+        residual: statistics.residual(&harmonics, &HarmonicProducts::from_harmonics(&harmonics)),
     }
 }
 

@@ -70,7 +70,7 @@ impl Elevation {
     ///
     /// # Errors
     /// [`TurnError::Setting`] beyond 0 to 89 degrees.
-    pub fn of_rig(degrees: f64) -> Result<Self, TurnError> {
+    pub fn from_rig(degrees: f64) -> Result<Self, TurnError> {
         Ok(Self {
             source: FactSource::Rig,
             ..Self::given(degrees)?
@@ -162,10 +162,10 @@ mod tests {
 
     #[test]
     fn an_elevation_beyond_what_a_camera_can_have_is_refused() {
-        assert_eq!(Elevation::of_rig(20.0).unwrap().source(), FactSource::Rig);
+        assert_eq!(Elevation::from_rig(20.0).unwrap().source(), FactSource::Rig);
         for degrees in [f64::NAN, 90.0, -1.0] {
             assert!(Elevation::given(degrees).is_err());
-            assert!(Elevation::of_rig(degrees).is_err());
+            assert!(Elevation::from_rig(degrees).is_err());
         }
     }
 }

@@ -49,7 +49,7 @@ impl TableLight {
     }
 
     /// A light in the table's frame, up to [`GLOSS_ORDER`].
-    pub(crate) fn of(light: &ShLight) -> Self {
+    pub(crate) fn from_light(light: &ShLight) -> Self {
         let mut terms = [[0.0; TERMS]; 3];
         for at in 0..light.coefficients().len().min(TERMS) {
             let (coefficient, sign) = of_term(at);
@@ -89,7 +89,7 @@ impl TableLight {
     }
 
     /// The light of which a white Lambertian surface shows this, as far as it shows it well.
-    pub(crate) fn of_irradiance(self) -> Self {
+    pub(crate) fn from_irradiance(self) -> Self {
         self.scaled(|l, _| {
             if l < LAMBERTIAN_BANDS {
                 PI / (MIRROR * cosine_lobe(l))
@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn the_curve_of_a_normal_is_its_shading_under_the_turning_light() {
         let frame = TableFrame::new(Elevation::given(23.0).unwrap());
-        let table = TableLight::of(&light().rotated(&frame.rotation())).irradiance();
+        let table = TableLight::from_light(&light().rotated(&frame.rotation())).irradiance();
         let (sin, cos) = 23.0_f64.to_radians().sin_cos();
         let axis = Direction::new(0.0, cos, sin).unwrap();
         let normal = Direction::new(0.3, -0.2, 0.7).unwrap().components();
@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn light_comes_back_from_what_is_seen_of_it() {
         let frame = TableFrame::new(Elevation::given(40.0).unwrap());
-        let table = TableLight::of(&light().rotated(&frame.rotation()));
+        let table = TableLight::from_light(&light().rotated(&frame.rotation()));
         let model = |material| ShadingModel {
             frame,
             diffuse: table.irradiance(),
@@ -271,7 +271,7 @@ mod tests {
     #[test]
     fn white_metal_is_as_bright_as_a_lambertian_white_surface_in_even_light() {
         let frame = TableFrame::new(Elevation::assumed());
-        let even = TableLight::of(&ShLight::even(Order::TWO, [1.0; 3]));
+        let even = TableLight::from_light(&ShLight::even(Order::TWO, [1.0; 3]));
         for material in [MaterialKind::Diffuse, MaterialKind::Metal] {
             let model = ShadingModel {
                 frame,

@@ -34,7 +34,7 @@ impl MirrorPanorama {
     }
 
     /// What a ball of these normals shows. What is clipped in it counts as white.
-    pub(crate) fn of(curves: &TurnCurves, normals: &Planes<3>, frame: TableFrame) -> Self {
+    pub(crate) fn from_curves(curves: &TurnCurves, normals: &Planes<3>, frame: TableFrame) -> Self {
         let white = curves.clipped_value();
         let mut panorama = Self::new(frame);
         for (pixel, normal) in curves.pixels_of(normals).enumerate() {

@@ -205,7 +205,7 @@ fn gathered(formats: &[CameraFormat]) -> Vec<Mode> {
 fn fourcc(format: FrameFormat) -> Option<Fourcc> {
     let mut formats = PixelFormat::ALL.into_iter();
     let found = formats.find(|&known| library_format(known) == Some(format))?;
-    Some(Fourcc::of(found))
+    Some(Fourcc::from_pixel_format(found))
 }
 
 fn library_format(wanted: PixelFormat) -> Option<FrameFormat> {

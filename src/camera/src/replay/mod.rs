@@ -61,12 +61,12 @@ impl ReplayCamera {
     pub(super) fn open(address: &ReplayAddress, clock: Clock) -> Result<Self, CameraError> {
         let recording = Recording::open(&address.path)?;
         let video = Arc::new(Video::open(&recording.video)?);
-        let delivery = Delivery::of(&video)?;
+        let delivery = Delivery::from_video(&video)?;
         let timeline = Timeline::new(recording.frames.as_ref(), video.frames());
         let (width, height) = delivery.size(&video);
         let manifest = recording.manifest.as_ref();
         let mode = CameraMode {
-            fourcc: Fourcc::of(delivery.format),
+            fourcc: Fourcc::from_pixel_format(delivery.format),
             width,
             height,
             rate: rate(manifest, &timeline).ok_or_else(|| CameraError::Replay {

@@ -28,7 +28,7 @@ pub(super) enum Source {
 
 impl Delivery {
     /// As the file has the frames, if a camera could send them so; otherwise decoded.
-    pub(super) fn of(video: &Video) -> Result<Self, CameraError> {
+    pub(super) fn from_video(video: &Video) -> Result<Self, CameraError> {
         let facts = video.facts();
         let coded = match (facts.codec.as_str(), facts.pixel_format.as_str()) {
             ("mjpeg", _) => Some(PixelFormat::Mjpeg),

@@ -70,7 +70,7 @@ pub(crate) fn check_object(name: &str) -> Result<(), String> {
 /// Checks that the table turns as fast as it is to.
 pub(super) fn check_speed(table: &Table, set: f64) -> Result<(), CaptureError> {
     let highest = table.identity().max_degrees_per_second;
-    match Obstacle::of_speed(set, highest) {
+    match Obstacle::from_speed(set, highest) {
         Some(obstacle) => Err(CaptureError::Refused(obstacle.to_string())),
         None => Ok(()),
     }

@@ -75,7 +75,9 @@ impl Settings {
     /// [`LockError::Held`] with the holder's process number, or what the file system answers.
     pub fn lock_camera(&self) -> Result<Option<LockFile>, LockError> {
         match &self.camera {
-            CameraAddress::V4l2(path) => LockFile::of_device(path, &self.runtime_folder).map(Some),
+            CameraAddress::V4l2(path) => {
+                LockFile::lock_device(path, &self.runtime_folder).map(Some)
+            }
             _ => Ok(None),
         }
     }

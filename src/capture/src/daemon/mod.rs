@@ -47,7 +47,7 @@ impl Daemon {
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
         // The lock of the folder is a file in it: nothing is left there where the camera is another's.
         let camera = settings.lock_camera()?;
-        let locks = (LockFile::of_root(&settings.root)?, camera);
+        let locks = (LockFile::lock_root(&settings.root)?, camera);
         let root = settings.root.clone();
         let shown = settings.shown();
         let equipment = Equipment::for_viewers(settings)?;

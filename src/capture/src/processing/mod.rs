@@ -49,7 +49,7 @@ pub struct ProcessingError {
 }
 
 impl ProcessingError {
-    fn of(what: String) -> impl FnOnce(io::Error) -> Self {
+    fn from_io(what: String) -> impl FnOnce(io::Error) -> Self {
         move |source| Self { what, source }
     }
 }
@@ -75,11 +75,14 @@ impl Processing {
             "the folder of sessions {} could not be found",
             root.display()
         );
-        let root = root.canonicalize().map_err(ProcessingError::of(missing))?;
-        let settings = ProcessingSettings::read(&root).map_err(ProcessingError::of(format!(
-            "{} could not be read: mend it, or remove it and set again what it held",
-            store::path(&root).display()
-        )))?;
+        let root = root
+            .canonicalize()
+            .map_err(ProcessingError::from_io(missing))?;
+        let settings =
+            ProcessingSettings::read(&root).map_err(ProcessingError::from_io(format!(
+                "{} could not be read: mend it, or remove it and set again what it held",
+                store::path(&root).display()
+            )))?;
         let beside = || root.parent().unwrap_or(&root).to_owned();
         let datasets = options.datasets.unwrap_or_else(beside);
         let mut dataset = datasets.join(DATASET);
@@ -105,7 +108,7 @@ impl Processing {
         let thread = thread::Builder::new()
             .name("relit-processing".to_owned())
             .spawn(move || runner::run(&worked))
-            .map_err(ProcessingError::of(
+            .map_err(ProcessingError::from_io(
                 "a thread for processing could not be started".to_owned(),
             ))?;
         Ok(Self {

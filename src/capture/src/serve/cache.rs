@@ -47,7 +47,7 @@ pub(super) struct FileVersion {
 
 impl FileVersion {
     /// `None` where there is no such file.
-    pub(super) fn of(path: &Path) -> Option<Self> {
+    pub(super) fn read(path: &Path) -> Option<Self> {
         let data = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
         Some(Self {
             bytes: data.len(),

@@ -140,7 +140,7 @@ impl Library {
     /// The summary of a session, without what was made of it. `None` where it has gone meanwhile.
     pub(super) fn summary(&self, root: &Path, name: &str) -> Option<SessionSummary> {
         let folder = root.join(name);
-        let version = FileVersion::of(&folder.join(MANIFEST_FILE))?;
+        let version = FileVersion::read(&folder.join(MANIFEST_FILE))?;
         let key = (folder.clone(), version);
         let summary = self.summaries.get_or_make(key, |_| {
             Ok::<_, Infallible>(match read_manifest(&folder) {
@@ -185,7 +185,7 @@ impl Library {
         let manifest = read_manifest(&folder).map_err(Failure::broken)?;
         let path = folder.join(&manifest.video.file);
         let missing = || Failure::not_found(format!("the video of {id} is missing"));
-        let version = FileVersion::of(&path).ok_or_else(missing)?;
+        let version = FileVersion::read(&path).ok_or_else(missing)?;
         Ok(VideoFile { path, version })
     }
 

@@ -46,7 +46,7 @@ impl Obstacle {
     }
 
     /// The obstacle that a table's highest speed is to a turn at the speed that is set, where it is one.
-    pub(crate) fn of_speed(set: f64, highest: f64) -> Option<Self> {
+    pub(crate) fn from_speed(set: f64, highest: f64) -> Option<Self> {
         let why = format!(
             "the table turns at {} degrees/s at most, and {} degrees/s are set: set a lower speed",
             rounded(highest),
@@ -116,7 +116,7 @@ impl Default for Advice {
 }
 
 impl Advice {
-    pub(super) fn of(state: &RigState) -> Self {
+    pub(super) fn from_state(state: &RigState) -> Self {
         if !state.rests() {
             return Self::stopping(doing(state.phase));
         }
@@ -124,7 +124,7 @@ impl Advice {
             Some(alarm) if alarm.is_alarm() => Self::against(alarm),
             _ if state.table.moves() => Self::stopping("The table moves"),
             Some(other) => Self::against(other),
-            None => Self::of_ready(state),
+            None => Self::from_ready(state),
         }
     }
 
@@ -153,7 +153,7 @@ impl Advice {
         }
     }
 
-    fn of_ready(state: &RigState) -> Self {
+    fn from_ready(state: &RigState) -> Self {
         if let Some(take) = state.last_take.as_ref().filter(|take| is_aborted(take)) {
             return Self::after_an_abort(take);
         }
@@ -240,7 +240,7 @@ impl RigState {
 
     fn obstacle_of_speed(&self) -> Option<Obstacle> {
         let highest = self.table.max_degrees_per_second?;
-        Obstacle::of_speed(self.settings.degrees_per_second, highest)
+        Obstacle::from_speed(self.settings.degrees_per_second, highest)
     }
 
     fn obstacle_of_camera(&self) -> Option<Obstacle> {

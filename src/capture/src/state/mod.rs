@@ -135,7 +135,7 @@ impl Monitor {
             let phase = state.phase.to_string();
             state.note(phase);
         }
-        state.advice = Advice::of(&state);
+        state.advice = Advice::from_state(&state);
         state.version = state.version.wrapping_add(1);
         self.shared.changed.notify_all();
         self.shared.version.send_replace(state.version);
@@ -208,6 +208,6 @@ mod tests {
     #[test]
     fn a_rig_of_which_nothing_is_known_has_its_own_advice() {
         let state = RigState::default();
-        assert_eq!(Advice::default(), Advice::of(&state));
+        assert_eq!(Advice::default(), Advice::from_state(&state));
     }
 }

@@ -164,7 +164,7 @@ impl ToSrgb {
         let unknown = || ColourFault::Primaries(numbered(primaries));
         // What is not stated, or reserved, is BT.709.
         let code = if primaries <= 3 { 1 } else { primaries };
-        let (name, primaries) = Primaries::of_code(code).ok_or_else(unknown)?;
+        let (name, primaries) = Primaries::from_code(code).ok_or_else(unknown)?;
         if transfer == Transfer::Sdr && primaries == Primaries::REC709 {
             return Ok(None);
         }

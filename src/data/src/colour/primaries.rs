@@ -50,7 +50,7 @@ impl Primaries {
     }
 
     /// Name and primaries of a number of ITU-T H.273 (table 2); none of one that says nothing or is not known.
-    pub(crate) const fn of_code(code: u32) -> Option<(&'static str, Self)> {
+    pub(crate) const fn from_code(code: u32) -> Option<(&'static str, Self)> {
         let (name, [red, green, blue], white) = match code {
             1 => return Some(("BT.709", Self::REC709)),
             4 => ("BT.470 M", [[0.67, 0.33], [0.21, 0.71], [0.14, 0.08]], C),
@@ -164,7 +164,7 @@ mod tests {
     }
 
     fn of_code(code: u32) -> Primaries {
-        Primaries::of_code(code).unwrap().1
+        Primaries::from_code(code).unwrap().1
     }
 
     fn is_near(a: [f64; 3], b: [f64; 3], by: f64) -> bool {

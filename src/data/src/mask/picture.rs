@@ -27,7 +27,7 @@ pub struct MaskPicture {
 impl MaskPicture {
     /// The values of a decoded picture. Floating point values count from 0, black, to 1, white.
     #[must_use]
-    pub fn of_image(image: &DynamicImage) -> Self {
+    pub fn from_image(image: &DynamicImage) -> Self {
         let (size, has_alpha) = (image.dimensions(), image.color().has_alpha());
         match image {
             DynamicImage::ImageLuma8(_)
@@ -36,24 +36,24 @@ impl MaskPicture {
             | DynamicImage::ImageRgba8(_) => {
                 let pixels = image.to_rgba8();
                 let values = pixels.pixels().map(|pixel| pixel.0.map(u16::from));
-                Self::of_values(size, values, u8::MAX.into(), has_alpha)
+                Self::from_values(size, values, u8::MAX.into(), has_alpha)
             }
             DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
                 let pixels = image.to_rgba32f();
                 let values = pixels.pixels().map(|pixel| pixel.0.map(sixteen_bits));
-                Self::of_values(size, values, u16::MAX, has_alpha)
+                Self::from_values(size, values, u16::MAX, has_alpha)
             }
             _ => {
                 let pixels = image.to_rgba16();
                 let values = pixels.pixels().map(|pixel| pixel.0);
-                Self::of_values(size, values, u16::MAX, has_alpha)
+                Self::from_values(size, values, u16::MAX, has_alpha)
             }
         }
     }
 
     /// Values from 0, black or transparent, to 1, plane by plane and each row by row. What a plane lacks is 0.
     #[must_use]
-    pub fn of_planes(size: (u32, u32), colours: [&[f32]; 3], alpha: Option<&[f32]>) -> Self {
+    pub fn from_planes(size: (u32, u32), colours: [&[f32]; 3], alpha: Option<&[f32]>) -> Self {
         let count = size.0 as usize * size.1 as usize;
         let at = |plane: &[f32], k: usize| plane.get(k).copied().unwrap_or_default();
         let is_eight_bits = |plane: &&[f32]| plane.iter().all(|&value| is_of_eight_bits(value));
@@ -70,10 +70,10 @@ impl MaskPicture {
             let [r, g, b] = colours.map(|plane| level(at(plane, k)));
             [r, g, b, alpha.map_or(white, |plane| level(at(plane, k)))]
         });
-        Self::of_values(size, values, white, alpha.is_some())
+        Self::from_values(size, values, white, alpha.is_some())
     }
 
-    fn of_values(
+    fn from_values(
         (width, height): (u32, u32),
         values: impl Iterator<Item = [u16; 4]>,
         white: u16,

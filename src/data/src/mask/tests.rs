@@ -45,7 +45,7 @@ fn photograph(x: u32, y: u32) -> [u8; 3] {
 }
 
 fn read(image: impl Into<DynamicImage>) -> Result<ObjectPixels, MaskFault> {
-    MaskPicture::of_image(&image.into()).object()
+    MaskPicture::from_image(&image.into()).object()
 }
 
 #[track_caller]
@@ -352,12 +352,12 @@ fn a_mask_may_be_all_object_and_not_without_one() {
 
 #[test]
 fn values_of_floating_point_are_those_of_the_integers_that_they_were() {
-    let label = MaskPicture::of_planes((2, 1), [&[0.0, 1.0 / 255.0]; 3], None)
+    let label = MaskPicture::from_planes((2, 1), [&[0.0, 1.0 / 255.0]; 3], None)
         .object()
         .unwrap();
     assert_eq!(label.basis, MaskBasis::Label("the value 1".to_owned()));
     assert_eq!(label.inside, [false, true]);
-    let of = |value: f32| MaskPicture::of_planes((2, 1), [&[0.0, value]; 3], None).object();
+    let of = |value: f32| MaskPicture::from_planes((2, 1), [&[0.0, value]; 3], None).object();
     assert_eq!(of(1.0 / 65535.0).unwrap().inside, [false, true]);
     assert_eq!(of(7.5).unwrap().basis, MaskBasis::Brightness);
     for nothing in [0.0, -1.0, f32::NAN] {
@@ -366,7 +366,7 @@ fn values_of_floating_point_are_those_of_the_integers_that_they_were() {
             "{nothing}"
         );
     }
-    let alpha = MaskPicture::of_planes((2, 1), [&[0.2, 0.3]; 3], Some(&[0.4, 0.6])).object();
+    let alpha = MaskPicture::from_planes((2, 1), [&[0.2, 0.3]; 3], Some(&[0.4, 0.6])).object();
     assert_eq!(alpha.unwrap().basis, MaskBasis::Alpha);
 }
 

@@ -52,7 +52,7 @@ pub struct Page<'a> {
 /// # Errors
 /// [`ImageError`] if a thumbnail cannot be encoded.
 pub fn render(page: &Page<'_>) -> Result<String, ImageError> {
-    let turn = Turn::of(page.records);
+    let turn = Turn::from_records(page.records);
     let contact = contact::sheet(page, &turn)?;
     Ok(sections::document(page, &turn, &contact))
 }

@@ -120,7 +120,7 @@ fn any_channel(record: &FrameRecord) -> f64 {
 }
 
 fn saturated(page: &Page<'_>, turn: &Turn) -> String {
-    let extremes = Extremes::of(page.records, turn, |r| r.saturated_fraction);
+    let extremes = Extremes::new(page.records, turn, |r| r.saturated_fraction);
     let caption = format!(
         "Pixels with all three channels at {level} or above. Above the dashed line, {gate}, \
          Spec-Net is on. {extremes}",
@@ -147,7 +147,7 @@ fn saturated(page: &Page<'_>, turn: &Turn) -> String {
 /// A plot of its own: on a coloured object this fraction is ten times the gated one, and on a common
 /// axis the gate would be unreadable.
 fn saturated_any(page: &Page<'_>, turn: &Turn) -> String {
-    let extremes = Extremes::of(page.records, turn, any_channel);
+    let extremes = Extremes::new(page.records, turn, any_channel);
     let caption = format!(
         "Pixels with at least one channel at {level} or above; not gated. {extremes}",
         level = page.saturation_level,
@@ -177,7 +177,7 @@ fn colour(page: &Page<'_>, turn: &Turn) -> String {
 }
 
 fn sharpness(page: &Page<'_>, turn: &Turn) -> String {
-    let extremes = Extremes::of(page.records, turn, |r| r.sharpness);
+    let extremes = Extremes::new(page.records, turn, |r| r.sharpness);
     let caption = format!(
         "Variance of the Laplacian; larger is sharper. {}",
         extremes.sentence(|value| number(value, 1))
@@ -228,7 +228,7 @@ struct Extremes {
 }
 
 impl Extremes {
-    fn of(records: &[FrameRecord], turn: &Turn, value: impl Fn(&FrameRecord) -> f64) -> Self {
+    fn new(records: &[FrameRecord], turn: &Turn, value: impl Fn(&FrameRecord) -> f64) -> Self {
         let points = turn.points(records, value);
         let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
         let nowhere = (0.0, 0.0);

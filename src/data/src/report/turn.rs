@@ -17,7 +17,7 @@ pub(super) struct Turn {
 impl Turn {
     /// By the table's angle if every record has one, else by the index: mixing them would draw a
     /// line between two different axes.
-    pub(super) fn of(records: &[FrameRecord]) -> Self {
+    pub(super) fn from_records(records: &[FrameRecord]) -> Self {
         let angles: Option<Vec<f64>> = records
             .iter()
             .map(|r| r.angle_deg.map(|angle| angle.rem_euclid(FULL)))

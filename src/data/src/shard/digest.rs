@@ -15,7 +15,7 @@ pub struct Digest([u8; 32]);
 impl Digest {
     /// The digest of `bytes`.
     #[must_use]
-    pub fn of(bytes: &[u8]) -> Self {
+    pub fn hash(bytes: &[u8]) -> Self {
         blake3::hash(bytes).into()
     }
 
@@ -23,7 +23,7 @@ impl Digest {
     ///
     /// # Errors
     /// If the file cannot be opened or read.
-    pub fn of_file(path: &Path) -> io::Result<(u64, Self)> {
+    pub fn hash_file(path: &Path) -> io::Result<(u64, Self)> {
         let mut reader = Hashing::new(File::open(path)?);
         reader.drain()?;
         Ok(reader.found())
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn a_digest_is_written_as_hexadecimal_and_read_back() {
-        let digest = Digest::of(b"relit");
+        let digest = Digest::hash(b"relit");
         let json = serde_json::to_string(&digest).unwrap();
         assert_eq!(json.len(), 66);
         assert_eq!(serde_json::from_str::<Digest>(&json).unwrap(), digest);
@@ -177,6 +177,6 @@ mod tests {
         let mut reader = Hashing::new(copy.as_slice());
         assert_eq!(reader.drain().unwrap(), 300_000);
         assert_eq!(reader.found(), (written, digest));
-        assert_eq!(digest, Digest::of(&bytes));
+        assert_eq!(digest, Digest::hash(&bytes));
     }
 }

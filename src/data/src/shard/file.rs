@@ -30,7 +30,7 @@ impl FileEntry {
 fn check_file(out: &Path, file: &str, expected: (u64, Digest)) -> Result<(), ShardError> {
     names::check_path(file)?;
     let path = out.join(file);
-    let found = Digest::of_file(&path).map_err(ShardError::io("read", &path))?;
+    let found = Digest::hash_file(&path).map_err(ShardError::io("read", &path))?;
     compare(file, expected, found)
 }
 
@@ -96,7 +96,7 @@ fn check_shard(out: &Path, shard: &ShardEntry, layout: Layout) -> Result<(), Sha
     let mut total = 0;
     for index in 0..shard.samples {
         let path = out.join(&shard.file).join(format!("{index}.png"));
-        let (bytes, digest) = Digest::of_file(&path).map_err(ShardError::io("read", &path))?;
+        let (bytes, digest) = Digest::hash_file(&path).map_err(ShardError::io("read", &path))?;
         hasher.add(&digest);
         total += bytes;
     }

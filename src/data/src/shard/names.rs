@@ -49,7 +49,7 @@ impl Part {
         }
     }
 
-    fn of_suffix(suffix: &str) -> Option<Self> {
+    fn from_suffix(suffix: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|part| part.suffix() == suffix)
     }
 }
@@ -72,7 +72,7 @@ pub(super) fn parse_member(session: &str, path: &str) -> Option<(u32, Part)> {
         .strip_prefix('/')?
         .split_once('.')?;
     let index: u32 = number.parse().ok()?;
-    let part = Part::of_suffix(suffix)?;
+    let part = Part::from_suffix(suffix)?;
     // Only the form that the writer uses: no sign, no other number of leading zeros.
     (member(session, index, part) == path).then_some((index, part))
 }

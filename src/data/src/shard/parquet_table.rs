@@ -324,8 +324,8 @@ mod tests {
                 shift_interpolated_sd_px: (!even).then_some(0.3),
                 ..FrameRecord::new("s", "mug \"ö\"", index, crop, &measures, SPEC_NET_GATE)
             },
-            png_blake3: Digest::of(&index.to_le_bytes()),
-            mask_blake3: Digest::of(b"mask"),
+            png_blake3: Digest::hash(&index.to_le_bytes()),
+            mask_blake3: Digest::hash(b"mask"),
         }
     }
 
@@ -338,7 +338,7 @@ mod tests {
     fn on_disk(bytes: &[u8]) -> (tempfile::TempDir, FileEntry) {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("s.parquet"), bytes).unwrap();
-        let blake3 = Digest::of(bytes);
+        let blake3 = Digest::hash(bytes);
         (
             dir,
             FileEntry {
@@ -362,7 +362,7 @@ mod tests {
     fn every_column_is_needed_and_both_numbers_of_a_shift() {
         let field = |(name, kind)| match kind {
             Kind::Text if name == "session" || name == "object" => Field::Str("s".to_owned()),
-            Kind::Text => Field::Str(Digest::of(b"x").to_string()),
+            Kind::Text => Field::Str(Digest::hash(b"x").to_string()),
             Kind::U32 => Field::UInt(1),
             Kind::I32 => Field::Int(1),
             Kind::U64 | Kind::MaybeU64 => Field::ULong(1),

@@ -100,7 +100,7 @@ impl SessionQuality {
     /// The figures of a session with these records, of which something was lost (`lossy`), or which covers
     /// only a part of the turn (`covered_deg`).
     #[must_use]
-    pub fn of(records: &[FrameRecord], lossy: bool, covered_deg: Option<f64>) -> Self {
+    pub fn from_records(records: &[FrameRecord], lossy: bool, covered_deg: Option<f64>) -> Self {
         let shifts = || {
             let measured = records.iter().filter_map(|record| record.shift_px);
             measured.map(|[dx, dy]| dx.hypot(dy))
@@ -258,7 +258,7 @@ mod tests {
     fn a_turn_of_which_nothing_is_to_say_is_good() {
         let mut records = turn(100);
         records[7].shift_px = Some([0.3, -0.4]);
-        let quality = SessionQuality::of(&records, false, None);
+        let quality = SessionQuality::from_records(&records, false, None);
         assert_eq!(quality.verdict, QualityVerdict::Good);
         assert!(quality.reasons.is_empty());
         assert_eq!(quality.shift_max_px, Some(0.5));
@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn a_mask_that_does_not_fit_lowers_the_verdict() {
-        let of = |misfit| SessionQuality::of(&turn(100), false, None).with_mask(misfit);
+        let of = |misfit| SessionQuality::from_records(&turn(100), false, None).with_mask(misfit);
         assert_eq!(of(None).verdict, QualityVerdict::Good);
         let partly = of(Some(MaskMisfit::InPart));
         assert_eq!(partly.verdict, QualityVerdict::Usable);
@@ -281,12 +281,13 @@ mod tests {
         let mut records = turn(100);
         records[3].shift_px = Some([0.1, 0.2]);
         records[3].shift_interpolated_sd_px = Some(0.3);
-        let quality = SessionQuality::of(&records, false, None);
+        let quality = SessionQuality::from_records(&records, false, None);
         assert_eq!(
             (quality.verdict, quality.interpolated),
             (QualityVerdict::Usable, 1)
         );
-        let json = serde_json::to_string(&SessionQuality::of(&turn(3), false, None)).unwrap();
+        let json =
+            serde_json::to_string(&SessionQuality::from_records(&turn(3), false, None)).unwrap();
         assert!(
             !json.contains("interpolated") && !json.contains("misfit"),
             "{json}"
@@ -307,7 +308,7 @@ mod tests {
             ] {
                 let mut records = turn(300);
                 records.iter_mut().take(samples).for_each(set);
-                let quality = SessionQuality::of(&records, false, None);
+                let quality = SessionQuality::from_records(&records, false, None);
                 assert_eq!(quality.verdict, verdict, "{:?}", quality.reasons);
                 assert_eq!(quality.reasons.len(), 1);
             }
@@ -319,7 +320,7 @@ mod tests {
         let mut records = turn(3);
         records[0].exposure_step = Some(0.5);
         records[1].blur = Some(1.0);
-        let quality = SessionQuality::of(&records, false, None);
+        let quality = SessionQuality::from_records(&records, false, None);
         assert_eq!(quality.verdict, QualityVerdict::Usable);
     }
 
@@ -332,7 +333,7 @@ mod tests {
             (true, None, "is lost"),
             (true, Some(120.5), "120.5 of 360 degrees"),
         ] {
-            let quality = SessionQuality::of(&records, lossy, covered);
+            let quality = SessionQuality::from_records(&records, lossy, covered);
             assert_eq!(quality.verdict, QualityVerdict::Usable);
             assert!(quality.reasons.iter().any(|reason| reason.contains(says)));
         }
@@ -346,7 +347,7 @@ mod tests {
                 record.mean_rgb = [mean; 3];
                 record.saturated_fraction = saturated;
             }
-            let quality = SessionQuality::of(&records, false, None);
+            let quality = SessionQuality::from_records(&records, false, None);
             assert_eq!(quality.verdict, QualityVerdict::Broken);
         }
     }

@@ -111,7 +111,7 @@ impl ShardWriter {
         Ok(Self {
             session: session.to_owned(),
             size,
-            mask_blake3: Digest::of(&mask_png),
+            mask_blake3: Digest::hash(&mask_png),
             mask_png,
             rows: vec![None; samples as usize],
             store,
@@ -146,7 +146,7 @@ impl ShardWriter {
         self.images += png.len() as u64;
         if let Some(row) = self.rows.get_mut(index as usize) {
             *row = Some(TableRow {
-                png_blake3: Digest::of(&png),
+                png_blake3: Digest::hash(&png),
                 record,
                 mask_blake3: self.mask_blake3,
             });

@@ -8,12 +8,12 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Li
 use crate::still::{Format, StillError, exr, isobmff, jpeg, png_exif, radiance};
 
 /// Decodes the content of a file, turned as it is displayed. The numbers stay as they are stored; what they stand for
-/// says [`crate::still::Colour::of_file`].
+/// says [`crate::still::Colour::from_file`].
 ///
 /// # Errors
 /// Where it is no picture of a format that is read, too large, or cut off.
 pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
-    let format = Format::of(bytes);
+    let format = Format::sniff(bytes);
     match format {
         Some(Format::Radiance) => return radiance::decode(bytes),
         Some(Format::Exr) => return exr::decode(bytes),
@@ -48,7 +48,7 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
 /// it is stored, or where its orientation cannot be read.
 #[must_use]
 pub fn orientation(bytes: &[u8]) -> Option<Orientation> {
-    let stated = match Format::of(bytes)? {
+    let stated = match Format::sniff(bytes)? {
         Format::Avif | Format::Heic => isobmff::orientation(bytes)?,
         Format::Png => Orientation::from_exif_chunk(png_exif::find(bytes)?)?,
         Format::Jpeg | Format::WebP | Format::Tiff => {
@@ -65,7 +65,7 @@ pub fn orientation(bytes: &[u8]) -> Option<Orientation> {
 /// Width and height that a file says it has, before it is turned; none where they cannot be read.
 #[must_use]
 pub fn stored_size(bytes: &[u8]) -> Option<(u32, u32)> {
-    match Format::of(bytes)? {
+    match Format::sniff(bytes)? {
         Format::Radiance => radiance::size(bytes),
         Format::Exr => exr::size(bytes),
         _ => {

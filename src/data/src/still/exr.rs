@@ -107,7 +107,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     })?;
     let channels = choose(&meta)?;
     let header = header_of(&meta, &channels).ok_or_else(|| no_picture(&meta))?;
-    let canvas = Canvas::of(header, &channels)?;
+    let canvas = Canvas::new(header, &channels)?;
     canvas.image(canvas.read(bytes, channels)?)
 }
 
@@ -121,7 +121,7 @@ struct Canvas {
 }
 
 impl Canvas {
-    fn of(header: &Header, channels: &Channels) -> Result<Self, StillError> {
+    fn new(header: &Header, channels: &Channels) -> Result<Self, StillError> {
         let (Channels::Colours(_, alpha) | Channels::Grey(_, alpha)) = channels;
         let window = header.shared_attributes.display_window;
         let offset = header.own_attributes.layer_position - window.position;

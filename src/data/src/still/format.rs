@@ -53,7 +53,7 @@ impl Format {
 
     /// The format that the first bytes of a file show.
     #[must_use]
-    pub fn of(bytes: &[u8]) -> Option<Self> {
+    pub fn sniff(bytes: &[u8]) -> Option<Self> {
         let starts = |magic: &[u8]| bytes.starts_with(magic);
         let at = |place: usize, magic: &[u8]| {
             bytes
@@ -209,7 +209,7 @@ mod tests {
             (b"a photograph", None),
             (b"", None),
         ] {
-            assert_eq!(Format::of(bytes), format, "{bytes:?}");
+            assert_eq!(Format::sniff(bytes), format, "{bytes:?}");
         }
     }
 
@@ -230,8 +230,8 @@ mod tests {
         let nef = ifd(&[(254, 4, 1), (271, 2, 65), (330, 4, 99)]);
         let dng = ifd(&[(254, 4, 0), (50706, 1, 4)]);
         let plain = ifd(&[(254, 4, 0), (256, 4, 8), (271, 2, 65)]);
-        assert_eq!(Format::of(&nef), Some(Format::RAW));
-        assert_eq!(Format::of(&dng), Some(Format::RAW));
-        assert_eq!(Format::of(&plain), Some(Format::Tiff));
+        assert_eq!(Format::sniff(&nef), Some(Format::RAW));
+        assert_eq!(Format::sniff(&dng), Some(Format::RAW));
+        assert_eq!(Format::sniff(&plain), Some(Format::Tiff));
     }
 }

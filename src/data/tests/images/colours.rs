@@ -12,7 +12,7 @@ use crate::files::{
 /// The areas of a file in sRGB.
 fn shown(bytes: &[u8]) -> [[u8; 3]; 4] {
     let mut image = decode(bytes).unwrap().into_rgb8();
-    Colour::of_file(bytes).unwrap().to_srgb8(&mut image);
+    Colour::from_file(bytes).unwrap().to_srgb8(&mut image);
     middles(&image)
 }
 
@@ -81,7 +81,7 @@ fn adobe_rgb_is_known_by_profile_and_by_exif() {
     // sRGB, and a colour space of which nothing is known.
     for (space, index) in [(1, b"R98\0"), (0xffff, b"R98\0")] {
         let bytes = jpeg_with(&jpeg, &[exif_segment(exif(1, space, index))]);
-        assert!(Colour::of_file(&bytes).unwrap().is_srgb());
+        assert!(Colour::from_file(&bytes).unwrap().is_srgb());
     }
 }
 
@@ -127,7 +127,7 @@ fn srgb_is_left_as_it_is_stored() {
         encoded(image.clone(), ImageFormat::Tiff),
         encoded(image.clone(), ImageFormat::Bmp),
     ] {
-        assert!(Colour::of_file(&bytes).unwrap().is_srgb());
+        assert!(Colour::from_file(&bytes).unwrap().is_srgb());
         assert_eq!(shown(&bytes), AREAS);
     }
 }
@@ -193,7 +193,7 @@ fn a_grey_profile_is_for_pictures_without_colours() {
         "{:?}",
         shown(&bytes)
     );
-    let fault = Colour::of_file(&png_with_icc(&areas(AREAS), icc)).unwrap_err();
+    let fault = Colour::from_file(&png_with_icc(&areas(AREAS), icc)).unwrap_err();
     assert!(
         fault
             .to_string()
@@ -207,7 +207,7 @@ fn what_is_not_converted_is_refused_by_its_name() {
     let image = areas(AREAS);
     let mut inks = ColorProfile::new_srgb();
     inks.color_space = DataColorSpace::Cmyk;
-    let fault = |bytes: &[u8]| Colour::of_file(bytes).unwrap_err();
+    let fault = |bytes: &[u8]| Colour::from_file(bytes).unwrap_err();
     let cmyk = fault(&png_with_profile(&image, &inks));
     assert!(
         cmyk.to_string().contains("which is for inks (CMYK)"),
@@ -251,7 +251,7 @@ fn a_jpeg_of_inks_is_refused() {
         8, 0, 8, 0, 8, 4, 1, 0x11, 0, 2, 0x11, 0, 3, 0x11, 0, 4, 0x11, 0,
     ];
     let bytes = jpeg_with(&[0xff, 0xd8, 0xff, 0xda, 0, 2], &[(0xc0, sof.to_vec())]);
-    let fault = Colour::of_file(&bytes).unwrap_err();
+    let fault = Colour::from_file(&bytes).unwrap_err();
     assert!(fault.to_string().contains("CMYK"), "{fault}");
 }
 
@@ -259,7 +259,7 @@ fn a_jpeg_of_inks_is_refused() {
 fn a_tiff_of_floating_point_is_light() {
     let image = image::Rgb32FImage::from_pixel(4, 4, image::Rgb([2.0, 0.5, 0.25]));
     let bytes = encoded(DynamicImage::from(image), ImageFormat::Tiff);
-    assert!(Colour::of_file(&bytes).unwrap().is_linear());
+    assert!(Colour::from_file(&bytes).unwrap().is_linear());
     assert_eq!(
         decode(&bytes).unwrap().into_rgb32f().get_pixel(1, 1).0,
         [2.0, 0.5, 0.25]
@@ -272,7 +272,7 @@ fn a_table_of_16_bits_keeps_the_dark() {
     let bytes = png_with(&image, &[(b"gAMA", hundred_thousandths(&[0.5]))]);
     let mut planes = [[1.0_f32 / 255.0]; 3];
     let [red, green, blue] = &mut planes;
-    Colour::of_file(&bytes)
+    Colour::from_file(&bytes)
         .unwrap()
         .to_light([red, green, blue]);
     assert!((planes[0][0] * 65025.0 - 1.0).abs() < 1e-3);

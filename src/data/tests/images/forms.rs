@@ -131,7 +131,7 @@ fn chromaticities_become_rec709_and_white_stays_white() {
         let [r, g, b, _] = pixel(&bytes);
         let mut planes = [[r], [g], [b]];
         let [red, green, blue] = &mut planes;
-        Colour::of_file(&bytes)
+        Colour::from_file(&bytes)
             .unwrap()
             .to_open_light([red, green, blue]);
         planes.map(|[value]| value)
@@ -165,7 +165,7 @@ fn chromaticities_become_rec709_and_white_stays_white() {
         Vec2(0.3, 0.3),
     );
     let channels = [("R", full(1.0)), ("G", full(1.0)), ("B", full(1.0))];
-    assert!(Colour::of_file(&exr(&channels, Some(flat))).is_err());
+    assert!(Colour::from_file(&exr(&channels, Some(flat))).is_err());
 }
 
 /// A picture in which every pixel is another one.
@@ -265,7 +265,7 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
         let error = decode(bytes).unwrap_err();
         let text = error.to_string();
         assert!(matches!(error, StillError::NotRead(_)), "{text}");
-        let (found, advice) = Format::of(bytes).and_then(Format::unread).unwrap();
+        let (found, advice) = Format::sniff(bytes).and_then(Format::unread).unwrap();
         assert_eq!(found, name);
         assert!(text.contains(name) && text.contains(advice), "{text}");
     }

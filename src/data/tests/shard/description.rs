@@ -13,7 +13,7 @@ fn entry(id: &str) -> SessionEntry {
         table: FileEntry {
             file: format!("{id}.parquet"),
             bytes: 0,
-            blake3: Digest::of(b""),
+            blake3: Digest::hash(b""),
         },
     };
     sample_set::entry(id, &files, &[])

@@ -42,7 +42,7 @@ fn image(index: u32) -> RgbImage {
 }
 
 pub(crate) fn record(session: &str, index: u32, image: &RgbImage) -> FrameRecord {
-    let measures = MaskSpans::of(&mask())
+    let measures = MaskSpans::from_mask(&mask())
         .measure(image, SATURATION_LEVEL)
         .unwrap();
     let duplicate = index == 5;
@@ -85,7 +85,7 @@ pub(crate) fn entry(
     };
     let mut records: Vec<FrameRecord> = all.iter().map(|s| s.record.clone()).collect();
     records.sort_by_key(|record| record.index);
-    let blake3 = Digest::of(b"input");
+    let blake3 = Digest::hash(b"input");
     SessionEntry {
         id: id.to_owned(),
         object: "mug".to_owned(),
@@ -110,7 +110,7 @@ pub(crate) fn entry(
         duplicates: count(|r| r.duplicate),
         spec_net: count(|r| r.spec_net),
         lossy: false,
-        quality: SessionQuality::of(&records, false, None),
+        quality: SessionQuality::from_records(&records, false, None),
         warnings: Vec::new(),
         table: files.table.clone(),
         report: None,

@@ -26,7 +26,7 @@ pub(super) struct Demand {
 
 impl Demand {
     /// Of templates, from the finest on, at shifts of up to `reach` pixels of the coarsest.
-    pub(super) fn of(templates: &[Template], crop: (u32, u32), halvings: u32, reach: f64) -> Self {
+    pub(super) fn new(templates: &[Template], crop: (u32, u32), halvings: u32, reach: f64) -> Self {
         let halvings = halvings as usize;
         let larger = halvings.saturating_sub(1);
         let sizes = (halvings - larger..halvings + templates.len())
@@ -39,7 +39,7 @@ impl Demand {
             .map(|(scale, template)| {
                 let pixels = template.pixels.iter().map(|pixel| (pixel.x, pixel.y));
                 let size = sizes.get(larger + scale).copied().unwrap_or_default();
-                Needs::of(Region::around(pixels, far(scale) + BETWEEN, size))
+                Needs::from_gradients(Region::around(pixels, far(scale) + BETWEEN, size))
             })
             .collect();
         let mut lumas: Vec<Region> = Vec::new();

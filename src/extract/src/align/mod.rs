@@ -68,7 +68,7 @@ pub struct AlignSample(GrayImage);
 impl AlignSample {
     /// The brightness of `crop`.
     #[must_use]
-    pub fn of(crop: CropView<'_>) -> Self {
+    pub fn from_crop(crop: CropView<'_>) -> Self {
         let (width, height) = crop.dimensions();
         let (halvings, rows) = (halvings((width, height)), 0..height as usize);
         let mut image = GrayImage::default();
@@ -183,7 +183,7 @@ impl Aligner {
                 2
             }];
             for round in 0..rounds {
-                let template = Template::of(&planes, &shifts, inner);
+                let template = Template::from_planes(&planes, &shifts, inner);
                 // The first template of all is too blurred to search with.
                 let search = coarsest && round > 0;
                 fit_all(&template, &planes, &mut shifts, reach, search, still(scale));
@@ -196,7 +196,7 @@ impl Aligner {
                     *shift = [shift[0] - origin[0], shift[1] - origin[1]];
                 }
             }
-            templates.push(Template::of(&planes, &shifts, inner));
+            templates.push(Template::from_planes(&planes, &shifts, inner));
             if scale > 0 {
                 for shift in &mut shifts {
                     let doubled = shift.map(|part| 2.0 * part);
@@ -209,7 +209,7 @@ impl Aligner {
         templates.reverse();
         let coarsest = reach / (1_u32 << (templates.len() - 1)) as f64;
         let mut aligner = Self {
-            demand: Demand::of(&templates, mask.dimensions(), halvings, coarsest),
+            demand: Demand::new(&templates, mask.dimensions(), halvings, coarsest),
             templates,
             reach,
             unit,
@@ -226,7 +226,7 @@ impl Aligner {
         let registered = found.iter().filter(|found| found.shift.is_some());
         let usual = middle(registered.map(|found| found.confidence).collect());
         aligner.least_confidence = MIN_CONFIDENCE.max(MIN_OF_MEDIAN * usual);
-        aligner.motion = Motion::of(&found, reference);
+        aligner.motion = Motion::from_alignments(&found, reference);
         usable.then_some(aligner)
     }
 
@@ -341,7 +341,7 @@ impl Aligner {
 
 impl Motion {
     /// From the frames that were learnt from; the mask was made on that of index `reference`.
-    fn of(found: &[Alignment], reference: usize) -> Self {
+    fn from_alignments(found: &[Alignment], reference: usize) -> Self {
         let shifts: Vec<[f64; 2]> = found.iter().filter_map(|found| found.shift).collect();
         let centre = middle_place(&shifts);
         let beyond = |found: &Alignment| {

@@ -66,7 +66,7 @@ pub(super) struct Needs {
 
 impl Needs {
     /// For these gradients.
-    pub(super) fn of(gradients: Region) -> Self {
+    pub(super) fn from_gradients(gradients: Region) -> Self {
         let plane = gradients.grown(1, 1);
         let coarse_rows = plane.grown(REST_RADIUS, 0);
         let fine = coarse_rows.grown(0, REST_RADIUS);
@@ -151,7 +151,7 @@ impl Extractor {
         let (width, height) = (luma.width() as usize, luma.height() as usize);
         (out.width, out.height) = (width, height);
         out.values.resize(width * height, 0.0);
-        let needs = Needs::of(Region::whole(luma.dimensions()));
+        let needs = Needs::from_gradients(Region::whole(luma.dimensions()));
         self.run(luma, &needs, out);
     }
 
@@ -555,7 +555,7 @@ mod tests {
             some.resize(width as usize, height as usize);
             // What is not made must not be read.
             some.values.fill([f32::NAN; 2]);
-            extractor.gradients(&luma, &Needs::of(region.clone()), &mut some);
+            extractor.gradients(&luma, &Needs::from_gradients(region.clone()), &mut some);
             for y in 0..height as usize {
                 for x in region.row(y) {
                     let at = (x as u32, y as u32);

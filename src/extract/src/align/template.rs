@@ -50,7 +50,7 @@ struct TemplateRow {
 
 impl Template {
     /// The template of pictures whose object lies at these shifts, under `inner` (row by row).
-    pub(super) fn of(planes: &[Plane], shifts: &[[f64; 2]], inner: &[bool]) -> Self {
+    pub(super) fn from_planes(planes: &[Plane], shifts: &[[f64; 2]], inner: &[bool]) -> Self {
         let Some((width, height)) = planes.first().map(|plane| (plane.width, plane.height)) else {
             return Self::default();
         };

@@ -37,7 +37,7 @@ fn frame(shift: [f64; 2], angle: f64) -> AlignSample {
         let highlight = 150.0 * (-((u - hx).powi(2) + (v - hy).powi(2)) / 60.0).exp();
         grey((paint * light + highlight).round().clamp(0.0, 255.0) as u8)
     });
-    AlignSample::of(CropView::whole(&image))
+    AlignSample::from_crop(CropView::whole(&image))
 }
 
 fn angle(at: usize, of: usize) -> f64 {
@@ -97,14 +97,14 @@ fn a_frame_without_the_object_is_not_registered() {
         grey((x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503_001)).to_le_bytes()[2])
     });
     for image in [noise, RgbaImage::from_pixel(SIDE, SIDE, grey(9))] {
-        let found = measured(&aligner, &AlignSample::of(CropView::whole(&image)));
+        let found = measured(&aligner, &AlignSample::from_crop(CropView::whole(&image)));
         assert_eq!(found.shift, None, "{found:?}");
     }
 }
 
 #[test]
 fn an_object_without_structure_cannot_be_learnt() {
-    let grey = AlignSample::of(CropView::whole(&RgbaImage::from_pixel(
+    let grey = AlignSample::from_crop(CropView::whole(&RgbaImage::from_pixel(
         SIDE,
         SIDE,
         grey(99),
@@ -218,7 +218,7 @@ fn the_masks_frame_is_no_other_place_than_the_rest_unless_it_surely_is() {
         [0.15, 0.06],
     ]
     .map(found);
-    let motion = Motion::of(&still, 0);
+    let motion = Motion::from_alignments(&still, 0);
     assert_eq!(motion.against_mask([0.15, 0.05], 0.08), [0.0; 2]);
     let pushed = [
         [-2.0, 0.0],
@@ -228,7 +228,7 @@ fn the_masks_frame_is_no_other_place_than_the_rest_unless_it_surely_is() {
         [0.15, 0.05],
     ]
     .map(found);
-    let [dx, dy] = Motion::of(&pushed, 0).against_mask([0.15, 0.05], 0.08);
+    let [dx, dy] = Motion::from_alignments(&pushed, 0).against_mask([0.15, 0.05], 0.08);
     assert!((dx - 2.15).hypot(dy - 0.05) < 0.01, "{dx} {dy}");
 }
 
@@ -251,13 +251,13 @@ fn a_large_picture_is_measured_in_its_own_pixels() {
         })
     };
     let samples: Vec<AlignSample> = (0..24)
-        .map(|at| AlignSample::of(CropView::whole(&large(&frame([0.0; 2], angle(at, 24))))))
+        .map(|at| AlignSample::from_crop(CropView::whole(&large(&frame([0.0; 2], angle(at, 24))))))
         .collect();
     assert!(samples[0].0.width() <= 640);
     let mask = image::imageops::resize(&mask(), 5 * SIDE, 5 * SIDE, image::imageops::Nearest);
     let aligner = Aligner::learn(&samples, 0, &mask, 16.0).unwrap();
     let moved = large(&frame([2.0, -1.0], angle(7, 24)));
-    let found = measured(&aligner, &AlignSample::of(CropView::whole(&moved)))
+    let found = measured(&aligner, &AlignSample::from_crop(CropView::whole(&moved)))
         .shift
         .unwrap();
     assert!((found[0] - 10.0).hypot(found[1] + 5.0) < 0.5, "{found:?}");

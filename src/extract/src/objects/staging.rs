@@ -48,7 +48,7 @@ pub(crate) fn extract(
         match staging.recordings(input, &into) {
             Ok(inside) => found.extend(inside),
             Err(error) => {
-                let outcome = RecordingOutcome::of(Err(error));
+                let outcome = RecordingOutcome::from_result(Err(error));
                 tally.count(&outcome);
                 observer.ended(input, &outcome);
             }

@@ -322,7 +322,7 @@ mod tests {
     }
 
     fn still(scaler: &Scaler, crop: CropView<'_>) -> RgbImage {
-        let spans = MaskSpans::of(&scaler.source.image);
+        let spans = MaskSpans::from_mask(&scaler.source.image);
         let mut buffers = ScaleBuffers::default();
         scaler
             .scale(crop, &mut buffers, &mut spans.measuring(SATURATION_LEVEL))
@@ -423,7 +423,7 @@ mod tests {
             for part in [[0.5, -0.25], [-0.4, 0.5], [0.2, 0.0]] {
                 let around = around(&mask, part);
                 let crop = CropView::within(&around, APRON);
-                let spans = MaskSpans::of(&mask);
+                let spans = MaskSpans::from_mask(&mask);
                 let found = scaler
                     .scale_moved(
                         crop,
@@ -446,7 +446,7 @@ mod tests {
             opaque([(9 * x) as u8, (8 * y * y) as u8, (x * y) as u8])
         });
         let crop = CropView::within(&around, APRON);
-        let spans = MaskSpans::of(&mask);
+        let spans = MaskSpans::from_mask(&mask);
         let rgb = image::DynamicImage::from(around.clone()).to_rgb8();
         let rgb = image::imageops::crop_imm(&rgb, APRON, APRON, 20, 20).to_image();
         let wanted = spans.measure(&rgb, 100).unwrap();
@@ -466,7 +466,7 @@ mod tests {
     fn a_crop_without_its_apron_is_refused() {
         let scaler = Scaler::new(disc(60), Some(24)).unwrap();
         let bare = RgbaImage::new(60, 60);
-        let spans = MaskSpans::of(&disc(60));
+        let spans = MaskSpans::from_mask(&disc(60));
         let mut buffers = ScaleBuffers::default();
         let refused = scaler.scale_moved(
             CropView::whole(&bare),

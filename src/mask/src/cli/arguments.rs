@@ -174,5 +174,5 @@ impl MaskArguments {
 }
 
 fn output(text: &str) -> Result<MaskFiles, MaskingError> {
-    MaskFiles::of(text.as_ref())
+    MaskFiles::from_mask_path(text.as_ref())
 }

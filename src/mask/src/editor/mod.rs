@@ -43,7 +43,7 @@ pub fn edit(
     announce: impl FnOnce(&Announcement),
 ) -> Result<Option<MaskOutput>, MaskingError> {
     let recording = Recording::open(input)?;
-    let of_recording = MaskingError::of(&recording);
+    let of_recording = MaskingError::in_recording(&recording);
     let files = files_of(&recording, output)?;
     let _made = make_folder(&files).map_err(&of_recording)?;
     check_replaceable(&files, request.force).map_err(&of_recording)?;

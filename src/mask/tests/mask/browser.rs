@@ -42,7 +42,7 @@ fn drawn_undone_drawn_again_and_accepted_with_the_mouse() {
         page.value("document.getElementById('accept').disabled"),
         true
     );
-    let screen = EditorCanvas::of(&mut page);
+    let screen = EditorCanvas::find(&mut page);
 
     // A box around the disc.
     page.drag(&[
@@ -110,13 +110,13 @@ fn a_finger_draws_and_two_zoom_on_a_phone() {
     );
 
     // Two fingers apart: twice as large, and nothing drawn.
-    let screen = EditorCanvas::of(&mut page);
+    let screen = EditorCanvas::find(&mut page);
     let apart = |way: f64| {
         let [x, y] = screen.at(48.0, 32.0);
         vec![[x - way, y], [x + way, y]]
     };
     page.touch(&[apart(40.0), apart(60.0), apart(80.0)]);
-    let zoomed = EditorCanvas::of(&mut page);
+    let zoomed = EditorCanvas::find(&mut page);
     assert!(
         zoomed.scale > 1.7 * screen.scale,
         "{} {}",

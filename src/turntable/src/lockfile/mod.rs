@@ -142,7 +142,7 @@ impl LockFile {
     ///
     /// # Errors
     /// As [`LockFile::take`].
-    pub fn of_root(root: &Path) -> Result<Self, LockError> {
+    pub fn lock_root(root: &Path) -> Result<Self, LockError> {
         Self::take(&root.join(ROOT_LOCK), &root.display().to_string())
     }
 
@@ -156,7 +156,7 @@ impl LockFile {
     ///
     /// # Errors
     /// As [`LockFile::take`] and [`use_folder`].
-    pub fn of_device(device: &Path, folder: &Path) -> Result<Self, LockError> {
+    pub fn lock_device(device: &Path, folder: &Path) -> Result<Self, LockError> {
         use_folder(folder)?;
         // A device has many names, one of which is the kernel's.
         let device = device.canonicalize().unwrap_or_else(|_| device.to_owned());

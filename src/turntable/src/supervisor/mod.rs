@@ -370,7 +370,7 @@ impl Supervisor {
     }
 
     fn on_report(&mut self, now_us: i64, poll: &Poll) {
-        let report = PositionReport::of(poll, &self.traits);
+        let report = PositionReport::from_poll(poll, &self.traits);
         self.confirmed = self
             .last_report
             .is_some_and(|before| before.confirms(&report));

@@ -31,7 +31,7 @@ pub(crate) struct PositionReport {
 
 impl PositionReport {
     /// Converts a report.
-    pub(super) fn of(poll: &Poll, traits: &ControllerTraits) -> PositionReport {
+    pub(super) fn from_poll(poll: &Poll, traits: &ControllerTraits) -> PositionReport {
         let report = poll.report;
         PositionReport {
             state: report.state,

@@ -112,14 +112,14 @@ impl Track {
     /// The track of an interrupted turn by what was reported of it; `None` where that does not determine it.
     #[must_use]
     pub fn from_reports(turn: &JournaledTurn, reports: &[JournaledReport]) -> Option<Self> {
-        Self::of_part(reports, turn).ok()
+        Self::from_part(reports, turn).ok()
     }
 
     /// The track of a turn that was interrupted, up to its last report.
     ///
     /// # Errors
     /// Why not, if there are too few reports, or they do not lie on a line of the planned speed.
-    fn of_part(reports: &[JournaledReport], expected: &JournaledTurn) -> Result<Self, String> {
+    fn from_part(reports: &[JournaledReport], expected: &JournaledTurn) -> Result<Self, String> {
         let points = points(reports, expected);
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Err(too_few(&points, MIN_OF_PART));

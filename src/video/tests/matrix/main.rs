@@ -472,7 +472,7 @@ fn is_possible(encoding: &str, encoders: &HashSet<String>) -> bool {
 fn encode(folder: &Path, encoding: &str, file: &str) {
     let mut source = Vec::new();
     for number in 0..FRAMES {
-        source.extend(Planes::of(number).bytes());
+        source.extend(Planes::numbered(number).bytes());
     }
     fs::write(folder.join("source.yuv"), source).unwrap();
     let size = format!("{WIDTH}x{HEIGHT}");

@@ -17,7 +17,7 @@ pub(crate) struct Planes {
 
 impl Planes {
     /// The picture with this number, above a texture that moves.
-    pub(crate) fn of(number: u64) -> Self {
+    pub(crate) fn numbered(number: u64) -> Self {
         let mut luma = Vec::with_capacity(WIDTH * HEIGHT);
         for y in 0..HEIGHT {
             for x in 0..WIDTH {

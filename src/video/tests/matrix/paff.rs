@@ -130,7 +130,7 @@ pub(crate) fn stream(frames: u64) -> Vec<u8> {
     };
     let mut stream = Vec::new();
     for number in 0..frames {
-        let planes = Planes::of(number);
+        let planes = Planes::numbered(number);
         for bottom in [0, 1] {
             stream.extend(delimiter());
             if number % GROUP == 0 && bottom == 0 {

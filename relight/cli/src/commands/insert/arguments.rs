@@ -148,13 +148,16 @@ impl Arguments {
                 mask.display()
             ));
         }
-        if OutputKind::of(&self.output).is_none() {
+        if OutputKind::from_path(&self.output).is_none() {
             return Some(format!(
                 "--output {}: give .png, .jpg, .exr, .mp4 or .webm",
                 self.output.display()
             ));
         }
-        let is_movie = matches!(OutputKind::of(&self.output), Some(OutputKind::Movie(_)));
+        let is_movie = matches!(
+            OutputKind::from_path(&self.output),
+            Some(OutputKind::Movie(_))
+        );
         (self.turn.is_some() && !is_movie).then(|| {
             format!(
                 "--output {}: give .mp4 or .webm for --turn",

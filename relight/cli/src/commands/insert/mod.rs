@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let objects = pairs.map(|(object, subject)| SceneObject::described(object, subject));
     let set = insertion.setting().scene(objects.collect())?;
     let output = arguments.written();
-    let bar = match OutputKind::of(output.path) {
+    let bar = match OutputKind::from_path(output.path) {
         Some(OutputKind::Movie(_)) => {
             console.progress(insertion.frames(&output).unwrap_or(0).into(), "frames")
         }
@@ -118,7 +118,7 @@ fn described(exposure: PanoramaExposure) -> String {
 /// Whether this background can become that output.
 fn check_output(background: &BackgroundFile, arguments: &Arguments) -> Result<(), String> {
     let is_movie = matches!(
-        OutputKind::of(&arguments.output),
+        OutputKind::from_path(&arguments.output),
         Some(OutputKind::Movie(_))
     );
     let output = arguments.output.display();

@@ -123,7 +123,7 @@ impl Arguments {
             return Some("--smoothness: give one value or a file".to_owned());
         }
         let is_folder = self.output.extension().is_none();
-        let wanted = match OutputKind::of(&self.output) {
+        let wanted = match OutputKind::from_path(&self.output) {
             Some(OutputKind::Png | OutputKind::Exr) if !is_turn => return None,
             Some(OutputKind::Movie(_)) if is_turn => return None,
             None if is_turn && is_folder => return None,
@@ -207,7 +207,7 @@ fn turn(
     let frame = |at: u32| frame(f64::from(at) / f64::from(frames));
     let path = &arguments.output;
     let bar = console.progress(frames.into(), "frames");
-    if let Some(OutputKind::Movie(format)) = OutputKind::of(path) {
+    if let Some(OutputKind::Movie(format)) = OutputKind::from_path(path) {
         let encoding = (format, arguments.fps);
         MovieWriter::write_frames(path, encoding, frames, frame, || bar.inc(1))?;
     } else {

@@ -22,7 +22,7 @@ use crate::image::{ColourImage, Extent, ImageError, Linear, Planes, Rgb, Samples
 /// use relight_core::light::{Direction, Order, Panorama, ShLight};
 ///
 /// let sky = ShLight::even(Order::TWO, [0.2, 0.4, 1.0]);
-/// let panorama = Panorama::of_light(&sky, Extent::new(32, 16));
+/// let panorama = Panorama::from_light(&sky, Extent::new(32, 16));
 /// assert!((panorama.radiance(Direction::UP)[2] - 1.0).abs() < 1e-6);
 /// assert_eq!(panorama.pixel_towards(Direction::RIGHT), (24, 8));
 /// ```
@@ -80,7 +80,7 @@ impl Panorama {
     /// # Panics
     /// Where `extent` has no pixels.
     #[must_use]
-    pub fn of_light(light: &ShLight, extent: Extent) -> Self {
+    pub fn from_light(light: &ShLight, extent: Extent) -> Self {
         assert!(extent.pixels() > 0, "a panorama has pixels");
         let mut planes = Planes::zeros(extent);
         planes.fill_rows(|y, row| {

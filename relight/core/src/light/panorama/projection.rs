@@ -196,7 +196,7 @@ mod tests {
     fn the_energy_of_a_smooth_panorama_is_that_of_its_coefficients() {
         // Parseval: the integral of radiance squared is the sum of coefficients squared.
         let light = ShLight::new((0..16).map(|i| [(i as f64).cos(); 3]).collect()).unwrap();
-        let panorama = Panorama::of_light(&light, Extent::new(400, 200));
+        let panorama = Panorama::from_light(&light, Extent::new(400, 200));
         let mut energy = 0.0;
         for y in 0..200 {
             let row = &panorama.image.planes().plane(0)[y * 400..(y + 1) * 400];

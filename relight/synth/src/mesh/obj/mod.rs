@@ -75,7 +75,7 @@ impl ObjFile {
     fn parsed(text: &str) -> Result<Self, String> {
         let mut file = Self::default();
         let mut material = None;
-        for (line, statement) in Statements::of(text) {
+        for (line, statement) in Statements::new(text) {
             let (key, rest) = keyword(&statement);
             let read = match key {
                 "v" => file.position(rest),

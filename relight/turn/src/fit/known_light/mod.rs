@@ -56,13 +56,13 @@ pub fn solve_in_light(
     let frame = TableFrame::new(elevation);
     let finish = Finish {
         frame,
-        light: TableLight::of(&light.rotated(&frame.rotation())),
+        light: TableLight::from_light(&light.rotated(&frame.rotation())),
         material,
     };
     let statistics = all_statistics(curves);
     let lobe = finish.best_lobe(&statistics);
     let model = finish.model(lobe);
-    let conditioning = Conditioning::of(curves).in_given(&finish.model(Lobe::SMOOTH));
+    let conditioning = Conditioning::from_curves(curves).in_given(&finish.model(Lobe::SMOOTH));
     let mut solver = Solver {
         curves,
         fits: search_all(&model, &statistics, None),

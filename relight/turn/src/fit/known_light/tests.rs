@@ -73,7 +73,7 @@ fn a_known_lamp_s_fourth_band_bends_no_normals() {
 fn gloss_beside_the_diffuse_part_is_found_in_known_light() {
     let (surface, light) = (ball(), environment());
     let table = TableFrame::new(elevation());
-    let shown = TableLight::of(&light.rotated(&table.rotation()));
+    let shown = TableLight::from_light(&light.rotated(&table.rotation()));
     let glossy = ShadingModel {
         frame: table,
         diffuse: shown.irradiance(),

@@ -47,7 +47,7 @@ pub(crate) struct Conditioning {
 
 impl Conditioning {
     /// That of a turn.
-    pub(crate) fn of(curves: &TurnCurves) -> Self {
+    pub(crate) fn from_curves(curves: &TurnCurves) -> Self {
         let pixels: Vec<PixelLight> = (0..curves.pixels())
             .into_par_iter()
             .map(|pixel| of_pixel(curves, pixel))

@@ -22,10 +22,10 @@ fn an_even_light_is_not_trusted_though_it_was_given() {
 #[test]
 fn even_light_is_called_too_even() {
     let surface = ball();
-    let good = Conditioning::of(&film(&surface, &environment(), TAKE));
+    let good = Conditioning::from_curves(&film(&surface, &environment(), TAKE));
     assert_eq!(good.verdict, TurnVerdict::Good);
     assert!(good.verdict.advice().is_none());
-    let bad = Conditioning::of(&film(&surface, &even_environment(), TAKE));
+    let bad = Conditioning::from_curves(&film(&surface, &even_environment(), TAKE));
     assert_eq!(bad.verdict, TurnVerdict::TooEven);
     let advice = bad.verdict.advice().unwrap();
     assert!(advice.contains("turn on one lamp"), "{advice}");
@@ -33,7 +33,9 @@ fn even_light_is_called_too_even() {
 
 #[test]
 fn the_network_s_errors_and_the_coverage_decide_where_the_light_is_not_known() {
-    let of = |light: ShLight, part| Conditioning::of(&film(&ball(), &light, Take { part, ..TAKE }));
+    let of = |light: ShLight, part| {
+        Conditioning::from_curves(&film(&ball(), &light, Take { part, ..TAKE }))
+    };
     let good = of(environment(), 1.0);
     assert_eq!(good.coverage_deg, 360.0);
     assert_eq!(good.by_network(10.0).verdict, TurnVerdict::Good);

@@ -186,7 +186,7 @@ fn check_one(check: &SessionCheck<'_>, index: u32, mask: Option<&MaskSpans>) -> 
     };
     let row = check.row(index);
     let record = row.map(|row| &row.record);
-    let digest = Digest::of(&png);
+    let digest = Digest::hash(&png);
     let (problems, image) = check_image(check.settings, &png, &digest, row, record, mask);
     CheckedImage {
         problems,

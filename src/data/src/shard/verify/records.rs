@@ -155,7 +155,7 @@ fn totals(session: &SessionEntry, records: &[FrameRecord]) -> Vec<String> {
         verdict: listed.verdict,
         reasons: listed.reasons.clone(),
         mask_misfit: listed.mask_misfit,
-        ..SessionQuality::of(records, session.lossy, session.covered_deg)
+        ..SessionQuality::from_records(records, session.lossy, session.covered_deg)
     };
     if found != *listed {
         problems.push("the figures under quality are not those of the records".to_owned());

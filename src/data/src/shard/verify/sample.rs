@@ -28,7 +28,7 @@ impl SessionMask {
     /// The problems with the bytes of a mask, whose digest in the table is `expected`. The first
     /// valid mask becomes the session's.
     pub(super) fn check(&mut self, png: &[u8], expected: Option<&Digest>) -> Vec<String> {
-        let digest = Digest::of(png);
+        let digest = Digest::hash(png);
         let mut problems = wrong_digest("mask", &digest, expected);
         if self
             .valid
@@ -40,7 +40,9 @@ impl SessionMask {
         if self.valid.is_some() && problems.is_empty() {
             problems.push("the mask differs from that of the session's other samples".to_owned());
         }
-        match decode_mask(png).and_then(|mask| check_mask(&mask).map(|()| MaskSpans::of(&mask))) {
+        match decode_mask(png)
+            .and_then(|mask| check_mask(&mask).map(|()| MaskSpans::from_mask(&mask)))
+        {
             Ok(spans) if problems.is_empty() => self.valid = Some((digest, Arc::new(spans))),
             Ok(_) => {}
             Err(error) => problems.push(format!("mask: {}", with_causes(&error))),

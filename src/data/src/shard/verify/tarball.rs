@@ -291,7 +291,7 @@ fn check_members(check: &SessionCheck<'_>, sample: &SampleMembers) -> CheckedMem
     };
     if let Some(png) = &sample.image {
         let known = row.map(|row| &row.record).or(record.as_ref());
-        let digest = Digest::of(png);
+        let digest = Digest::hash(png);
         let mask = sample.mask.as_deref();
         problems.extend(check_image(check.settings, png, &digest, row, known, mask).0);
     }

@@ -119,6 +119,6 @@ fn curve_of(curve: &ToneReprCurve) -> Result<Curve, ColourError> {
     } else if is(|light| light) {
         Curve::Linear
     } else {
-        Curve::of_table(at)
+        Curve::from_table(at)
     })
 }

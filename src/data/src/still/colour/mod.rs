@@ -242,7 +242,7 @@ impl Curve {
     }
 
     /// The curve of these values at [`LAST_ENTRY`] even steps.
-    fn of_table(at: impl Fn(f32) -> f32) -> Self {
+    fn from_table(at: impl Fn(f32) -> f32) -> Self {
         let values = (0..=LAST_ENTRY).map(|entry| at(entry as f32 / LAST_ENTRY as f32));
         Self::Table(values.collect())
     }

@@ -21,7 +21,7 @@ pub(super) fn stated(info: &Info<'_>, is_grey: bool) -> Result<Option<Colour>, C
         }
         let matrix = match points.color_primaries {
             UNSPECIFIED => None,
-            code => match Primaries::of_code(code.into()) {
+            code => match Primaries::from_code(code.into()) {
                 Some((_, primaries)) => to_rec709(primaries)?,
                 None => {
                     return Err(ColourError(format!(

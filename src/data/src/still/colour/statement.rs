@@ -20,8 +20,8 @@ impl Colour {
     ///
     /// # Errors
     /// Where it says what is not converted.
-    pub fn of_file(bytes: &[u8]) -> Result<Self, ColourError> {
-        match Format::of(bytes) {
+    pub fn from_file(bytes: &[u8]) -> Result<Self, ColourError> {
+        match Format::sniff(bytes) {
             Some(Format::Exr) => Ok(Self::light(exr::to_rec709(bytes)?)),
             Some(Format::Radiance) => Ok(Self::light(radiance::to_rec709(bytes)?)),
             Some(Format::Png) => of_png(bytes),

@@ -10,15 +10,15 @@ use accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
 #[test]
 fn a_lock_is_taken_once_and_the_refusal_names_the_holder() {
     let root = tempfile::tempdir().unwrap();
-    let held = LockFile::of_root(root.path()).unwrap();
-    let error = LockFile::of_root(root.path()).unwrap_err();
+    let held = LockFile::lock_root(root.path()).unwrap();
+    let error = LockFile::lock_root(root.path()).unwrap_err();
     let pid = std::process::id();
     assert!(
         error.to_string().contains(&format!("process {pid}")),
         "{error}"
     );
     drop(held);
-    LockFile::of_root(root.path()).unwrap();
+    LockFile::lock_root(root.path()).unwrap();
 }
 
 #[test]
@@ -26,8 +26,8 @@ fn every_name_of_a_device_leads_to_one_lock() {
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("camera");
     symlink("/dev/null", &link).unwrap();
-    let _held = LockFile::of_device(Path::new("/dev/null"), folder.path()).unwrap();
-    let again = LockFile::of_device(&link, folder.path());
+    let _held = LockFile::lock_device(Path::new("/dev/null"), folder.path()).unwrap();
+    let again = LockFile::lock_device(&link, folder.path());
     assert!(matches!(again, Err(LockError::Held { .. })), "{again:?}");
 }
 

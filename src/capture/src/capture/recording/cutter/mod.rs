@@ -178,7 +178,7 @@ impl Cutter {
             .chain(self.stamps.iter().copied())
             .collect();
         let lead = all.len() - self.stamps.len();
-        let timing = FrameTiming::of(&all, self.fps);
+        let timing = FrameTiming::from_stamps(&all, self.fps);
         let nominal = 1e6 / self.fps;
         let measured = all.len() >= MIN_FOR_RATE;
         let period = if measured { timing.period_us } else { nominal };

@@ -60,7 +60,7 @@ pub(crate) struct FrameTiming {
 impl FrameTiming {
     /// Analyses the stamps of frames in the order of their delivery. `fps`: the agreed rate,
     /// frames a second; one that is not positive counts as 30.
-    pub(crate) fn of(stamps: &[FrameStamp], fps: f64) -> Self {
+    pub(crate) fn from_stamps(stamps: &[FrameStamp], fps: f64) -> Self {
         let usable = fps.is_finite() && fps > 0.0;
         let fps = if usable { fps } else { 30.0 };
         let nominal = 1e6 / fps;

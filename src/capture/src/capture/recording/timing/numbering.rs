@@ -47,7 +47,7 @@ impl Numbering {
         let fit = if times.len() >= MIN_FOR_FIT {
             PeriodFit::find(times, nominal)
         } else {
-            Some(PeriodFit::of_few(times, nominal))
+            Some(PeriodFit::from_few(times, nominal))
         };
         let Some(PeriodFit { line, mut numbers }) = fit else {
             let numbers: Vec<i64> = (0..times.len() as i64).collect();

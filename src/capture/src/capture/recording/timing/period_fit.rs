@@ -42,7 +42,7 @@ impl PeriodFit {
     }
 
     /// For too few stamps to find a period from: the nominal one, from the first stamp on.
-    pub(super) fn of_few(times: &[f64], nominal: f64) -> Self {
+    pub(super) fn from_few(times: &[f64], nominal: f64) -> Self {
         let start = times.first().copied().unwrap_or(0.0);
         let line = Line {
             start,

@@ -85,7 +85,7 @@ fn missing(timing: &FrameTiming) -> u64 {
 fn every_gap_is_found(seeds: std::ops::Range<u64>) {
     for seed in seeds {
         let made = made(seed);
-        let timing = FrameTiming::of(&made.stamps, made.fps);
+        let timing = FrameTiming::from_stamps(&made.stamps, made.fps);
         assert_eq!(found(&timing), made.missing, "seed {seed}");
         assert!(
             timing.anomalies.is_empty(),
@@ -103,7 +103,7 @@ fn every_gap_is_found_without_a_counter(seeds: std::ops::Range<u64>) {
         made.stamps
             .iter_mut()
             .for_each(|stamp| stamp.sequence = stands);
-        let timing = FrameTiming::of(&made.stamps, made.fps);
+        let timing = FrameTiming::from_stamps(&made.stamps, made.fps);
         assert_eq!(found(&timing), made.missing, "seed {seed}");
         assert!(
             timing.anomalies.is_empty(),
@@ -141,7 +141,7 @@ fn a_gap_in_the_time_stamps_that_the_driver_did_not_count_is_missing_and_reporte
     for (n, stamp) in stamps.iter_mut().enumerate() {
         stamp.sequence = Some(n as u64);
     }
-    let timing = FrameTiming::of(&stamps, 30.0);
+    let timing = FrameTiming::from_stamps(&stamps, 30.0);
     let reported = TimingAnomaly::Contradiction {
         before: 250,
         counted: 1,
@@ -157,7 +157,7 @@ fn a_jump_of_the_counter_that_no_time_stamp_shows_is_reported_and_nothing_is_mis
     for stamp in &mut stamps[400..] {
         stamp.sequence = stamp.sequence.map(|sequence| sequence + 5);
     }
-    let timing = FrameTiming::of(&stamps, 30.0);
+    let timing = FrameTiming::from_stamps(&stamps, 30.0);
     assert!(gaps_of(&timing).is_empty());
     let reported = TimingAnomaly::Contradiction {
         before: 400,
@@ -171,7 +171,7 @@ fn a_jump_of_the_counter_that_no_time_stamp_shows_is_reported_and_nothing_is_mis
 fn a_counter_that_repeats_a_number_and_catches_up_loses_nothing() {
     let mut stamps = regular(300);
     stamps[100].sequence = stamps[99].sequence;
-    let timing = FrameTiming::of(&stamps, 30.0);
+    let timing = FrameTiming::from_stamps(&stamps, 30.0);
     assert_eq!((timing.counts, missing(&timing)), (true, 0));
     assert_eq!(timing.exposures, (0..300).collect::<Vec<_>>());
     assert!(!timing.anomalies.is_empty());
@@ -183,7 +183,7 @@ fn a_counter_that_starts_anew_is_reported_and_loses_nothing() {
     for (n, stamp) in stamps[120..].iter_mut().enumerate() {
         stamp.sequence = Some(n as u64);
     }
-    let timing = FrameTiming::of(&stamps, 30.0);
+    let timing = FrameTiming::from_stamps(&stamps, 30.0);
     assert_eq!(missing(&timing), 0);
     assert!(matches!(
         timing.anomalies[..],
@@ -199,7 +199,7 @@ fn a_counter_that_starts_anew_is_reported_and_loses_nothing() {
 fn a_single_late_stamp_is_reported_and_is_no_gap() {
     let mut stamps = regular(300);
     stamps[150].t_us += 36_000;
-    let timing = FrameTiming::of(&stamps, 30.0);
+    let timing = FrameTiming::from_stamps(&stamps, 30.0);
     assert_eq!(missing(&timing), 0);
     assert_eq!(
         timing.anomalies,
@@ -215,7 +215,7 @@ fn irregular_stamps_leave_the_counter_as_evidence() {
         stamp.t_us = 33_333 * n as i64 + random.below(200_000) as i64;
     }
     stamps.drain(77..79);
-    let timing = FrameTiming::of(&stamps, 30.0);
+    let timing = FrameTiming::from_stamps(&stamps, 30.0);
     assert_eq!(found(&timing), [(77, 2, 77)]);
     assert!(timing.anomalies.contains(&TimingAnomaly::Irregular));
 }
@@ -229,7 +229,7 @@ fn a_camera_at_half_the_rate_is_reported_with_and_without_a_counter() {
                 t_us: 66_667 * n as i64,
             })
             .collect();
-        let timing = FrameTiming::of(&stamps, 30.0);
+        let timing = FrameTiming::from_stamps(&stamps, 30.0);
         let reported = timing.anomalies.iter().find_map(|anomaly| match anomaly {
             TimingAnomaly::Rate { measured, .. } => Some(*measured),
             _ => None,
@@ -253,7 +253,7 @@ fn no_stamps_make_it_panic() {
             })
             .collect();
         let fps = [30.0, 0.0, f64::NAN, -1.0, 1e300][random.below(5) as usize];
-        let timing = FrameTiming::of(&stamps, fps);
+        let timing = FrameTiming::from_stamps(&stamps, fps);
         assert_eq!(timing.exposures.len(), stamps.len());
         assert!(timing.exposures.windows(2).all(|pair| pair[0] < pair[1]));
     }
