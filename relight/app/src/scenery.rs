@@ -2,7 +2,7 @@
 
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{Direction, LightError, Panorama};
-use relight_photo::insert::DiscLamp;
+use relight_photo::relighting::DiscLamp;
 
 /// Their size.
 const EXTENT: Extent = Extent::new(1024, 512);

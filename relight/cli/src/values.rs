@@ -9,7 +9,7 @@ use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
 use relight_core::render::DiffuseForm;
 use relight_photo::decompose::SpecularGate;
-use relight_photo::insert::WhiteBalance;
+use relight_photo::relighting::WhiteBalance;
 
 /// Values of an option: the name on the command line, what the help says of it, and what it stands for.
 pub(crate) type Choices<T> = &'static [(&'static str, &'static str, T)];

@@ -4,7 +4,7 @@
 #![allow(clippy::expect_used, reason = "a fuzz target reports by a panic")]
 
 use libfuzzer_sys::fuzz_target;
-use relight_photo::insert::SceneDescription;
+use relight_photo::compositing::SceneDescription;
 
 fuzz_target!(|text: &str| {
     let Ok(scene) = SceneDescription::parse(text) else {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
-use relight_photo::insert::SceneDescription;
+use relight_photo::compositing::SceneDescription;
 use relit_data::text;
 use relit_grabcut::grey_png;
 use zip::result::ZipError;

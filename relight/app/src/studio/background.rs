@@ -4,7 +4,8 @@ use std::path::Path;
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Samples, Srgb, encode_exr};
 use relight_core::light::Panorama;
-use relight_photo::insert::{PanoramaView, SceneBackground, SceneDescription, SceneSetting};
+use relight_photo::compositing::{SceneBackground, SceneDescription, SceneSetting};
+use relight_photo::relighting::PanoramaView;
 use relit_data::still::Format;
 
 use super::error::{Refusal, refused};

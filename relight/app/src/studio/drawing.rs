@@ -1,9 +1,10 @@
 //! Pictures of a scene: whole, in layers that the page can move, and in full size.
 
 use relight_core::image::{Extent, Linear, Planes, Rgb};
-use relight_photo::insert::{
-    InsertScene, SceneDescription, SceneLayer, SceneObject, SceneSetting, Subject,
+use relight_photo::compositing::{
+    InsertScene, SceneDescription, SceneLayer, SceneObject, SceneSetting,
 };
+use relight_photo::relighting::Subject;
 use serde_json::{Value, json};
 
 use super::background::{StudioBackground, reduced};
@@ -44,7 +45,7 @@ impl KeptSetting {
                 let lamp = scene
                     .light
                     .lamp()?
-                    .map(relight_photo::insert::LightSource::Lamp);
+                    .map(relight_photo::relighting::LightSource::Lamp);
                 SceneSetting::new(scene, background.for_scene(), lamp)?
             }
         };

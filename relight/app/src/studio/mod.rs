@@ -24,9 +24,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use relight_core::image::{ColourSpace, Depth, Extent, Planes, Srgb, encode_jpeg, encode_png};
+use relight_photo::compositing::SceneDescription;
 use relight_photo::decompose::Decomposer;
-use relight_photo::insert::{SceneDescription, Subject};
 use relight_photo::nets::Weights;
+use relight_photo::relighting::Subject;
 use serde_json::{Value, json};
 
 use crate::message::{pack, unpack};
@@ -348,7 +349,7 @@ fn told(object: &StudioObject) -> Answer {
 }
 
 fn kept_object(
-    described: &relight_photo::insert::ObjectDescription,
+    described: &relight_photo::compositing::ObjectDescription,
     files: &SceneFiles,
 ) -> Result<StudioObject, Refusal> {
     let name = described.photo.to_string_lossy();

@@ -6,10 +6,11 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, GrayImage, ImageEncoder, RgbImage};
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{ColourImage, Extent, ImageError, ReducedFile, StoredImage, Transfer};
+use relight_photo::compositing::{ObjectDescription, SceneSetting};
 use relight_photo::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, PhotoHints, stated_extent,
 };
-use relight_photo::insert::{ObjectDescription, SceneSetting, Subject};
+use relight_photo::relighting::Subject;
 use relit_data::geometry::Rect;
 use relit_grabcut::{Hints, Mask, SegmentSettings, Stroke, Strokes, segment};
 

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use relight_core::image::Transfer;
-use relight_photo::insert::{
-    DiscLamp, InsertError, LightDescription, ObjectDescription, SceneDescription,
-};
+use relight_photo::compositing::{LightDescription, ObjectDescription, SceneDescription};
+use relight_photo::relighting::{DiscLamp, InsertError};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 

@@ -10,7 +10,7 @@ use relight_core::image::Extent;
 use relight_photo::files::{
     MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading, write_picture,
 };
-use relight_photo::insert::{
+use relight_photo::relighting::{
     Backdrop, DiscLamp, InsertError, LightSource, PanoramaView, Shot, Subject, WhiteBalance,
     likeness,
 };

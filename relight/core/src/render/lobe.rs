@@ -107,7 +107,8 @@ fn zonal<T: Number>(smoothness: T, lobe: &mut [T]) {
         lobe[l] = if l < 2 {
             T::splat(2.0 * PI) / (smoothness + T::splat(degree + 1.0))
         } else {
-            lobe[l - 2] * (smoothness + T::splat(2.0 - degree)) / (smoothness + T::splat(degree + 1.0))
+            lobe[l - 2] * (smoothness + T::splat(2.0 - degree))
+                / (smoothness + T::splat(degree + 1.0))
         };
     }
 }

@@ -9,7 +9,7 @@ use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Order, ShLight};
 use relight_core::render::{DiffuseForm, Gloss, Layers, SpecularForm, Surface};
 use relight_photo::decompose::{DecomposeOptions, Decomposer, Decomposition, SpecularGate};
-use relight_photo::insert::{MaterialChange, Subject};
+use relight_photo::relighting::{MaterialChange, Subject};
 
 /// What cannot be done with an object.
 const NOT_RELIT: &str = "cannot be decomposed or shown in other light";

@@ -5,7 +5,7 @@ use std::f32::consts::{PI, SQRT_2};
 use relight_core::image::{Extent, beside};
 use relight_core::light::{Normals, YUp};
 
-use crate::insert::HeightSolver;
+use crate::relighting::HeightSolver;
 
 /// Normals that face the viewer less than this count as if they did so much: the rim is as steep as can be seen.
 const MIN_FACING: f32 = 0.12;

@@ -9,8 +9,9 @@ use relit_data::file_names::{VIDEO_EXTENSIONS, has_extension};
 use relit_data::still::Format;
 
 use super::{FrameTiming, MovieReader};
+use crate::compositing::SceneDescription;
 use crate::decompose::stated_extent;
-use crate::insert::{InsertError, PanoramaView, SceneDescription};
+use crate::relighting::{InsertError, PanoramaView};
 
 /// A background out of a file.
 #[derive(Debug)]

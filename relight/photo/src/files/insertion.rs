@@ -10,11 +10,11 @@ use super::{
     BackgroundFile, MovieFormat, MovieReader, MovieWriter, OutputKind, PhotoInput, PhotoReading,
     write_picture,
 };
-use crate::decompose::{DecomposeOptions, Decomposer, Photo};
-use crate::insert::{
-    InsertError, InsertScene, LightSource, ObjectDescription, SceneBackground, SceneDescription,
-    SceneSetting, Subject,
+use crate::compositing::{
+    InsertScene, ObjectDescription, SceneBackground, SceneDescription, SceneSetting,
 };
+use crate::decompose::{DecomposeOptions, Decomposer, Photo};
+use crate::relighting::{InsertError, LightSource, Subject};
 
 /// The most frames of a video in which a panorama turns.
 const MAX_FRAMES: f64 = 100_000.0;

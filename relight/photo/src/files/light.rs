@@ -4,7 +4,7 @@ use std::path::Path;
 
 use relight_core::light::{Panorama, ShLight};
 
-use crate::insert::{InsertError, LightSource};
+use crate::relighting::{InsertError, LightSource};
 
 impl LightSource {
     /// Whether a file is called as a text of coefficients (`.txt`).

@@ -14,7 +14,7 @@ use relight_core::parallel;
 use relit_data::causes::with_causes;
 use relit_data::durable;
 
-use crate::insert::InsertError;
+use crate::relighting::InsertError;
 
 /// The colours of what is written, as a filter.
 const COLOURS: &str = "setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1";

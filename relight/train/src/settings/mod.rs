@@ -20,9 +20,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::decompose::DecomposeLossCoefficients;
 use super::error::TrainError;
-use super::paper_phases::PaperPhase;
+use super::tasks::decompose::DecomposeLossCoefficients;
+use super::tasks::paper_phases::PaperPhase;
 
 pub use data::{DataSettings, TurnSettings};
 pub(super) use file::first_difference;

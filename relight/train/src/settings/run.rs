@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{positive, within};
+use crate::engine::model::ComputePrecision;
 use crate::error::TrainError;
-use crate::model::ComputePrecision;
 
 // Nobody trains more: these keep a slip of the pen from filling the memory.
 const MAX_STEPS: u64 = 1_000_000_000;

@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::{ArgAction, Args};
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::Transfer;
+use relight_photo::compositing::{LightDescription, ObjectDescription, SceneDescription};
 use relight_photo::files::{InsertionOutput, OutputKind, PhotoReading};
-use relight_photo::insert::{
-    LightDescription, LightSource, ObjectDescription, SceneDescription, WhiteBalance,
-};
+use relight_photo::relighting::{LightSource, WhiteBalance};
 use relit_data::text;
 
 use crate::photos::NetworkArguments;

@@ -4,10 +4,9 @@ mod arguments;
 
 use std::path::{Path, PathBuf};
 
+use relight_photo::compositing::{LightDescription, SceneDescription, SceneObject, SceneSetting};
 use relight_photo::files::{BackgroundFile, InsertSource, Insertion, OutputKind};
-use relight_photo::insert::{
-    LightDescription, PanoramaExposure, SceneDescription, SceneObject, SceneSetting, SeenSun,
-};
+use relight_photo::relighting::{PanoramaExposure, SeenSun};
 use relit_console::{Console, Outcome, ProgressBar};
 use serde_json::json;
 

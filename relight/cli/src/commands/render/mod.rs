@@ -11,7 +11,7 @@ use relight_core::image::{ImageError, Linear, Rgb, Srgb};
 use relight_core::light::{Direction, Order, Panorama, Rotation, ShLight};
 use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_for};
 use relight_photo::files::{MovieWriter, OutputKind, write_picture};
-use relight_photo::insert::InsertError;
+use relight_photo::relighting::InsertError;
 use relit_console::{Console, Outcome};
 use serde_json::json;
 

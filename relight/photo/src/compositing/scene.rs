@@ -1,0 +1,462 @@
+//! Objects in a new picture: in its light, with their shadows.
+
+use super::harmonisation::grain;
+use super::layer::{GroundShadow, SceneLayer};
+use super::shadow::Shadow;
+use super::{Matching, SceneObject};
+use crate::relighting::{Fit, InsertError, Standing, exposure_between};
+use relight_core::image::{Extent, Linear, Planes, Rgb};
+use relight_core::light::{Direction, Panorama, Rotation, ShLight};
+
+/// A picture that objects are put into.
+#[derive(Debug)]
+pub struct InsertScene<'a> {
+    extent: Extent,
+    light: ShLight,
+    /// The same light, as shadows are drawn from it.
+    panorama: Panorama,
+    tilt: f64,
+    matching: Matching,
+    objects: Vec<SceneObject<'a>>,
+}
+
+impl<'a> InsertScene<'a> {
+    /// A picture of a size in this light, as coefficients and as a panorama, whose ground the camera looks down on by `tilt`
+    /// degrees (0 to 90), with objects from back to front.
+    ///
+    /// # Errors
+    /// Where an object would lie outside, or be larger than can be.
+    pub(crate) fn new(
+        extent: Extent,
+        (light, panorama): (ShLight, Panorama),
+        tilt: f64,
+        matching: Matching,
+        objects: Vec<SceneObject<'a>>,
+    ) -> Result<Self, InsertError> {
+        for (number, object) in objects.iter().enumerate() {
+            object.check(extent, number + 1)?;
+        }
+        let balance = matching.balance.map(f64::from);
+        Ok(Self {
+            extent,
+            light: light.tinted(balance),
+            panorama,
+            tilt: tilt.to_radians(),
+            matching,
+            objects,
+        })
+    }
+
+    /// All objects as they are seen after the light has turned about the vertical by so many radians, from back to front.
+    ///
+    /// # Errors
+    /// Those of the render layers.
+    pub fn layers(&self, turn: f64) -> Result<Vec<SceneLayer>, InsertError> {
+        let (light, panorama) = if turn == 0.0 {
+            (self.light.clone(), self.panorama.clone())
+        } else {
+            let columns = self.panorama.extent().width;
+            let part = (turn / std::f64::consts::TAU).rem_euclid(1.0);
+            let rotation = Rotation::about(Direction::UP, turn);
+            (
+                self.light.rotated(&rotation),
+                self.panorama
+                    .turned((part * columns as f64).round() as usize),
+            )
+        };
+        self.objects
+            .iter()
+            .map(|object| self.layer(object, &light, &panorama))
+            .collect()
+    }
+
+    /// A background of the scene's size with the layers on it: first all shadows, then the objects. `frame` is the number of a
+    /// video's frame, whose grain it draws.
+    ///
+    /// # Panics
+    /// Where the background has another size.
+    #[must_use]
+    pub fn compose(
+        &self,
+        background: &Rgb<Linear>,
+        layers: &[SceneLayer],
+        frame: u64,
+    ) -> Rgb<Linear> {
+        assert_eq!(
+            background.planes().extent(),
+            self.extent,
+            "size of the background"
+        );
+        let mut picture = background.clone();
+        for layer in layers {
+            layer.darken(picture.planes_mut());
+        }
+        for layer in layers {
+            layer.cover(picture.planes_mut(), frame);
+        }
+        picture
+    }
+
+    fn layer(
+        &self,
+        object: &SceneObject<'_>,
+        light: &ShLight,
+        panorama: &Panorama,
+    ) -> Result<SceneLayer, InsertError> {
+        let subject = object.subject;
+        let angle = object.placement.rotation.to_radians();
+        let mut gain = object.exposure.exp2();
+        let colours = if object.relit {
+            // The background's brightness is no guess: it is not hedged as the light's shape is.
+            gain *= self.matching.level;
+            let scale = exposure_between(&subject.light, &self.light);
+            // The object is turned back, and the light with it.
+            let turned = if angle == 0.0 {
+                light.clone()
+            } else {
+                light.rotated(&Rotation::about(Direction::VIEWER, -angle))
+            };
+            subject.relit(&turned.tinted([f64::from(scale); 3]), &object.change)?
+        } else {
+            subject.matte.foreground.clone()
+        };
+        let standing = subject.standing(Fit::new(
+            &subject.matte.alpha,
+            object.placement,
+            self.extent,
+        ));
+        let mut premultiplied = colours.map(|v| v * gain);
+        for plane in premultiplied.planes_mut() {
+            plane
+                .iter_mut()
+                .zip(subject.matte.alpha.plane(0))
+                .for_each(|(v, a)| *v *= a);
+        }
+        let alpha = standing.alpha.clone();
+        let colours = standing.fit.apply(&premultiplied);
+        let place = standing.foot.first_pixel(object.placement, self.extent);
+        let shadow = (object.shadow > 0.0)
+            .then(|| self.shadow(object, &standing, panorama))
+            .flatten()
+            .map(|(from, arriving)| GroundShadow {
+                place: [place[0] + from[0], place[1] + from[1]],
+                arriving,
+            });
+        let grain = self.lacking_grain(&colours, &alpha);
+        Ok(SceneLayer {
+            place,
+            alpha,
+            colours,
+            shadow,
+            grain,
+        })
+    }
+
+    /// The grain that the picture has and an object has not.
+    fn lacking_grain(&self, colours: &Planes<3>, alpha: &Planes<1>) -> f32 {
+        let wanted = self.matching.grain;
+        if wanted <= 0.0 {
+            return 0.0;
+        }
+        let own = grain(colours, Some(alpha));
+        (wanted.powi(2) - own.powi(2)).max(0.0).sqrt()
+    }
+
+    /// The shadow of an object, from its layer's first pixel.
+    fn shadow(
+        &self,
+        object: &SceneObject<'_>,
+        standing: &Standing,
+        panorama: &Panorama,
+    ) -> Option<([i64; 2], Planes<3>)> {
+        let relief = standing.relief(&object.subject.normals)?;
+        let shadow = Shadow::cast(relief, self.tilt, panorama);
+        let pixels = |cells: f64| cells / relief.scale;
+        let extent = shadow.arriving.extent();
+        let side = |cells: usize| (pixels(cells as f64).round() as usize).max(1);
+        let seen = shadow
+            .arriving
+            .resized(Extent::new(side(extent.width), side(extent.height)));
+        let part = object.shadow.min(1.0);
+        let arriving = seen.map(|arriving| 1.0 - part * (1.0 - arriving));
+        Some((
+            shadow.from.map(|cells| pixels(cells as f64).round() as i64),
+            arriving,
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decompose::{DecomposeOptions, Decomposer};
+    use crate::nets::{Weights, decomposer};
+    use crate::relighting::{DiscLamp, LightSource, MaterialChange, Placement, Subject};
+    use relight_core::image::{ColourSpace, Srgb};
+
+    const PHOTO: Extent = Extent::new(60, 50);
+
+    fn is_object(x: usize, y: usize) -> bool {
+        (20..44).contains(&x) && (10..40).contains(&y)
+    }
+
+    fn photo() -> Rgb<Linear> {
+        Rgb::new(Planes::from_fn(PHOTO, |x, y| {
+            if is_object(x, y) {
+                [0.5, 0.3, 0.2]
+            } else {
+                [0.1; 3]
+            }
+        }))
+    }
+
+    fn subject() -> Subject {
+        let decomposer = Decomposer::with_side(&Weights::initial(&decomposer(), 3), 32).unwrap();
+        let mask = Planes::from_fn(PHOTO, |x, y| [f32::from(u8::from(is_object(x, y)))]);
+        Subject::new(
+            &photo(),
+            &mask,
+            None,
+            &decomposer,
+            &DecomposeOptions::default(),
+        )
+        .unwrap()
+    }
+
+    fn object(subject: &Subject, placement: Placement) -> SceneObject<'_> {
+        SceneObject {
+            subject,
+            placement,
+            change: MaterialChange::default(),
+            exposure: 0.0,
+            shadow: 1.0,
+            relit: false,
+        }
+    }
+
+    fn lamp() -> (ShLight, Panorama) {
+        let lamp = LightSource::Lamp(DiscLamp {
+            azimuth: 90.0,
+            elevation: 45.0,
+            ..DiscLamp::default()
+        });
+        (lamp.light().unwrap(), lamp.panorama())
+    }
+
+    /// Where the object stands in its own photograph.
+    const OWN_PLACE: Placement = Placement {
+        at: [32.0 / 60.0, 40.0 / 50.0],
+        height: 30.0 / 50.0,
+        rotation: 0.0,
+    };
+
+    fn composed(extent: Extent, objects: Vec<SceneObject<'_>>) -> Rgb<Linear> {
+        let white = Rgb::new(Planes::filled(extent, [0.8; 3]));
+        let scene = InsertScene::new(extent, lamp(), 25.0, Matching::default(), objects).unwrap();
+        scene.compose(&white, &scene.layers(0.0).unwrap(), 0)
+    }
+
+    /// The columns and rows of the pixels that are as red as the object.
+    fn bounds(picture: &Rgb<Linear>) -> [usize; 4] {
+        let Extent { width, height } = picture.planes().extent();
+        let is_red = |x: usize, y: usize| {
+            let [red, green, _] = picture.planes().pixel(x, y);
+            red > 1.4 * green
+        };
+        let places: Vec<[usize; 2]> = (0..height)
+            .flat_map(|y| (0..width).map(move |x| [x, y]))
+            .filter(|&[x, y]| is_red(x, y))
+            .collect();
+        let line = |axis: usize| places.iter().map(move |place| place[axis]);
+        [line(0).min(), line(0).max(), line(1).min(), line(1).max()].map(Option::unwrap)
+    }
+
+    #[test]
+    fn an_object_stands_where_it_is_wanted_and_as_high() {
+        let subject = subject();
+        let placement = Placement {
+            at: [0.25, 0.75],
+            height: 0.5,
+            rotation: 0.0,
+        };
+        let picture = composed(Extent::new(160, 120), vec![object(&subject, placement)]);
+        let [left, right, top, bottom] = bounds(&picture);
+        assert!(
+            bottom.abs_diff(89) <= 1 && top.abs_diff(30) <= 1,
+            "{top} {bottom}"
+        );
+        assert!(
+            (left + right).abs_diff(79) <= 2 && (right - left).abs_diff(47) <= 2,
+            "{left} {right}"
+        );
+    }
+
+    #[test]
+    fn at_its_own_place_it_covers_itself() {
+        let subject = subject();
+        let placement = OWN_PLACE;
+        let scene = InsertScene::new(
+            PHOTO,
+            lamp(),
+            25.0,
+            Matching::default(),
+            vec![SceneObject {
+                shadow: 0.0,
+                ..object(&subject, placement)
+            }],
+        );
+        let scene = scene.unwrap();
+        let picture = scene.compose(&photo(), &scene.layers(0.0).unwrap(), 0);
+        for y in 0..PHOTO.height {
+            for x in 0..PHOTO.width {
+                let (a, b) = (picture.planes().pixel(x, y), photo().planes().pixel(x, y));
+                assert!((a[0] - b[0]).abs() < 0.1, "{x} {y} {a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn turned_by_a_right_angle_it_is_as_wide_as_it_was_high() {
+        let subject = subject();
+        let placement = Placement {
+            at: [0.5, 0.9],
+            height: 0.4,
+            rotation: 90.0,
+        };
+        let [left, right, top, bottom] = bounds(&composed(
+            Extent::new(160, 120),
+            vec![object(&subject, placement)],
+        ));
+        let (width, height) = ((right - left + 1) as f64, (bottom - top + 1) as f64);
+        assert!(
+            (width - 48.0).abs() <= 2.0 && (width / height - 30.0 / 24.0).abs() < 0.08,
+            "{width} {height}"
+        );
+    }
+
+    #[test]
+    fn the_front_covers_the_back_and_shadows_fall_on_the_ground() {
+        let subject = subject();
+        let place = |x| Placement {
+            at: [x, 0.9],
+            height: 0.5,
+            rotation: 0.0,
+        };
+        let black = MaterialChange {
+            tint: [0.0; 3],
+            gloss: None,
+        };
+        let front = SceneObject {
+            change: black,
+            relit: true,
+            ..object(&subject, place(0.5))
+        };
+        let picture = composed(
+            Extent::new(160, 120),
+            vec![object(&subject, place(0.5)), front],
+        );
+        assert!(picture.planes().pixel(80, 80)[0] < 0.05);
+        // The lamp is on the right: the shadow lies on the left.
+        let [left, right] = [40, 120].map(|x| picture.planes().pixel(x, 104)[0]);
+        assert!(left < 0.7 && right > 0.75, "{left} {right}");
+    }
+
+    #[test]
+    fn a_dark_background_with_grain_makes_the_object_so() {
+        let subject = subject();
+        let placement = Placement {
+            at: [0.5, 0.9],
+            height: 0.7,
+            rotation: 0.0,
+        };
+        let relit = SceneObject {
+            relit: true,
+            shadow: 0.0,
+            ..object(&subject, placement)
+        };
+        let extent = Extent::new(160, 120);
+        let black = Rgb::new(Planes::zeros(extent));
+        let brightness = |matching: Matching, object: SceneObject<'_>| {
+            let scene = InsertScene::new(extent, lamp(), 25.0, matching, vec![object]).unwrap();
+            let picture = scene.compose(&black, &scene.layers(0.0).unwrap(), 0);
+            let middle: Vec<f32> = (70..90)
+                .map(|x| Srgb::from_linear(picture.planes().pixel(x, 70)[1]))
+                .collect();
+            let mean = middle.iter().sum::<f32>() / middle.len() as f32;
+            let noise = middle
+                .windows(2)
+                .map(|pair| (pair[0] - pair[1]).abs())
+                .sum::<f32>()
+                / 19.0;
+            (mean, noise)
+        };
+        let plain = brightness(Matching::default(), relit);
+        let dark = brightness(
+            Matching {
+                level: 0.25,
+                ..Matching::default()
+            },
+            relit,
+        );
+        assert!((Srgb::to_linear(dark.0) / Srgb::to_linear(plain.0) - 0.25).abs() < 0.05);
+        // What the photograph shows there has no grain.
+        let even = SceneObject {
+            relit: false,
+            ..relit
+        };
+        let grainy = brightness(
+            Matching {
+                grain: 0.05,
+                ..Matching::default()
+            },
+            even,
+        );
+        let plain = brightness(Matching::default(), even);
+        assert!(grainy.1 > plain.1 + 0.02, "{grainy:?} {plain:?}");
+    }
+
+    #[test]
+    fn what_cannot_stand_is_named() {
+        let subject = subject();
+        let refused = |placement| {
+            let objects = vec![object(&subject, OWN_PLACE), object(&subject, placement)];
+            InsertScene::new(PHOTO, lamp(), 25.0, Matching::default(), objects)
+                .unwrap_err()
+                .to_string()
+        };
+        let good = OWN_PLACE;
+        for at in [
+            [1.5, 0.9],
+            [0.5, 1.9],
+            [0.5, -0.1],
+            [-0.4, 0.9],
+            [f64::NAN, 0.5],
+        ] {
+            let found = refused(Placement {
+                at,
+                height: 0.4,
+                rotation: 30.0,
+            });
+            assert!(
+                found.starts_with("object 2 would lie wholly outside"),
+                "{found}"
+            );
+        }
+        let objects = vec![object(
+            &subject,
+            Placement {
+                height: 4.0,
+                ..good
+            },
+        )];
+        let error = InsertScene::new(
+            Extent::new(4000, 4000),
+            lamp(),
+            25.0,
+            Matching::default(),
+            objects,
+        )
+        .unwrap_err();
+        assert!(error.to_string().contains("would be enlarged"), "{error}");
+    }
+}

@@ -1,0 +1,375 @@
+//! What a background says of the objects that are put before it: their light, how far their ground is looked down on, and
+//! how bright they are. Opens no files.
+
+use std::f32::consts::PI;
+
+use relight_core::image::{Extent, Linear, Rgb};
+use relight_core::light::{Panorama, ShLight};
+use relight_core::render::exposure_for;
+
+use super::{InsertScene, Matching, ObjectDescription, SceneDescription, SceneObject};
+use crate::decompose::Photo;
+use crate::relighting::{
+    InsertError, LightSource, PanoramaExposure, PanoramaView, SeenSun, WhiteBalance, rows, tinted,
+};
+
+/// The part of the brightest light that a white diffuse surface has in a picture of a panorama: bright places clip, as in
+/// photographs.
+const WHITE: f32 = 1.4;
+/// The size of a panorama from which shadows are drawn, at most.
+const MAX_AROUND: Extent = Extent::new(512, 256);
+/// The longer side of the picture of a panorama by which it is exposed, pixels.
+const LOOK: usize = 160;
+/// Photographs are brought to this much more than the size in which they are shown.
+const RESERVE: f64 = 1.25;
+/// The shortest that the longest side of a photograph is made, pixels.
+const MIN_SIDE: usize = 32;
+/// Ground that is looked down on in a photograph, degrees.
+const TILT: f64 = 20.0;
+/// The least and the most of a panorama's, degrees.
+const TILTS: (f64, f64) = (5.0, 89.0);
+
+/// A background that stands still.
+#[derive(Debug, Clone, Copy)]
+pub enum SceneBackground<'a> {
+    /// A photograph, or the first frame of a video.
+    Picture(&'a Rgb<Linear>),
+    /// A panorama, of which a part is seen.
+    Panorama(&'a Panorama),
+}
+
+/// What follows from a scene's description and its background, before the objects are known.
+#[derive(Debug, Clone)]
+pub struct SceneSetting {
+    /// Width and height of the picture.
+    pub extent: Extent,
+    /// The light: the one that is given, or that of the background.
+    pub light: LightSource,
+    /// How far the camera looks down on the ground of the objects, degrees.
+    pub tilt: f64,
+    /// What the background asks of the objects.
+    pub matching: Matching,
+    /// The sun that is seen in a picture from which the light is taken.
+    pub sun: Option<SeenSun>,
+    /// How a panorama is exposed.
+    pub exposure: Option<PanoramaExposure>,
+    /// The light as coefficients.
+    projected: ShLight,
+    /// The same as a panorama, from which shadows are drawn.
+    around: Panorama,
+    /// What a panorama's radiance is multiplied with to be shown.
+    panorama_scale: [f32; 3],
+}
+
+impl SceneSetting {
+    /// The setting of a scene before a background. Light that is not `given` is taken from the background.
+    ///
+    /// # Errors
+    /// [`InsertError::Dark`] where there is no light.
+    pub fn new(
+        scene: &SceneDescription,
+        background: SceneBackground<'_>,
+        given: Option<LightSource>,
+    ) -> Result<Self, InsertError> {
+        let mut matching = match background {
+            SceneBackground::Picture(picture) if scene.matches => {
+                Matching::from_background(picture)
+            }
+            _ => Matching::default(),
+        };
+        if given.is_none() {
+            // Light that was taken from the background has its colour.
+            matching.balance = [1.0; 3];
+        }
+        if scene.white_balance == WhiteBalance::Auto
+            && let SceneBackground::Picture(picture) = background
+        {
+            matching.balance = Matching::from_background(picture).balance;
+        }
+        let sun = match background {
+            SceneBackground::Picture(picture) if given.is_none() => SeenSun::find(picture.planes()),
+            _ => None,
+        };
+        let light = given.unwrap_or_else(|| match background {
+            SceneBackground::Panorama(panorama) => LightSource::Panorama(panorama.clone()),
+            SceneBackground::Picture(picture) => {
+                LightSource::from_picture(picture, scene.field, sun)
+            }
+        });
+        let coefficients = light.light()?;
+        let tint = scene.white_balance.tint(&coefficients);
+        let light = scene.white_balance.shown(light)?;
+        let projected = if scene.white_balance == WhiteBalance::Light {
+            coefficients.clone()
+        } else {
+            light.light()?
+        };
+        let around = for_shadows(light.panorama());
+        let base = exposure_for(&coefficients.clone().tinted(tint)) * WHITE * PI;
+        let mut panorama_scale = tint.map(|t| t as f32 * base);
+        let mut exposure = None;
+        if let SceneBackground::Panorama(panorama) = background {
+            // A lamp's strength and a panorama's are told in other units: each is exposed by itself.
+            let is_one_light = matches!(light, LightSource::Panorama(_));
+            let bound = is_one_light.then_some(&coefficients);
+            let found = exposed(scene, panorama, panorama_scale, bound);
+            let gain = found.stops.exp2();
+            matching.level = if is_one_light {
+                gain
+            } else {
+                scene.exposure.exp2()
+            };
+            panorama_scale = panorama_scale.map(|scale| scale * gain);
+            exposure = Some(found);
+        }
+        let extent = match background {
+            SceneBackground::Panorama(_) => scene.panorama_extent(),
+            SceneBackground::Picture(picture) => picture.planes().extent(),
+        };
+        Ok(Self {
+            extent,
+            light,
+            tilt: Self::ground_tilt(scene, background),
+            matching,
+            sun,
+            exposure,
+            projected,
+            around,
+            panorama_scale,
+        })
+    }
+
+    /// How far the camera of a scene looks down on the ground of its objects, degrees: as far as it is given, or as the first
+    /// object's place says.
+    #[must_use]
+    pub fn ground_tilt(scene: &SceneDescription, background: SceneBackground<'_>) -> f64 {
+        scene.tilt.unwrap_or_else(|| tilt_of(scene, background))
+    }
+
+    /// The photograph of an object no larger than it has to be for its size in the scene.
+    #[must_use]
+    pub fn reduced(&self, object: &ObjectDescription, photo: Photo) -> Photo {
+        let wanted = object.height * self.extent.height as f64 * RESERVE;
+        let Extent { width, height } = photo.picture.planes().extent();
+        let own = rows(&photo.mask).len().max(1) as f64;
+        let longest = (width.max(height) as f64 * wanted / own).ceil() as usize;
+        photo.at_most(longest.max(MIN_SIDE))
+    }
+
+    /// The objects in this setting, from back to front.
+    ///
+    /// # Errors
+    /// Whatever is wrong with an object or the background.
+    pub fn scene<'a>(&self, objects: Vec<SceneObject<'a>>) -> Result<InsertScene<'a>, InsertError> {
+        let light = (self.projected.clone(), self.around.clone());
+        InsertScene::new(self.extent, light, self.tilt, self.matching, objects)
+    }
+
+    /// What is seen of a panorama that has turned by so many radians, as bright as it is shown.
+    #[must_use]
+    pub fn seen(&self, view: &PanoramaView, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
+        shown(view, panorama, turn, self.panorama_scale)
+    }
+}
+
+fn shown(view: &PanoramaView, panorama: &Panorama, turn: f64, scale: [f32; 3]) -> Rgb<Linear> {
+    let seen = view.picture(panorama, turn).into_planes();
+    tinted(Rgb::new(seen.map(|v| v.max(0.0))), scale)
+}
+
+/// A panorama no larger than shadows need it: it is turned and looked at again and again.
+fn for_shadows(panorama: Panorama) -> Panorama {
+    if panorama.extent().width > MAX_AROUND.width {
+        panorama.resized(MAX_AROUND)
+    } else {
+        panorama
+    }
+}
+
+/// The exposure of a panorama: by what is seen of it, where brightness is to be matched, and as it is given beyond that;
+/// `light` that is its own binds it to the objects.
+fn exposed(
+    scene: &SceneDescription,
+    panorama: &Panorama,
+    scale: [f32; 3],
+    light: Option<&ShLight>,
+) -> PanoramaExposure {
+    let Extent { width, height } = scene.panorama_extent();
+    let side = |side: usize| (side * LOOK / width.max(height).max(1)).max(1);
+    let view = PanoramaView::new(
+        Extent::new(side(width), side(height)),
+        scene.field,
+        scene.down,
+    );
+    let seen = shown(&view, panorama, 0.0, scale);
+    let found = if scene.matches {
+        PanoramaExposure::new(&seen, light)
+    } else {
+        PanoramaExposure::fixed(&seen, 0.0)
+    };
+    found.brighter(&seen, scene.exposure)
+}
+
+/// How far the camera looks down on the ground of the first object, degrees.
+fn tilt_of(scene: &SceneDescription, background: SceneBackground<'_>) -> f64 {
+    let (SceneBackground::Panorama(_), Some(object)) = (background, scene.objects.first()) else {
+        return TILT;
+    };
+    let [width, height] = scene.size.map(f64::from);
+    let tangent = (scene.field / 2.0).to_radians().tan();
+    let below = (object.at[1] - 0.5) * height * 2.0 * tangent / width.max(height);
+    (scene.down + below.atan().to_degrees()).clamp(TILTS.0, TILTS.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use relight_core::image::Planes;
+    use relight_core::light::{Order, ShLight};
+
+    use super::*;
+    use crate::relighting::DiscLamp;
+
+    fn described(more: &str) -> SceneDescription {
+        let text = format!("background = \"a.hdr\"\n{more}\n[[object]]\nphoto = \"b.jpg\"");
+        SceneDescription::parse(&text).unwrap()
+    }
+
+    fn sky() -> Panorama {
+        let even = ShLight::even(Order::TWO, [0.2, 0.4, 1.0]);
+        Panorama::from_light(&even, Extent::new(32, 16))
+    }
+
+    fn dusk() -> Rgb<Linear> {
+        Rgb::new(Planes::from_fn(Extent::new(64, 48), |x, _| {
+            [0.3, 0.2, 0.1].map(|v| v * x as f32 / 64.0)
+        }))
+    }
+
+    #[test]
+    fn a_panorama_lights_its_objects_and_is_seen_as_bright_as_it_lights_them() {
+        let panorama = sky();
+        let background = SceneBackground::Panorama(&panorama);
+        let scene = described("size = [200, 100]");
+        let plain = SceneSetting::new(&scene, background, None).unwrap();
+        assert_eq!(plain.extent, Extent::new(200, 100));
+        assert_eq!(plain.light, LightSource::Panorama(panorama.clone()));
+        // The sky is even: it is brought to the brightness of a bright place, and the objects with it.
+        let exposure = plain.exposure.unwrap();
+        assert!(exposure.clipped == 0.0 && !exposure.for_objects);
+        assert_eq!(plain.matching.level, exposure.stops.exp2());
+        assert_eq!(plain.matching.balance, [1.0; 3]);
+        let view = PanoramaView::new(plain.extent, scene.field, scene.down);
+        let shown = |setting: &SceneSetting| {
+            let seen = setting.seen(&view, &panorama, 0.0);
+            seen.planes().pixel(100, 50)[1]
+        };
+        let brighter = described("size = [200, 100]\nexposure = 1.0");
+        let brighter = SceneSetting::new(&brighter, background, None).unwrap();
+        assert!((brighter.matching.level / plain.matching.level - 2.0).abs() < 1e-5);
+        assert!((shown(&brighter) / shown(&plain) - 2.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_lamp_before_a_panorama_leaves_both_as_bright_as_they_are_wanted() {
+        let bright = ShLight::even(Order::TWO, [40.0; 3]);
+        let panorama = Panorama::from_light(&bright, Extent::new(32, 16));
+        let background = SceneBackground::Panorama(&panorama);
+        let lamp = LightSource::Lamp("170,30".parse().unwrap());
+        let scene = described("size = [200, 100]");
+        let set = SceneSetting::new(&scene, background, Some(lamp)).unwrap();
+        assert_eq!(set.matching.level, 1.0);
+        let view = PanoramaView::new(set.extent, scene.field, scene.down);
+        let shown = set.seen(&view, &panorama, 0.0).planes().pixel(100, 50)[1];
+        assert!((shown - 0.8).abs() < 0.01, "{shown}");
+        assert!(set.exposure.unwrap().clipped == 0.0);
+    }
+
+    #[test]
+    fn nothing_is_matched_where_nobody_asks_and_a_camera_may_be_balanced_for_the_light() {
+        let panorama = sky();
+        let background = SceneBackground::Panorama(&panorama);
+        let unmatched = described("size = [200, 100]\nmatch = false");
+        let unmatched = SceneSetting::new(&unmatched, background, None).unwrap();
+        assert_eq!(unmatched.matching, Matching::default());
+        let balanced = described("size = [200, 100]\nwhite_balance = \"auto\"");
+        let balanced = SceneSetting::new(&balanced, background, None).unwrap();
+        let view = PanoramaView::new(balanced.extent, 60.0, 10.0);
+        let [r, g, b] = balanced.seen(&view, &panorama, 0.0).planes().pixel(9, 9);
+        assert!((r / b - 1.0).abs() < 0.01 && (g / b - 1.0).abs() < 0.01);
+        assert!((g - 0.8).abs() < 0.02, "{g}");
+        // Before a picture, the light is as coloured as the picture's.
+        let lamp: DiscLamp = "60,30,2700K".parse().unwrap();
+        let scene = described("white_balance = \"auto\"");
+        let dusk = dusk();
+        let picture = SceneBackground::Picture(&dusk);
+        let set = SceneSetting::new(&scene, picture, Some(LightSource::Lamp(lamp))).unwrap();
+        let LightSource::Lamp(shown) = set.light else {
+            panic!("a lamp")
+        };
+        assert!((shown.colour[0] / shown.colour[2] - 1.0).abs() < 1e-6);
+        assert!(set.matching.balance[0] > set.matching.balance[2]);
+    }
+
+    #[test]
+    fn a_picture_is_followed_in_brightness_and_only_given_light_in_colour() {
+        let (picture, scene) = (dusk(), described(""));
+        let background = SceneBackground::Picture(&picture);
+        let taken = SceneSetting::new(&scene, background, None).unwrap();
+        assert_eq!(taken.extent, Extent::new(64, 48));
+        assert!(taken.matching.level < 0.5 && taken.matching.balance == [1.0; 3]);
+        let lamp = LightSource::Lamp(DiscLamp::default());
+        let given = SceneSetting::new(&scene, background, Some(lamp.clone())).unwrap();
+        assert_eq!(given.light, lamp);
+        assert!(given.matching.balance[0] > given.matching.balance[2]);
+        let unmatched = SceneSetting::new(&described("match = false"), background, Some(lamp));
+        assert_eq!(unmatched.unwrap().matching, Matching::default());
+    }
+
+    #[test]
+    fn the_ground_is_looked_down_on_as_far_as_the_camera_sees_it() {
+        let panorama = sky();
+        let tilt = |more: &str, background| {
+            let setting = SceneSetting::new(&described(more), background, None);
+            setting.unwrap().tilt
+        };
+        let around = SceneBackground::Panorama(&panorama);
+        // The object stands at 0.9 of the height: 0.4 x 960 / 1280 x 2 tan 30° below the middle, after 10° down.
+        let expected = 10.0
+            + (0.4 * 0.75 * 2.0 * 30_f64.to_radians().tan())
+                .atan()
+                .to_degrees();
+        assert!((tilt("", around) - expected).abs() < 1e-9);
+        assert_eq!(tilt("down = -80.0", around), 5.0);
+        assert_eq!(tilt("tilt = 33.0", around), 33.0);
+        assert_eq!(tilt("", SceneBackground::Picture(&dusk())), 20.0);
+    }
+
+    #[test]
+    fn light_that_is_none_is_refused() {
+        let black = Panorama::from_light(&ShLight::dark(Order::TWO), Extent::new(32, 16));
+        let refused = SceneSetting::new(&described(""), SceneBackground::Panorama(&black), None);
+        assert!(matches!(refused, Err(InsertError::Dark)));
+    }
+
+    #[test]
+    fn a_photograph_is_brought_to_the_size_in_which_its_object_is_shown() {
+        let extent = Extent::new(400, 300);
+        let picture = Rgb::new(Planes::filled(extent, [0.5; 3]));
+        // The object is 150 rows high, and shown in half of 48 rows.
+        let mask = Planes::from_fn(extent, |_, y| {
+            [f32::from(u8::from((100..250).contains(&y)))]
+        });
+        let photo = Photo::from_frame("a".into(), picture, mask, None).unwrap();
+        let background = dusk();
+        let setting =
+            SceneSetting::new(&described(""), SceneBackground::Picture(&background), None);
+        let object = ObjectDescription {
+            height: 0.5,
+            ..described("").objects[0].clone()
+        };
+        let reduced = setting.unwrap().reduced(&object, photo);
+        // 400 x 0.5 x 48 x 1.25 / 150 pixels.
+        assert_eq!(reduced.picture.planes().extent(), Extent::new(80, 60));
+        assert_eq!(rows(&reduced.mask).len(), 30);
+    }
+}

@@ -1,0 +1,61 @@
+//! An object of a scene: where it stands and how it is shown.
+
+use relight_core::image::Extent;
+
+use super::ObjectDescription;
+use crate::relighting::{InsertError, MaterialChange, Placement, Subject, rows};
+
+/// How much an object may be enlarged.
+const MAX_GROWTH: f64 = 64.0;
+
+/// An object of a scene.
+#[derive(Debug, Clone, Copy)]
+pub struct SceneObject<'a> {
+    /// The object.
+    pub subject: &'a Subject,
+    /// Where it stands.
+    pub placement: Placement,
+    /// What its material becomes.
+    pub change: MaterialChange,
+    /// Its brightness in stops.
+    pub exposure: f32,
+    /// How much of its shadow is seen, 0 to 1.
+    pub shadow: f32,
+    /// Whether it is shown in the scene's light; else in that of its photograph.
+    pub relit: bool,
+}
+
+impl<'a> SceneObject<'a> {
+    /// An object as it is described, in the scene's light.
+    #[must_use]
+    pub fn described(object: &ObjectDescription, subject: &'a Subject) -> Self {
+        Self {
+            subject,
+            placement: object.placement(),
+            change: object.change(),
+            exposure: object.exposure,
+            shadow: object.shadow,
+            relit: true,
+        }
+    }
+
+    /// Refuses what cannot stand in a picture of this size.
+    pub(crate) fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
+        let wrong = |fault| InsertError::Object { number, fault };
+        let Placement { at, height, .. } = self.placement;
+        let alpha = &self.subject.matte.alpha;
+        if !self.placement.is_seen(alpha, extent) {
+            return Err(wrong(format!(
+                "would lie wholly outside the picture: its place is {},{}, in parts of the picture's sides",
+                at[0], at[1]
+            )));
+        }
+        let growth = height * extent.height as f64 / rows(alpha).len().max(1) as f64;
+        if growth > MAX_GROWTH {
+            return Err(wrong(format!(
+                "would be enlarged {growth:.0} times: give a larger photograph or a smaller height"
+            )));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,48 @@
+//! Why an object cannot be relit or inserted.
+
+use crate::decompose::DecomposeError;
+use relight_core::captured_object::CapturedObjectError;
+use relight_core::image::ImageError;
+use relight_core::light::LightError;
+
+/// Why an object cannot be relit or inserted.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InsertError {
+    /// A photograph has values that are no light.
+    #[error(
+        "the photograph has a value that is negative, infinite or not a number at column {x}, row {y}"
+    )]
+    NotLight {
+        /// Column of the first.
+        x: usize,
+        /// Row of the first.
+        y: usize,
+    },
+    /// The photograph cannot be decomposed.
+    #[error(transparent)]
+    Decompose(#[from] DecomposeError),
+    /// Images do not fit together.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// Light cannot be used.
+    #[error(transparent)]
+    Light(#[from] LightError),
+    /// There is no light at all.
+    #[error("the light is dark: it has no radiance from anywhere")]
+    Dark,
+    /// A text describes no scene, the parts of one cannot be used together, or a video of it cannot be read or written.
+    #[error("{0}")]
+    Input(String),
+    /// A captured object cannot be read.
+    #[error(transparent)]
+    Captured(#[from] CapturedObjectError),
+    /// An object cannot stand so.
+    #[error("object {number} {fault}")]
+    Object {
+        /// Which, from 1.
+        number: usize,
+        /// What is wrong.
+        fault: String,
+    },
+}

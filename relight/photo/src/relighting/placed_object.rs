@@ -1,0 +1,126 @@
+//! An object at the size and the angle at which it stands in a picture: all that neither light nor its place changes.
+
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use super::height_field::Relief;
+use super::placement::{Fit, Foot};
+use relight_core::image::Planes;
+use relight_core::light::{Normals, YUp};
+
+/// An object as it stands, without its colours.
+#[derive(Debug)]
+pub(crate) struct Standing {
+    pub(crate) fit: Fit,
+    /// How far it covers each pixel of the picture.
+    pub(crate) alpha: Planes<1>,
+    pub(crate) foot: Foot,
+    /// Its shape, once a shadow was asked for.
+    relief: OnceLock<Option<Relief>>,
+}
+
+impl Standing {
+    fn new(alpha: &Planes<1>, fit: Fit) -> Self {
+        let alpha = fit.apply(alpha);
+        Self {
+            foot: Foot::from_alpha(&alpha),
+            fit,
+            alpha,
+            relief: OnceLock::new(),
+        }
+    }
+
+    /// The shape of the object whose own normals these are; none where it covers no pixel by a half.
+    pub(crate) fn relief(&self, normals: &Normals<YUp>) -> Option<&Relief> {
+        if self.relief.get().is_none() {
+            // Not within `get_or_init`: while this thread waits for others, it may take over another frame that comes here.
+            let _ = self.relief.set(self.new_relief(normals));
+        }
+        self.relief.get()?.as_ref()
+    }
+
+    fn new_relief(&self, normals: &Normals<YUp>) -> Option<Relief> {
+        let mut turned = self.fit.apply(normals.planes());
+        let (sin, cos) = (self.fit.angle.sin() as f32, self.fit.angle.cos() as f32);
+        let [x, y, _] = turned.planes_mut();
+        for (x, y) in x.iter_mut().zip(y) {
+            [*x, *y] = [cos * *x - sin * *y, sin * *x + cos * *y];
+        }
+        Relief::new(&Normals::<YUp>::new(turned), &self.alpha)
+    }
+}
+
+/// How an object stood last: while its light turns, or it is moved, it stands so again.
+#[derive(Debug, Default)]
+pub(crate) struct LastStanding(Mutex<Option<Arc<Standing>>>);
+
+impl LastStanding {
+    /// An object that covers its own pixels so far, as it stands by this fit.
+    pub(crate) fn by(&self, fit: Fit, alpha: &Planes<1>) -> Arc<Standing> {
+        if let Some(standing) = self.get().filter(|standing| standing.fit == fit) {
+            return standing;
+        }
+        // Without the lock: while this thread waits for others, it may take over another frame that comes here.
+        let standing = Arc::new(Standing::new(alpha, fit));
+        *self.lock() = Some(Arc::clone(&standing));
+        standing
+    }
+
+    fn get(&self) -> Option<Arc<Standing>> {
+        self.lock().clone()
+    }
+
+    /// What is kept is always whole, whoever had the lock.
+    fn lock(&self) -> MutexGuard<'_, Option<Arc<Standing>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Clone for LastStanding {
+    fn clone(&self) -> Self {
+        Self(Mutex::new(self.get()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Placement;
+    use super::*;
+    use relight_core::image::Extent;
+
+    fn disc() -> Planes<1> {
+        Planes::from_fn(Extent::new(40, 40), |x, y| {
+            let [x, y] = [x, y].map(|at| at as f32 - 19.5);
+            [f32::from(u8::from(x.hypot(y) < 16.0))]
+        })
+    }
+
+    fn fit(height: f64, rotation: f64) -> Fit {
+        let placement = Placement {
+            at: [0.5, 0.9],
+            height,
+            rotation,
+        };
+        Fit::new(&disc(), placement, Extent::new(160, 120))
+    }
+
+    #[test]
+    fn what_stands_as_before_is_not_made_again() {
+        let last = LastStanding::default();
+        let first = last.by(fit(0.5, 0.0), &disc());
+        assert!(Arc::ptr_eq(&first, &last.by(fit(0.5, 0.0), &disc())));
+        let shape = first.relief(&Normals::sphere(40)).unwrap();
+        let again = first.relief(&Normals::sphere(40)).unwrap();
+        assert!(std::ptr::eq(shape, again));
+    }
+
+    #[test]
+    fn what_stands_otherwise_is() {
+        let last = LastStanding::default();
+        let first = last.by(fit(0.5, 0.0), &disc());
+        for other in [fit(0.6, 0.0), fit(0.5, 20.0)] {
+            let changed = last.by(other, &disc());
+            assert_eq!(changed.fit, other);
+            assert_ne!(changed.alpha.extent(), first.alpha.extent());
+        }
+    }
+}

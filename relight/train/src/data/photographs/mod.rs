@@ -1,0 +1,214 @@
+//! Photographs to learn from: processor cores cast views once, the device lights them many times.
+//!
+//! | file | concern |
+//! | --- | --- |
+//! | `view_loader` | threads that cast views |
+//! | `view_pool` | the views of a step, on the device |
+//! | `lit` | views in a light |
+//! | `camera`, `jpeg` | what a camera makes of it |
+//! | `truth` | what a network sees of it, and what it should answer |
+//!
+//! A batch is a function of the settings and its step, whatever the number of threads and processes. Sample i of each batch
+//! is of a view whose number is i modulo the batch: where several processes share the batches, each casts the views of its
+//! samples only.
+
+mod camera;
+mod jpeg;
+mod lit;
+mod truth;
+mod view_loader;
+mod view_pool;
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use tch::{Kind, no_grad};
+
+use self::camera::{NoiseTiles, photograph};
+use self::lit::{DirectionMaps, Lit, PlannedPhoto};
+use self::view_loader::{ViewLoader, ViewSource};
+use self::view_pool::ViewPool;
+use super::sample::TruthBatch;
+use crate::distributed::process_group::indivisible;
+use crate::engine::task::Resources;
+use crate::error::TrainError;
+use crate::settings::{DataSettings, RunSettings};
+use crate::tasks::symmetry::Symmetry;
+use relight_core::light::Panorama;
+use relight_core::reader::Rank;
+use relight_synth::{Folders, LeftOut, Library, PhotoPlan, PhotoViewRecipe, Rooms, stream};
+
+/// The batches of a run, lit while it trains.
+#[derive(Debug)]
+pub struct Photographs {
+    source: Arc<ViewSource>,
+    rooms: Rooms,
+    data: DataSettings,
+    batch: u64,
+    seed: u64,
+    kind: Kind,
+    rank: Rank,
+    resources: Resources,
+    /// Opened with the first batch, whose step says where.
+    open: Option<OpenPool>,
+}
+
+/// Views on the device, and those that follow.
+#[derive(Debug)]
+struct OpenPool {
+    loader: ViewLoader,
+    pool: ViewPool,
+    maps: DirectionMaps,
+    noise: NoiseTiles,
+}
+
+impl Photographs {
+    /// Reads the files that are named.
+    ///
+    /// # Errors
+    /// [`TrainError::Synth`], [`TrainError::Refused`].
+    pub fn new(
+        data: &DataSettings,
+        run: &RunSettings,
+        resources: Resources,
+    ) -> Result<Self, TrainError> {
+        data.check_batch(run.batch)?;
+        let library = Library::read(&Folders {
+            meshes: data.meshes.clone(),
+            textures: data.textures.clone(),
+            panoramas: data.panoramas.clone(),
+        })?
+        .training()?;
+        let panoramas: Vec<&Panorama> = (0..library.panoramas.len())
+            .filter_map(|number| library.panoramas.get(number))
+            .collect();
+        Ok(Self {
+            rooms: Rooms::new(&panoramas, data.variants, stream(run.seed, 24)),
+            source: Arc::new(ViewSource {
+                recipe: PhotoViewRecipe {
+                    seed: stream(run.seed, 21),
+                    size: data.size,
+                    rays: data.rays,
+                },
+                library,
+            }),
+            data: data.clone(),
+            batch: run.batch,
+            seed: stream(run.seed, 22),
+            kind: run.precision.kind(),
+            rank: Rank::ONLY,
+            resources,
+            open: None,
+        })
+    }
+
+    /// What views are cast of.
+    pub(crate) fn library(&self) -> &Library {
+        &self.source.library
+    }
+
+    /// What of the folders is not used.
+    pub(crate) fn left_out(&self) -> &[LeftOut] {
+        &self.source.library.left_out
+    }
+
+    /// Leaves the rest of each batch to other processes. Called before the first batch.
+    ///
+    /// # Errors
+    /// [`TrainError::Refused`].
+    pub(crate) fn set_rank(&mut self, rank: Rank) -> Result<(), TrainError> {
+        let of = rank.world_size();
+        if !self.batch.is_multiple_of(u64::from(of)) {
+            let needed = format!("a multiple of {of}");
+            return Err(indivisible("run.batch", self.batch, rank, &needed));
+        }
+        self.rank = rank;
+        Ok(())
+    }
+
+    /// The batch of a step; steps are asked for one after the other.
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`] where the run is asked to stop before the views are cast, [`TrainError::Fault`],
+    /// [`TrainError::Torch`].
+    pub fn batch(&mut self, step: u64) -> Result<TruthBatch, TrainError> {
+        let newest = self.data.views_at(step);
+        let oldest = newest - self.data.views;
+        let mut open = match self.open.take() {
+            Some(open) => open,
+            None => self.opened(oldest)?,
+        };
+        while open.loader.next_number() < newest {
+            let place = self.place(open.loader.next_number(), open.pool.len());
+            open.pool.put(place, open.loader.next_view()?)?;
+        }
+        let (seeds, places): (Vec<u64>, Vec<usize>) = (0..self.batch)
+            .filter(|sample| sample % u64::from(self.rank.world_size()) == self.index())
+            .map(|sample| {
+                let seed = stream(stream(self.seed, step), sample);
+                let view = self.view_of(sample, oldest, seed);
+                (seed, self.place(view, open.pool.len()))
+            })
+            .unzip();
+        let (rooms, lamps) = (&self.rooms, open.pool.lamps());
+        let photos: Vec<PlannedPhoto> = seeds
+            .par_iter()
+            .zip(places)
+            .map(|(&seed, place)| PlannedPhoto {
+                place,
+                plan: PhotoPlan::draw(stream(seed, 1), &lamps[place], rooms),
+            })
+            .collect();
+        let symmetry = Symmetry::from_bits(stream(stream(self.seed, step), u64::MAX));
+        let batch = no_grad(|| {
+            let lit = Lit::new(&open.pool, &open.maps, &photos)?;
+            let noise = (&open.noise, seeds.as_slice());
+            let photographed = photograph(&lit.image()?, &lit.mask, &photos, noise)?;
+            truth::truth(&lit, &photographed, &photos, symmetry)
+        })?;
+        self.open = Some(open);
+        Ok(batch)
+    }
+
+    /// A pool whose first view is that of a number.
+    fn opened(&self, first: u64) -> Result<OpenPool, TrainError> {
+        let of = u64::from(self.rank.world_size());
+        // The other processes of a group wait for this one's first step.
+        let stop = if self.rank == Rank::ONLY {
+            Arc::clone(&self.resources.stop)
+        } else {
+            Arc::default()
+        };
+        let device = self.resources.device;
+        let views = self.data.views.div_ceil(of) as usize + 1;
+        let pool = ViewPool::new(views, self.data.size, (self.kind, device))?;
+        Ok(OpenPool {
+            loader: ViewLoader::start(
+                &self.source,
+                self.rank,
+                first,
+                self.resources.workers,
+                stop,
+            )?,
+            maps: DirectionMaps::new(self.kind, device)?,
+            noise: NoiseTiles::new(pool.side(), self.seed, device)?,
+            pool,
+        })
+    }
+
+    fn index(&self) -> u64 {
+        u64::from(self.rank.index())
+    }
+
+    /// Where a view of this process lies in a pool.
+    fn place(&self, view: u64, pool: usize) -> usize {
+        (view / u64::from(self.rank.world_size())) as usize % pool
+    }
+
+    /// One of the views from `oldest` on whose number is that of the sample modulo the batch.
+    fn view_of(&self, sample: u64, oldest: u64, seed: u64) -> u64 {
+        let first = oldest + (sample + self.batch - oldest % self.batch) % self.batch;
+        let count = (oldest + self.data.views - first).div_ceil(self.batch);
+        first + self.batch * (stream(seed, 0) % count)
+    }
+}

@@ -1,0 +1,13 @@
+//! A run: steps of an optimiser, mixed precision, checkpoints, the log of metrics, and what ends a run that diverges. Knows no
+//! task: a [`task::TrainingTask`] says what is trained.
+
+pub(crate) mod adam;
+pub(crate) mod checkpoint;
+pub(crate) mod cuda;
+pub(crate) mod divergence_guard;
+pub(crate) mod memory;
+pub(crate) mod metrics_log;
+pub(crate) mod model;
+pub(crate) mod run;
+pub(crate) mod task;
+pub(crate) mod trainable;

@@ -1,0 +1,412 @@
+//! A run: steps, one after the other, with what is logged, validated and saved on the way. Knows nothing of
+//! what is trained.
+//!
+//! Several processes make a run together as one would: each computes its part of every batch, the gradients are
+//! summed, and all make the same step. Process 0 validates, and writes the run's files.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use relit_data::causes::with_causes;
+
+use super::checkpoint::Checkpoint;
+use super::divergence_guard::Guard;
+use super::metrics_log::Journal;
+use super::task::{StepLosses, TrainingTask, Validation};
+use crate::distributed::all_reduced::AllReducedLosses;
+use crate::distributed::process_group::ProcessGroup;
+use crate::error::TrainError;
+use crate::settings::RunSettings;
+use crate::tasks::agreement::{Fact, agree, fingerprint};
+use relight_photo::nets::WeightPrecision;
+
+/// How long a process waits for process 0 to write its checkpoint and end, where the run ends early. No longer, as process 0 can
+/// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.
+const SUCCESSION: Duration = Duration::from_secs(3);
+
+/// What a run says while it goes on.
+pub trait TrainObserver {
+    /// A step was made. `losses` have their weights.
+    fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>);
+    /// Something in the data of a step is damaged, and was left out.
+    fn damaged(&mut self, step: u64, what: &str);
+    /// The networks were validated.
+    fn validated(&mut self, step: u64, figures: &BTreeMap<String, f64>);
+    /// The run was saved.
+    fn saved(&mut self, step: u64, path: &Path);
+}
+
+/// How a run came out.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct RunOutcome {
+    /// Steps made in all.
+    pub steps: u64,
+    /// Whether it was asked to stop before its last step.
+    pub stopped: bool,
+    /// Whether something in the data was damaged, and left out.
+    pub damaged: bool,
+    /// Figures of the last validation; none in other processes than the first.
+    pub figures: BTreeMap<String, f64>,
+    /// The file of weights, which the first process writes.
+    pub weights: Option<PathBuf>,
+}
+
+/// A run in its folder.
+pub struct Run<'a> {
+    task: &'a mut dyn TrainingTask,
+    settings: &'a RunSettings,
+    folder: &'a Path,
+    group: Option<ProcessGroup>,
+    /// Of the first process.
+    journal: Option<Journal>,
+    guard: Guard,
+    step: u64,
+    /// What the task was given beside its settings.
+    inputs: String,
+    /// The cursor in the data after that step.
+    cursor: String,
+    /// Whether something in the data was left out.
+    damaged: bool,
+}
+
+impl<'a> Run<'a> {
+    /// Begins a run in a folder, or goes on with the one that is there (`resume`); among the processes of a group, all of
+    /// which open it with the same arguments.
+    ///
+    /// # Errors
+    /// [`TrainError::Refused`] where there is one without `resume`, or another one; [`TrainError::Io`],
+    /// [`TrainError::ProcessLost`].
+    pub fn open(
+        task: &'a mut dyn TrainingTask,
+        settings: &'a RunSettings,
+        folder: &'a Path,
+        resume: bool,
+        group: Option<ProcessGroup>,
+    ) -> Result<Self, TrainError> {
+        settings.check()?;
+        fs::create_dir_all(folder).map_err(TrainError::io(folder, "made"))?;
+        let inputs = task.inputs()?;
+        let step = match Checkpoint::read(folder)? {
+            None => 0,
+            Some(_) if !resume => {
+                return Err(TrainError::Refused(format!(
+                    "{} holds a run already: go on with --resume, or give another folder",
+                    folder.display()
+                )));
+            }
+            Some(checkpoint) => recall(task, &inputs, &checkpoint, folder)?,
+        };
+        if let Some(group) = &group {
+            agree(group, &facts(task, &inputs, step)?)?;
+            task.join(group)?;
+        }
+        let is_first = group.as_ref().is_none_or(ProcessGroup::is_first);
+        Ok(Self {
+            inputs,
+            cursor: task.cursor(),
+            task,
+            settings,
+            folder,
+            group,
+            journal: is_first.then(|| Journal::open(folder, step)).transpose()?,
+            guard: Guard::default(),
+            step,
+            damaged: false,
+        })
+    }
+
+    /// Steps made so far.
+    #[must_use]
+    pub fn steps_made(&self) -> u64 {
+        self.step
+    }
+
+    /// Makes all steps that are left, or those until `stop` is set in one of the processes; saves the run and the averaged
+    /// weights at the end.
+    ///
+    /// # Errors
+    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Refused`] where another process is lost:
+    /// the run is
+    /// saved.
+    pub fn finish(
+        mut self,
+        stop: &AtomicBool,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<RunOutcome, TrainError> {
+        let figures = match self.make_steps(stop, observer) {
+            Ok(figures) => figures,
+            Err(lost @ TrainError::ProcessLost(_)) => {
+                return Err(self.end_early(lost, observer));
+            }
+            Err(fault) => return Err(fault),
+        };
+        let mut weights = None;
+        if self.journal.is_some() {
+            self.save(observer)?;
+            weights = Some(self.write_weights()?);
+        }
+        // Only now: launchers end all processes as soon as one has ended with another code than 0.
+        if let Some(group) = self.group.take() {
+            group.leave();
+        }
+        Ok(RunOutcome {
+            steps: self.step,
+            stopped: self.step < self.settings.steps,
+            damaged: self.damaged,
+            figures,
+            weights,
+        })
+    }
+
+    /// Figures of the last validation.
+    fn make_steps(
+        &mut self,
+        stop: &AtomicBool,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<BTreeMap<String, f64>, TrainError> {
+        if self.journal.is_some() {
+            for left_out in self.task.left_out() {
+                self.damaged = true;
+                observer.damaged(self.step, &left_out.to_string());
+            }
+        }
+        let between = Duration::from_secs_f64(60.0 * self.settings.checkpoint_minutes);
+        let mut saved = Instant::now();
+        // Where training begins, so that it shows what it has changed.
+        let mut figures = if self.step == 0 {
+            self.validate(observer)?
+        } else {
+            BTreeMap::new()
+        };
+        let mut stopped = false;
+        while self.step < self.settings.steps && !stopped {
+            let asked = stop.load(Ordering::Relaxed);
+            if asked && self.group.is_none() {
+                break;
+            }
+            // Processes of a group stop after the same step, the one in which the first of them is asked to.
+            stopped = match self.make_step(asked, observer) {
+                Err(TrainError::Stopped) => break,
+                made => made?,
+            };
+            if self.journal.is_none() {
+                continue;
+            }
+            if self.step.is_multiple_of(self.settings.validate_every)
+                || self.step == self.settings.steps
+            {
+                figures = self.validate(observer)?;
+            }
+            if saved.elapsed() >= between {
+                self.save(observer)?;
+                saved = Instant::now();
+            }
+        }
+        Ok(figures)
+    }
+
+    /// Makes a step; whether one of the processes was asked to stop.
+    fn make_step(
+        &mut self,
+        stop: bool,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<bool, TrainError> {
+        let learning_rate = self.settings.learning_rate_at(self.step);
+        let losses = self.task.step(self.step)?;
+        if let Some(damage) = &losses.damage {
+            self.damaged = true;
+            observer.damaged(self.step, damage);
+        }
+        let reduced = match &self.group {
+            Some(group) => AllReducedLosses::new(&losses, stop, group)?,
+            None => AllReducedLosses::alone(&losses)?,
+        };
+        // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.
+        if !reduced.values.is_empty() {
+            self.guard
+                .check(self.step, &reduced.values, &reduced.spreads)?;
+            let norm = self.descend(&losses, &reduced, learning_rate)?;
+            self.log(&reduced, (learning_rate, norm), observer)?;
+        }
+        self.step += 1;
+        self.cursor = self.task.cursor();
+        Ok(reduced.stop)
+    }
+
+    /// Goes down the all-reduced loss; the norm of its gradient.
+    fn descend(
+        &mut self,
+        losses: &StepLosses,
+        reduced: &AllReducedLosses,
+        learning_rate: f64,
+    ) -> Result<f64, TrainError> {
+        let learner = self.task.learner();
+        match reduced.part(losses)? {
+            Some(part) => part.f_backward()?,
+            None => learner.model.add_zero_gradients()?,
+        }
+        if let Some(group) = &self.group {
+            group.sum_gradients(learner.model.parameters())?;
+        }
+        learner.learn(learning_rate, self.settings.max_grad_norm)
+    }
+
+    fn log(
+        &mut self,
+        reduced: &AllReducedLosses,
+        (learning_rate, gradient_norm): (f64, f64),
+        observer: &mut dyn TrainObserver,
+    ) -> Result<(), TrainError> {
+        let step = self.step + 1;
+        observer.step(step, &reduced.values);
+        let Some(journal) = &mut self.journal else {
+            return Ok(());
+        };
+        if !step.is_multiple_of(self.settings.log_every) {
+            return Ok(());
+        }
+        let mut values = reduced.values.clone();
+        values.insert("learning_rate".to_owned(), learning_rate);
+        values.insert("gradient_norm".to_owned(), gradient_norm);
+        for (head, spread) in &reduced.spreads {
+            values.insert(format!("spread/{head}"), *spread);
+        }
+        journal.scalars(step, &values)
+    }
+
+    /// Ends the run of which another process is lost: the first of those that are left saves it.
+    fn end_early(&mut self, lost: TrainError, observer: &mut dyn TrainObserver) -> TrainError {
+        let path = Checkpoint::path(self.folder);
+        let path = path.display();
+        let saved = match self.save_as_successor(observer) {
+            Ok(()) => format!("its checkpoint is {path}: start all processes again with --resume"),
+            Err(fault) => format!("it could not be saved: {}", with_causes(&fault)),
+        };
+        let step = self.step;
+        TrainError::Refused(format!(
+            "{lost}; the run ends after {step} steps, and {saved}"
+        ))
+    }
+
+    /// Saves the run in process 0, and in others where that has ended and has not.
+    fn save_as_successor(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
+        if self.journal.is_none() {
+            let begun = Instant::now();
+            while Journal::is_open(self.folder) && !self.is_saved() && begun.elapsed() < SUCCESSION
+            {
+                std::thread::sleep(Duration::from_millis(500));
+            }
+            if self.is_saved() {
+                return Ok(());
+            }
+        }
+        self.save(observer)
+    }
+
+    /// Whether a checkpoint has this process's steps. One that cannot be read does not.
+    fn is_saved(&self) -> bool {
+        let found = Checkpoint::read(self.folder).ok().flatten();
+        found.is_some_and(|checkpoint| checkpoint.step >= self.step)
+    }
+
+    fn validate(
+        &mut self,
+        observer: &mut dyn TrainObserver,
+    ) -> Result<BTreeMap<String, f64>, TrainError> {
+        let Some(journal) = &mut self.journal else {
+            return Ok(BTreeMap::new());
+        };
+        let Validation {
+            figures,
+            sheet,
+            damage,
+        } = self.task.validate()?;
+        if let Some(damage) = damage {
+            self.damaged = true;
+            observer.damaged(self.step, &damage);
+        }
+        let named: BTreeMap<String, f64> = figures
+            .iter()
+            .map(|(name, value)| (format!("validation/{name}"), *value))
+            .collect();
+        journal.scalars(self.step, &named)?;
+        if let Some(png) = sheet {
+            let path = self.folder.join("validation.png");
+            relit_data::durable::write_whole(&path, &png)
+                .map_err(TrainError::io(&path, "written"))?;
+        }
+        observer.validated(self.step, &figures);
+        Ok(figures)
+    }
+
+    fn save(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
+        let state = self.task.learner().state()?;
+        Checkpoint {
+            task: self.task.name().to_owned(),
+            step: self.step,
+            settings: self.task.settings(),
+            inputs: self.inputs.clone(),
+            cursor: self.cursor.clone(),
+            state,
+        }
+        .write(self.folder)?;
+        observer.saved(self.step, &Checkpoint::path(self.folder));
+        Ok(())
+    }
+
+    /// The averaged weights, half precision.
+    fn write_weights(&mut self) -> Result<PathBuf, TrainError> {
+        let learner = self.task.learner();
+        let path = self.folder.join(format!("{}.safetensors", learner.name()));
+        learner.averaged()?.write(&path, WeightPrecision::Half)?;
+        Ok(path)
+    }
+}
+
+/// What has to be the same in all processes.
+fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
+    let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
+    let weights = fingerprint(task.learner().model.parameters())?;
+    Ok(vec![
+        ("version and task", version),
+        ("the settings", task.settings()),
+        (
+            "the turns and the networks that are given",
+            inputs.to_owned(),
+        ),
+        ("the steps made before", step.to_string()),
+        ("the weights", weights),
+    ])
+}
+
+/// Brings a task to a checkpoint; its step.
+fn recall(
+    task: &mut dyn TrainingTask,
+    inputs: &str,
+    checkpoint: &Checkpoint,
+    folder: &Path,
+) -> Result<u64, TrainError> {
+    let other = |fault: String| TrainError::checkpoint(&Checkpoint::path(folder), &fault);
+    if checkpoint.task != task.name() {
+        return Err(other(format!(
+            "it trains {}, not {}",
+            checkpoint.task,
+            task.name()
+        )));
+    }
+    if let Some(setting) = task.differing_setting(&checkpoint.settings) {
+        return Err(other(format!("its settings are others: {setting}")));
+    }
+    if checkpoint.inputs != inputs {
+        let fault =
+            "it was trained on other turns, or with other networks beside the one that learns";
+        return Err(other(fault.to_owned()));
+    }
+    task.go_to(&checkpoint.cursor).map_err(other)?;
+    task.learner().recall(&checkpoint.state)?;
+    Ok(checkpoint.step)
+}

@@ -1,0 +1,119 @@
+//! What a run trains, on what, and what it hears of it: the losses of a step, the figures of a validation.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use tch::Device;
+
+use super::trainable::Learner;
+use crate::distributed::process_group::ProcessGroup;
+use crate::error::TrainError;
+use crate::tasks::terms::LossTerms;
+use relight_synth::LeftOut;
+
+/// Where a run is computed, and with how many threads.
+#[derive(Debug, Clone)]
+pub struct Resources {
+    /// Where networks are computed.
+    pub device: Device,
+    /// Data-loader workers: threads that compose samples.
+    pub workers: usize,
+    /// Set to end a run early, also while its first samples are being composed.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// What a run trains.
+pub trait TrainingTask {
+    /// Its name, as on the command line.
+    fn name(&self) -> &'static str;
+
+    /// The settings that make the run what it is, as TOML.
+    fn settings(&self) -> String;
+
+    /// The first setting that another run's settings have otherwise.
+    fn differing_setting(&self, other: &str) -> Option<String>;
+
+    /// What it was given beside its settings and what learns, as text that is the same where that is.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    fn inputs(&self) -> Result<String, TrainError> {
+        Ok(String::new())
+    }
+
+    /// Takes this process's part of the work from now on. Called before the first step.
+    ///
+    /// # Errors
+    /// [`TrainError::Refused`] where the settings leave no equal parts.
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
+
+    /// What of a user's own files it does not use.
+    fn left_out(&self) -> &[LeftOut] {
+        &[]
+    }
+
+    /// The network that learns.
+    fn learner(&mut self) -> &mut Learner;
+
+    /// The losses of a step, from 0, on this process's part of its batch; always the same ones, in the same order. Steps
+    /// are asked for one after the other.
+    ///
+    /// # Errors
+    /// Whatever keeps the step from being computed.
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError>;
+
+    /// Figures of the averaged networks on what they are not trained on.
+    ///
+    /// # Errors
+    /// Whatever keeps them from being computed.
+    fn validate(&mut self) -> Result<Validation, TrainError>;
+
+    /// The cursor in data that are read one after the other, to go on from; empty where there are none.
+    fn cursor(&self) -> String {
+        String::new()
+    }
+
+    /// Goes on from such a cursor.
+    ///
+    /// # Errors
+    /// A sentence that says why it cannot.
+    fn go_to(&mut self, _place: &str) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+/// What a step gives.
+#[derive(Debug, Default)]
+#[non_exhaustive]
+pub struct StepLosses {
+    /// The losses.
+    pub terms: LossTerms,
+    /// How much each head's answers vary, in parts of the ground truth's variation.
+    pub spreads: BTreeMap<&'static str, f64>,
+    /// What was damaged in the data, and is not in the batch.
+    pub damage: Option<String>,
+}
+
+impl StepLosses {
+    /// Adds what was damaged in a part of the data.
+    pub(crate) fn add_damage(&mut self, damage: &[String]) {
+        if !damage.is_empty() {
+            let earlier = self.damage.take();
+            let all: Vec<&str> = earlier.iter().chain(damage).map(String::as_str).collect();
+            self.damage = Some(all.join("; "));
+        }
+    }
+}
+
+/// What a validation gives.
+#[derive(Debug, Default)]
+#[non_exhaustive]
+pub struct Validation {
+    /// Figures by name.
+    pub figures: BTreeMap<String, f64>,
+    /// A sheet of answers beside the ground truth, a PNG file.
+    pub sheet: Option<Vec<u8>>,
+    /// What was damaged in the data, and is not in the figures.
+    pub damage: Option<String>,
+}

@@ -1,0 +1,278 @@
+//! Training of the decomposing network on composed samples: its answers as maps, and its losses.
+
+use std::collections::BTreeMap;
+
+use tch::Tensor;
+
+use super::losses::{Mean, chord, gradient, relative_distance, scale_invariant, windowed};
+use super::shadow_vs_paint::Darkness;
+use super::terms::LossTerms;
+use crate::data::sample::TruthBatch;
+use crate::error::TrainError;
+use relight_photo::decompose::{HIGHLIGHT_OFFSET, LOG_LUMINANCE, LOG_SHADING, MIN_FACING};
+
+/// Added to shading before its logarithm is taken.
+const SHADING_FLOOR: f64 = 0.03;
+/// Added to albedo before its logarithm is taken.
+const ALBEDO_FLOOR: f64 = 0.02;
+/// Added to shading before the picture is divided by it.
+const DIVISOR_FLOOR: f64 = 0.02;
+/// Highlights of this size count fully.
+pub(crate) const FULL_HIGHLIGHT: f64 = 0.1;
+/// How much more a full highlight counts than none: most pixels have none, and an answer without any would do.
+pub(crate) const HIGHLIGHT_EMPHASIS: f64 = 8.0;
+/// Energy of a faint highlight, a pixel.
+const FAINT_ENERGY: f64 = 1e-4;
+
+/// The network's answers as maps on tensors, `batch x channels x height x width`: what
+/// [`relight_photo::decompose::EncodedPicture::decode`] makes of them one by one.
+#[derive(Debug)]
+pub struct AnsweredTensors {
+    /// Unit normals.
+    pub normals: Tensor,
+    /// Albedo, 0..1.
+    pub albedo: Tensor,
+    /// Shading, 1 channel.
+    pub shading: Tensor,
+    /// Highlight in whites, 1 channel.
+    pub highlight: Tensor,
+    /// How much of the darkness is paint, as a logit, 1 channel; none of a network without that head.
+    pub paint: Option<Tensor>,
+    /// The light, `batch x 9` as [`relight_photo::decompose::PredictedLight`] has it; none of a network without that head.
+    pub light: Option<Tensor>,
+}
+
+impl AnsweredTensors {
+    /// The maps for the network's input and its outputs.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub fn from_outputs(input: &Tensor, outputs: &[Tensor]) -> Result<Self, TrainError> {
+        let head = |at: usize| outputs.get(at).map(Tensor::shallow_clone);
+        Ok(Self {
+            paint: head(1),
+            light: head(2),
+            ..Self::new(input, &outputs[0])?
+        })
+    }
+
+    /// The maps for the network's input and its answer, the output `maps`.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub fn new(input: &Tensor, answer: &Tensor) -> Result<Self, TrainError> {
+        let part = |from: i64, count: i64| answer.f_narrow(1, from, count);
+        let facing = part(2, 1)?
+            .f_softplus()?
+            .f_add_scalar(f64::from(MIN_FACING))?;
+        let normals = Tensor::f_cat(&[part(0, 2)?, facing], 1)?;
+        let length = normals
+            .f_square()?
+            .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+            .f_sqrt()?;
+        let log_luminance = input
+            .f_narrow(1, LOG_LUMINANCE as i64, 1)?
+            .f_mul_scalar(2.0)?
+            .f_add_scalar(-2.0)?;
+        let log_shading = part(7, 1)?
+            .f_add(&part(8, 1)?.f_sigmoid()?.f_mul(&log_luminance)?)?
+            .f_clamp(f64::from(LOG_SHADING.0), f64::from(LOG_SHADING.1))?;
+        Ok(Self {
+            normals: normals.f_div(&length)?,
+            albedo: part(3, 3)?.f_sigmoid()?,
+            shading: log_shading.f_exp()?,
+            highlight: part(6, 1)?
+                .f_add_scalar(-f64::from(HIGHLIGHT_OFFSET))?
+                .f_softplus()?,
+            paint: None,
+            light: None,
+        })
+    }
+}
+
+/// What each loss counts.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DecomposeLossCoefficients {
+    /// Scale-invariant errors of shading and albedo.
+    pub whole: f64,
+    /// Scale-invariant error of the picture over the shading, against albedo, in parts of the others.
+    pub quotient: f64,
+    /// The same errors in windows.
+    pub windows: f64,
+    /// Steps from pixel to pixel of log shading and log albedo.
+    pub gradient: f64,
+    /// Distance of the normals.
+    pub normals: f64,
+    /// Mean error of the highlights.
+    pub highlight: f64,
+    /// Energy of the highlights' error, as a part of their energy.
+    pub highlight_energy: f64,
+    /// Cross entropy of what is paint of a pixel's darkness.
+    pub paint: f64,
+    /// Distance of the light.
+    pub light: f64,
+}
+
+impl Default for DecomposeLossCoefficients {
+    fn default() -> Self {
+        Self {
+            whole: 1.0,
+            quotient: 0.5,
+            windows: 0.5,
+            gradient: 0.2,
+            normals: 1.0,
+            highlight: 1.0,
+            highlight_energy: 0.2,
+            paint: 0.1,
+            light: 0.1,
+        }
+    }
+}
+
+/// The weighted losses of a batch.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn decompose_losses(
+    batch: &TruthBatch,
+    answer: &AnsweredTensors,
+    coefficients: &DecomposeLossCoefficients,
+) -> Result<LossTerms, TrainError> {
+    let mut terms = LossTerms::default();
+    let mask = &batch.mask;
+    let (albedo, found_albedo) = (grey(&batch.albedo)?, grey(&answer.albedo)?);
+    let diffuse = batch.picture.f_sub(&batch.highlight)?.f_clamp_min(0.0)?;
+    let quotient = grey(&diffuse)?.f_div(&answer.shading.f_add_scalar(DIVISOR_FLOOR)?)?;
+
+    let whole = coefficients.whole;
+    let error = scale_invariant(&answer.shading, &batch.shading, mask)?;
+    terms.add("shading", whole, error)?;
+    let error = scale_invariant(&answer.albedo, &batch.albedo, mask)?;
+    terms.add("albedo", whole, error)?;
+    let error = scale_invariant(&quotient, &albedo, mask)?;
+    terms.add("quotient", whole * coefficients.quotient, error)?;
+
+    let height = mask.size()[2];
+    let narrow = (height / 16).max(4);
+    for (name, found, truth, part) in [
+        ("shading_windows", &answer.shading, &batch.shading, 1.0),
+        ("albedo_windows", &found_albedo, &albedo, 1.0),
+        (
+            "quotient_windows",
+            &quotient,
+            &albedo,
+            coefficients.quotient,
+        ),
+    ] {
+        let coefficient = coefficients.windows * part;
+        let near = windowed(found, truth, mask, narrow)?;
+        let far = windowed(found, truth, mask, 3 * narrow)?;
+        terms.add(name, coefficient, near.f_add(&far.f_mul_scalar(0.5)?)?)?;
+    }
+
+    let log = |of: &Tensor, floor: f64| of.f_add_scalar(floor)?.f_log();
+    let steps = gradient(
+        &log(&answer.shading, SHADING_FLOOR)?,
+        &log(&batch.shading, SHADING_FLOOR)?,
+        mask,
+    )?;
+    for mean in steps {
+        terms.add_mean("shading_steps", coefficients.gradient, mean);
+    }
+    let steps = gradient(
+        &log(&found_albedo, ALBEDO_FLOOR)?,
+        &log(&albedo, ALBEDO_FLOOR)?,
+        mask,
+    )?;
+    for mean in steps {
+        terms.add_mean("albedo_steps", coefficients.gradient * 0.5, mean);
+    }
+    let distance = chord(&answer.normals, &batch.normals, mask)?;
+    terms.add_mean("normals", coefficients.normals, distance);
+    let highlight = highlight_error(batch, answer)?;
+    terms.add_mean("highlight", coefficients.highlight, highlight);
+    let energy = highlight_energy_error(batch, answer)?;
+    terms.add_mean("highlight_energy", coefficients.highlight_energy, energy);
+    if let Some(logit) = &answer.paint {
+        let truth = Darkness::new(&batch.albedo, &batch.shading, mask)?;
+        terms.add_mean("paint", coefficients.paint, truth.cross_entropy(logit)?);
+    }
+    if let Some(light) = &answer.light {
+        let distance = relative_distance(light, &batch.light)?;
+        terms.add_mean("light", coefficients.light, distance);
+    }
+    Ok(terms)
+}
+
+/// Mean absolute error, in which highlights count more than their absence.
+fn highlight_error(batch: &TruthBatch, answer: &AnsweredTensors) -> Result<Mean, TrainError> {
+    let truth = &batch.highlight;
+    let emphasis = truth
+        .f_clamp(0.0, FULL_HIGHLIGHT)?
+        .f_mul_scalar(HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT)?
+        .f_add_scalar(1.0)?
+        .f_mul(&batch.mask)?;
+    let error = answer.highlight.f_sub(truth)?.f_abs()?.f_mul(&emphasis)?;
+    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
+    let value = error.f_sum(None)?.f_div(&over)?;
+    Ok(Mean { value, over })
+}
+
+/// Energy of the error as a part of the energy of the batch's highlights: 1 for an answer without any. A batch
+/// with hardly any highlight counts as if it had a faint one.
+fn highlight_energy_error(
+    batch: &TruthBatch,
+    answer: &AnsweredTensors,
+) -> Result<Mean, TrainError> {
+    let energy = |of: &Tensor| of.f_square()?.f_mul(&batch.mask)?.f_sum(None);
+    let faint = batch.mask.f_sum(None)?.f_mul_scalar(FAINT_ENERGY)?;
+    let over = energy(&batch.highlight)?.f_add(&faint)?;
+    let error = energy(&answer.highlight.f_sub(&batch.highlight)?)?;
+    let value = error.f_div(&over)?;
+    Ok(Mean { value, over })
+}
+
+/// How much each head's answers vary from pixel to pixel under the mask, as a part of the ground truth's variation: a head that has
+/// collapsed answers the same everywhere.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn head_spreads(
+    batch: &TruthBatch,
+    answer: &AnsweredTensors,
+) -> Result<BTreeMap<&'static str, f64>, TrainError> {
+    let pairs = [
+        ("normals", &answer.normals, &batch.normals),
+        ("albedo", &answer.albedo, &batch.albedo),
+        ("shading", &answer.shading, &batch.shading),
+        ("highlight", &answer.highlight, &batch.highlight),
+    ];
+    pairs
+        .into_iter()
+        .map(|(name, found, truth)| Ok((name, spread(found, truth, &batch.mask)?)))
+        .collect()
+}
+
+/// How much an answer varies under the mask, as a part of the ground truth's variation; 1 where that has none.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn spread(found: &Tensor, truth: &Tensor, mask: &Tensor) -> Result<f64, TrainError> {
+    let (found, truth) = (deviation(found, mask)?, deviation(truth, mask)?);
+    Ok(if truth > 0.0 { found / truth } else { 1.0 })
+}
+
+/// Standard deviation under the mask, all channels together.
+fn deviation(of: &Tensor, mask: &Tensor) -> Result<f64, TrainError> {
+    let of = of.f_detach()?;
+    let sum = |of: &Tensor| f64::try_from(of.f_sum(None)?);
+    let count = (sum(mask)? * of.size()[1] as f64).max(1.0);
+    let mean = sum(&of.f_mul(mask)?)? / count;
+    let difference = of.f_sub_scalar(mean)?.f_mul(mask)?;
+    Ok((sum(&difference.f_square()?)? / count).sqrt())
+}
+
+fn grey(of: &Tensor) -> Result<Tensor, tch::TchError> {
+    of.f_mean_dim([1_i64].as_slice(), true, None)
+}

@@ -1,0 +1,153 @@
+//! The run that trains the decomposing network on photographs of synthetic objects.
+
+use tch::Tensor;
+
+use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
+use super::losses::{angular_degrees, relative_distance, scale_invariant, windowed};
+use crate::data::contact_sheet::validation_sheet;
+use crate::data::photographs::Photographs;
+use crate::data::sample::TruthBatch;
+use crate::data::validation::{HeldOutSamples, highlight_figures};
+use crate::distributed::process_group::ProcessGroup;
+use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
+use crate::engine::trainable::Learner;
+use crate::error::TrainError;
+use crate::settings::{DecomposeSettings, first_difference};
+use relight_photo::nets::{Weights, decomposer_with_heads};
+use relight_synth::LeftOut;
+
+/// Samples that are shown.
+const SHOWN: usize = 10;
+
+/// Training of the decomposing network.
+#[derive(Debug)]
+pub struct DecomposeTask {
+    settings: DecomposeSettings,
+    resources: Resources,
+    learner: Learner,
+    photographs: Photographs,
+    validation: HeldOutSamples,
+}
+
+impl DecomposeTask {
+    /// Reads what photographs are made of, and begins with `weights`, or with random ones.
+    ///
+    /// # Errors
+    /// Settings out of range, files that cannot be read, weights that do not fit.
+    pub fn new(
+        settings: DecomposeSettings,
+        resources: Resources,
+        weights: Option<&Weights>,
+    ) -> Result<Self, TrainError> {
+        settings.check()?;
+        let photographs = Photographs::new(&settings.data, &settings.run, resources.clone())?;
+        let (size, count) = (settings.data.size, settings.data.validation);
+        let validation = HeldOutSamples::new(photographs.library(), size, count);
+        let graph = decomposer_with_heads();
+        let learner = Learner::new(graph, weights, &settings.run, resources.device)?;
+        Ok(Self {
+            photographs,
+            settings,
+            resources,
+            learner,
+            validation,
+        })
+    }
+}
+
+impl TrainingTask for DecomposeTask {
+    fn name(&self) -> &'static str {
+        "decompose"
+    }
+
+    fn settings(&self) -> String {
+        // Numbers, names and paths: all of them can be written.
+        toml::to_string(&self.settings).unwrap_or_default()
+    }
+
+    fn differing_setting(&self, other: &str) -> Option<String> {
+        first_difference(&self.settings, other)
+    }
+
+    fn left_out(&self) -> &[LeftOut] {
+        self.photographs.left_out()
+    }
+
+    fn learner(&mut self) -> &mut Learner {
+        &mut self.learner
+    }
+
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        self.photographs.set_rank(group.rank())
+    }
+
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
+        let batch = self.photographs.batch(step)?;
+        let answer = self.learner.model.forward(&batch.input)?;
+        let answer = AnsweredTensors::from_outputs(&batch.input, &answer)?;
+        Ok(StepLosses {
+            terms: decompose_losses(&batch, &answer, &self.settings.loss)?,
+            spreads: head_spreads(&batch, &answer)?,
+            damage: None,
+        })
+    }
+
+    fn validate(&mut self) -> Result<Validation, TrainError> {
+        let (model, device) = (self.learner.averaged_model()?, self.resources.device);
+        let (kind, mut sheet) = (model.precision().kind(), None);
+        let figures = self.validation.figures(kind, device, |batch| {
+            let answer =
+                AnsweredTensors::from_outputs(&batch.input, &model.forward(&batch.input)?)?;
+            if sheet.is_none() {
+                sheet = Some(validation_sheet(batch, &answer, SHOWN)?);
+            }
+            figures(batch, &answer)
+        })?;
+        Ok(Validation {
+            figures,
+            sheet,
+            damage: None,
+        })
+    }
+}
+
+/// How far the answers are from the ground truth, means over the batch.
+fn figures(
+    batch: &TruthBatch,
+    answer: &AnsweredTensors,
+) -> Result<Vec<(&'static str, f64)>, TrainError> {
+    let mask = &batch.mask;
+    let grey = |of: &Tensor| of.f_mean_dim([1_i64].as_slice(), true, None);
+    let diffuse = batch.picture.f_sub(&batch.highlight)?.f_clamp_min(0.0)?;
+    let quotient = grey(&diffuse)?.f_div(&answer.shading.f_clamp_min(0.03)?)?;
+    let albedo = grey(&batch.albedo)?;
+    let window = (mask.size()[2] / 16).max(4);
+    let mut figures = highlight_figures(&answer.highlight, batch)?.to_vec();
+    let errors = [
+        (
+            "shading",
+            scale_invariant(&answer.shading, &batch.shading, mask)?,
+        ),
+        ("albedo", scale_invariant(&quotient, &albedo, mask)?),
+        (
+            "shading_windows",
+            windowed(&answer.shading, &batch.shading, mask, window)?,
+        ),
+        (
+            "albedo_windows",
+            windowed(&quotient, &albedo, mask, window)?,
+        ),
+        (
+            "normals_deg",
+            angular_degrees(&answer.normals, &batch.normals, mask)?,
+        ),
+    ];
+    for (name, error) in errors {
+        figures.push((name, f64::try_from(error)?));
+    }
+    if let Some(light) = &answer.light {
+        let distance = relative_distance(light, &batch.light)?.value;
+        figures.push(("light", f64::try_from(distance)?));
+    }
+    Ok(figures)
+}

@@ -1,0 +1,293 @@
+//! The paper's render layers on tensors, `batch x channels x height x width`: the same numbers as the plain ones of
+//! [`relight_core::render`], with gradients by libtorch.
+
+use tch::Tensor;
+
+use crate::error::TrainError;
+use relight_core::render::{DiffuseForm, RELEASED_AMBIENT, diffuse_constants, power_constants};
+
+/// Keeps a division by nothing from being one.
+const TINY: f64 = 1e-6;
+
+/// A picture in sRGB, `3` channels of 0..=1, as the paper's networks are fed: `(x - 0.5) / 0.5` inside the mask.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn network_input(srgb: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+    Ok(srgb.f_mul_scalar(2.0)?.f_add_scalar(-1.0)?.f_mul(mask)?)
+}
+
+/// The sRGB values of linear light, 0..=1.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn to_srgb(linear: &Tensor) -> Result<Tensor, TrainError> {
+    let light = linear.f_clamp(0.0, 1.0)?;
+    let dark = light.f_mul_scalar(12.92)?;
+    // The root's slope at 0 is infinite: there the line is taken, and the root must not be asked.
+    let bright = light
+        .f_clamp_min(0.003)?
+        .f_pow_tensor_scalar(1.0 / 2.4)?
+        .f_mul_scalar(1.055)?
+        .f_add_scalar(-0.055)?;
+    Ok(dark.f_where_self(&light.f_le(0.003_130_8)?, &bright)?)
+}
+
+/// Normals (p, q, 1) over their length of slopes (p, q), 0 outside the mask. y is as the slopes have it: down in the
+/// paper's figures and in the answers of Normal-Net.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn normals_of_slopes(slopes: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+    let length = slopes
+        .f_square()?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+        .f_add_scalar(1.0)?
+        .f_sqrt()?;
+    let one = slopes.f_narrow(1, 0, 1)?.f_ones_like()?;
+    let vectors = Tensor::f_cat(&[slopes.shallow_clone(), one], 1)?;
+    Ok(vectors.f_div(&length)?.f_mul(mask)?)
+}
+
+/// The shading of normals (y up) under coefficients, `batch x 9 x 3` (harmonic, colour): `batch x 3 x height x width`.
+///
+/// The released form takes |L00| and adds 0.1, as [`DiffuseForm::Released`] says.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn diffuse_shading(
+    normals: &Tensor,
+    coefficients: &Tensor,
+    form: DiffuseForm,
+) -> Result<Tensor, TrainError> {
+    let coefficients = match form {
+        DiffuseForm::Irradiance => coefficients.shallow_clone(),
+        DiffuseForm::Released => {
+            let first = coefficients.f_narrow(1, 0, 1)?.f_abs()?;
+            Tensor::f_cat(&[first, coefficients.f_narrow(1, 1, 8)?], 1)?
+        }
+    };
+    let sums = weighted_terms(&diffuse_terms(normals)?, &coefficients)?;
+    let positive = sums.f_clamp_min(0.0)?;
+    Ok(match form {
+        DiffuseForm::Irradiance => positive,
+        DiffuseForm::Released => positive.f_add_scalar(RELEASED_AMBIENT)?,
+    })
+}
+
+/// The paper's highlight (5) of normals (y up): s_p times the sum of C_lm (Â_l Ŷ_lm(n))^α, each power with the sign of what
+/// is raised. `reflectance` is `batch x 3`, `smoothness` `batch`.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn power_highlight(
+    normals: &Tensor,
+    coefficients: &Tensor,
+    reflectance: &Tensor,
+    smoothness: &Tensor,
+) -> Result<Tensor, TrainError> {
+    let terms = power_terms(normals)?;
+    let exponent = smoothness.f_view([-1, 1, 1, 1])?;
+    let powers = terms
+        .f_abs()?
+        .f_clamp_min(TINY)?
+        .f_pow(&exponent)?
+        .f_mul(&terms.f_sign()?)?;
+    let sums = weighted_terms(&powers, coefficients)?;
+    Ok(sums.f_mul(&reflectance.f_view([-1, 3, 1, 1])?)?)
+}
+
+/// `batch x 9 x h x w` terms times `batch x 9 x 3` coefficients: `batch x 3 x h x w`.
+fn weighted_terms(terms: &Tensor, coefficients: &Tensor) -> Result<Tensor, TrainError> {
+    let size = terms.size();
+    let flat = terms.f_view([size[0], 9, size[2] * size[3]])?;
+    let sums = coefficients.f_transpose(1, 2)?.f_matmul(&flat)?;
+    Ok(sums.f_view([size[0], 3, size[2], size[3]])?)
+}
+
+/// x, y and z of normals.
+fn components(normals: &Tensor) -> Result<[Tensor; 3], tch::TchError> {
+    Ok([
+        normals.f_narrow(1, 0, 1)?,
+        normals.f_narrow(1, 1, 1)?,
+        normals.f_narrow(1, 2, 1)?,
+    ])
+}
+
+/// Â_l Y_lm of normals, `batch x 9 x h x w`: the quadratic form's terms.
+fn diffuse_terms(normals: &Tensor) -> Result<Tensor, TrainError> {
+    let [c1, c2, c3, c4, c5] = diffuse_constants();
+    let [x, y, z] = components(normals)?;
+    let product = |a: &Tensor, b: &Tensor, c: f64| a.f_mul(b)?.f_mul_scalar(c);
+    Ok(Tensor::f_cat(
+        &[
+            x.f_zeros_like()?.f_add_scalar(c4)?,
+            y.f_mul_scalar(2.0 * c2)?,
+            z.f_mul_scalar(2.0 * c2)?,
+            x.f_mul_scalar(2.0 * c2)?,
+            product(&x, &y, 2.0 * c1)?,
+            product(&y, &z, 2.0 * c1)?,
+            product(&z, &z, c3)?.f_add_scalar(-c5)?,
+            product(&x, &z, 2.0 * c1)?,
+            x.f_square()?.f_sub(&y.f_square()?)?.f_mul_scalar(c1)?,
+        ],
+        1,
+    )?)
+}
+
+/// Â_l Ŷ_lm of normals, `batch x 9 x h x w`: the harmonics at twice the polar angle.
+fn power_terms(normals: &Tensor) -> Result<Tensor, TrainError> {
+    let [c0, c1, c2, c3, c4] = power_constants();
+    let [x, y, z] = components(normals)?;
+    let square = z.f_square()?;
+    // 4 z^3 - 2 z.
+    let odd = square.f_mul_scalar(4.0)?.f_add_scalar(-2.0)?.f_mul(&z)?;
+    let product = |a: &Tensor, b: &Tensor, c: f64| a.f_mul(b)?.f_mul_scalar(c);
+    // 4 z^4 - 4 z^2 + 1.
+    let even = square
+        .f_square()?
+        .f_sub(&square)?
+        .f_mul_scalar(4.0)?
+        .f_add_scalar(1.0)?;
+    Ok(Tensor::f_cat(
+        &[
+            x.f_zeros_like()?.f_add_scalar(c0)?,
+            product(&y, &z, 2.0 * c1)?,
+            square.f_mul_scalar(2.0 * c1)?.f_add_scalar(-c1)?,
+            product(&x, &z, 2.0 * c1)?,
+            product(&x.f_mul(&y)?, &square, 4.0 * c2)?,
+            product(&y, &odd, c2)?,
+            even.f_mul_scalar(3.0 * c3)?.f_add_scalar(-c3)?,
+            product(&x, &odd, c2)?,
+            product(&x.f_square()?.f_sub(&y.f_square()?)?, &square, 4.0 * c4)?,
+        ],
+        1,
+    )?)
+}
+
+/// Light-Net's answer, `batch x 12`, as coefficients for each colour, `batch x 9 x 3`: nine of length 1, times the
+/// light's colour.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn answered_light(answer: &Tensor) -> Result<Tensor, TrainError> {
+    let nine = answer.f_narrow(1, 0, 9)?;
+    let length = nine
+        .f_square()?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+        .f_clamp_min(TINY)?
+        .f_sqrt()?;
+    let nine = nine.f_div(&length)?.f_unsqueeze(2)?;
+    Ok(nine.f_matmul(&answer.f_narrow(1, 9, 3)?.f_unsqueeze(1)?)?)
+}
+
+/// The reflectance net's answer, `batch x 4`, as s_p (`batch x 3`, above 0) and α (`batch`, 1 to 201).
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn answered_gloss(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
+    let reflectance = answer.f_narrow(1, 0, 3)?.f_softplus()?;
+    let smoothness = answer
+        .f_select(1, 3)?
+        .f_sigmoid()?
+        .f_mul_scalar(200.0)?
+        .f_add_scalar(1.0)?;
+    Ok((reflectance, smoothness))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relight_core::image::Extent;
+    use relight_core::light::{Normals, ShLight};
+    use relight_core::render::{DiffuseLayer, Gloss, PowerLayer};
+    use tch::{Device, Kind};
+
+    const SIDE: usize = 21;
+
+    fn some_light() -> ShLight {
+        let value = |i: usize| ((i * i + 1) as f64).sin();
+        let colours = (0..9).map(|i| [value(i), value(i + 9), 0.4]);
+        ShLight::new(colours.collect()).unwrap()
+    }
+
+    fn coefficients(light: &ShLight) -> Tensor {
+        let flat: Vec<f32> = light.coefficients()[..9]
+            .iter()
+            .flatten()
+            .map(|&c| c as f32)
+            .collect();
+        Tensor::from_slice(&flat).view([1, 9, 3])
+    }
+
+    fn sphere() -> (Tensor, Tensor, Normals<relight_core::light::YUp>) {
+        let normals = Normals::sphere(SIDE);
+        let planes: Vec<f32> = normals.planes().planes().concat();
+        let tensor = Tensor::from_slice(&planes).view([1, 3, SIDE as i64, SIDE as i64]);
+        let mask = tensor
+            .square()
+            .sum_dim_intlist([1_i64].as_slice(), true, None::<Kind>)
+            .gt(0.5);
+        (tensor, mask.to_kind(Kind::Float), normals)
+    }
+
+    fn largest_difference(tensor: &Tensor, planes: [&[f32]; 3]) -> f32 {
+        let values = Vec::<f32>::try_from(tensor.flatten(0, -1)).unwrap();
+        let plain = planes.concat();
+        let pairs = values.iter().zip(&plain);
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn shading_is_that_of_the_plain_layer() {
+        let (tensor, mask, normals) = sphere();
+        let light = some_light();
+        for form in [DiffuseForm::Irradiance, DiffuseForm::Released] {
+            let plain = DiffuseLayer::new(&light, form).shading(&normals);
+            let ours = diffuse_shading(&tensor, &coefficients(&light), form).unwrap() * &mask;
+            let error = largest_difference(&ours, plain.planes().planes());
+            assert!(error < 1e-5, "{form:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_papers_highlight_is_that_of_the_plain_layer() {
+        let (tensor, mask, normals) = sphere();
+        let light = some_light();
+        let gloss = Gloss::even(Extent::new(SIDE, SIDE), [0.5, 0.25, 1.0], 6.0);
+        let plain = PowerLayer::new(&light).highlight(&normals, &gloss).unwrap();
+        let reflectance = Tensor::from_slice(&[0.5_f32, 0.25, 1.0]).view([1, 3]);
+        let smoothness = Tensor::from_slice(&[6.0_f32]);
+        let ours = power_highlight(&tensor, &coefficients(&light), &reflectance, &smoothness);
+        let ours = ours.unwrap() * &mask;
+        let error = largest_difference(&ours, plain.planes().planes());
+        let largest = plain
+            .planes()
+            .planes()
+            .concat()
+            .into_iter()
+            .fold(0.0, f32::max);
+        assert!(error < 1e-5 * largest.max(1.0), "{error}");
+    }
+
+    #[test]
+    fn light_of_length_one_has_the_colour_that_was_answered() {
+        tch::manual_seed(2);
+        let answer = Tensor::rand([3, 12], (Kind::Float, Device::Cpu)) - 0.3;
+        let light = answered_light(&answer).unwrap();
+        let lengths = light
+            .square()
+            .sum_dim_intlist([1_i64].as_slice(), false, None::<Kind>)
+            .sqrt();
+        let colours = answer.narrow(1, 9, 3).abs();
+        assert!((lengths - colours).abs().max().double_value(&[]) < 1e-5);
+    }
+
+    #[test]
+    fn srgb_has_a_slope_everywhere() {
+        let light = Tensor::from_slice(&[0.0_f32, 0.001, 0.3, 1.0]).set_requires_grad(true);
+        to_srgb(&light).unwrap().sum(None::<Kind>).backward();
+        let slopes = Vec::<f32>::try_from(light.grad()).unwrap();
+        assert!(slopes.iter().all(|slope| slope.is_finite()), "{slopes:?}");
+    }
+}

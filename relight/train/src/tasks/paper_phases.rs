@@ -1,0 +1,493 @@
+//! The phases in which the paper's networks are trained, and the losses of each.
+//!
+//! | phase | learns | from |
+//! | --- | --- | --- |
+//! | `spec` | Spec-Net | highlights of composed samples; chromaticity of rank one on turns whose frames are saturated |
+//! | `normal` | Normal-Net | normals of composed samples (the paper's warm-up) |
+//! | `light` | Light-Net, from random weights | reflectance of rank one on turns, Normal-Net as it is (first round) |
+//! | `joint` | Normal-Net | reflectance of rank one on turns, Light-Net as it is (second round) |
+//! | `specular` | the reflectance net | the highlight of Spec-Net, rendered again |
+//!
+//! On turns alone the low-rank loss pulls networks away from what they know: each phase that has both has a cratevised
+//! term on composed samples.
+
+use tch::Tensor;
+
+use super::decompose::{FULL_HIGHLIGHT, HIGHLIGHT_EMPHASIS, spread};
+use super::losses::{Mean, angular, scale_invariant};
+use super::low_rank::{chromaticity, low_rank_loss};
+use super::paper_layers::{
+    answered_gloss, answered_light, diffuse_shading, network_input, normals_of_slopes,
+    power_highlight, to_srgb,
+};
+use crate::data::sample::TruthBatch;
+use crate::data::turn_reader::TurnTensors;
+use crate::engine::model::Model;
+use crate::error::TrainError;
+use relight_core::render::DiffuseForm;
+
+/// Least diffuse light, so that its chromaticity exists.
+const DARKEST: f64 = 1e-5;
+/// Keeps a division by nothing from being one.
+const TINY: f64 = 1e-6;
+/// Shading below this is not divided by.
+const MIN_SHADING: f64 = 0.02;
+
+/// A phase of the paper's training.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PaperPhase {
+    /// Spec-Net.
+    Spec,
+    /// Normal-Net's warm-up.
+    Normal,
+    /// Light-Net, with Normal-Net as it is.
+    Light,
+    /// Normal-Net, with Light-Net as it is.
+    Joint,
+    /// Specular reflectance and smoothness.
+    Specular,
+}
+
+impl PaperPhase {
+    /// Its name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Spec => "spec",
+            Self::Normal => "normal",
+            Self::Light => "light",
+            Self::Joint => "joint",
+            Self::Specular => "specular",
+        }
+    }
+
+    /// The learning rate where settings name none: the paper's, 1e-6 in both rounds of joint training (`light` and `joint`)
+    /// and 1e-4 for what is trained apart.
+    #[must_use]
+    pub fn default_learning_rate(self) -> f64 {
+        match self {
+            Self::Light | Self::Joint => 1e-6,
+            Self::Spec | Self::Normal | Self::Specular => 1e-4,
+        }
+    }
+
+    /// Whether there are figures of how well it does on turns.
+    #[must_use]
+    pub fn is_judged_by_turns(self) -> bool {
+        matches!(self, Self::Spec | Self::Light | Self::Joint)
+    }
+
+    /// Whether turns teach it anything.
+    #[must_use]
+    pub fn learns_from_turns(self) -> bool {
+        self != Self::Normal
+    }
+
+    /// Whether it cannot do without turns.
+    #[must_use]
+    pub fn needs_turns(self) -> bool {
+        matches!(self, Self::Light | Self::Joint | Self::Specular)
+    }
+}
+
+/// Spec-Net's highlight, linear, 3 channels of 0..=1.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn highlight_of(
+    spec: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
+    let answer = &spec.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
+    let highlight = answer.f_add_scalar(1.0)?.f_mul_scalar(0.5)?;
+    Ok(highlight.f_clamp(0.0, 1.0)?.f_mul(mask)?)
+}
+
+/// Normal-Net's normals, y up. The network itself has y down, as the paper does.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn normals_of(
+    normal: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
+    let slopes = &normal.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
+    let (p, q) = (slopes.f_narrow(1, 0, 1)?, slopes.f_narrow(1, 1, 1)?);
+    normals_of_slopes(&Tensor::f_cat(&[p, q.f_neg()?], 1)?, mask)
+}
+
+/// Light-Net's coefficients, `frames x 9 x 3`.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn light_of(
+    light: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
+    answered_light(&light.forward(&network_input(&to_srgb(picture)?, mask)?)?[0])
+}
+
+/// Rows of one turn's frames under their mask, for the low-rank loss: `1 x frames x values`, brought to a mean length of 1
+/// so that a dark turn counts as much as a bright one.
+fn rows(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+    let rows = of.f_mul(mask)?.f_flatten(1, -1)?;
+    let frames = rows.size()[0] as f64;
+    let length = rows.f_detach()?.f_square()?.f_sum(None)?;
+    let scale = length.f_div_scalar(frames)?.f_clamp_min(TINY)?.f_sqrt()?;
+    Ok(rows.f_div(&scale)?.f_unsqueeze(0)?)
+}
+
+/// The same, each row brought to the length 1.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn equal_rows(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+    let rows = of.f_mul(mask)?.f_flatten(1, -1)?;
+    let square = rows
+        .f_square()?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?;
+    Ok(rows
+        .f_div(&square.f_clamp_min(TINY)?.f_sqrt()?)?
+        .f_unsqueeze(0)?)
+}
+
+fn low_rank(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+    low_rank_loss(&rows(of, mask)?)
+}
+
+/// The frames for which the gate of saturation opens Spec-Net, and their masks; none where they are fewer than two.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn saturated_frames(
+    turns: &TurnTensors,
+) -> Result<Option<(Tensor, Tensor)>, TrainError> {
+    let open: Vec<i64> = (0_i64..)
+        .zip(&turns.spec_net)
+        .filter_map(|(at, &is_open)| is_open.then_some(at))
+        .collect();
+    if open.len() < 2 {
+        return Ok(None);
+    }
+    let index = Tensor::f_from_slice(&open)?.f_to_device(turns.picture.device())?;
+    Ok(Some((
+        turns.picture.f_index_select(0, &index)?,
+        turns.mask.f_index_select(0, &index)?,
+    )))
+}
+
+/// The chromaticity that is left of pictures when Spec-Net's highlight is taken off.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn diffuse_chromaticity(
+    spec: &Model,
+    picture: &Tensor,
+    mask: &Tensor,
+) -> Result<Tensor, TrainError> {
+    let highlight = highlight_of(spec, picture, mask)?;
+    chromaticity(&picture.f_sub(&highlight)?.f_clamp(DARKEST, 1.0)?)
+}
+
+/// Low-rank loss of the chromaticity that Spec-Net's diffuse pictures have; none where the gate opens for fewer than
+/// two frames.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn spec_on_turns(
+    spec: &Model,
+    turns: &TurnTensors,
+) -> Result<Option<Tensor>, TrainError> {
+    let Some((picture, mask)) = saturated_frames(turns)? else {
+        return Ok(None);
+    };
+    low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask).map(Some)
+}
+
+/// What an answer on composed samples comes to.
+#[derive(Debug)]
+pub(crate) struct TruthLoss {
+    /// Its loss.
+    pub mean: Mean,
+    /// What is answered.
+    pub head: &'static str,
+    /// How much it varies, as a part of the ground truth's variation.
+    pub spread: f64,
+}
+
+/// Mean error of Spec-Net's highlight on composed samples; highlights count more than their absence.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+    let found = highlight_of(spec, &batch.picture, &batch.mask)?;
+    let truth = batch.highlight.f_clamp(0.0, 1.0)?;
+    let emphasis = truth
+        .f_clamp(0.0, FULL_HIGHLIGHT)?
+        .f_mul_scalar(HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT)?
+        .f_add_scalar(1.0)?
+        .f_mul(&batch.mask)?;
+    let error = found.f_sub(&truth)?.f_abs()?.f_mul(&emphasis)?;
+    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
+    let value = error.f_sum(None)?.f_div(&over)?.f_mul_scalar(1.0 / 3.0)?;
+    let grey = found.f_mean_dim([1_i64].as_slice(), true, None)?;
+    Ok(TruthLoss {
+        mean: Mean { value, over },
+        head: "highlight",
+        spread: spread(&grey, &truth, &batch.mask)?,
+    })
+}
+
+/// `1 - cos` of Normal-Net's normals on composed samples.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+    let found = normals_of(normal, &diffuse_of_truth(batch)?, &batch.mask)?;
+    Ok(TruthLoss {
+        mean: angular(&found, &batch.normals, &batch.mask)?,
+        head: "normals",
+        spread: spread(&found, &batch.normals, &batch.mask)?,
+    })
+}
+
+/// Scale-invariant error of the shading that Light-Net's light makes of the true normals of composed samples.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn light_on_truth(light: &Model, batch: &TruthBatch) -> Result<TruthLoss, TrainError> {
+    let coefficients = light_of(light, &diffuse_of_truth(batch)?, &batch.mask)?;
+    let shading = diffuse_shading(&batch.normals, &coefficients, DiffuseForm::Released)?;
+    let grey = shading.f_mean_dim([1_i64].as_slice(), true, None)?;
+    let value = scale_invariant(&grey, &batch.shading, &batch.mask)?;
+    let over = Tensor::f_from_slice(&[batch.mask.size()[0]])?;
+    Ok(TruthLoss {
+        mean: Mean { value, over },
+        head: "shading",
+        spread: spread(&grey, &batch.shading, &batch.mask)?,
+    })
+}
+
+/// Low-rank loss of the reflectance.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn reflectance_on_turns(
+    normal: &Model,
+    light: &Model,
+    spec: Option<&Model>,
+    turns: &TurnTensors,
+) -> Result<Tensor, TrainError> {
+    low_rank(&reflectance(normal, light, spec, turns)?, &turns.mask)
+}
+
+/// The reflectance of a turn's frames: their diffuse pictures over the shading of the networks' normals and light.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn reflectance(
+    normal: &Model,
+    light: &Model,
+    spec: Option<&Model>,
+    turns: &TurnTensors,
+) -> Result<Tensor, TrainError> {
+    let mask = &turns.mask;
+    let diffuse = match spec {
+        Some(spec) => without_highlight(turns, &highlight_of(spec, &turns.picture, mask)?)?,
+        None => turns.picture.shallow_clone(),
+    };
+    let normals = normals_of(normal, &diffuse, mask)?;
+    let coefficients = light_of(light, &diffuse, mask)?;
+    let shading = diffuse_shading(&normals, &coefficients, DiffuseForm::Released)?;
+    Ok(diffuse
+        .f_div(&shading.f_clamp_min(MIN_SHADING)?)?
+        .f_clamp(0.0, 1.0)?)
+}
+
+/// The pictures without Spec-Net's highlights, where the gate is open for them: what Normal-Net and Light-Net are given.
+fn without_highlight(turns: &TurnTensors, highlight: &Tensor) -> Result<Tensor, TrainError> {
+    let removed = highlight.f_mul(&gate(turns)?)?;
+    Ok(turns.picture.f_sub(&removed)?.f_clamp(0.0, 1.0)?)
+}
+
+/// The same of composed samples, whose highlights are known.
+pub(crate) fn diffuse_of_truth(batch: &TruthBatch) -> Result<Tensor, TrainError> {
+    Ok(batch.picture.f_sub(&batch.highlight)?.f_clamp(0.0, 1.0)?)
+}
+
+/// 1 for the frames for which the gate of saturation opens Spec-Net, 0 for the others: `frames x 1 x 1 x 1`.
+fn gate(turns: &TurnTensors) -> Result<Tensor, TrainError> {
+    let open = turns
+        .spec_net
+        .iter()
+        .map(|&is_open| f32::from(u8::from(is_open)));
+    let open = Tensor::f_from_slice(&open.collect::<Vec<_>>())?;
+    Ok(open
+        .f_to_device(turns.picture.device())?
+        .f_view([-1, 1, 1, 1])?)
+}
+
+/// Mean squared difference between Spec-Net's highlight and the one that the answered reflectance and smoothness
+/// render; none where the gate opens for no frame.
+///
+/// # Errors
+/// [`TrainError::Torch`].
+pub(crate) fn specular_on_turns(
+    reflectance: &Model,
+    (spec, normal, light): (&Model, &Model, &Model),
+    turns: &TurnTensors,
+) -> Result<Option<Tensor>, TrainError> {
+    if !turns.spec_net.contains(&true) {
+        return Ok(None);
+    }
+    let (picture, mask) = (&turns.picture, &turns.mask);
+    let highlight = highlight_of(spec, picture, mask)?;
+    let diffuse = without_highlight(turns, &highlight)?;
+    let normals = normals_of(normal, &diffuse, mask)?;
+    let coefficients = light_of(light, &diffuse, mask)?;
+    let answer = &reflectance.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
+    let (strength, smoothness) = answered_gloss(answer)?;
+    let rendered = power_highlight(&normals, &coefficients, &strength, &smoothness)?
+        .f_clamp(0.0, 1.0)?
+        .f_mul(mask)?;
+    let weight = gate(turns)?.f_mul(mask)?;
+    let error = rendered.f_sub(&highlight)?.f_square()?.f_mul(&weight)?;
+    let pixels = weight.f_sum(None)?.f_mul_scalar(3.0)?.f_clamp_min(1.0)?;
+    Ok(Some(error.f_sum(None)?.f_div(&pixels)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::model::ComputePrecision;
+    use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
+    use relight_photo::nets::{Graph, Weights};
+    use tch::{Device, Kind};
+
+    const SIDE: i64 = 64;
+
+    fn model(graph: Graph, seed: u64) -> Model {
+        let weights = Weights::initial(&graph, seed);
+        Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap()
+    }
+
+    fn frames(picture: Tensor, spec_net: Vec<bool>) -> TurnTensors {
+        TurnTensors {
+            mask: Tensor::ones([2, 1, SIDE, SIDE], (Kind::Float, Device::Cpu)),
+            picture,
+            spec_net,
+        }
+    }
+
+    fn picture() -> Tensor {
+        let count = 2 * 3 * SIDE * SIDE;
+        let ramp = Tensor::arange(count, (Kind::Float, Device::Cpu));
+        (ramp * 0.37)
+            .sin()
+            .f_mul_scalar(0.3)
+            .unwrap()
+            .f_add_scalar(0.6)
+            .unwrap()
+            .view([2, 3, SIDE, SIDE])
+    }
+
+    #[test]
+    fn normal_net_and_light_net_are_given_the_picture_without_its_highlights() {
+        let (normal, light) = (model(normal_net(), 1), model(light_net(Head::Pooled), 2));
+        let spec = model(spec_net(), 3);
+        let turns = frames(picture(), vec![true, false]);
+        let found = reflectance(&normal, &light, Some(&spec), &turns).unwrap();
+        // The first frame without its highlight, the second as it is: the gate is closed.
+        let highlight = highlight_of(&spec, &turns.picture, &turns.mask).unwrap();
+        assert!(highlight.max().double_value(&[]) > 0.05);
+        let open = Tensor::from_slice(&[1.0_f32, 0.0]).view([2, 1, 1, 1]);
+        let diffuse = (&turns.picture - highlight * open).clamp(0.0, 1.0);
+        let expected =
+            reflectance(&normal, &light, None, &frames(diffuse, vec![false; 2])).unwrap();
+        let off = (found - expected).abs().max().double_value(&[]);
+        assert!(off < 1e-5, "{off}");
+    }
+
+    #[test]
+    fn a_turn_has_a_reflectance_of_rank_one_in_linear_light_and_not_in_that_of_files() {
+        let place = (Kind::Float, Device::Cpu);
+        let (frames, side) = (12, SIDE);
+        let across = Tensor::linspace(-0.7, 0.7, side, place);
+        let (x, y) = (
+            across
+                .view([1, 1, 1, side])
+                .expand([frames, 1, side, side], false),
+            across
+                .view([1, 1, side, 1])
+                .expand([frames, 1, side, side], false),
+        );
+        let z = (x.square() + y.square())
+            .neg()
+            .f_add_scalar(1.0)
+            .unwrap()
+            .sqrt();
+        let normals = Tensor::cat(&[&x, &y, &z], 1);
+        // A bright side that goes around, as over a turn.
+        let light: Vec<f32> = (0..frames)
+            .flat_map(|frame| {
+                let (sin, cos) = (frame as f32 / frames as f32 * std::f32::consts::TAU).sin_cos();
+                let bands = [
+                    0.8,
+                    0.2,
+                    0.3 * cos,
+                    0.3 * sin,
+                    0.1 * sin * cos,
+                    0.05,
+                    0.1,
+                    0.05,
+                    0.05,
+                ];
+                bands.into_iter().flat_map(|value| [value; 3])
+            })
+            .collect();
+        let light = Tensor::from_slice(&light).view([frames, 9, 3]);
+        let shading = diffuse_shading(&normals, &light, DiffuseForm::Released).unwrap();
+        let albedo = (x * 7.0)
+            .sin()
+            .f_mul_scalar(0.25)
+            .unwrap()
+            .f_add_scalar(0.4)
+            .unwrap();
+        let picture = (albedo * &shading).clamp(0.0, 1.0);
+        let mask = Tensor::ones([frames, 1, side, side], place);
+        let residual = |picture: &Tensor| {
+            let reflectance = picture / &shading;
+            crate::data::validation::rank_residual(&reflectance, &mask).unwrap()
+        };
+        let (linear, file) = (residual(&picture), residual(&to_srgb(&picture).unwrap()));
+        assert!(linear < 1e-6 && file > 0.002, "{linear} {file}");
+    }
+
+    #[test]
+    fn composed_samples_teach_normals_of_the_picture_without_its_highlights() {
+        let normal = model(normal_net(), 1);
+        let place = (Kind::Float, Device::Cpu);
+        let ones = || Tensor::ones([2, 1, SIDE, SIDE], place);
+        let batch = |picture: Tensor, highlight: Tensor| TruthBatch {
+            input: Tensor::zeros([2, 4, SIDE, SIDE], place),
+            mask: ones(),
+            picture,
+            shading: ones(),
+            albedo: Tensor::ones([2, 3, SIDE, SIDE], place),
+            normals: Tensor::cat(&[ones() * 0.0, ones() * 0.0, ones()], 1),
+            highlight,
+            light: Tensor::zeros([2, 9], place),
+        };
+        let loss = |batch: &TruthBatch| {
+            let loss = normal_on_truth(&normal, batch).unwrap();
+            loss.mean.value.double_value(&[])
+        };
+        let highlight = picture().narrow(1, 0, 1) * 0.3;
+        let shining = loss(&batch(picture() * 0.5 + &highlight, highlight.copy()));
+        let plain = loss(&batch(picture() * 0.5, ones() * 0.0));
+        assert!((shining - plain).abs() < 1e-4, "{shining} {plain}");
+    }
+}

@@ -1,0 +1,240 @@
+//! The runs of the paper's phases.
+
+use std::path::PathBuf;
+
+use tch::{Kind, Tensor};
+
+use super::agreement::fingerprint;
+use super::losses::Mean;
+use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed};
+use super::paper_phases::PaperPhase;
+use crate::data::photographs::Photographs;
+use crate::data::turn_reader::{TurnGroup, TurnReader};
+use crate::data::validation::{HeldOutSamples, HeldOutTurns};
+use crate::distributed::process_group::{ProcessGroup, indivisible};
+use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
+use crate::engine::trainable::Learner;
+use crate::error::TrainError;
+use crate::settings::{PaperSettings, first_difference};
+use relight_core::reader::Rank;
+use relight_synth::{LeftOut, stream};
+
+/// Training of one of the paper's networks.
+#[derive(Debug)]
+pub struct PaperTask {
+    networks: PhaseNetworks,
+    name: &'static str,
+    settings: PaperSettings,
+    resources: Resources,
+    learner: Learner,
+    photographs: Photographs,
+    turns: Option<TurnReader>,
+    rank: Rank,
+    held_out_samples: HeldOutSamples,
+    held_out_turns: Option<HeldOutTurns>,
+}
+
+impl PaperTask {
+    /// Reads what photographs are made of, opens the turns, and makes the networks.
+    ///
+    /// # Errors
+    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Refused`] where the phase
+    /// needs what is not given.
+    pub fn new(
+        phase: PaperPhase,
+        settings: PaperSettings,
+        resources: Resources,
+        inputs: &PaperInputs,
+    ) -> Result<Self, TrainError> {
+        settings.check()?;
+        if phase.needs_turns() && inputs.turns.is_none() {
+            return Err(needed(phase, "--turns"));
+        }
+        if inputs.turns.is_some() && !phase.learns_from_turns() {
+            return Err(TrainError::Refused(format!(
+                "relight train {} learns from synthetic photographs, not from turns: leave --turns away",
+                phase.name()
+            )));
+        }
+        if inputs.held_out.is_some() && !phase.is_judged_by_turns() {
+            return Err(TrainError::Refused(format!(
+                "relight train {} has no figures on turns: leave --held-out away",
+                phase.name()
+            )));
+        }
+        let graph = learned(phase);
+        let weights = inputs.weights.as_ref();
+        let kind = settings.run.precision.kind();
+        let seed = stream(settings.run.seed, 31);
+        let open = |path: &PathBuf| TurnReader::open(path, seed);
+        let held_out = |path: &PathBuf| HeldOutTurns::read(path, kind, resources.device);
+        let photographs = Photographs::new(&settings.data, &settings.run, resources.clone())?;
+        // On them, nothing is known of the paper's smoothness.
+        let samples = match phase {
+            PaperPhase::Specular => 0,
+            _ => settings.data.validation,
+        };
+        Ok(Self {
+            held_out_samples: HeldOutSamples::new(
+                photographs.library(),
+                settings.data.size,
+                samples,
+            ),
+            held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
+            networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
+            name: phase.name(),
+            learner: Learner::new(graph, weights, &settings.run, resources.device)?,
+            photographs,
+            turns: inputs.turns.as_ref().map(open).transpose()?,
+            rank: Rank::ONLY,
+            settings,
+            resources,
+        })
+    }
+
+    /// The type of what goes into the network.
+    fn kind(&self) -> Kind {
+        self.settings.run.precision.kind()
+    }
+
+    /// The losses on this process's groups of a step.
+    fn on_turns(&mut self, losses: &mut StepLosses) -> Result<(), TrainError> {
+        let kind = self.kind();
+        let Some(reader) = &mut self.turns else {
+            return Ok(());
+        };
+        let (mut values, mut damage) = (Vec::new(), Vec::new());
+        for _ in 0..self.settings.turns.groups / u64::from(self.rank.world_size()) {
+            let TurnGroup {
+                frames,
+                damage: found,
+            } = reader.next_group(kind, self.resources.device)?;
+            damage.extend(found);
+            if let Some(turns) = frames {
+                let own = &self.learner.model;
+                values.extend(self.networks.on_turns(own, &turns)?);
+            }
+        }
+        losses.add_damage(&damage);
+        let coefficient = self.settings.loss.low_rank;
+        if values.is_empty() {
+            losses.terms.add_nothing("turns", coefficient);
+        } else {
+            let over = Tensor::f_from_slice(&[values.len() as i64])?;
+            let value = Tensor::f_stack(&values, 0)?.f_mean(None)?;
+            losses
+                .terms
+                .add_mean("turns", coefficient, Mean { value, over });
+        }
+        Ok(())
+    }
+
+    /// The coefficient of the cratevised term on composed samples: 1 where there are no turns.
+    fn cratevised(&self) -> f64 {
+        match (&self.networks, &self.turns) {
+            (PhaseNetworks::Specular { .. }, _) => 0.0,
+            (PhaseNetworks::Normal, _) | (_, None) => 1.0,
+            (_, Some(_)) => self.settings.loss.cratevised,
+        }
+    }
+}
+
+impl TrainingTask for PaperTask {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn settings(&self) -> String {
+        // Numbers, names and paths: all of them can be written.
+        toml::to_string(&self.settings).unwrap_or_default()
+    }
+
+    fn differing_setting(&self, other: &str) -> Option<String> {
+        first_difference(&self.settings, other)
+    }
+
+    fn left_out(&self) -> &[LeftOut] {
+        self.photographs.left_out()
+    }
+
+    fn learner(&mut self) -> &mut Learner {
+        &mut self.learner
+    }
+
+    fn inputs(&self) -> Result<String, TrainError> {
+        let mut inputs = self
+            .turns
+            .as_ref()
+            .map_or(String::new(), TurnReader::identity);
+        for model in self.networks.given() {
+            inputs += &fingerprint(model.parameters())?;
+        }
+        Ok(inputs)
+    }
+
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        let (rank, groups) = (group.rank(), self.settings.turns.groups);
+        if self.cratevised() > 0.0 {
+            self.photographs.set_rank(rank)?;
+        }
+        if let Some(reader) = &mut self.turns {
+            if !groups.is_multiple_of(u64::from(rank.world_size())) {
+                let needed = format!("a multiple of {}", rank.world_size());
+                return Err(indivisible("turns.groups", groups, rank, &needed));
+            }
+            reader.set_rank(rank)?;
+        }
+        self.rank = rank;
+        Ok(())
+    }
+
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
+        let mut losses = StepLosses::default();
+        let cratevised = self.cratevised();
+        if cratevised > 0.0 {
+            let batch = self.photographs.batch(step)?;
+            if let Some(loss) = self.networks.on_truth(&self.learner.model, &batch)? {
+                losses.terms.add_mean("cratevised", cratevised, loss.mean);
+                losses.spreads.insert(loss.head, loss.spread);
+            }
+        }
+        self.on_turns(&mut losses)?;
+        Ok(losses)
+    }
+
+    fn validate(&mut self) -> Result<Validation, TrainError> {
+        let own = self.learner.averaged_model()?;
+        let device = self.resources.device;
+        let mut figures = self
+            .held_out_samples
+            .figures(self.kind(), device, |batch| {
+                self.networks.sample_figures(&own, batch)
+            })?;
+        let mut damage = None;
+        if let Some(turns) = &mut self.held_out_turns {
+            damage = turns.take_damage();
+            figures.extend(turns.figures(|turns| self.networks.turn_figures(&own, turns))?);
+        }
+        Ok(Validation {
+            figures,
+            sheet: None,
+            damage,
+        })
+    }
+
+    fn cursor(&self) -> String {
+        let cursor = self.turns.as_ref().map(TurnReader::cursor);
+        // Two numbers: they can be written.
+        serde_json::to_string(&cursor).unwrap_or_default()
+    }
+
+    fn go_to(&mut self, cursor: &str) -> Result<(), String> {
+        let cursor: Option<relight_core::reader::Cursor> =
+            serde_json::from_str(cursor).map_err(|error| error.to_string())?;
+        match (&mut self.turns, cursor) {
+            (Some(reader), Some(cursor)) => reader.go_to(cursor).map_err(|error| error.to_string()),
+            (None, None) => Ok(()),
+            _ => Err("it was trained with turns, or without, and this run is not".to_owned()),
+        }
+    }
+}

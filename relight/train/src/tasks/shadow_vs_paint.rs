@@ -1,0 +1,113 @@
+//! Which part of a picture's darkness is paint, and which is lack of light: what the head for paint learns.
+//!
+//! A pixel of albedo R under a shading S is darker than the object's brightest place by `ln(R_b / R) + ln(S_b / S)`. The
+//! first summand's part of the sum is what is paint. Bright pixels say nothing, so each counts as its darkness does.
+
+use tch::Tensor;
+
+use super::losses::Mean;
+use crate::error::TrainError;
+
+/// Keeps logarithms of dark values finite.
+const FLOOR: f64 = 0.02;
+/// Pixels along a side over which the brightest place is a mean.
+const AROUND: i64 = 5;
+/// Darkness beyond this counts no more: a factor of e^2.
+const MAX_DARKNESS: f64 = 2.0;
+
+/// The darkness of a batch, `batch x 1 x height x width`.
+#[derive(Debug)]
+pub(crate) struct Darkness {
+    /// Which part of it is paint, 0..=1.
+    pub(crate) paint: Tensor,
+    /// How dark a pixel is: by how much it counts, 0 outside the mask.
+    pub(crate) weight: Tensor,
+}
+
+impl Darkness {
+    /// The darkness of albedo under a shading.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub(crate) fn new(
+        albedo: &Tensor,
+        shading: &Tensor,
+        mask: &Tensor,
+    ) -> Result<Self, TrainError> {
+        let grey = albedo.f_mean_dim([1_i64].as_slice(), true, None)?;
+        let (paint, shadow) = (darkness(&grey, mask)?, darkness(shading, mask)?);
+        let sum = paint.f_add(&shadow)?;
+        Ok(Self {
+            paint: paint.f_div(&sum.f_add_scalar(1e-4)?)?,
+            weight: sum.f_clamp_max(MAX_DARKNESS)?.f_mul(mask)?,
+        })
+    }
+
+    /// The cross entropy of an answer, a logit.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub(crate) fn cross_entropy(&self, logit: &Tensor) -> Result<Mean, TrainError> {
+        // softplus(x) - p x is the cross entropy of the probability p and the logit x.
+        let entropy = logit.f_softplus()?.f_sub(&self.paint.f_mul(logit)?)?;
+        let over = self.weight.f_sum(None)?.f_clamp_min(1.0)?;
+        let value = entropy.f_mul(&self.weight)?.f_sum(None)?.f_div(&over)?;
+        Ok(Mean { value, over })
+    }
+}
+
+/// By how much values are darker than the brightest place, as a logarithm, 0 and above.
+fn darkness(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
+    let inside = of.f_mul(mask)?;
+    let half = AROUND / 2;
+    let around = inside.f_avg_pool2d([AROUND; 2], [1; 2], [half; 2], false, true, None)?;
+    let brightest = around.f_amax([1_i64, 2, 3], true)?;
+    let log = |of: &Tensor| of.f_add_scalar(FLOOR)?.f_log();
+    Ok(log(&brightest)?.f_sub(&log(of)?)?.f_clamp_min(0.0)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use tch::{Device, Kind};
+
+    use super::*;
+
+    fn halves(left: f64, right: f64, channels: i64) -> Tensor {
+        let side =
+            |value: f64| Tensor::full([1, channels, 8, 8], value, (Kind::Double, Device::Cpu));
+        Tensor::cat(&[side(left), side(right)], 3)
+    }
+
+    fn at(of: &Tensor, x: i64) -> f64 {
+        of.double_value(&[0, 0, 4, x])
+    }
+
+    #[test]
+    fn black_print_in_even_light_is_paint_and_a_shadow_on_even_paint_is_not() {
+        let mask = halves(1.0, 1.0, 1);
+        let print = Darkness::new(&halves(0.8, 0.05, 3), &halves(1.0, 1.0, 1), &mask).unwrap();
+        assert!(at(&print.paint, 13) > 0.99 && at(&print.weight, 13) > 1.0);
+        assert!(at(&print.weight, 3) < 0.01);
+        let shadow = Darkness::new(&halves(0.8, 0.8, 3), &halves(1.5, 0.1, 1), &mask).unwrap();
+        assert!(at(&shadow.paint, 13) < 0.01 && at(&shadow.weight, 13) > 1.0);
+        let both = Darkness::new(&halves(0.8, 0.2, 3), &halves(1.6, 0.4, 1), &mask).unwrap();
+        assert!((at(&both.paint, 13) - 0.5).abs() < 0.05);
+    }
+
+    #[test]
+    fn the_right_answer_costs_least_and_what_is_outside_costs_nothing() {
+        let mask = halves(1.0, 0.0, 1);
+        let albedo = Tensor::cat(&[halves(0.8, 0.05, 3), halves(0.05, 0.8, 3)], 2);
+        let (shading, mask) = (
+            Tensor::ones_like(&albedo).narrow(1, 0, 1),
+            mask.repeat([1, 1, 2, 1]),
+        );
+        let truth = Darkness::new(&albedo, &shading, &mask).unwrap();
+        let cost = |left: f64, right: f64| {
+            let logit = halves(left, right, 1).repeat([1, 1, 2, 1]);
+            truth.cross_entropy(&logit).unwrap().value.double_value(&[])
+        };
+        assert!(cost(5.0, 0.0) < 0.02 && cost(-5.0, 0.0) > 3.0);
+        assert_eq!(cost(5.0, 0.0), cost(5.0, -9.0));
+    }
+}

@@ -1,0 +1,108 @@
+//! The losses of a step, by name.
+
+use std::collections::BTreeMap;
+
+use tch::Tensor;
+
+use super::losses::Mean;
+use crate::error::TrainError;
+
+/// Losses with their coefficients. Their weighted sum is what is descended.
+#[derive(Debug, Default)]
+pub struct LossTerms(Vec<Term>);
+
+#[derive(Debug)]
+struct Term {
+    name: &'static str,
+    coefficient: f64,
+    mean: Option<Mean>,
+}
+
+impl LossTerms {
+    /// Adds a loss that is a mean over the samples of the batch. Where several processes share a batch, each has as many
+    /// of them.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub fn add(
+        &mut self,
+        name: &'static str,
+        coefficient: f64,
+        value: Tensor,
+    ) -> Result<(), TrainError> {
+        let over = Tensor::f_from_slice(&[1.0_f64])?;
+        self.add_mean(name, coefficient, Mean { value, over });
+        Ok(())
+    }
+
+    /// Adds a loss that is a mean over something else, as over pixels. Several of one name are parts of one loss.
+    pub(crate) fn add_mean(&mut self, name: &'static str, coefficient: f64, mean: Mean) {
+        let mean = Some(mean);
+        self.0.push(Term {
+            name,
+            coefficient,
+            mean,
+        });
+    }
+
+    /// Says that there is nothing in the batch that this loss could be taken of.
+    pub(crate) fn add_nothing(&mut self, name: &'static str, coefficient: f64) {
+        let mean = None;
+        self.0.push(Term {
+            name,
+            coefficient,
+            mean,
+        });
+    }
+
+    /// Whether there is nothing to descend.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.iter().all(|term| term.mean.is_none())
+    }
+
+    /// What each loss is a mean over, and its value; 0 and 0 where there is nothing.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub(crate) fn means(&self) -> Result<Vec<(f64, f64)>, TrainError> {
+        let mean = |term: &Term| {
+            term.mean.as_ref().map_or(Ok((0.0, 0.0)), |mean| {
+                Ok((f64::try_from(&mean.over)?, f64::try_from(&mean.value)?))
+            })
+        };
+        self.0.iter().map(mean).collect()
+    }
+
+    /// The weighted sum, in which each loss counts the part that `parts` says: 1 for all of it. None where there is
+    /// nothing.
+    ///
+    /// # Errors
+    /// [`TrainError::Torch`].
+    pub(crate) fn total(&self, parts: &[f64]) -> Result<Option<Tensor>, TrainError> {
+        let mut total: Option<Tensor> = None;
+        for (term, part) in self.0.iter().zip(parts) {
+            if let Some(mean) = &term.mean {
+                let loss = mean.value.f_mul_scalar(term.coefficient * part)?;
+                total = Some(match total {
+                    Some(total) => total.f_add(&loss)?,
+                    None => loss,
+                });
+            }
+        }
+        Ok(total)
+    }
+
+    /// Values in the order of [`Self::means`] by name, each times its coefficient, and their sum as `loss`.
+    pub(crate) fn named(&self, values: &[Option<f64>]) -> BTreeMap<String, f64> {
+        let mut named = BTreeMap::new();
+        for (term, value) in self.0.iter().zip(values) {
+            if let Some(value) = value {
+                let weighted = term.coefficient * value;
+                *named.entry(format!("loss/{}", term.name)).or_default() += weighted;
+                *named.entry("loss".to_owned()).or_default() += weighted;
+            }
+        }
+        named
+    }
+}

@@ -1,0 +1,316 @@
+//! The run that trains the network of whole turns.
+
+use std::path::Path;
+
+use tch::{Kind, Tensor, no_grad};
+
+use super::losses::{Mean, angular_degrees, chord};
+use super::terms::LossTerms;
+use crate::data::turn_samples::{TurnBatch, TurnViews};
+use crate::distributed::process_group::{ProcessGroup, indivisible};
+use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
+use crate::engine::trainable::Learner;
+use crate::error::TrainError;
+use crate::settings::{TurnNetworkSettings, first_difference};
+use relight_core::reader::Rank;
+use relight_photo::nets::{LOG_MEANS, Weights, turn_network};
+use relight_synth::{DrawnTurn, LeftOut, stream};
+
+/// What the expected error counts beside the normals.
+const EXPECTED_ERROR: f64 = 0.05;
+/// What the albedo counts beside them.
+const ALBEDO: f64 = 0.5;
+/// Range of the logarithm of the expected chord while training.
+const LOG_CHORD: (f64, f64) = (-4.0, 1.0);
+/// Turns of a batch of validation.
+const VALIDATION_BATCH: usize = 8;
+/// Expected errors at which validation says how many pixels keep them, degrees.
+const WITHIN_DEG: [(f64, &str); 2] = [(10.0, "within_10"), (20.0, "within_20")];
+
+/// Training of the network of whole turns.
+#[derive(Debug)]
+pub struct TurnNetworkTask {
+    settings: TurnNetworkSettings,
+    resources: Resources,
+    learner: Learner,
+    training: TurnViews,
+    validation: TurnViews,
+    rank: Rank,
+}
+
+impl TurnNetworkTask {
+    /// Begins with `weights`, or with random ones. Views are kept in `views`, a folder.
+    ///
+    /// # Errors
+    /// Settings out of range, files that cannot be read, weights that do not fit.
+    pub fn new(
+        settings: TurnNetworkSettings,
+        views: &Path,
+        resources: Resources,
+        weights: Option<&Weights>,
+    ) -> Result<Self, TrainError> {
+        settings.check()?;
+        let graph = turn_network();
+        let learner = Learner::new(graph, weights, &settings.run, resources.device)?;
+        Ok(Self {
+            training: TurnViews::for_training(&settings.data, views, settings.run.seed)?,
+            validation: TurnViews::for_validation(&settings.data, views)?,
+            settings,
+            resources,
+            learner,
+            rank: Rank::ONLY,
+        })
+    }
+
+    /// The views and seeds of this process's part of a step.
+    fn turns_of(&self, step: u64) -> Vec<(u64, u64)> {
+        let seed = stream(stream(self.settings.run.seed, 43), step);
+        let views = self.settings.data.views_at(step);
+        let processes = u64::from(self.rank.world_size());
+        (0..self.settings.run.batch)
+            .filter(|number| number % processes == u64::from(self.rank.index()))
+            .map(|number| {
+                let seed = stream(seed, number);
+                (stream(seed, 0) % views, seed)
+            })
+            .collect()
+    }
+
+    fn is_coarse(&self, step: u64) -> bool {
+        (step as f64) < self.settings.data.coarse_part * self.settings.run.steps as f64
+    }
+}
+
+/// Unit normals, and the logarithm of the chord by which they are expected to be off.
+fn answered(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
+    let normals = answer.f_narrow(1, 0, 3)?;
+    let length = normals
+        .f_square()?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+        .f_add_scalar(1e-8)?
+        .f_sqrt()?;
+    let log_chord = answer
+        .f_narrow(1, 3, 1)?
+        .f_clamp(LOG_CHORD.0, LOG_CHORD.1)?;
+    Ok((normals.f_div(&length)?, log_chord))
+}
+
+/// How far the logarithm of the albedo is off at each pixel and channel, 0 outside the masks. Each channel of a turn is in a
+/// unit of its own: that in which it is off by 0 in the mean.
+fn albedo_errors(answer: &Tensor, batch: &TurnBatch) -> Result<Tensor, TrainError> {
+    let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
+    let errors = answer
+        .f_add(&means)?
+        .f_sub(&batch.log_albedo)?
+        .f_mul(&batch.mask)?;
+    let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
+    let covered = over(&batch.mask)?.f_clamp_min(1.0)?;
+    let units = over(&errors)?.f_div(&covered)?;
+    Ok(errors.f_sub(&units)?.f_mul(&batch.mask)?)
+}
+
+/// The mean amount of these errors.
+fn albedo_error(errors: &Tensor, batch: &TurnBatch) -> Result<Mean, TrainError> {
+    let channels = errors.size()[1] as f64;
+    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
+    let sum = errors.f_abs()?.f_sum(None)?;
+    let value = sum.f_div(&over)?.f_div_scalar(channels)?;
+    Ok(Mean { value, over })
+}
+
+/// Minus the logarithm of the chord's likelihood, where it is distributed exponentially with the expected mean.
+fn expected_error(
+    normals: &Tensor,
+    log_chord: &Tensor,
+    batch: &TurnBatch,
+) -> Result<Mean, TrainError> {
+    let found = normals.f_detach()?;
+    let chord = found
+        .f_sub(&batch.normals)?
+        .f_square()?
+        .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+        .f_sqrt()?;
+    let each = chord
+        .f_mul(&log_chord.f_neg()?.f_exp()?)?
+        .f_add(log_chord)?;
+    let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
+    let value = each.f_mul(&batch.mask)?.f_sum(None)?.f_div(&over)?;
+    Ok(Mean { value, over })
+}
+
+impl TrainingTask for TurnNetworkTask {
+    fn name(&self) -> &'static str {
+        "turn"
+    }
+
+    fn settings(&self) -> String {
+        // Numbers, names and paths: all of them can be written.
+        toml::to_string(&self.settings).unwrap_or_default()
+    }
+
+    fn differing_setting(&self, other: &str) -> Option<String> {
+        first_difference(&self.settings, other)
+    }
+
+    fn inputs(&self) -> Result<String, TrainError> {
+        Ok(format!("turns of recipe {}\n", DrawnTurn::RECIPE))
+    }
+
+    fn left_out(&self) -> &[LeftOut] {
+        self.training.left_out()
+    }
+
+    fn learner(&mut self) -> &mut Learner {
+        &mut self.learner
+    }
+
+    fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
+        let (batch, rank) = (self.settings.run.batch, group.rank());
+        if !batch.is_multiple_of(u64::from(rank.world_size())) {
+            return Err(indivisible(
+                "run.batch",
+                batch,
+                rank,
+                "a multiple of their number",
+            ));
+        }
+        self.rank = rank;
+        Ok(())
+    }
+
+    fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
+        let place = (Kind::Float, self.resources.device);
+        let batch = self
+            .training
+            .batch(&self.turns_of(step), self.is_coarse(step), place)?;
+        let answer = self.learner.model.forward(&batch.input)?;
+        let (normals, log_chord) = answered(&answer[0])?;
+        let mut terms = LossTerms::default();
+        terms.add_mean(
+            "normals",
+            1.0,
+            chord(&normals, &batch.normals, &batch.mask)?,
+        );
+        let expected = expected_error(&normals, &log_chord, &batch)?;
+        terms.add_mean("expected_error", EXPECTED_ERROR, expected);
+        let albedo = albedo_error(&albedo_errors(&answer[1], &batch)?, &batch)?;
+        terms.add_mean("albedo", ALBEDO, albedo);
+        Ok(StepLosses {
+            terms,
+            ..StepLosses::default()
+        })
+    }
+
+    fn validate(&mut self) -> Result<Validation, TrainError> {
+        let model = self.learner.averaged_model()?;
+        let mut tally = ValidationTally::default();
+        let count = self.settings.data.validation;
+        let turns: Vec<(u64, u64)> = (0..count).map(|k| (k, stream(44, k))).collect();
+        for turns in turns.chunks(VALIDATION_BATCH) {
+            let place = (Kind::Float, self.resources.device);
+            let batch = self.validation.batch(turns, false, place)?;
+            no_grad(|| {
+                let answer = model.forward(&batch.input)?;
+                let (normals, log_chord) = answered(&answer[0])?;
+                tally.add(&batch, &normals, &log_chord)?;
+                tally.add_albedo(&batch, &answer[1])
+            })?;
+        }
+        Ok(Validation {
+            figures: tally.figures(),
+            ..Validation::default()
+        })
+    }
+}
+
+/// Errors over the turns of a validation.
+#[derive(Debug, Default)]
+struct ValidationTally {
+    /// The mean error of each turn, degrees.
+    means: Vec<f64>,
+    /// The error of each pixel, and by how much it is expected to be off, degrees.
+    pixels: Vec<(f32, f32)>,
+    /// The relative squared error of each turn's albedo, in the best unit of each channel.
+    albedo: Vec<f64>,
+}
+
+impl ValidationTally {
+    fn add(
+        &mut self,
+        batch: &TurnBatch,
+        normals: &Tensor,
+        log_chord: &Tensor,
+    ) -> Result<(), TrainError> {
+        for k in 0..batch.mask.size()[0] {
+            let part = |of: &Tensor| of.f_narrow(0, k, 1);
+            let mask = part(&batch.mask)?;
+            let error = angular_degrees(&part(normals)?, &part(&batch.normals)?, &mask)?;
+            self.means.push(f64::try_from(error)?);
+            let inside = mask.f_gt(0.5)?;
+            let dots = part(normals)?
+                .f_mul(&part(&batch.normals)?)?
+                .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
+                .f_clamp(-1.0, 1.0)?;
+            let errors = dots.f_acos()?.f_rad2deg()?.f_masked_select(&inside)?;
+            let chords = part(log_chord)?
+                .f_exp()?
+                .f_mul_scalar(0.5)?
+                .f_clamp_max(1.0)?;
+            let expected = chords
+                .f_asin()?
+                .f_rad2deg()?
+                .f_mul_scalar(2.0)?
+                .f_masked_select(&inside)?;
+            let (errors, expected) = (
+                Vec::<f32>::try_from(errors)?,
+                Vec::<f32>::try_from(expected)?,
+            );
+            self.pixels.extend(errors.into_iter().zip(expected));
+        }
+        Ok(())
+    }
+
+    fn add_albedo(&mut self, batch: &TurnBatch, answer: &Tensor) -> Result<(), TrainError> {
+        let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
+        let within = |of: &Tensor| of.f_exp()?.f_mul(&batch.mask);
+        let (found, right) = (within(&answer.f_add(&means)?)?, within(&batch.log_albedo)?);
+        let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
+        let square = over(&found.f_square()?)?.f_clamp_min(1e-12)?;
+        let unit = over(&found.f_mul(&right)?)?.f_div(&square)?;
+        let apart = found.f_mul(&unit)?.f_sub(&right)?.f_square()?;
+        let all = |of: &Tensor| of.f_sum_dim_intlist([1_i64, 2, 3].as_slice(), false, None);
+        let error = all(&apart)?.f_div(&all(&right.f_square()?)?.f_clamp_min(1e-12)?)?;
+        self.albedo
+            .extend(Vec::<f64>::try_from(error.f_to_kind(Kind::Double)?)?);
+        Ok(())
+    }
+
+    fn figures(mut self) -> std::collections::BTreeMap<String, f64> {
+        let count = self.means.len().max(1) as f64;
+        let mean = self.means.iter().sum::<f64>() / count;
+        let square = self.means.iter().map(|m| (m - mean).powi(2)).sum::<f64>();
+        let mut figures = std::collections::BTreeMap::from([
+            ("normals_deg".to_owned(), mean),
+            ("standard_error".to_owned(), square.sqrt() / count),
+            ("albedo".to_owned(), self.albedo.iter().sum::<f64>() / count),
+        ]);
+        for (limit, name) in WITHIN_DEG {
+            let expected = self
+                .pixels
+                .iter()
+                .filter(|(_, expected)| f64::from(*expected) <= limit);
+            let (all, kept) = expected.fold((0.0, 0.0), |(all, kept), (error, _)| {
+                let is_kept = f64::from(*error) <= limit;
+                (all + 1.0, kept + f64::from(u8::from(is_kept)))
+            });
+            figures.insert(name.to_owned(), if all > 0.0 { kept / all } else { 1.0 });
+        }
+        self.pixels.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let median = self
+            .pixels
+            .get(self.pixels.len() / 2)
+            .map_or(0.0, |pixel| pixel.0);
+        figures.insert("median_deg".to_owned(), f64::from(median));
+        figures
+    }
+}
