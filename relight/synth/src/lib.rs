@@ -30,41 +30,33 @@
 //! # Ok::<(), relight_synth::SynthError>(())
 //! ```
 
-mod camera;
 mod error;
-mod finish;
-mod folder;
 mod geometry;
 mod library;
 mod lighting;
 mod mesh;
 mod noise;
-mod object;
 mod pack;
 mod paint;
-mod png;
 mod random;
-mod recipe;
-mod sample;
+mod samples;
 mod shape;
-mod studio;
 mod texture;
 mod transfer;
 mod turn;
 mod vectors;
-mod view;
 
 pub use error::SynthError;
-pub use folder::{SynthTally, write_samples};
 pub use geometry::GBuffer;
 pub use library::{Folders, LeftOut, Library, made_panoramas};
 pub use lighting::{BlinnPhong, LightKind, Lighting, Material, Panoramas, Shaded, SyntheticScene};
 pub use mesh::Mesh;
-pub use object::{ObjectSource, SyntheticView};
 pub use pack::{LIBRARY_EXTENSION, LibraryEntry, LibrarySources, LibrarySummary, build_library};
 pub use random::stream;
-pub use recipe::Recipe;
-pub use sample::SynthSample;
+pub use samples::folder::{SynthTally, write_samples};
+pub use samples::object::{ObjectSource, SyntheticView};
+pub use samples::recipe::Recipe;
+pub use samples::sample::SynthSample;
 pub use shape::ShapeKind;
 pub use transfer::{
     DrawnTurn, PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint, PhotoView,

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 
 use super::SynthError;
 use super::lighting::Panoramas;
+use super::lighting::studio::Surroundings;
 use super::mesh::{Mesh, NOT_READ};
 use super::pack::{self, Contents, Wanted};
-use super::studio::Surroundings;
 use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;

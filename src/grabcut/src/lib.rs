@@ -47,41 +47,27 @@
 //! Of the result the largest 8-connected component is kept, and those that have three tenths of its area.
 //! Small holes are filled, except those in which seeds mark background.
 
-mod backdrop;
 mod bitmap;
 mod check;
 mod cleanup;
-mod cut_energy;
+mod cut;
 mod error;
-mod grab_cut;
 mod hints;
-mod initial;
-mod lab;
-mod max_flow;
-mod mixture;
 mod outline;
-mod parts;
 mod preview;
-mod pyramid;
-mod registration;
-mod rim;
 mod segment;
 mod settings;
-mod shape_faults;
-mod strokes;
 mod turn;
-mod turntable;
 mod warning;
-mod witness;
 
-pub use check::{DoubtfulRegion, MaskCheck, ShapeCheck};
+pub use check::fit::{DoubtfulRegion, MaskCheck, ShapeCheck};
+pub use cut::grab_cut::ITERATIONS;
+pub use cut::pyramid::half_image;
 pub use error::MaskError;
-pub use grab_cut::ITERATIONS;
-pub use hints::{Hints, Mark, Seeds};
+pub use hints::hints::{Hints, Mark, Seeds};
+pub use hints::strokes::{Brush, Stroke, Strokes};
 pub use outline::outline;
 pub use preview::{grey_png, preview, rgb_png};
-pub use pyramid::half_image;
 pub use segment::{Mask, MaskStatistics, check_hints, clean_cut, segment, segment_with};
 pub use settings::{Effort, MAX_PIXELS, MIN_SIDE, SegmentSettings};
-pub use strokes::{Brush, Stroke, Strokes};
-pub use turn::{MIN_TURN_FRAMES, TURN_FRAMES, TurnFrames, TurnStatistics};
+pub use turn::statistics::{MIN_TURN_FRAMES, TURN_FRAMES, TurnFrames, TurnStatistics};

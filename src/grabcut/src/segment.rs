@@ -5,14 +5,16 @@ use relit_data::geometry::Rect;
 use serde::{Deserialize, Serialize};
 
 use super::bitmap::{Bitmap, Component, Connectivity};
-use super::cut_energy::CutEnergy;
-use super::grab_cut::Label;
-use super::initial::InitialLabels;
-use super::pyramid::FirstModels;
+use super::cut::energy::CutEnergy;
+use super::cut::grab_cut::Label;
+use super::cut::pyramid;
+use super::cut::pyramid::FirstModels;
+use super::hints::trimap::InitialLabels;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
-use super::turn::{self, TurnStatistics};
+use super::turn::statistics;
+use super::turn::statistics::TurnStatistics;
 use super::warning::{NOTHING_MOVES, OPENING, filled, hole_filled, turn_dropped, warnings};
-use super::{Effort, Hints, Mark, MaskError, SegmentSettings, cleanup, pyramid};
+use super::{Effort, Hints, Mark, MaskError, SegmentSettings, cleanup};
 
 /// On one frame a hole of this share of the object may be a highlight, and is filled.
 const FILLED_OF_FRAME: f64 = 0.01;

@@ -86,7 +86,7 @@ impl PageScene {
         }
         match scene.check() {
             // A background alone is a picture too.
-            Ok(()) | Err(InsertError::Objects(0)) => Ok(scene),
+            Ok(()) | Err(InsertError::Objects { count: 0, .. }) => Ok(scene),
             Err(fault) => Err(fault.into()),
         }
     }

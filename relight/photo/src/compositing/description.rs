@@ -192,9 +192,10 @@ impl SceneDescription {
         }
         match self.objects.len() {
             1..=MAX_OBJECTS => Ok(()),
-            count => Err(InsertError::Input(format!(
-                "there are {count} objects: give [[object]] 1 to {MAX_OBJECTS} times"
-            ))),
+            count => Err(InsertError::Objects {
+                count,
+                most: MAX_OBJECTS,
+            }),
         }
     }
 }

@@ -34,6 +34,14 @@ pub enum InsertError {
     /// A text describes no scene, the parts of one cannot be used together, or a video of it cannot be read or written.
     #[error("{0}")]
     Input(String),
+    /// A scene has a number of objects that cannot be.
+    #[error("there are {count} objects: give [[object]] 1 to {most} times")]
+    Objects {
+        /// How many there are.
+        count: usize,
+        /// How many there can be.
+        most: usize,
+    },
     /// A captured object cannot be read.
     #[error(transparent)]
     Captured(#[from] CapturedObjectError),

@@ -17,6 +17,7 @@ mod environment;
 mod lamp;
 mod scene;
 mod shaded;
+mod studio;
 #[cfg(test)]
 mod tests;
 

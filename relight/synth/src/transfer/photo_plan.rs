@@ -8,9 +8,9 @@ use relight_core::light::{Direction, Order, ShLight, basis};
 use super::cast::table_frame;
 use super::photo_view::{PhotoView, ViewLamp};
 use super::rooms::{Rooms, rotation};
-use crate::camera::{CameraModel, Response};
 use crate::lighting::{BlinnPhong, tint};
 use crate::random::Random;
+use crate::samples::camera::{CameraModel, Response};
 
 /// Part of the photographs whose main light is a lamp.
 const BY_LAMP: f32 = 0.8;

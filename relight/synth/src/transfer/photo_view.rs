@@ -9,14 +9,14 @@ use relight_core::light::Order;
 
 use super::BOUNCE_COEFFICIENTS;
 use super::cast::cast_pixels;
-use crate::finish::Finish;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::Library;
 use crate::lighting::SyntheticLamp;
 use crate::mesh::Mesh;
-use crate::object::ObjectSource;
 use crate::random::{Random, stream};
-use crate::recipe::Recipe;
+use crate::samples::finish::Finish;
+use crate::samples::object::ObjectSource;
+use crate::samples::recipe::Recipe;
 use crate::turn::Stand;
 
 /// Part of the closed objects that stand on a black table.

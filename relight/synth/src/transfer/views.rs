@@ -5,11 +5,11 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::cast::{RadianceTransfer, TransferFinish};
-use crate::finish::Finish;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::Library;
 use crate::random::{Random, stream};
-use crate::recipe::Recipe;
+use crate::samples::finish::Finish;
+use crate::samples::recipe::Recipe;
 use crate::turn::{Stand, standing_object};
 
 /// The camera over the plate, degrees.

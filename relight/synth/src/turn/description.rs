@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::camera::CameraModel;
-use crate::finish::Finish;
 use crate::lighting::Lighting;
-use crate::object::ObjectSource;
-use crate::recipe::Recipe;
-use crate::sample::Whites;
-use crate::view::{Pose, Projection};
+use crate::samples::camera::CameraModel;
+use crate::samples::finish::Finish;
+use crate::samples::object::ObjectSource;
+use crate::samples::recipe::Recipe;
+use crate::samples::sample::Whites;
+use crate::samples::view::{Pose, Projection};
 
 /// How turns are made.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use relit_data::durable::publish;
 
 use super::simulated::{RenderedFrame, SimulatedTurn};
 use crate::SynthError;
-use crate::png::{Sixteen, encode_sixteen};
+use crate::samples::png::{Sixteen, encode_sixteen};
 
 /// The folder of the ground truth of all turns.
 const TRUTH: &str = "truth";

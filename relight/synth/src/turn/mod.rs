@@ -27,9 +27,9 @@ use relit_data::shard::{
 };
 
 use super::SynthError;
-use super::folder::{SynthTally, holds_samples};
 use super::library::Library;
-use super::sample::mask;
+use super::samples::folder::{SynthTally, holds_samples};
+use super::samples::sample::mask;
 use ground_truth::GroundTruthFolder;
 use simulated::{RenderedFrame, SimulatedTurn};
 pub(crate) use stand::{Stand, standing_object};

@@ -12,16 +12,16 @@ use relit_data::shard::{Digest, FrameRecord, Sample, SourceVideo};
 use super::description::{FrameTruth, TurnDescription, TurnRecipe};
 use super::stand::{Stand, standing_object};
 use crate::SynthError;
-use crate::camera::CameraModel;
-use crate::finish::Finish;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::Library;
 use crate::lighting::{Environment, Lighting, Material, Method, Shaded, SyntheticScene};
 use crate::mesh::Mesh;
-use crate::png::{Sixteen, encode_sixteen};
 use crate::random::{Random, stream};
-use crate::recipe::{AMBIENT_RAYS, Recipe};
-use crate::sample::{Whites, photograph};
+use crate::samples::camera::CameraModel;
+use crate::samples::finish::Finish;
+use crate::samples::png::{Sixteen, encode_sixteen};
+use crate::samples::recipe::{AMBIENT_RAYS, Recipe};
+use crate::samples::sample::{Whites, photograph};
 use relight_core::light::{Direction, Order, Rotation, ShLight};
 
 /// Frames from which the exposure is found.

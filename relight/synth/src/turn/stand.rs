@@ -8,10 +8,10 @@ use glam::{Affine3A, Vec3};
 use crate::geometry::Disc;
 use crate::library::Library;
 use crate::mesh::Mesh;
-use crate::object::ObjectSource;
 use crate::random::Random;
-use crate::recipe::Recipe;
-use crate::view::{Pose, Projection};
+use crate::samples::object::ObjectSource;
+use crate::samples::recipe::Recipe;
+use crate::samples::view::{Pose, Projection};
 
 /// The plate's radius, in halves of the picture's width.
 const PLATE: f32 = 2.5;

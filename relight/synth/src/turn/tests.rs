@@ -9,10 +9,10 @@ use rayon::ThreadPoolBuilder;
 use relit_data::shard::{FrameRecord, ShardReader, decode_rgb, verify};
 
 use super::*;
-use crate::camera::CameraModel;
 use crate::library::Folders;
 use crate::lighting::LightKind;
-use crate::recipe::Recipe;
+use crate::samples::camera::CameraModel;
+use crate::samples::recipe::Recipe;
 use crate::write_samples;
 
 fn turns(seed: u64) -> TurnRecipe {

@@ -6,9 +6,9 @@
 use image::RgbImage;
 use relit_data::geometry::Rect;
 
-use super::bitmap::Bitmap;
 use super::grab_cut::{DIRECTIONS_AHEAD, SMOOTHNESS, neighbour};
 use super::max_flow::DIRECTIONS;
+use crate::bitmap::Bitmap;
 
 /// Bits of a channel that a histogram distinguishes.
 const BITS: usize = 4;
@@ -19,7 +19,7 @@ const AROUND: f64 = 0.3;
 const SIDE: f64 = 600.0;
 
 /// An image, as far as cuts in it are measured.
-pub(super) struct CutEnergy<'a> {
+pub(crate) struct CutEnergy<'a> {
     frame: &'a RgbImage,
     size: (usize, usize),
     /// The part in which colours count.
@@ -28,7 +28,7 @@ pub(super) struct CutEnergy<'a> {
 }
 
 impl<'a> CutEnergy<'a> {
-    pub(super) fn new(frame: &'a RgbImage, rect: Rect) -> Self {
+    pub(crate) fn new(frame: &'a RgbImage, rect: Rect) -> Self {
         let (width, height) = frame.dimensions();
         let grow = |side: u32| (f64::from(side) * AROUND) as u32;
         let (dx, dy) = (grow(rect.w), grow(rect.h));
@@ -54,7 +54,7 @@ impl<'a> CutEnergy<'a> {
     }
 
     /// The energy of a cut, in units of the log-likelihood of a pixel of the part.
-    pub(super) fn of(&self, object: &Bitmap) -> f64 {
+    pub(crate) fn of(&self, object: &Bitmap) -> f64 {
         let mut histograms = [vec![0_u32; 1 << (3 * BITS)], vec![0_u32; 1 << (3 * BITS)]];
         let (columns, rows) = (
             i64::from(self.part.x)..self.part.right(),

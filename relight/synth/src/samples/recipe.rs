@@ -5,21 +5,21 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
-use super::SynthError;
 use super::camera::CameraModel;
 use super::finish::Finish;
-use super::geometry::{GBuffer, Occluder};
-use super::library::Library;
-use super::lighting::{LightKind, Lighting, Material, SyntheticScene};
-use super::mesh::Mesh;
 use super::object::{ObjectSource, SyntheticView};
-use super::random::{Random, stream};
 use super::sample::{Description, SynthSample};
-use super::shape::ShapeKind;
 use super::view::{Pose, Projection};
+use crate::SynthError;
+use crate::geometry::{GBuffer, Occluder};
+use crate::library::Library;
+use crate::lighting::{LightKind, Lighting, Material, SyntheticScene};
+use crate::mesh::Mesh;
+use crate::random::{Random, stream};
+use crate::shape::ShapeKind;
 
 /// Rays a pixel by which a scene learns how much of the sky it sees.
-pub(super) const AMBIENT_RAYS: u32 = 16;
+pub(crate) const AMBIENT_RAYS: u32 = 16;
 /// Part of the objects that are meshes, where there are any.
 const MESHES: f32 = 0.25;
 /// Least part of the picture that an object covers, where another view of it covers more.

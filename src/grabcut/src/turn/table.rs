@@ -1,6 +1,6 @@
 //! The turntable itself: still, dark, without colour or structure, below the object.
 
-use super::bitmap::{Bitmap, Connectivity};
+use crate::bitmap::{Bitmap, Connectivity};
 
 /// Largest average brightness, as a feature.
 const MAX_LIGHT: f32 = 50.0 / 3.0;
@@ -29,19 +29,19 @@ const SHADOW_REACH: f64 = 0.08;
 
 /// The table, as far as it is seen.
 #[derive(Debug)]
-pub(super) struct Turntable {
+pub(crate) struct Turntable {
     /// Its plain surface.
-    pub(super) surface: Bitmap,
+    pub(crate) surface: Bitmap,
     /// Darker pixels of the same colour beside it: where the object shadows it all the time.
-    pub(super) shadow: Bitmap,
+    pub(crate) shadow: Bitmap,
     /// All that is as dark, still and plain as a table, connected with its surface or not.
-    pub(super) plain: Bitmap,
+    pub(crate) plain: Bitmap,
 }
 
 /// The table, from the features of a turn (average L, a, b, changes of light and colour)
 /// and the largest contrast of each pixel to its neighbours. Empty if none is
 /// found.
-pub(super) fn find_turntable(
+pub(crate) fn find_turntable(
     features: &[[f32; 5]],
     contrast: &[f32],
     size: (usize, usize),

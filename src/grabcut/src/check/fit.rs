@@ -7,9 +7,9 @@ use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
 use serde::Serialize;
 
-use super::bitmap::{Bitmap, Component, Connectivity};
-use super::turn::TurnField;
-use super::{Effort, Hints, MaskError, SegmentSettings, TurnStatistics, segment_with};
+use crate::bitmap::{Bitmap, Component, Connectivity};
+use crate::turn::statistics::TurnField;
+use crate::{Effort, Hints, MaskError, SegmentSettings, TurnStatistics, segment_with};
 
 /// Narrower differences of the shape are differences of the edge, pixels of the turn's statistics.
 const NARROW: usize = 2;

@@ -13,7 +13,7 @@ const POWER_ROUNDS: usize = 12;
 
 /// A mixture of Gaussians in `D` dimensions.
 #[derive(Debug, Clone)]
-pub(super) struct Mixture<const D: usize> {
+pub(crate) struct Mixture<const D: usize> {
     components: Vec<Gaussian<D>>,
     /// Added to the variances: the spread of equal surfaces.
     floor: f64,
@@ -38,14 +38,14 @@ struct Moments<const D: usize> {
 
 impl<const D: usize> Mixture<D> {
     /// Learns `count` components, or fewer if the samples have fewer values.
-    pub(super) fn learn(samples: &[[f32; D]], count: usize, floor: f64) -> Self {
+    pub(crate) fn learn(samples: &[[f32; D]], count: usize, floor: f64) -> Self {
         let centres = split(samples, count);
         let nearest = |sample: &[f32; D]| nearest(&centres, sample);
         Self::from_assignment(samples, centres.len(), floor, nearest)
     }
 
     /// Learns again: each sample belongs to the component under which it is most likely.
-    pub(super) fn refine(&mut self, samples: &[[f32; D]]) {
+    pub(crate) fn refine(&mut self, samples: &[[f32; D]]) {
         let best = |sample: &[f32; D]| self.best(sample);
         let refined = Self::from_assignment(samples, self.components.len(), self.floor, best);
         if !refined.components.is_empty() {
@@ -54,7 +54,7 @@ impl<const D: usize> Mixture<D> {
     }
 
     /// The negative logarithm of the likelihood, without the constant that all mixtures share.
-    pub(super) fn cost(&self, sample: &[f32; D]) -> f32 {
+    pub(crate) fn cost(&self, sample: &[f32; D]) -> f32 {
         let logs = || self.components.iter().map(|gaussian| gaussian.log(sample));
         let most = logs().fold(f32::NEG_INFINITY, f32::max);
         if most == f32::NEG_INFINITY {

@@ -4,9 +4,9 @@
 use glam::{Affine3A, Mat3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::mesh::Mesh;
-use super::random::Random;
-use super::shape::ShapeKind;
+use crate::mesh::Mesh;
+use crate::random::Random;
+use crate::shape::ShapeKind;
 
 /// How points become places in the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -23,7 +23,7 @@ pub(crate) enum Projection {
 
 impl Projection {
     /// Place in the picture, -1..=1, and how much larger things appear there than at z = 0.
-    pub(super) fn project(self, point: Vec3) -> (Vec2, f32) {
+    pub(crate) fn project(self, point: Vec3) -> (Vec2, f32) {
         let magnification = match self {
             Self::Orthographic => 1.0,
             Self::Perspective { distance } => distance / (distance - point.z).max(1e-3),
@@ -32,7 +32,7 @@ impl Projection {
     }
 
     /// The direction from a point to the eye.
-    pub(super) fn towards_eye(self, point: Vec3) -> Vec3 {
+    pub(crate) fn towards_eye(self, point: Vec3) -> Vec3 {
         match self {
             Self::Orthographic => Vec3::Z,
             Self::Perspective { distance } => (Vec3::Z * distance - point).normalize_or(Vec3::Z),
@@ -66,7 +66,7 @@ impl Pose {
     }
 
     /// A random pose for an object of a kind; meshes from files stand mostly upright.
-    pub(super) fn draw(random: &mut Random, kind: Option<ShapeKind>) -> Self {
+    pub(crate) fn draw(random: &mut Random, kind: Option<ShapeKind>) -> Self {
         let turn = match kind {
             Some(kind) if kind.is_open() => facing(random),
             _ if random.chance(0.6) => upright(random),

@@ -4,9 +4,9 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::noise::Noise;
-use super::random::{Random, stream};
-use super::vectors::vector;
+use crate::noise::Noise;
+use crate::random::{Random, stream};
+use crate::vectors::vector;
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{LightError, Panorama};
 

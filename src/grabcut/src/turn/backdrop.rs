@@ -6,9 +6,9 @@
 //! Where the two ends of the rows differ (no whole turn, or a second object at the border), the
 //! evidence is weak. Ends that show the table are left to the search for the table.
 
-use super::bitmap::Bitmap;
-use super::grab_cut::squared_distance;
-use super::turntable::Turntable;
+use super::table::Turntable;
+use crate::bitmap::Bitmap;
+use crate::cut::grab_cut::squared_distance;
 
 /// Share of the width from which each end of a row is averaged.
 const END: f64 = 0.03;
@@ -27,18 +27,18 @@ const RIM: f64 = 0.014;
 
 /// Evidence from the rows' ends and the table.
 #[derive(Debug)]
-pub(super) struct Backdrop {
+pub(crate) struct Backdrop {
     /// The pixels that are background at first.
-    pub(super) alike: Bitmap,
+    pub(crate) alike: Bitmap,
     /// What each pixel's position says, in units of the log-likelihood: 0 for nothing, negative for
     /// background.
-    pub(super) evidence: Vec<f32>,
+    pub(crate) evidence: Vec<f32>,
 }
 
 impl Backdrop {
     /// From the features of an image of `size` (average L, a, b, then the changes of light and colour)
     /// and the table.
-    pub(super) fn new(features: &[[f32; 5]], table: &Turntable, size: (usize, usize)) -> Self {
+    pub(crate) fn new(features: &[[f32; 5]], table: &Turntable, size: (usize, usize)) -> Self {
         let ends = Ends::new(features, &table.surface, size);
         let distance: Vec<f32> = (0..features.len())
             .map(|at| ends.distance(&features[at], at / size.0))

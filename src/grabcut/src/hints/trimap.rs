@@ -2,25 +2,25 @@
 
 use relit_data::geometry::Rect;
 
-use super::grab_cut::Label;
-use super::pyramid::FirstModels;
-use super::{Hints, Mark, MaskError};
+use crate::cut::grab_cut::Label;
+use crate::cut::pyramid::FirstModels;
+use crate::{Hints, Mark, MaskError};
 
 /// Share of a rectangle that is taken for background at first: a person leaves about half free.
 const SHARE_OF_RECT: f64 = 0.5;
 
 /// The labels with which the cut starts.
 #[derive(Debug)]
-pub(super) struct InitialLabels {
-    pub(super) labels: Vec<Label>,
-    pub(super) first: FirstModels,
+pub(crate) struct InitialLabels {
+    pub(crate) labels: Vec<Label>,
+    pub(crate) first: FirstModels,
     /// The part of the hinted rectangle that is inside the frame.
-    pub(super) rect: Option<Rect>,
+    pub(crate) rect: Option<Rect>,
 }
 
 impl InitialLabels {
     /// The labels that the hints give to a frame of `size`.
-    pub(super) fn new(hints: &Hints, size: (u32, u32)) -> Result<Self, MaskError> {
+    pub(crate) fn new(hints: &Hints, size: (u32, u32)) -> Result<Self, MaskError> {
         let rect = hints.rect.map(|rect| clip(rect, size)).transpose()?;
         let seeds = hints.seeds.as_ref();
         if let Some(seeds) = seeds.filter(|seeds| seeds.size() != size) {

@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 
 /// The eight neighbours of a pixel as (column, row) offsets. The opposite of direction `d` is `7 - d`.
-pub(super) const DIRECTIONS: [(isize, isize); 8] = [
+pub(crate) const DIRECTIONS: [(isize, isize); 8] = [
     (-1, -1),
     (0, -1),
     (1, -1),
@@ -18,7 +18,7 @@ pub(super) const DIRECTIONS: [(isize, isize); 8] = [
 ];
 
 /// No neighbour in this direction.
-pub(super) const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 /// The parent of a node that hangs on its terminal.
 const TERMINAL: u8 = 8;
 /// The parent of a node without one.
@@ -49,7 +49,7 @@ struct Node {
 
 /// A graph whose nodes have up to eight neighbours and two terminals.
 #[derive(Debug, Default)]
-pub(super) struct PixelGraph {
+pub(crate) struct PixelGraph {
     nodes: Vec<Node>,
     active: VecDeque<u32>,
     orphans: VecDeque<u32>,
@@ -60,7 +60,7 @@ impl PixelGraph {
     /// Adds a node. `terminal` is what it costs to put it on the sink's side, minus what it costs to
     /// put it on the source's. `capacity[d]` is the cost of separating it from `neighbours[d]`, which
     /// has to state the same capacity in the opposite direction; 0 where there is none ([`NONE`]).
-    pub(super) fn add(&mut self, terminal: i32, neighbours: [u32; 8], capacity: [i32; 8]) {
+    pub(crate) fn add(&mut self, terminal: i32, neighbours: [u32; 8], capacity: [i32; 8]) {
         self.nodes.push(Node {
             neighbours,
             capacity,
@@ -75,12 +75,12 @@ impl PixelGraph {
 
     /// Changes what it costs to put a node on the sink's side, minus what it costs to put it on the source's, by so much. What
     /// flows already stays: the next cut has only the rest to find, and is that of the new costs all the same.
-    pub(super) fn change(&mut self, node: u32, by: i32) {
+    pub(crate) fn change(&mut self, node: u32, by: i32) {
         self.node_mut(node).terminal += by;
     }
 
     /// Finds the minimum cut; true for the nodes on the source's side: of several least cuts the one with the fewest of them.
-    pub(super) fn cut(&mut self) -> Vec<bool> {
+    pub(crate) fn cut(&mut self) -> Vec<bool> {
         self.plant();
         let mut growing = None;
         while let Some(at) = growing.take().or_else(|| self.next_active()) {

@@ -4,17 +4,17 @@
 //! mixtures, and a cost for every pair of neighbours that the cut separates, which is smaller where
 //! they differ. Only a set of active pixels is decided; the others keep their labels.
 
-use super::MaskError;
-use super::bitmap::Bitmap;
+use super::gmm::Mixture;
 use super::max_flow::{DIRECTIONS, NONE, PixelGraph};
-use super::mixture::Mixture;
+use crate::MaskError;
+use crate::bitmap::Bitmap;
 
 /// Rounds of models and cuts, at most.
 pub const ITERATIONS: u32 = 5;
 /// Gaussians of each side.
 const COMPONENTS: usize = 5;
 /// Cost of separating two equal neighbours, in units of the log-likelihood.
-pub(super) const SMOOTHNESS: f32 = 50.0;
+pub(crate) const SMOOTHNESS: f32 = 50.0;
 /// Integer capacity of one unit of cost.
 const UNIT: f32 = 256.0;
 /// The largest cost of a pixel, far above any sum of smoothness around it.
@@ -23,11 +23,11 @@ const MAX_COST: f32 = 4000.0;
 const MAX_SAMPLES: usize = 120_000;
 
 /// The half of the directions that lead to later pixels.
-pub(super) const DIRECTIONS_AHEAD: [usize; 4] = [4, 5, 6, 7];
+pub(crate) const DIRECTIONS_AHEAD: [usize; 4] = [4, 5, 6, 7];
 
 /// What is known of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Label {
+pub(crate) enum Label {
     Background,
     Object,
     ProbablyBackground,
@@ -35,15 +35,15 @@ pub(super) enum Label {
 }
 
 impl Label {
-    pub(super) fn is_object(self) -> bool {
+    pub(crate) fn is_object(self) -> bool {
         matches!(self, Self::Object | Self::ProbablyObject)
     }
 
-    pub(super) fn is_sure(self) -> bool {
+    pub(crate) fn is_sure(self) -> bool {
         matches!(self, Self::Object | Self::Background)
     }
 
-    pub(super) fn probably(object: bool) -> Self {
+    pub(crate) fn probably(object: bool) -> Self {
         if object {
             Self::ProbablyObject
         } else {
@@ -53,13 +53,13 @@ impl Label {
 }
 
 /// The pixels that are object.
-pub(super) fn object_of(labels: &[Label], (width, height): (usize, usize)) -> Bitmap {
+pub(crate) fn object_of(labels: &[Label], (width, height): (usize, usize)) -> Bitmap {
     let object = labels.iter().map(|label| label.is_object());
     Bitmap::new((width as u32, height as u32), object)
 }
 
 /// Makes another object of what is object; what is sure stays.
-pub(super) fn change(
+pub(crate) fn change(
     labels: &mut [Label],
     size: (usize, usize),
     how: impl FnOnce(&Bitmap) -> Bitmap,
@@ -73,12 +73,12 @@ pub(super) fn change(
 }
 
 /// The squared distance of two features.
-pub(super) fn squared_distance<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
+pub(crate) fn squared_distance<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
 /// Pixels with features, as far as the cut needs them.
-pub(super) trait Field<const D: usize> {
+pub(crate) trait Field<const D: usize> {
     /// Variance of the features of equal surfaces.
     const VARIANCE_FLOOR: f64;
 
@@ -97,14 +97,14 @@ pub(super) trait Field<const D: usize> {
 
 /// The colour models of both sides.
 #[derive(Debug, Clone)]
-pub(super) struct Models<const D: usize> {
+pub(crate) struct Models<const D: usize> {
     object: Mixture<D>,
     background: Mixture<D>,
 }
 
 impl<const D: usize> Models<D> {
     /// Learns both from the pixels for which `take` is true of their label.
-    pub(super) fn learn<F: Field<D>>(
+    pub(crate) fn learn<F: Field<D>>(
         field: &F,
         labels: &[Label],
         take: impl Fn(Label) -> bool,
@@ -121,7 +121,7 @@ impl<const D: usize> Models<D> {
     }
 
     /// Learns again from all pixels, starting from these models.
-    pub(super) fn refine<F: Field<D>>(&mut self, field: &F, labels: &[Label]) {
+    pub(crate) fn refine<F: Field<D>>(&mut self, field: &F, labels: &[Label]) {
         self.object
             .refine(&samples(field, labels, Label::is_object));
         self.background
@@ -129,14 +129,14 @@ impl<const D: usize> Models<D> {
     }
 
     /// How much more likely a feature is object than background, as a logarithm.
-    pub(super) fn log_ratio(&self, feature: &[f32; D]) -> f32 {
+    pub(crate) fn log_ratio(&self, feature: &[f32; D]) -> f32 {
         self.background.cost(feature) - self.object.cost(feature)
     }
 }
 
 /// Of the pixels that are probably object, makes the `share` that is most like the sure background, or
 /// like what `also` names, probably background.
-pub(super) fn rank<const D: usize, F: Field<D>>(
+pub(crate) fn rank<const D: usize, F: Field<D>>(
     field: &F,
     labels: &mut [Label],
     share: f64,
@@ -173,7 +173,7 @@ pub(super) fn rank<const D: usize, F: Field<D>>(
 
 /// Lets models and cuts take turns until nothing changes, at most [`ITERATIONS`] times. `smoothness` is what separating
 /// two equal neighbours costs, usually [`SMOOTHNESS`].
-pub(super) fn iterate<const D: usize, F: Field<D>>(
+pub(crate) fn iterate<const D: usize, F: Field<D>>(
     field: &F,
     labels: &mut [Label],
     first: Option<Models<D>>,
@@ -222,7 +222,7 @@ fn check_sides(labels: &[Label]) -> Result<(), MaskError> {
 }
 
 /// The factor that makes the average contrast 1/2.
-pub(super) fn contrast_scale<const D: usize, F: Field<D>>(field: &F) -> f32 {
+pub(crate) fn contrast_scale<const D: usize, F: Field<D>>(field: &F) -> f32 {
     let (width, height) = field.size();
     let step = (width * height).div_ceil(MAX_SAMPLES).max(1);
     let (mut sum, mut count) = (0.0, 0_u32);
@@ -239,7 +239,7 @@ pub(super) fn contrast_scale<const D: usize, F: Field<D>>(field: &F) -> f32 {
 }
 
 /// Minimum cuts of the same pixels by changing models.
-pub(super) struct OpenCut<'a> {
+pub(crate) struct OpenCut<'a> {
     /// The pixels that are decided, in order.
     active: &'a [u32],
     graph: PixelGraph,
@@ -251,7 +251,7 @@ pub(super) struct OpenCut<'a> {
 
 impl<'a> OpenCut<'a> {
     /// The graph of the `active` pixels, which are in order. Labels of the others may not change between cuts.
-    pub(super) fn new<const D: usize, F: Field<D>>(
+    pub(crate) fn new<const D: usize, F: Field<D>>(
         field: &F,
         scale: f32,
         smoothness: f32,
@@ -294,7 +294,7 @@ impl<'a> OpenCut<'a> {
     }
 
     /// Decides the pixels by one minimum cut. Returns how many changed.
-    pub(super) fn decide<const D: usize, F: Field<D>>(
+    pub(crate) fn decide<const D: usize, F: Field<D>>(
         &mut self,
         field: &F,
         models: &Models<D>,
@@ -338,7 +338,7 @@ fn separation<const D: usize, F: Field<D>>(
 }
 
 /// The neighbour of a pixel in one of [`DIRECTIONS`].
-pub(super) fn neighbour(
+pub(crate) fn neighbour(
     at: usize,
     direction: usize,
     (width, height): (usize, usize),

@@ -6,8 +6,8 @@
 //! the background shows another thing at every angle, and its curve has all harmonics. This looks at no mask but
 //! the one that is asked about, and so is evidence of its own.
 
-use super::bitmap::Bitmap;
-use super::grab_cut::squared_distance;
+use crate::bitmap::Bitmap;
+use crate::cut::grab_cut::squared_distance;
 
 /// Harmonics of the table's angle that a diffuse surface follows.
 const ORDER: usize = 2;
@@ -28,7 +28,7 @@ const TOGETHER: f32 = 0.7;
 
 /// The curves of all pixels.
 #[derive(Debug)]
-pub(super) struct Witness {
+pub(crate) struct Witness {
     /// Variance that the harmonics do not explain, for each pixel; empty with few frames.
     residual: Vec<f32>,
     /// Cosines and sines of the harmonics.
@@ -37,14 +37,14 @@ pub(super) struct Witness {
 
 /// Sums over the frames.
 #[derive(Debug)]
-pub(super) struct Curves {
+pub(crate) struct Curves {
     frames: usize,
     sum: Vec<[f32; WAVES + 2]>,
 }
 
 impl Curves {
     /// Of `frames` frames, spread evenly over the turn, of `pixels` pixels.
-    pub(super) fn new(frames: usize, pixels: usize) -> Self {
+    pub(crate) fn new(frames: usize, pixels: usize) -> Self {
         let pixels = if frames < MIN_FRAMES { 0 } else { pixels };
         Self {
             frames,
@@ -53,7 +53,7 @@ impl Curves {
     }
 
     /// Adds frame number `at`.
-    pub(super) fn add(&mut self, at: usize, lab: &[[f32; 3]]) {
+    pub(crate) fn add(&mut self, at: usize, lab: &[[f32; 3]]) {
         let angle = std::f32::consts::TAU * at as f32 / self.frames.max(1) as f32;
         let basis: [f32; WAVES] = std::array::from_fn(|wave| {
             let angle = angle * (wave / 2 + 1) as f32;
@@ -74,7 +74,7 @@ impl Curves {
     }
 
     /// What they say together.
-    pub(super) fn finish(self) -> Witness {
+    pub(crate) fn finish(self) -> Witness {
         let many = self.frames.max(1) as f32;
         let free = self.frames.saturating_sub(WAVES + 1).max(1) as f32;
         let wave = |sum: &[f32; WAVES + 2]| std::array::from_fn(|at| 2.0 * sum[at + 2] / many);
@@ -94,7 +94,7 @@ impl Curves {
 impl Witness {
     /// Where the brightness of the pixels of `part` changes as what is behind the object does, and not as the object
     /// beside it; none where the curves say nothing.
-    pub(super) fn moves(&self, part: &Bitmap, beside: &Bitmap, ground: &Bitmap) -> Option<bool> {
+    pub(crate) fn moves(&self, part: &Bitmap, beside: &Bitmap, ground: &Bitmap) -> Option<bool> {
         let of_part = self.residual_of(part)?;
         let of_object = self.residual_of(beside)?;
         let of_ground = self.residual_of(ground)?;
@@ -103,7 +103,7 @@ impl Witness {
     }
 
     /// Whether two parts become brighter and darker together over the turn.
-    pub(super) fn together(&self, one: &Bitmap, other: &Bitmap) -> bool {
+    pub(crate) fn together(&self, one: &Bitmap, other: &Bitmap) -> bool {
         let (Some(one), Some(other)) = (self.course(one), self.course(other)) else {
             return false;
         };
@@ -117,7 +117,7 @@ impl Witness {
 
     /// Whether the curve of a part is nearer to that of one other than to that of another; none where one of them is
     /// empty, or the frames are few.
-    pub(super) fn nearer(&self, part: &Bitmap, one: &Bitmap, another: &Bitmap) -> Option<bool> {
+    pub(crate) fn nearer(&self, part: &Bitmap, one: &Bitmap, another: &Bitmap) -> Option<bool> {
         let (part, one, another) = (self.course(part)?, self.course(one)?, self.course(another)?);
         Some(squared_distance(&part, &one) < squared_distance(&part, &another))
     }

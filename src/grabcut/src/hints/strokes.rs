@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::hints::Mark;
-use super::settings::MAX_PIXELS;
-use super::{MaskError, Seeds};
+use super::marks::Mark;
+use crate::settings::MAX_PIXELS;
+use crate::{MaskError, Seeds};
 
 /// Coordinates and radii are smaller, pixels.
 const FARTHEST: f32 = 1e5;

@@ -4,14 +4,14 @@ use glam::Vec3;
 use image::{GrayImage, RgbImage};
 use serde::{Deserialize, Serialize};
 
-use super::SynthError;
 use super::camera::CameraModel;
 use super::finish::Finish;
-use super::geometry::GBuffer;
-use super::lighting::{Lighting, Material, Panoramas, Shaded};
 use super::object::{ObjectSource, SyntheticView};
 use super::png::{Sixteen, encode_sixteen};
 use super::view::{Pose, Projection};
+use crate::SynthError;
+use crate::geometry::GBuffer;
+use crate::lighting::{Lighting, Material, Panoramas, Shaded};
 use relight_core::light::{Order, ShLight};
 
 /// All that a sample was made of.
@@ -43,19 +43,19 @@ pub(crate) struct Description {
 
 impl Lighting {
     /// The name of its panorama.
-    pub(super) fn panorama_name(&self, panoramas: &Panoramas) -> Option<String> {
+    pub(crate) fn panorama_name(&self, panoramas: &Panoramas) -> Option<String> {
         let environment = self.environment.as_ref()?;
         panoramas.name(environment.panorama).map(str::to_owned)
     }
 
     /// All light but what bounces, as a camera of this gain sees it.
-    pub(super) fn seen(&self, order: Order, panoramas: &Panoramas, gain: Vec3) -> ShLight {
+    pub(crate) fn seen(&self, order: Order, panoramas: &Panoramas, gain: Vec3) -> ShLight {
         self.coefficients(order, panoramas)
             .tinted(gain.to_array().map(f64::from))
     }
 
     /// Its first nine coefficients.
-    pub(super) fn seen_coefficients(&self, panoramas: &Panoramas, gain: Vec3) -> [[f64; 3]; 9] {
+    pub(crate) fn seen_coefficients(&self, panoramas: &Panoramas, gain: Vec3) -> [[f64; 3]; 9] {
         let light = self.seen(Order::TWO, panoramas, gain);
         let mut coefficients = [[0.0; 3]; 9];
         for (to, from) in coefficients.iter_mut().zip(light.coefficients()) {
@@ -91,7 +91,7 @@ pub(crate) struct Whites {
 impl<'a> SynthSample<'a> {
     /// Takes the picture: `shaded` is still without the gain of the description's camera; `seed` draws
     /// the noise.
-    pub(super) fn new(
+    pub(crate) fn new(
         view: &'a SyntheticView,
         material: Material,
         mut shaded: Shaded,
@@ -123,7 +123,7 @@ impl<'a> SynthSample<'a> {
     }
 
     /// The sample as files, by name.
-    pub(super) fn files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, SynthError> {
+    pub(crate) fn files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, SynthError> {
         let buffer = self.view.scene.buffer();
         let shading = Sixteen::up_to_largest(&self.shaded.shading);
         let highlight = Sixteen::up_to_largest(&self.shaded.highlight);
@@ -167,13 +167,13 @@ impl<'a> SynthSample<'a> {
 }
 
 /// The mask of what a buffer covers, 0 and 255.
-pub(super) fn mask(buffer: &GBuffer) -> GrayImage {
+pub(crate) fn mask(buffer: &GBuffer) -> GrayImage {
     let values = buffer.spread(&vec![255; buffer.len()], 0);
     GrayImage::from_raw(buffer.size, buffer.size, values).unwrap_or_default()
 }
 
 /// The camera's picture of light that already has its gain.
-pub(super) fn photograph(
+pub(crate) fn photograph(
     buffer: &GBuffer,
     camera: &CameraModel,
     material: &Material,
@@ -195,7 +195,7 @@ pub(super) fn photograph(
 }
 
 /// A picture with these colours at the covered pixels and black elsewhere.
-pub(super) fn picture_of(buffer: &GBuffer, values: &[[u8; 3]]) -> RgbImage {
+pub(crate) fn picture_of(buffer: &GBuffer, values: &[[u8; 3]]) -> RgbImage {
     let values = buffer.spread(values, [0; 3]).into_flattened();
     RgbImage::from_raw(buffer.size, buffer.size, values).unwrap_or_default()
 }

@@ -1,8 +1,8 @@
 //! Parts of the image that a cut left out although the object encloses them, or nearly does: they are object unless
 //! they show the background or the table.
 
-use super::bitmap::{Bitmap, Component, Connectivity};
-use super::turn::TurnField;
+use super::statistics::TurnField;
+use crate::bitmap::{Bitmap, Component, Connectivity};
 
 /// An opening to the outside of at most twice this share of the frame's width counts as closed.
 const NECK: f64 = 0.012;
@@ -24,7 +24,7 @@ fn enclosed(object: &Bitmap, width: usize) -> Bitmap {
 
 impl TurnField {
     /// The object with the parts that it encloses and that show nothing else.
-    pub(super) fn completed(&self, object: &Bitmap) -> Bitmap {
+    pub(crate) fn completed(&self, object: &Bitmap) -> Bitmap {
         let is_object = |_: &Component, part: &dyn Fn() -> Bitmap| {
             self.is_background(&part(), object) == Some(false)
         };
@@ -32,7 +32,7 @@ impl TurnField {
     }
 
     /// Whether a part inside or beside the object shows the background or the table; none of a part without pixels.
-    pub(super) fn is_background(&self, part: &Bitmap, object: &Bitmap) -> Option<bool> {
+    pub(crate) fn is_background(&self, part: &Bitmap, object: &Bitmap) -> Option<bool> {
         if part.count() == 0 {
             return None;
         }
@@ -62,7 +62,7 @@ impl TurnField {
 
     /// Whether a part outside the object shows that it belongs to it: it does not move, is neither room nor table,
     /// becomes brighter with the object, and its outline is stronger where it does not touch it.
-    pub(super) fn belongs(&self, part: &Bitmap, object: &Bitmap) -> bool {
+    pub(crate) fn belongs(&self, part: &Bitmap, object: &Bitmap) -> bool {
         let ground = self.ground(part, object);
         let beside = self.beside(part, object);
         let known =

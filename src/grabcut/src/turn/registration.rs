@@ -4,7 +4,7 @@
 //! the object of the frame for which it is wanted. The shift is that at which the brightness's
 //! gradients of both fit best under the mask.
 
-use super::bitmap::Bitmap;
+use crate::bitmap::Bitmap;
 
 /// Largest shift that is looked for in each direction, pixels.
 const REACH: isize = 6;
@@ -13,7 +13,7 @@ const BETTER_BY: f32 = 0.01;
 
 /// The shift (right, down) in pixels of the object from `average` to `frame`, two images of brightness
 /// of the same size; (0, 0) if none fits clearly better.
-pub(super) fn shift(
+pub(crate) fn shift(
     average: &[f32],
     frame: &[f32],
     object: &Bitmap,
@@ -51,7 +51,7 @@ fn best_shift(width: usize, fit: impl Fn(isize) -> f32) -> Option<([f32; 2], f32
 
 /// The labels moved by a shift (right, down): each pixel takes what was there before, between pixels the
 /// larger share.
-pub(super) fn moved(
+pub(crate) fn moved(
     object: &Bitmap,
     (dx, dy): (f32, f32),
     (width, height): (usize, usize),

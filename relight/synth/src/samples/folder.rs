@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use relit_data::durable::write_whole;
 use serde::{Deserialize, Serialize};
 
-use super::SynthError;
-use super::library::Library;
 use super::recipe::Recipe;
 use super::sample::SynthSample;
+use crate::SynthError;
+use crate::library::Library;
 
 /// The description of a folder of samples.
 const FILE: &str = "synth.json";
@@ -177,7 +177,7 @@ impl SampleFolder {
 }
 
 /// Whether a folder holds samples.
-pub(super) fn holds_samples(folder: &Path) -> bool {
+pub(crate) fn holds_samples(folder: &Path) -> bool {
     folder.join(FILE).exists()
 }
 
@@ -226,9 +226,9 @@ mod tests {
 
     use rayon::ThreadPoolBuilder;
 
+    use super::super::sample::{Description, Whites};
     use super::*;
     use crate::library::Folders;
-    use crate::sample::{Description, Whites};
 
     fn recipe() -> Recipe {
         Recipe {

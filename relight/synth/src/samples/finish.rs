@@ -3,12 +3,12 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::geometry::GBuffer;
-use super::library::Library;
-use super::lighting::{BlinnPhong, Material};
-use super::mesh::OwnSurface;
-use super::paint::{AlbedoKind, Paint, Relief, possible};
-use super::random::Random;
+use crate::geometry::GBuffer;
+use crate::library::Library;
+use crate::lighting::{BlinnPhong, Material};
+use crate::mesh::OwnSurface;
+use crate::paint::{AlbedoKind, Paint, Relief, possible};
+use crate::random::Random;
 
 /// Part of the objects that have relief.
 const RELIEF: f32 = 0.35;
@@ -36,7 +36,7 @@ pub(crate) struct Finish {
 impl Finish {
     /// A random finish for what a buffer shows; it is glossy with the probability `glossy`. Half of the objects that come
     /// with a look of their own keep it, with the gloss of that; with `own` all do.
-    pub(super) fn draw(
+    pub(crate) fn draw(
         random: &mut Random,
         buffer: &GBuffer,
         library: &Library,
@@ -52,7 +52,7 @@ impl Finish {
     }
 
     /// The same for an object whose own look, if it has one, is painted over.
-    pub(super) fn painted(
+    pub(crate) fn painted(
         random: &mut Random,
         buffer: &GBuffer,
         library: &Library,
@@ -145,7 +145,7 @@ impl BlinnPhong {
     }
 
     /// A random strength and exponent.
-    pub(super) fn draw_strength(random: &mut Random) -> (f32, f32) {
+    pub(crate) fn draw_strength(random: &mut Random) -> (f32, f32) {
         let exponent = random.log_uniform(BROADEST..SHARPEST);
         // A sharper highlight is brighter, as it gathers the same light.
         let strength = random.uniform(0.03..0.6) * ((exponent + 8.0) / 16.0).min(4.0);

@@ -1,8 +1,8 @@
 //! The table's rim in a result: where the rig shakes, the rim between table and room is neither the one nor
 //! the other on average, and hangs on the object as a thin line.
 
-use super::bitmap::{Bitmap, Component, Connectivity};
-use super::turntable::Turntable;
+use super::table::Turntable;
+use crate::bitmap::{Bitmap, Component, Connectivity};
 
 /// A line is at most twice this share of the frame's width wide.
 const WIDTH: f64 = 0.005;
@@ -14,7 +14,7 @@ const LENGTH: u64 = 4;
 const BETWEEN: f64 = 0.4;
 
 /// The object without thin lines that have the table below and the room above them.
-pub(super) fn without_rim(object: &Bitmap, table: &Turntable, size: (usize, usize)) -> Bitmap {
+pub(crate) fn without_rim(object: &Bitmap, table: &Turntable, size: (usize, usize)) -> Bitmap {
     let radius = ((size.0 as f64 * WIDTH).round() as usize).max(1);
     let reach = ((size.0 as f64 * REACH).round() as usize).max(2);
     let thin = object.minus(&object.opened(radius));

@@ -1,6 +1,6 @@
 //! What is wrong with a mask's shape, as sentences.
 
-use super::{DoubtfulRegion, ShapeCheck};
+use crate::{DoubtfulRegion, ShapeCheck};
 
 /// Parts of the mask that are background, of the object that are not in it, or holes in it may have this
 /// share of its area, where all of the turn is looked at.

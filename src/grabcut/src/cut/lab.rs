@@ -5,13 +5,13 @@ const ROOTS: usize = 4096;
 
 /// From 8-bit sRGB to L*a*b*: L in 0..=100, a and b in about -128..=128.
 #[derive(Debug)]
-pub(super) struct LabTable {
+pub(crate) struct LabTable {
     linear: [f32; 256],
     root: Vec<f32>,
 }
 
 impl LabTable {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let linear = std::array::from_fn(|level| {
             let value = level as f32 / 255.0;
             if value <= 0.04045 {
@@ -34,7 +34,7 @@ impl LabTable {
         }
     }
 
-    pub(super) fn lab(&self, rgb: [u8; 3]) -> [f32; 3] {
+    pub(crate) fn lab(&self, rgb: [u8; 3]) -> [f32; 3] {
         let [r, g, b] = rgb.map(|level| self.linear[usize::from(level)]);
         // The rows of the sRGB matrix, divided by the white point.
         let x = self.root(0.433_953 * r + 0.376_219 * g + 0.189_828 * b);

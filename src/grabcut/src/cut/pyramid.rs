@@ -7,10 +7,11 @@ use std::borrow::Cow;
 
 use image::{ImageBuffer, Pixel, RgbImage};
 
-use super::bitmap::Bitmap;
-use super::grab_cut::{self, Field, Label, Models, OpenCut, SMOOTHNESS, squared_distance};
+use super::grab_cut;
+use super::grab_cut::{Field, Label, Models, OpenCut, SMOOTHNESS, squared_distance};
 use super::lab::LabTable;
-use super::{Effort, MaskError};
+use crate::bitmap::Bitmap;
+use crate::{Effort, MaskError};
 
 /// Variance of the colour of equal surfaces.
 const COLOUR_VARIANCE: f64 = 0.1;
@@ -23,7 +24,7 @@ const MIN_SMOOTHNESS: f32 = SMOOTHNESS / 8.0;
 
 /// Where the first colour models come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum FirstModels {
+pub(crate) enum FirstModels {
     /// From all pixels, after the given share of the probable object that is most like the sure
     /// background was set to probably background.
     Ranked(f64),
@@ -34,19 +35,19 @@ pub(super) enum FirstModels {
 }
 
 /// An image at one of its sizes, with what is known at it.
-pub(super) struct Level<'a> {
-    pub(super) image: Cow<'a, RgbImage>,
-    pub(super) labels: Vec<Label>,
+pub(crate) struct Level<'a> {
+    pub(crate) image: Cow<'a, RgbImage>,
+    pub(crate) labels: Vec<Label>,
 }
 
 impl Level<'_> {
-    pub(super) fn size(&self) -> (usize, usize) {
+    pub(crate) fn size(&self) -> (usize, usize) {
         (self.image.width() as usize, self.image.height() as usize)
     }
 }
 
 /// The image, its half, its quarter, down to at most `coarsest` pixels.
-pub(super) fn levels(image: &RgbImage, known: Vec<Label>, coarsest: usize) -> Vec<Level<'_>> {
+pub(crate) fn levels(image: &RgbImage, known: Vec<Label>, coarsest: usize) -> Vec<Level<'_>> {
     let mut level = Level {
         image: Cow::Borrowed(image),
         labels: known,
@@ -65,7 +66,7 @@ pub(super) fn levels(image: &RgbImage, known: Vec<Label>, coarsest: usize) -> Ve
 }
 
 /// Cuts the object out of `image`, of which this is known.
-pub(super) fn segment(
+pub(crate) fn segment(
     image: &RgbImage,
     known: Vec<Label>,
     first: FirstModels,
@@ -92,7 +93,7 @@ pub(super) fn segment(
 
 /// Takes a result of this size up to the finest of the levels, whose order is from fine to coarse. `field` is told how
 /// many steps there were before.
-pub(super) fn ascend<'a, const D: usize, F: Field<D>>(
+pub(crate) fn ascend<'a, const D: usize, F: Field<D>>(
     finer: &'a [Level<'_>],
     mut labels: Vec<Label>,
     mut size: (usize, usize),
@@ -140,7 +141,7 @@ fn begin_smooth(
 }
 
 /// Cuts at the coarsest size.
-pub(super) fn start<const D: usize>(
+pub(crate) fn start<const D: usize>(
     field: &impl Field<D>,
     labels: &mut [Label],
     first: FirstModels,
@@ -158,7 +159,7 @@ pub(super) fn start<const D: usize>(
 }
 
 /// Decides a band along the coarse result's edge; elsewhere the coarse result stays.
-pub(super) fn refine<const D: usize>(
+pub(crate) fn refine<const D: usize>(
     field: &impl Field<D>,
     labels: &mut [Label],
     coarse: &[Label],
@@ -252,7 +253,7 @@ fn half_labels(labels: &[Label], (width, height): (usize, usize)) -> Vec<Label> 
 }
 
 /// An image in the colours of L*a*b*.
-pub(super) struct RgbField<'a> {
+pub(crate) struct RgbField<'a> {
     image: &'a RgbImage,
     table: &'a LabTable,
     /// The colours where all of them are needed; empty where few are.
@@ -261,7 +262,7 @@ pub(super) struct RgbField<'a> {
 
 impl<'a> RgbField<'a> {
     /// A large image, of which few pixels are needed.
-    pub(super) fn new(image: &'a RgbImage, table: &'a LabTable) -> Self {
+    pub(crate) fn new(image: &'a RgbImage, table: &'a LabTable) -> Self {
         let lab = Vec::new();
         Self { image, table, lab }
     }

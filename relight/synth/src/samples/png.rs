@@ -3,20 +3,20 @@
 use glam::Vec3;
 use png::{BitDepth, ColorType, Compression, Filter};
 
-use super::SynthError;
-use super::geometry::GBuffer;
+use crate::SynthError;
+use crate::geometry::GBuffer;
 
 /// Colours as 16-bit values.
-pub(super) struct Sixteen {
+pub(crate) struct Sixteen {
     /// One for each covered pixel.
     values: Vec<[u16; 3]>,
     /// What 65535 stands for.
-    pub(super) white: f32,
+    pub(crate) white: f32,
 }
 
 impl Sixteen {
     /// Colours of 0..=`white`; others are clipped.
-    pub(super) fn up_to(colours: &[Vec3], white: f32) -> Self {
+    pub(crate) fn up_to(colours: &[Vec3], white: f32) -> Self {
         let scale = 65_535.0 / white;
         let value = |colour: &Vec3| (*colour * scale).to_array().map(|v| (v + 0.5) as u16);
         Self {
@@ -26,7 +26,7 @@ impl Sixteen {
     }
 
     /// Colours of 0 to the largest among them.
-    pub(super) fn up_to_largest(colours: &[Vec3]) -> Self {
+    pub(crate) fn up_to_largest(colours: &[Vec3]) -> Self {
         let largest = colours
             .iter()
             .map(|colour| colour.max_element())
@@ -36,14 +36,14 @@ impl Sixteen {
     }
 
     /// Normals as colours `(n + 1) / 2`.
-    pub(super) fn normals(normals: &[Vec3]) -> Self {
+    pub(crate) fn normals(normals: &[Vec3]) -> Self {
         let colours: Vec<Vec3> = normals.iter().map(|&normal| (normal + 1.0) / 2.0).collect();
         Self::up_to(&colours, 1.0)
     }
 }
 
 /// The map as PNG, 0 outside the object.
-pub(super) fn encode_sixteen(buffer: &GBuffer, map: &Sixteen) -> Result<Vec<u8>, SynthError> {
+pub(crate) fn encode_sixteen(buffer: &GBuffer, map: &Sixteen) -> Result<Vec<u8>, SynthError> {
     let values = buffer.spread(&map.values, [0; 3]).into_flattened();
     let pixels: Vec<u8> = values.into_iter().flat_map(u16::to_be_bytes).collect();
     let mut bytes = Vec::with_capacity(pixels.len() / 2);

@@ -8,19 +8,23 @@
 
 use image::RgbImage;
 
-use super::MaskError;
 use super::backdrop::Backdrop;
-use super::bitmap::Bitmap;
-use super::grab_cut::{
-    self, DIRECTIONS_AHEAD, Field, Label, Models, SMOOTHNESS, change, neighbour, squared_distance,
-};
-use super::initial::InitialLabels;
-use super::lab::LabTable;
-use super::pyramid::{FirstModels, Level, RgbField, ascend, half_image, levels, refine, start};
+use super::registration;
 use super::rim::without_rim;
-use super::turntable::{Turntable, find_turntable};
-use super::witness::{Curves, Witness};
-use super::{Effort, Hints, registration};
+use super::table::{Turntable, find_turntable};
+use super::temporal_evidence::{Curves, Witness};
+use crate::MaskError;
+use crate::bitmap::Bitmap;
+use crate::cut::grab_cut;
+use crate::cut::grab_cut::{
+    DIRECTIONS_AHEAD, Field, Label, Models, SMOOTHNESS, change, neighbour, squared_distance,
+};
+use crate::cut::lab::LabTable;
+use crate::cut::pyramid::{
+    FirstModels, Level, RgbField, ascend, half_image, levels, refine, start,
+};
+use crate::hints::trimap::InitialLabels;
+use crate::{Effort, Hints};
 
 /// Fewest frames from which anything can be learned.
 pub const MIN_TURN_FRAMES: usize = 4;
@@ -91,8 +95,8 @@ fn pixels(image: &RgbImage) -> usize {
 pub struct TurnStatistics {
     frames: usize,
     /// The frames' width and height.
-    pub(super) full: (u32, u32),
-    pub(super) fine: TurnField,
+    pub(crate) full: (u32, u32),
+    pub(crate) fine: TurnField,
     /// At half the size; none where the fine one is small enough for the first cut.
     coarse: Option<TurnField>,
 }
@@ -116,7 +120,7 @@ impl TurnStatistics {
     }
 
     /// That there are enough frames.
-    pub(super) fn check(&self) -> Result<(), MaskError> {
+    pub(crate) fn check(&self) -> Result<(), MaskError> {
         if self.frames >= MIN_TURN_FRAMES {
             Ok(())
         } else {
@@ -125,13 +129,13 @@ impl TurnStatistics {
     }
 
     /// The frames are so many times larger: a power of two.
-    pub(super) fn factor(&self) -> usize {
+    pub(crate) fn factor(&self) -> usize {
         let ratio = (self.full.0 as usize).div_ceil(self.fine.size.0.max(1));
         ratio.next_power_of_two()
     }
 
     /// A bitmap of the frames' size in that of the statistics.
-    pub(super) fn reduced(&self, object: &Bitmap) -> Bitmap {
+    pub(crate) fn reduced(&self, object: &Bitmap) -> Bitmap {
         let ((columns, rows), factor) = (self.fine.size, self.factor());
         let is_set = |at: usize| {
             let (x, y) = (at % columns * factor, at / columns * factor);
@@ -145,13 +149,13 @@ impl TurnStatistics {
 
     /// How well an outline follows what moves differently: the mean over its edges of the strength of
     /// the contrast there, 0..=1.
-    pub(super) fn outline(&self, object: &Bitmap) -> f32 {
+    pub(crate) fn outline(&self, object: &Bitmap) -> f32 {
         let object = self.reduced(object);
         self.fine.outline(&object)
     }
 
     /// Whether anything moves: the median change of the brightness away from the table.
-    pub(super) fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         let features = self.fine.features.iter();
         let mut changes: Vec<f32> = features.map(|feature| feature[3]).collect();
         let upper = changes.len() * 3 / 4;
@@ -165,16 +169,16 @@ impl TurnStatistics {
 
 /// Averages and changes of each pixel over the frames.
 #[derive(Debug)]
-pub(super) struct TurnField {
-    pub(super) size: (usize, usize),
+pub(crate) struct TurnField {
+    pub(crate) size: (usize, usize),
     features: Vec<[f32; 5]>,
     /// To the neighbours in [`DIRECTIONS_AHEAD`].
     contrasts: Vec<[f32; 4]>,
     /// Pixels that are background by the ends of their rows.
-    pub(super) backdrop: Bitmap,
-    pub(super) table: Turntable,
+    pub(crate) backdrop: Bitmap,
+    pub(crate) table: Turntable,
     evidence: Vec<f32>,
-    pub(super) witness: Witness,
+    pub(crate) witness: Witness,
 }
 
 impl TurnField {
@@ -243,20 +247,20 @@ impl TurnField {
 
 impl TurnField {
     /// The average brightness L of each pixel.
-    pub(super) fn light(&self) -> Vec<f32> {
+    pub(crate) fn light(&self) -> Vec<f32> {
         let features = self.features.iter();
         features.map(|feature| feature[0] / COLOUR_WEIGHT).collect()
     }
 
     /// How strong the contrast is along an outline.
-    pub(super) fn outline(&self, object: &Bitmap) -> f32 {
+    pub(crate) fn outline(&self, object: &Bitmap) -> f32 {
         let boundary = self.boundary(object, &object.inverted());
         boundary.unwrap_or(0.0)
     }
 
     /// How strong the contrast is along the boundary between two parts, which have its size; `None` where they do not
     /// touch.
-    pub(super) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> Option<f32> {
+    pub(crate) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> Option<f32> {
         let (columns, rows) = self.size;
         let (one, other) = (one.bits(), other.bits());
         let scale = grab_cut::contrast_scale(self);
@@ -383,7 +387,7 @@ impl FrameInTurn<'_> {
 }
 
 /// Cuts the object out by what the turn tells, on the pixels of `frame`.
-pub(super) fn segment(
+pub(crate) fn segment(
     frame: &RgbImage,
     turn: &TurnStatistics,
     hints: &Hints,

@@ -7,7 +7,7 @@ use image::{DynamicImage, GrayImage, ImageFormat, ImageReader, RgbaImage};
 
 use relit_data::geometry::Rect;
 
-use super::{MaskError, Strokes, grey_png};
+use crate::{MaskError, Strokes, grey_png};
 
 /// A pixel marks the object if all its channels are at least this.
 const OBJECT_FROM: u8 = 250;
@@ -124,7 +124,7 @@ impl Seeds {
         })
     }
 
-    pub(super) fn new(
+    pub(crate) fn new(
         size: (u32, u32),
         marks: Vec<Mark>,
         coloured_px: u64,
@@ -209,7 +209,7 @@ impl Hints {
     }
 
     /// The hints without what the seeds mark as object.
-    pub(super) fn without_object_marks(&self) -> Self {
+    pub(crate) fn without_object_marks(&self) -> Self {
         let background = self.seeds.as_ref().and_then(|seeds| {
             let keep = |&mark: &Mark| match mark {
                 Mark::Object => Mark::Unknown,

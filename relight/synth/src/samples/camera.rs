@@ -6,7 +6,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ImageFormat, RgbImage};
 use serde::{Deserialize, Serialize};
 
-use super::random::{Random, mix};
+use crate::random::{Random, mix};
 use relight_core::image::{ColourSpace, Srgb};
 use relight_core::statistics::ranked;
 
@@ -71,7 +71,7 @@ impl CameraModel {
     }
 
     /// A random camera, without its exposure.
-    pub(super) fn draw(random: &mut Random) -> Self {
+    pub(crate) fn draw(random: &mut Random) -> Self {
         let balance = Vec3::from_array([(); 3].map(|()| (random.normal() * 0.08).exp()));
         let is_noisy = random.chance(0.6);
         let mut noise = |most: f32| {
@@ -99,7 +99,7 @@ impl CameraModel {
 
     /// The same camera, exposed so that of these colours the brightest channel of 99 in 100 pixels lies
     /// below `level`. Of black ones it keeps its exposure.
-    pub(super) fn exposed(mut self, image: &[Vec3], level: f32) -> Self {
+    pub(crate) fn exposed(mut self, image: &[Vec3], level: f32) -> Self {
         let brightest = |colour: &Vec3| (*colour * self.gain).max_element();
         let mut levels: Vec<f32> = image.iter().map(brightest).collect();
         let place = levels.len() * 99 / 100;
@@ -114,7 +114,7 @@ impl CameraModel {
 
     /// The same camera, exposed longer, at most `longest` times, so that `part` of the pixels of one of
     /// these pictures clip in all channels, and of no other more.
-    pub(super) fn clipping(mut self, pictures: &[Vec<Vec3>], part: f32, longest: f32) -> Self {
+    pub(crate) fn clipping(mut self, pictures: &[Vec<Vec3>], part: f32, longest: f32) -> Self {
         let level = |picture: &Vec<Vec3>| {
             let mut levels: Vec<f32> = picture
                 .iter()
@@ -132,7 +132,7 @@ impl CameraModel {
 
     /// The values that the camera gives for light that already has its gain, with its noise. One value
     /// a channel for each colour; `seed` draws the noise.
-    pub(super) fn values(&self, image: &[Vec3], seed: u64) -> Vec<[u8; 3]> {
+    pub(crate) fn values(&self, image: &[Vec3], seed: u64) -> Vec<[u8; 3]> {
         let table = response_table(self.response);
         let encoded = |light: f32| {
             let root = light.clamp(0.0, 1.0).sqrt();
@@ -153,7 +153,7 @@ impl CameraModel {
     }
 
     /// The picture after its compression, where there is one.
-    pub(super) fn compressed(&self, picture: RgbImage) -> RgbImage {
+    pub(crate) fn compressed(&self, picture: RgbImage) -> RgbImage {
         let Some(quality) = self.jpeg else {
             return picture;
         };

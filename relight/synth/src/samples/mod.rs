@@ -1,0 +1,10 @@
+//! Samples: what is drawn from a seed, the picture of it with its ground truth, and a folder of them.
+
+pub(crate) mod camera;
+pub(crate) mod finish;
+pub(crate) mod folder;
+pub(crate) mod object;
+pub(crate) mod png;
+pub(crate) mod recipe;
+pub(crate) mod sample;
+pub(crate) mod view;

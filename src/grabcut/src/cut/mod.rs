@@ -1,0 +1,8 @@
+//! GrabCut: colour models of both sides and minimum cuts take turns, coarse to fine.
+
+pub(crate) mod energy;
+pub(crate) mod gmm;
+pub(crate) mod grab_cut;
+pub(crate) mod lab;
+pub(crate) mod max_flow;
+pub(crate) mod pyramid;

@@ -1,0 +1,9 @@
+//! What a whole turn says of each pixel: the object stands still, the room passes by, the table lies below.
+
+pub(crate) mod backdrop;
+pub(crate) mod enclosed_regions;
+pub(crate) mod registration;
+pub(crate) mod rim;
+pub(crate) mod statistics;
+pub(crate) mod table;
+pub(crate) mod temporal_evidence;
