@@ -3,16 +3,13 @@
 //! | module | concern |
 //! | --- | --- |
 //! | `mesh`, `shape` | triangles from files, and out of nothing but a seed |
-//! | `view`, `geometry`, `object` | what a camera sees of them, which light is blocked |
-//! | `paint`, `texture`, `finish` | albedo, relief and gloss; pictures that are laid onto objects |
-//! | `lighting` | lamps and panoramas on what is seen |
-//! | `studio` | panoramas out of nothing but a seed |
-//! | `camera` | from light to 8-bit values |
-//! | `library`, `recipe` | what there is to draw from, and what is drawn |
-//! | `pack` | many objects and panoramas in one file |
-//! | `sample`, `folder` | one sample; a folder of them |
+//! | `geometry` | what a camera sees of them, which light is blocked |
+//! | `paint`, `texture` | albedo and relief; pictures that are laid onto objects |
+//! | `lighting` | lamps and panoramas on what is seen; `studio` makes panoramas out of nothing but a seed |
+//! | `samples` | `recipe` draws objects, `view`s, `finish`es and lights; `camera` makes 8-bit values of light; `folder` writes |
+//! | `library`, `pack` | what there is to draw from; many objects and panoramas in one file |
 //! | `turn` | whole turns as shards |
-//! | `transfer` | objects on the table, to be lit by any room over a whole turn without a ray |
+//! | `transfer` | views that any room lights without a ray: of photographs and of whole turns |
 //!
 //! All of it follows from a seed: the same seed gives the same bytes on any number of threads. What is
 //! slow is kept apart from what is cheap: a [`SyntheticScene`] is made once for an object in a pose, and then

@@ -7,7 +7,7 @@
 //! faster, with faults on demand; a whole capture runs on it without hardware.
 //!
 //! Frames are returned as the camera delivered them: this module neither counts nor judges them, and
-//! knows nothing of turntables, captures or masks. [`hold::ManualPlan`] decides which controls to set
+//! knows nothing of turntables, captures or masks. [`manual_controls::ManualPlan`] decides which controls to set
 //! so that exposure, gain, white balance and focus do not change; it is a pure function of the list
 //! of controls.
 //!
@@ -32,7 +32,7 @@ mod control;
 mod error;
 mod format;
 mod frame;
-pub mod hold;
+pub mod manual_controls;
 mod mode;
 #[cfg(all(feature = "nokhwa", any(target_os = "linux", target_os = "macos")))]
 mod nokhwa;

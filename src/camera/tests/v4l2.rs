@@ -16,7 +16,7 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use relit_camera::hold::{ManualPlan, ManualValues};
+use relit_camera::manual_controls::{ManualPlan, ManualValues};
 use relit_camera::{self as camera, Camera, CameraError, CameraMode, ControlKind, Frame, Rates};
 use relit_clock::Clock;
 use relit_data::session::FrameClock;

@@ -10,7 +10,7 @@ use relit_data::file_names::folded;
 use relit_data::session::{self, beside_sessions, recording_name, recordings};
 use relit_data::shard::{Dataset, OutputFolder};
 
-use super::catalog::Catalog;
+use super::dataset_index::Catalog;
 use super::job::Job;
 use super::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally};
 

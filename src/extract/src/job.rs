@@ -25,7 +25,7 @@ use super::pipeline::{self, LostFrame, ProcessedFrame, Stage};
 use super::plan::{Assignment, Assignments, Plan};
 use super::quality;
 use super::select::{TURN_DEG, TURN_TOLERANCE_DEG};
-use super::steadiness::Steadiness;
+use super::stability::Steadiness;
 use super::{Aligner, ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
 
 /// Images on the report's contact sheet.

@@ -38,9 +38,9 @@
 mod align;
 mod batch;
 mod blur;
-mod catalog;
 mod crop;
 mod crop_view;
+mod dataset_index;
 mod error;
 mod interpolate;
 mod job;
@@ -54,7 +54,7 @@ mod plan;
 mod quality;
 mod scale;
 mod select;
-mod steadiness;
+mod stability;
 mod timeline;
 
 use std::path::{Path, PathBuf};

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use super::codes::{Alarm, meaning_of_error};
+use super::protocol::{ControllerState, LineFault, SendError};
 use super::supervisor::MotionFault;
-use super::wire::{ControllerState, LineFault, SendError};
 use crate::lockfile::LockError;
 
 /// An error of a turntable.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::wire::Message;
+use super::protocol::Message;
 
 /// Which firmware of the Grbl family a controller runs, as it says itself.
 #[derive(

@@ -8,13 +8,13 @@ use rustix::process::{Pid, Signal, kill_process};
 use super::TableOptions;
 use super::codes::Alarm;
 use super::error::TurntableError;
-use super::greeting;
+use super::handshake;
 use super::identity::Identity;
-use super::link::{IoThread, Link};
+use super::io_thread::{IoThread, Link};
 use super::port::{self, Port, SerialPort};
+use super::protocol::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
 use super::status::TableStatus;
 use super::supervisor::{MotionFault, MotionGoal};
-use super::wire::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
 use crate::lockfile::LockFile;
 use relit_clock::Clock;
 
@@ -376,7 +376,7 @@ impl Table {
     }
 
     /// The error for a line without answer. The supervisor stops the table then; waits for that.
-    pub(super) fn lost(&self, block: &str, fault: super::wire::LineFault) -> TurntableError {
+    pub(super) fn lost(&self, block: &str, fault: super::protocol::LineFault) -> TurntableError {
         match self.end_by_fault() {
             Err(error) => error,
             Ok(Some(TurntableError::Motion(fault @ MotionFault::PortLost(_)))) => fault.into(),

@@ -5,7 +5,7 @@ use super::error::TurntableError;
 use super::grbl_client::{Table, refused, require_released};
 use super::supervisor::{MotionFault, MotionGoal};
 
-use super::wire::{ControllerState, LineOutcome, ReplyTimeout};
+use super::protocol::{ControllerState, LineOutcome, ReplyTimeout};
 
 /// Time limit of the search for the index.
 const HOMING: ReplyTimeout = ReplyTimeout::Within(120_000_000);

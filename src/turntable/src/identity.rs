@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::error::TurntableError;
 use super::family::Family;
-use super::wire::Message;
+use super::protocol::Message;
 
 /// How far a table without a limit of its own may turn in either direction before its cable is wound up, degrees.
 const TRAVEL_DEG: f64 = 400.0;
@@ -151,8 +151,8 @@ impl GrblSettings {
 
 #[cfg(test)]
 mod tests {
+    use super::super::protocol::parse;
     use super::*;
-    use crate::wire::parse;
 
     fn identity(about: &[&str], changed: &[(u16, f64)]) -> Result<Identity, TurntableError> {
         let usual = [

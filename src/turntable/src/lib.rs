@@ -46,31 +46,32 @@
 //! shares no code with the firmware, which the simulator runs: both sides implement the published interface.
 
 mod address;
+mod angle_fit;
 mod codes;
 mod error;
 mod family;
 mod grbl_client;
-mod greeting;
+mod handshake;
 mod homing;
 mod identity;
-mod link;
+mod io_thread;
 pub mod lockfile;
 mod plan;
 mod port;
+pub mod protocol;
 pub mod simulator;
 mod status;
 mod supervisor;
-mod sync;
 #[cfg(test)]
 mod tests;
 mod turn;
-pub mod wire;
 
 use std::path::PathBuf;
 
 use relit_clock::Clock;
 
 pub use address::{SimulatedAddress, TurntableAddress, find_serial};
+pub use angle_fit::Track;
 pub use codes::Alarm;
 pub use error::TurntableError;
 pub use family::Family;
@@ -80,11 +81,10 @@ pub use identity::Identity;
 pub(crate) use plan::MARGIN_DEG;
 pub use plan::TurnPlan;
 pub use port::{Port, SerialPort};
+pub use protocol::{ControllerState, Counts, LineFault, SendError};
 pub use status::TableStatus;
 pub use supervisor::MotionFault;
-pub use sync::Track;
 pub use turn::{FinishedTurn, Turn};
-pub use wire::{ControllerState, Counts, LineFault, SendError};
 
 /// How a table is opened.
 #[derive(Debug, Clone, PartialEq)]

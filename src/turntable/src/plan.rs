@@ -152,9 +152,9 @@ impl Identity {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::protocol::ControllerState;
     use super::*;
     use crate::family::Family;
-    use crate::wire::ControllerState;
 
     fn identity(low_deg: f64, high_deg: f64) -> Identity {
         Identity {

@@ -1,8 +1,8 @@
 //! The status of a table.
 
 use super::codes::Alarm;
+use super::protocol::ControllerState;
 use super::supervisor::{PositionReport, Supervisor};
-use super::wire::ControllerState;
 
 /// The status of a table by a fresh report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -4,13 +4,14 @@ use std::time::Duration;
 
 use relit_data::turn_motion::{JournaledReport, JournaledTurn};
 
+use super::angle_fit;
+use super::angle_fit::Track;
 use super::error::TurntableError;
 use super::grbl_client::{Table, straight};
 use super::plan::TurnPlan;
+use super::protocol::{ControllerState, Message};
 use super::status::TableStatus;
 use super::supervisor::{MotionFault, PositionReport};
-use super::sync::{self, Track};
-use super::wire::{ControllerState, Message};
 
 /// Rest before the start, until the table has stopped swinging.
 const SETTLE: Duration = Duration::from_millis(300);

@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::lanes::{self, Kernel, Lanes, Number};
 use super::series::HarmonicSeries;
+use super::simd;
+use super::simd::{Kernel, Lanes, Number};
 use crate::image::{Linear, Planes, Rgb};
 use crate::light::{Normals, Order, ShLight, YUp};
 

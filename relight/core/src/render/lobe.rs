@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::lanes::{Kernel, Lanes, Number};
 use super::series::HarmonicSeries;
+use super::simd::{Kernel, Lanes, Number};
 use super::surface::Gloss;
 use crate::image::{ImageError, Linear, Rgb};
 use crate::light::{Normals, Order, Quadrature, ShLight, YUp, polar_functions};

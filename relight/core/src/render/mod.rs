@@ -7,27 +7,25 @@
 
 mod diffuse;
 mod fit;
-mod lanes;
 mod layers;
 mod lobe;
 mod power;
+mod sequence;
 mod series;
-mod shots;
+mod simd;
 mod surface;
 
-pub use diffuse::{DiffuseForm, DiffuseLayer};
-pub use diffuse::{RELEASED_AMBIENT, cosine_lobe, diffuse_constants};
+pub use diffuse::{DiffuseForm, DiffuseLayer, RELEASED_AMBIENT, cosine_lobe, diffuse_constants};
 pub use fit::{fit_light, fit_light_near};
 pub use layers::{EXPOSURE, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;
-pub use power::PowerLayer;
-pub use power::power_constants;
-pub use shots::{Look, exposure_for, mirror_reflectance};
+pub use power::{PowerLayer, power_constants};
+pub use sequence::{Look, exposure_for, mirror_reflectance};
 pub use surface::{Gloss, Surface};
 
 use crate::image::{ImageError, Linear, Planes, Rgb, check_extent};
 use crate::light::{Normals, YUp};
-use lanes::Kernel;
+use simd::Kernel;
 
 /// The highlight H of a whole image.
 fn highlight(
@@ -40,6 +38,6 @@ fn highlight(
     let [x, y, z] = normals.planes().planes();
     let [red, green, blue] = gloss.reflectance().planes();
     let inputs = [x, y, z, red, green, blue, gloss.smoothness().plane(0)];
-    lanes::run(layer, inputs, highlight.planes_mut());
+    simd::run(layer, inputs, highlight.planes_mut());
     Ok(Rgb::new(highlight))
 }

@@ -1,7 +1,7 @@
 //! The specular layer as the paper writes it.
 
 use super::diffuse::COSINE_LOBE;
-use super::lanes::{Kernel, Lanes, Number};
+use super::simd::{Kernel, Lanes, Number};
 use super::surface::Gloss;
 use crate::image::{ImageError, Linear, Rgb};
 use crate::light::{Normals, ShLight, YUp};

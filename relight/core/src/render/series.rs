@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use super::lanes::{Lanes, Number};
+use super::simd::{Lanes, Number};
 use crate::light::{Order, legendre_step};
 
 /// The coefficients G_lm of a series, in both precisions.

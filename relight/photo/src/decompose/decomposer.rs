@@ -3,19 +3,18 @@
 #[cfg(feature = "files")]
 use std::path::Path;
 
-use super::answer::{Engine, MapsNet, Scales, Whole, to_maps};
 use super::compose::{normalised, possible_highlight};
 use super::crop::{CropSquare, Window, cut_out, inside};
 use super::error::DecomposeError;
+use super::external_normals::OtherNormals;
 use super::gloss::{FittedGloss, fit_gloss};
 use super::light::light_of_shading;
-use super::other::OtherNormals;
-use super::strips::{Enlargement, LayerPlan};
+use super::network_output::{Engine, MapsNet, Scales, Whole, to_maps};
+use super::tiled_compose::{Enlargement, LayerPlan};
 use crate::nets::{Inference, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 #[cfg(feature = "files")]
-use relight_core::light::NormalsFrame;
-use relight_core::light::{Normals, ShLight, YUp};
+use relight_core::light::{Normals, NormalsFrame, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer};
 use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};

@@ -3,7 +3,6 @@
 //! [`Decomposer`] does it for a picture in memory; [`Photo`] is a picture with its mask out of the
 //! content of a file.
 
-mod answer;
 mod compose;
 #[cfg_attr(
     not(feature = "files"),
@@ -14,18 +13,19 @@ mod crop;
 mod decomposer;
 mod encoding;
 mod error;
+mod external_normals;
 mod gloss;
 mod light;
 mod mask;
+mod network_output;
 #[cfg_attr(
     not(feature = "files"),
     allow(dead_code, reason = "other networks for normals come from files")
 )]
-mod other;
 mod photo;
-mod strips;
 #[cfg(test)]
 mod tests;
+mod tiled_compose;
 
 pub use crop::CropSquare;
 #[cfg(feature = "files")]
@@ -33,13 +33,12 @@ pub(crate) use decomposer::in_colour;
 pub use decomposer::{
     DecomposeOptions, Decomposer, Decomposition, MAX_PIXELS, SpecularGate, WORKING_SIDE,
 };
-pub use encoding::{AnsweredMaps, EncodedPicture};
 pub use encoding::{
-    HIGHLIGHT_OFFSET, LOG_FLOOR, LOG_LUMINANCE, LOG_SHADING, MASK, MAX_LIGHT, MIN_FACING,
+    AnsweredMaps, EncodedPicture, HIGHLIGHT_OFFSET, LOG_FLOOR, LOG_LUMINANCE, LOG_SHADING, MASK,
+    MAX_LIGHT, MIN_FACING,
 };
 pub use error::DecomposeError;
-pub use gloss::FittedGloss;
-pub use gloss::fit_gloss;
+pub use gloss::{FittedGloss, fit_gloss};
 pub use light::PredictedLight;
 pub use mask::MaskSource;
 #[cfg(feature = "files")]

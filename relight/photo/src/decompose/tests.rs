@@ -1,6 +1,6 @@
 //! The decomposer as a whole, on networks that are not trained and on stubs.
 
-use super::answer::{MapsNet, NetAnswer, look, to_maps};
+use super::network_output::{MapsNet, NetAnswer, look, to_maps};
 use super::*;
 use crate::nets::{
     INPUTS, LIGHT_PARAMETERS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_heads,

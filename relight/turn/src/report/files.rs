@@ -8,8 +8,8 @@ use relight_photo::files::write_light;
 use relit_data::durable::write_whole;
 use serde_json::{Value, json};
 
+use super::contact_sheet::{contact_sheet, grey};
 use crate::error::TurnError;
-use crate::report::sheet::{contact_sheet, grey};
 use crate::solving::SolvedTurn;
 
 /// The file of figures.

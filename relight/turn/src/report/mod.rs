@@ -1,6 +1,6 @@
 //! What is written of a solved turn.
 
+pub(crate) mod contact_sheet;
 pub(crate) mod files;
 pub(crate) mod object;
-pub(crate) mod sheet;
 pub(crate) mod warnings;

@@ -7,7 +7,7 @@ use super::error::CaptureError;
 use super::settings::Settings;
 use super::stop::StopRequest;
 use crate::state::Check;
-use relit_camera::hold::{ControlDrift, ManualPlan};
+use relit_camera::manual_controls::{ControlDrift, ManualPlan};
 use relit_camera::{Camera, CameraError, CameraMode, Control, Fourcc};
 use relit_data::session::FrameClock;
 use relit_video::StreamFormat;

@@ -6,7 +6,7 @@ use super::error::CaptureError;
 use super::mode_preference::ModePreference;
 use crate::state::CaptureSettings;
 use relit_camera::CameraAddress;
-use relit_camera::hold::ManualValues;
+use relit_camera::manual_controls::ManualValues;
 use relit_turntable::TurntableAddress;
 use relit_turntable::lockfile::{self, LockError, LockFile};
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use relit_camera::hold::ManualValues;
+use relit_camera::manual_controls::ManualValues;
 use relit_camera::{CameraAddress, Fourcc};
 use relit_capture::capture::{ModePreference, Settings};
 use relit_capture::serve::ListenAddress;

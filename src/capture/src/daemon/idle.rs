@@ -12,7 +12,7 @@ use crate::capture::turn::show_table;
 use crate::capture::{CaptureError, Equipment};
 use crate::preview::Preview;
 use crate::state::{CameraState, Monitor, RigState, TableState};
-use relit_camera::hold::{ManualPlan, ManualValues};
+use relit_camera::manual_controls::{ManualPlan, ManualValues};
 use relit_camera::{Camera, CameraError};
 use relit_clock::Clock;
 

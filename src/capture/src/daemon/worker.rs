@@ -12,7 +12,7 @@ use crate::capture::turn::show_table;
 use crate::capture::{CaptureContext, CaptureError, Equipment, StopRequest, capture};
 use crate::preview::Preview;
 use relit_camera::Camera;
-use relit_camera::hold::{ManualPlan, ManualValues};
+use relit_camera::manual_controls::{ManualPlan, ManualValues};
 use relit_turntable::{Table, TurntableError};
 
 /// Time between two checks of a motion.

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use super::heard::Heard;
+use super::events::Heard;
 
 /// What is read of standard error, bytes: its end.
 const COMPLAINT: u64 = 4096;

@@ -9,7 +9,7 @@ use relit_data::session::MASK_FILE;
 
 use super::child::Worker;
 use super::commands::ProcessingPrograms;
-use super::heard::Heard;
+use super::events::Heard;
 use crate::command::Refused;
 
 /// Time in which the editor has to come up: it reads the video through once.

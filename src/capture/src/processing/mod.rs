@@ -9,7 +9,7 @@
 mod child;
 mod commands;
 mod editor;
-mod heard;
+mod events;
 mod queue;
 mod runner;
 mod shared;

@@ -8,7 +8,7 @@ use relit_data::session::{MANIFEST_FILE, Manifest, Status};
 
 use super::child::Worker;
 use super::commands::StepPlaces;
-use super::heard::Heard;
+use super::events::Heard;
 use super::queue::{Begun, PendingWork, StepEnd};
 use super::shared::{Shared, is_busy};
 use crate::state::{Monitor, ProcessingOutcome, ProcessingStep, Verdict};

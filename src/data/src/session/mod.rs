@@ -11,6 +11,7 @@
 //! This module knows the files and how they relate. It decodes no video and knows nothing of
 //! cameras, masks or shards.
 
+mod annotations;
 mod error;
 mod frames;
 mod interrupted;
@@ -18,10 +19,10 @@ mod journal;
 mod lock;
 mod manifest;
 mod recording;
-mod remarks;
 mod writer;
 
 pub use crate::naming::is_session_name;
+pub use annotations::remark;
 pub use error::SessionError;
 pub use frames::{FrameEntry, FrameIndex, Gap};
 pub use interrupted::InterruptedSession;
@@ -32,7 +33,6 @@ pub use manifest::{
     TurntableFacts, VideoFacts, object_of,
 };
 pub use recording::{Notice, Recording, beside_sessions, recording_name, recordings};
-pub use remarks::remark;
 pub use writer::SessionWriter;
 
 /// Name of the manifest in a session folder.

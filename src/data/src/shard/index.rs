@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::ShardError;
 use super::reader::{MAX_BYTES, split};
-use super::tarball::{MemberSpan, TarReader};
+use super::tar_reader::{MemberSpan, TarReader};
 
 /// Where a sample stands in a shard.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -136,9 +136,9 @@ impl<R: Read + Seek> Iterator for SampleSpans<R> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tar_reader::tar_of;
     use super::*;
     use crate::shard::ShardReader;
-    use crate::shard::tarball::tar_of;
     use proptest::prelude::*;
     use std::io::Cursor;
 
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn a_member_that_claims_more_than_there_is_takes_no_memory() {
-        let block = crate::shard::tarball::header("a.png", u64::MAX >> 3).unwrap();
+        let block = super::super::tar_reader::header("a.png", u64::MAX >> 3).unwrap();
         assert!(matches!(
             spans(block.as_bytes())[..],
             [Err(ShardError::ShardDamaged { .. })]

@@ -34,13 +34,13 @@ mod names;
 mod order;
 mod output;
 mod parquet_table;
-mod pieces;
+mod partial_manifest;
 mod quality;
 mod reader;
 pub mod record;
 mod settings;
 mod spool;
-mod tarball;
+mod tar_reader;
 mod verify;
 mod writer;
 
@@ -54,7 +54,9 @@ pub use names::{check_session, sample_key};
 pub use order::order;
 pub use output::OutputFolder;
 pub use parquet_table::{TableRow, read_table};
-pub use pieces::{ArrayTask, MAX_TASKS, Merged, TaskOutcome, TaskPiece, described_so_far, merge};
+pub use partial_manifest::{
+    ArrayTask, MAX_TASKS, Merged, TaskOutcome, TaskPiece, described_so_far, merge,
+};
 pub use quality::{MaskMisfit, QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;

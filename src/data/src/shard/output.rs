@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::digest::Hashing;
 use super::file::FileEntry;
-use super::pieces::ArrayTask;
+use super::partial_manifest::ArrayTask;
 use super::{ShardError, names};
 use crate::durable::{self, MadeFolder, Partial, SealedPartial};
 

@@ -4,7 +4,7 @@
 use std::io::Read;
 
 use super::ShardError;
-use super::tarball::{Member, TarReader, too_large};
+use super::tar_reader::{Member, TarReader, too_large};
 
 /// Largest total size of the members of a sample, bytes.
 pub(super) const MAX_BYTES: u64 = 256 << 20;
@@ -134,8 +134,8 @@ pub(super) fn split(path: &str) -> Option<(String, String)> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tar_reader::tar_of;
     use super::*;
-    use crate::shard::tarball::tar_of;
     use proptest::prelude::*;
 
     fn read(bytes: &[u8]) -> Vec<Result<ShardSample, ShardError>> {

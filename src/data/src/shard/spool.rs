@@ -8,7 +8,7 @@ use super::names::{self, Part};
 use super::order::order;
 use super::output::{PartialFile, ScratchFile, SealedFile};
 use super::parquet_table::TableRow;
-use super::{ShardError, tarball};
+use super::{ShardError, tar_reader};
 
 /// Part of the spool that holds an image.
 #[derive(Debug, Clone, Copy, Default)]

@@ -10,7 +10,7 @@ use rig_firmware::realtime::{Realtime, Received, classify};
 use rig_firmware::stepper::Stepper;
 
 use super::ground_truth::STEPS_PER_TURN;
-use super::wire::{BYTE_TICKS, Timed};
+use super::serial_line::{BYTE_TICKS, Timed};
 
 const RECEIVE_BUFFER: usize = 128;
 const SEND_BUFFER: usize = 64;

@@ -36,9 +36,9 @@ mod ground_truth;
 mod model;
 mod openings;
 mod options;
+mod serial_line;
 mod simulated_table;
 mod terminal;
-mod wire;
 
 use std::fs;
 use std::path::{Path, PathBuf};

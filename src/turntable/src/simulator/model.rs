@@ -10,7 +10,7 @@ use super::chip::{Chip, IndexPlace, Pins};
 use super::faults::TableFaults;
 use super::ground_truth::{GroundTruth, STEPS_PER_TURN, StepEdge};
 use super::options::SimulatorOptions;
-use super::wire::{Timed, Wire};
+use super::serial_line::{Timed, Wire};
 
 /// Ticks of the chip's timer per microsecond.
 const TICKS_PER_US: f64 = 2.0;

@@ -1,7 +1,7 @@
 //! Why a motion ended that had not arrived.
 
 use crate::codes::Alarm;
-use crate::wire::{ControllerState, LineFault};
+use crate::protocol::{ControllerState, LineFault};
 
 /// The fault that ended a motion. The table is being stopped then, or has been.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -12,7 +12,7 @@ mod stop;
 mod tests;
 
 use super::codes::Alarm;
-use super::wire::{
+use super::protocol::{
     ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ReplyTimeout, SendError,
     WireEvent,
 };

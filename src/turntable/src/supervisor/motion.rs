@@ -2,7 +2,7 @@
 
 use super::{ControllerTraits, MotionFault, PositionReport};
 use crate::codes::Alarm;
-use crate::wire::ControllerState;
+use crate::protocol::ControllerState;
 
 /// Longest silence of a controller in motion, microseconds.
 const SILENCE_US: i64 = 2_000_000;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::family::Family;
-use crate::wire::{ControllerState, Pins, Poll};
+use crate::protocol::{ControllerState, Pins, Poll};
 
 /// Rounding error of a printed position, degrees.
 const PRINTED_DEG: f64 = 0.002;

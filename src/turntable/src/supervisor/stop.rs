@@ -4,7 +4,7 @@
 //! the position. The table is reset in motion only if it does not answer or does not slow down.
 
 use super::PositionReport;
-use crate::wire::{ControllerState, Machine, realtime};
+use crate::protocol::{ControllerState, Machine, realtime};
 
 /// Interval at which the feed hold is repeated, microseconds.
 const REPEAT_US: i64 = 250_000;

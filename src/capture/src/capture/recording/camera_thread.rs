@@ -7,10 +7,10 @@ use crossbeam_channel::{SendTimeoutError, Sender};
 
 use relit_data::causes::with_causes;
 
-use super::cutter::{Cutter, TurnFrame};
 use super::finding::Finding;
 use super::outcome::{CameraOutcome, End};
 use super::progress::Shared;
+use super::trimmer::{Cutter, TurnFrame};
 use crate::preview::Preview;
 use relit_camera::{Camera, CameraError, Frame, FrameFault};
 

@@ -3,7 +3,7 @@
 //! A [`Recorder`] reads the camera in a thread of its own, so that nothing that happens elsewhere
 //! costs a frame: the disk has a queue and a thread before it, and the preview never
 //! holds it up. The time of the turn may be announced after it began ([`Window`]). What is on the
-//! disk is never older than a second, and [`salvage`] closes a session whose recorder died.
+//! disk is never older than a second, and [`recovery`] closes a session whose recorder died.
 //!
 //! ```text
 //! camera thread -> cutter -> queue -> writer thread      CameraOutcome, WriterOutcome
@@ -15,15 +15,15 @@
 //! follow from a journal.
 
 mod camera_thread;
-mod cutter;
 mod environment_light;
 mod error;
 mod finding;
 mod outcome;
 mod progress;
 mod recorder;
-mod salvage;
+mod recovery;
 mod timing;
+mod trimmer;
 mod verdict;
 mod writer_thread;
 
@@ -31,5 +31,5 @@ pub use error::RecordingError;
 pub use outcome::End;
 pub use progress::{Progress, Window};
 pub use recorder::{Recorder, RecordingPlan};
-pub use salvage::{Salvaged, Saved, salvage, salvage_session};
+pub use recovery::{Salvaged, Saved, salvage, salvage_session};
 pub use verdict::Recorded;

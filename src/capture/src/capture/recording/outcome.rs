@@ -1,9 +1,9 @@
 //! What the camera's thread and the writer's thread leave when a recording has ended.
 
-use super::cutter::TurnCount;
 use super::environment_light::EnvironmentLight;
 use super::error::RecordingError;
 use super::finding::Finding;
+use super::trimmer::TurnCount;
 use relit_data::session::SessionWriter;
 
 /// Why a recording ended.

@@ -8,11 +8,11 @@ use std::time::Duration;
 use crossbeam_channel::Sender;
 
 use super::camera_thread::CameraThread;
-use super::cutter::{Cutter, IsKey};
 use super::environment_light::EnvironmentLight;
 use super::error::RecordingError;
 use super::outcome::{CameraOutcome, WriterOutcome};
 use super::progress::{Progress, Shared, State, Window};
+use super::trimmer::{Cutter, IsKey};
 use super::verdict::Recorded;
 use super::writer_thread::{JournalLine, WriterThread};
 use crate::preview::Preview;

@@ -2,12 +2,12 @@
 
 use std::error::Error;
 
-use super::cutter::TurnCount;
 use super::error::RecordingError;
 use super::finding::{Finding, frames};
 use super::outcome::{CameraOutcome, End, WriterOutcome};
-use super::salvage::whole_frames;
+use super::recovery::whole_frames;
 use super::timing::{MissingFrames, TimingAnomaly};
+use super::trimmer::TurnCount;
 use crate::state::{TakeSummary, Verdict};
 use relit_data::causes::with_causes;
 use relit_data::disk::DISK_FULL;

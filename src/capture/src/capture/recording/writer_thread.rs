@@ -6,12 +6,12 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 
-use super::cutter::TurnFrame;
 use super::environment_light::EnvironmentLight;
 use super::error::RecordingError;
 use super::finding::Finding;
 use super::outcome::WriterOutcome;
 use super::progress::Shared;
+use super::trimmer::TurnFrame;
 use relit_data::session::{FrameEntry, SessionWriter};
 use relit_data::turn_motion::{JournaledReport, JournaledTurn};
 use relit_video::{Muxer, StreamFormat, Written};

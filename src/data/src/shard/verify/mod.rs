@@ -6,7 +6,7 @@ mod listing;
 mod records;
 mod sample;
 mod session;
-mod tarball;
+mod tar_reader;
 
 use std::fmt;
 use std::path::Path;
@@ -99,7 +99,7 @@ pub fn verify(
 /// Checks the shard and the records of a session; returns the number of complete samples.
 fn check_session(check: &mut SessionCheck<'_>) -> u64 {
     let found = match check.settings.layout {
-        Layout::Webdataset => tarball::check(check),
+        Layout::Webdataset => tar_reader::check(check),
         Layout::Relit => folder::check(check),
     };
     check_records(check, &found);

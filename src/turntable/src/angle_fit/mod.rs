@@ -13,8 +13,8 @@ mod tests;
 
 use relit_data::turn_motion::{JournaledReport, JournaledTurn};
 
+use super::protocol::ControllerState;
 use super::supervisor::PositionReport;
-use super::wire::ControllerState;
 use line::{Fit, Line};
 
 /// Minimum number of reports.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::*;
+use crate::manual_controls::*;
 use crate::{CameraMode, ControlFlags, DeviceInfo, Frame, MenuItem, Mode};
 
 fn control(name: &str, kind: ControlKind, range: (i64, i64), value: i64) -> Control {

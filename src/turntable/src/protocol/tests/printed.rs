@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::wire::number::MAX_LENGTH;
-use crate::wire::{Message, StatusReport};
+use crate::protocol::number::MAX_LENGTH;
+use crate::protocol::{Message, StatusReport};
 
 impl fmt::Display for Message {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

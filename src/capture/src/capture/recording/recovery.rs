@@ -4,9 +4,8 @@
 //! The index is cut to the frames that the video holds, and kept as it was found under another name.
 //! The manifest says what happened. The frames get their angles from what the table had reported.
 
-use std::fmt;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fmt, fs};
 
 use super::error::RecordingError;
 use relit_data::causes::with_causes;

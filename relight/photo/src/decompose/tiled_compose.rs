@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::answer::{Fields, to_maps};
 use super::compose::{ComposedLayers, LayerSums, ResidualSums, possible_highlight};
 use super::crop::{Window, inside};
 use super::encoding::AnsweredMaps;
+use super::network_output::{Fields, to_maps};
 use relight_core::image::{Extent, ImageError, Part, Planes};
 use relight_core::light::{Normals, YUp};
 use relight_core::parallel;

@@ -112,8 +112,8 @@ fn plain(image: DynamicImage) -> DynamicImage {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Planes, StoredImage, encode_jpeg};
     use super::*;
-    use crate::image::{Planes, StoredImage, encode_jpeg};
 
     fn ramp(extent: Extent) -> Planes<3> {
         Planes::from_fn(extent, |x, y| {

@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 
-use super::*;
+use crate::capture::recording::trimmer::*;
 use crate::capture::tests::frame;
 
 /// Plays frames into a cutter, announces the window when frame `at` has come, and answers the

@@ -17,7 +17,7 @@ use crate::shard::file::compare;
 use crate::shard::names::{Part, parse_member};
 use crate::shard::order::order;
 use crate::shard::record::FrameRecord;
-use crate::shard::tarball::{Member, TarReader};
+use crate::shard::tar_reader::{Member, TarReader};
 
 /// Largest member that is read, bytes.
 const MAX_BYTES: u64 = 256 << 20;

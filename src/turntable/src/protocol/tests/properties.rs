@@ -6,8 +6,8 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 
 use super::{checked, events, outcome};
+use crate::protocol::*;
 use crate::tests::fake_grbl::{FakeGrbl, seal};
-use crate::wire::*;
 
 /// A fault of the wire that changes a line.
 #[derive(Debug, Clone, Copy)]

@@ -4,15 +4,14 @@
 //! `tasks/<task>-of-<count>.json`. [`merge`] joins the pieces to `dataset.json`.
 
 use std::collections::BTreeMap;
-use std::fmt;
-use std::fs;
-use std::io;
 use std::path::Path;
+use std::{fmt, fs, io};
 
 use serde::{Deserialize, Serialize};
 
 use super::dataset::{Dataset, described, json_of};
-use super::output::{self, OutputFolder};
+use super::output;
+use super::output::OutputFolder;
 use super::{ShardError, names};
 
 /// The schema that this version writes and reads.

@@ -177,7 +177,7 @@ mod tests {
             let mirror =
                 Surface::new(surface.normals().clone(), black.clone(), Some(gloss)).unwrap();
             let look = Look {
-                exposure: crate::render::EXPOSURE,
+                exposure: super::super::EXPOSURE,
                 ..LOOK
             };
             let image = look.image(&mirror, &even).unwrap();

@@ -3,7 +3,7 @@
 mod printed;
 mod properties;
 
-use super::*;
+use crate::protocol::*;
 use crate::tests::fake_grbl::seal;
 
 const HALF_SECOND: i64 = 500_000;
@@ -275,19 +275,19 @@ fn after_a_lost_report_the_next_ones_are_not_trusted_for_time() {
 const TRANSCRIPTS: [(&str, &str); 4] = [
     (
         "grblhal",
-        include_str!("../../../../../tests/fuzz/seeds/turntable_wire/grblhal.txt"),
+        include_str!("../../../../../tests/fuzz/seeds/turntable_protocol/grblhal.txt"),
     ),
     (
         "fluidnc",
-        include_str!("../../../../../tests/fuzz/seeds/turntable_wire/fluidnc.txt"),
+        include_str!("../../../../../tests/fuzz/seeds/turntable_protocol/fluidnc.txt"),
     ),
     (
         "grbl-esp32",
-        include_str!("../../../../../tests/fuzz/seeds/turntable_wire/grbl-esp32.txt"),
+        include_str!("../../../../../tests/fuzz/seeds/turntable_protocol/grbl-esp32.txt"),
     ),
     (
         "stock",
-        include_str!("../../../../../tests/fuzz/seeds/turntable_wire/stock.txt"),
+        include_str!("../../../../../tests/fuzz/seeds/turntable_protocol/stock.txt"),
     ),
 ];
 

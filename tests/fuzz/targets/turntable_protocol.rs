@@ -6,7 +6,7 @@
 #![allow(clippy::expect_used, reason = "a panic is how a target reports")]
 
 use libfuzzer_sys::fuzz_target;
-use relit_turntable::wire::{LineOutcome, Machine, ReplyTimeout, WireEvent, parse};
+use relit_turntable::protocol::{LineOutcome, Machine, ReplyTimeout, WireEvent, parse};
 
 /// Answers `ok N0`, with its checksum, to the line that opens a session.
 const OPENED: &[u8] = b"ok N0*B4B2\r\n";

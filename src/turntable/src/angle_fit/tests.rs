@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 
-use super::*;
-use crate::wire::Pins;
+use crate::angle_fit::*;
+use crate::protocol::Pins;
 
 const STEP: f64 = 1.0 / 88.889;
 const EXPECTED: JournaledTurn = JournaledTurn {
