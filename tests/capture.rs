@@ -19,7 +19,7 @@ use relit_camera::{
     Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode,
     Rates, open,
 };
-use relit_capture::capture::{End, Recorder, RecordingPlan, Window, salvage, salvage_session};
+use relit_capture::capture::{End, Recorder, RecordingPlan, Window, recover, recover_session};
 use relit_capture::preview::Preview;
 use relit_capture::state::{Monitor, TakeSummary, Verdict};
 use relit_clock::Clock;
@@ -772,7 +772,7 @@ struct Lost {
     us: i64,
 }
 
-/// Kills a recorder that has written so many frames, and salvages its session. `clock`: whether it
+/// Kills a recorder that has written so many frames, and recovers its session. `clock`: whether it
 /// goes by `real` time.
 fn kill_and_salvage(clock: &str, frames: u64) -> Lost {
     let root = tempfile::tempdir().unwrap();
@@ -786,7 +786,7 @@ fn kill_and_salvage(clock: &str, frames: u64) -> Lost {
     let folder = root.path().join(ID);
     assert!(written.any(|written: u64| written >= frames));
     // A session under way is left alone.
-    assert!(salvage(root.path()).unwrap().is_empty());
+    assert!(recover(root.path()).unwrap().is_empty());
     let killed_us = Clock::monotonic().now_us();
     child.kill().unwrap();
     child.wait().unwrap();
@@ -794,9 +794,9 @@ fn kill_and_salvage(clock: &str, frames: u64) -> Lost {
 
     let video = folder.join("video.mkv");
     let before = fs::read(&video).unwrap();
-    let salvaged = salvage(root.path()).unwrap();
-    assert_eq!((salvaged.len(), &salvaged[0].folder), (1, &folder));
-    let saved = salvaged[0].saved.as_ref().unwrap();
+    let recovered = recover(root.path()).unwrap();
+    assert_eq!((recovered.len(), &recovered[0].folder), (1, &folder));
+    let saved = recovered[0].saved.as_ref().unwrap();
     assert!(
         before == fs::read(&video).unwrap(),
         "the video stays as it is"
@@ -812,8 +812,8 @@ fn kill_and_salvage(clock: &str, frames: u64) -> Lost {
     assert_eq!(status, Status::Aborted(reason));
     let last = *recording.frames.unwrap().entries().last().unwrap();
     assert_eq!(last.n + 1, frames as u64);
-    assert!(salvage(root.path()).unwrap().is_empty());
-    assert!(salvage_session(&folder).is_err());
+    assert!(recover(root.path()).unwrap().is_empty());
+    assert!(recover_session(&folder).is_err());
     extracts(&folder, &root.path().join("out"));
     Lost {
         frames: written.saturating_sub(frames as u64),
@@ -859,7 +859,7 @@ fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
     let folder = root.path().join(ID);
     recorder.stop();
     drop(recorder.wait().unwrap());
-    let saved = salvage_session(&folder).unwrap();
+    let saved = recover_session(&folder).unwrap();
     assert_eq!((saved.frames, saved.lines_cut), (0, 0));
     let manifest = Manifest::from_json(&fs::read(folder.join("session.json")).unwrap()).unwrap();
     let Status::Aborted(reason) = manifest.status else {
@@ -898,7 +898,7 @@ fn frames_whose_content_a_power_cut_took_are_cut_from_the_index() {
     let mut bytes = fs::read(&path).unwrap();
     bytes[places[110].at + 100..].fill(0);
     fs::write(&path, bytes).unwrap();
-    let saved = salvage_session(&folder).unwrap();
+    let saved = recover_session(&folder).unwrap();
     assert_eq!((saved.frames, saved.lines_cut), (110, 10));
     assert!(folder.join("frames.interrupted.jsonl").exists());
     extracts(&folder, &root.path().join("out"));

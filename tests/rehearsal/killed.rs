@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
-use relit_capture::capture::salvage;
+use relit_capture::capture::recover;
 use relit_clock::Clock;
 use relit_data::session::{FrameEntry, Recording, Status, recordings};
 use relit_data::shard::{Dataset, ImageSize};
@@ -62,7 +62,7 @@ fn end_while_it_turns_back(signal: Signal, milliseconds: u64) {
     assert!(lines.any(|line| line.unwrap().contains("\"unwinding\"")));
     thread::sleep(Duration::from_millis(milliseconds));
     end(&mut child, signal);
-    assert!(salvage(root.path()).unwrap().is_empty());
+    assert!(recover(root.path()).unwrap().is_empty());
     let (recording, entries) = only_session(root.path());
     assert_eq!(recording.manifest.unwrap().status, Status::Complete);
     assert_eq!(entries.len(), FRAMES);
@@ -167,7 +167,7 @@ fn kill_in_the_turn(frames: u64) -> f64 {
     });
     assert!(enough, "the turn ended before so many frames were written");
     end(&mut child, Signal::KILL);
-    assert_eq!(salvage(root.path()).unwrap().len(), 1);
+    assert_eq!(recover(root.path()).unwrap().len(), 1);
     let (recording, entries) = only_session(root.path());
     let known: Vec<_> = entries
         .iter()

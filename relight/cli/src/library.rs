@@ -16,9 +16,9 @@ pub(crate) fn read_library(
         console.warn_with(&left_out.to_string(), &event);
     }
     let outcome = if library.left_out.is_empty() {
-        Outcome::Whole
+        Outcome::Success
     } else {
-        Outcome::Incomplete
+        Outcome::Partial
     };
     Ok((library, outcome))
 }

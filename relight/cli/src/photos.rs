@@ -68,11 +68,11 @@ impl PhotoArguments {
 /// What comes of a run in which so many photographs were lost.
 pub(crate) fn outcome(found: &FoundPhotos, lost: usize, what: &str) -> CommandResult {
     match lost {
-        0 if found.unused.is_empty() => Ok(Outcome::Whole),
+        0 if found.unused.is_empty() => Ok(Outcome::Success),
         _ if lost > 0 && lost == found.inputs.len() => {
             Err(format!("no photograph could be {what}").into())
         }
-        _ => Ok(Outcome::Incomplete),
+        _ => Ok(Outcome::Partial),
     }
 }
 

@@ -35,7 +35,7 @@ pub use relighting::{
 };
 pub use run::EvalProgress;
 pub use scores::{ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
-pub use turns::{TurnTable, evaluate_turns};
+pub use turns::{TurnScores, evaluate_turns};
 
 /// The examples of the README, so that they are built.
 #[cfg(doctest)]

@@ -58,7 +58,7 @@ struct TurnLine {
 
 /// All methods on all turns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TurnTable {
+pub struct TurnScores {
     /// What the turns are called.
     split: String,
     lines: [TurnLine; METHODS.len()],
@@ -127,7 +127,7 @@ pub fn evaluate_turns(
     split: &str,
     networks: &TurnNetworks,
     progress: EvalProgress<'_>,
-) -> Result<TurnTable, EvalError> {
+) -> Result<TurnScores, EvalError> {
     let set = TurnSet::open(folder)?;
     let mut lines = METHODS.map(|(method, _)| TurnLine {
         method,
@@ -143,7 +143,7 @@ pub fn evaluate_turns(
             progress(steps);
         }
     }
-    Ok(TurnTable {
+    Ok(TurnScores {
         split: split.to_owned(),
         lines,
     })
@@ -287,7 +287,7 @@ impl TurnLine {
     }
 }
 
-impl fmt::Display for TurnTable {
+impl fmt::Display for TurnScores {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let turns = self.lines.first().map_or(0, |line| line.turns.len());
         writeln!(f, "turns, {turns} of {}", self.split)?;

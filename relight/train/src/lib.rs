@@ -25,11 +25,11 @@ pub use engine::adam::Adam;
 pub use engine::checkpoint::{CHECKPOINT, Checkpoint};
 pub use engine::cuda::cuda_device;
 pub use engine::memory::keep_memory;
-pub use engine::metrics_log::{Journal, TABLE};
+pub use engine::metrics_log::{MetricsLog, TABLE};
 pub use engine::model::{ComputePrecision, Model};
 pub use engine::run::{Run, RunOutcome, TrainObserver};
 pub use engine::task::{Resources, StepLosses, TrainingTask, Validation};
-pub use engine::trainable::Learner;
+pub use engine::trainable::Trainable;
 pub use error::TrainError;
 pub use settings::{
     DataSettings, DecomposeSettings, PaperLossCoefficients, PaperSettings, RunSettings,

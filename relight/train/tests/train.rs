@@ -19,9 +19,9 @@ use relight_photo::nets::{Graph, Inference, Weights, decomposer, decomposer_with
 use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
 use relight_train::{
     Adam, AnsweredTensors, Checkpoint, ComputePrecision, DataSettings, DecomposeSettings,
-    DecomposeTask, Journal, Learner, Model, PaperInputs, PaperLossCoefficients, PaperPhase,
+    DecomposeTask, MetricsLog, Model, PaperInputs, PaperLossCoefficients, PaperPhase,
     PaperSettings, PaperTask, Photographs, ProcessGroup, Resources, Run, RunOutcome, RunSettings,
-    StepLosses, TABLE, TrainError, TrainObserver, TrainingTask, TransferSettings,
+    StepLosses, TABLE, TrainError, TrainObserver, Trainable, TrainingTask, TransferSettings,
     TurnNetworkSettings, TurnNetworkTask, Validation, read_settings,
 };
 use tch::{Device, Kind, Tensor};
@@ -541,7 +541,7 @@ fn a_damaged_sample_of_a_turn_is_told_and_the_run_goes_on() {
 
 /// A network of which every second step has nothing to learn from, as where the gate of saturation is closed.
 struct EverySecondStep {
-    learner: Learner,
+    learner: Trainable,
 }
 
 impl EverySecondStep {
@@ -553,7 +553,7 @@ impl EverySecondStep {
         let graph = light_net(Head::Pooled);
         let weights = Weights::initial(&graph, 5);
         Self {
-            learner: Learner::new(graph, Some(&weights), &run, Device::Cpu).unwrap(),
+            learner: Trainable::new(graph, Some(&weights), &run, Device::Cpu).unwrap(),
         }
     }
 }
@@ -571,7 +571,7 @@ impl TrainingTask for EverySecondStep {
     fn join(&mut self, _: &ProcessGroup) -> Result<(), TrainError> {
         Ok(())
     }
-    fn learner(&mut self) -> &mut Learner {
+    fn learner(&mut self) -> &mut Trainable {
         &mut self.learner
     }
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
@@ -687,7 +687,7 @@ fn a_run_that_is_asked_to_stop_while_its_first_views_are_cast_stops_then() {
 fn a_run_that_another_program_makes_is_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let (mut task, settings) = decompose_task(1);
-    let open = Journal::open(folder.path(), 0).unwrap();
+    let open = MetricsLog::open(folder.path(), 0).unwrap();
     let error = make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap_err();
     let text = error.to_string();
     assert!(text.contains("is being made by another program"), "{text}");

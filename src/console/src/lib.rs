@@ -42,19 +42,19 @@ pub use progress::ProgressBar;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Everything was done: exit code 0.
-    Whole,
+    Success,
     /// Finished, but nothing came out, or a check failed: exit code 1.
-    Wrong,
+    Failure,
     /// Finished, but something was left out or lost: exit code 3.
-    Incomplete,
+    Partial,
 }
 
 impl From<Outcome> for ExitCode {
     fn from(outcome: Outcome) -> Self {
         match outcome {
-            Outcome::Whole => Self::SUCCESS,
-            Outcome::Wrong => Self::from(1),
-            Outcome::Incomplete => Self::from(3),
+            Outcome::Success => Self::SUCCESS,
+            Outcome::Failure => Self::from(1),
+            Outcome::Partial => Self::from(3),
         }
     }
 }
@@ -171,11 +171,11 @@ impl Console {
     /// outcome is not whole.
     pub fn finish<E: Into<Box<dyn Error>>>(self, result: Result<Outcome, E>) -> ExitCode {
         match (result, lost_line()) {
-            (Ok(Outcome::Whole), Some(fault)) => {
+            (Ok(Outcome::Success), Some(fault)) => {
                 print_error_line(&format!(
                     "error: standard output could not be written, lines are missing there: {fault}"
                 ));
-                Outcome::Incomplete.into()
+                Outcome::Partial.into()
             }
             (Ok(outcome), _) => outcome.into(),
             (Err(error), _) => {

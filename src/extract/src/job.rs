@@ -25,7 +25,7 @@ use super::pipeline::{self, LostFrame, ProcessedFrame, Stage};
 use super::plan::{Assignment, Assignments, Plan};
 use super::quality;
 use super::select::{TURN_DEG, TURN_TOLERANCE_DEG};
-use super::stability::Steadiness;
+use super::stability::Stability;
 use super::{Aligner, ExtractError, ExtractOptions, Observer, Scaler, cut, square_around};
 
 /// Images on the report's contact sheet.
@@ -145,7 +145,7 @@ impl Job {
         let mut notices = self.notices.clone();
         notices.extend(self.notices_of_plan(&plan, options.frames));
         let mut stage = self.stage(options)?;
-        let mut steadiness = Steadiness::new(options.max_shift);
+        let mut steadiness = Stability::new(options.max_shift);
         let mut writer = ShardWriter::create(
             folder.path(),
             options.layout,

@@ -8,7 +8,7 @@ use super::align::Alignment;
 
 /// The shifts of a turn, frame by frame, in any order.
 #[derive(Debug, Default)]
-pub(super) struct Steadiness {
+pub(super) struct Stability {
     max_shift: f64,
     frames: u64,
     unregistered: Vec<u64>,
@@ -21,7 +21,7 @@ pub(super) struct Steadiness {
     turned_frames: u64,
 }
 
-impl Steadiness {
+impl Stability {
     /// Of a turn whose object may move by `max_shift` pixels.
     pub(super) fn new(max_shift: f64) -> Self {
         Self {
@@ -114,18 +114,18 @@ mod tests {
 
     #[test]
     fn the_first_frame_beyond_the_largest_shift_is_named_in_any_order() {
-        let mut steadiness = Steadiness::new(8.0);
+        let mut steadiness = Stability::new(8.0);
         for (frame, dx) in [(3, 1.0), (9, -8.5), (7, 9.0), (8, 2.0)] {
             steadiness.add(frame, &moved_by(dx), None);
         }
         let error = steadiness.check().unwrap_err().to_string();
         assert!(error.starts_with("from frame 7 on"), "{error}");
-        assert!(Steadiness::new(8.0).check().is_ok());
+        assert!(Stability::new(8.0).check().is_ok());
     }
 
     #[test]
     fn frames_that_cannot_be_registered_are_counted() {
-        let mut steadiness = Steadiness::new(8.0);
+        let mut steadiness = Stability::new(8.0);
         steadiness.add(1, &moved_by(0.2), None);
         assert!(steadiness.notices(0.3).is_empty());
         let lost = Alignment {

@@ -9,7 +9,7 @@ use super::cut::energy::CutEnergy;
 use super::cut::grab_cut::Label;
 use super::cut::pyramid;
 use super::cut::pyramid::FirstModels;
-use super::hints::trimap::InitialLabels;
+use super::hints::trimap::Trimap;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::turn::statistics;
 use super::turn::statistics::TurnStatistics;
@@ -207,8 +207,8 @@ pub fn clean_cut(
 }
 
 /// The labels of a frame by hints alone, which have to say where the object may be.
-fn initial(hints: &Hints, size: (u32, u32)) -> Result<InitialLabels, MaskError> {
-    let initial = InitialLabels::new(hints, size)?;
+fn initial(hints: &Hints, size: (u32, u32)) -> Result<Trimap, MaskError> {
+    let initial = Trimap::new(hints, size)?;
     // Marks of the background alone cut nothing out of a frame; a turn may do without those of the object.
     if initial.labels.iter().any(|label| label.is_object()) {
         Ok(initial)
@@ -234,7 +234,7 @@ fn by_hints(
 ) -> Result<Mask, MaskError> {
     let size = frame.dimensions();
     check_size(size)?;
-    let InitialLabels {
+    let Trimap {
         labels,
         first,
         rect,

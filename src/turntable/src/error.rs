@@ -180,7 +180,7 @@ pub enum TurntableError {
     NotStopped,
     /// The reports of a turn do not determine its angles; why.
     #[error("the turn's angles cannot be determined: {0}")]
-    Track(String),
+    AngleFit(String),
 }
 
 fn advice(state: ControllerState, alarm: Option<&Alarm>) -> String {

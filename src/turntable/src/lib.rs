@@ -71,7 +71,7 @@ use std::path::PathBuf;
 use relit_clock::Clock;
 
 pub use address::{SimulatedAddress, TurntableAddress, find_serial};
-pub use angle_fit::Track;
+pub use angle_fit::AngleFit;
 pub use codes::Alarm;
 pub use error::TurntableError;
 pub use family::Family;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use relit_data::turn_motion::{JournaledReport, JournaledTurn};
 
 use super::angle_fit;
-use super::angle_fit::Track;
+use super::angle_fit::AngleFit;
 use super::error::TurntableError;
 use super::grbl_client::{Table, straight};
 use super::plan::TurnPlan;
@@ -125,9 +125,9 @@ impl<'table> Turn<'table> {
     /// Waits until the table rests at the turn's end, turns it back, and returns its angles over time.
     ///
     /// # Errors
-    /// The fault that has ended the turn; the table has been stopped. [`TurntableError::Track`] if
+    /// The fault that has ended the turn; the table has been stopped. [`TurntableError::AngleFit`] if
     /// the turn is complete but its angles cannot be determined.
-    pub fn wait_end(self) -> Result<Track, TurntableError> {
+    pub fn wait_end(self) -> Result<AngleFit, TurntableError> {
         let (track, finished) = self.wait_rest();
         finished.unwind()?;
         track
@@ -138,14 +138,14 @@ impl<'table> Turn<'table> {
     /// its part at constant speed, which [`FinishedTurn::unwind`] reports.
     ///
     /// # Errors
-    /// [`TurntableError::Track`] in the first part of the result, if the angles cannot be determined.
-    pub fn wait_rest(mut self) -> (Result<Track, TurntableError>, FinishedTurn<'table>) {
+    /// [`TurntableError::AngleFit`] in the first part of the result, if the angles cannot be determined.
+    pub fn wait_rest(mut self) -> (Result<AngleFit, TurntableError>, FinishedTurn<'table>) {
         let plan = &self.plan;
         let distance = (plan.end_deg() - plan.back_deg()).abs();
         let limit = self.table.travel_time(distance, plan.degrees_per_second);
         let arrived = self.table.wait_arrival(limit);
         let reports = self.leave();
-        let track = sync::fit(&reports, &self.expected()).map_err(TurntableError::Track);
+        let track = sync::fit(&reports, &self.expected()).map_err(TurntableError::AngleFit);
         let finished = FinishedTurn {
             table: self.table,
             arrived,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Samples, Srgb, encode_exr};
 use relight_core::light::Panorama;
-use relight_photo::compositing::{SceneBackground, SceneDescription, SceneSetting};
+use relight_photo::compositing::{SceneBackground, SceneDescription, SceneEnvironment};
 use relight_photo::relighting::PanoramaView;
 use relit_data::still::Format;
 
@@ -246,7 +246,7 @@ impl StudioBackground {
     }
 
     /// What is seen of it after light has turned by so many radians, after [`StudioBackground::prepare`].
-    pub(super) fn seen(&self, setting: &SceneSetting, turn: f64) -> Rgb<Linear> {
+    pub(super) fn seen(&self, setting: &SceneEnvironment, turn: f64) -> Rgb<Linear> {
         match &self.content {
             Content::Photo(photo) => photo.shown().clone(),
             Content::Panorama(panorama) => match &panorama.view {

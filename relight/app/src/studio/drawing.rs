@@ -2,9 +2,9 @@
 
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_photo::compositing::{
-    InsertScene, SceneDescription, SceneLayer, SceneObject, SceneSetting,
+    InsertScene, SceneDescription, SceneEnvironment, SceneLayer, SceneObject,
 };
-use relight_photo::relighting::Subject;
+use relight_photo::relighting::RelightableObject;
 use serde_json::{Value, json};
 
 use super::background::{StudioBackground, reduced};
@@ -19,9 +19,9 @@ const MUCH_CLIPPED: f32 = 0.25;
 /// The setting that was made last, with all that it depends on: a background, the scene without objects and without the
 /// light's angle, and its longest side. While only those change it stays.
 #[derive(Default)]
-pub(super) struct KeptSetting(Option<((SceneDescription, Option<u32>), SceneSetting)>);
+pub(super) struct KeptEnvironment(Option<((SceneDescription, Option<u32>), SceneEnvironment)>);
 
-impl KeptSetting {
+impl KeptEnvironment {
     /// The setting of a scene, `longest` pixels at most; the background is made ready for it.
     ///
     /// # Errors
@@ -31,13 +31,13 @@ impl KeptSetting {
         scene: &SceneDescription,
         background: &mut StudioBackground,
         longest: Option<u32>,
-    ) -> Result<&SceneSetting, Refusal> {
+    ) -> Result<&SceneEnvironment, Refusal> {
         background.prepare(scene, longest);
         let mut bare = scene.clone();
         bare.objects.clear();
         bare.light.turn = 0.0;
         let key = (bare, longest);
-        let tilt = SceneSetting::ground_tilt(scene, background.for_scene());
+        let tilt = SceneEnvironment::ground_tilt(scene, background.for_scene());
         let kept = self.0.take().filter(|(was, _)| *was == key);
         let mut setting = match kept {
             Some((_, setting)) => setting,
@@ -46,7 +46,7 @@ impl KeptSetting {
                     .light
                     .lamp()?
                     .map(relight_photo::relighting::LightSource::Lamp);
-                SceneSetting::new(scene, background.for_scene(), lamp)?
+                SceneEnvironment::new(scene, background.for_scene(), lamp)?
             }
         };
         setting.tilt = tilt;
@@ -67,7 +67,7 @@ pub(super) fn of_size(
 
 /// A scene ready to be drawn: its objects in their setting before their background.
 pub(super) struct Drawing<'a> {
-    pub(super) setting: &'a SceneSetting,
+    pub(super) setting: &'a SceneEnvironment,
     pub(super) background: &'a StudioBackground,
     scene: InsertScene<'a>,
     turn: f64,
@@ -80,9 +80,9 @@ impl<'a> Drawing<'a> {
     /// Where an object cannot stand where it should.
     pub(super) fn new(
         scene: &SceneDescription,
-        setting: &'a SceneSetting,
+        setting: &'a SceneEnvironment,
         background: &'a StudioBackground,
-        subjects: &[&'a Subject],
+        subjects: &[&'a RelightableObject],
         before: bool,
     ) -> Result<Self, Refusal> {
         let pairs = scene.objects.iter().zip(subjects);

@@ -27,13 +27,13 @@ use relight_core::image::{ColourSpace, Depth, Extent, Planes, Srgb, encode_jpeg,
 use relight_photo::compositing::SceneDescription;
 use relight_photo::decompose::Decomposer;
 use relight_photo::nets::Weights;
-use relight_photo::relighting::Subject;
+use relight_photo::relighting::RelightableObject;
 use serde_json::{Value, json};
 
 use crate::message::{pack, unpack};
 use archive::SceneFiles;
 use background::{StudioBackground, made_panoramas};
-use drawing::{Drawing, KeptSetting, of_size};
+use drawing::{Drawing, KeptEnvironment, of_size};
 use error::{Refusal, refused};
 use object::StudioObject;
 use page_scene::{ObjectFiles, PageScene};
@@ -60,7 +60,7 @@ pub struct Studio {
     decomposer: Option<Decomposer>,
     objects: Objects,
     background: Option<StudioBackground>,
-    setting: KeptSetting,
+    setting: KeptEnvironment,
 }
 
 /// By the page's numbers.
@@ -199,7 +199,7 @@ impl Studio {
 
     fn choose(&mut self, background: StudioBackground) -> Result<Answer, Refusal> {
         let extent = background.extent(PANORAMA_PICTURE);
-        self.setting = KeptSetting::default();
+        self.setting = KeptEnvironment::default();
         self.background = Some(background);
         let says = json!({ "width": extent.width, "height": extent.height });
         Ok((says, Vec::new()))
@@ -226,7 +226,8 @@ impl Studio {
             let subject = object.and_then(StudioObject::prepared);
             subject.ok_or_else(|| no_object(placed.object))
         };
-        let subjects: Vec<&Subject> = scene.objects.iter().map(ready).collect::<Result<_, _>>()?;
+        let subjects: Vec<&RelightableObject> =
+            scene.objects.iter().map(ready).collect::<Result<_, _>>()?;
         let drawing = Drawing::new(&described, setting, background, &subjects, before)?;
         let (parts, objects) = if layered {
             drawing.layers()?
@@ -250,7 +251,7 @@ impl Studio {
             let object = self.objects.get(placed.object)?;
             subjects.push(object.subject(setting, described, decomposer)?);
         }
-        let subjects: Vec<&Subject> = subjects.iter().collect();
+        let subjects: Vec<&RelightableObject> = subjects.iter().collect();
         let drawing = Drawing::new(&described, setting, background, &subjects, false)?;
         let picture = drawing.picture()?.0.encode::<Srgb>().into_planes();
         let Extent { width, height } = picture.extent();

@@ -5,12 +5,12 @@ use std::path::Path;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, GrayImage, ImageEncoder, RgbImage};
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::{ColourImage, Extent, ImageError, ReducedFile, StoredImage, Transfer};
-use relight_photo::compositing::{ObjectDescription, SceneSetting};
+use relight_core::image::{ColourImage, DownscaledFile, Extent, ImageError, StoredImage, Transfer};
+use relight_photo::compositing::{ObjectDescription, SceneEnvironment};
 use relight_photo::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, PhotoHints, stated_extent,
 };
-use relight_photo::relighting::Subject;
+use relight_photo::relighting::RelightableObject;
 use relit_data::geometry::Rect;
 use relit_grabcut::{Hints, Mask, SegmentSettings, Stroke, Strokes, segment};
 
@@ -43,7 +43,7 @@ pub(super) struct StudioObject {
 
 enum Content {
     Photo(Box<Cut>),
-    Captured(Box<(CapturedObject, Subject)>),
+    Captured(Box<(CapturedObject, RelightableObject)>),
 }
 
 /// A photograph, as far as it is cut out.
@@ -55,7 +55,7 @@ struct Cut {
     /// The photograph with its mask.
     photo: Option<Photo>,
     /// The object in the size in which the scene is worked on.
-    preview: Option<Subject>,
+    preview: Option<RelightableObject>,
 }
 
 impl StudioObject {
@@ -66,7 +66,7 @@ impl StudioObject {
     pub(super) fn open(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         if is_captured(name) {
             let captured = CapturedObject::from_bytes(&bytes)?;
-            let subject = Subject::from_captured(&captured)?;
+            let subject = RelightableObject::from_captured(&captured)?;
             return Ok(Self {
                 name: name.to_owned(),
                 file: bytes,
@@ -251,7 +251,8 @@ impl StudioObject {
         let longest = width.max(photo.mask.extent().height);
         let longest = (longest * PREVIEW_ROWS / rows).min(PREVIEW_SIDE);
         let photo = photo.clone().at_most(longest.max(PREVIEW_ROWS));
-        let subject = Subject::from_photo(&photo, decomposer, &DecomposeOptions::default())?;
+        let subject =
+            RelightableObject::from_photo(&photo, decomposer, &DecomposeOptions::default())?;
         if let Content::Photo(cut) = &mut self.content {
             cut.preview = Some(subject);
         }
@@ -259,7 +260,7 @@ impl StudioObject {
     }
 
     /// The object as it is shown while the scene is worked on, after [`StudioObject::prepare`].
-    pub(super) fn prepared(&self) -> Option<&Subject> {
+    pub(super) fn prepared(&self) -> Option<&RelightableObject> {
         match &self.content {
             Content::Photo(cut) => cut.preview.as_ref(),
             Content::Captured(object) => Some(&object.1),
@@ -272,16 +273,16 @@ impl StudioObject {
     /// Where it is not cut out yet, or cannot be decomposed.
     pub(super) fn subject(
         &mut self,
-        setting: &SceneSetting,
+        setting: &SceneEnvironment,
         described: &ObjectDescription,
         decomposer: &Decomposer,
-    ) -> Result<Subject, Refusal> {
+    ) -> Result<RelightableObject, Refusal> {
         if let Content::Captured(object) = &self.content {
             return Ok(object.1.clone());
         }
         let photo = setting.reduced(described, self.photo()?.clone());
         let options = DecomposeOptions::default();
-        Ok(Subject::from_photo(&photo, decomposer, &options)?)
+        Ok(RelightableObject::from_photo(&photo, decomposer, &options)?)
     }
 }
 
@@ -322,7 +323,7 @@ impl OpenedFile {
         let smaller = if has_at_most(MAX_PIXELS) {
             None
         } else {
-            ReducedFile::new(path, &bytes, MAX_PIXELS, transfer)?
+            DownscaledFile::new(path, &bytes, MAX_PIXELS, transfer)?
         };
         let reduced = smaller.is_some();
         let (name, bytes, transfer) = match smaller {

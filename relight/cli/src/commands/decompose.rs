@@ -127,7 +127,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     {
         let done = run.decompose(input)?;
         console.say(&done.text, &done.event);
-        return Ok(Outcome::Whole);
+        return Ok(Outcome::Success);
     }
     let bar = console.progress(inputs.len() as u64, "photographs");
     let failed = |input: &PhotoInput, message: &str| {

@@ -228,7 +228,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         | Protocol::Normals { set }
         | Protocol::Light { set, .. }
         | Protocol::Highlight { set } => {
-            (images(&arguments.protocol, set, console)?, Outcome::Whole)
+            (images(&arguments.protocol, set, console)?, Outcome::Success)
         }
         Protocol::Relighting(arguments) => relighting(arguments, console)?,
         Protocol::Turn(arguments) => return turns(arguments, console),
@@ -259,7 +259,7 @@ fn relighting(
     let outcome = if arguments.make {
         make(arguments, console)?
     } else {
-        Outcome::Whole
+        Outcome::Success
     };
     let common = &arguments.common;
     let set = RelightingSet::open(&common.data)?;
@@ -322,7 +322,7 @@ fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
     write_json(&table, arguments.output.as_deref())?;
     let event = json!({ "event": "table", "table": table });
     console.say(table.to_string().trim_end(), &event);
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }
 
 fn with_progress<T, E: Error + 'static>(

@@ -60,5 +60,5 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         &output.display().to_string(),
         &json!({ "event": "exported", "output": output, "object": object.name() }),
     );
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }

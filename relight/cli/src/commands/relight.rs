@@ -11,8 +11,8 @@ use relight_photo::files::{
     MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading, write_picture,
 };
 use relight_photo::relighting::{
-    Backdrop, DiscLamp, InsertError, LightSource, PanoramaView, Shot, Subject, WhiteBalance,
-    likeness,
+    Backdrop, DiscLamp, InsertError, LightSource, PanoramaView, RelightableObject, Shot,
+    WhiteBalance, likeness,
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
@@ -199,7 +199,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         && let [input] = inputs.as_slice()
     {
         run.relight(input, console)?;
-        return Ok(Outcome::Whole);
+        return Ok(Outcome::Success);
     }
     let mut lost = 0;
     for input in inputs {
@@ -229,7 +229,7 @@ impl Run<'_> {
             }
         };
         let start = Instant::now();
-        let subject = Subject::from_photo(&photo, &network.decomposer, &network.options)?;
+        let subject = RelightableObject::from_photo(&photo, &network.decomposer, &network.options)?;
         let decomposed = start.elapsed().as_secs_f64();
         let own = LightSource::Coefficients(subject.light.clone());
         let source = self.light.as_ref().unwrap_or(&own);

@@ -62,5 +62,5 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         console.say(&text, &event);
     };
     serve_page(files, address, token, names, announce, &Shutdown::new())?;
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }

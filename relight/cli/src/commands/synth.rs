@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use relight_synth::{
     Folders, LIBRARY_EXTENSION, Library, LibrarySources, LibrarySummary, LightKind, Recipe,
-    SynthError, SynthTally, TurnRecipe, build_library, made_panoramas, write_samples, write_turns,
+    SynthError, SynthSummary, TurnRecipe, build_library, made_panoramas, write_samples,
+    write_turns,
 };
 use relit_console::{Console, Outcome};
 use serde_json::json;
@@ -167,9 +168,9 @@ fn library(arguments: &LibraryArguments, console: Console) -> CommandResult {
     }
     report_library(out, &summary, console);
     Ok(if summary.faults.is_empty() {
-        Outcome::Whole
+        Outcome::Success
     } else {
-        Outcome::Incomplete
+        Outcome::Partial
     })
 }
 
@@ -296,8 +297,8 @@ fn turns(
     Ok(())
 }
 
-fn report(arguments: &SampleArguments, console: Console, what: &str, written: SynthTally) {
-    let SynthTally { new, kept, .. } = written;
+fn report(arguments: &SampleArguments, console: Console, what: &str, written: SynthSummary) {
+    let SynthSummary { new, kept, .. } = written;
     let out = &arguments.output;
     console.say(
         &format!("{}: {new} {what} written, {kept} were there", out.display()),
@@ -317,5 +318,5 @@ fn panoramas(out: &Path, console: Console) -> CommandResult {
         &format!("{}: {} panoramas", out.display(), made.len()),
         &json!({ "event": "panoramas", "out": out, "count": made.len() }),
     );
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }

@@ -295,7 +295,7 @@ fn train<S: Serialize, T: TrainingTask>(
     if arguments.print_settings {
         let event = json!({ "event": "settings", "settings": settings });
         console.say(toml::to_string(&settings)?.trim_end(), &event);
-        return Ok(Outcome::Whole);
+        return Ok(Outcome::Success);
     }
     let (resources, group) = arguments.join(console)?;
     let stop = Arc::clone(&resources.stop);
@@ -321,9 +321,9 @@ fn train<S: Serialize, T: TrainingTask>(
     }
     let is_incomplete = outcome.stopped || outcome.damaged;
     Ok(if is_incomplete {
-        Outcome::Incomplete
+        Outcome::Partial
     } else {
-        Outcome::Whole
+        Outcome::Success
     })
 }
 

@@ -142,5 +142,5 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         &format!("{output}: {net}, {count} parameters"),
         &json!({ "event": "exported", "output": export.output, "net": net, "parameters": count }),
     );
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }

@@ -14,14 +14,14 @@ use super::{ColourImage, ColourSpace, Extent, ImageError, Srgb, Transfer};
 
 /// A picture that was made smaller.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ReducedFile {
+pub struct DownscaledFile {
     /// The file.
     pub bytes: Vec<u8>,
     /// How its name ends: `png`, or `exr` where values are floating point.
     pub ending: &'static str,
 }
 
-impl ReducedFile {
+impl DownscaledFile {
     /// The picture of a file with at most so many pixels, turned as it is displayed; none where the file has no more, or has
     /// floating point values with alpha. Integers are averaged as they are encoded, and become sRGB where they are none;
     /// what they stand for says `transfer`, or else the file. Errors name it as `path`.
@@ -129,8 +129,11 @@ mod tests {
     fn a_large_picture_is_made_as_small_as_it_has_to_be() {
         let path = Path::new("a.jpg");
         let file = encode_jpeg(path, &ramp(Extent::new(300, 200))).unwrap();
-        assert_eq!(ReducedFile::new(path, &file, 60_000, None).unwrap(), None);
-        let reduced = ReducedFile::new(path, &file, 15_000, None)
+        assert_eq!(
+            DownscaledFile::new(path, &file, 60_000, None).unwrap(),
+            None
+        );
+        let reduced = DownscaledFile::new(path, &file, 15_000, None)
             .unwrap()
             .unwrap();
         assert_eq!(reduced.ending, "png");
@@ -148,7 +151,9 @@ mod tests {
         let path = Path::new("a.exr");
         let bright = ramp(Extent::new(40, 40)).map(|value| value * 7.0);
         let file = encode_exr(path, &bright).unwrap();
-        let reduced = ReducedFile::new(path, &file, 400, None).unwrap().unwrap();
+        let reduced = DownscaledFile::new(path, &file, 400, None)
+            .unwrap()
+            .unwrap();
         assert_eq!(reduced.ending, "exr");
         let image = StoredImage::from_bytes(path, &reduced.bytes).unwrap();
         assert!(image.planes.pixel(19, 0)[0] > 6.0);
@@ -156,6 +161,6 @@ mod tests {
 
     #[test]
     fn what_is_no_picture_is_refused() {
-        assert!(ReducedFile::new(Path::new("a.png"), b"no picture", 1, None).is_err());
+        assert!(DownscaledFile::new(Path::new("a.png"), b"no picture", 1, None).is_err());
     }
 }

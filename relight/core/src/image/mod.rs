@@ -13,7 +13,7 @@ mod resize;
 pub use codec::{Depth, Samples, StoredImage, encode_exr, encode_jpeg};
 pub use colour::{ColourSpace, Linear, Rgb, Srgb, Transfer};
 pub use colour_image::ColourImage;
-pub use downscaled::ReducedFile;
+pub use downscaled::DownscaledFile;
 pub use error::{ImageError, check_extent};
 pub use extent::Extent;
 pub use planes::Planes;

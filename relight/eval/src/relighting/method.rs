@@ -9,7 +9,7 @@ use relight_core::image::{Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Order, ShLight};
 use relight_core::render::{DiffuseForm, Gloss, Layers, SpecularForm, Surface};
 use relight_photo::decompose::{DecomposeOptions, Decomposer, Decomposition, SpecularGate};
-use relight_photo::relighting::{MaterialChange, Subject};
+use relight_photo::relighting::{MaterialChange, RelightableObject};
 
 /// What cannot be done with an object.
 const NOT_RELIT: &str = "cannot be decomposed or shown in other light";
@@ -75,11 +75,16 @@ impl RelightMethod<'_> {
             Self::Photograph(decomposer) => {
                 let photo = Photographed::new(set, object, part)?;
                 let mask = &photo.mask;
-                let subject =
-                    Subject::new(&photo.picture, mask, Some(mask), decomposer, &photo.options);
+                let subject = RelightableObject::new(
+                    &photo.picture,
+                    mask,
+                    Some(mask),
+                    decomposer,
+                    &photo.options,
+                );
                 let subject =
                     Box::new(subject.map_err(EvalError::sample(&object.name, NOT_RELIT))?);
-                Ok(Relight::Subject {
+                Ok(Relight::RelightableObject {
                     set,
                     object,
                     photo,
@@ -167,11 +172,11 @@ pub(super) enum Relight<'a> {
         part: Part,
     },
     /// A photograph's object.
-    Subject {
+    RelightableObject {
         set: &'a RelightingSet,
         object: &'a Object,
         photo: Photographed,
-        subject: Box<Subject>,
+        subject: Box<RelightableObject>,
     },
 }
 
@@ -198,7 +203,7 @@ impl Relight<'_> {
                 let image = read_image(path, object.surface.extent())?;
                 Ok(cut_out(&image, &object.mask))
             }
-            Self::Subject {
+            Self::RelightableObject {
                 set,
                 object,
                 photo,

@@ -29,7 +29,7 @@ const MAX_GRAIN: f32 = 0.06;
 
 /// What a background asks of the objects that are put into it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Matching {
+pub struct Harmonisation {
     /// What the light is multiplied with, 1 for a picture that was exposed well.
     pub level: f32,
     /// The colour of the light, of mean 1.
@@ -38,7 +38,7 @@ pub struct Matching {
     pub grain: f32,
 }
 
-impl Default for Matching {
+impl Default for Harmonisation {
     fn default() -> Self {
         Self {
             level: 1.0,
@@ -48,7 +48,7 @@ impl Default for Matching {
     }
 }
 
-impl Matching {
+impl Harmonisation {
     /// Looks at a background: how bright its bright places are, the colour of its light by shades of grey (Finlayson and Trezzi,
     /// 2004), and its grain where it is smoothest.
     #[must_use]
@@ -199,14 +199,16 @@ mod tests {
         let picture = Rgb::new(Planes::from_fn(Extent::new(40, 40), |x, _| {
             [0.2, 0.18, 0.1].map(|v| v * x as f32 / 40.0)
         }));
-        let found = Matching::from_background(&picture);
+        let found = Harmonisation::from_background(&picture);
         assert!((found.level - 0.19 / 0.8).abs() < 0.02, "{found:?}");
         assert!(
             found.balance[0] > 1.1 && found.balance[2] < 0.8,
             "{found:?}"
         );
-        let even =
-            Matching::from_background(&Rgb::new(Planes::filled(Extent::new(40, 40), [0.8; 3])));
-        assert_eq!(even, Matching::default());
+        let even = Harmonisation::from_background(&Rgb::new(Planes::filled(
+            Extent::new(40, 40),
+            [0.8; 3],
+        )));
+        assert_eq!(even, Harmonisation::default());
     }
 }

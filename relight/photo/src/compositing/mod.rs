@@ -18,8 +18,8 @@ mod scene_object;
 mod shadow;
 
 pub use description::{LightDescription, ObjectDescription, SceneDescription};
-pub use harmonisation::Matching;
+pub use harmonisation::Harmonisation;
 pub use layer::SceneLayer;
 pub use scene::InsertScene;
-pub use scene_environment::{SceneBackground, SceneSetting};
+pub use scene_environment::{SceneBackground, SceneEnvironment};
 pub use scene_object::SceneObject;

@@ -3,8 +3,8 @@
 use super::harmonisation::grain;
 use super::layer::{GroundShadow, SceneLayer};
 use super::shadow::Shadow;
-use super::{Matching, SceneObject};
-use crate::relighting::{Fit, InsertError, Standing, exposure_between};
+use super::{Harmonisation, SceneObject};
+use crate::relighting::{Fit, InsertError, PlacedObject, exposure_between};
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::light::{Direction, Panorama, Rotation, ShLight};
 
@@ -16,7 +16,7 @@ pub struct InsertScene<'a> {
     /// The same light, as shadows are drawn from it.
     panorama: Panorama,
     tilt: f64,
-    matching: Matching,
+    matching: Harmonisation,
     objects: Vec<SceneObject<'a>>,
 }
 
@@ -30,7 +30,7 @@ impl<'a> InsertScene<'a> {
         extent: Extent,
         (light, panorama): (ShLight, Panorama),
         tilt: f64,
-        matching: Matching,
+        matching: Harmonisation,
         objects: Vec<SceneObject<'a>>,
     ) -> Result<Self, InsertError> {
         for (number, object) in objects.iter().enumerate() {
@@ -166,7 +166,7 @@ impl<'a> InsertScene<'a> {
     fn shadow(
         &self,
         object: &SceneObject<'_>,
-        standing: &Standing,
+        standing: &PlacedObject,
         panorama: &Panorama,
     ) -> Option<([i64; 2], Planes<3>)> {
         let relief = standing.relief(&object.subject.normals)?;
@@ -191,7 +191,7 @@ mod tests {
     use super::*;
     use crate::decompose::{DecomposeOptions, Decomposer};
     use crate::nets::{Weights, decomposer};
-    use crate::relighting::{DiscLamp, LightSource, MaterialChange, Placement, Subject};
+    use crate::relighting::{DiscLamp, LightSource, MaterialChange, Placement, RelightableObject};
     use relight_core::image::{ColourSpace, Srgb};
 
     const PHOTO: Extent = Extent::new(60, 50);
@@ -210,10 +210,10 @@ mod tests {
         }))
     }
 
-    fn subject() -> Subject {
+    fn subject() -> RelightableObject {
         let decomposer = Decomposer::with_side(&Weights::initial(&decomposer(), 3), 32).unwrap();
         let mask = Planes::from_fn(PHOTO, |x, y| [f32::from(u8::from(is_object(x, y)))]);
-        Subject::new(
+        RelightableObject::new(
             &photo(),
             &mask,
             None,
@@ -223,7 +223,7 @@ mod tests {
         .unwrap()
     }
 
-    fn object(subject: &Subject, placement: Placement) -> SceneObject<'_> {
+    fn object(subject: &RelightableObject, placement: Placement) -> SceneObject<'_> {
         SceneObject {
             subject,
             placement,
@@ -252,7 +252,8 @@ mod tests {
 
     fn composed(extent: Extent, objects: Vec<SceneObject<'_>>) -> Rgb<Linear> {
         let white = Rgb::new(Planes::filled(extent, [0.8; 3]));
-        let scene = InsertScene::new(extent, lamp(), 25.0, Matching::default(), objects).unwrap();
+        let scene =
+            InsertScene::new(extent, lamp(), 25.0, Harmonisation::default(), objects).unwrap();
         scene.compose(&white, &scene.layers(0.0).unwrap(), 0)
     }
 
@@ -299,7 +300,7 @@ mod tests {
             PHOTO,
             lamp(),
             25.0,
-            Matching::default(),
+            Harmonisation::default(),
             vec![SceneObject {
                 shadow: 0.0,
                 ..object(&subject, placement)
@@ -376,7 +377,7 @@ mod tests {
         };
         let extent = Extent::new(160, 120);
         let black = Rgb::new(Planes::zeros(extent));
-        let brightness = |matching: Matching, object: SceneObject<'_>| {
+        let brightness = |matching: Harmonisation, object: SceneObject<'_>| {
             let scene = InsertScene::new(extent, lamp(), 25.0, matching, vec![object]).unwrap();
             let picture = scene.compose(&black, &scene.layers(0.0).unwrap(), 0);
             let middle: Vec<f32> = (70..90)
@@ -390,11 +391,11 @@ mod tests {
                 / 19.0;
             (mean, noise)
         };
-        let plain = brightness(Matching::default(), relit);
+        let plain = brightness(Harmonisation::default(), relit);
         let dark = brightness(
-            Matching {
+            Harmonisation {
                 level: 0.25,
-                ..Matching::default()
+                ..Harmonisation::default()
             },
             relit,
         );
@@ -405,13 +406,13 @@ mod tests {
             ..relit
         };
         let grainy = brightness(
-            Matching {
+            Harmonisation {
                 grain: 0.05,
-                ..Matching::default()
+                ..Harmonisation::default()
             },
             even,
         );
-        let plain = brightness(Matching::default(), even);
+        let plain = brightness(Harmonisation::default(), even);
         assert!(grainy.1 > plain.1 + 0.02, "{grainy:?} {plain:?}");
     }
 
@@ -420,7 +421,7 @@ mod tests {
         let subject = subject();
         let refused = |placement| {
             let objects = vec![object(&subject, OWN_PLACE), object(&subject, placement)];
-            InsertScene::new(PHOTO, lamp(), 25.0, Matching::default(), objects)
+            InsertScene::new(PHOTO, lamp(), 25.0, Harmonisation::default(), objects)
                 .unwrap_err()
                 .to_string()
         };
@@ -453,7 +454,7 @@ mod tests {
             Extent::new(4000, 4000),
             lamp(),
             25.0,
-            Matching::default(),
+            Harmonisation::default(),
             objects,
         )
         .unwrap_err();

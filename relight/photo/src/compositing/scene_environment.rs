@@ -7,7 +7,7 @@ use relight_core::image::{Extent, Linear, Rgb};
 use relight_core::light::{Panorama, ShLight};
 use relight_core::render::exposure_for;
 
-use super::{InsertScene, Matching, ObjectDescription, SceneDescription, SceneObject};
+use super::{Harmonisation, InsertScene, ObjectDescription, SceneDescription, SceneObject};
 use crate::decompose::Photo;
 use crate::relighting::{
     InsertError, LightSource, PanoramaExposure, PanoramaView, SeenSun, WhiteBalance, rows, tinted,
@@ -40,7 +40,7 @@ pub enum SceneBackground<'a> {
 
 /// What follows from a scene's description and its background, before the objects are known.
 #[derive(Debug, Clone)]
-pub struct SceneSetting {
+pub struct SceneEnvironment {
     /// Width and height of the picture.
     pub extent: Extent,
     /// The light: the one that is given, or that of the background.
@@ -48,7 +48,7 @@ pub struct SceneSetting {
     /// How far the camera looks down on the ground of the objects, degrees.
     pub tilt: f64,
     /// What the background asks of the objects.
-    pub matching: Matching,
+    pub matching: Harmonisation,
     /// The sun that is seen in a picture from which the light is taken.
     pub sun: Option<SeenSun>,
     /// How a panorama is exposed.
@@ -61,7 +61,7 @@ pub struct SceneSetting {
     panorama_scale: [f32; 3],
 }
 
-impl SceneSetting {
+impl SceneEnvironment {
     /// The setting of a scene before a background. Light that is not `given` is taken from the background.
     ///
     /// # Errors
@@ -73,9 +73,9 @@ impl SceneSetting {
     ) -> Result<Self, InsertError> {
         let mut matching = match background {
             SceneBackground::Picture(picture) if scene.matches => {
-                Matching::from_background(picture)
+                Harmonisation::from_background(picture)
             }
-            _ => Matching::default(),
+            _ => Harmonisation::default(),
         };
         if given.is_none() {
             // Light that was taken from the background has its colour.
@@ -84,7 +84,7 @@ impl SceneSetting {
         if scene.white_balance == WhiteBalance::Auto
             && let SceneBackground::Picture(picture) = background
         {
-            matching.balance = Matching::from_background(picture).balance;
+            matching.balance = Harmonisation::from_background(picture).balance;
         }
         let sun = match background {
             SceneBackground::Picture(picture) if given.is_none() => SeenSun::find(picture.planes()),
@@ -250,7 +250,7 @@ mod tests {
         let panorama = sky();
         let background = SceneBackground::Panorama(&panorama);
         let scene = described("size = [200, 100]");
-        let plain = SceneSetting::new(&scene, background, None).unwrap();
+        let plain = SceneEnvironment::new(&scene, background, None).unwrap();
         assert_eq!(plain.extent, Extent::new(200, 100));
         assert_eq!(plain.light, LightSource::Panorama(panorama.clone()));
         // The sky is even: it is brought to the brightness of a bright place, and the objects with it.
@@ -259,12 +259,12 @@ mod tests {
         assert_eq!(plain.matching.level, exposure.stops.exp2());
         assert_eq!(plain.matching.balance, [1.0; 3]);
         let view = PanoramaView::new(plain.extent, scene.field, scene.down);
-        let shown = |setting: &SceneSetting| {
+        let shown = |setting: &SceneEnvironment| {
             let seen = setting.seen(&view, &panorama, 0.0);
             seen.planes().pixel(100, 50)[1]
         };
         let brighter = described("size = [200, 100]\nexposure = 1.0");
-        let brighter = SceneSetting::new(&brighter, background, None).unwrap();
+        let brighter = SceneEnvironment::new(&brighter, background, None).unwrap();
         assert!((brighter.matching.level / plain.matching.level - 2.0).abs() < 1e-5);
         assert!((shown(&brighter) / shown(&plain) - 2.0).abs() < 1e-5);
     }
@@ -276,7 +276,7 @@ mod tests {
         let background = SceneBackground::Panorama(&panorama);
         let lamp = LightSource::Lamp("170,30".parse().unwrap());
         let scene = described("size = [200, 100]");
-        let set = SceneSetting::new(&scene, background, Some(lamp)).unwrap();
+        let set = SceneEnvironment::new(&scene, background, Some(lamp)).unwrap();
         assert_eq!(set.matching.level, 1.0);
         let view = PanoramaView::new(set.extent, scene.field, scene.down);
         let shown = set.seen(&view, &panorama, 0.0).planes().pixel(100, 50)[1];
@@ -289,10 +289,10 @@ mod tests {
         let panorama = sky();
         let background = SceneBackground::Panorama(&panorama);
         let unmatched = described("size = [200, 100]\nmatch = false");
-        let unmatched = SceneSetting::new(&unmatched, background, None).unwrap();
-        assert_eq!(unmatched.matching, Matching::default());
+        let unmatched = SceneEnvironment::new(&unmatched, background, None).unwrap();
+        assert_eq!(unmatched.matching, Harmonisation::default());
         let balanced = described("size = [200, 100]\nwhite_balance = \"auto\"");
-        let balanced = SceneSetting::new(&balanced, background, None).unwrap();
+        let balanced = SceneEnvironment::new(&balanced, background, None).unwrap();
         let view = PanoramaView::new(balanced.extent, 60.0, 10.0);
         let [r, g, b] = balanced.seen(&view, &panorama, 0.0).planes().pixel(9, 9);
         assert!((r / b - 1.0).abs() < 0.01 && (g / b - 1.0).abs() < 0.01);
@@ -302,7 +302,7 @@ mod tests {
         let scene = described("white_balance = \"auto\"");
         let dusk = dusk();
         let picture = SceneBackground::Picture(&dusk);
-        let set = SceneSetting::new(&scene, picture, Some(LightSource::Lamp(lamp))).unwrap();
+        let set = SceneEnvironment::new(&scene, picture, Some(LightSource::Lamp(lamp))).unwrap();
         let LightSource::Lamp(shown) = set.light else {
             panic!("a lamp")
         };
@@ -314,22 +314,22 @@ mod tests {
     fn a_picture_is_followed_in_brightness_and_only_given_light_in_colour() {
         let (picture, scene) = (dusk(), described(""));
         let background = SceneBackground::Picture(&picture);
-        let taken = SceneSetting::new(&scene, background, None).unwrap();
+        let taken = SceneEnvironment::new(&scene, background, None).unwrap();
         assert_eq!(taken.extent, Extent::new(64, 48));
         assert!(taken.matching.level < 0.5 && taken.matching.balance == [1.0; 3]);
         let lamp = LightSource::Lamp(DiscLamp::default());
-        let given = SceneSetting::new(&scene, background, Some(lamp.clone())).unwrap();
+        let given = SceneEnvironment::new(&scene, background, Some(lamp.clone())).unwrap();
         assert_eq!(given.light, lamp);
         assert!(given.matching.balance[0] > given.matching.balance[2]);
-        let unmatched = SceneSetting::new(&described("match = false"), background, Some(lamp));
-        assert_eq!(unmatched.unwrap().matching, Matching::default());
+        let unmatched = SceneEnvironment::new(&described("match = false"), background, Some(lamp));
+        assert_eq!(unmatched.unwrap().matching, Harmonisation::default());
     }
 
     #[test]
     fn the_ground_is_looked_down_on_as_far_as_the_camera_sees_it() {
         let panorama = sky();
         let tilt = |more: &str, background| {
-            let setting = SceneSetting::new(&described(more), background, None);
+            let setting = SceneEnvironment::new(&described(more), background, None);
             setting.unwrap().tilt
         };
         let around = SceneBackground::Panorama(&panorama);
@@ -347,7 +347,8 @@ mod tests {
     #[test]
     fn light_that_is_none_is_refused() {
         let black = Panorama::from_light(&ShLight::dark(Order::TWO), Extent::new(32, 16));
-        let refused = SceneSetting::new(&described(""), SceneBackground::Panorama(&black), None);
+        let refused =
+            SceneEnvironment::new(&described(""), SceneBackground::Panorama(&black), None);
         assert!(matches!(refused, Err(InsertError::Dark)));
     }
 
@@ -362,7 +363,7 @@ mod tests {
         let photo = Photo::from_frame("a".into(), picture, mask, None).unwrap();
         let background = dusk();
         let setting =
-            SceneSetting::new(&described(""), SceneBackground::Picture(&background), None);
+            SceneEnvironment::new(&described(""), SceneBackground::Picture(&background), None);
         let object = ObjectDescription {
             height: 0.5,
             ..described("").objects[0].clone()

@@ -3,7 +3,7 @@
 use relight_core::image::Extent;
 
 use super::ObjectDescription;
-use crate::relighting::{InsertError, MaterialChange, Placement, Subject, rows};
+use crate::relighting::{InsertError, MaterialChange, Placement, RelightableObject, rows};
 
 /// How much an object may be enlarged.
 const MAX_GROWTH: f64 = 64.0;
@@ -12,7 +12,7 @@ const MAX_GROWTH: f64 = 64.0;
 #[derive(Debug, Clone, Copy)]
 pub struct SceneObject<'a> {
     /// The object.
-    pub subject: &'a Subject,
+    pub subject: &'a RelightableObject,
     /// Where it stands.
     pub placement: Placement,
     /// What its material becomes.
@@ -28,7 +28,7 @@ pub struct SceneObject<'a> {
 impl<'a> SceneObject<'a> {
     /// An object as it is described, in the scene's light.
     #[must_use]
-    pub fn described(object: &ObjectDescription, subject: &'a Subject) -> Self {
+    pub fn described(object: &ObjectDescription, subject: &'a RelightableObject) -> Self {
         Self {
             subject,
             placement: object.placement(),

@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-use crate::relighting::{BLOCK, Relief};
+use crate::relighting::{BLOCK, HeightField};
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Direction, LightSampler, Panorama};
 
@@ -97,7 +97,7 @@ struct Ground {
 
 impl Shadow {
     /// The shadow of a shape on ground that the camera looks down on by `tilt` radians, in the light of a panorama.
-    pub(crate) fn cast(relief: &Relief, tilt: f64, light: &Panorama) -> Self {
+    pub(crate) fn cast(relief: &HeightField, tilt: f64, light: &Panorama) -> Self {
         let ground = Ground::under(relief, tilt);
         let patterns = rays(&ground, relief.around(), &light.resized(DRAWN));
         let Extent { width, height } = relief.extent;
@@ -179,7 +179,7 @@ impl Shadow {
 
 impl Ground {
     /// The ground that the shape stands on.
-    fn under(relief: &Relief, tilt: f64) -> Self {
+    fn under(relief: &HeightField, tilt: f64) -> Self {
         let (sin, cos) = tilt.clamp(MIN_TILT, PI / 2.0).sin_cos();
         let up = [0.0, cos, sin];
         let width = relief.extent.width;
@@ -203,7 +203,7 @@ impl Ground {
     /// far below the relief's first row, and begins at column `first` of the relief.
     fn shade(
         &self,
-        relief: &Relief,
+        relief: &HeightField,
         rays: &[Ray],
         row: &mut [&mut [f32]; 3],
         (phase, below, first): (usize, f64, f64),
@@ -244,7 +244,7 @@ impl Ground {
     }
 }
 
-impl Relief {
+impl HeightField {
     /// The corners of the box around the shape.
     fn around(&self) -> [[f32; 3]; 2] {
         let Extent { width, height } = self.extent;
@@ -442,12 +442,12 @@ mod tests {
     use crate::relighting::DiscLamp;
     use relight_core::light::Normals;
 
-    fn ball() -> Relief {
+    fn ball() -> HeightField {
         let normals = Normals::sphere(60);
         let alpha = Planes::from_fn(normals.extent(), |x, y| {
             [f32::from(u8::from(normals.planes().pixel(x, y)[2] > 0.0))]
         });
-        Relief::new(&normals, &alpha).unwrap()
+        HeightField::new(&normals, &alpha).unwrap()
     }
 
     fn lamp(azimuth: f64, ambient: f64) -> Panorama {
@@ -473,7 +473,7 @@ mod tests {
     }
 
     /// What is missing on the left and on the right of the object.
-    fn missing_beside(shadow: &Shadow, relief: &Relief) -> [f32; 2] {
+    fn missing_beside(shadow: &Shadow, relief: &HeightField) -> [f32; 2] {
         let Extent { width, height } = relief.extent;
         let missing = |columns: Range<i64>| {
             let cells = columns.flat_map(|x| (0..4 * height as i64).map(move |y| [x, y]));
@@ -510,7 +510,7 @@ mod tests {
     }
 
     /// Whether a ray is inside of the shape in any of its steps, all looked at.
-    fn is_met(relief: &Relief, from: [f32; 3], ray: &Ray) -> bool {
+    fn is_met(relief: &HeightField, from: [f32; 3], ray: &Ray) -> bool {
         let mut walk = Walk::through(ray, from, &ray.inside_from(from[1], from[2]));
         while walk.left > 0 {
             if relief.holds(&walk) {

@@ -11,10 +11,10 @@ use super::{
     write_picture,
 };
 use crate::compositing::{
-    InsertScene, ObjectDescription, SceneBackground, SceneDescription, SceneSetting,
+    InsertScene, ObjectDescription, SceneBackground, SceneDescription, SceneEnvironment,
 };
 use crate::decompose::{DecomposeOptions, Decomposer, Photo};
-use crate::relighting::{InsertError, LightSource, Subject};
+use crate::relighting::{InsertError, LightSource, RelightableObject};
 
 /// The most frames of a video in which a panorama turns.
 const MAX_FRAMES: f64 = 100_000.0;
@@ -34,7 +34,7 @@ pub struct Insertion<'a> {
     background: BackgroundFile,
     /// The first frame of a video.
     first: Option<Rgb<Linear>>,
-    setting: SceneSetting,
+    setting: SceneEnvironment,
     /// How far the light has turned, radians.
     turned: f64,
     decomposer: &'a Decomposer,
@@ -104,7 +104,7 @@ impl<'a> Insertion<'a> {
             (BackgroundFile::Movie(_), None) => return Err(no_frame()),
         };
         let given = given_light(scene, folder, still, (decomposer, &options))?;
-        let setting = SceneSetting::new(scene, still, given)?;
+        let setting = SceneEnvironment::new(scene, still, given)?;
         Ok(Self {
             background,
             first,
@@ -117,7 +117,7 @@ impl<'a> Insertion<'a> {
 
     /// Light, size, tilt and matching.
     #[must_use]
-    pub const fn setting(&self) -> &SceneSetting {
+    pub const fn setting(&self) -> &SceneEnvironment {
         &self.setting
     }
 
@@ -129,13 +129,13 @@ impl<'a> Insertion<'a> {
         &self,
         object: &ObjectDescription,
         source: InsertSource,
-    ) -> Result<Subject, InsertError> {
+    ) -> Result<RelightableObject, InsertError> {
         Ok(match source {
             InsertSource::Photo(photo) => {
                 let photo = self.setting.reduced(object, *photo);
-                Subject::from_photo(&photo, self.decomposer, &self.options)?
+                RelightableObject::from_photo(&photo, self.decomposer, &self.options)?
             }
-            InsertSource::Captured(object) => Subject::from_captured(&object)?,
+            InsertSource::Captured(object) => RelightableObject::from_captured(&object)?,
         })
     }
 
@@ -276,8 +276,9 @@ fn given_light(
     };
     let path = folder.join(mask);
     let (mask, _) = StoredImage::read(&path)?.object_mask(&path)?;
-    let subject = Subject::new(picture, &mask, None, decomposer, options).map_err(|source| {
-        InsertError::Input(format!("{}: {}", path.display(), with_causes(&source)))
-    })?;
+    let subject =
+        RelightableObject::new(picture, &mask, None, decomposer, options).map_err(|source| {
+            InsertError::Input(format!("{}: {}", path.display(), with_causes(&source)))
+        })?;
     Ok(Some(LightSource::Coefficients(subject.light.clone())))
 }

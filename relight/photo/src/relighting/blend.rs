@@ -2,9 +2,9 @@
 
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 
-use super::Subject;
+use super::RelightableObject;
 
-impl Subject {
+impl RelightableObject {
     /// The photograph with these colours of the object in place of its own: its soft edge keeps the background that it has.
     ///
     /// # Panics

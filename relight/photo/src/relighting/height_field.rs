@@ -21,7 +21,7 @@ pub(crate) const BLOCK: usize = 1 << BLOCK_BITS;
 /// How far an object reaches towards the viewer, cell by cell. What is behind is not seen: it is taken to be the front,
 /// mirrored at the plane of the rim.
 #[derive(Debug, Clone)]
-pub(crate) struct Relief {
+pub(crate) struct HeightField {
     pub(crate) extent: Extent,
     /// Cells of a pixel's side of the picture.
     pub(crate) scale: f64,
@@ -35,7 +35,7 @@ pub(crate) struct Relief {
     blocks: usize,
 }
 
-impl Relief {
+impl HeightField {
     /// The shape whose normals these are, where alpha is at least one half; none where that is nowhere.
     ///
     /// Heights are those whose differences from cell to cell are nearest to the slopes that the normals have, by least squares.
@@ -210,7 +210,7 @@ mod tests {
         let alpha = Planes::from_fn(normals.extent(), |x, y| {
             [f32::from(u8::from(normals.planes().pixel(x, y)[2] > 0.0))]
         });
-        let relief = Relief::new(&normals, &alpha).unwrap();
+        let relief = HeightField::new(&normals, &alpha).unwrap();
         assert_eq!(relief.extent, Extent::new(MAX_SIDE, MAX_SIDE));
         let radius = MAX_SIDE as f32 / 2.0;
         let middle = relief.half[MAX_SIDE / 2 * MAX_SIDE + MAX_SIDE / 2];
@@ -224,8 +224,8 @@ mod tests {
     fn what_faces_the_viewer_is_thin_and_nothing_has_no_shape() {
         let extent = Extent::new(50, 80);
         let flat = Normals::<YUp>::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
-        let relief = Relief::new(&flat, &Planes::filled(extent, [1.0])).unwrap();
+        let relief = HeightField::new(&flat, &Planes::filled(extent, [1.0])).unwrap();
         assert!(relief.half.iter().all(|&half| half == MIN_THICKNESS));
-        assert!(Relief::new(&flat, &Planes::zeros(extent)).is_none());
+        assert!(HeightField::new(&flat, &Planes::zeros(extent)).is_none());
     }
 }

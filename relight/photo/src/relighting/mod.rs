@@ -42,13 +42,13 @@ mod white_balance;
 pub use error::InsertError;
 pub use exposure::PanoramaExposure;
 #[cfg(feature = "files")]
-pub(crate) use height_field::{BLOCK, HeightSolver, Relief};
+pub(crate) use height_field::{BLOCK, HeightField, HeightSolver};
 pub use lamp::{DiscLamp, colour_of_temperature};
 pub use material::{MaterialChange, ObjectGloss};
-pub(crate) use placed_object::Standing;
+pub(crate) use placed_object::PlacedObject;
 pub use placement::Placement;
 pub(crate) use placement::{Fit, rows};
-pub use relightable_object::Subject;
+pub use relightable_object::RelightableObject;
 pub use sequence::{Backdrop, Shot};
 pub use source::{LightSource, exposure_between, likeness};
 pub use sun::SeenSun;

@@ -2,23 +2,23 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::height_field::Relief;
+use super::height_field::HeightField;
 use super::placement::{Fit, Foot};
 use relight_core::image::Planes;
 use relight_core::light::{Normals, YUp};
 
 /// An object as it stands, without its colours.
 #[derive(Debug)]
-pub(crate) struct Standing {
+pub(crate) struct PlacedObject {
     pub(crate) fit: Fit,
     /// How far it covers each pixel of the picture.
     pub(crate) alpha: Planes<1>,
     pub(crate) foot: Foot,
     /// Its shape, once a shadow was asked for.
-    relief: OnceLock<Option<Relief>>,
+    relief: OnceLock<Option<HeightField>>,
 }
 
-impl Standing {
+impl PlacedObject {
     fn new(alpha: &Planes<1>, fit: Fit) -> Self {
         let alpha = fit.apply(alpha);
         Self {
@@ -30,7 +30,7 @@ impl Standing {
     }
 
     /// The shape of the object whose own normals these are; none where it covers no pixel by a half.
-    pub(crate) fn relief(&self, normals: &Normals<YUp>) -> Option<&Relief> {
+    pub(crate) fn relief(&self, normals: &Normals<YUp>) -> Option<&HeightField> {
         if self.relief.get().is_none() {
             // Not within `get_or_init`: while this thread waits for others, it may take over another frame that comes here.
             let _ = self.relief.set(self.new_relief(normals));
@@ -38,44 +38,44 @@ impl Standing {
         self.relief.get()?.as_ref()
     }
 
-    fn new_relief(&self, normals: &Normals<YUp>) -> Option<Relief> {
+    fn new_relief(&self, normals: &Normals<YUp>) -> Option<HeightField> {
         let mut turned = self.fit.apply(normals.planes());
         let (sin, cos) = (self.fit.angle.sin() as f32, self.fit.angle.cos() as f32);
         let [x, y, _] = turned.planes_mut();
         for (x, y) in x.iter_mut().zip(y) {
             [*x, *y] = [cos * *x - sin * *y, sin * *x + cos * *y];
         }
-        Relief::new(&Normals::<YUp>::new(turned), &self.alpha)
+        HeightField::new(&Normals::<YUp>::new(turned), &self.alpha)
     }
 }
 
 /// How an object stood last: while its light turns, or it is moved, it stands so again.
 #[derive(Debug, Default)]
-pub(crate) struct LastStanding(Mutex<Option<Arc<Standing>>>);
+pub(crate) struct LastPlaced(Mutex<Option<Arc<PlacedObject>>>);
 
-impl LastStanding {
+impl LastPlaced {
     /// An object that covers its own pixels so far, as it stands by this fit.
-    pub(crate) fn by(&self, fit: Fit, alpha: &Planes<1>) -> Arc<Standing> {
+    pub(crate) fn by(&self, fit: Fit, alpha: &Planes<1>) -> Arc<PlacedObject> {
         if let Some(standing) = self.get().filter(|standing| standing.fit == fit) {
             return standing;
         }
         // Without the lock: while this thread waits for others, it may take over another frame that comes here.
-        let standing = Arc::new(Standing::new(alpha, fit));
+        let standing = Arc::new(PlacedObject::new(alpha, fit));
         *self.lock() = Some(Arc::clone(&standing));
         standing
     }
 
-    fn get(&self) -> Option<Arc<Standing>> {
+    fn get(&self) -> Option<Arc<PlacedObject>> {
         self.lock().clone()
     }
 
     /// What is kept is always whole, whoever had the lock.
-    fn lock(&self) -> MutexGuard<'_, Option<Arc<Standing>>> {
+    fn lock(&self) -> MutexGuard<'_, Option<Arc<PlacedObject>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Clone for LastStanding {
+impl Clone for LastPlaced {
     fn clone(&self) -> Self {
         Self(Mutex::new(self.get()))
     }
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn what_stands_as_before_is_not_made_again() {
-        let last = LastStanding::default();
+        let last = LastPlaced::default();
         let first = last.by(fit(0.5, 0.0), &disc());
         assert!(Arc::ptr_eq(&first, &last.by(fit(0.5, 0.0), &disc())));
         let shape = first.relief(&Normals::sphere(40)).unwrap();
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn what_stands_otherwise_is() {
-        let last = LastStanding::default();
+        let last = LastPlaced::default();
         let first = last.by(fit(0.5, 0.0), &disc());
         for other in [fit(0.6, 0.0), fit(0.5, 20.0)] {
             let changed = last.by(other, &disc());

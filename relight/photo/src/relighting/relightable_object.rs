@@ -6,7 +6,7 @@ use super::InsertError;
 use super::cut::Cut;
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
-use super::placed_object::{LastStanding, Standing};
+use super::placed_object::{LastPlaced, PlacedObject};
 use super::placement::Fit;
 use super::shading::{DARK, Shading};
 use super::smooth::weighted_mean;
@@ -28,21 +28,21 @@ const REST_GROWTH: f32 = 3.0;
 /// ```
 /// use relight_photo::decompose::{DecomposeOptions, Decomposer};
 /// use relight_core::image::{Extent, Planes, Rgb};
-/// use relight_photo::relighting::{MaterialChange, Subject};
+/// use relight_photo::relighting::{MaterialChange, RelightableObject};
 /// use relight_photo::nets::{Weights, decomposer};
 ///
 /// let weights = Weights::initial(&decomposer(), 1); // not trained
 /// let decomposer = Decomposer::with_side(&weights, 32)?;
 /// let photo = Rgb::new(Planes::filled(Extent::new(60, 40), [0.5, 0.4, 0.3]));
 /// let mask = Planes::from_fn(Extent::new(60, 40), |x, _| [f32::from(u8::from((10..50).contains(&x)))]);
-/// let subject = Subject::new(&photo, &mask, None, &decomposer, &DecomposeOptions::default())?;
+/// let subject = RelightableObject::new(&photo, &mask, None, &decomposer, &DecomposeOptions::default())?;
 /// let same = subject.relit(&subject.light, &MaterialChange::default())?;
 /// let shown = subject.in_place(&photo, &same);
 /// assert!((shown.planes().pixel(30, 20)[0] - 0.5).abs() < 1e-3);
 /// # Ok::<(), relight_photo::relighting::InsertError>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Subject {
+pub struct RelightableObject {
     /// Column and row of the maps' first pixel in the photograph.
     pub(crate) place: [usize; 2],
     /// Width and height of the photograph.
@@ -61,10 +61,10 @@ pub struct Subject {
     rest: Planes<3>,
     /// The light in which the object was, grey, of order 2, in units in which the mean shading is 1.
     pub light: ShLight,
-    last_standing: LastStanding,
+    last_standing: LastPlaced,
 }
 
-impl Subject {
+impl RelightableObject {
     /// Decomposes the object that a mask (1 on it, else 0) shows in a photograph of linear light. Of a cut-out
     /// picture, `alpha` is what its file says; else alpha and the colours of its edge are estimated.
     ///
@@ -91,7 +91,7 @@ impl Subject {
     /// The object of a photograph with its mask.
     ///
     /// # Errors
-    /// As [`Subject::new`].
+    /// As [`RelightableObject::new`].
     pub fn from_photo(
         photo: &Photo,
         decomposer: &Decomposer,
@@ -138,7 +138,7 @@ impl Subject {
             gloss: surface.gloss().map(|gloss| mean_gloss(gloss, &covered)),
             rest: Planes::zeros(extent),
             light,
-            last_standing: LastStanding::default(),
+            last_standing: LastPlaced::default(),
         })
     }
 
@@ -199,7 +199,7 @@ impl Subject {
             gloss,
             rest,
             light: found.shading_light.clone(),
-            last_standing: LastStanding::default(),
+            last_standing: LastPlaced::default(),
         })
     }
 
@@ -210,12 +210,12 @@ impl Subject {
     }
 
     /// The object as it stands by this fit.
-    pub(crate) fn standing(&self, fit: Fit) -> Arc<Standing> {
+    pub(crate) fn standing(&self, fit: Fit) -> Arc<PlacedObject> {
         self.last_standing.by(fit, &self.matte.alpha)
     }
 
-    /// The object's colours in another light, in the units of [`Subject::light`] (see
-    /// [`exposure_between`](super::exposure_between)), of the size of [`Subject::extent`], not yet multiplied with alpha.
+    /// The object's colours in another light, in the units of [`RelightableObject::light`] (see
+    /// [`exposure_between`](super::exposure_between)), of the size of [`RelightableObject::extent`], not yet multiplied with alpha.
     ///
     /// With E the irradiance of the old light on the normals and E' that of the new, R the albedo, S and H shading and highlight
     /// of the photograph I, and w the [`likeness`] of the lights:

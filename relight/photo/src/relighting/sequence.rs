@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::{InsertError, MaterialChange, PanoramaView, Subject, exposure_between};
+use super::{InsertError, MaterialChange, PanoramaView, RelightableObject, exposure_between};
 use relight_core::image::{Linear, Planes, Rgb, check_extent};
 use relight_core::light::{Direction, Panorama, Rotation, ShLight};
 
@@ -22,7 +22,7 @@ pub enum Backdrop {
 #[derive(Debug)]
 pub struct Shot<'a> {
     photo: &'a Rgb<Linear>,
-    subject: &'a Subject,
+    subject: &'a RelightableObject,
     /// In the subject's units.
     light: ShLight,
     backdrop: Backdrop,
@@ -37,7 +37,7 @@ impl<'a> Shot<'a> {
     /// Where the photograph is not the subject's.
     pub fn new(
         photo: &'a Rgb<Linear>,
-        subject: &'a Subject,
+        subject: &'a RelightableObject,
         light: &ShLight,
         backdrop: Backdrop,
         exposure: f32,
@@ -64,7 +64,7 @@ impl<'a> Shot<'a> {
     /// The picture after the light has turned about the vertical by so many radians, from the viewer to the right.
     ///
     /// # Errors
-    /// As [`Subject::relit`].
+    /// As [`RelightableObject::relit`].
     pub fn picture(&self, turn: f64) -> Result<Rgb<Linear>, InsertError> {
         let turned = self.turned(turn);
         let relit = self.subject.relit(&turned, &MaterialChange::default())?;

@@ -1,7 +1,8 @@
 //! Objects relit by a network that is not trained: these tests are about what holds for any decomposition.
 
 use super::{
-    DiscLamp, InsertError, LightSource, MaterialChange, ObjectGloss, Subject, exposure_between,
+    DiscLamp, InsertError, LightSource, MaterialChange, ObjectGloss, RelightableObject,
+    exposure_between,
 };
 use crate::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 use crate::nets::{Weights, decomposer};
@@ -39,12 +40,12 @@ fn photo() -> Rgb<Linear> {
     }))
 }
 
-fn subject(specular: SpecularGate) -> Subject {
+fn subject(specular: SpecularGate) -> RelightableObject {
     let options = DecomposeOptions {
         specular,
         ..DecomposeOptions::default()
     };
-    Subject::new(&photo(), &mask(), None, &untrained(), &options).unwrap()
+    RelightableObject::new(&photo(), &mask(), None, &untrained(), &options).unwrap()
 }
 
 fn most_apart(a: &Rgb<Linear>, b: &Rgb<Linear>) -> f32 {
@@ -163,7 +164,7 @@ fn pasted_edges_do_not_show_the_old_background() {
 fn what_is_no_photograph_is_refused() {
     let refused = |photo: Rgb<Linear>, mask: Planes<1>| {
         let options = DecomposeOptions::default();
-        Subject::new(&photo, &mask, None, &untrained(), &options)
+        RelightableObject::new(&photo, &mask, None, &untrained(), &options)
             .unwrap_err()
             .to_string()
     };
@@ -205,7 +206,7 @@ fn captured_ball() -> CapturedObject {
 
 #[test]
 fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_where_a_lamp_is() {
-    let subject = Subject::from_captured(&captured_ball()).unwrap();
+    let subject = RelightableObject::from_captured(&captured_ball()).unwrap();
     let none = MaterialChange::default();
     let even = subject.relit(&subject.light, &none).unwrap();
     for (found, wanted) in even.pixel(12, 20).into_iter().zip([0.6, 0.3, 0.1]) {
@@ -231,5 +232,5 @@ fn a_captured_object_that_covers_nothing_is_refused() {
     let nothing = Planes::zeros(ball.extent());
     let empty =
         CapturedObject::new("none", ball.surface().clone(), nothing.clone(), nothing).unwrap();
-    assert!(Subject::from_captured(&empty).is_err());
+    assert!(RelightableObject::from_captured(&empty).is_err());
 }

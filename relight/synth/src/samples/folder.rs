@@ -52,7 +52,7 @@ impl Origin {
 /// How many samples were written, and how many were there already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
-pub struct SynthTally {
+pub struct SynthSummary {
     /// Made by this call.
     pub new: u64,
     /// Whole already, by an earlier call with the same recipe.
@@ -72,7 +72,7 @@ pub fn write_samples(
     count: u64,
     out: &Path,
     progress: &(dyn Fn() + Sync),
-) -> Result<SynthTally, SynthError> {
+) -> Result<SynthSummary, SynthError> {
     recipe.check()?;
     let folder = SampleFolder::open(out, &Origin::new(recipe, library))?;
     let each = recipe.samples_an_object();
@@ -83,8 +83,8 @@ pub fn write_samples(
             let numbers = object * each..count.min((object + 1) * each);
             folder.write_object(recipe, library, numbers, progress)
         })
-        .try_reduce(SynthTally::default, |a, b| {
-            Ok(SynthTally {
+        .try_reduce(SynthSummary::default, |a, b| {
+            Ok(SynthSummary {
                 new: a.new + b.new,
                 kept: a.kept + b.kept,
             })
@@ -124,8 +124,8 @@ impl SampleFolder {
         library: &Library,
         numbers: std::ops::Range<u64>,
         progress: &(dyn Fn() + Sync),
-    ) -> Result<SynthTally, SynthError> {
-        let mut written = SynthTally::default();
+    ) -> Result<SynthSummary, SynthError> {
+        let mut written = SynthSummary::default();
         let missing: Vec<u64> = numbers
             .filter(|&number| {
                 !self.place(number).is_dir() || {
@@ -275,7 +275,7 @@ mod tests {
             pool.install(|| write_samples(&recipe(), &library, count, folder.path(), &|| {}));
         assert_eq!(
             result.unwrap(),
-            SynthTally {
+            SynthSummary {
                 new: count,
                 kept: 0
             }
@@ -335,7 +335,7 @@ mod tests {
         fs::create_dir(folder.path().join(".000005.1.partial")).unwrap();
         fs::remove_dir_all(folder.path().join("000002")).unwrap();
         let again = write_samples(&recipe(), &library, 8, folder.path(), &|| {}).unwrap();
-        assert_eq!(again, SynthTally { new: 4, kept: 4 });
+        assert_eq!(again, SynthSummary { new: 4, kept: 4 });
         assert!(contents(folder.path()) == written(1, 8));
     }
 

@@ -28,7 +28,7 @@ use relit_data::shard::{
 
 use super::SynthError;
 use super::library::Library;
-use super::samples::folder::{SynthTally, holds_samples};
+use super::samples::folder::{SynthSummary, holds_samples};
 use super::samples::sample::mask;
 use ground_truth::GroundTruthFolder;
 use simulated::{RenderedFrame, SimulatedTurn};
@@ -52,7 +52,7 @@ pub fn write_turns(
     count: u64,
     out: &Path,
     progress: &(dyn Fn() + Sync),
-) -> Result<SynthTally, SynthError> {
+) -> Result<SynthSummary, SynthError> {
     turns.recipe.check()?;
     if !(1..=shard::MAX_SAMPLES).contains(&turns.frames) {
         let fault = format!(
@@ -63,7 +63,7 @@ pub fn write_turns(
     }
     let folder = OutputFolder::lock(out)?;
     let mut dataset = open_dataset(out, &settings(turns))?;
-    let mut written = SynthTally::default();
+    let mut written = SynthSummary::default();
     for number in 0..count {
         let turn = SimulatedTurn::draw(turns, library, number);
         if is_whole(&turn, &dataset, out)? {

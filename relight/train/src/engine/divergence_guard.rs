@@ -15,13 +15,13 @@ const KEEP: f64 = 0.99;
 
 /// Looks at every step.
 #[derive(Debug, Default)]
-pub(crate) struct Guard {
+pub(crate) struct DivergenceGuard {
     seen: u64,
     loss: f64,
     spreads: BTreeMap<&'static str, f64>,
 }
 
-impl Guard {
+impl DivergenceGuard {
     /// Looks at the losses and spreads of a step.
     ///
     /// # Errors
@@ -82,7 +82,12 @@ fn bad_loss(step: u64, loss: &str, value: f64) -> TrainError {
 mod tests {
     use super::*;
 
-    fn step(guard: &mut Guard, step: u64, loss: f64, spread: f64) -> Result<(), TrainError> {
+    fn step(
+        guard: &mut DivergenceGuard,
+        step: u64,
+        loss: f64,
+        spread: f64,
+    ) -> Result<(), TrainError> {
         let losses = BTreeMap::from([("loss".to_owned(), loss)]);
         let spreads = BTreeMap::from([("albedo", spread)]);
         guard.check(step, &losses, &spreads)
@@ -90,7 +95,7 @@ mod tests {
 
     #[test]
     fn a_run_that_goes_well_goes_on() {
-        let mut guard = Guard::default();
+        let mut guard = DivergenceGuard::default();
         for number in 0..2000 {
             step(&mut guard, number, 3.0 / (1.0 + number as f64), 0.8).unwrap();
         }
@@ -98,7 +103,7 @@ mod tests {
 
     #[test]
     fn a_loss_that_is_no_number_ends_it_at_once() {
-        let error = step(&mut Guard::default(), 4, f64::NAN, 1.0).unwrap_err();
+        let error = step(&mut DivergenceGuard::default(), 4, f64::NAN, 1.0).unwrap_err();
         assert!(error.to_string().contains("at step 4"), "{error}");
     }
 
@@ -109,14 +114,14 @@ mod tests {
             ("loss/albedo".to_owned(), 0.2),
             ("loss/normals".to_owned(), f64::NAN),
         ]);
-        let error = Guard::default().check(7, &losses, &BTreeMap::new());
+        let error = DivergenceGuard::default().check(7, &losses, &BTreeMap::new());
         let text = error.unwrap_err().to_string();
         assert!(text.contains("loss/normals is NaN"), "{text}");
     }
 
     #[test]
     fn a_loss_that_explodes_ends_it() {
-        let mut guard = Guard::default();
+        let mut guard = DivergenceGuard::default();
         for number in 0..400 {
             step(&mut guard, number, 1.0, 1.0).unwrap();
         }
@@ -126,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_head_that_answers_the_same_for_everything_ends_it() {
-        let mut guard = Guard::default();
+        let mut guard = DivergenceGuard::default();
         let ended = (0..3000).find(|&number| step(&mut guard, number, 1.0, 1e-4).is_err());
         assert_eq!(ended, Some(SETTLING - 1));
     }

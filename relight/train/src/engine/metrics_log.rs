@@ -12,12 +12,12 @@ pub const TABLE: &str = "losses.csv";
 
 /// A table `step,series,value`, grown line by line.
 #[derive(Debug)]
-pub struct Journal {
+pub struct MetricsLog {
     table: File,
     table_path: PathBuf,
 }
 
-impl Journal {
+impl MetricsLog {
     /// The journal in a run's folder; a resumed run goes on behind the line of its last step.
     ///
     /// # Errors
@@ -95,12 +95,12 @@ mod tests {
     fn a_resumed_run_does_not_write_its_lines_twice() {
         let folder = tempfile::tempdir().unwrap();
         let values = |loss: f64| BTreeMap::from([("loss".to_owned(), loss)]);
-        let mut journal = Journal::open(folder.path(), 0).unwrap();
+        let mut journal = MetricsLog::open(folder.path(), 0).unwrap();
         for step in 1..=4 {
             journal.scalars(step, &values(step as f64)).unwrap();
         }
         drop(journal);
-        let mut journal = Journal::open(folder.path(), 2).unwrap();
+        let mut journal = MetricsLog::open(folder.path(), 2).unwrap();
         journal.scalars(3, &values(0.5)).unwrap();
         let table = std::fs::read_to_string(folder.path().join(TABLE)).unwrap();
         assert_eq!(table, "step,series,value\n1,loss,1\n2,loss,2\n3,loss,0.5\n");
@@ -109,10 +109,10 @@ mod tests {
     #[test]
     fn a_journal_is_open_until_it_is_dropped() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(!Journal::is_open(folder.path()));
-        let journal = Journal::open(folder.path(), 0).unwrap();
-        assert!(Journal::is_open(folder.path()));
+        assert!(!MetricsLog::is_open(folder.path()));
+        let journal = MetricsLog::open(folder.path(), 0).unwrap();
+        assert!(MetricsLog::is_open(folder.path()));
         drop(journal);
-        assert!(!Journal::is_open(folder.path()));
+        assert!(!MetricsLog::is_open(folder.path()));
     }
 }

@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 use relit_data::causes::with_causes;
 
 use super::checkpoint::Checkpoint;
-use super::divergence_guard::Guard;
-use super::metrics_log::Journal;
+use super::divergence_guard::DivergenceGuard;
+use super::metrics_log::MetricsLog;
 use super::task::{StepLosses, TrainingTask, Validation};
 use crate::distributed::all_reduced::AllReducedLosses;
 use crate::distributed::process_group::ProcessGroup;
@@ -62,8 +62,8 @@ pub struct Run<'a> {
     folder: &'a Path,
     group: Option<ProcessGroup>,
     /// Of the first process.
-    journal: Option<Journal>,
-    guard: Guard,
+    journal: Option<MetricsLog>,
+    guard: DivergenceGuard,
     step: u64,
     /// What the task was given beside its settings.
     inputs: String,
@@ -112,8 +112,10 @@ impl<'a> Run<'a> {
             settings,
             folder,
             group,
-            journal: is_first.then(|| Journal::open(folder, step)).transpose()?,
-            guard: Guard::default(),
+            journal: is_first
+                .then(|| MetricsLog::open(folder, step))
+                .transpose()?,
+            guard: DivergenceGuard::default(),
             step,
             damaged: false,
         })
@@ -296,7 +298,9 @@ impl<'a> Run<'a> {
     fn save_as_successor(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
         if self.journal.is_none() {
             let begun = Instant::now();
-            while Journal::is_open(self.folder) && !self.is_saved() && begun.elapsed() < SUCCESSION
+            while MetricsLog::is_open(self.folder)
+                && !self.is_saved()
+                && begun.elapsed() < SUCCESSION
             {
                 std::thread::sleep(Duration::from_millis(500));
             }

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use tch::Device;
 
-use super::trainable::Learner;
+use super::trainable::Trainable;
 use crate::distributed::process_group::ProcessGroup;
 use crate::error::TrainError;
 use crate::tasks::terms::LossTerms;
@@ -54,7 +54,7 @@ pub trait TrainingTask {
     }
 
     /// The network that learns.
-    fn learner(&mut self) -> &mut Learner;
+    fn learner(&mut self) -> &mut Trainable;
 
     /// The losses of a step, from 0, on this process's part of its batch; always the same ones, in the same order. Steps
     /// are asked for one after the other.

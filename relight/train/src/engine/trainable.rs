@@ -13,7 +13,7 @@ use relight_photo::nets::{Graph, Weights};
 
 /// A network in training.
 #[derive(Debug)]
-pub struct Learner {
+pub struct Trainable {
     name: &'static str,
     /// The network.
     pub model: Model,
@@ -21,7 +21,7 @@ pub struct Learner {
     average: WeightAverage,
 }
 
-impl Learner {
+impl Trainable {
     /// A network that begins with these weights, or with random ones, and learns as a run does.
     ///
     /// # Errors

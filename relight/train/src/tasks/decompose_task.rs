@@ -10,7 +10,7 @@ use crate::data::sample::TruthBatch;
 use crate::data::validation::{HeldOutSamples, highlight_figures};
 use crate::distributed::process_group::ProcessGroup;
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
-use crate::engine::trainable::Learner;
+use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
 use crate::settings::{DecomposeSettings, first_difference};
 use relight_photo::nets::{Weights, decomposer_with_heads};
@@ -24,7 +24,7 @@ const SHOWN: usize = 10;
 pub struct DecomposeTask {
     settings: DecomposeSettings,
     resources: Resources,
-    learner: Learner,
+    learner: Trainable,
     photographs: Photographs,
     validation: HeldOutSamples,
 }
@@ -44,7 +44,7 @@ impl DecomposeTask {
         let (size, count) = (settings.data.size, settings.data.validation);
         let validation = HeldOutSamples::new(photographs.library(), size, count);
         let graph = decomposer_with_heads();
-        let learner = Learner::new(graph, weights, &settings.run, resources.device)?;
+        let learner = Trainable::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
             photographs,
             settings,
@@ -73,7 +73,7 @@ impl TrainingTask for DecomposeTask {
         self.photographs.left_out()
     }
 
-    fn learner(&mut self) -> &mut Learner {
+    fn learner(&mut self) -> &mut Trainable {
         &mut self.learner
     }
 

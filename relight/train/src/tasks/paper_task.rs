@@ -13,7 +13,7 @@ use crate::data::turn_reader::{TurnGroup, TurnReader};
 use crate::data::validation::{HeldOutSamples, HeldOutTurns};
 use crate::distributed::process_group::{ProcessGroup, indivisible};
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
-use crate::engine::trainable::Learner;
+use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
 use crate::settings::{PaperSettings, first_difference};
 use relight_core::reader::Rank;
@@ -26,7 +26,7 @@ pub struct PaperTask {
     name: &'static str,
     settings: PaperSettings,
     resources: Resources,
-    learner: Learner,
+    learner: Trainable,
     photographs: Photographs,
     turns: Option<TurnReader>,
     rank: Rank,
@@ -83,7 +83,7 @@ impl PaperTask {
             held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),
-            learner: Learner::new(graph, weights, &settings.run, resources.device)?,
+            learner: Trainable::new(graph, weights, &settings.run, resources.device)?,
             photographs,
             turns: inputs.turns.as_ref().map(open).transpose()?,
             rank: Rank::ONLY,
@@ -157,7 +157,7 @@ impl TrainingTask for PaperTask {
         self.photographs.left_out()
     }
 
-    fn learner(&mut self) -> &mut Learner {
+    fn learner(&mut self) -> &mut Trainable {
         &mut self.learner
     }
 

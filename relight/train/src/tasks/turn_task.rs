@@ -9,7 +9,7 @@ use super::terms::LossTerms;
 use crate::data::turn_samples::{TurnBatch, TurnViews};
 use crate::distributed::process_group::{ProcessGroup, indivisible};
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
-use crate::engine::trainable::Learner;
+use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
 use crate::settings::{TurnNetworkSettings, first_difference};
 use relight_core::reader::Rank;
@@ -32,7 +32,7 @@ const WITHIN_DEG: [(f64, &str); 2] = [(10.0, "within_10"), (20.0, "within_20")];
 pub struct TurnNetworkTask {
     settings: TurnNetworkSettings,
     resources: Resources,
-    learner: Learner,
+    learner: Trainable,
     training: TurnViews,
     validation: TurnViews,
     rank: Rank,
@@ -51,7 +51,7 @@ impl TurnNetworkTask {
     ) -> Result<Self, TrainError> {
         settings.check()?;
         let graph = turn_network();
-        let learner = Learner::new(graph, weights, &settings.run, resources.device)?;
+        let learner = Trainable::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
             training: TurnViews::for_training(&settings.data, views, settings.run.seed)?,
             validation: TurnViews::for_validation(&settings.data, views)?,
@@ -160,7 +160,7 @@ impl TrainingTask for TurnNetworkTask {
         self.training.left_out()
     }
 
-    fn learner(&mut self) -> &mut Learner {
+    fn learner(&mut self) -> &mut Trainable {
         &mut self.learner
     }
 
@@ -203,7 +203,7 @@ impl TrainingTask for TurnNetworkTask {
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
         let model = self.learner.averaged_model()?;
-        let mut tally = ValidationTally::default();
+        let mut tally = ValidationSummary::default();
         let count = self.settings.data.validation;
         let turns: Vec<(u64, u64)> = (0..count).map(|k| (k, stream(44, k))).collect();
         for turns in turns.chunks(VALIDATION_BATCH) {
@@ -225,7 +225,7 @@ impl TrainingTask for TurnNetworkTask {
 
 /// Errors over the turns of a validation.
 #[derive(Debug, Default)]
-struct ValidationTally {
+struct ValidationSummary {
     /// The mean error of each turn, degrees.
     means: Vec<f64>,
     /// The error of each pixel, and by how much it is expected to be off, degrees.
@@ -234,7 +234,7 @@ struct ValidationTally {
     albedo: Vec<f64>,
 }
 
-impl ValidationTally {
+impl ValidationSummary {
     fn add(
         &mut self,
         batch: &TurnBatch,

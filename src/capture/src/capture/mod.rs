@@ -29,8 +29,8 @@ pub use equipment::Equipment;
 pub use error::{CaptureError, Stopped};
 pub use mode_preference::ModePreference;
 pub use recording::{
-    End, Progress, Recorded, Recorder, RecordingError, RecordingPlan, Salvaged, Saved, Window,
-    salvage, salvage_session,
+    End, Progress, Recorded, Recorder, RecordingError, RecordingPlan, Recovered, Saved, Window,
+    recover, recover_session,
 };
 pub use settings::Settings;
 pub use stop::StopRequest;

@@ -25,7 +25,7 @@ use super::recording::{End, Recorder, RecordingPlan};
 use super::turn::{TurnRecording, unwind};
 use crate::state::{Check, Phase, TakeSummary, Verdict};
 use relit_camera::CameraAddress;
-use relit_turntable::{Track, TurnPlan};
+use relit_turntable::{AngleFit, TurnPlan};
 
 /// How long a replayed camera waits for the disk, so that a rehearsal on a slow disk loses nothing.
 const REPLAY_WAIT: Duration = Duration::from_secs(60);
@@ -109,7 +109,7 @@ fn run_take(
         }
         recorded
             .journal()
-            .and_then(|journal| Track::from_reports(&journal.turn, &journal.reports))
+            .and_then(|journal| AngleFit::from_reports(&journal.turn, &journal.reports))
     });
     let mut repeatable = matches!(recorded.end(), End::Over);
     let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));

@@ -11,7 +11,7 @@ use crate::state::{Monitor, Obstacle, Phase, TableState};
 use relit_clock::Clock;
 use relit_data::causes::with_causes;
 use relit_turntable::{
-    ControllerState, FinishedTurn, MotionFault, Table, TableStatus, Track, Turn, TurnPlan,
+    AngleFit, ControllerState, FinishedTurn, MotionFault, Table, TableStatus, Turn, TurnPlan,
     TurntableError,
 };
 
@@ -38,7 +38,7 @@ impl TurnRecording<'_> {
         &self,
         table: &'t Table,
         plan: TurnPlan,
-    ) -> Result<(Result<Track, TurntableError>, FinishedTurn<'t>), CaptureError> {
+    ) -> Result<(Result<AngleFit, TurntableError>, FinishedTurn<'t>), CaptureError> {
         let stop = self.context.stop;
         stop.explain(stop.over(table, || self.turn(table, plan)))
     }
@@ -52,7 +52,7 @@ impl TurnRecording<'_> {
         &self,
         table: &'t Table,
         plan: TurnPlan,
-    ) -> Result<(Result<Track, TurntableError>, FinishedTurn<'t>), CaptureError> {
+    ) -> Result<(Result<AngleFit, TurntableError>, FinishedTurn<'t>), CaptureError> {
         enter_without_reports(self.context, Phase::MovingBack);
         let margin_us = preflight::margin_us(&plan);
         let mut turn = table.start_turn(plan)?;

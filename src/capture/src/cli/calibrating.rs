@@ -19,7 +19,7 @@ pub(crate) fn run(console: Console, asked: CalibrateArguments) -> Result<Outcome
     facts.camera_elevation_deg = asked.elevation.or(facts.camera_elevation_deg);
     if settings.turntable != TurntableAddress::None {
         if !asked.yes && !agreed(console, &settings)? {
-            return Ok(Outcome::Wrong);
+            return Ok(Outcome::Failure);
         }
         let _camera = settings.lock_camera()?;
         let mut equipment = Equipment::new(settings)?;
@@ -47,5 +47,5 @@ pub(crate) fn run(console: Console, asked: CalibrateArguments) -> Result<Outcome
             camera_elevation_deg: elevation,
         },
     );
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }

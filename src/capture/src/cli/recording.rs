@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use relit_capture::capture::{
     CaptureContext, CaptureError, Captured, Equipment, Settings, StopRequest, Stopped, capture,
-    salvage,
+    recover,
 };
 use relit_capture::state::{Monitor, Phase, RigState, Verdict};
 use relit_turntable::TurntableAddress;
@@ -26,7 +26,7 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
     let settings: Settings = rig.into();
     let _made = make_root(&settings)?;
     if !yes && !agreed(console, &settings)? {
-        return Ok(Outcome::Wrong);
+        return Ok(Outcome::Failure);
     }
     let _camera = settings.lock_camera()?;
     report_salvaged(console, &settings)?;
@@ -75,8 +75,8 @@ pub(crate) fn agreed(console: Console, settings: &Settings) -> Result<bool, Capt
 }
 
 fn report_salvaged(console: Console, settings: &Settings) -> Result<(), CaptureError> {
-    let salvaged = salvage(&settings.root)?;
-    salvaged
+    let recovered = recover(&settings.root)?;
+    recovered
         .iter()
         .for_each(|found| console.warn(&found.to_string()));
     Ok(())
@@ -189,13 +189,10 @@ fn report(console: Console, captured: &Captured, folder: &str) -> Outcome {
 /// What a capture is worth, in words and as an exit code.
 fn judgement(captured: &Captured) -> (&'static str, Outcome) {
     match captured.take.verdict {
-        Verdict::Clean if captured.repeated == 0 => ("clean", Outcome::Whole),
-        Verdict::Clean => (
-            "clean, after a take that is not usable",
-            Outcome::Incomplete,
-        ),
-        Verdict::Tolerated => ("whole, with remarks", Outcome::Incomplete),
-        Verdict::Aborted => ("not usable, kept as aborted", Outcome::Wrong),
+        Verdict::Clean if captured.repeated == 0 => ("clean", Outcome::Success),
+        Verdict::Clean => ("clean, after a take that is not usable", Outcome::Partial),
+        Verdict::Tolerated => ("whole, with remarks", Outcome::Partial),
+        Verdict::Aborted => ("not usable, kept as aborted", Outcome::Failure),
     }
 }
 
@@ -208,12 +205,12 @@ mod tests {
     #[test]
     fn only_a_clean_first_take_ends_without_a_remark() {
         for (verdict, repeated, outcome) in [
-            (Verdict::Clean, 0, Outcome::Whole),
-            (Verdict::Clean, 1, Outcome::Incomplete),
-            (Verdict::Tolerated, 0, Outcome::Incomplete),
-            (Verdict::Tolerated, 1, Outcome::Incomplete),
-            (Verdict::Aborted, 0, Outcome::Wrong),
-            (Verdict::Aborted, 1, Outcome::Wrong),
+            (Verdict::Clean, 0, Outcome::Success),
+            (Verdict::Clean, 1, Outcome::Partial),
+            (Verdict::Tolerated, 0, Outcome::Partial),
+            (Verdict::Tolerated, 1, Outcome::Partial),
+            (Verdict::Aborted, 0, Outcome::Failure),
+            (Verdict::Aborted, 1, Outcome::Failure),
         ] {
             let take = TakeSummary {
                 session: String::new(),

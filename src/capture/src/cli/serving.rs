@@ -61,7 +61,7 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
     rig.end();
     processing.end();
     drop(made);
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }
 
 fn announce(console: Console, announcement: &Announcement) {

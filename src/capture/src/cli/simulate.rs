@@ -39,7 +39,7 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
     wait(console);
     drop(simulator);
     console.say("the simulated turntable has ended", &Event::Ended);
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }
 
 /// Waits until a signal arrives.

@@ -25,12 +25,12 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
         Action::Status => {
             let table = open(console, &port, &options)?;
             report(console, Event::Status, &table.status()?);
-            Ok(Outcome::Whole)
+            Ok(Outcome::Success)
         }
         Action::Stop => {
             let table = Table::take_over(&port, &options)?;
             report(console, Event::Stopped, &table.stop()?);
-            Ok(Outcome::Whole)
+            Ok(Outcome::Success)
         }
         Action::Home => home(console, open_to_move(console, &port, &options)?.as_ref()),
         Action::Jog {
@@ -43,12 +43,12 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
                 home(console, &table)?;
             }
             report(console, Event::Jogged, &table.jog(degrees, speed)?);
-            Ok(Outcome::Whole)
+            Ok(Outcome::Success)
         }
         Action::Unlock => {
             let table = open(console, &port, &options)?;
             report(console, Event::Unlocked, &table.unlock()?);
-            Ok(Outcome::Whole)
+            Ok(Outcome::Success)
         }
     }
 }
@@ -104,7 +104,7 @@ fn home(console: Console, table: &Table) -> Result<Outcome, TurntableError> {
         );
     }
     report(console, Event::Homed, &status);
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }
 
 fn report(console: Console, event: fn(Value) -> Event, status: &TableStatus) {

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-use crate::capture::{CaptureError, Equipment, Settings, preflight, salvage};
+use crate::capture::{CaptureError, Equipment, Settings, preflight, recover};
 use crate::command::{Command, Refused, Rig};
 use crate::preview::Preview;
 use crate::state::{Monitor, RigState};
@@ -38,7 +38,7 @@ pub struct Daemon {
 }
 
 impl Daemon {
-    /// Takes folder and camera for this process, salvages sessions whose recorder died, and starts
+    /// Takes folder and camera for this process, recovers sessions whose recorder died, and starts
     /// the worker, which opens camera and table, and keeps trying while they are not there.
     ///
     /// # Errors
@@ -177,7 +177,7 @@ fn check_object(object: &str) -> Result<(), Refused> {
 
 /// Salvages what an earlier run left, and shows what came of it.
 fn report_salvaged(root: &Path, clock: &Clock, monitor: &Monitor) -> Result<(), CaptureError> {
-    for found in salvage(root)? {
+    for found in recover(root)? {
         monitor.fault(clock.now_us(), found.to_string());
     }
     Ok(())

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use super::events::Heard;
+use super::events::ProgramEvent;
 
 /// What is read of standard error, bytes: its end.
 const COMPLAINT: u64 = 4096;
@@ -51,7 +51,7 @@ impl Worker {
     }
 
     /// Hands on what was said since.
-    pub(super) fn hear(&mut self, heard: &mut Heard) {
+    pub(super) fn hear(&mut self, heard: &mut ProgramEvent) {
         let mut piece = [0; 4096];
         while let Ok(count @ 1..) = self.output.read_at(&mut piece, self.read) {
             self.read += count as u64;
@@ -88,7 +88,7 @@ impl Worker {
     }
 
     /// How the program ended, once it has, and everything that it said was heard.
-    pub(super) fn ended(&mut self, heard: &mut Heard) -> io::Result<Option<ExitStatus>> {
+    pub(super) fn ended(&mut self, heard: &mut ProgramEvent) -> io::Result<Option<ExitStatus>> {
         let status = self.child.try_wait()?;
         if status.is_some() {
             self.hear(heard);

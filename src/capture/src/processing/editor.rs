@@ -9,7 +9,7 @@ use relit_data::session::MASK_FILE;
 
 use super::child::Worker;
 use super::commands::ProcessingPrograms;
-use super::events::Heard;
+use super::events::ProgramEvent;
 use crate::command::Refused;
 
 /// Time in which the editor has to come up: it reads the video through once.
@@ -36,7 +36,7 @@ pub(super) struct OpenEditor {
     pub(super) session: String,
     pub(super) target: EditorTarget,
     worker: Worker,
-    heard: Heard,
+    heard: ProgramEvent,
     used: Instant,
 }
 
@@ -55,7 +55,7 @@ impl OpenEditor {
         let failed = |why: String| Refused::Unavailable(format!("the editor did not open: {why}"));
         let mut worker = Worker::start(command.ok_or_else(missing)?)
             .map_err(|error| failed(error.to_string()))?;
-        let mut heard = Heard::default();
+        let mut heard = ProgramEvent::default();
         let until = Instant::now() + START;
         loop {
             worker.hold(is_busy());
@@ -100,7 +100,7 @@ impl OpenEditor {
     }
 }
 
-fn target(heard: &Heard) -> Option<EditorTarget> {
+fn target(heard: &ProgramEvent) -> Option<EditorTarget> {
     let place = heard.editor()?;
     let (_, token) = place.url.split_once("?token=")?;
     Some(EditorTarget {

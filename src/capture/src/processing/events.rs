@@ -41,7 +41,7 @@ pub(super) struct EditorPlace {
 
 /// All that was heard of a program.
 #[derive(Debug, Default)]
-pub(super) struct Heard {
+pub(super) struct ProgramEvent {
     progress: Option<(u64, u64)>,
     error: Option<String>,
     warnings: Vec<String>,
@@ -54,7 +54,7 @@ pub(super) struct Heard {
     editor: Option<EditorPlace>,
 }
 
-impl Heard {
+impl ProgramEvent {
     /// Takes in a line. What cannot be understood is passed over: newer programs say more.
     pub(super) fn line(&mut self, line: &[u8]) {
         let Ok(event) = serde_json::from_slice(line) else {
@@ -192,7 +192,7 @@ mod tests {
         code: Option<i32>,
         lines: &[&str],
     ) -> (ProcessingOutcome, String, bool) {
-        let mut heard = Heard::default();
+        let mut heard = ProgramEvent::default();
         for line in lines {
             heard.line(line.as_bytes());
         }
@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn a_program_that_says_nothing_is_reported_by_what_ended_it() {
-        let heard = Heard::default();
+        let heard = ProgramEvent::default();
         assert!(heard.failure(Some(7), "").contains("exit code 7"));
         assert!(heard.failure(None, "\n").contains("signal"));
         assert_eq!(heard.failure(Some(1), "error: a\n\n"), "a");

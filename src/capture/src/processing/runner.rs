@@ -8,7 +8,7 @@ use relit_data::session::{MANIFEST_FILE, Manifest, Status};
 
 use super::child::Worker;
 use super::commands::StepPlaces;
-use super::events::Heard;
+use super::events::ProgramEvent;
 use super::queue::{Begun, PendingWork, StepEnd};
 use super::shared::{Shared, is_busy};
 use crate::state::{Monitor, ProcessingOutcome, ProcessingStep, Verdict};
@@ -28,7 +28,7 @@ const ALL: [ProcessingStep; 3] = [
 struct Running {
     begun: Begun,
     worker: Worker,
-    heard: Heard,
+    heard: ProgramEvent,
 }
 
 /// Works until the program ends.
@@ -105,7 +105,7 @@ fn begin(shared: &Shared) -> Option<Running> {
         Ok(worker) => Some(Running {
             begun,
             worker,
-            heard: Heard::default(),
+            heard: ProgramEvent::default(),
         }),
         Err(why) => {
             finish(

@@ -25,7 +25,7 @@ const SUMMARIES: usize = 4096;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum SessionStatus {
-    /// Being written, or waiting to be salvaged.
+    /// Being written, or waiting to be recovered.
     Recording,
     /// Whole.
     Complete,

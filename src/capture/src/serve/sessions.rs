@@ -103,7 +103,7 @@ pub(super) async fn trash(
 /// What a person says of a take; a field that is left out or `null` is removed.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Remarks {
+pub(super) struct Annotations {
     /// A note of up to 2000 characters.
     note: Option<String>,
     /// 1 to 5.
@@ -117,7 +117,7 @@ pub(super) async fn remark(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
-    JsonBody(Remarks { note, rating }): JsonBody<Remarks>,
+    JsonBody(Annotations { note, rating }): JsonBody<Annotations>,
 ) -> Result<StatusCode, Failure> {
     let done = permits.run(Work::Listing, move || {
         library.remark(&id, note.as_deref(), rating)

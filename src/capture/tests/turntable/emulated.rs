@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread;
 
-use relit_turntable::{Table, TableOptions, Track};
+use relit_turntable::{AngleFit, Table, TableOptions};
 use tempfile::TempDir;
 
 use crate::rig::{STEP_DEG, paper_turn, spread};
@@ -113,7 +113,7 @@ fn built() -> PathBuf {
 }
 
 /// One turn of the paper; the track that the host fitted, and the chip's steps.
-fn turn() -> (Track, Vec<(i64, f64)>) {
+fn turn() -> (AngleFit, Vec<(i64, f64)>) {
     let chip = Chip::start();
     let table = chip.open();
     table.home().unwrap();
@@ -133,7 +133,7 @@ fn angle_of(steps: &[(i64, f64)], t_us: i64) -> f64 {
     a0 + (a1 - a0) * (t_us - t0) as f64 / (t1 - t0) as f64
 }
 
-fn report(name: &str, track: &Track, steps: &[(i64, f64)]) -> f64 {
+fn report(name: &str, track: &AngleFit, steps: &[(i64, f64)]) -> f64 {
     let (from, _) = track.constant_us();
     let errors = (0..1500).map(|frame| {
         let t = from + frame * FRAME_US;

@@ -17,7 +17,7 @@ pub enum SessionError {
     #[error("{0} is being recorded by another process: wait for it to end")]
     InUse(PathBuf),
     /// The session has ended already.
-    #[error("{0} is not marked as still recording: there is nothing to salvage")]
+    #[error("{0} is not marked as still recording: there is nothing to recover")]
     Ended(PathBuf),
     /// A file could not be read or written.
     #[error(

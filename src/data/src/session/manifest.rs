@@ -51,11 +51,11 @@ pub struct Manifest {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "status", content = "reason", rename_all = "lowercase")]
 pub enum Status {
-    /// Running, or interrupted and not yet salvaged.
+    /// Running, or interrupted and not yet recovered.
     Recording,
     /// Finished, with all frames.
     Complete,
-    /// Ended early or salvaged, for this reason.
+    /// Ended early or recovered, for this reason.
     Aborted(String),
 }
 

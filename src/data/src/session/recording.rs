@@ -88,7 +88,7 @@ impl Recording {
         match &manifest.status {
             Status::Complete => {}
             Status::Recording => {
-                let what = "is marked as still recording: wait for the capture to end, let the capture program salvage it, or give the video file itself";
+                let what = "is marked as still recording: wait for the capture to end, let the capture program recover it, or give the video file itself";
                 return Err(SessionError::unusable(folder, what));
             }
             Status::Aborted(reason) => {

@@ -69,9 +69,9 @@ pub(crate) fn run(
     let nothing_came_out = tally.extracted + tally.skipped == 0;
     Ok(
         match (tally.failed, tally.lossy + tally.misfits + tally.left_out) {
-            (0, 0) => Outcome::Whole,
-            (1.., _) if nothing_came_out => Outcome::Wrong,
-            _ => Outcome::Incomplete,
+            (0, 0) => Outcome::Success,
+            (1.., _) if nothing_came_out => Outcome::Failure,
+            _ => Outcome::Partial,
         },
     )
 }

@@ -43,8 +43,8 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
     let mut sessions = merged.dataset.sessions.iter();
     let is_flawed = sessions.any(|session| session.lossy || session.has_misfit());
     Ok(if is_flawed || !merged.left_out.is_empty() {
-        Outcome::Incomplete
+        Outcome::Partial
     } else {
-        Outcome::Whole
+        Outcome::Success
     })
 }

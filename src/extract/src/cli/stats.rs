@@ -63,8 +63,8 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
     let (text, event) = sums(out, sessions);
     console.say(&text, &event);
     Ok(match problem {
-        None => Outcome::Whole,
-        Some(_) => Outcome::Incomplete,
+        None => Outcome::Success,
+        Some(_) => Outcome::Partial,
     })
 }
 

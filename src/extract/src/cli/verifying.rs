@@ -63,8 +63,8 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         },
     );
     Ok(if count == 0 {
-        Outcome::Whole
+        Outcome::Success
     } else {
-        Outcome::Wrong
+        Outcome::Failure
     })
 }

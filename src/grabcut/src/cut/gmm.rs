@@ -13,7 +13,7 @@ const POWER_ROUNDS: usize = 12;
 
 /// A mixture of Gaussians in `D` dimensions.
 #[derive(Debug, Clone)]
-pub(crate) struct Mixture<const D: usize> {
+pub(crate) struct GaussianMixture<const D: usize> {
     components: Vec<Gaussian<D>>,
     /// Added to the variances: the spread of equal surfaces.
     floor: f64,
@@ -36,7 +36,7 @@ struct Moments<const D: usize> {
     square: [[f64; D]; D],
 }
 
-impl<const D: usize> Mixture<D> {
+impl<const D: usize> GaussianMixture<D> {
     /// Learns `count` components, or fewer if the samples have fewer values.
     pub(crate) fn learn(samples: &[[f32; D]], count: usize, floor: f64) -> Self {
         let centres = split(samples, count);
@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn what_was_learned_costs_less_than_what_was_not() {
-        let mut mixture = Mixture::learn(&clusters(), 2, 0.01);
+        let mut mixture = GaussianMixture::learn(&clusters(), 2, 0.01);
         mixture.refine(&clusters());
         for near in [[0.5, 0.5], [10.5, 4.5]] {
             assert!(mixture.cost(&near) < 1.0, "{}", mixture.cost(&near));
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn equal_samples_make_one_component_of_the_floors_spread() {
-        let mixture = Mixture::learn(&[[3.0, 3.0]; 50], 5, 0.01);
+        let mixture = GaussianMixture::learn(&[[3.0, 3.0]; 50], 5, 0.01);
         assert_eq!(mixture.components.len(), 1);
         // -ln of the peak of a Gaussian with the variance 0.01 in two dimensions, less the constant.
         assert!((mixture.cost(&[3.0, 3.0]) - 0.01_f32.ln()).abs() < 1e-3);
@@ -329,7 +329,7 @@ mod tests {
 
     #[test]
     fn a_mixture_of_nothing_has_no_opinion() {
-        let mixture = Mixture::<3>::learn(&[], 5, 0.01);
+        let mixture = GaussianMixture::<3>::learn(&[], 5, 0.01);
         assert!(mixture.cost(&[1.0, 2.0, 3.0]).abs() < 1e-6);
     }
 }

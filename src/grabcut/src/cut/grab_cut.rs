@@ -4,7 +4,7 @@
 //! mixtures, and a cost for every pair of neighbours that the cut separates, which is smaller where
 //! they differ. Only a set of active pixels is decided; the others keep their labels.
 
-use super::gmm::Mixture;
+use super::gmm::GaussianMixture;
 use super::max_flow::{DIRECTIONS, NONE, PixelGraph};
 use crate::MaskError;
 use crate::bitmap::Bitmap;
@@ -98,8 +98,8 @@ pub(crate) trait Field<const D: usize> {
 /// The colour models of both sides.
 #[derive(Debug, Clone)]
 pub(crate) struct Models<const D: usize> {
-    object: Mixture<D>,
-    background: Mixture<D>,
+    object: GaussianMixture<D>,
+    background: GaussianMixture<D>,
 }
 
 impl<const D: usize> Models<D> {
@@ -115,8 +115,8 @@ impl<const D: usize> Models<D> {
             })
         };
         Self {
-            object: Mixture::learn(&of(true), COMPONENTS, F::VARIANCE_FLOOR),
-            background: Mixture::learn(&of(false), COMPONENTS, F::VARIANCE_FLOOR),
+            object: GaussianMixture::learn(&of(true), COMPONENTS, F::VARIANCE_FLOOR),
+            background: GaussianMixture::learn(&of(false), COMPONENTS, F::VARIANCE_FLOOR),
         }
     }
 
@@ -151,7 +151,7 @@ pub(crate) fn rank<const D: usize, F: Field<D>>(
         })
         .collect();
     let background = samples(field, &known, |label| label == Label::Background);
-    let model = Mixture::learn(&background, COMPONENTS, F::VARIANCE_FLOOR);
+    let model = GaussianMixture::learn(&background, COMPONENTS, F::VARIANCE_FLOOR);
     let open = |&at: &usize| known[at] == Label::ProbablyObject;
     let mut costs: Vec<(f32, usize)> = (0..known.len())
         .filter(open)

@@ -11,14 +11,14 @@ const SHARE_OF_RECT: f64 = 0.5;
 
 /// The labels with which the cut starts.
 #[derive(Debug)]
-pub(crate) struct InitialLabels {
+pub(crate) struct Trimap {
     pub(crate) labels: Vec<Label>,
     pub(crate) first: FirstModels,
     /// The part of the hinted rectangle that is inside the frame.
     pub(crate) rect: Option<Rect>,
 }
 
-impl InitialLabels {
+impl Trimap {
     /// The labels that the hints give to a frame of `size`.
     pub(crate) fn new(hints: &Hints, size: (u32, u32)) -> Result<Self, MaskError> {
         let rect = hints.rect.map(|rect| clip(rect, size)).transpose()?;

@@ -12,7 +12,7 @@ use super::backdrop::Backdrop;
 use super::registration;
 use super::rim::without_rim;
 use super::table::{Turntable, find_turntable};
-use super::temporal_evidence::{Curves, Witness};
+use super::temporal_evidence::{Curves, TemporalEvidence};
 use crate::MaskError;
 use crate::bitmap::Bitmap;
 use crate::cut::grab_cut;
@@ -23,7 +23,7 @@ use crate::cut::lab::LabTable;
 use crate::cut::pyramid::{
     FirstModels, Level, RgbField, ascend, half_image, levels, refine, start,
 };
-use crate::hints::trimap::InitialLabels;
+use crate::hints::trimap::Trimap;
 use crate::{Effort, Hints};
 
 /// Fewest frames from which anything can be learned.
@@ -178,7 +178,7 @@ pub(crate) struct TurnField {
     pub(crate) backdrop: Bitmap,
     pub(crate) table: Turntable,
     evidence: Vec<f32>,
-    pub(crate) witness: Witness,
+    pub(crate) witness: TemporalEvidence,
 }
 
 impl TurnField {
@@ -435,7 +435,7 @@ fn known(hints: &Hints, size: (u32, u32)) -> Result<(Vec<Label>, f64), MaskError
             Label::ProbablyObject
         }
     };
-    let initial = InitialLabels::new(hints, size)?;
+    let initial = Trimap::new(hints, size)?;
     let labels = initial.labels.into_iter().enumerate();
     let labels = labels.map(|(at, label)| match label {
         Label::ProbablyBackground => open(at),

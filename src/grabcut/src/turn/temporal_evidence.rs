@@ -28,7 +28,7 @@ const TOGETHER: f32 = 0.7;
 
 /// The curves of all pixels.
 #[derive(Debug)]
-pub(crate) struct Witness {
+pub(crate) struct TemporalEvidence {
     /// Variance that the harmonics do not explain, for each pixel; empty with few frames.
     residual: Vec<f32>,
     /// Cosines and sines of the harmonics.
@@ -74,7 +74,7 @@ impl Curves {
     }
 
     /// What they say together.
-    pub(crate) fn finish(self) -> Witness {
+    pub(crate) fn finish(self) -> TemporalEvidence {
         let many = self.frames.max(1) as f32;
         let free = self.frames.saturating_sub(WAVES + 1).max(1) as f32;
         let wave = |sum: &[f32; WAVES + 2]| std::array::from_fn(|at| 2.0 * sum[at + 2] / many);
@@ -84,14 +84,14 @@ impl Curves {
             let all = sum[1] - sum[0] * sum[0] / many;
             ((all - many * explained) / free).max(0.0) + NOISE
         });
-        Witness {
+        TemporalEvidence {
             residual: residual.collect(),
             waves,
         }
     }
 }
 
-impl Witness {
+impl TemporalEvidence {
     /// Where the brightness of the pixels of `part` changes as what is behind the object does, and not as the object
     /// beside it; none where the curves say nothing.
     pub(crate) fn moves(&self, part: &Bitmap, beside: &Bitmap, ground: &Bitmap) -> Option<bool> {
@@ -165,7 +165,7 @@ mod tests {
 
     /// A strip of three parts: a bright one and a dark one that one light turns about, and one that shows other
     /// things all the time.
-    fn witness(frames: usize) -> Witness {
+    fn witness(frames: usize) -> TemporalEvidence {
         let mut curves = Curves::new(frames, 30);
         for at in 0..frames {
             let angle = std::f32::consts::TAU * at as f32 / frames as f32;

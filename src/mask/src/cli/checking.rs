@@ -13,20 +13,20 @@ pub(crate) fn run(
     input: &Path,
     mask: Option<&Path>,
 ) -> Result<Outcome, MaskingError> {
-    let mut outcome = Outcome::Whole;
+    let mut outcome = Outcome::Success;
     let paths = recordings(input)?;
     for path in &paths {
         match check_mask(path, mask) {
             Ok(output) => {
                 print(&output, console);
                 if output.report.verdict != MaskVerdict::Fits {
-                    outcome = Outcome::Wrong;
+                    outcome = Outcome::Failure;
                 }
             }
             Err(error) if paths.len() == 1 => return Err(error),
             Err(error) => {
                 console.error(&error);
-                outcome = Outcome::Wrong;
+                outcome = Outcome::Failure;
             }
         }
     }

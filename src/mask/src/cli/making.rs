@@ -29,7 +29,7 @@ pub(crate) fn run(arguments: &MaskArguments) -> ExitCode {
             let leaves_out = says_unused(&paths, &arguments.input, console);
             let made = make(&paths, arguments, console);
             console.finish(made.map(|outcome| match outcome {
-                Outcome::Whole if leaves_out => Outcome::Incomplete,
+                Outcome::Success if leaves_out => Outcome::Partial,
                 outcome => outcome,
             }))
         }
@@ -59,11 +59,11 @@ fn draw(path: &Path, arguments: &MaskArguments, console: Console) -> Result<Outc
     match edit(path, output, request, arguments.listen.socket(), announce)? {
         Some(output) => {
             print(&output, console);
-            Ok(Outcome::Whole)
+            Ok(Outcome::Success)
         }
         None => {
             console.warn("the editor was left without a mask: nothing was written");
-            Ok(Outcome::Wrong)
+            Ok(Outcome::Failure)
         }
     }
 }
@@ -89,9 +89,9 @@ fn make(
     }
     bar.finish_and_clear();
     Ok(match failed {
-        0 => Outcome::Whole,
-        all if all == paths.len() => Outcome::Wrong,
-        _ => Outcome::Incomplete,
+        0 => Outcome::Success,
+        all if all == paths.len() => Outcome::Failure,
+        _ => Outcome::Partial,
     })
 }
 

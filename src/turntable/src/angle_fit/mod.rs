@@ -50,7 +50,7 @@ fn uneven(outliers: usize, polls: usize) -> String {
 
 /// The table's angle over time, in the part of a turn at constant speed: a straight line.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Track {
+pub struct AngleFit {
     line: Line,
     from_us: i64,
     to_us: i64,
@@ -65,7 +65,7 @@ pub struct Track {
     pub chip_rate: Option<f64>,
 }
 
-impl Track {
+impl AngleFit {
     /// The table's angle at `t_us` microseconds of the host's clock, degrees; `None` outside
     /// the part at constant speed.
     #[must_use]
@@ -108,7 +108,7 @@ pub(crate) fn timed(report: &PositionReport, turn: &JournaledTurn) -> Option<Jou
     })
 }
 
-impl Track {
+impl AngleFit {
     /// The track of an interrupted turn by what was reported of it; `None` where that does not determine it.
     #[must_use]
     pub fn from_reports(turn: &JournaledTurn, reports: &[JournaledReport]) -> Option<Self> {
@@ -174,7 +174,10 @@ impl Point {
 }
 
 /// Fits the track of a turn to its reports.
-pub(crate) fn fit(reports: &[PositionReport], expected: &JournaledTurn) -> Result<Track, String> {
+pub(crate) fn fit(
+    reports: &[PositionReport],
+    expected: &JournaledTurn,
+) -> Result<AngleFit, String> {
     let timed = |report: &PositionReport| self::timed(report, expected);
     let reports: Vec<_> = reports.iter().filter_map(timed).collect();
     let points = points(&reports, expected);
@@ -195,7 +198,7 @@ fn checked_track(
     points: &[Point],
     expected: &JournaledTurn,
     fitted: &Fitted,
-) -> Result<Track, String> {
+) -> Result<AngleFit, String> {
     if fitted.outliers as f64 > points.len() as f64 * MAX_OUTLIERS {
         return Err(uneven(fitted.outliers, points.len()));
     }
@@ -348,7 +351,7 @@ fn fastest_by<T: Copy>(items: &[T], point: impl Fn(&T) -> &Point) -> Vec<T> {
     chosen
 }
 
-fn track(points: &[Point], expected: &JournaledTurn, fitted: &Fitted) -> Track {
+fn track(points: &[Point], expected: &JournaledTurn, fitted: &Fitted) -> AngleFit {
     let line = fitted.line;
     let time = |machine_deg: f64| {
         let t_us = line.inverse(machine_deg - expected.zero_deg);
@@ -356,7 +359,7 @@ fn track(points: &[Point], expected: &JournaledTurn, fitted: &Fitted) -> Track {
     };
     let quick = fastest(points);
     let trips = quick.iter().map(Point::round_trip_us);
-    Track {
+    AngleFit {
         line,
         from_us: time(expected.from_deg).ceil() as i64,
         to_us: time(expected.to_deg).floor() as i64,

@@ -4,7 +4,9 @@ mod arguments;
 
 use std::path::{Path, PathBuf};
 
-use relight_photo::compositing::{LightDescription, SceneDescription, SceneObject, SceneSetting};
+use relight_photo::compositing::{
+    LightDescription, SceneDescription, SceneEnvironment, SceneObject,
+};
 use relight_photo::files::{BackgroundFile, InsertSource, Insertion, OutputKind};
 use relight_photo::relighting::{PanoramaExposure, SeenSun};
 use relit_console::{Console, Outcome, ProgressBar};
@@ -79,11 +81,11 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             "exposure": setting.exposure, "sun": setting.sun,
         }),
     );
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }
 
 /// Whether the light was taken from a photograph.
-fn takes_light(scene: &SceneDescription, setting: &SceneSetting) -> bool {
+fn takes_light(scene: &SceneDescription, setting: &SceneEnvironment) -> bool {
     setting.exposure.is_none() && scene.light == LightDescription::default()
 }
 

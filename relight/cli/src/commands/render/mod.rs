@@ -178,7 +178,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         &output,
         &json!({ "event": "rendered", "output": output, "frames": arguments.turn.unwrap_or(1), "exposure": look.exposure }),
     );
-    Ok(Outcome::Whole)
+    Ok(Outcome::Success)
 }
 
 /// The one image that is asked for.

@@ -35,9 +35,9 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         console.warn(&warning);
     }
     Ok(if solved.is_whole() {
-        Outcome::Whole
+        Outcome::Success
     } else {
-        Outcome::Incomplete
+        Outcome::Partial
     })
 }
 

@@ -1,4 +1,4 @@
-//! What can go wrong when a turn is recorded or salvaged.
+//! What can go wrong when a turn is recorded or recovered.
 
 use std::io;
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use relit_data::disk::is_full;
 use relit_data::session;
 use relit_video::VideoError;
 
-/// Why a recording could not begin, be finished, or be salvaged. What ends a recording early is no
+/// Why a recording could not begin, be finished, or be recovered. What ends a recording early is no
 /// such error: see [`super::End`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -22,7 +22,7 @@ pub enum RecordingError {
     },
     /// A thread panicked.
     #[error(
-        "the {0} thread failed, which is an error in this program; the session is salvaged at the next start"
+        "the {0} thread failed, which is an error in this program; the session is recovered at the next start"
     )]
     Panicked(&'static str),
     /// The session folder could not be made, written or read.
@@ -31,9 +31,9 @@ pub enum RecordingError {
     /// The video could not be made, written or read.
     #[error(transparent)]
     Video(#[from] VideoError),
-    /// A salvaged session does not read back.
+    /// A recovered session does not read back.
     #[error(
-        "{folder} was salvaged to {wanted} frames and {found} read back: look at its video with `ffprobe`"
+        "{folder} was recovered to {wanted} frames and {found} read back: look at its video with `ffprobe`"
     )]
     NotMended {
         /// The session folder.

@@ -31,5 +31,5 @@ pub use error::RecordingError;
 pub use outcome::End;
 pub use progress::{Progress, Window};
 pub use recorder::{Recorder, RecordingPlan};
-pub use recovery::{Salvaged, Saved, salvage, salvage_session};
+pub use recovery::{Recovered, Saved, recover, recover_session};
 pub use verdict::Recorded;

@@ -56,7 +56,7 @@ pub struct RecordingPlan {
 type CameraHandle = JoinHandle<(Box<dyn Camera>, CameraOutcome)>;
 type WriterHandle = thread::JoinHandle<WriterOutcome>;
 
-/// A recording under way. Dropped, it is asked to stop, and its session is left to be salvaged.
+/// A recording under way. Dropped, it is asked to stop, and its session is left to be recovered.
 pub struct Recorder {
     shared: Arc<Shared>,
     journal: Sender<JournalLine>,

@@ -14,7 +14,7 @@ use relit_data::session::{
 };
 use relit_video::Video;
 
-use relit_turntable::Track;
+use relit_turntable::AngleFit;
 
 /// How many frames at the end are tried until one decodes. A power cut can leave blocks of the last
 /// half second without their content.
@@ -43,19 +43,19 @@ impl fmt::Display for Saved {
 
 /// A session that was found interrupted.
 #[derive(Debug)]
-pub struct Salvaged {
+pub struct Recovered {
     /// The session folder.
     pub folder: PathBuf,
     /// What was saved, or why it could not be.
     pub saved: Result<Saved, RecordingError>,
 }
 
-impl fmt::Display for Salvaged {
+impl fmt::Display for Recovered {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} was interrupted", self.folder.display())?;
         match &self.saved {
             Ok(saved) => write!(f, ", and is kept as aborted: {saved}"),
-            Err(error) => write!(f, " and could not be salvaged: {}", with_causes(error)),
+            Err(error) => write!(f, " and could not be recovered: {}", with_causes(error)),
         }
     }
 }
@@ -65,8 +65,8 @@ impl fmt::Display for Salvaged {
 ///
 /// # Errors
 /// [`RecordingError::System`] where the folder cannot be listed. What goes wrong with one session
-/// is in its [`Salvaged`].
-pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, RecordingError> {
+/// is in its [`Recovered`].
+pub fn recover(root: &Path) -> Result<Vec<Recovered>, RecordingError> {
     let failed = |source| RecordingError::System {
         what: format!(
             "{} could not be listed: check that it is there and may be read",
@@ -82,16 +82,16 @@ pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, RecordingError> {
         }
     }
     folders.sort();
-    let salvaged = folders.into_iter().filter_map(|folder| {
-        let saved = salvage_session(&folder);
+    let recovered = folders.into_iter().filter_map(|folder| {
+        let saved = recover_session(&folder);
         let other =
             |error: &SessionError| matches!(error, SessionError::InUse(_) | SessionError::Ended(_));
         match &saved {
             Err(RecordingError::Session(error)) if other(error) => None,
-            _ => Some(Salvaged { folder, saved }),
+            _ => Some(Recovered { folder, saved }),
         }
     });
-    Ok(salvaged.collect())
+    Ok(recovered.collect())
 }
 
 /// Closes one interrupted session.
@@ -100,7 +100,7 @@ pub fn salvage(root: &Path) -> Result<Vec<Salvaged>, RecordingError> {
 /// [`SessionError::InUse`] where its recorder lives, [`SessionError::Ended`] where there is nothing
 /// to do, [`RecordingError::NotMended`], or what the file system answers; its status stays
 /// "recording" then, except for [`RecordingError::NotMended`].
-pub fn salvage_session(folder: &Path) -> Result<Saved, RecordingError> {
+pub fn recover_session(folder: &Path) -> Result<Saved, RecordingError> {
     let session = InterruptedSession::open(folder)?;
     let entries = session.index().entries();
     let frames = whole_frames(&session.video_path()).min(entries.len());
@@ -119,7 +119,7 @@ pub fn salvage_session(folder: &Path) -> Result<Saved, RecordingError> {
     };
     let track = session
         .journal()
-        .and_then(|journal| Track::from_reports(&journal.turn, &journal.reports));
+        .and_then(|journal| AngleFit::from_reports(&journal.turn, &journal.reports));
     let angle = |t_us| track.as_ref()?.angle_at(t_us);
     session.abort(frames, &angle, &reason)?;
     verify(folder, frames)?;

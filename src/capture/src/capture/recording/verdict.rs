@@ -57,7 +57,7 @@ impl Recorded {
     /// on the camera, a sentence each.
     ///
     /// # Errors
-    /// What closing the session answers; its status stays "recording" then, and it can be salvaged.
+    /// What closing the session answers; its status stays "recording" then, and it can be recovered.
     pub fn finish(
         mut self,
         angle: &dyn Fn(i64) -> Option<f64>,

@@ -33,7 +33,7 @@ fn sessions_are_listed_newest_first_with_their_verdicts() {
         .collect();
     assert_eq!(ids, [CUT, DROPPED, BUST, COW]);
     assert_eq!(list[0]["status"], "aborted");
-    assert!(list[0]["reason"].as_str().unwrap().contains("salvaged"));
+    assert!(list[0]["reason"].as_str().unwrap().contains("recovered"));
     assert_eq!(list[1]["status"], "complete");
     assert!(list[1]["dropped"].as_u64() > Some(0));
     assert_eq!(
