@@ -1,4 +1,4 @@
-//! Recording turns with a camera that does as the test says, and salvaging what was killed.
+//! Recording turns with a camera that does as the test says, and recovering what was killed.
 #![allow(
     missing_docs,
     clippy::unwrap_used,
@@ -774,7 +774,7 @@ struct Lost {
 
 /// Kills a recorder that has written so many frames, and recovers its session. `clock`: whether it
 /// goes by `real` time.
-fn kill_and_salvage(clock: &str, frames: u64) -> Lost {
+fn kill_and_recover(clock: &str, frames: u64) -> Lost {
     let root = tempfile::tempdir().unwrap();
     let mut child = again("child_that_records_until_it_is_killed", "", root.path())
         .env("RELIT_TEST_CLOCK", clock)
@@ -832,9 +832,9 @@ fn random_moments() -> impl Iterator<Item = u64> {
 }
 
 #[test]
-fn a_killed_recording_is_salvaged_and_loses_a_second_of_what_was_written_at_most() {
+fn a_killed_recording_is_recovered_and_loses_a_second_of_what_was_written_at_most() {
     for frames in random_moments().take(5) {
-        let lost = kill_and_salvage("paced", frames);
+        let lost = kill_and_recover("paced", frames);
         assert!(lost.frames <= 30, "{} frames lost", lost.frames);
     }
 }
@@ -842,15 +842,15 @@ fn a_killed_recording_is_salvaged_and_loses_a_second_of_what_was_written_at_most
 /// `cargo test --test capture -- --ignored --nocapture a_hundred_killed`
 #[test]
 #[ignore = "takes five minutes"]
-fn a_hundred_killed_recordings_are_salvaged_and_lose_a_second_at_most() {
-    let lost = random_moments().map(|frames| kill_and_salvage("real", frames).us);
+fn a_hundred_killed_recordings_are_recovered_and_lose_a_second_at_most() {
+    let lost = random_moments().map(|frames| kill_and_recover("real", frames).us);
     let worst = lost.take(100).max().unwrap();
     println!("at most {worst} us lost");
     assert!(worst <= 1_000_000, "{worst} us lost");
 }
 
 #[test]
-fn a_recording_killed_before_its_first_frame_is_salvaged_as_such() {
+fn a_recording_killed_before_its_first_frame_is_recovered_as_such() {
     let root = tempfile::tempdir().unwrap();
     let script = steps(stream(5, 0)).chain([Step::Silence]);
     let clock = Clock::virtual_time();

@@ -171,7 +171,7 @@ fn a_second_daemon_is_refused_with_the_process_that_has_the_folder() {
 }
 
 #[test]
-fn a_session_whose_recorder_died_is_salvaged_at_the_start_and_told() {
+fn a_session_whose_recorder_died_is_recovered_at_the_start_and_told() {
     let root = tempfile::tempdir().unwrap();
     let json = std::fs::read(fixture(SHORT).join("session.json")).unwrap();
     let manifest = Manifest::from_json(&json).unwrap();

@@ -6,7 +6,7 @@
 //!
 //! | module | purpose |
 //! | --- | --- |
-//! | [`session`] | the session folder: manifest, frame index, video file; reading, writing, salvaging |
+//! | [`session`] | the session folder: manifest, frame index, video file; reading, writing, recovery |
 //! | [`shard`] | the data set: samples, records, statistics; writing, reading, verifying |
 //! | [`report`] | the HTML page of one extracted session |
 //! | [`geometry`] | pixel rectangles |

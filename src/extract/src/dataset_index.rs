@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use relit_data::causes::with_causes;
 use relit_data::shard::{
-    Dataset, ExtractionSettings, OutputFolder, SessionEntry, ShardEntry, ShardError, TaskOutcome,
-    TaskPiece,
+    Dataset, ExtractionSettings, OutputFolder, PartialManifest, SessionEntry, ShardEntry,
+    ShardError, TaskOutcome,
 };
 
 use super::{ExtractError, ExtractOptions, RecordingOutcome};
@@ -15,7 +15,7 @@ pub(super) enum Catalog {
     /// `dataset.json`.
     Whole(Dataset),
     /// A task's piece.
-    Piece(Box<TaskPiece>),
+    Piece(Box<PartialManifest>),
 }
 
 impl Catalog {
@@ -40,12 +40,12 @@ impl Catalog {
             let name = path.file_name().unwrap_or(path.as_os_str());
             name.to_string_lossy().into_owned()
         };
-        let dataset = match TaskPiece::read(out, task)? {
+        let dataset = match PartialManifest::read(out, task)? {
             Some(piece) => piece.dataset,
             None => Dataset::new(settings.clone()),
         };
         check_settings(out, &dataset.settings, &settings)?;
-        let piece = TaskPiece::new(task, found.iter().map(name).collect(), dataset);
+        let piece = PartialManifest::new(task, found.iter().map(name).collect(), dataset);
         // A task without recordings has a piece too, so that none is missing.
         piece.write(out)?;
         Ok(Self::Piece(Box::new(piece)))

@@ -29,7 +29,7 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
         return Ok(Outcome::Failure);
     }
     let _camera = settings.lock_camera()?;
-    report_salvaged(console, &settings)?;
+    report_recovered(console, &settings)?;
     let mut equipment = Equipment::new(settings)?;
     let stop = StopRequest::new(&equipment.clock());
     let asked = stop.clone();
@@ -74,7 +74,7 @@ pub(crate) fn agreed(console: Console, settings: &Settings) -> Result<bool, Capt
     Ok(agreed)
 }
 
-fn report_salvaged(console: Console, settings: &Settings) -> Result<(), CaptureError> {
+fn report_recovered(console: Console, settings: &Settings) -> Result<(), CaptureError> {
     let recovered = recover(&settings.root)?;
     recovered
         .iter()

@@ -54,7 +54,7 @@ impl Daemon {
         let dispatcher = Arc::new(Dispatcher::new(equipment.clock()));
         let show = |state: &mut RigState| state.settings = shown;
         dispatcher.monitor().update(show);
-        report_salvaged(&root, &equipment.clock(), dispatcher.monitor())?;
+        report_recovered(&root, &equipment.clock(), dispatcher.monitor())?;
         let thread = |source| CaptureError::system("a thread", "started")(source);
         let preview = Preview::start(dispatcher.monitor().clone()).map_err(thread)?;
         let clock = equipment.clock();
@@ -175,8 +175,8 @@ fn check_object(object: &str) -> Result<(), Refused> {
     preflight::check_object(object).map_err(Refused::Invalid)
 }
 
-/// Salvages what an earlier run left, and shows what came of it.
-fn report_salvaged(root: &Path, clock: &Clock, monitor: &Monitor) -> Result<(), CaptureError> {
+/// Recovers what an earlier run left, and shows what came of it.
+fn report_recovered(root: &Path, clock: &Clock, monitor: &Monitor) -> Result<(), CaptureError> {
     for found in recover(root)? {
         monitor.fault(clock.now_us(), found.to_string());
     }

@@ -1,4 +1,4 @@
-//! Salvaging a session whose recorder died.
+//! Recovery of a session whose recorder died.
 
 use std::fs;
 use std::io;

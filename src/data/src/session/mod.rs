@@ -6,7 +6,7 @@
 //!   index.
 //! - Writing: [`SessionWriter`], which holds the folder's lock (`lock`).
 //! - [`TurnJournal`]: what the turntable reported, until the index has the angles.
-//! - Salvaging what a killed recorder left behind: [`InterruptedSession`].
+//! - Recovery of what a killed recorder left behind: [`InterruptedSession`].
 //!
 //! This module knows the files and how they relate. It decodes no video and knows nothing of
 //! cameras, masks or shards.

@@ -46,7 +46,7 @@ pub enum ShardError {
     #[error(
         "the tasks' pieces in {path} do not make a whole data set: {}", .problems.join("; "), path = .path.display()
     )]
-    Pieces {
+    PartialManifests {
         /// The folder of the pieces.
         path: PathBuf,
         /// What is wrong, one sentence each.

@@ -16,7 +16,7 @@
 //! | [`Dataset`], [`ExtractionSettings`] | `dataset.json`; `file` compares the files with it |
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
 //! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
-//! | [`ArrayTask`], [`TaskPiece`], [`merge`] | a data set that several tasks write |
+//! | [`ArrayTask`], [`PartialManifest`], [`merge`] | a data set that several tasks write |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
 //! This module knows pixel rectangles, images and their statistics
@@ -55,7 +55,7 @@ pub use order::order;
 pub use output::OutputFolder;
 pub use parquet_table::{TableRow, read_table};
 pub use partial_manifest::{
-    ArrayTask, MAX_TASKS, Merged, TaskOutcome, TaskPiece, described_so_far, merge,
+    ArrayTask, MAX_TASKS, Merged, PartialManifest, TaskOutcome, described_so_far, merge,
 };
 pub use quality::{MaskMisfit, QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};

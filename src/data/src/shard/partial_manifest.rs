@@ -82,7 +82,7 @@ pub enum TaskOutcome {
 
 /// A task's piece of the description.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TaskPiece {
+pub struct PartialManifest {
     schema: String,
     task: u32,
     count: u32,
@@ -94,7 +94,7 @@ pub struct TaskPiece {
     pub dataset: Dataset,
 }
 
-impl TaskPiece {
+impl PartialManifest {
     /// A piece without outcomes.
     #[must_use]
     pub fn new(task: ArrayTask, recordings: Vec<String>, dataset: Dataset) -> Self {
@@ -155,7 +155,7 @@ pub struct Merged {
 /// anything for a folder of images, or an error where there is none.
 ///
 /// # Errors
-/// [`ShardError::Pieces`] if a task or a recording is missing, failed, or is there twice, if tasks saw
+/// [`ShardError::PartialManifests`] if a task or a recording is missing, failed, or is there twice, if tasks saw
 /// different recordings or settings, or a file is missing; then nothing is written.
 /// [`ShardError::Locked`] while a task is running, [`ShardError::Description`], [`ShardError::Io`].
 pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Merged, ShardError> {
@@ -172,7 +172,7 @@ pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Mer
             merged.dataset.write(folder.path())?;
             Ok(merged)
         }
-        None => Err(ShardError::Pieces {
+        None => Err(ShardError::PartialManifests {
             path: out.join(names::TASKS),
             problems,
         }),
@@ -211,7 +211,7 @@ pub fn described_so_far(out: &Path) -> Result<(Dataset, Option<String>), ShardEr
 }
 
 /// The pieces of all tasks that are there.
-fn read_pieces(out: &Path) -> Result<Vec<TaskPiece>, ShardError> {
+fn read_pieces(out: &Path) -> Result<Vec<PartialManifest>, ShardError> {
     let folder = out.join(names::TASKS);
     let files = output::names_in(&folder)?;
     let pieces = files
@@ -221,13 +221,13 @@ fn read_pieces(out: &Path) -> Result<Vec<TaskPiece>, ShardError> {
         .map(|name| {
             let path = folder.join(name);
             let bytes = fs::read(&path).map_err(ShardError::io("read", &path))?;
-            TaskPiece::parse(&path, &bytes)
+            PartialManifest::parse(&path, &bytes)
         })
         .collect()
 }
 
 /// The pieces joined, and what is wrong with them; `None` if they do not belong together.
-fn join(pieces: &[TaskPiece], problems: &mut Vec<String>) -> Option<Merged> {
+fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged> {
     let Some(first) = pieces.first() else {
         problems.push("there are none".to_owned());
         return None;
@@ -249,7 +249,7 @@ fn join(pieces: &[TaskPiece], problems: &mut Vec<String>) -> Option<Merged> {
         problems.push(problem);
         return None;
     }
-    let by_task: BTreeMap<u32, &TaskPiece> = pieces.iter().map(|p| (p.task, p)).collect();
+    let by_task: BTreeMap<u32, &PartialManifest> = pieces.iter().map(|p| (p.task, p)).collect();
     let missing: Vec<String> = (0..first.count)
         .filter(|task| !by_task.contains_key(task))
         .map(|task| task.to_string())

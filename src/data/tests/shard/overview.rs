@@ -3,7 +3,7 @@
 use std::fs;
 
 use relit_data::shard::{
-    ArrayTask, Dataset, Layout, SessionQuality, ShardError, TaskOutcome, TaskPiece,
+    ArrayTask, Dataset, Layout, PartialManifest, SessionQuality, ShardError, TaskOutcome,
     described_so_far,
 };
 
@@ -30,7 +30,7 @@ fn what_tasks_have_written_so_far_is_summed_and_said_to_be_unmerged() {
     fs::remove_file(dir.path().join(Dataset::FILE)).unwrap();
     fs::create_dir(dir.path().join("tasks")).unwrap();
     let names = ["a", "b", "c"].map(str::to_owned).to_vec();
-    let mut piece = TaskPiece::new(ArrayTask::new(0, 2).unwrap(), names, dataset);
+    let mut piece = PartialManifest::new(ArrayTask::new(0, 2).unwrap(), names, dataset);
     for (position, session) in [(0, "a"), (2, "b")] {
         let session = session.to_owned();
         piece

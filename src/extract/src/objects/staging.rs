@@ -103,7 +103,9 @@ fn named_by_url(error: ShardError, url: &str) -> ExtractError {
     let path = PathBuf::from(url);
     match error {
         ShardError::NoDataset(_) => ShardError::NoDataset(path).into(),
-        ShardError::Pieces { problems, .. } => ShardError::Pieces { path, problems }.into(),
+        ShardError::PartialManifests { problems, .. } => {
+            ShardError::PartialManifests { path, problems }.into()
+        }
         other => other.into(),
     }
 }

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! It knows cameras, videos and sessions, and nothing of turntables: the time of a turn, the reports
-//! for the journal and the angle at a time are given to it. Salvaging alone asks for the angles that
+//! for the journal and the angle at a time are given to it. Recovery alone asks for the angles that
 //! follow from a journal.
 
 mod camera_thread;
