@@ -39,7 +39,7 @@ fn extract(session: &str, out: &Path) {
         .join(session);
     let output = Command::new(relit_tests::program("relit-extract"))
         .arg(&session)
-        .arg("--out")
+        .arg("--output")
         .arg(out)
         .arg("--mask")
         .arg(session.join("mask_gt.png"))

@@ -10,7 +10,7 @@ use crate::turn::{TOLERANT, turn};
 use crate::turntable;
 
 /// A picture that costs an emulated machine little.
-const SMALL: &str = "320x180";
+const SMALL: &str = "YUYV:320x180@10";
 /// Seconds that the end of a take may take in an emulated machine: noticing, stopping the table,
 /// and closing the session.
 const ENDS_WITHIN: f64 = 30.0;

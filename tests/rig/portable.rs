@@ -6,17 +6,13 @@ use crate::camera::Vivid;
 use crate::program::{Running, sessions};
 
 /// A turn of ten seconds in 100 frames, without a table.
-const TURN: [&str; 14] = [
+const TURN: [&str; 10] = [
     "--camera",
     "nokhwa:0",
     "--turntable",
     "none",
-    "--fourcc",
-    "YUYV",
-    "--size",
-    "320x180",
-    "--fps",
-    "10",
+    "--mode",
+    "YUYV:320x180@10",
     "--degrees-per-second",
     "36",
     "--max-dropped",

@@ -13,10 +13,10 @@ use crate::turntable;
 /// told, and is no fault of the recorder's.
 pub(crate) const TOLERANT: [&str; 2] = ["--max-dropped", "60"];
 
-/// A turn of ten seconds in 100 frames, as much as emulation carries.
-pub(crate) fn turn<'a>(size: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+/// A turn of ten seconds in this mode, with 10 frames a second as much as emulation carries.
+pub(crate) fn turn<'a>(mode: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     let mut arguments = vec!["--camera", VIVID, "--turntable", "serial:/dev/ttyS1"];
-    arguments.extend(["--fourcc", "YUYV", "--size", size, "--fps", "10"]);
+    arguments.extend(["--mode", mode]);
     arguments.extend(["--degrees-per-second", "36"]);
     arguments.extend(more);
     arguments
@@ -28,7 +28,7 @@ fn every_frame_that_the_kernel_handed_out_during_the_turn_is_in_the_session() {
     drop(Vivid::open());
     let root = sessions("turn");
     let trace = BufferTrace::begin();
-    let ended = Running::start(&root, &turn("640x480", &TOLERANT)).end();
+    let ended = Running::start(&root, &turn("YUYV:640x480@10", &TOLERANT)).end();
     let handed = trace.end();
     let state = turntable::stands();
     assert!(matches!(ended.code, Some(0 | 3)), "{ended:#?}");

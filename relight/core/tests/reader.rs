@@ -191,7 +191,7 @@ fn memory_that_is_given_back_leaves_no_trace() {
 fn folders_in_the_layout_of_the_released_data_give_what_shards_give() {
     let dir = tempfile::tempdir().unwrap();
     let (shards, folders) = (dir.path().join("shards"), dir.path().join("folders"));
-    for (out, layout) in [(&shards, Layout::Webdataset), (&folders, Layout::Relit)] {
+    for (out, layout) in [(&shards, Layout::Webdataset), (&folders, Layout::Paper)] {
         fs::create_dir(out).unwrap();
         write(out, layout, "turn", 30);
     }
@@ -309,7 +309,7 @@ fn samples_that_the_description_tells_of_and_no_shard_holds_are_told() {
 #[test]
 fn a_frame_that_is_missing_in_a_folder_is_told() {
     let dir = tempfile::tempdir().unwrap();
-    write(dir.path(), Layout::Relit, "turn", 12);
+    write(dir.path(), Layout::Paper, "turn", 12);
     fs::remove_file(dir.path().join("imgs/turn/4.png")).unwrap();
     let (given, damaged) = given_and_damaged(dir.path());
     assert_eq!((given.len(), damaged.len()), (11, 1));

@@ -32,10 +32,12 @@ use serde_json::Value;
 
 mod event;
 mod manual;
+mod options;
 mod progress;
 
 pub use event::{Check, Done, Event};
 pub use manual::written_manual;
+pub use options::ConsoleOptions;
 pub use progress::ProgressBar;
 
 /// The outcome of a command that ran to its end.

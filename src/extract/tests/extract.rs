@@ -124,11 +124,11 @@ fn native_size_keeps_source_pixels_and_its_statistics_are_recomputed_by_verify()
 }
 
 #[test]
-fn the_relit_layout_has_gap_free_names_and_is_verified() {
+fn the_paper_layout_has_gap_free_names_and_is_verified() {
     let bench = Bench::new();
     bench.errors(
         0,
-        "clip.mkv --mask mask.png --frames 30 --size 32 --layout relit -o out",
+        "clip.mkv --mask mask.png --frames 30 --size 32 --layout paper -o out",
     );
     bench.verified(0, "out");
     for k in 0..30 {
@@ -623,7 +623,7 @@ fn a_mask_of_another_session_lowers_the_verdict_and_exits_with_3() {
     // Nor when the pieces of tasks are merged.
     bench.errors(
         3,
-        &format!("{} --task-id 0 --task-count 1", line(&other, "pieces")),
+        &format!("{} --task 0/1", line(&other, "pieces")),
     );
     bench.errors(3, "merge pieces");
     bench.errors(0, &line(&session, "right"));

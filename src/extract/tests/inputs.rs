@@ -122,12 +122,12 @@ fn of_two_names_alike_in_different_tasks_the_first_is_kept() {
             "-o",
             "out",
         ];
-        inputs.extract(&[&both[..], &["--task-count", "2", "--task-id", task]].concat())
+        inputs.extract(&[&both[..], &["--task", task]].concat())
     };
     // The second first: whoever comes first, it is the same that is refused.
-    let (code, errors) = task("1");
+    let (code, errors) = task("1/2");
     assert_eq!(code, Some(1), "{errors}");
-    let (code, errors) = task("0");
+    let (code, errors) = task("0/2");
     assert_eq!(code, Some(0), "{errors}");
     assert!(inputs.path("out/Mug.tar").is_file());
     assert!(!inputs.path("out/mug.tar").is_file());

@@ -1,6 +1,7 @@
 //! Which of a camera's modes to record in.
 
 use std::fmt;
+use std::str::FromStr;
 
 use super::error::CaptureError;
 use relit_camera::{CameraMode, Fourcc, Mode, Rate, Rates};
@@ -15,6 +16,9 @@ const PREFERRED: [Fourcc; 5] = [
 ];
 /// Rates that differ by less count as the same, frames a second: 29.97 is asked for as 30.
 const SAME_RATE: f64 = 0.05;
+/// Frames a second that can be asked for.
+const MIN_FPS: f64 = 1.0;
+const MAX_FPS: f64 = 1000.0;
 
 /// What is preferred of a camera's mode; what is not given is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,6 +39,69 @@ impl Default for ModePreference {
             fps: 30.0,
         }
     }
+}
+
+/// Read as a camera's mode is written, `MJPG:1920x1080@30`, of which each part may be left out.
+impl FromStr for ModePreference {
+    type Err = CaptureError;
+
+    fn from_str(text: &str) -> Result<Self, CaptureError> {
+        let mut preference = Self::default();
+        let format_and_size = match text.split_once('@') {
+            Some((rest, rate)) => {
+                preference.fps = fps_of(rate)?;
+                rest
+            }
+            None => text,
+        };
+        match format_and_size.split_once(':') {
+            Some((format, size)) => {
+                preference.fourcc = Some(fourcc_of(format)?);
+                preference.size = Some(size_of(size)?);
+            }
+            None if format_and_size.contains('x') => {
+                preference.size = Some(size_of(format_and_size)?);
+            }
+            None if !format_and_size.is_empty() => {
+                preference.fourcc = Some(fourcc_of(format_and_size)?);
+            }
+            None if text.is_empty() => {
+                let empty = "a mode is written MJPG:1920x1080@30, or as a part of that";
+                return Err(CaptureError::Refused(empty.to_owned()));
+            }
+            None => {}
+        }
+        Ok(preference)
+    }
+}
+
+fn fourcc_of(text: &str) -> Result<Fourcc, CaptureError> {
+    let fourcc = text.as_bytes().try_into().map(Fourcc).ok();
+    let recorded = fourcc.filter(|fourcc| fourcc.pixel_format().is_some());
+    recorded.ok_or_else(|| {
+        CaptureError::Refused(format!(
+            "{text:?} frames cannot be recorded: give four characters such as MJPG, H264 or YUYV"
+        ))
+    })
+}
+
+fn size_of(text: &str) -> Result<(u32, u32), CaptureError> {
+    let side = |text: &str| text.parse().ok().filter(|&pixels: &u32| pixels > 0);
+    let sides = text.split_once('x');
+    let size = sides.and_then(|(width, height)| Some((side(width)?, side(height)?)));
+    size.ok_or_else(|| {
+        CaptureError::Refused(format!("{text:?} is not a frame size: write 1920x1080"))
+    })
+}
+
+fn fps_of(text: &str) -> Result<f64, CaptureError> {
+    let rate = text.parse().ok();
+    let rate = rate.filter(|rate| (MIN_FPS..=MAX_FPS).contains(rate));
+    rate.ok_or_else(|| {
+        CaptureError::Refused(format!(
+            "{text:?} is not a frame rate: give {MIN_FPS} to {MAX_FPS} frames a second"
+        ))
+    })
 }
 
 impl fmt::Display for ModePreference {
@@ -163,6 +230,29 @@ mod tests {
             ..ModePreference::default()
         };
         assert_eq!(preference.choose(&modes).unwrap().width, 3840);
+    }
+
+    #[test]
+    fn each_part_of_a_mode_may_be_left_out() {
+        let vga = Some((640, 480));
+        for (text, fourcc, size, fps) in [
+            ("MJPG:640x480@15", Some(Fourcc::MJPG), vga, 15.0),
+            ("MJPG:640x480", Some(Fourcc::MJPG), vga, 30.0),
+            ("MJPG@29.97", Some(Fourcc::MJPG), None, 29.97),
+            ("MJPG", Some(Fourcc::MJPG), None, 30.0),
+            ("640x480@15", None, vga, 15.0),
+            ("640x480", None, vga, 30.0),
+            ("@15", None, None, 15.0),
+        ] {
+            let preference: ModePreference = text.parse().unwrap();
+            assert_eq!(preference, ModePreference { fourcc, size, fps }, "{text}");
+        }
+        for text in [
+            "", "@", "@0", "@2000", ":", "MJPG:", ":640x480", "0x480", "640x", "1x2x3", "MJPEG",
+            "ABCD", "640x480@x", "@30@15",
+        ] {
+            assert!(text.parse::<ModePreference>().is_err(), "{text}");
+        }
     }
 
     #[test]

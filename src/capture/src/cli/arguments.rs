@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use relit_camera::manual_controls::ManualValues;
-use relit_camera::{CameraAddress, Fourcc};
+use relit_camera::CameraAddress;
 use relit_capture::capture::{ModePreference, Settings};
 use relit_capture::serve::ListenAddress;
+use relit_console::ConsoleOptions;
 use relit_turntable as turntable;
 
 use super::turntable_arguments::{
@@ -36,9 +37,8 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left 
 pub(crate) struct CommandLine {
     #[command(subcommand)]
     pub(crate) verb: Verb,
-    /// Print JSON lines on standard output, for machines.
-    #[arg(long, global = true)]
-    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) console: ConsoleOptions,
 }
 
 #[derive(Subcommand)]
@@ -74,11 +74,8 @@ pub(crate) struct RecordArguments {
     /// The object's name, as it goes into the session's: letters, digits, '-', '_', '.'.
     #[arg(long, value_name = "NAME")]
     pub(crate) object: String,
-    /// Do not ask before the table turns.
-    #[arg(long)]
-    pub(crate) yes: bool,
     #[command(flatten)]
-    pub(crate) rig: RigArguments,
+    pub(crate) turn: TurnArguments,
 }
 
 #[derive(Args)]
@@ -86,6 +83,13 @@ pub(crate) struct CalibrateArguments {
     /// How high the camera looks down on the table, degrees: 0 from the side [default: as noted before].
     #[arg(long, value_name = "DEGREES", value_parser = elevation)]
     pub(crate) elevation: Option<f64>,
+    #[command(flatten)]
+    pub(crate) turn: TurnArguments,
+}
+
+/// A turn that a person at the terminal lets begin.
+#[derive(Args)]
+pub(crate) struct TurnArguments {
     /// Do not ask before the table turns.
     #[arg(long)]
     pub(crate) yes: bool,
@@ -128,15 +132,10 @@ pub(crate) struct RigArguments {
     /// Speed of the turn, degrees a second.
     #[arg(long, value_name = "SPEED", default_value_t = 7.2, value_parser = speed)]
     degrees_per_second: f64,
-    /// Frames a second.
-    #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
-    fps: f64,
-    /// Frame size, such as 1920x1080 [default: the largest at that rate].
-    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
-    size: Option<(u32, u32)>,
-    /// Pixel format: MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer [default: compressed before raw].
-    #[arg(long, value_name = "FORMAT", value_parser = fourcc)]
-    fourcc: Option<Fourcc>,
+    /// Pixel format, frame size and frames a second: each part may be left out. Formats are MJPG, H264, YUYV,
+    /// NV12, RGB3, GREY and 8-bit Bayer [default: compressed before raw, the largest frames at 30 a second].
+    #[arg(long, value_name = "MJPG:1920x1080@30")]
+    mode: Option<ModePreference>,
     /// Exposure to hold, in the camera's own units [default: as it is].
     #[arg(long, value_name = "VALUE")]
     exposure: Option<i64>,
@@ -160,11 +159,7 @@ pub(crate) struct RigArguments {
 impl From<RigArguments> for Settings {
     fn from(line: RigArguments) -> Self {
         let mut settings = Self::new(line.root, line.camera, line.turntable);
-        settings.mode = ModePreference {
-            fourcc: line.fourcc,
-            size: line.size,
-            fps: line.fps,
-        };
+        settings.mode = line.mode.unwrap_or_default();
         settings.wanted = ManualValues {
             exposure: line.exposure,
             gain: line.gain,
@@ -179,23 +174,6 @@ impl From<RigArguments> for Settings {
     }
 }
 
-fn fourcc(text: &str) -> Result<Fourcc, String> {
-    let known = || "give four characters such as MJPG, H264 or YUYV".to_owned();
-    let fourcc = Fourcc(text.as_bytes().try_into().map_err(|_| known())?);
-    match fourcc.pixel_format() {
-        Some(_) => Ok(fourcc),
-        None => Err(format!("{text} frames cannot be recorded: {}", known())),
-    }
-}
-
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let side = |text: &str| text.parse().ok().filter(|&pixels: &u32| pixels > 0);
-    let sides = text.split_once('x');
-    sides
-        .and_then(|(width, height)| Some((side(width)?, side(height)?)))
-        .ok_or_else(|| format!("{text:?} is no size: write it as 1920x1080"))
-}
-
 fn figure(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),
@@ -207,23 +185,6 @@ fn speed(text: &str) -> Result<f64, String> {
     figure(text, 0.1, 360.0, "degrees a second")
 }
 
-fn rate(text: &str) -> Result<f64, String> {
-    figure(text, 1.0, 1000.0, "frames a second")
-}
-
 fn elevation(text: &str) -> Result<f64, String> {
     figure(text, 0.0, 89.0, "degrees")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_are_written_with_an_x() {
-        assert_eq!(size("1920x1080"), Ok((1920, 1080)));
-        for text in ["", "1920", "0x5", "axb", "1920x1080x3"] {
-            assert!(size(text).is_err(), "{text}");
-        }
-    }
 }

@@ -12,13 +12,13 @@ use super::environment::at_end;
 use super::recording::{agreed, make_root};
 
 pub(crate) fn run(console: Console, asked: CalibrateArguments) -> Result<Outcome, CaptureError> {
-    let settings: Settings = asked.rig.into();
+    let settings: Settings = asked.turn.rig.into();
     let root = settings.root.clone();
     let _made = make_root(&settings)?;
     let mut facts = read_facts(&root)?.unwrap_or_default();
     facts.camera_elevation_deg = asked.elevation.or(facts.camera_elevation_deg);
     if settings.turntable != TurntableAddress::None {
-        if !asked.yes && !agreed(console, &settings)? {
+        if !asked.turn.yes && !agreed(console, &settings)? {
             return Ok(Outcome::Failure);
         }
         let _camera = settings.lock_camera()?;

@@ -14,7 +14,6 @@ use std::process::ExitCode;
 
 use arguments::{CommandLine, Verb};
 use clap::{CommandFactory, Parser};
-use relit_console::Console;
 
 /// Runs the program with the arguments of the process.
 pub(crate) fn run() -> ExitCode {
@@ -22,7 +21,7 @@ pub(crate) fn run() -> ExitCode {
         return code;
     }
     let line = CommandLine::parse();
-    let console = Console::new(line.json);
+    let console = line.console.console();
     match line.verb {
         Verb::Devices => devices::run(console),
         Verb::Record(record) => console.finish(recording::run(console, *record)),

@@ -22,10 +22,10 @@ use relit_data::durable::MadeFolder;
 const UPDATE: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, CaptureError> {
-    let RecordArguments { rig, object, yes } = record;
-    let settings: Settings = rig.into();
+    let RecordArguments { object, turn } = record;
+    let settings: Settings = turn.rig.into();
     let _made = make_root(&settings)?;
-    if !yes && !agreed(console, &settings)? {
+    if !turn.yes && !agreed(console, &settings)? {
         return Ok(Outcome::Failure);
     }
     let _camera = settings.lock_camera()?;

@@ -28,7 +28,7 @@ struct Software {
     version: String,
 }
 
-/// A shard: a tar, or in the layout `relit` a folder of images.
+/// A shard: a tar, or in the layout `paper` a folder of images.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShardEntry {
     /// Path relative to the data set: `<session>.tar` or `imgs/<session>`.

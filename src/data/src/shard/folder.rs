@@ -1,4 +1,4 @@
-//! The layout `relit`: images in a folder that gets its final name when it is complete.
+//! The layout `paper`: images in a folder that gets its final name when it is complete.
 
 use std::fs;
 use std::path::{Path, PathBuf};

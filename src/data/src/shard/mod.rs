@@ -1,7 +1,7 @@
 //! The data set: writing, reading and verifying shards of samples with records and tables.
 //!
 //! A data set is a folder. `dataset.json` describes it and lists every other file with length and
-//! BLAKE3. Each session has a shard (a tar, or in the layout `relit` a folder of images), a table of
+//! BLAKE3. Each session has a shard (a tar, or in the layout `paper` a folder of images), a table of
 //! its records, and usually a report. `docs/formats.md` describes every file and field.
 //!
 //! | item | purpose |

@@ -98,7 +98,7 @@ pub(super) fn mean_file(session: &str) -> String {
     format!("{MEANS}/{session}.png")
 }
 
-/// The folders of the layout `relit`.
+/// The folders of the layout `paper`.
 pub(super) const IMAGES: &str = "imgs";
 pub(super) const MASKS: &str = "masks";
 pub(super) const MEANS: &str = "mean_img";

@@ -13,19 +13,19 @@ pub enum Layout {
     /// One tar per session: `<session>.tar`, with members `<session>/<kkkk>.{png,mask.png,json}`.
     Webdataset,
     /// Folders: `imgs/<session>/<k>.png`, `masks/<session>.png`, `mean_img/<session>.png`.
-    Relit,
+    Paper,
 }
 
 impl Layout {
     /// All layouts.
-    pub const ALL: [Self; 2] = [Self::Webdataset, Self::Relit];
+    pub const ALL: [Self; 2] = [Self::Webdataset, Self::Paper];
 
     /// The name on the command line and in `dataset.json`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Webdataset => "webdataset",
-            Self::Relit => "relit",
+            Self::Paper => "paper",
         }
     }
 
@@ -33,7 +33,7 @@ impl Layout {
     pub(super) fn shard_file(self, session: &str) -> String {
         match self {
             Self::Webdataset => names::tar_file(session),
-            Self::Relit => names::image_folder(session),
+            Self::Paper => names::image_folder(session),
         }
     }
 }

@@ -106,7 +106,7 @@ impl ShardWriter {
         let size = [mask.width(), mask.height()];
         let store = match layout {
             Layout::Webdataset => Store::Spool(SpoolStore::create(out, session, samples)?),
-            Layout::Relit => Store::Folder(FolderStore::create(out, session, samples, size)?),
+            Layout::Paper => Store::Folder(FolderStore::create(out, session, samples, size)?),
         };
         Ok(Self {
             session: session.to_owned(),

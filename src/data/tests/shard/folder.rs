@@ -1,4 +1,4 @@
-//! The layout `relit`: what it holds, and damage to it.
+//! The layout `paper`: what it holds, and damage to it.
 
 use std::fs;
 
@@ -14,7 +14,7 @@ const MEAN: &str = "mean_img/20261120T093015Z-mug.png";
 
 #[test]
 fn the_folders_hold_images_mask_and_mean() {
-    let dir = dataset(Layout::Relit);
+    let dir = dataset(Layout::Paper);
     let read = |file: &str| fs::read(dir.path().join(file)).unwrap();
     let images: Vec<_> = (0..SAMPLES)
         .map(|index| decode_rgb(&read(&format!("{IMAGES}/{index}.png"))).unwrap())
@@ -39,7 +39,7 @@ fn the_folders_hold_images_mask_and_mean() {
 
 #[test]
 fn damage_to_an_image_is_named() {
-    let dir = dataset(Layout::Relit);
+    let dir = dataset(Layout::Paper);
     let path = dir.path().join(IMAGES).join("6.png");
     let good = fs::read(&path).unwrap();
     let mut bytes = good.clone();
@@ -66,7 +66,7 @@ fn damage_to_an_image_is_named() {
 
 #[test]
 fn damage_to_mask_and_mean_is_named() {
-    let dir = dataset(Layout::Relit);
+    let dir = dataset(Layout::Paper);
     let mut other = mask();
     other.put_pixel(0, 0, image::Luma([255]));
     fs::write(dir.path().join(MASK), encode_mask(&other).unwrap()).unwrap();
@@ -89,7 +89,7 @@ fn damage_to_mask_and_mean_is_named() {
 
 #[test]
 fn unknown_files_in_the_folders_are_named() {
-    let dir = dataset(Layout::Relit);
+    let dir = dataset(Layout::Paper);
     for name in ["14.png", "06.png", "notes.txt"] {
         fs::write(dir.path().join(IMAGES).join(name), b"").unwrap();
         assert_names(dir.path(), IMAGES, None, name);
@@ -102,7 +102,7 @@ fn unknown_files_in_the_folders_are_named() {
 
 #[test]
 fn a_dangling_link_is_not_an_image() {
-    let dir = dataset(Layout::Relit);
+    let dir = dataset(Layout::Paper);
     let image = dir.path().join(IMAGES).join("3.png");
     fs::remove_file(&image).unwrap();
     std::os::unix::fs::symlink("nowhere", &image).unwrap();

@@ -227,7 +227,7 @@ fn a_session_replaces_an_older_one_and_leaves_others_alone() {
 
 #[test]
 fn a_folder_can_be_locked_again_after_a_writer_is_done() {
-    let dir = dataset(Layout::Relit);
+    let dir = dataset(Layout::Paper);
     let held = OutputFolder::lock(dir.path()).unwrap();
     assert!(matches!(
         OutputFolder::lock(held.path()),

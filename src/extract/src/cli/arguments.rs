@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
+use relit_console::ConsoleOptions;
 use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
 use relit_data::shard::{Align, ArrayTask, ImageSize, Layout, MAX_TASKS};
 use relit_extract::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
@@ -21,7 +22,7 @@ Examples:
       read everything back
   relit-extract stats dataset
       the data set at a glance
-  relit-extract sessions -o dataset --task-id 3 --task-count 10
+  relit-extract sessions -o dataset --task 3/10
       the fourth of ten parts; afterwards: relit-extract merge dataset
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost, \
@@ -33,7 +34,6 @@ or a mask is not that of its object.";
     name = "relit-extract",
     version,
     after_help = EXAMPLES,
-    args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true
 )]
 pub(crate) struct CommandLine {
@@ -41,6 +41,8 @@ pub(crate) struct CommandLine {
     pub(crate) verb: Option<Verb>,
     #[command(flatten)]
     pub(crate) extract: Option<ExtractArguments>,
+    #[command(flatten)]
+    pub(crate) console: ConsoleOptions,
 }
 
 #[derive(Subcommand)]
@@ -49,24 +51,13 @@ pub(crate) enum Verb {
     #[command(after_help = "Example:\n  relit-extract verify dataset")]
     Verify {
         /// The data set's folder.
-        #[arg(value_name = "OUT")]
         out: PathBuf,
-        /// Print one JSON line per event on standard output.
-        #[arg(long)]
-        json: bool,
-        /// With --json, print also how far the work has come.
-        #[arg(long, requires = "json")]
-        progress: bool,
     },
     /// Join what several tasks wrote into one data set.
     #[command(after_help = "Example:\n  relit-extract merge dataset")]
     Merge {
         /// The data set's folder, or a URL of one.
-        #[arg(value_name = "OUT")]
         out: PathBuf,
-        /// Print one JSON line per event on standard output.
-        #[arg(long)]
-        json: bool,
     },
     /// Show a data set at a glance: sessions with verdicts, saturation, shifts and what else was found.
     #[command(
@@ -74,11 +65,7 @@ pub(crate) enum Verb {
     )]
     Stats {
         /// The data set's folder, or a URL of one.
-        #[arg(value_name = "OUT")]
         out: PathBuf,
-        /// Print one JSON line per event on standard output.
-        #[arg(long)]
-        json: bool,
     },
 }
 
@@ -89,7 +76,7 @@ pub(crate) struct ExtractArguments {
     pub(crate) inputs: Vec<PathBuf>,
     /// The data set's folder, or a URL of one; created if it does not exist.
     #[arg(short, long, value_name = "OUT")]
-    pub(crate) out: PathBuf,
+    pub(crate) output: PathBuf,
     /// The mask for all inputs [default: each session folder's mask.png].
     #[arg(long, value_name = "PNG")]
     mask: Option<PathBuf>,
@@ -107,10 +94,10 @@ pub(crate) struct ExtractArguments {
     saturation_level: u8,
     /// Spec-Net should run above this fraction of saturated pixels.
     #[arg(long, value_name = "FRACTION", default_value_t = SPEC_NET_GATE, value_parser = within(0.0, 1.0))]
-    gate: f64,
+    spec_net_above: f64,
     /// How samples are stored: one tar per session, as WebDataset reads it, or folders of images, as in the released
     /// data set.
-    #[arg(long, default_value = "webdataset", value_parser = named::<Layout>(["webdataset", "relit"]))]
+    #[arg(long, default_value = "webdataset", value_parser = named::<Layout>(["webdataset", "paper"]))]
     layout: Layout,
     /// What to do about shifts of the object against its mask, from vibration or drift: measure and correct them above
     /// the tolerance, only measure them, or neither.
@@ -131,22 +118,13 @@ pub(crate) struct ExtractArguments {
     /// Replace sessions of the same name that were made from another video.
     #[arg(long)]
     replace: bool,
-    /// Extract one part of the recordings: the number of this task, from 0 [default: that of a Slurm array
-    /// job or a Kubernetes indexed job, where this is one].
-    #[arg(long, value_name = "I")]
-    task_id: Option<u32>,
-    /// Number of tasks that share the recordings.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_TASKS)))]
-    task_count: Option<u32>,
+    /// Extract one part of the recordings: task I of N that share them, from 0/N on [default: that of a Slurm
+    /// array job, where this is one].
+    #[arg(long, value_name = "I/N", value_parser = array_task)]
+    task: Option<ArrayTask>,
     /// Number of worker threads [default: one per core].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
-    /// Print one JSON line per event on standard output.
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// With --json, print also how far the work has come.
-    #[arg(long, requires = "json")]
-    pub(crate) progress: bool,
 }
 
 /// The task that is asked for on the command line, else by the scheduler that started the program.
@@ -154,33 +132,38 @@ fn task(
     line: &ExtractArguments,
     variable: &dyn Fn(&str) -> Option<String>,
 ) -> Result<Option<ArrayTask>, String> {
+    if line.task.is_some() {
+        return Ok(line.task);
+    }
     let number = |name: &str| -> Result<Option<u32>, String> {
         let text = variable(name).filter(|text| !text.is_empty());
         text.map(|text| {
             text.parse()
-                .map_err(|_| format!("{name} is {text:?}, no number"))
+                .map_err(|_| format!("{name} is {text:?}, not a number"))
         })
         .transpose()
     };
-    let count = |from: Option<u32>| line.task_count.or(from);
-    let (index, count) = if let Some(index) = line.task_id {
-        (index, count(None))
-    } else if let Some(index) = number("SLURM_ARRAY_TASK_ID")? {
-        // An array may start at any number.
-        let first = number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0);
-        let count = count(number("SLURM_ARRAY_TASK_COUNT")?);
-        (index.saturating_sub(first), count)
-    } else if let Some(index) = number("JOB_COMPLETION_INDEX")? {
-        (index, count(None))
-    } else if line.task_count.is_some() {
-        return Err("--task-count needs --task-id: the number of this task, from 0".to_owned());
-    } else {
+    let Some(index) = number("SLURM_ARRAY_TASK_ID")? else {
         return Ok(None);
     };
-    let count = count.ok_or("give --task-count, the number of tasks")?;
-    let task = ArrayTask::new(index, count);
-    task.map(Some)
-        .ok_or_else(|| format!("there is no task {index} of {count}: they count from 0"))
+    // An array may start at any number.
+    let first = number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0);
+    let count = number("SLURM_ARRAY_TASK_COUNT")?;
+    let count = count.ok_or("SLURM_ARRAY_TASK_COUNT is not set: give --task I/N")?;
+    new_task(index.saturating_sub(first), count).map(Some)
+}
+
+fn array_task(text: &str) -> Result<ArrayTask, String> {
+    let numbers = text.split_once('/');
+    let numbers = numbers.and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
+    let (index, count) = numbers.ok_or("write 3/40: task 3 of 40, counted from 0")?;
+    new_task(index, count)
+}
+
+fn new_task(index: u32, count: u32) -> Result<ArrayTask, String> {
+    ArrayTask::new(index, count).ok_or_else(|| {
+        format!("there is no task {index} of {count}: they count from 0, and at most {MAX_TASKS}")
+    })
 }
 
 impl ExtractArguments {
@@ -191,7 +174,7 @@ impl ExtractArguments {
             size: self.size,
             margin: self.margin,
             saturation_level: self.saturation_level,
-            gate: self.gate,
+            gate: self.spec_net_above,
             layout: self.layout,
             align: self.align,
             align_tolerance: self.align_tolerance,
@@ -260,26 +243,39 @@ mod tests {
             ("SLURM_ARRAY_TASK_MIN", "1"),
             ("SLURM_ARRAY_TASK_COUNT", "8"),
         ];
-        let index = [("JOB_COMPLETION_INDEX", "2")];
         assert_eq!(asked("", &[]), Ok(None));
         assert_eq!(asked("", &slurm), Ok(ArrayTask::new(3, 8)));
-        assert_eq!(
-            asked("--task-id 0 --task-count 2", &slurm),
-            Ok(ArrayTask::new(0, 2))
-        );
-        assert_eq!(asked("--task-count 3", &index), Ok(ArrayTask::new(2, 3)));
+        assert_eq!(asked("--task 0/2", &slurm), Ok(ArrayTask::new(0, 2)));
+        assert_eq!(asked("--task 39/40", &[]), Ok(ArrayTask::new(39, 40)));
     }
 
     #[test]
     fn half_a_task_and_one_beyond_the_last_are_refused() {
         for (line, variables) in [
-            ("--task-id 1", &[][..]),
-            ("--task-count 2", &[]),
-            ("--task-id 2 --task-count 2", &[]),
-            ("", &[("JOB_COMPLETION_INDEX", "2")]),
+            ("--task 1", &[][..]),
+            ("--task 1/", &[]),
+            ("--task /2", &[]),
+            ("--task 2/2", &[]),
+            ("--task 0/0", &[]),
+            ("", &[("SLURM_ARRAY_TASK_ID", "0")]),
             ("", &[("SLURM_ARRAY_TASK_ID", "x")]),
         ] {
             assert!(asked(line, variables).is_err(), "{line} {variables:?}");
         }
+    }
+
+    #[test]
+    fn json_is_taken_before_and_after_a_verb() {
+        for line in [
+            "relit-extract --json verify out",
+            "relit-extract verify out --json",
+            "relit-extract --json in -o out",
+            "relit-extract verify out --json --progress",
+        ] {
+            let line = CommandLine::try_parse_from(line.split(' ')).unwrap();
+            assert!(line.console.json);
+        }
+        let alone = CommandLine::try_parse_from("relit-extract verify out --progress".split(' '));
+        assert!(alone.is_err());
     }
 }

@@ -39,7 +39,7 @@ pub(crate) fn run(
         && tally == Tally::default()
     {
         console.warn(&format!(
-            "task {task} has none of the recordings: name all of them to each task, or give --task-id 0 --task-count 1 for all that are named"
+            "task {task} has none of the recordings: name all of them to each task, or give --task 0/1 for all that are named"
         ));
     }
     console.say(

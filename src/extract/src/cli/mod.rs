@@ -11,7 +11,6 @@ use std::process::ExitCode;
 use arguments::{CommandLine, Verb};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
-use relit_console::Console;
 
 /// Runs the program with the arguments of the process.
 pub(crate) fn run() -> ExitCode {
@@ -19,40 +18,26 @@ pub(crate) fn run() -> ExitCode {
         return code;
     }
     let line = CommandLine::parse();
+    let console = line.console.console();
     let wrong = |kind, text: &str| CommandLine::command().error(kind, text).exit();
     match (line.verb, line.extract) {
-        (
-            Some(Verb::Verify {
-                out,
-                json,
-                progress,
-            }),
-            _,
-        ) => {
-            let console = Console::new(json).with_progress(progress);
-            console.finish(verifying::run(console, &out))
-        }
-        (Some(Verb::Merge { out, json }), _) => {
-            let console = Console::new(json);
-            console.finish(merging::run(console, &out))
-        }
-        (Some(Verb::Stats { out, json }), _) => {
-            let console = Console::new(json);
-            console.finish(stats::run(console, &out))
-        }
-        (None, Some(extract)) => {
-            let console = Console::new(extract.json).with_progress(extract.progress);
-            match extract.options() {
-                Ok(options) => {
-                    let (inputs, out) = (&extract.inputs, &extract.out);
-                    console.finish(extracting::run(console, inputs, out, &options))
-                }
-                Err(text) => wrong(ErrorKind::ValueValidation, &text),
+        (Some(_), Some(_)) => wrong(
+            ErrorKind::ArgumentConflict,
+            "an input and a command are given: write ./NAME for an input that is named like a command",
+        ),
+        (Some(Verb::Verify { out }), None) => console.finish(verifying::run(console, &out)),
+        (Some(Verb::Merge { out }), None) => console.finish(merging::run(console, &out)),
+        (Some(Verb::Stats { out }), None) => console.finish(stats::run(console, &out)),
+        (None, Some(extract)) => match extract.options() {
+            Ok(options) => {
+                let (inputs, out) = (&extract.inputs, &extract.output);
+                console.finish(extracting::run(console, inputs, out, &options))
             }
-        }
+            Err(text) => wrong(ErrorKind::ValueValidation, &text),
+        },
         (None, None) => wrong(
             ErrorKind::MissingRequiredArgument,
-            "INPUT and --out are required",
+            "INPUT and --output are required",
         ),
     }
 }

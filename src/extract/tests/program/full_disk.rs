@@ -68,7 +68,7 @@ fn small_disks() -> Result<(), String> {
 
 fn a_full_disk_ends_with_what_is_needed_and_leaves_no_partial_file() {
     let workshop = Workshop::with(&["a.mkv"]);
-    for layout in ["webdataset", "relit"] {
+    for layout in ["webdataset", "paper"] {
         let line = format!("a.mkv {SETTINGS} --layout {layout} --resume -o");
         workshop.errors(0, &format!("{line} whole-{layout}"));
         let whole = files(&workshop.path(&format!("whole-{layout}")));

@@ -23,7 +23,7 @@ fn random() -> f64 {
 
 pub(crate) fn a_kill_at_any_moment_leaves_only_whole_files_and_resume_ends_in_the_same_bytes() {
     let workshop = Workshop::with(&["a.mkv", "b.mkv"]);
-    let layouts = ["webdataset", "relit"].map(|layout| {
+    let layouts = ["webdataset", "paper"].map(|layout| {
         let line = format!("a.mkv b.mkv {SETTINGS} --layout {layout} --resume -o");
         let start = Instant::now();
         workshop.errors(0, &format!("{line} whole-{layout}"));

@@ -13,7 +13,7 @@ fn workshop() -> (Workshop, String) {
 
 pub(crate) fn a_data_set_at_a_url_is_that_of_a_folder_and_nothing_stays_on_the_way() {
     let (workshop, url) = workshop();
-    for layout in ["webdataset", "relit"] {
+    for layout in ["webdataset", "paper"] {
         let line = format!("{SETTINGS} --layout {layout}");
         workshop.errors(0, &format!("in {line} -o whole-{layout}"));
         let whole = files(&workshop.path(&format!("whole-{layout}")));
@@ -40,7 +40,7 @@ pub(crate) fn tasks_write_to_a_url_and_are_merged_and_summed_there() {
     let (workshop, url) = workshop();
     workshop.errors(0, &format!("in {SETTINGS} -o whole"));
     let part = |index: u32| {
-        format!("{url}/in {SETTINGS} -o {url}/out --resume --task-id {index} --task-count 2")
+        format!("{url}/in {SETTINGS} -o {url}/out --resume --task {index}/2")
     };
     workshop.errors(0, &part(0));
     let errors = workshop.errors(1, &format!("merge {url}/out"));

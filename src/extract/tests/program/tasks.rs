@@ -11,7 +11,7 @@ fn workshop() -> Workshop {
 }
 
 fn part(index: u32, count: u32) -> String {
-    format!("{VIDEOS} {SETTINGS} -o out --resume --task-id {index} --task-count {count}")
+    format!("{VIDEOS} {SETTINGS} -o out --resume --task {index}/{count}")
 }
 
 pub(crate) fn tasks_at_the_same_time_and_a_merge_make_the_same_data_set_as_one_run() {
@@ -65,7 +65,7 @@ pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
     fs::create_dir(workshop.path("x")).unwrap();
     fs::copy(workshop.path("a.mkv"), workshop.path("x/a.mkv")).unwrap();
     for (index, code) in [(0, 0), (1, 1)] {
-        let line = format!("a.mkv x/a.mkv {SETTINGS} -o twice --task-id {index} --task-count 2");
+        let line = format!("a.mkv x/a.mkv {SETTINGS} -o twice --task {index}/2");
         workshop.errors(code, &line);
     }
     let errors = workshop.errors(1, "merge twice");
@@ -74,7 +74,7 @@ pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
     fs::write(workshop.path("bad.mkv"), "no video").unwrap();
     workshop.errors(
         1,
-        &format!("bad.mkv {SETTINGS} -o bad --task-id 0 --task-count 1"),
+        &format!("bad.mkv {SETTINGS} -o bad --task 0/1"),
     );
     let errors = workshop.errors(1, "merge bad");
     assert!(errors.contains("task 0 failed with bad.mkv"), "{errors}");
@@ -82,7 +82,7 @@ pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
     workshop.errors(0, &part(0, 2));
     workshop.errors(
         0,
-        &format!("b.mkv d.mkv {SETTINGS} -o out --task-id 1 --task-count 2"),
+        &format!("b.mkv d.mkv {SETTINGS} -o out --task 1/2"),
     );
     let errors = workshop.errors(1, "merge out");
     assert!(

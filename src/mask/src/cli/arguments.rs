@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::error::ErrorKind;
 use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand};
+use relit_console::ConsoleOptions;
 use relit_data::geometry::Rect;
 use relit_grabcut::{Hints, SegmentSettings};
 use relit_mask::{
@@ -29,7 +30,6 @@ Check mask-preview.png afterwards. Exit codes: 0 all masks made, 1 none, 2 wrong
     name = "relit-mask",
     version,
     after_help = EXAMPLES,
-    args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true
 )]
 pub(crate) struct CommandLine {
@@ -37,6 +37,8 @@ pub(crate) struct CommandLine {
     pub(crate) verb: Option<Verb>,
     #[command(flatten)]
     pub(crate) mask: Option<MaskArguments>,
+    #[command(flatten)]
+    pub(crate) console: ConsoleOptions,
 }
 
 /// What is done other than making masks.
@@ -53,9 +55,6 @@ pub(crate) enum Verb {
         /// The mask [default: mask.png in the session folder, or here]
         #[arg(long, value_name = "PNG")]
         mask: Option<PathBuf>,
-        /// Print one JSON line per event on standard output
-        #[arg(long)]
-        json: bool,
     },
 }
 
@@ -64,7 +63,6 @@ pub(crate) enum Verb {
 #[command(group = ArgGroup::new("hint").args(["rect", "seeds", "auto", "edit", "recipe"]).required(true).multiple(true))]
 pub(crate) struct MaskArguments {
     /// A session folder, a folder of sessions (each gets a mask with the same hints), or a video
-    #[arg(value_name = "INPUT")]
     pub(crate) input: PathBuf,
 
     /// A rectangle that contains the whole object, in pixels of the frame
@@ -121,10 +119,6 @@ pub(crate) struct MaskArguments {
     #[arg(long, value_name = "JSON", conflicts_with_all =
         ["rect", "seeds", "auto", "frame", "engine", "keep_all"])]
     recipe: Option<PathBuf>,
-
-    /// Print one JSON line per event on standard output
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 impl MaskArguments {

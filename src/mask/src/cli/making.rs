@@ -12,8 +12,7 @@ use serde_json::json;
 use super::arguments::MaskArguments;
 
 /// Makes the mask of every recording that the arguments name.
-pub(crate) fn run(arguments: &MaskArguments) -> ExitCode {
-    let console = Console::new(arguments.json);
+pub(crate) fn run(console: Console, arguments: &MaskArguments) -> ExitCode {
     let paths = match recordings(&arguments.input) {
         Ok(paths) => paths,
         Err(error) => return console.finish(Err(error)),

@@ -6,8 +6,8 @@ mod making;
 
 use std::process::ExitCode;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
-use relit_console::Console;
 
 use arguments::{CommandLine, Verb};
 
@@ -17,12 +17,18 @@ pub(crate) fn run() -> ExitCode {
         return code;
     }
     let line = CommandLine::parse();
+    let console = line.console.console();
     match (line.verb, line.mask) {
-        (Some(Verb::Check { input, mask, json }), _) => {
-            let console = Console::new(json);
+        (Some(_), Some(_)) => CommandLine::command()
+            .error(
+                ErrorKind::ArgumentConflict,
+                "an input and a command are given: write ./check for an input of that name",
+            )
+            .exit(),
+        (Some(Verb::Check { input, mask }), None) => {
             console.finish(checking::run(console, &input, mask.as_deref()))
         }
-        (None, Some(arguments)) => making::run(&arguments),
+        (None, Some(arguments)) => making::run(console, &arguments),
         (None, None) => {
             // Nothing can be done if standard output is closed.
             let _ = CommandLine::command().print_help();

@@ -150,7 +150,7 @@ fn open_dataset(path: &Path) -> Result<Vec<Turn>, OpenError> {
             Layout::Webdataset => {
                 ShardTurn::open(&path.join(&shard.file), Some(shard.samples)).map(Turn::Shard)
             }
-            Layout::Relit => {
+            Layout::Paper => {
                 FolderTurn::open(path, &shard.session, Some(shard.samples)).map(Turn::Folder)
             }
         }

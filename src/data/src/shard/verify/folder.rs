@@ -1,4 +1,4 @@
-//! Checks the layout `relit`: a folder of images with the session's samples.
+//! Checks the layout `paper`: a folder of images with the session's samples.
 
 use std::fs::File;
 use std::io::{self, Read};

@@ -100,7 +100,7 @@ pub fn verify(
 fn check_session(check: &mut SessionCheck<'_>) -> u64 {
     let found = match check.settings.layout {
         Layout::Webdataset => tar_reader::check(check),
-        Layout::Relit => folder::check(check),
+        Layout::Paper => folder::check(check),
     };
     check_records(check, &found);
     let expected = u64::from(check.session.samples);

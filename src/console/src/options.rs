@@ -1,0 +1,25 @@
+//! The options that every program of the toolkit has.
+
+use clap::Args;
+
+use super::Console;
+
+/// How a program prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+#[group(skip)]
+pub struct ConsoleOptions {
+    /// Print one JSON line per event on standard output, for machines.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// With --json, print also how far the work has come.
+    #[arg(long, global = true, requires = "json")]
+    pub progress: bool,
+}
+
+impl ConsoleOptions {
+    /// The console that prints so.
+    #[must_use]
+    pub fn console(self) -> Console {
+        Console::new(self.json).with_progress(self.progress)
+    }
+}
