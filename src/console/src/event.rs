@@ -95,6 +95,8 @@ pub enum Event {
         lossy: bool,
         #[serde(default)]
         misfit: bool,
+        #[serde(default)]
+        broken: bool,
     },
     LeftOut {
         #[serde(default)]
@@ -166,6 +168,7 @@ pub enum Done {
         extracted: u64,
         lossy: u64,
         misfits: u64,
+        broken: u64,
         skipped: u64,
         left_out: u64,
         failed: u64,

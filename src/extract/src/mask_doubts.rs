@@ -7,23 +7,31 @@ use std::borrow::Cow;
 use image::{GrayImage, ImageBuffer, Pixel, RgbImage};
 use relit_data::shard::MaskMisfit;
 use relit_grabcut::{
-    Effort, MIN_SIDE, MaskCheck, MaskError, ShapeCheck, TurnFrames, TurnStatistics, half_image,
+    Effort, MIN_SIDE, MaskCheck, MaskError, ShapeCheck, TURN_FRAMES, TurnFrames, TurnStatistics,
+    half_image,
 };
 use relit_video::{Video, VideoError};
 
 use super::ExtractError;
 use super::object::LARGE;
 
-/// Frames that are looked at.
+/// Frames of the first look.
 const FRAMES: usize = 12;
 /// Frames are halved until they have at most so many pixels.
 const MAX_PIXELS: u64 = 310_000;
+/// A mask is that of something else where its outline follows what moves less than so well, compared with the turn's
+/// own, and so much of its area is wrong.
+const OTHER_OUTLINE: f32 = 0.5;
+const OTHER_AREA: f64 = 0.2;
 
 /// One sentence for each thing that is worth a warning about a mask, and how much the mask does not fit.
 type MaskDoubts = (Vec<String>, Option<MaskMisfit>);
 
 /// What is worth a warning about a mask; nothing if the video says nothing about it. `frame` is the one on which the
 /// mask was made, if that is known: in others the object may lie elsewhere.
+///
+/// The first look takes a few frames. What it finds may be a shadow, so that all the frames decide of which the check
+/// of relit-mask decides.
 ///
 /// # Errors
 /// [`ExtractError::Video`] or [`ExtractError::MaskDoubts`].
@@ -37,45 +45,67 @@ pub fn mask_doubts(
         // Too little background is left to be compared with.
         return Ok(MaskDoubts::default());
     }
-    let halvings = halvings(mask.dimensions());
-    let small = halved(mask, halvings);
-    let mut turn = TurnFrames::new(small.width(), small.height());
-    let frame = collect(video, mask.dimensions(), halvings, frame, &mut turn)?;
-    let statistics = TurnStatistics::new(&turn);
-    let check = match MaskCheck::new(&small, &statistics) {
-        Ok(check) => check,
-        Err(MaskError::FewFrames { .. } | MaskError::Empty) => return Ok(MaskDoubts::default()),
-        Err(error) => return Err(error.into()),
+    let look = MaskLook {
+        video,
+        mask,
+        frame,
+        halvings: halvings(mask.dimensions()),
     };
-    let Some(frame) = frame else {
+    let first = look.shape(&video.quick_spread(FRAMES), Effort::Draft)?;
+    if first.is_none_or(|shape| shape.faults_at_a_look().is_empty()) {
         return Ok(MaskDoubts::default());
-    };
-    let shape = check.shape(&frame, Effort::Draft)?;
-    let shape = shape.map(|shape| shape.enlarged(1 << halvings));
+    }
+    let shape = look.shape(&video.spread(TURN_FRAMES), Effort::Fine)?;
     Ok(shape.as_ref().map(doubts).unwrap_or_default())
 }
 
-/// Puts some frames, halved, into `turn`. Returns the one on which the mask was made, halved too: one in the middle if
-/// that is not known.
-fn collect(
-    video: &Video,
-    size: (u32, u32),
+/// A mask that is held against some frames of its video.
+struct MaskLook<'a> {
+    video: &'a Video,
+    mask: &'a GrayImage,
+    /// The frame on which the mask was made, if that is known.
+    frame: Option<u64>,
     halvings: u32,
-    of_mask: Option<u64>,
-    turn: &mut TurnFrames,
-) -> Result<Option<RgbImage>, VideoError> {
-    let numbers = video.quick_spread(FRAMES);
-    let middle = numbers.get(numbers.len() / 2).copied();
-    let of_mask = of_mask.and_then(|number| video.frame(number).ok());
-    let mut shown = of_mask.map(|frame| halved(&frame, halvings).into_owned());
-    for (number, picture) in video.pictures(&numbers, size)? {
-        let picture = halved(&picture, halvings);
-        turn.push(&picture);
-        if shown.is_none() && Some(number) >= middle {
-            shown = Some(picture.into_owned());
-        }
+}
+
+impl MaskLook<'_> {
+    /// The mask's shape against that which frames of these numbers show; none where they say nothing about it.
+    fn shape(&self, numbers: &[u64], effort: Effort) -> Result<Option<ShapeCheck>, ExtractError> {
+        let small = halved(self.mask, self.halvings);
+        let mut turn = TurnFrames::new(small.width(), small.height());
+        let frame = self.collect(numbers, &mut turn)?;
+        let statistics = TurnStatistics::new(&turn);
+        let check = match MaskCheck::new(&small, &statistics) {
+            Ok(check) => check,
+            Err(MaskError::FewFrames { .. } | MaskError::Empty) => return Ok(None),
+            Err(error) => return Err(error.into()),
+        };
+        let Some(frame) = frame else {
+            return Ok(None);
+        };
+        let shape = check.shape(&frame, effort)?;
+        Ok(shape.map(|shape| shape.enlarged(1 << self.halvings)))
     }
-    Ok(shown)
+
+    /// Puts frames, halved, into `turn`. Returns the one on which the mask was made, halved too: one in the middle if
+    /// that is not known.
+    fn collect(
+        &self,
+        numbers: &[u64],
+        turn: &mut TurnFrames,
+    ) -> Result<Option<RgbImage>, VideoError> {
+        let middle = numbers.get(numbers.len() / 2).copied();
+        let of_mask = self.frame.and_then(|number| self.video.frame(number).ok());
+        let mut shown = of_mask.map(|frame| halved(&frame, self.halvings).into_owned());
+        for (number, picture) in self.video.pictures(numbers, self.mask.dimensions())? {
+            let picture = halved(&picture, self.halvings);
+            turn.push(&picture);
+            if shown.is_none() && Some(number) >= middle {
+                shown = Some(picture.into_owned());
+            }
+        }
+        Ok(shown)
+    }
 }
 
 /// How often a frame of this size is halved.
@@ -98,13 +128,21 @@ fn halved<P: Pixel<Subpixel = u8>>(
 }
 
 fn doubts(shape: &ShapeCheck) -> MaskDoubts {
-    let reasons = shape.faults_at_a_look();
-    let misfit = match (reasons.is_empty(), shape.is_of_something_else()) {
+    let reasons = shape.faults();
+    let misfit = match (reasons.is_empty(), is_of_something_else(shape)) {
         (true, _) => None,
         (false, false) => Some(MaskMisfit::InPart),
         (false, true) => Some(MaskMisfit::AsAWhole),
     };
     (reasons, misfit)
+}
+
+fn is_of_something_else(shape: &ShapeCheck) -> bool {
+    let regions = [&shape.leaks, &shape.missing, &shape.holes];
+    let wrong_px: u64 = regions.into_iter().flatten().map(|region| region.px).sum();
+    let has_other_outline = shape.outline < OTHER_OUTLINE * shape.outline_of_turn;
+    let has_other_area = wrong_px as f64 > OTHER_AREA * shape.area_px as f64;
+    shape.is_of_something_else() || (has_other_outline && has_other_area)
 }
 
 #[cfg(test)]

@@ -58,6 +58,10 @@ pub struct Tally {
     pub lossy: usize,
     /// Extracted or skipped recordings whose mask does not fit.
     pub misfits: usize,
+    /// Extracted or skipped recordings whose verdict is broken.
+    pub broken: usize,
+    /// Extracted or skipped recordings to which any of these three applies.
+    pub flawed: usize,
     /// Recordings that were in the data set already.
     pub skipped: usize,
     /// Recordings that hold too little of a turn, and were left out.
@@ -86,5 +90,7 @@ impl Tally {
     fn count_flaws(&mut self, entry: &SessionEntry) {
         self.lossy += usize::from(entry.lossy);
         self.misfits += usize::from(entry.has_misfit());
+        self.broken += usize::from(entry.is_broken());
+        self.flawed += usize::from(entry.is_flawed());
     }
 }

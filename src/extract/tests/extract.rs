@@ -10,8 +10,11 @@ use relit_data::shard::{Dataset, FrameRecord, ShardReader};
 use relit_test_support::{ffmpeg, packets};
 use tempfile::TempDir;
 
-/// Thirty frames in which the pattern moves; the object is a disc in the middle.
-const PATTERN: &str = "testsrc2=size=96x72:rate=30:duration=1";
+/// Thirty frames in which the pattern moves around a disc in the middle, the object, and the light changes.
+const PATTERN: &str = "testsrc2=size=96x72:rate=30:duration=1,split[a][b];\
+    [b]trim=end_frame=1,loop=29:1:0,setpts=N/30/TB,format=yuva444p,\
+    geq=lum='lum(X,Y)':cb='cb(X,Y)':cr='cr(X,Y)':a='255*lt(hypot(X-50,Y-35),22.5)'[o];\
+    [a][o]overlay=shortest=1,eq=brightness='0.1*sin(5*t)':eval=frame";
 
 struct Bench {
     folder: TempDir,

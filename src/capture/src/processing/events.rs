@@ -32,6 +32,29 @@ struct Quality {
     reasons: Vec<String>,
 }
 
+/// A session that was not extracted again, because the data set holds it.
+#[derive(Debug, Clone, Copy)]
+struct SkippedSession {
+    lossy: bool,
+    misfit: bool,
+    broken: bool,
+}
+
+impl SkippedSession {
+    /// What a person should know of it.
+    fn fault(self) -> Option<&'static str> {
+        if self.misfit {
+            Some("its mask does not fit")
+        } else if self.broken {
+            Some("it is broken")
+        } else if self.lossy {
+            Some("something of it is lost")
+        } else {
+            None
+        }
+    }
+}
+
 /// Where the editor of masks is, as it says itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct EditorPlace {
@@ -47,8 +70,7 @@ pub(super) struct ProgramEvent {
     warnings: Vec<String>,
     check: Option<CheckReport>,
     extracted: Option<ExtractedSession>,
-    /// A session that was not extracted again: whether it is lossy, and has the mask of something else.
-    skipped: Option<(bool, bool)>,
+    skipped: Option<SkippedSession>,
     left_out: Option<String>,
     has_mask: bool,
     editor: Option<EditorPlace>,
@@ -69,7 +91,18 @@ impl ProgramEvent {
                 self.check = serde_json::from_value(report).ok();
             }
             Event::Extracted { session } => self.extracted = serde_json::from_value(session).ok(),
-            Event::Skipped { lossy, misfit, .. } => self.skipped = Some((lossy, misfit)),
+            Event::Skipped {
+                lossy,
+                misfit,
+                broken,
+                ..
+            } => {
+                self.skipped = Some(SkippedSession {
+                    lossy,
+                    misfit,
+                    broken,
+                });
+            }
             Event::LeftOut { message, .. } => self.left_out = Some(message),
             Event::Editor { address, url } => self.editor = Some(EditorPlace { address, url }),
             _ => {}
@@ -129,11 +162,9 @@ impl ProgramEvent {
     }
 
     fn extracted(&mut self, code: i32) -> Option<StepEnd> {
-        if let Some((is_lossy, has_misfit)) = self.skipped {
-            let fault = match (is_lossy, has_misfit) {
-                (_, true) => "its mask is not that of the object",
-                (true, false) => "something of it is lost",
-                (false, false) => return Some(good("it is in the data set already")),
+        if let Some(skipped) = self.skipped {
+            let Some(fault) = skipped.fault() else {
+                return Some(good("it is in the data set already"));
             };
             let what = format!("it is in the data set already; {fault}: see its report");
             return Some(doubtful(&what, true));
@@ -224,7 +255,7 @@ mod tests {
             ),
             (
                 Check,
-                1,
+                3,
                 r#"{"event":"check","report":{"verdict":"wrong","reasons":["a hole"]}}"#,
                 Doubtful,
                 "wrong: a hole",
@@ -269,7 +300,15 @@ mod tests {
                 3,
                 r#"{"event":"skipped","id":"x","lossy":false,"misfit":true}"#,
                 Doubtful,
-                "its mask is not that of the object",
+                "its mask does not fit",
+                true,
+            ),
+            (
+                Extract,
+                3,
+                r#"{"event":"skipped","id":"x","lossy":false,"broken":true}"#,
+                Doubtful,
+                "it is broken",
                 true,
             ),
             (

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::digest::Digest;
 use super::file::FileEntry;
-use super::quality::{MaskMisfit, SessionQuality};
+use super::quality::{QualityVerdict, SessionQuality};
 use super::settings::ExtractionSettings;
 use super::{ShardError, names, output};
 use crate::file_names::folded;
@@ -131,11 +131,22 @@ pub struct SessionEntry {
 }
 
 impl SessionEntry {
-    /// Whether its mask is that of another object or recording, as far as that is known. A mask that does not fit in
-    /// part may be a false alarm of the look at a few frames: it only lowers the verdict.
+    /// Whether its mask does not fit, in part or as a whole, as far as that is known.
     #[must_use]
     pub fn has_misfit(&self) -> bool {
-        self.quality.mask_misfit == Some(MaskMisfit::AsAWhole)
+        self.quality.mask_misfit.is_some()
+    }
+
+    /// Whether its verdict is the worst one.
+    #[must_use]
+    pub fn is_broken(&self) -> bool {
+        self.quality.verdict == QualityVerdict::Broken
+    }
+
+    /// Whether a person should look at it before it is used: something is lost, its mask does not fit, or it is broken.
+    #[must_use]
+    pub fn is_flawed(&self) -> bool {
+        self.lossy || self.has_misfit() || self.is_broken()
     }
 }
 

@@ -44,14 +44,12 @@ pub(crate) fn run(
     }
     console.say(
         &format!(
-            "{}: {} extracted ({} with losses{}), {} skipped, {} left out, {} failed",
+            "{}: {} extracted ({} with losses, {} with a mask that does not fit, {} broken), {} skipped, {} left out, {} failed",
             out.display(),
             tally.extracted,
             tally.lossy,
-            match tally.misfits {
-                0 => String::new(),
-                misfits => format!(", {misfits} with the mask of something else"),
-            },
+            tally.misfits,
+            tally.broken,
             tally.skipped,
             tally.left_out,
             tally.failed
@@ -61,19 +59,18 @@ pub(crate) fn run(
             extracted: tally.extracted as u64,
             lossy: tally.lossy as u64,
             misfits: tally.misfits as u64,
+            broken: tally.broken as u64,
             skipped: tally.skipped as u64,
             left_out: tally.left_out as u64,
             failed: tally.failed as u64,
         }),
     );
     let nothing_came_out = tally.extracted + tally.skipped == 0;
-    Ok(
-        match (tally.failed, tally.lossy + tally.misfits + tally.left_out) {
-            (0, 0) => Outcome::Success,
-            (1.., _) if nothing_came_out => Outcome::Failure,
-            _ => Outcome::Partial,
-        },
-    )
+    Ok(match (tally.failed, tally.flawed + tally.left_out) {
+        (0, 0) => Outcome::Success,
+        (1.., _) if nothing_came_out => Outcome::Failure,
+        _ => Outcome::Partial,
+    })
 }
 
 /// Prints the progress and the outcome of each recording.
@@ -89,10 +86,14 @@ impl Reporter<'_> {
     }
 
     fn skipped(&self, entry: &SessionEntry) {
-        let flaw = match (entry.lossy, entry.has_misfit()) {
-            (_, true) => "; its mask is not that of the object, see its report",
-            (true, false) => "; something of it is lost, see its report",
-            (false, false) => "",
+        let flaw = if entry.has_misfit() {
+            "; its mask does not fit, see its report"
+        } else if entry.is_broken() {
+            "; it is broken, see its report"
+        } else if entry.lossy {
+            "; something of it is lost, see its report"
+        } else {
+            ""
         };
         self.console.say(
             &format!("{}: already extracted, skipped{flaw}", entry.id),
@@ -100,6 +101,7 @@ impl Reporter<'_> {
                 id: entry.id.clone(),
                 lossy: entry.lossy,
                 misfit: entry.has_misfit(),
+                broken: entry.is_broken(),
             },
         );
     }

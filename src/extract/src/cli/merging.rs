@@ -4,6 +4,7 @@ use std::path::Path;
 
 use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
+use relit_data::shard::SessionEntry;
 use relit_extract::ExtractError;
 use relit_extract::objects::merge;
 
@@ -41,7 +42,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         },
     );
     let mut sessions = merged.dataset.sessions.iter();
-    let is_flawed = sessions.any(|session| session.lossy || session.has_misfit());
+    let is_flawed = sessions.any(SessionEntry::is_flawed);
     Ok(if is_flawed || !merged.left_out.is_empty() {
         Outcome::Partial
     } else {

@@ -9,7 +9,7 @@ use relit_test_support::ffmpeg;
 use tempfile::TempDir;
 
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_relit-extract");
-/// What all runs have in common. The pattern moves, and no object does.
+/// What all runs have in common.
 pub(crate) const SETTINGS: &str = "--mask mask.png --frames 24 --size 48 --align off";
 
 pub(crate) struct Workshop {
@@ -21,8 +21,12 @@ impl Workshop {
     pub(crate) fn with(videos: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         for (number, video) in videos.iter().enumerate() {
+            // The pattern moves around a disc, the object, and the light changes.
             let pattern = format!(
-                "testsrc2=size=96x72:rate=24:duration=1,hue=h={}",
+                "testsrc2=size=96x72:rate=24:duration=1,hue=h={},split[a][b];\
+                 [b]trim=end_frame=1,loop=23:1:0,setpts=N/24/TB,format=yuva444p,\
+                 geq=lum='lum(X,Y)':cb='cb(X,Y)':cr='cr(X,Y)':a='255*lt(hypot(X-50,Y-35),22.5)'[o];\
+                 [a][o]overlay=shortest=1,eq=brightness='0.1*sin(5*t)':eval=frame",
                 40 * number
             );
             let path = folder.path().join(video);

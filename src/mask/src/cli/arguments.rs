@@ -46,7 +46,7 @@ pub(crate) struct CommandLine {
 pub(crate) enum Verb {
     /// Hold the mask of a recording against what its turn shows; writes NAME-check.html
     #[command(
-        after_help = "Example:\n  relit-mask check 20261120T093015Z-mug\n\nExit codes: 0 the mask fits, 1 it does not or could not be checked."
+        after_help = "Example:\n  relit-mask check 20261120T093015Z-mug\n\nExit codes: 0 the mask fits, 1 it could not be checked, 2 wrong usage, 3 it does not fit."
     )]
     Check {
         /// A session folder, a folder of sessions, or a video

@@ -13,24 +13,28 @@ pub(crate) fn run(
     input: &Path,
     mask: Option<&Path>,
 ) -> Result<Outcome, MaskingError> {
-    let mut outcome = Outcome::Success;
     let paths = recordings(input)?;
+    let (mut fitting, mut failed) = (0, 0);
     for path in &paths {
         match check_mask(path, mask) {
             Ok(output) => {
                 print(&output, console);
-                if output.report.verdict != MaskVerdict::Fits {
-                    outcome = Outcome::Failure;
-                }
+                fitting += usize::from(output.report.verdict == MaskVerdict::Fits);
             }
             Err(error) if paths.len() == 1 => return Err(error),
             Err(error) => {
                 console.error(&error);
-                outcome = Outcome::Failure;
+                failed += 1;
             }
         }
     }
-    Ok(outcome)
+    Ok(if failed == paths.len() {
+        Outcome::Failure
+    } else if fitting == paths.len() {
+        Outcome::Success
+    } else {
+        Outcome::Partial
+    })
 }
 
 fn print(output: &CheckOutput, console: Console) {

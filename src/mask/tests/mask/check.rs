@@ -109,7 +109,7 @@ fn masks_of_another_shape_are_wrong_with_the_place_of_what_differs() {
     let wrong = |inside: &dyn Fn(f64, f64) -> bool, list: &str| {
         mask(path, inside);
         let (code, report) = check(path);
-        assert_eq!((code, &report["verdict"]), (1, &"wrong".into()), "{report}");
+        assert_eq!((code, &report["verdict"]), (3, &"wrong".into()), "{report}");
         let px = report["shape"][list][0]["px"].as_u64();
         assert!(px > Some(60), "{list}: {report}");
     };

@@ -273,7 +273,7 @@ fn what_goes_wrong_is_told_in_the_programs_own_words() {
 fn a_mask_that_is_wrong_is_not_extracted_before_a_person_has_looked() {
     let folder = tempfile::tempdir().unwrap();
     let scripts = Scripts {
-        check: r#"echo '{"event":"check","report":{"verdict":"wrong","reasons":["a hole"]}}'; exit 1"#,
+        check: r#"echo '{"event":"check","report":{"verdict":"wrong","reasons":["a hole"]}}'; exit 3"#,
         ..ALL_WELL
     };
     let serving = serving(folder.path(), scripts);

@@ -1,0 +1,114 @@
+//! The program `relit-extract` on folders of clips with folders of masks, and on masks that do not fit.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use relit_data::shard::{Dataset, MaskMisfit, QualityVerdict};
+use tempfile::TempDir;
+
+const COW: &str = "20261120T101500Z-cow-short";
+const BUST: &str = "20261120T102000Z-bust-short";
+
+/// A session that comes with the repository.
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../fixtures")
+        .join(name)
+}
+
+struct Place(TempDir);
+
+impl Place {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn copy(&self, from: &Path, to: &str) {
+        let to = self.path(to);
+        fs::create_dir_all(to.parent().unwrap()).unwrap();
+        fs::copy(from, to).unwrap();
+    }
+
+    fn run(&self, line: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_relit-extract"))
+            .args(line.split_whitespace())
+            .current_dir(self.0.path())
+            .output()
+            .unwrap()
+    }
+
+    /// Runs the program, asserts the exit code, and returns the JSON lines.
+    #[track_caller]
+    fn events(&self, code: i32, line: &str) -> Vec<serde_json::Value> {
+        let output = self.run(&format!("{line} --json"));
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{line}: {errors}");
+        let text = String::from_utf8(output.stdout).unwrap();
+        text.lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect()
+    }
+
+    fn ids(&self, out: &str) -> Vec<String> {
+        let dataset = Dataset::read(&self.path(out)).unwrap();
+        dataset.sessions.into_iter().map(|entry| entry.id).collect()
+    }
+}
+
+fn of_kind<'a>(events: &'a [serde_json::Value], kind: &str) -> Vec<&'a serde_json::Value> {
+    let of_kind = events.iter().filter(|event| event["event"] == kind);
+    of_kind.collect()
+}
+
+const SETTINGS: &str = "--frames 60 --size 32";
+
+#[test]
+fn the_mask_of_another_object_ends_with_3_however_little_differs() {
+    let place = Place::new();
+    let mask = fixture(BUST).join("mask_gt.png");
+    let line = format!(
+        "{} --mask {} {SETTINGS} -o out",
+        fixture(COW).display(),
+        mask.display()
+    );
+    let events = place.events(3, &line);
+    let done = of_kind(&events, "done")[0];
+    assert_eq!((&done["misfits"], &done["broken"]), (&1.into(), &1.into()));
+    let dataset = Dataset::read(&place.path("out")).unwrap();
+    let quality = &dataset.sessions[0].quality;
+    assert_eq!(quality.mask_misfit, Some(MaskMisfit::AsAWhole));
+    assert_eq!(quality.verdict, QualityVerdict::Broken);
+    let events = place.events(3, &format!("{line} --resume"));
+    assert_eq!(of_kind(&events, "skipped")[0]["broken"], true);
+}
+
+#[test]
+fn a_mask_with_a_part_of_the_background_ends_with_3_and_leaves_the_session_usable() {
+    let place = Place::new();
+    let mut mask = image::open(fixture(COW).join("mask_gt.png"))
+        .unwrap()
+        .into_luma8();
+    let bounds = relit_extract::bounding_box(&mask).unwrap();
+    // A block beside the object, of about a twelfth of its area.
+    let (left, top) = (bounds.right() as u32 + 6, bounds.y as u32 + bounds.h / 3);
+    for y in top..top + 70 {
+        for x in left..(left + 50).min(mask.width()) {
+            mask.put_pixel(x, y, image::Luma([255]));
+        }
+    }
+    mask.save(place.path("mask.png")).unwrap();
+    let line = format!("{} --mask mask.png {SETTINGS} -o out", fixture(COW).display());
+    let events = place.events(3, &line);
+    let done = of_kind(&events, "done")[0];
+    assert_eq!((&done["misfits"], &done["broken"]), (&1.into(), &0.into()));
+    let dataset = Dataset::read(&place.path("out")).unwrap();
+    let quality = &dataset.sessions[0].quality;
+    assert_eq!(quality.mask_misfit, Some(MaskMisfit::InPart));
+    assert_eq!(quality.verdict, QualityVerdict::Usable);
+}
