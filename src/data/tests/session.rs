@@ -9,7 +9,8 @@ use proptest::prelude::*;
 use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::session::{
     CameraFacts, FrameClock, FrameEntry, FrameIndex, Manifest, Notice, Recording, SessionError,
-    SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, object_of, recordings,
+    SessionWriter, SoftwareFacts, Status, TurntableFacts, VideoFacts, beside_recordings, clips,
+    object_of, recordings,
 };
 use tempfile::TempDir;
 
@@ -303,9 +304,26 @@ fn inputs_are_sessions_folders_of_them_or_videos() {
 
 #[test]
 fn a_video_beside_sessions_does_not_hide_them() {
-    let (root, _folder) = whole();
-    fs::write(root.path().join("preview.mkv"), b"").unwrap();
-    refused(recordings(root.path()), "holds sessions and also the video");
+    let (root, folder) = whole();
+    let video = root.path().join("preview.mkv");
+    fs::write(&video, b"").unwrap();
+    assert_eq!(recordings(root.path()).unwrap(), [folder, video]);
+}
+
+#[test]
+fn a_folder_of_clips_is_one_recording_each_and_with_a_single_video_it_may_be_either() {
+    let root = tempfile::tempdir().unwrap();
+    let at = |name: &str| root.path().join(name);
+    fs::write(at("a.mp4"), b"").unwrap();
+    assert_eq!(recordings(root.path()).unwrap(), [root.path()]);
+    assert_eq!(clips(root.path()).unwrap(), [at("a.mp4")]);
+    fs::write(at("b.MOV"), b"").unwrap();
+    fs::write(at("notes.txt"), b"").unwrap();
+    fs::create_dir(at("empty")).unwrap();
+    assert_eq!(recordings(root.path()).unwrap(), [at("a.mp4"), at("b.MOV")]);
+    assert_eq!(clips(root.path()).unwrap(), [at("a.mp4"), at("b.MOV")]);
+    let beside = beside_recordings(root.path()).unwrap();
+    assert_eq!(beside, [at("empty"), at("notes.txt")]);
 }
 
 #[test]

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use relit_data::file_names::folded;
-use relit_data::session::{self, beside_sessions, recording_name, recordings};
+use relit_data::session::{
+    self, SessionError, beside_recordings, clips, recording_name, recordings,
+};
 use relit_data::shard::{Dataset, OutputFolder};
 
 use super::dataset_index::Catalog;
@@ -87,7 +89,7 @@ pub(super) fn into_session(out: &Path) -> ExtractError {
 }
 
 /// All recordings in the inputs, in the order in which tasks share them; inputs without any are reported, and so is, by one
-/// task, what lies beside sessions.
+/// task, what lies beside recordings.
 pub(super) fn find(
     inputs: &[PathBuf],
     out: &Path,
@@ -101,15 +103,17 @@ pub(super) fn find(
         observer.ended(path, &outcome);
     };
     for input in inputs {
-        let inside = recordings(input);
-        let is_folder_of_sessions = inside
+        let inside = recordings_in(input, options);
+        let is_folder_of_recordings = inside
             .as_ref()
             .is_ok_and(|inside| inside != std::slice::from_ref(input));
-        if is_folder_of_sessions && options.task.is_none_or(|task| task.takes(0)) {
-            for path in beside_sessions(input).unwrap_or_default() {
-                let mask = options.mask.as_ref();
+        if is_folder_of_recordings && options.task.is_none_or(|task| task.takes(0)) {
+            let mask = options.mask.as_ref();
+            let holds_masks = mask.is_some_and(|mask| is_same(input, mask));
+            let beside = beside_recordings(input).unwrap_or_default();
+            for path in beside.into_iter().filter(|_| !holds_masks) {
                 if !is_same(&path, out) && !mask.is_some_and(|mask| is_same(&path, mask)) {
-                    let what = "it is no session and holds no video".to_owned();
+                    let what = "it is not a session and holds no video".to_owned();
                     report(
                         &path,
                         RecordingOutcome::LeftOut(ExtractError::Refused(what)),
@@ -123,6 +127,19 @@ pub(super) fn find(
         }
     }
     found
+}
+
+/// The recordings at a path of the local disk. Where masks are named by clips, a folder with one clip is that clip.
+pub(super) fn recordings_in(
+    path: &Path,
+    options: &ExtractOptions,
+) -> Result<Vec<PathBuf>, SessionError> {
+    let has_folder_of_masks = options.mask.as_ref().is_some_and(|mask| mask.is_dir());
+    if has_folder_of_masks {
+        clips(path)
+    } else {
+        recordings(path)
+    }
 }
 
 fn is_same(path: &Path, other: &Path) -> bool {

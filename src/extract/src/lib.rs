@@ -68,7 +68,7 @@ pub use observer::{Observer, RecordingOutcome, Tally};
 pub use options::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
 pub use scale::{APRON, ScaleBuffers, Scaler};
 
-/// Extracts all recordings in `inputs` (session folders, folders of sessions, video files) into the
+/// Extracts all recordings in `inputs` (session folders, folders of sessions or of videos, video files) into the
 /// data set in the folder `out`, which is created if it does not exist. With the feature `object-store`, both may
 /// be URLs: see [`objects`].
 ///

@@ -8,7 +8,7 @@ use image::imageops::{FilterType, resize};
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
 use relit_data::mask::{MaskPicture, size_hint};
-use relit_data::session::{MASK_FILE, Recording};
+use relit_data::session::{MASK_FILE, Recording, mask_in, mask_stem};
 use relit_data::shard::Digest;
 use relit_data::still;
 
@@ -33,7 +33,8 @@ pub(super) struct ObjectMask {
 }
 
 impl ObjectMask {
-    /// Reads the mask `named`, or else the one in the recording's folder, for frames of this size.
+    /// Reads the mask `named`, or that of the recording in a folder `named`, or else the one in the recording's folder,
+    /// for frames of this size.
     /// A mask of the size in which the frames are `stored`, with pixels that are not square, is stretched as they are.
     pub(super) fn open(
         recording: &Recording,
@@ -44,6 +45,9 @@ impl ObjectMask {
         let refused = |text| Err(ExtractError::Refused(text));
         let path = match (named, &recording.folder) {
             (Some(named), _) if named.is_file() => named.to_owned(),
+            (Some(masks), _) if masks.is_dir() => {
+                mask_in(masks, recording).ok_or_else(|| no_mask_in(masks, recording))?
+            }
             (Some(named), _) => {
                 let named = named.display();
                 return refused(format!(
@@ -114,6 +118,16 @@ impl ObjectMask {
             )
         })
     }
+}
+
+fn no_mask_in(masks: &Path, recording: &Recording) -> ExtractError {
+    let named_after = recording.folder.as_deref().unwrap_or(&recording.video);
+    ExtractError::Refused(format!(
+        "{} has no {}.png, the mask of this recording: make one with relit-mask -o {}/",
+        masks.display(),
+        mask_stem(named_after).to_string_lossy(),
+        masks.display()
+    ))
 }
 
 /// The frame on which a mask was made, by the record beside it (`mask.json` of `mask.png`). A record that is

@@ -38,7 +38,8 @@ pub struct ExtractOptions {
     /// A turn in which the object moves further fails, source pixels, 1..=[`MAX_SHIFT`]. Without effect
     /// where shifts are not measured.
     pub max_shift: f64,
-    /// The mask for all recordings; `None` uses the `mask.png` in each session folder.
+    /// The mask for all recordings, or a folder of masks with the names of clips or sessions; `None` uses the
+    /// `mask.png` in each session folder.
     pub mask: Option<PathBuf>,
     /// Extract the part of a turn where a recording is no whole one; otherwise it is left out.
     pub partial: bool,

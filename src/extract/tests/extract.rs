@@ -624,10 +624,7 @@ fn a_mask_of_another_session_lowers_the_verdict_and_exits_with_3() {
     // Nor is it forgotten when nothing is done again.
     bench.errors(3, &format!("{} --resume", line(&other, "wrong")));
     // Nor when the pieces of tasks are merged.
-    bench.errors(
-        3,
-        &format!("{} --task 0/1", line(&other, "pieces")),
-    );
+    bench.errors(3, &format!("{} --task 0/1", line(&other, "pieces")));
     bench.errors(3, "merge pieces");
     bench.errors(0, &line(&session, "right"));
     assert_eq!(quality("right")["mask_misfit"], serde_json::Value::Null);

@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use image::codecs::jpeg::JpegEncoder;
 use image::{GrayImage, RgbImage};
 use relit_data::mask::{MaskPicture, size_hint};
-use relit_data::session::{MASK_FILE, Recording};
+use relit_data::session::{MASK_FILE, Recording, mask_in, mask_stem};
 use relit_grabcut::{Effort, MaskCheck, MaskError, ShapeCheck, TURN_FRAMES, preview};
 use relit_video::Video;
 use serde::Serialize;
@@ -99,7 +99,7 @@ pub struct CheckOutput {
     pub page: PathBuf,
 }
 
-/// Holds a recording's mask (`mask`, or else the one in the session folder) against what its turn shows, and
+/// Holds a recording's mask (`mask`, that of its name in the folder `mask`, or else the one in the session folder) against what its turn shows, and
 /// writes a page and a record about it.
 ///
 /// # Errors
@@ -119,9 +119,7 @@ fn check_recording(
     recording: &Recording,
     mask: Option<&Path>,
 ) -> Result<(MaskReport, PathBuf), MaskingError> {
-    let folder = recording.folder.clone().unwrap_or_default();
-    let files =
-        MaskFiles::from_mask_path(&mask.map_or_else(|| folder.join(MASK_FILE), Path::to_owned))?;
+    let files = MaskFiles::from_mask_path(&mask_of(recording, mask)?)?;
     let (picture, png) = read_mask(&files.mask)?;
     let video = Video::open(&recording.video)?;
     check_size(&files.mask, picture.size(), &video)?;
@@ -136,6 +134,20 @@ fn check_recording(
     write(&page_file, page.as_bytes())?;
     write(&record_file, &record)?;
     Ok((report, page_file))
+}
+
+/// The file of a recording's mask: `named`, that of its name in a folder `named`, or the one in its own folder.
+fn mask_of(recording: &Recording, named: Option<&Path>) -> Result<PathBuf, MaskingError> {
+    match named {
+        Some(masks) if masks.is_dir() => mask_in(masks, recording).ok_or_else(|| {
+            let named_after = recording.folder.as_deref().unwrap_or(&recording.video);
+            let name = mask_stem(named_after);
+            let what = format!("has no {}.png", name.to_string_lossy());
+            MaskingError::Refused(format!("{} {what}: make it with -o", masks.display()))
+        }),
+        Some(file) => Ok(file.to_owned()),
+        None => Ok(recording.folder.clone().unwrap_or_default().join(MASK_FILE)),
+    }
 }
 
 /// The picture of the mask, and its file.

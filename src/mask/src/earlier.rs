@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 
 use relit_data::counts::count_of;
-use relit_data::session::Notice;
+use relit_data::session::{Notice, Recording};
 use relit_video::Video;
 
 use super::files::{read_if_exists, read_record, write};
@@ -56,6 +56,29 @@ pub(super) fn with_strokes<'a>(
         request.hints.strokes = record.hints.strokes;
     }
     Ok((Cow::Owned(request), Some(notice)))
+}
+
+/// Checks that the mask that is there, if any, was made of this recording: a mask in a session's own folder always
+/// was.
+///
+/// # Errors
+/// [`MaskingError::OtherInput`]; [`MaskingError::ForeignFile`] or [`MaskingError::Io`] if the record cannot be read.
+pub(super) fn check_same_input(
+    files: &MaskFiles,
+    recording: &Recording,
+    video: &Video,
+) -> Result<(), MaskingError> {
+    let own = recording.folder.as_deref();
+    if own.is_some() && own == files.mask.parent() || !files.mask.exists() {
+        return Ok(());
+    }
+    match read_record(&files.record)? {
+        Some(record) if !is_of(&record, video) => Err(MaskingError::OtherInput {
+            mask: files.mask.clone(),
+            input: record.source.video,
+        }),
+        _ => Ok(()),
+    }
 }
 
 fn has_strokes(record: &MaskRecord) -> bool {

@@ -30,6 +30,16 @@ pub enum MaskingError {
         "{0} was not made by this program, or was changed since: it may have been painted by hand and is kept; give --force to replace it, or another name with -o"
     )]
     Handmade(PathBuf),
+    /// The mask that is there is that of another recording.
+    #[error(
+        "{mask} is the mask of another input, {input}: give another name with -o, or --force to replace it"
+    )]
+    OtherInput {
+        /// The mask.
+        mask: PathBuf,
+        /// The video or photograph that it was made of, as its record names it.
+        input: String,
+    },
     /// Another file has the name of the record.
     #[error(
         "{path} would be overwritten, but is not a mask's record ({why}): move it away, or give another name with -o"

@@ -1,7 +1,8 @@
 //! The mask of a recording or a photograph: which of its pixels are the object.
 //!
 //! `NAME.png` is the mask, `NAME.json` its record, `NAME-preview.png` the image for checking it. An
-//! existing mask is replaced only if its record has its hash, because then it can be made again. Strokes that were
+//! existing mask is replaced only if its record has its hash, because then it can be made again, and only by one of the
+//! same input. Strokes that were
 //! painted for it are applied again, and `NAME-previous.json` keeps its record.
 //!
 //! [`make_mask`] makes a mask from hints that are known; [`edit`] lets a person draw them in a browser;
@@ -42,6 +43,7 @@ mod editor;
 mod engine;
 mod error;
 mod files;
+mod inputs;
 mod making;
 #[cfg(feature = "opencv")]
 mod opencv_grab_cut;
@@ -54,6 +56,7 @@ pub use editor::edit;
 pub use engine::{MaskEngine, OPENCV_KNOWS_NO_TURN};
 pub use error::MaskingError;
 pub use files::MaskFiles;
+pub use inputs::{MaskInputs, MaskTarget};
 pub use making::{MaskOutput, make_mask};
 pub use record::{
     MASK_SCHEMA, MaskRecord, MaskSoftware, RecordedHints, RecordedResult, SourceFrame,

@@ -7,7 +7,7 @@ use relit_data::session::{MASK_FILE, Notice, Recording};
 use relit_grabcut::{Effort, Mask, grey_png, preview, rgb_png, segment_with};
 use relit_video::Video;
 
-use super::earlier::{keep_recipe, with_strokes};
+use super::earlier::{check_same_input, keep_recipe, with_strokes};
 use super::engine::cut_by_opencv;
 use super::files::{check_replaceable, make_folder, write};
 use super::request::Recipe;
@@ -62,6 +62,9 @@ fn mask_recording(
     let _made = make_folder(&files)?;
     check_replaceable(&files, request.force)?;
     let video = Video::open(&recording.video)?;
+    if !request.force {
+        check_same_input(&files, recording, &video)?;
+    }
     let (request, notice) = with_strokes(request, &files, &video)?;
     let record = segment_and_write(&video, &files, &request)?;
     Ok((files, record, notice))

@@ -248,8 +248,20 @@ mod tests {
             assert_eq!(preference, ModePreference { fourcc, size, fps }, "{text}");
         }
         for text in [
-            "", "@", "@0", "@2000", ":", "MJPG:", ":640x480", "0x480", "640x", "1x2x3", "MJPEG",
-            "ABCD", "640x480@x", "@30@15",
+            "",
+            "@",
+            "@0",
+            "@2000",
+            ":",
+            "MJPG:",
+            ":640x480",
+            "0x480",
+            "640x",
+            "1x2x3",
+            "MJPEG",
+            "ABCD",
+            "640x480@x",
+            "@30@15",
         ] {
             assert!(text.parse::<ModePreference>().is_err(), "{text}");
         }

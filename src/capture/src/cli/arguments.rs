@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use relit_camera::manual_controls::ManualValues;
 use relit_camera::CameraAddress;
+use relit_camera::manual_controls::ManualValues;
 use relit_capture::capture::{ModePreference, Settings};
 use relit_capture::serve::ListenAddress;
 use relit_console::ConsoleOptions;

@@ -18,6 +18,7 @@ mod interrupted;
 mod journal;
 mod lock;
 mod manifest;
+mod masks;
 mod recording;
 mod writer;
 
@@ -32,7 +33,8 @@ pub use manifest::{
     CameraFacts, Fault, FrameClock, MANIFEST_SCHEMA, Manifest, SoftwareFacts, Status,
     TurntableFacts, VideoFacts, object_of,
 };
-pub use recording::{Notice, Recording, beside_sessions, recording_name, recordings};
+pub use masks::{MASK_SUFFIX, mask_in, mask_stem};
+pub use recording::{Notice, Recording, beside_recordings, clips, recording_name, recordings};
 pub use writer::SessionWriter;
 
 /// Name of the manifest in a session folder.

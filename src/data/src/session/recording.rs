@@ -166,12 +166,12 @@ impl Recording {
     }
 }
 
-/// The recordings at a path: the path itself for a session folder or a video file; for a folder of
-/// sessions each of them, sorted by name. A session folder that has lost its manifest or its video, and a folder
-/// that cannot be looked into, are listed too, so that opening them reports it.
+/// The recordings at a path: the path itself for a session folder, a video file, or a folder with one video; for a
+/// folder of sessions or of several videos each of them, sorted by name. A session folder that has lost its manifest or
+/// its video, and a folder that cannot be looked into, are listed too, so that opening them reports it.
 ///
 /// # Errors
-/// [`SessionError::Unusable`] if there is none, or sessions and videos; or [`SessionError::Io`].
+/// [`SessionError::Unusable`] if there is none; or [`SessionError::Io`].
 pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
     if !path.exists() {
         return Err(not_there(path));
@@ -190,31 +190,48 @@ pub fn recordings(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
             inner.push(folder);
         }
     }
-    inner.sort();
-    match (videos_in(path)?.into_iter().next(), inner.is_empty()) {
-        (None, true) => Err(no_session(path)),
-        (None, false) => Ok(inner),
-        (Some(_), true) => Ok(vec![path.to_owned()]),
-        (Some(video), false) => {
-            let what = format!(
-                "holds sessions and also the video {}: give the sessions by name, or move the video away",
-                video.display()
-            );
-            Err(SessionError::unusable(path, &what))
+    let videos = videos_in(path)?;
+    match (videos.len(), inner.len()) {
+        (0, 0) => Err(no_session(path)),
+        // The recording has the name of the folder.
+        (1, 0) => Ok(vec![path.to_owned()]),
+        _ => {
+            inner.extend(videos);
+            inner.sort();
+            Ok(inner)
         }
     }
 }
 
-/// What lies beside the sessions in a folder of sessions, sorted by name: neither what is hidden nor data sets.
+/// As [`recordings`], where a folder with one video, and no session, stands for that clip: whoever has a folder of masks
+/// names them by clips, also where there is only one.
+///
+/// # Errors
+/// As there.
+pub fn clips(path: &Path) -> Result<Vec<PathBuf>, SessionError> {
+    let found = recordings(path)?;
+    let is_plain_folder = path.is_dir() && !path.join(MANIFEST_FILE).exists();
+    if is_plain_folder && found == [path] {
+        videos_in(path)
+    } else {
+        Ok(found)
+    }
+}
+
+/// What lies beside the recordings in a folder of sessions or videos, sorted by name: neither what is hidden nor data
+/// sets.
 ///
 /// # Errors
 /// [`SessionError::Io`].
-pub fn beside_sessions(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
+pub fn beside_recordings(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
     let mut beside = Vec::new();
     for entry in fs::read_dir(folder).map_err(SessionError::io(folder, "listed"))? {
         let path = entry.map_err(SessionError::io(folder, "listed"))?.path();
-        let is_known = path.is_dir()
-            && (path.join(DATASET_FILE).exists() || is_session_folder(&path).unwrap_or(true));
+        let is_known = if path.is_dir() {
+            path.join(DATASET_FILE).exists() || is_session_folder(&path).unwrap_or(true)
+        } else {
+            is_video(&path)
+        };
         if !is_known && !is_hidden(&path) {
             beside.push(path);
         }

@@ -18,6 +18,8 @@ Examples:
       every session in a folder; those that are there already are skipped
   relit-extract clip.mp4 --mask mask.png -o dataset --size native
       a bare video, in its own pixels
+  relit-extract videos --mask masks -o dataset
+      every clip in a folder, each with the mask of its name: masks/clip.png for videos/clip.mp4
   relit-extract verify dataset
       read everything back
   relit-extract stats dataset
@@ -71,14 +73,14 @@ pub(crate) enum Verb {
 
 #[derive(Args)]
 pub(crate) struct ExtractArguments {
-    /// A session folder, a folder of sessions, a video file, or a URL of one: s3://BUCKET/PATH, gs://, az://, file://.
+    /// A session folder, a folder of sessions or of videos, a video file, or a URL of one: s3://BUCKET/PATH, gs://, az://, file://.
     #[arg(value_name = "INPUT", required = true)]
     pub(crate) inputs: Vec<PathBuf>,
     /// The data set's folder, or a URL of one; created if it does not exist.
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
-    /// The mask for all inputs [default: each session folder's mask.png].
-    #[arg(long, value_name = "PNG")]
+    /// The mask for all inputs, or a folder of masks: clip.png for clip.mp4 [default: each session folder's mask.png].
+    #[arg(long, value_name = "PNG|DIR")]
     mask: Option<PathBuf>,
     /// Samples per session, evenly spread over one turn.
     #[arg(long, value_name = "N", default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -155,7 +157,8 @@ fn task(
 
 fn array_task(text: &str) -> Result<ArrayTask, String> {
     let numbers = text.split_once('/');
-    let numbers = numbers.and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
+    let numbers =
+        numbers.and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
     let (index, count) = numbers.ok_or("write 3/40: task 3 of 40, counted from 0")?;
     new_task(index, count)
 }

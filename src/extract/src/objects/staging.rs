@@ -7,13 +7,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use relit_data::session::{self, recordings};
+use relit_data::session;
 use relit_data::shard::{self, ArrayTask, Dataset, Merged, ShardError};
 use tempfile::TempDir;
 
 use super::bucket::{Bucket, not_there};
 use super::url::{check, is_url};
-use crate::batch::{StorageBackend, extract_recordings, into_session};
+use crate::batch::{StorageBackend, extract_recordings, into_session, recordings_in};
 use crate::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally};
 
 /// As [`extract`](crate::extract), where some of the inputs or `out` are URLs.
@@ -45,7 +45,7 @@ pub(crate) fn extract(
     let (mut found, mut tally) = (Vec::new(), Tally::default());
     for (number, input) in inputs.iter().enumerate() {
         let into = folder.path().join(format!("in-{number}"));
-        match staging.recordings(input, &into) {
+        match staging.recordings(input, &into, options) {
             Ok(inside) => found.extend(inside),
             Err(error) => {
                 let outcome = RecordingOutcome::from_result(Err(error));
@@ -140,9 +140,14 @@ struct Staging {
 
 impl Staging {
     /// The recordings in an input. Those of a URL are found as on disk, by empty files of the same names.
-    fn recordings(&mut self, input: &Path, into: &Path) -> Result<Vec<PathBuf>, ExtractError> {
+    fn recordings(
+        &mut self,
+        input: &Path,
+        into: &Path,
+        options: &ExtractOptions,
+    ) -> Result<Vec<PathBuf>, ExtractError> {
         if !is_url(input) {
-            return Ok(recordings(input)?);
+            return Ok(recordings_in(input, options)?);
         }
         let bucket = Rc::new(Bucket::open(input)?);
         let shown = bucket.url("");
@@ -162,7 +167,7 @@ impl Staging {
             placeholder(&place(name)).map_err(ExtractError::io("made", &root))?;
         }
         let mut found = Vec::new();
-        for local in recordings(&root)? {
+        for local in recordings_in(&root, options)? {
             let inside = local.strip_prefix(&root).unwrap_or(Path::new(""));
             let name = PathBuf::from(bucket.url(&inside.to_string_lossy()));
             let files = files.iter().map(|(name, _)| (name.clone(), place(name)));

@@ -39,9 +39,7 @@ pub(crate) fn a_data_set_at_a_url_is_that_of_a_folder_and_nothing_stays_on_the_w
 pub(crate) fn tasks_write_to_a_url_and_are_merged_and_summed_there() {
     let (workshop, url) = workshop();
     workshop.errors(0, &format!("in {SETTINGS} -o whole"));
-    let part = |index: u32| {
-        format!("{url}/in {SETTINGS} -o {url}/out --resume --task {index}/2")
-    };
+    let part = |index: u32| format!("{url}/in {SETTINGS} -o {url}/out --resume --task {index}/2");
     workshop.errors(0, &part(0));
     let errors = workshop.errors(1, &format!("merge {url}/out"));
     assert!(

@@ -72,18 +72,12 @@ pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
     assert!(errors.contains("task 1 failed with a.mkv"), "{errors}");
 
     fs::write(workshop.path("bad.mkv"), "no video").unwrap();
-    workshop.errors(
-        1,
-        &format!("bad.mkv {SETTINGS} -o bad --task 0/1"),
-    );
+    workshop.errors(1, &format!("bad.mkv {SETTINGS} -o bad --task 0/1"));
     let errors = workshop.errors(1, "merge bad");
     assert!(errors.contains("task 0 failed with bad.mkv"), "{errors}");
 
     workshop.errors(0, &part(0, 2));
-    workshop.errors(
-        0,
-        &format!("b.mkv d.mkv {SETTINGS} -o out --task 1/2"),
-    );
+    workshop.errors(0, &format!("b.mkv d.mkv {SETTINGS} -o out --task 1/2"));
     let errors = workshop.errors(1, "merge out");
     assert!(
         errors.contains("tasks 0 and 1 saw different recordings"),

@@ -8,7 +8,7 @@ use relit_console::ConsoleOptions;
 use relit_data::geometry::Rect;
 use relit_grabcut::{Hints, SegmentSettings};
 use relit_mask::{
-    MaskEngine, MaskFiles, MaskRequest, MaskingError, OPENCV_KNOWS_NO_TURN, read_seeds,
+    MaskEngine, MaskRequest, MaskTarget, MaskingError, OPENCV_KNOWS_NO_TURN, read_seeds,
 };
 use relit_web::ListenAddress;
 
@@ -19,6 +19,8 @@ Examples:
   relit-mask 20261120T093015Z-mug --edit
   relit-mask clip.mp4 --seeds seeds.png --frame 30 -o masks/mug.png
   relit-mask sessions/ --rect 610,240,420,380 --keep-all
+  relit-mask videos/ --auto -o masks/
+  relit-mask cup.jpg bowl.jpg --rect 120,40,260,420 -o masks/
   relit-mask check 20261120T093015Z-mug
 
 Check mask-preview.png afterwards. Exit codes: 0 all masks made, 1 none, 2 wrong usage, \
@@ -49,11 +51,11 @@ pub(crate) enum Verb {
         after_help = "Example:\n  relit-mask check 20261120T093015Z-mug\n\nExit codes: 0 the mask fits, 1 it could not be checked, 2 wrong usage, 3 it does not fit."
     )]
     Check {
-        /// A session folder, a folder of sessions, or a video
+        /// A session folder, a video, or a folder of sessions or videos
         #[arg(value_name = "SESSION")]
         input: PathBuf,
-        /// The mask [default: mask.png in the session folder, or here]
-        #[arg(long, value_name = "PNG")]
+        /// The mask, or a folder of masks: clip.png for clip.mp4 [default: mask.png in the session folder, or here]
+        #[arg(long, value_name = "PNG|DIR")]
         mask: Option<PathBuf>,
     },
 }
@@ -62,8 +64,9 @@ pub(crate) enum Verb {
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("hint").args(["rect", "seeds", "auto", "edit", "recipe"]).required(true).multiple(true))]
 pub(crate) struct MaskArguments {
-    /// A session folder, a folder of sessions (each gets a mask with the same hints), or a video
-    pub(crate) input: PathBuf,
+    /// A session folder, a video, a photograph, or a folder of them: each gets a mask with the same hints
+    #[arg(value_name = "INPUT", required = true)]
+    pub(crate) inputs: Vec<PathBuf>,
 
     /// A rectangle that contains the whole object, in pixels of the frame
     #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true)]
@@ -107,11 +110,13 @@ pub(crate) struct MaskArguments {
     #[arg(long)]
     keep_all: bool,
 
-    /// The mask's file name, ending in .png [default: mask.png in the session folder, or here]
-    #[arg(short, long, value_name = "PNG", value_parser = output)]
-    pub(crate) output: Option<MaskFiles>,
+    /// The mask's file name, ending in .png, or a folder for masks with the names of their inputs [default: mask.png in
+    /// the session folder, or here; of several clips or photographs NAME-mask.png]
+    #[arg(short, long, value_name = "PNG|DIR", value_parser = output)]
+    pub(crate) output: Option<MaskTarget>,
 
-    /// Replace a mask that was painted or changed by hand; strokes of the mask that is there are left out
+    /// Replace a mask that was painted or changed by hand, or that of another input; strokes of the mask that is there
+    /// are left out
     #[arg(long)]
     force: bool,
 
@@ -151,22 +156,23 @@ impl MaskArguments {
     /// # Errors
     /// A usage error, ready to be printed.
     pub(crate) fn check(&self, recordings: usize) -> Result<(), clap::Error> {
-        let input = self.input.display();
-        let text = match (self.edit, &self.output) {
-            _ if self.auto && self.engine == MaskEngine::OpenCv => OPENCV_KNOWS_NO_TURN.to_owned(),
-            _ if recordings == 1 => return Ok(()),
-            (true, _) => format!(
-                "--edit shows one recording, but {input} holds {recordings}: name one of them"
-            ),
-            (false, Some(_)) => format!(
-                "-o names one mask, but {input} holds {recordings} recordings: leave it out, and each gets its mask.png"
-            ),
-            (false, None) => return Ok(()),
+        let text = if self.auto && self.engine == MaskEngine::OpenCv {
+            OPENCV_KNOWS_NO_TURN.to_owned()
+        } else if recordings <= 1 {
+            return Ok(());
+        } else if self.edit {
+            format!("--edit shows one recording, but {recordings} are given: name one of them")
+        } else if matches!(self.output, Some(MaskTarget::File(_))) {
+            format!(
+                "-o names one mask, but {recordings} recordings are given: name a folder, such as masks/, and each gets a mask of its name"
+            )
+        } else {
+            return Ok(());
         };
         Err(CommandLine::command().error(ErrorKind::ArgumentConflict, text))
     }
 }
 
-fn output(text: &str) -> Result<MaskFiles, MaskingError> {
-    MaskFiles::from_mask_path(text.as_ref())
+fn output(text: &str) -> Result<MaskTarget, MaskingError> {
+    MaskTarget::from_path(text.as_ref())
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use relit_console::{Check, Console, Event, Outcome};
-use relit_data::session::recordings;
+use relit_data::session::{clips, recordings};
 use relit_mask::{CheckOutput, MaskVerdict, MaskingError, check_mask};
 use serde_json::json;
 
@@ -13,7 +13,12 @@ pub(crate) fn run(
     input: &Path,
     mask: Option<&Path>,
 ) -> Result<Outcome, MaskingError> {
-    let paths = recordings(input)?;
+    // Masks in a folder have the names of clips.
+    let paths = if mask.is_some_and(Path::is_dir) {
+        clips(input)?
+    } else {
+        recordings(input)?
+    };
     let (mut fitting, mut failed) = (0, 0);
     for path in &paths {
         match check_mask(path, mask) {

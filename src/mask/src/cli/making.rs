@@ -1,11 +1,10 @@
 //! Making masks.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use relit_console::{Console, Event, Outcome};
-use relit_data::session::{beside_sessions, recordings};
-use relit_mask::{MaskOutput, MaskingError, edit, make_mask};
+use relit_mask::{MaskInputs, MaskOutput, MaskingError, edit, make_mask};
 use relit_web::Announcement;
 use serde_json::json;
 
@@ -13,49 +12,38 @@ use super::arguments::MaskArguments;
 
 /// Makes the mask of every recording that the arguments name.
 pub(crate) fn run(console: Console, arguments: &MaskArguments) -> ExitCode {
-    let paths = match recordings(&arguments.input) {
-        Ok(paths) => paths,
-        Err(error) => return console.finish(Err(error)),
-    };
-    if let Err(usage) = arguments.check(paths.len()) {
+    let mut inputs = MaskInputs::find(&arguments.inputs, arguments.output.as_ref());
+    if inputs.recordings.is_empty()
+        && inputs.faults.len() == 1
+        && let Some((_, fault)) = inputs.faults.pop()
+    {
+        return console.finish(Err(fault));
+    }
+    if let Err(usage) = arguments.check(inputs.recordings.len()) {
         // Nothing can be done if standard error is closed.
         let _ = usage.print();
         return ExitCode::from(2);
     }
-    match (arguments.edit, paths.first()) {
-        (true, Some(path)) => console.finish(draw(path, arguments, console)),
-        _ => {
-            let leaves_out = says_unused(&paths, &arguments.input, console);
-            let made = make(&paths, arguments, console);
-            console.finish(made.map(|outcome| match outcome {
-                Outcome::Success if leaves_out => Outcome::Partial,
-                outcome => outcome,
-            }))
-        }
-    }
-}
-
-/// Names what lies beside the recordings of a folder; whether there is anything.
-fn says_unused(paths: &[PathBuf], input: &Path, console: Console) -> bool {
-    if paths == [input] {
-        return false;
-    }
-    let unused = beside_sessions(input).unwrap_or_default();
-    for path in &unused {
-        console.warn(&format!(
-            "{} is left out: it is no session and holds no video",
-            path.display()
-        ));
-    }
-    !unused.is_empty()
+    console.finish(if arguments.edit {
+        draw(inputs, arguments, console)
+    } else {
+        make(inputs, arguments, console)
+    })
 }
 
 /// Lets a person draw the hints in a browser.
-fn draw(path: &Path, arguments: &MaskArguments, console: Console) -> Result<Outcome, MaskingError> {
+fn draw(
+    mut inputs: MaskInputs,
+    arguments: &MaskArguments,
+    console: Console,
+) -> Result<Outcome, MaskingError> {
+    let Some(path) = inputs.recordings.pop() else {
+        return Ok(says_left_out(&inputs, console));
+    };
     let request = arguments.request()?;
-    let output = arguments.output.clone();
+    let output = inputs.files_of(&path, arguments.output.as_ref())?;
     let announce = |announcement: &Announcement| print_editor(announcement, console);
-    match edit(path, output, request, arguments.listen.socket(), announce)? {
+    match edit(&path, output, request, arguments.listen.socket(), announce)? {
         Some(output) => {
             print(&output, console);
             Ok(Outcome::Success)
@@ -67,30 +55,57 @@ fn draw(path: &Path, arguments: &MaskArguments, console: Console) -> Result<Outc
     }
 }
 
+/// Names what lies beside the recordings, and inputs that hold none.
+fn says_left_out(inputs: &MaskInputs, console: Console) -> Outcome {
+    for path in &inputs.strays {
+        let input = path.to_string_lossy().into_owned();
+        let message = "it is not a session, a video or a photograph".to_owned();
+        console.say(
+            &format!("{input}: left out: {message}"),
+            &Event::LeftOut { input, message },
+        );
+    }
+    for (input, fault) in &inputs.faults {
+        console.error_in(input, fault);
+    }
+    if !inputs.faults.is_empty() && inputs.recordings.is_empty() {
+        Outcome::Failure
+    } else if inputs.strays.is_empty() && inputs.faults.is_empty() {
+        Outcome::Success
+    } else {
+        Outcome::Partial
+    }
+}
+
 fn make(
-    paths: &[PathBuf],
+    mut inputs: MaskInputs,
     arguments: &MaskArguments,
     console: Console,
 ) -> Result<Outcome, MaskingError> {
     let request = arguments.request()?;
+    let found = says_left_out(&inputs, console);
+    let paths = std::mem::take(&mut inputs.recordings);
     let bar = console.progress(paths.len() as u64, "masks");
     let mut failed = 0;
-    for path in paths {
-        match make_mask(path, arguments.output.clone(), &request) {
+    for path in &paths {
+        let files = inputs.files_of(path, arguments.output.as_ref());
+        match files.and_then(|files| make_mask(path, files, &request)) {
             Ok(output) => bar.suspend(|| print(&output, console)),
-            Err(error) if paths.len() == 1 => return Err(error),
+            Err(error) if paths.len() == 1 && found == Outcome::Success => return Err(error),
             Err(error) => {
                 failed += 1;
-                bar.suspend(|| console.error(&error));
+                bar.suspend(|| console.error_in(path, &error));
             }
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(match failed {
-        0 => Outcome::Success,
-        all if all == paths.len() => Outcome::Failure,
-        _ => Outcome::Partial,
+    Ok(if failed == paths.len() {
+        Outcome::Failure
+    } else if failed > 0 {
+        Outcome::Partial
+    } else {
+        found
     })
 }
 

@@ -17,7 +17,7 @@ use relit_video::Video;
 use relit_web::{Announcement, Shutdown, Token, serve_page};
 use tokio::sync::Semaphore;
 
-use super::earlier::with_strokes;
+use super::earlier::{check_same_input, with_strokes};
 use super::files::{check_replaceable, make_folder};
 use super::making::files_of;
 use super::{MaskFiles, MaskOutput, MaskRecord, MaskRequest, MaskingError};
@@ -48,6 +48,9 @@ pub fn edit(
     let _made = make_folder(&files).map_err(&of_recording)?;
     check_replaceable(&files, request.force).map_err(&of_recording)?;
     let video = Video::open(&recording.video).map_err(|error| of_recording(error.into()))?;
+    if !request.force {
+        check_same_input(&files, &recording, &video).map_err(&of_recording)?;
+    }
     let (request, notice) = with_strokes(&request, &files, &video).map_err(&of_recording)?;
     let request = request.into_owned();
     let session = EditorSession::new(&recording, video, files.clone(), request);

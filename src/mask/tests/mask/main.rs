@@ -11,6 +11,7 @@ mod degenerate;
 mod editing;
 mod editor;
 mod engine;
+mod folders;
 mod names;
 mod photographs;
 mod program;

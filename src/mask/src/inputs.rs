@@ -1,0 +1,191 @@
+//! What the masks of a call are made of, and where they go.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
+
+use relit_data::file_names::{folded, is_hidden};
+use relit_data::session::{
+    MANIFEST_FILE, MASK_SUFFIX, SessionError, beside_recordings, clips, mask_stem, recordings,
+};
+use relit_data::still::is_named;
+
+use super::files::read_record;
+use super::{MaskFiles, MaskingError};
+
+/// What stands behind a mask's name in the names of the files that go with it.
+const COMPANIONS: [&str; 3] = ["-preview", "-previous", "-check"];
+
+/// Where masks are written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MaskTarget {
+    /// One mask.
+    File(MaskFiles),
+    /// A folder: each mask has the name of its recording.
+    Folder(PathBuf),
+}
+
+impl MaskTarget {
+    /// The mask that a path names, which ends in `.png`; otherwise a folder, which may be new if it has no ending, or a
+    /// separator behind it.
+    ///
+    /// # Errors
+    /// [`MaskingError::OutputName`].
+    pub fn from_path(path: &Path) -> Result<Self, MaskingError> {
+        let text = path.as_os_str().to_string_lossy();
+        let ends_as_folder = text.ends_with(['/', MAIN_SEPARATOR]);
+        let is_name = path.extension().is_none() && path.file_name().is_some();
+        if ends_as_folder || is_name || path.is_dir() {
+            Ok(Self::Folder(path.to_owned()))
+        } else {
+            MaskFiles::from_mask_path(path).map(Self::File)
+        }
+    }
+}
+
+/// The recordings of which masks are made, and what lies beside them.
+#[derive(Debug, Default)]
+pub struct MaskInputs {
+    /// Session folders, videos and photographs.
+    pub recordings: Vec<PathBuf>,
+    /// What else is in the folders that were searched.
+    pub strays: Vec<PathBuf>,
+    /// Inputs that hold no recording, and why.
+    pub faults: Vec<(PathBuf, SessionError)>,
+    /// Whether a mask that is named after nothing could be that of several.
+    are_several: bool,
+    /// The masks that were named so far, as a file system sees them that ignores case.
+    named: BTreeSet<String>,
+}
+
+impl MaskInputs {
+    /// All recordings in the inputs: sessions, videos, photographs, and folders of them.
+    #[must_use]
+    pub fn find(inputs: &[PathBuf], target: Option<&MaskTarget>) -> Self {
+        let mut found = Self::default();
+        for input in inputs {
+            match found.search(input, target) {
+                Ok(()) => {}
+                Err(error) => found.faults.push((input.clone(), error)),
+            }
+        }
+        found.are_several |= found.recordings.len() > 1;
+        found
+    }
+
+    fn search(&mut self, input: &Path, target: Option<&MaskTarget>) -> Result<(), SessionError> {
+        let into_folder = match target {
+            Some(MaskTarget::Folder(folder)) => Some(folder.as_path()),
+            _ => None,
+        };
+        let inside = if into_folder.is_some() {
+            clips(input)
+        } else {
+            recordings(input)
+        };
+        let (inside, beside) = match inside {
+            Ok(inside) if inside == [input] => (inside, Vec::new()),
+            Ok(inside) => (inside, beside_recordings(input)?),
+            Err(error) => match photographs(input)? {
+                (photographs, _) if photographs.is_empty() => return Err(error),
+                found => found,
+            },
+        };
+        self.are_several |= inside != [input];
+        self.recordings.extend(inside);
+        let strays = beside.into_iter().filter(|path| {
+            !is_of_mask(path) && !into_folder.is_some_and(|folder| is_same(path, folder))
+        });
+        self.strays.extend(strays);
+        Ok(())
+    }
+
+    /// The files of the mask of `recording`, where they are not those of its session folder or, for a single file,
+    /// `mask.png` in the working directory.
+    ///
+    /// # Errors
+    /// [`MaskingError::OutputName`]; [`MaskingError::Refused`] if another recording of these has the same name.
+    pub fn files_of(
+        &mut self,
+        recording: &Path,
+        target: Option<&MaskTarget>,
+    ) -> Result<Option<MaskFiles>, MaskingError> {
+        let mut name = mask_stem(recording);
+        let folder = match target {
+            Some(MaskTarget::File(files)) => return Ok(Some(files.clone())),
+            Some(MaskTarget::Folder(folder)) => folder.as_path(),
+            None if self.are_several && !recording.is_dir() => {
+                name.push(MASK_SUFFIX);
+                Path::new("")
+            }
+            None => return Ok(None),
+        };
+        name.push(".png");
+        if !self.named.insert(folded(&name.to_string_lossy())) {
+            return Err(MaskingError::Refused(format!(
+                "the mask {} is that of another input of this call: rename one, or mask it in a call of its own with -o",
+                folder.join(name).display()
+            )));
+        }
+        MaskFiles::from_mask_path(&folder.join(name)).map(Some)
+    }
+}
+
+/// The photographs in a folder that is not a session, sorted by name, and what lies beside them. Masks that were made
+/// of them are neither.
+fn photographs(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), SessionError> {
+    if !folder.is_dir() || folder.join(MANIFEST_FILE).exists() {
+        return Ok(Default::default());
+    }
+    let beside = beside_recordings(folder)?;
+    let is_photograph = |path: &PathBuf| path.is_file() && is_named(path) && !is_hidden(path);
+    let (pictures, others): (Vec<_>, Vec<_>) = beside.into_iter().partition(is_photograph);
+    let photographs = pictures.into_iter().filter(|path| !is_of_mask(path));
+    Ok((photographs.collect(), others))
+}
+
+/// Whether a file is a mask that this program made, or goes with one: the record beside it says so.
+fn is_of_mask(path: &Path) -> bool {
+    let stem = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
+    let stems = COMPANIONS
+        .iter()
+        .filter_map(|ending| stem.strip_suffix(ending));
+    let mut stems = stems.chain([stem]);
+    stems.any(|stem| {
+        let record = path.with_file_name(format!("{stem}.json"));
+        matches!(read_record(&record), Ok(Some(_)))
+    })
+}
+
+fn is_same(path: &Path, other: &Path) -> bool {
+    let [path, other] = [path, other].map(|path| fs::canonicalize(path).ok());
+    path.is_some() && path == other
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_is_a_png_or_a_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let dotted = folder.path().join("masks.v2");
+        fs::create_dir(&dotted).unwrap();
+        for path in [
+            Path::new("masks"),
+            Path::new("a/masks.v3/"),
+            Path::new("."),
+            &dotted,
+        ] {
+            let target = MaskTarget::from_path(path).unwrap();
+            assert_eq!(target, MaskTarget::Folder(path.to_owned()));
+        }
+        let file = MaskTarget::from_path(Path::new("a/mug.PNG")).unwrap();
+        assert!(matches!(file, MaskTarget::File(_)));
+        for path in ["mask.jpg", ""] {
+            let target = MaskTarget::from_path(Path::new(path));
+            assert!(matches!(target, Err(MaskingError::OutputName(_))), "{path}");
+        }
+    }
+}
