@@ -126,6 +126,13 @@ pub enum Event {
         sessions: u64,
         samples: u64,
         tasks: u64,
+        datasets: u64,
+    },
+    Converted {
+        out: String,
+        layout: String,
+        sessions: u64,
+        samples: u64,
     },
     Session(Value),
     Stats(Value),
@@ -192,6 +199,6 @@ mod tests {
             assert_eq!(json_of(&event), line);
             count += 1;
         }
-        assert_eq!(count, 31);
+        assert_eq!(count, 33);
     }
 }

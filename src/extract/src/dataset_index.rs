@@ -112,19 +112,13 @@ fn check_settings(
     old: &ExtractionSettings,
     new: &ExtractionSettings,
 ) -> Result<(), ExtractError> {
-    if old == new {
+    let differences = old.differences(new);
+    if differences.is_empty() {
         return Ok(());
     }
-    let [old, new] = [old, new].map(|s| serde_json::to_value(s).unwrap_or_default());
-    let names = old.as_object().into_iter().chain(new.as_object());
-    let mut names: Vec<&String> = names.flat_map(serde_json::Map::keys).collect();
-    names.sort_unstable();
-    names.dedup();
-    let differ = names.into_iter().filter(|name| old[*name] != new[*name]);
-    let differ = differ.map(|name| format!("{name} {} there, {} now", old[name], new[name]));
     Err(ExtractError::Refused(format!(
         "{} holds a data set with other settings ({}): give the same ones, or another folder",
         out.display(),
-        differ.collect::<Vec<_>>().join("; ")
+        differences.join("; ")
     )))
 }

@@ -52,6 +52,12 @@ pub enum ShardError {
         /// What is wrong, one sentence each.
         problems: Vec<String>,
     },
+    /// Data sets that cannot be joined.
+    #[error("the data sets cannot be merged: {}", .problems.join("; "))]
+    NotJoined {
+        /// Why not, one sentence each.
+        problems: Vec<String>,
+    },
     /// Another process is writing into the folder.
     #[error(
         "{} is being written by another process: wait for it to end, or give another folder", .0.display()

@@ -27,6 +27,17 @@ impl FileEntry {
     }
 }
 
+/// The tar as a file.
+impl From<&ShardEntry> for FileEntry {
+    fn from(shard: &ShardEntry) -> Self {
+        Self {
+            file: shard.file.clone(),
+            bytes: shard.bytes,
+            blake3: shard.blake3,
+        }
+    }
+}
+
 fn check_file(out: &Path, file: &str, expected: (u64, Digest)) -> Result<(), ShardError> {
     names::check_path(file)?;
     let path = out.join(file);

@@ -17,6 +17,7 @@
 //! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
 //! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
 //! | [`ArrayTask`], [`PartialManifest`], [`merge`] | a data set that several tasks write |
+//! | [`merge_datasets`], [`convert`](convert()) | finished data sets joined, or in the other layout (`new_dataset`: whole or not at all) |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
 //! This module knows pixel rectangles, images and their statistics
@@ -24,6 +25,8 @@
 //! or of session folders: here a session is a name and its samples.
 
 mod codec;
+mod combine;
+mod convert;
 mod dataset;
 mod digest;
 mod error;
@@ -31,6 +34,7 @@ mod file;
 mod folder;
 mod index;
 mod names;
+mod new_dataset;
 mod order;
 mod output;
 mod parquet_table;
@@ -45,6 +49,8 @@ mod verify;
 mod writer;
 
 pub use codec::{decode_mask, decode_rgb, encode_mask, encode_rgb};
+pub use combine::{has_only_pieces, merge_datasets};
+pub use convert::convert;
 pub use dataset::{Dataset, MaskInfo, SamplingBasis, SessionEntry, ShardEntry, SourceVideo};
 pub use digest::Digest;
 pub use error::ShardError;

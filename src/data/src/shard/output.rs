@@ -106,6 +106,16 @@ impl OutputFolder {
     }
 }
 
+/// Keeps writers out of the data set in a folder while the handle is open; several may read.
+///
+/// # Errors
+/// [`ShardError::Locked`] if it is being written; [`ShardError::NoDataset`] if there is no such folder.
+pub(super) fn lock_for_reading(out: &Path) -> Result<File, ShardError> {
+    let handle = File::open(out).map_err(|_| ShardError::NoDataset(out.to_owned()))?;
+    locked(handle.try_lock_shared(), out)?;
+    Ok(handle)
+}
+
 fn locked(result: Result<(), TryLockError>, path: &Path) -> Result<(), ShardError> {
     result.map_err(|reason| match reason {
         TryLockError::WouldBlock => ShardError::Locked(path.to_owned()),

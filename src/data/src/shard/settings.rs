@@ -1,5 +1,6 @@
 //! How the sessions of a data set are extracted and stored, as `dataset.json` records it.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -104,11 +105,13 @@ pub struct ExtractionSettings {
 }
 
 impl ExtractionSettings {
-    /// Names and values as they are shown to people.
+    /// Names and values as they are shown to people beside the samples. The layout is not among them: it says nothing of
+    /// the samples, and a page outlasts its change.
     #[must_use]
     pub fn rows(&self) -> Vec<(String, String)> {
         let settings = serde_json::to_value(self).unwrap_or_default();
         let rows = settings.as_object().into_iter().flatten();
+        let rows = rows.filter(|(name, _)| *name != "layout");
         rows.map(|(name, value)| {
             let text = value
                 .as_str()
@@ -116,6 +119,17 @@ impl ExtractionSettings {
             (name.replace('_', " "), text)
         })
         .collect()
+    }
+
+    /// In what other settings differ from these, one phrase each with both values.
+    #[must_use]
+    pub fn differences(&self, other: &Self) -> Vec<String> {
+        let [old, new] = [self, other].map(|s| serde_json::to_value(s).unwrap_or_default());
+        let names = old.as_object().into_iter().chain(new.as_object());
+        let names: BTreeSet<&String> = names.flat_map(serde_json::Map::keys).collect();
+        let differ = names.into_iter().filter(|name| old[*name] != new[*name]);
+        let phrases = differ.map(|name| format!("{name} {} there, {} here", old[name], new[name]));
+        phrases.collect()
     }
 }
 

@@ -55,11 +55,31 @@ pub(crate) enum Verb {
         /// The data set's folder.
         out: PathBuf,
     },
-    /// Join what several tasks wrote into one data set.
-    #[command(after_help = "Example:\n  relit-extract merge dataset")]
+    /// Join what several tasks wrote into one data set, or finished data sets to a new one.
+    #[command(
+        after_help = "Examples:\n  relit-extract merge dataset\n      what several tasks wrote there\n  relit-extract merge monday tuesday -o week\n      finished data sets, whose files are copied"
+    )]
     Merge {
-        /// The data set's folder, or a URL of one.
+        /// The data set's folder, or a URL of one; with --output the folders of several.
+        #[arg(value_name = "OUT", required = true)]
+        out: Vec<PathBuf>,
+        /// The folder of the new data set.
+        #[arg(short, long, value_name = "OUT")]
+        output: Option<PathBuf>,
+    },
+    /// Write a data set in the other layout, from its own files.
+    #[command(
+        after_help = "Example:\n  relit-extract convert dataset -o for-the-paper --layout paper"
+    )]
+    Convert {
+        /// The data set's folder.
         out: PathBuf,
+        /// The folder of the new data set.
+        #[arg(short, long, value_name = "OUT")]
+        output: PathBuf,
+        /// The new layout.
+        #[arg(long, value_parser = named::<Layout>(["webdataset", "paper"]))]
+        layout: Layout,
     },
     /// Show a data set at a glance: sessions with verdicts, saturation, shifts and what else was found.
     #[command(

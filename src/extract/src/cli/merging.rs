@@ -1,14 +1,17 @@
-//! `relit-extract merge OUT`: the pieces of several tasks become one data set.
+//! `relit-extract merge`: the pieces of several tasks, or finished data sets, become one.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
-use relit_data::shard::SessionEntry;
+use relit_data::shard::{Dataset, SessionEntry, has_only_pieces, merge_datasets};
 use relit_extract::ExtractError;
 use relit_extract::objects::merge;
 
-pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
+use super::refuse_urls;
+
+/// Joins what several tasks wrote into `out`.
+pub(crate) fn merge_tasks(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
     let merged = merge(out)?;
     for (name, why) in &merged.left_out {
         console.say(
@@ -19,33 +22,86 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
             },
         );
     }
-    let (sessions, tasks) = (merged.dataset.sessions.len(), merged.tasks);
-    let samples: u64 = merged
-        .dataset
-        .shards
+    let from = MergedFrom {
+        tasks: merged.tasks.into(),
+        datasets: 0,
+    };
+    let outcome = report(console, out, &merged.dataset, &from);
+    if merged.left_out.is_empty() {
+        Ok(outcome)
+    } else {
+        Ok(Outcome::Partial)
+    }
+}
+
+/// Joins finished data sets to a new one in `output`.
+pub(crate) fn merge_finished(
+    console: Console,
+    inputs: &[PathBuf],
+    output: &Path,
+) -> Result<Outcome, ExtractError> {
+    let all: Vec<&Path> = inputs
         .iter()
-        .map(|shard| u64::from(shard.samples))
-        .sum();
+        .map(PathBuf::as_path)
+        .chain([output])
+        .collect();
+    refuse_urls(&all)?;
+    if let Some(unmerged) = inputs.iter().find(|input| has_only_pieces(input)) {
+        let unmerged = unmerged.display();
+        return Err(ExtractError::Refused(format!(
+            "{unmerged} holds what tasks have written: run relit-extract merge {unmerged} first"
+        )));
+    }
+    let bar = console.progress(0, "merge");
+    let merged = merge_datasets(inputs, output, &|done, of| {
+        bar.set_length(of);
+        bar.set_position(done);
+    });
+    bar.finish_and_clear();
+    let from = MergedFrom {
+        tasks: 0,
+        datasets: inputs.len() as u64,
+    };
+    Ok(report(console, output, &merged?, &from))
+}
+
+/// What a data set was merged from.
+struct MergedFrom {
+    tasks: u64,
+    datasets: u64,
+}
+
+fn report(console: Console, out: &Path, dataset: &Dataset, from: &MergedFrom) -> Outcome {
+    let sessions = dataset.sessions.len() as u64;
+    let samples = dataset.shards.iter().map(|shard| u64::from(shard.samples));
+    let samples: u64 = samples.sum();
+    let merged_from = match from.datasets {
+        0 => count_of(from.tasks, "task"),
+        datasets => count_of(datasets, "data set"),
+    };
     console.say(
         &format!(
-            "{}: {} with {}, of {}",
+            "{}: {} with {}, merged from {merged_from}",
             out.display(),
-            count_of(sessions as u64, "session"),
+            count_of(sessions, "session"),
             count_of(samples, "sample"),
-            count_of(tasks.into(), "task")
         ),
         &Event::Merged {
             out: out.to_string_lossy().into_owned(),
-            sessions: sessions as u64,
+            sessions,
             samples,
-            tasks: tasks.into(),
+            tasks: from.tasks,
+            datasets: from.datasets,
         },
     );
-    let mut sessions = merged.dataset.sessions.iter();
-    let is_flawed = sessions.any(SessionEntry::is_flawed);
-    Ok(if is_flawed || !merged.left_out.is_empty() {
+    outcome_of(dataset)
+}
+
+/// Whether a person should look at some session of a data set.
+pub(super) fn outcome_of(dataset: &Dataset) -> Outcome {
+    if dataset.sessions.iter().any(SessionEntry::is_flawed) {
         Outcome::Partial
     } else {
         Outcome::Success
-    })
+    }
 }

@@ -6,18 +6,14 @@ use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
 use relit_data::shard::verify;
 use relit_extract::ExtractError;
-use relit_extract::objects::is_url;
+
+use super::refuse_urls;
 
 /// Number of problems that are printed for a person.
 const MAX_PRINTED: usize = 50;
 
 pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
-    if is_url(out) {
-        return Err(ExtractError::Refused(format!(
-            "{} is a URL, and this command reads a folder: copy the data set to the local disk first",
-            out.display()
-        )));
-    }
+    refuse_urls(&[out])?;
     let bar = console.progress(0, "verify");
     let report = verify(out, &|done, total| {
         bar.set_length(total);
