@@ -10,16 +10,22 @@ use serde_json::Value;
 #[serde(tag = "event", rename_all = "snake_case")]
 #[allow(missing_docs, reason = "docs/json-lines.md explains the fields")]
 pub enum Event {
-    // Every program.
+    // Every program. `session` is missing where an event concerns none.
     Warning {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        session: Option<String>,
         message: String,
     },
     Error {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        session: Option<String>,
         message: String,
         /// The input that it concerns, of several.
         input: Option<String>,
     },
     Progress {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        session: Option<String>,
         #[serde(default)]
         what: String,
         done: u64,
@@ -65,7 +71,7 @@ pub enum Event {
     // relit-mask
     Mask {
         #[serde(default)]
-        recording: String,
+        session: String,
         #[serde(default)]
         mask: String,
         #[serde(default)]
@@ -88,10 +94,12 @@ pub enum Event {
         task: String,
     },
     Extracted {
-        session: Value,
+        session: String,
+        /// That of `dataset.json`.
+        entry: Value,
     },
     Skipped {
-        id: String,
+        session: String,
         lossy: bool,
         #[serde(default)]
         misfit: bool,
@@ -99,11 +107,22 @@ pub enum Event {
         broken: bool,
     },
     LeftOut {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        session: Option<String>,
         #[serde(default)]
         input: String,
         message: String,
     },
+    /// How far all sessions together have come.
+    Total {
+        done: u64,
+        of: u64,
+        /// Until all are done, about; not known before one is extracted.
+        seconds_left: Option<u64>,
+    },
     Problem {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        session: Option<String>,
         #[serde(default)]
         file: String,
         sample: Option<String>,
@@ -149,7 +168,7 @@ pub enum Check {
     /// A mask, by `relit-mask check`.
     Mask {
         #[serde(default)]
-        recording: String,
+        session: String,
         #[serde(default)]
         page: String,
         report: Value,
@@ -179,6 +198,21 @@ pub enum Done {
         skipped: u64,
         left_out: u64,
         failed: u64,
+        summary: String,
+    },
+    /// `relit-mask` of several recordings.
+    Masks {
+        made: u64,
+        left_out: u64,
+        failed: u64,
+        summary: String,
+    },
+    /// `relit-mask check` of several recordings.
+    Checks {
+        fitting: u64,
+        unfit: u64,
+        failed: u64,
+        summary: String,
     },
 }
 
@@ -199,6 +233,6 @@ mod tests {
             assert_eq!(json_of(&event), line);
             count += 1;
         }
-        assert_eq!(count, 33);
+        assert_eq!(count, 36);
     }
 }

@@ -30,11 +30,13 @@ use relit_data::causes::with_causes;
 use serde::Serialize;
 use serde_json::Value;
 
+mod duration;
 mod event;
 mod manual;
 mod options;
 mod progress;
 
+pub use duration::in_words;
 pub use event::{Check, Done, Event};
 pub use manual::written_manual;
 pub use options::ConsoleOptions;
@@ -131,8 +133,20 @@ impl Console {
 
     /// A warning.
     pub fn warn(self, text: &str) {
-        let message = text.to_owned();
-        self.warn_with(text, &Event::Warning { message });
+        let event = Event::Warning {
+            session: None,
+            message: text.to_owned(),
+        };
+        self.warn_with(text, &event);
+    }
+
+    /// A warning about a session.
+    pub fn warn_in(self, session: &str, text: &str) {
+        let event = Event::Warning {
+            session: Some(session.to_owned()),
+            message: text.to_owned(),
+        };
+        self.warn_with(&format!("{session}: {text}"), &event);
     }
 
     /// A warning that is an event of its own for a machine.
@@ -145,17 +159,18 @@ impl Console {
 
     /// An error, with its causes, as one sentence.
     pub fn error(self, error: &(dyn Error + 'static)) {
-        self.print_error(&with_causes(error), None);
+        self.print_error(&with_causes(error), None, None);
     }
 
-    /// An error that concerns one of several inputs.
-    pub fn error_in(self, input: &Path, error: &(dyn Error + 'static)) {
-        self.print_error(&with_causes(error), Some(input));
+    /// An error that concerns one of several inputs, and its session, if it is one.
+    pub fn error_in(self, input: &Path, session: Option<&str>, error: &(dyn Error + 'static)) {
+        self.print_error(&with_causes(error), Some(input), session);
     }
 
-    fn print_error(self, text: &str, input: Option<&Path>) {
+    fn print_error(self, text: &str, input: Option<&Path>, session: Option<&str>) {
         if self.json {
             let event = Event::Error {
+                session: session.map(str::to_owned),
                 message: text.to_owned(),
                 input: input.map(|input| input.to_string_lossy().into_owned()),
             };
@@ -190,8 +205,13 @@ impl Console {
     /// A progress bar of `length` steps; hidden if standard error is not a terminal. With `--json` lines for
     /// the machine, or nothing where it did not [ask for them](Self::with_progress).
     pub fn progress(self, length: u64, label: &str) -> ProgressBar {
+        self.progress_in(None, length, label)
+    }
+
+    /// The same for the work on a session.
+    pub fn progress_in(self, session: Option<&str>, length: u64, label: &str) -> ProgressBar {
         match (self.json, self.progress) {
-            (true, true) => ProgressBar::lines(length, label),
+            (true, true) => ProgressBar::lines(session, length, label),
             (true, false) => ProgressBar::hidden(),
             (false, _) => ProgressBar::visible(length, label),
         }

@@ -20,6 +20,7 @@ pub struct ProgressBar {
 /// The lines for a machine.
 #[derive(Debug)]
 struct Lines {
+    session: Option<String>,
     what: String,
     done: u64,
     of: u64,
@@ -37,6 +38,7 @@ impl Lines {
         }
         self.printed = Some(now);
         let event = Event::Progress {
+            session: self.session.clone(),
             what: self.what.clone(),
             done: self.done,
             of: self.of,
@@ -56,8 +58,9 @@ impl ProgressBar {
     }
 
     /// Lines for a machine about `of` steps.
-    pub(super) fn lines(of: u64, what: &str) -> Self {
+    pub(super) fn lines(session: Option<&str>, of: u64, what: &str) -> Self {
         let lines = Lines {
+            session: session.map(str::to_owned),
             what: what.to_owned(),
             done: 0,
             of,

@@ -69,6 +69,8 @@ pub(super) fn extract_recordings(
         observer,
         storage,
     };
+    let takes = |position: &usize| options.task.is_none_or(|task| task.takes(*position));
+    observer.planned((0..found.len()).filter(takes).count());
     for (position, recording) in found.iter().enumerate() {
         if options.task.is_none_or(|task| task.takes(position)) {
             run.extract(position, recording, &mut tally)?;
@@ -100,7 +102,7 @@ pub(super) fn find(
     let mut found = Vec::new();
     let mut report = |path: &Path, outcome: RecordingOutcome| {
         tally.count(&outcome);
-        observer.ended(path, &outcome);
+        observer.ended(path, None, &outcome);
     };
     for input in inputs {
         let inside = recordings_in(input, options);
@@ -174,7 +176,8 @@ impl Run<'_> {
             Err(ExtractError::Refused(text.to_owned()))
         }));
         tally.count(&outcome);
-        self.observer.ended(recording, &outcome);
+        let name = recording_name(recording);
+        self.observer.ended(recording, Some(&name), &outcome);
         self.catalog.note(&self.folder, position, &outcome)?;
         let extracted = match &outcome {
             RecordingOutcome::Extracted(entry) => Some(entry.id.as_str()),
@@ -221,7 +224,7 @@ impl Run<'_> {
         if options.task.is_some() {
             folder.clear_leftovers_of(job.id())?;
         }
-        self.observer.started(path, options.frames);
+        self.observer.started(job.id(), options.frames);
         let (entry, shards) = job.run(folder, options, &self.pool, self.observer)?;
         self.catalog.add(folder, entry.clone(), shards)?;
         Ok(RecordingOutcome::Extracted(Box::new(entry)))

@@ -8,18 +8,21 @@ use super::ExtractError;
 
 /// Receives the progress of an extraction, from several threads. `()` ignores it.
 pub trait Observer: Sync {
-    /// Work on a recording starts; it will have `samples` samples.
-    fn started(&self, recording: &Path, samples: u32);
+    /// So many recordings will be worked on.
+    fn planned(&self, recordings: usize);
+    /// The extraction of a session starts; it will have `samples` samples.
+    fn started(&self, session: &str, samples: u32);
     /// One more sample was written.
     fn advanced(&self);
-    /// Work on a recording ended.
-    fn ended(&self, recording: &Path, outcome: &RecordingOutcome);
+    /// Work on a recording ended, whose session has this name; or the input is none.
+    fn ended(&self, input: &Path, session: Option<&str>, outcome: &RecordingOutcome);
 }
 
 impl Observer for () {
-    fn started(&self, _recording: &Path, _samples: u32) {}
+    fn planned(&self, _recordings: usize) {}
+    fn started(&self, _session: &str, _samples: u32) {}
     fn advanced(&self) {}
-    fn ended(&self, _recording: &Path, _outcome: &RecordingOutcome) {}
+    fn ended(&self, _input: &Path, _session: Option<&str>, _outcome: &RecordingOutcome) {}
 }
 
 /// The outcome of one recording.

@@ -182,3 +182,30 @@ fn a_folder_of_one_clip_keeps_the_clips_name_and_masks_may_lie_beside_clips() {
     place.events(0, &format!("videos --mask videos {SETTINGS} -o out"));
     assert_eq!(place.ids("out"), ["cow"]);
 }
+
+#[test]
+fn every_event_names_its_session_and_totals_count_to_the_last() {
+    let place = clips();
+    fs::write(place.path("videos/torn.mp4"), "not a video").unwrap();
+    let events = place.events(
+        3,
+        &format!("videos --mask masks {SETTINGS} -o out --progress"),
+    );
+    let sessions = ["cow", "the_bust", "torn"];
+    for event in &events {
+        let kind = event["event"].as_str().unwrap();
+        if !["total", "done"].contains(&kind) {
+            let session = event["session"].as_str().unwrap();
+            assert!(sessions.contains(&session), "{event}");
+        }
+    }
+    for kind in ["progress", "extracted", "error"] {
+        assert!(!of_kind(&events, kind).is_empty(), "{kind}");
+    }
+    let totals = of_kind(&events, "total");
+    let done: Vec<_> = totals.iter().map(|total| total["done"].as_u64()).collect();
+    assert_eq!(done, [Some(1), Some(2), Some(3)]);
+    assert!(totals.iter().all(|total| total["of"] == 3));
+    assert_eq!(totals[2]["seconds_left"], 0);
+    assert_eq!(events.last().unwrap()["event"], "done");
+}

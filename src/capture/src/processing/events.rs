@@ -85,12 +85,12 @@ impl ProgramEvent {
         match event {
             Event::Progress { done, of, .. } => self.progress = Some((done, of)),
             Event::Error { message, .. } => self.error = Some(message),
-            Event::Warning { message } => keep(&mut self.warnings, message),
+            Event::Warning { message, .. } => keep(&mut self.warnings, message),
             Event::Mask { .. } => self.has_mask = true,
             Event::Check(Check::Mask { report, .. }) => {
                 self.check = serde_json::from_value(report).ok();
             }
-            Event::Extracted { session } => self.extracted = serde_json::from_value(session).ok(),
+            Event::Extracted { entry, .. } => self.extracted = serde_json::from_value(entry).ok(),
             Event::Skipped {
                 lossy,
                 misfit,
@@ -234,13 +234,13 @@ mod tests {
     #[test]
     fn each_programs_last_word_is_understood() {
         use ProcessingStep::{Check, Extract, Mask};
-        let good = r#"{"event":"extracted","session":{"samples":1500,"lossy":false,"quality":{"verdict":"good","reasons":[]},"warnings":[]}}"#;
-        let usable = r#"{"event":"extracted","session":{"samples":1500,"lossy":true,"quality":{"verdict":"usable","reasons":["3 frames are lost"]},"warnings":["the camera dropped 3 frames"]}}"#;
+        let good = r#"{"event":"extracted","session":"x","entry":{"samples":1500,"lossy":false,"quality":{"verdict":"good","reasons":[]},"warnings":[]}}"#;
+        let usable = r#"{"event":"extracted","session":"x","entry":{"samples":1500,"lossy":true,"quality":{"verdict":"usable","reasons":["3 frames are lost"]},"warnings":["the camera dropped 3 frames"]}}"#;
         for (step, code, line, outcome, words, goes_on) in [
             (
                 Mask,
                 0,
-                r#"{"event":"mask","recording":"x"}"#,
+                r#"{"event":"mask","session":"x"}"#,
                 Good,
                 "made",
                 true,
@@ -290,7 +290,7 @@ mod tests {
             (
                 Extract,
                 0,
-                r#"{"event":"skipped","id":"x","lossy":false}"#,
+                r#"{"event":"skipped","session":"x","lossy":false}"#,
                 Good,
                 "already",
                 true,
@@ -298,7 +298,7 @@ mod tests {
             (
                 Extract,
                 3,
-                r#"{"event":"skipped","id":"x","lossy":false,"misfit":true}"#,
+                r#"{"event":"skipped","session":"x","lossy":false,"misfit":true}"#,
                 Doubtful,
                 "its mask does not fit",
                 true,
@@ -306,7 +306,7 @@ mod tests {
             (
                 Extract,
                 3,
-                r#"{"event":"skipped","id":"x","lossy":false,"broken":true}"#,
+                r#"{"event":"skipped","session":"x","lossy":false,"broken":true}"#,
                 Doubtful,
                 "it is broken",
                 true,
@@ -331,7 +331,7 @@ mod tests {
     #[test]
     fn a_mask_with_a_warning_is_looked_at_by_the_check() {
         let lines = [
-            r#"{"event":"warning","message":"x: the mask touches the border"}"#,
+            r#"{"event":"warning","session":"x","message":"the mask touches the border"}"#,
             r#"{"event":"mask"}"#,
         ];
         let (outcome, what, goes_on) = end(ProcessingStep::Mask, Some(0), &lines);

@@ -1,15 +1,17 @@
 //! `relit-extract INPUT... -o OUT`: progress and results of the extraction.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
-use relit_console::{Console, Outcome};
-use relit_console::{Done, Event, ProgressBar};
+use relit_console::{Console, Done, Event, Outcome, ProgressBar, in_words};
 use relit_data::causes::with_causes;
 use relit_data::counts::count_of;
 use relit_data::shard::SessionEntry;
 use relit_extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract};
 use serde_json::json;
+
+use super::totals::RunTotals;
 
 pub(crate) fn run(
     console: Console,
@@ -21,6 +23,7 @@ pub(crate) fn run(
         console,
         out,
         bar: Mutex::new(ProgressBar::hidden()),
+        totals: Mutex::new(RunTotals::new(Instant::now())),
     };
     if let Some(task) = options.task {
         // It may be the scheduler's variables that say so.
@@ -42,18 +45,9 @@ pub(crate) fn run(
             "task {task} has none of the recordings: name all of them to each task, or give --task 0/1 for all that are named"
         ));
     }
+    let summary = summary(&tally);
     console.say(
-        &format!(
-            "{}: {} extracted ({} with losses, {} with a mask that does not fit, {} broken), {} skipped, {} left out, {} failed",
-            out.display(),
-            tally.extracted,
-            tally.lossy,
-            tally.misfits,
-            tally.broken,
-            tally.skipped,
-            tally.left_out,
-            tally.failed
-        ),
+        &format!("{}: {summary}", out.display()),
         &Event::Done(Done::Extraction {
             out: out.to_string_lossy().into_owned(),
             extracted: tally.extracted as u64,
@@ -63,6 +57,7 @@ pub(crate) fn run(
             skipped: tally.skipped as u64,
             left_out: tally.left_out as u64,
             failed: tally.failed as u64,
+            summary,
         }),
     );
     let nothing_came_out = tally.extracted + tally.skipped == 0;
@@ -73,16 +68,51 @@ pub(crate) fn run(
     })
 }
 
+/// What happened, in words that need no manual.
+fn summary(tally: &Tally) -> String {
+    let sessions = |count: usize| count_of(count as u64, "session");
+    let came_out = match (tally.extracted, tally.skipped) {
+        (0, 0) => "nothing extracted".to_owned(),
+        (0, skipped) => format!("nothing new, {} were there already", sessions(skipped)),
+        (extracted, 0) => format!("{} extracted", sessions(extracted)),
+        (extracted, skipped) => format!(
+            "{} extracted, {skipped} were there already",
+            sessions(extracted)
+        ),
+    };
+    let troubles = [
+        (tally.failed, "failed"),
+        (tally.left_out, "left out"),
+        (tally.lossy, "with something lost"),
+        (tally.misfits, "with a mask that does not fit"),
+        (tally.broken, "broken: do not train on it"),
+    ];
+    let troubles = troubles.iter().filter(|(count, _)| *count > 0);
+    let troubles: Vec<String> = troubles
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    match (troubles.is_empty(), tally.extracted + tally.skipped) {
+        (true, 0) => came_out,
+        (true, _) => format!("{came_out}, all is well"),
+        (false, _) => format!("{came_out}; {}; see above", troubles.join(", ")),
+    }
+}
+
 /// Prints the progress and the outcome of each recording.
 struct Reporter<'a> {
     console: Console,
     out: &'a Path,
     bar: Mutex<ProgressBar>,
+    totals: Mutex<RunTotals>,
 }
 
 impl Reporter<'_> {
-    fn bar(&self) -> std::sync::MutexGuard<'_, ProgressBar> {
+    fn bar(&self) -> MutexGuard<'_, ProgressBar> {
         self.bar.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn totals(&self) -> MutexGuard<'_, RunTotals> {
+        self.totals.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn skipped(&self, entry: &SessionEntry) {
@@ -98,7 +128,7 @@ impl Reporter<'_> {
         self.console.say(
             &format!("{}: already extracted, skipped{flaw}", entry.id),
             &Event::Skipped {
-                id: entry.id.clone(),
+                session: entry.id.clone(),
                 lossy: entry.lossy,
                 misfit: entry.has_misfit(),
                 broken: entry.is_broken(),
@@ -106,56 +136,118 @@ impl Reporter<'_> {
         );
     }
 
-    fn left_out(&self, recording: &Path, error: &ExtractError) {
-        let input = recording.to_string_lossy().into_owned();
+    fn left_out(&self, input: &Path, session: Option<&str>, error: &ExtractError) {
+        let input = input.to_string_lossy().into_owned();
         let message = with_causes(error);
         self.console.say(
             &format!("{input}: left out: {message}"),
-            &Event::LeftOut { input, message },
+            &Event::LeftOut {
+                session: session.map(str::to_owned),
+                input,
+                message,
+            },
         );
     }
 
     fn extracted(&self, entry: &SessionEntry) {
         for warning in &entry.warnings {
-            self.console.warn(&format!("{}: {warning}", entry.id));
+            self.console.warn_in(&entry.id, warning);
         }
         let report = self.out.join(format!("{}.html", entry.id));
         self.console.say(
             &format!(
-                "{}: {} ({}), Spec-Net on for {}, report {}",
+                "{}: {}, {} ({}), Spec-Net on for {}, report {}",
                 entry.id,
+                entry.quality.verdict,
                 count_of(u64::from(entry.samples), "sample"),
                 count_of(u64::from(entry.duplicates), "duplicate"),
                 entry.spec_net,
                 report.display()
             ),
             &Event::Extracted {
-                session: json!(entry),
+                session: entry.id.clone(),
+                entry: json!(entry),
+            },
+        );
+    }
+
+    /// Says how far all recordings have come, where there are several.
+    fn say_total(&self, was_extracted: bool) {
+        let (done, of, left) = {
+            let mut totals = self.totals();
+            totals.ended(was_extracted, Instant::now());
+            (totals.done, totals.of, totals.left())
+        };
+        if of < 2 {
+            return;
+        }
+        let until = match left {
+            Some(left) if done < of => format!(", about {} left", in_words(left)),
+            _ => String::new(),
+        };
+        self.console.say_phase(
+            &format!("{done} of {of} recordings done{until}"),
+            &Event::Total {
+                done,
+                of,
+                seconds_left: left.map(|left| left.as_secs()),
             },
         );
     }
 }
 
 impl Observer for Reporter<'_> {
-    fn started(&self, recording: &Path, samples: u32) {
-        let name = recording
-            .file_name()
-            .unwrap_or(recording.as_os_str())
-            .to_string_lossy();
-        *self.bar() = self.console.progress(u64::from(samples), &name);
+    fn planned(&self, recordings: usize) {
+        self.totals().of = recordings as u64;
+    }
+
+    fn started(&self, session: &str, samples: u32) {
+        let label = {
+            let totals = self.totals();
+            match totals.of {
+                0 | 1 => session.to_owned(),
+                of => format!("{}/{of} {session}", totals.done + 1),
+            }
+        };
+        let samples = u64::from(samples);
+        *self.bar() = self.console.progress_in(Some(session), samples, &label);
     }
 
     fn advanced(&self) {
         self.bar().inc(1);
     }
 
-    fn ended(&self, recording: &Path, outcome: &RecordingOutcome) {
+    fn ended(&self, input: &Path, session: Option<&str>, outcome: &RecordingOutcome) {
         self.bar().finish_and_clear();
         match outcome {
             RecordingOutcome::Extracted(entry) => self.extracted(entry),
             RecordingOutcome::Skipped(entry) => self.skipped(entry),
-            RecordingOutcome::LeftOut(error) => self.left_out(recording, error),
-            RecordingOutcome::Failed(error) => self.console.error_in(recording, error),
+            RecordingOutcome::LeftOut(error) => self.left_out(input, session, error),
+            RecordingOutcome::Failed(error) => self.console.error_in(input, session, error),
         }
+        if session.is_some() {
+            self.say_total(matches!(outcome, RecordingOutcome::Extracted(_)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_summary_names_what_happened_and_nothing_else() {
+        let of = |change: fn(&mut Tally)| {
+            let mut tally = Tally::default();
+            change(&mut tally);
+            summary(&tally)
+        };
+        assert_eq!(of(|_| ()), "nothing extracted");
+        let failed = of(|tally| tally.failed = 3);
+        assert!(failed.contains("nothing extracted") && failed.contains('3'));
+        assert!(of(|tally| tally.extracted = 2).contains("all is well"));
+        let broken = of(|tally| (tally.extracted, tally.broken) = (2, 1));
+        assert!(broken.contains("1 broken") && !broken.contains("well"));
+        assert!(!broken.contains('0'), "{broken}");
     }
 }

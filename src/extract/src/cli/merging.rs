@@ -17,6 +17,7 @@ pub(crate) fn merge_tasks(console: Console, out: &Path) -> Result<Outcome, Extra
         console.say(
             &format!("{name}: left out: {why}"),
             &Event::LeftOut {
+                session: None,
                 input: name.clone(),
                 message: why.clone(),
             },

@@ -5,6 +5,7 @@ mod converting;
 mod extracting;
 mod merging;
 mod stats;
+mod totals;
 mod verifying;
 
 use std::path::Path;

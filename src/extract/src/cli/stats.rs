@@ -98,7 +98,7 @@ fn percent(part: u64, whole: u64) -> f64 {
 fn event(entry: &SessionEntry) -> Value {
     json!({
         "event": "session",
-        "id": entry.id,
+        "session": entry.id,
         "object": entry.object,
         "samples": entry.samples,
         "duplicates": entry.duplicates,

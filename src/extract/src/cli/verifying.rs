@@ -26,6 +26,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         console.say(
             &problem.to_string(),
             &Event::Problem {
+                session: problem.session.clone(),
                 file: file.clone(),
                 sample: sample.clone(),
                 message: what.clone(),

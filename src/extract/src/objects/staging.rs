@@ -50,7 +50,7 @@ pub(crate) fn extract(
             Err(error) => {
                 let outcome = RecordingOutcome::from_result(Err(error));
                 tally.count(&outcome);
-                observer.ended(input, &outcome);
+                observer.ended(input, None, &outcome);
             }
         }
     }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use relit_console::{Check, Console, Event, Outcome};
-use relit_data::session::{clips, recordings};
+use relit_console::{Check, Console, Done, Event, Outcome};
+use relit_data::session::{clips, recording_name, recordings};
 use relit_mask::{CheckOutput, MaskVerdict, MaskingError, check_mask};
 use serde_json::json;
 
@@ -19,6 +19,7 @@ pub(crate) fn run(
     } else {
         recordings(input)?
     };
+    let several = paths.len() > 1;
     let (mut fitting, mut failed) = (0, 0);
     for path in &paths {
         match check_mask(path, mask) {
@@ -26,12 +27,15 @@ pub(crate) fn run(
                 print(&output, console);
                 fitting += usize::from(output.report.verdict == MaskVerdict::Fits);
             }
-            Err(error) if paths.len() == 1 => return Err(error),
+            Err(error) if !several => return Err(error),
             Err(error) => {
-                console.error(&error);
+                console.error_in(path, Some(&recording_name(path)), &error);
                 failed += 1;
             }
         }
+    }
+    if several {
+        say_summary(console, fitting, paths.len() - fitting - failed, failed);
     }
     Ok(if failed == paths.len() {
         Outcome::Failure
@@ -42,6 +46,27 @@ pub(crate) fn run(
     })
 }
 
+/// What became of all of them.
+fn say_summary(console: Console, fitting: usize, unfit: usize, failed: usize) {
+    let parts = [
+        (fitting, "that fit"),
+        (unfit, "that do not fit or are unknown: look at their pages"),
+        (failed, "that could not be checked"),
+    ];
+    let parts = parts.iter().filter(|(count, _)| *count > 0);
+    let parts: Vec<String> = parts
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    let summary = format!("masks: {}", parts.join(", "));
+    let event = Event::Done(Done::Checks {
+        fitting: fitting as u64,
+        unfit: unfit as u64,
+        failed: failed as u64,
+        summary: summary.clone(),
+    });
+    console.say(&summary, &event);
+}
+
 fn print(output: &CheckOutput, console: Console) {
     let (id, report) = (&output.recording, &output.report);
     let (_, word) = report.verdict.words();
@@ -50,7 +75,7 @@ fn print(output: &CheckOutput, console: Console) {
         text += &format!("\n  {reason}");
     }
     let event = Event::Check(Check::Mask {
-        recording: id.clone(),
+        session: id.clone(),
         page: output.page.to_string_lossy().into_owned(),
         report: json!(report),
     });

@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use relit_console::{Console, Event, Outcome};
+use relit_console::{Console, Done, Event, Outcome};
+use relit_data::counts::count_of;
+use relit_data::session::recording_name;
 use relit_mask::{MaskInputs, MaskOutput, MaskingError, edit, make_mask};
 use relit_web::Announcement;
 use serde_json::json;
@@ -62,11 +64,15 @@ fn says_left_out(inputs: &MaskInputs, console: Console) -> Outcome {
         let message = "it is not a session, a video or a photograph".to_owned();
         console.say(
             &format!("{input}: left out: {message}"),
-            &Event::LeftOut { input, message },
+            &Event::LeftOut {
+                session: None,
+                input,
+                message,
+            },
         );
     }
     for (input, fault) in &inputs.faults {
-        console.error_in(input, fault);
+        console.error_in(input, None, fault);
     }
     if !inputs.faults.is_empty() && inputs.recordings.is_empty() {
         Outcome::Failure
@@ -94,12 +100,22 @@ fn make(
             Err(error) if paths.len() == 1 && found == Outcome::Success => return Err(error),
             Err(error) => {
                 failed += 1;
-                bar.suspend(|| console.error_in(path, &error));
+                let session = recording_name(path);
+                bar.suspend(|| console.error_in(path, Some(&session), &error));
             }
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
+    if paths.len() > 1 || found != Outcome::Success {
+        let left_out = inputs.strays.len();
+        say_summary(
+            console,
+            paths.len() - failed,
+            left_out,
+            failed + inputs.faults.len(),
+        );
+    }
     Ok(if failed == paths.len() {
         Outcome::Failure
     } else if failed > 0 {
@@ -109,14 +125,39 @@ fn make(
     })
 }
 
+/// What became of all inputs.
+fn say_summary(console: Console, made: usize, left_out: usize, failed: usize) {
+    let mut summary = match made {
+        0 => "no mask made".to_owned(),
+        made => format!("{} made", count_of(made as u64, "mask")),
+    };
+    for (count, what) in [(failed, "failed"), (left_out, "left out")] {
+        if count > 0 {
+            summary += &format!(", {count} {what}");
+        }
+    }
+    summary += match (made, left_out + failed) {
+        (0, _) => ": see above",
+        (_, 0) => "; look at each preview",
+        _ => ": see above; look at each preview",
+    };
+    let event = Event::Done(Done::Masks {
+        made: made as u64,
+        left_out: left_out as u64,
+        failed: failed as u64,
+        summary: summary.clone(),
+    });
+    console.say(&summary, &event);
+}
+
 /// Prints the warnings about one mask, its files and its size.
 fn print(output: &MaskOutput, console: Console) {
     let id = &output.recording;
     for notice in &output.notices {
-        console.warn(&format!("{id}: {}", notice.text()));
+        console.warn_in(id, notice.text());
     }
     for warning in &output.record.warnings {
-        console.warn(&format!("{id}: {warning}"));
+        console.warn_in(id, warning);
     }
     let (source, result) = (&output.record.source, &output.record.result);
     let found = result.statistics;
@@ -133,7 +174,7 @@ fn print(output: &MaskOutput, console: Console) {
     );
     let path = |path: &Path| path.to_string_lossy().into_owned();
     let event = Event::Mask {
-        recording: id.clone(),
+        session: id.clone(),
         mask: path(&output.files.mask),
         record: path(&output.files.record),
         preview: path(&output.files.preview),

@@ -323,8 +323,9 @@ fn each_session_of_a_folder_gets_its_mask_and_a_failing_one_stops_no_other() {
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
     let kinds: Vec<_> = events.iter().map(|event| event["event"].clone()).collect();
-    assert_eq!(kinds, ["mask", "error", "mask"]);
-    assert_eq!(events[0]["recording"], names[0]);
+    assert_eq!(kinds, ["mask", "error", "mask", "done"]);
+    assert_eq!(events[0]["session"], names[0]);
+    assert_eq!(events[1]["session"], names[1]);
 }
 
 #[test]

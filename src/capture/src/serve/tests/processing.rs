@@ -18,7 +18,7 @@ const BUST: &str = "20261120T102000Z-bust-short";
 /// A mask that fits, and an extraction: what the programs leave and say.
 const MASK: &str = r#"printf png > "$1/mask.png"; echo '{"event":"mask"}'"#;
 const FITS: &str = r#"echo '{"event":"check","report":{"verdict":"fits","reasons":[]}}'"#;
-const GOOD: &str = r#"echo '{"event":"extracted","session":{"samples":1500,"quality":{"verdict":"good","reasons":[]}}}'"#;
+const GOOD: &str = r#"echo '{"event":"extracted","session":"x","entry":{"samples":1500,"quality":{"verdict":"good","reasons":[]}}}'"#;
 /// Waits until the file `go` appears beside the script. It starts no other program meanwhile: a shell that is held
 /// while it does so waits for that program, and does not count as stopped.
 const WAIT: &str = r#"echo $$ > "$here/pid"; while [ ! -e "$here/go" ]; do :; done"#;

@@ -15,13 +15,14 @@ const UNLISTED: &str = "dataset.json does not list it";
 /// The problems with the list of sessions and shards, with reports, and with unlisted files.
 pub(super) fn check(out: &Path, dataset: &Dataset) -> Result<Vec<VerifyProblem>, ShardError> {
     let mut problems = entries(dataset);
-    for report in dataset
-        .sessions
-        .iter()
-        .filter_map(|session| session.report.as_ref())
-    {
-        if let Err(error) = report.check(out) {
-            problems.push(about(&report.file, with_causes(&error)));
+    for session in &dataset.sessions {
+        if let Some(report) = &session.report
+            && let Err(error) = report.check(out)
+        {
+            problems.push(VerifyProblem {
+                session: Some(session.id.clone()),
+                ..about(&report.file, with_causes(&error))
+            });
         }
     }
     problems.extend(unlisted(out, dataset)?);
@@ -41,6 +42,7 @@ pub(super) fn only_shard<'a>(
 
 fn about(file: &str, what: String) -> VerifyProblem {
     VerifyProblem {
+        session: None,
         file: file.to_owned(),
         sample: None,
         what,

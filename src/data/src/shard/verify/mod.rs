@@ -35,6 +35,8 @@ pub struct VerifyReport {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct VerifyProblem {
+    /// The session, if it is known.
+    pub session: Option<String>,
     /// The file, or the folder of images, relative to the data set.
     pub file: String,
     /// The key of the sample, `<session>/<kkkk>`, if the problem concerns one.

@@ -113,6 +113,11 @@ impl<'a> SessionCheck<'a> {
     pub(super) fn note_in(&mut self, file: &str, index: Option<u32>, what: String) {
         let sample = index.map(|index| sample_key(&self.session.id, index));
         let file = file.to_owned();
-        self.problems.push(VerifyProblem { file, sample, what });
+        self.problems.push(VerifyProblem {
+            session: Some(self.session.id.clone()),
+            file,
+            sample,
+            what,
+        });
     }
 }
