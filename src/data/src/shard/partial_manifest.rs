@@ -148,14 +148,16 @@ pub struct Merged {
     pub tasks: u32,
     /// Recordings that hold too little of a turn: name and reason.
     pub left_out: Vec<(String, String)>,
+    /// Recordings that could not be extracted: name and reason.
+    pub failed: Vec<(String, String)>,
 }
 
 /// Joins the pieces in the data set `out` and writes its `dataset.json`: the same bytes as one run over all
-/// recordings writes. It can be repeated, and changes nothing else. `length` is that of a file of the data set, or of
+/// recordings writes, also where some of them fail. It can be repeated, and changes nothing else. `length` is that of a file of the data set, or of
 /// anything for a folder of images, or an error where there is none.
 ///
 /// # Errors
-/// [`ShardError::PartialManifests`] if a task or a recording is missing, failed, or is there twice, if tasks saw
+/// [`ShardError::PartialManifests`] if a task or a recording is missing or is there twice, if all failed, if tasks saw
 /// different recordings or settings, or a file is missing; then nothing is written.
 /// [`ShardError::Locked`] while a task is running, [`ShardError::Description`], [`ShardError::Io`].
 pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Merged, ShardError> {
@@ -166,6 +168,10 @@ pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Mer
     if let Some(merged) = &merged {
         problems.extend(missing_files(&merged.dataset, length));
         problems.extend(not_of_a_task(out, &merged.dataset)?);
+        if merged.dataset.sessions.is_empty() {
+            let failed = merged.failed.iter();
+            problems.extend(failed.map(|(name, why)| format!("{name}: {why}")));
+        }
     }
     match merged.filter(|_| problems.is_empty()) {
         Some(merged) => {
@@ -258,7 +264,7 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
         problems.push(format!("no piece of task {}", missing.join(", ")));
     }
     let mut dataset = Dataset::new(first.dataset.settings.clone());
-    let mut left_out = Vec::new();
+    let (mut left_out, mut failed) = (Vec::new(), Vec::new());
     for (position, name) in first.recordings.iter().enumerate() {
         let task = (position % first.count as usize) as u32;
         let Some(piece) = by_task.get(&task) else {
@@ -269,7 +275,7 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
                 "task {task} lacks {name}: run it again with --resume"
             )),
             Some(TaskOutcome::Failed { why }) => {
-                problems.push(format!("task {task} failed with {name}: {why}"));
+                failed.push((name.clone(), format!("task {task} failed with it: {why}")));
             }
             Some(TaskOutcome::LeftOut { why }) => left_out.push((name.clone(), why.clone())),
             Some(TaskOutcome::Extracted { session }) => {
@@ -295,6 +301,7 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
         dataset,
         tasks: first.count,
         left_out,
+        failed,
     })
 }
 

@@ -165,6 +165,12 @@ fn task(
         })
         .transpose()
     };
+    if let Some(index) = number("JOB_COMPLETION_INDEX")? {
+        // Kubernetes does not say how many there are, and each of them would extract everything.
+        return Err(format!(
+            "this is number {index} of an indexed job: give --task $(JOB_COMPLETION_INDEX)/N, or --task 0/1 for all recordings"
+        ));
+    }
     let Some(index) = number("SLURM_ARRAY_TASK_ID")? else {
         return Ok(None);
     };
@@ -282,6 +288,7 @@ mod tests {
             ("--task 0/0", &[]),
             ("", &[("SLURM_ARRAY_TASK_ID", "0")]),
             ("", &[("SLURM_ARRAY_TASK_ID", "x")]),
+            ("", &[("JOB_COMPLETION_INDEX", "2")]),
         ] {
             assert!(asked(line, variables).is_err(), "{line} {variables:?}");
         }

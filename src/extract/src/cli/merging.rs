@@ -23,12 +23,16 @@ pub(crate) fn merge_tasks(console: Console, out: &Path) -> Result<Outcome, Extra
             },
         );
     }
+    for (name, why) in &merged.failed {
+        let error = ExtractError::Refused(why.clone());
+        console.error_in(Path::new(name), None, &error);
+    }
     let from = MergedFrom {
         tasks: merged.tasks.into(),
         datasets: 0,
     };
     let outcome = report(console, out, &merged.dataset, &from);
-    if merged.left_out.is_empty() {
+    if merged.left_out.is_empty() && merged.failed.is_empty() {
         Ok(outcome)
     } else {
         Ok(Outcome::Partial)

@@ -24,7 +24,7 @@ fn main() -> ExitCode {
         killed::a_kill_at_any_moment_leaves_only_whole_files_and_resume_ends_in_the_same_bytes,
         tasks::tasks_at_the_same_time_and_a_merge_make_the_same_data_set_as_one_run,
         tasks::a_task_that_is_missing_or_was_killed_is_named_and_nothing_is_written,
-        tasks::doubles_failures_and_tasks_of_different_inputs_are_refused,
+        tasks::a_merge_names_what_failed_and_refuses_tasks_of_different_inputs,
         tasks::a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed,
         tasks::a_task_without_recordings_says_so,
     ];

@@ -60,7 +60,7 @@ pub(crate) fn a_task_that_is_missing_or_was_killed_is_named_and_nothing_is_writt
     workshop.errors(0, "merge out");
 }
 
-pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
+pub(crate) fn a_merge_names_what_failed_and_refuses_tasks_of_different_inputs() {
     let workshop = workshop();
     fs::create_dir(workshop.path("x")).unwrap();
     fs::copy(workshop.path("a.mkv"), workshop.path("x/a.mkv")).unwrap();
@@ -68,13 +68,16 @@ pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
         let line = format!("a.mkv x/a.mkv {SETTINGS} -o twice --task {index}/2");
         workshop.errors(code, &line);
     }
-    let errors = workshop.errors(1, "merge twice");
-    assert!(errors.contains("task 1 failed with a.mkv"), "{errors}");
+    // The first is there, and the other is named.
+    let errors = workshop.errors(3, "merge twice");
+    assert!(errors.contains("a.mkv"), "{errors}");
+    assert!(workshop.path("twice/dataset.json").exists());
 
     fs::write(workshop.path("bad.mkv"), "no video").unwrap();
     workshop.errors(1, &format!("bad.mkv {SETTINGS} -o bad --task 0/1"));
     let errors = workshop.errors(1, "merge bad");
-    assert!(errors.contains("task 0 failed with bad.mkv"), "{errors}");
+    assert!(errors.contains("bad.mkv"), "{errors}");
+    assert!(!workshop.path("bad/dataset.json").exists());
 
     workshop.errors(0, &part(0, 2));
     workshop.errors(0, &format!("b.mkv d.mkv {SETTINGS} -o out --task 1/2"));
