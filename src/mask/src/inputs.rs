@@ -65,9 +65,8 @@ impl MaskInputs {
     pub fn find(inputs: &[PathBuf], target: Option<&MaskTarget>) -> Self {
         let mut found = Self::default();
         for input in inputs {
-            match found.search(input, target) {
-                Ok(()) => {}
-                Err(error) => found.faults.push((input.clone(), error)),
+            if let Err(error) = found.search(input, target) {
+                found.faults.push((input.clone(), error));
             }
         }
         found.are_several |= found.recordings.len() > 1;
