@@ -42,6 +42,7 @@ mod texture;
 mod transfer;
 mod turn;
 mod vectors;
+pub(crate) mod view;
 
 pub use error::SynthError;
 pub use geometry::GBuffer;

@@ -3,8 +3,8 @@
 //! | module | concern |
 //! | --- | --- |
 //! | `engine` | any run: a [`relight_photo::nets::Graph`] on tensors, the optimiser, checkpoints, the log, what ends a run |
-//! | `tasks` | what is trained: `decompose_task` (photographs), `turn_task` (turns), `paper_task` (the paper's phases); their losses, `low_rank` |
-//! | `data` | `photographs` lit on the device, `turn_samples`, `validation` |
+//! | `tasks` | what is trained: `decompose_task` (photographs), `turn_task` (turns), `paper_task` (the paper's phases); their losses, `low_rank`, `validation` |
+//! | `data` | `photographs` lit on the device, `turn_samples` |
 //! | `distributed` | several processes: their ranks, sums over them |
 //! | `settings` | [`RunSettings`] and others, in TOML |
 
@@ -26,21 +26,21 @@ pub use engine::checkpoint::{CHECKPOINT, Checkpoint};
 pub use engine::cuda::cuda_device;
 pub use engine::memory::keep_memory;
 pub use engine::metrics_log::{MetricsLog, TABLE};
-pub use engine::model::{ComputePrecision, Model};
+pub use engine::model::Model;
 pub use engine::run::{Run, RunOutcome, TrainObserver};
 pub use engine::task::{Resources, StepLosses, TrainingTask, Validation};
+pub use engine::terms::LossTerms;
 pub use engine::trainable::Trainable;
 pub use error::TrainError;
 pub use settings::{
-    DataSettings, DecomposeSettings, PaperLossCoefficients, PaperSettings, RunSettings,
-    TransferSettings, TurnNetworkSettings, TurnSettings, read_settings,
+    ComputePrecision, DataSettings, DecomposeLossCoefficients, DecomposeSettings,
+    PaperLossCoefficients, PaperPhase, PaperSettings, RunSettings, TransferSettings,
+    TurnNetworkSettings, TurnSettings, read_settings,
 };
-pub use tasks::decompose::{AnsweredTensors, DecomposeLossCoefficients};
+pub use tasks::decompose::AnsweredTensors;
 pub use tasks::decompose_task::DecomposeTask;
 pub use tasks::paper_networks::PaperInputs;
-pub use tasks::paper_phases::PaperPhase;
 pub use tasks::paper_task::PaperTask;
-pub use tasks::terms::LossTerms;
 pub use tasks::turn_task::TurnNetworkTask;
 
 /// The examples of the README, so that they are built.

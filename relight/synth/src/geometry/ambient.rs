@@ -74,8 +74,8 @@ fn cosine_direction(normal: Vec3, number: u32, count: u32, turn: f32) -> Vec3 {
 mod tests {
     use super::*;
     use crate::mesh::{Mesh, RawMesh};
-    use crate::samples::view::Projection;
     use crate::shape::ShapeKind;
+    use crate::view::Projection;
     use glam::Affine3A;
 
     #[test]

@@ -4,7 +4,7 @@ use glam::{Affine3A, DVec4, Mat3, Vec2, Vec3, Vec4};
 
 use super::raster::{NOTHING, Projected, Triangle, Weights, foremost};
 use crate::mesh::{Mesh, OwnSurface, blended};
-use crate::samples::view::Projection;
+use crate::view::Projection;
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, YUp};
 
@@ -284,8 +284,8 @@ fn lift(point: Vec3, weights: Weights, places: [Vec3; 3], normals: [Vec3; 3]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::samples::view::Pose;
     use crate::shape::ShapeKind;
+    use crate::view::Pose;
 
     fn ball(projection: Projection, size: u32) -> GBuffer {
         let mesh = ShapeKind::Sphere.build(0);

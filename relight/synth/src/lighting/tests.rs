@@ -7,9 +7,9 @@ use glam::{Affine3A, Quat, Vec3};
 use super::*;
 use crate::geometry::{GBuffer, Occluder};
 use crate::mesh::{Mesh, RawMesh};
-use crate::samples::view::Projection;
 use crate::shape::ShapeKind;
 use crate::vectors::direction;
+use crate::view::Projection;
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{Direction, Panorama, Rotation, basis};
 

@@ -98,8 +98,8 @@ impl Octave {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::samples::view::{Pose, Projection};
     use crate::shape::ShapeKind;
+    use crate::view::{Pose, Projection};
 
     /// Normals of a plane that leans as the height field says.
     #[test]

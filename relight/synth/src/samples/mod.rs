@@ -7,4 +7,3 @@ pub(crate) mod object;
 pub(crate) mod png;
 pub(crate) mod recipe;
 pub(crate) mod sample;
-pub(crate) mod view;

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::view::{Pose, Projection};
 use crate::lighting::SyntheticScene;
 use crate::shape::ShapeKind;
+use crate::view::{Pose, Projection};
 
 /// Where an object comes from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

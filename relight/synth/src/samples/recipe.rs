@@ -9,7 +9,6 @@ use super::camera::CameraModel;
 use super::finish::Finish;
 use super::object::{ObjectSource, SyntheticView};
 use super::sample::{Description, SynthSample};
-use super::view::{Pose, Projection};
 use crate::SynthError;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::Library;
@@ -17,6 +16,7 @@ use crate::lighting::{LightKind, Lighting, Material, SyntheticScene};
 use crate::mesh::Mesh;
 use crate::random::{Random, stream};
 use crate::shape::ShapeKind;
+use crate::view::{Pose, Projection};
 
 /// Rays a pixel by which a scene learns how much of the sky it sees.
 pub(crate) const AMBIENT_RAYS: u32 = 16;

@@ -8,10 +8,10 @@ use super::camera::CameraModel;
 use super::finish::Finish;
 use super::object::{ObjectSource, SyntheticView};
 use super::png::{Sixteen, encode_sixteen};
-use super::view::{Pose, Projection};
 use crate::SynthError;
 use crate::geometry::GBuffer;
 use crate::lighting::{Lighting, Material, Panoramas, Shaded};
+use crate::view::{Pose, Projection};
 use relight_core::light::{Order, ShLight};
 
 /// All that a sample was made of.

@@ -14,8 +14,8 @@ use crate::lighting::{
 };
 use crate::made_panoramas;
 use crate::mesh::Mesh;
-use crate::samples::view::{Pose, Projection};
 use crate::shape::ShapeKind;
+use crate::view::{Pose, Projection};
 
 fn recipe() -> TransferRecipe {
     TransferRecipe {

@@ -8,7 +8,7 @@ use crate::samples::finish::Finish;
 use crate::samples::object::ObjectSource;
 use crate::samples::recipe::Recipe;
 use crate::samples::sample::Whites;
-use crate::samples::view::{Pose, Projection};
+use crate::view::{Pose, Projection};
 
 /// How turns are made.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use crate::mesh::Mesh;
 use crate::random::Random;
 use crate::samples::object::ObjectSource;
 use crate::samples::recipe::Recipe;
-use crate::samples::view::{Pose, Projection};
+use crate::view::{Pose, Projection};
 
 /// The plate's radius, in halves of the picture's width.
 const PLATE: f32 = 2.5;

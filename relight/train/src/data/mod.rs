@@ -1,8 +1,7 @@
-//! What networks learn from and are validated by: photographs lit on the device, views of turns, contact sheets.
+//! What networks learn from: photographs lit on the device, views of turns.
 
-pub(crate) mod contact_sheet;
 pub(crate) mod photographs;
 pub(crate) mod sample;
+pub(crate) mod symmetry;
 pub(crate) mod turn_reader;
 pub(crate) mod turn_samples;
-pub(crate) mod validation;

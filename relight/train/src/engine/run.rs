@@ -12,15 +12,15 @@ use std::time::{Duration, Instant};
 
 use relit_data::causes::with_causes;
 
+use super::all_reduced::AllReducedLosses;
 use super::checkpoint::Checkpoint;
 use super::divergence_guard::DivergenceGuard;
 use super::metrics_log::MetricsLog;
 use super::task::{StepLosses, TrainingTask, Validation};
-use crate::distributed::all_reduced::AllReducedLosses;
+use crate::distributed::agreement::{Fact, agree, fingerprint};
 use crate::distributed::process_group::ProcessGroup;
 use crate::error::TrainError;
 use crate::settings::RunSettings;
-use crate::tasks::agreement::{Fact, agree, fingerprint};
 use relight_photo::nets::WeightPrecision;
 
 /// How long a process waits for process 0 to write its checkpoint and end, where the run ends early. No longer, as process 0 can

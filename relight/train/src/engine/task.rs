@@ -6,10 +6,10 @@ use std::sync::atomic::AtomicBool;
 
 use tch::Device;
 
+use super::terms::LossTerms;
 use super::trainable::Trainable;
 use crate::distributed::process_group::ProcessGroup;
 use crate::error::TrainError;
-use crate::tasks::terms::LossTerms;
 use relight_synth::LeftOut;
 
 /// Where a run is computed, and with how many threads.

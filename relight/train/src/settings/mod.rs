@@ -5,10 +5,14 @@
 //! | `run` | how long and how fast a network learns: `[run]` |
 //! | `data` | composed samples and turns: `[data]`, `[turns]` |
 //! | `transfer` | views and rooms of the network of turns: its `[data]` |
+//! | `loss`, `paper_phase`, `precision` | loss coefficients; the paper's phases; the precision of a run |
 //! | `file` | reading TOML, and how the settings of two runs differ |
 
 mod data;
 mod file;
+mod loss;
+mod paper_phase;
+mod precision;
 mod run;
 #[cfg(test)]
 mod tests;
@@ -21,12 +25,13 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::error::TrainError;
-use super::tasks::decompose::DecomposeLossCoefficients;
-use super::tasks::paper_phases::PaperPhase;
 
 pub use data::{DataSettings, TurnSettings};
 pub(super) use file::first_difference;
 pub use file::read_settings;
+pub use loss::DecomposeLossCoefficients;
+pub use paper_phase::PaperPhase;
+pub use precision::ComputePrecision;
 pub use run::RunSettings;
 pub use transfer::TransferSettings;
 

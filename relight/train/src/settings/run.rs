@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{positive, within};
-use crate::engine::model::ComputePrecision;
+use super::{ComputePrecision, positive, within};
 use crate::error::TrainError;
 
 // Nobody trains more: these keep a slip of the pen from filling the memory.

@@ -2,13 +2,13 @@
 
 use tch::Tensor;
 
+use super::contact_sheet::validation_sheet;
 use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
-use super::losses::{angular_degrees, relative_distance, scale_invariant, windowed};
-use crate::data::contact_sheet::validation_sheet;
+use super::validation::{HeldOutSamples, highlight_figures};
 use crate::data::photographs::Photographs;
 use crate::data::sample::TruthBatch;
-use crate::data::validation::{HeldOutSamples, highlight_figures};
 use crate::distributed::process_group::ProcessGroup;
+use crate::engine::losses::{angular_degrees, relative_distance, scale_invariant, windowed};
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;

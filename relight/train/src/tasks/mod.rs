@@ -1,15 +1,13 @@
 //! What is trained, and by which losses: the network of photographs, the network of turns, the paper's phases.
 
-pub(crate) mod agreement;
+pub(crate) mod contact_sheet;
 pub(crate) mod decompose;
 pub(crate) mod decompose_task;
-pub(crate) mod losses;
 pub(crate) mod low_rank;
 pub(crate) mod paper_layers;
 pub(crate) mod paper_networks;
 pub(crate) mod paper_phases;
 pub(crate) mod paper_task;
 pub(crate) mod shadow_vs_paint;
-pub(crate) mod symmetry;
-pub(crate) mod terms;
 pub(crate) mod turn_task;
+pub(crate) mod validation;

@@ -5,19 +5,19 @@ use std::path::PathBuf;
 
 use tch::{Device, Tensor};
 
-use super::losses::angular_degrees;
 use super::low_rank::chromaticity;
 use super::paper_phases::{
-    PaperPhase, TruthLoss, diffuse_chromaticity, diffuse_of_truth, highlight_of, light_on_truth,
+    TruthLoss, diffuse_chromaticity, diffuse_of_truth, highlight_of, light_on_truth,
     normal_on_truth, normals_of, reflectance, reflectance_on_turns, saturated_frames,
     spec_on_truth, spec_on_turns, specular_on_turns,
 };
+use super::validation::{highlight_figures, rank_residual};
 use crate::data::sample::TruthBatch;
 use crate::data::turn_reader::TurnTensors;
-use crate::data::validation::{highlight_figures, rank_residual};
+use crate::engine::losses::angular_degrees;
 use crate::engine::model::Model;
 use crate::error::TrainError;
-use crate::settings::PaperSettings;
+use crate::settings::{PaperPhase, PaperSettings};
 use relight_photo::nets::paper::{Head, light_net, normal_net, reflectance_net, spec_net};
 use relight_photo::nets::{Graph, Weights};
 

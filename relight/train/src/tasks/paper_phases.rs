@@ -14,7 +14,6 @@
 use tch::Tensor;
 
 use super::decompose::{FULL_HIGHLIGHT, HIGHLIGHT_EMPHASIS, spread};
-use super::losses::{Mean, angular, scale_invariant};
 use super::low_rank::{chromaticity, low_rank_loss};
 use super::paper_layers::{
     answered_gloss, answered_light, diffuse_shading, network_input, normals_of_slopes,
@@ -22,6 +21,7 @@ use super::paper_layers::{
 };
 use crate::data::sample::TruthBatch;
 use crate::data::turn_reader::TurnTensors;
+use crate::engine::losses::{Mean, angular, scale_invariant};
 use crate::engine::model::Model;
 use crate::error::TrainError;
 use relight_core::render::DiffuseForm;
@@ -32,63 +32,6 @@ const DARKEST: f64 = 1e-5;
 const TINY: f64 = 1e-6;
 /// Shading below this is not divided by.
 const MIN_SHADING: f64 = 0.02;
-
-/// A phase of the paper's training.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PaperPhase {
-    /// Spec-Net.
-    Spec,
-    /// Normal-Net's warm-up.
-    Normal,
-    /// Light-Net, with Normal-Net as it is.
-    Light,
-    /// Normal-Net, with Light-Net as it is.
-    Joint,
-    /// Specular reflectance and smoothness.
-    Specular,
-}
-
-impl PaperPhase {
-    /// Its name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Spec => "spec",
-            Self::Normal => "normal",
-            Self::Light => "light",
-            Self::Joint => "joint",
-            Self::Specular => "specular",
-        }
-    }
-
-    /// The learning rate where settings name none: the paper's, 1e-6 in both rounds of joint training (`light` and `joint`)
-    /// and 1e-4 for what is trained apart.
-    #[must_use]
-    pub fn default_learning_rate(self) -> f64 {
-        match self {
-            Self::Light | Self::Joint => 1e-6,
-            Self::Spec | Self::Normal | Self::Specular => 1e-4,
-        }
-    }
-
-    /// Whether there are figures of how well it does on turns.
-    #[must_use]
-    pub fn is_judged_by_turns(self) -> bool {
-        matches!(self, Self::Spec | Self::Light | Self::Joint)
-    }
-
-    /// Whether turns teach it anything.
-    #[must_use]
-    pub fn learns_from_turns(self) -> bool {
-        self != Self::Normal
-    }
-
-    /// Whether it cannot do without turns.
-    #[must_use]
-    pub fn needs_turns(self) -> bool {
-        matches!(self, Self::Light | Self::Joint | Self::Specular)
-    }
-}
 
 /// Spec-Net's highlight, linear, 3 channels of 0..=1.
 ///
@@ -362,7 +305,7 @@ pub(crate) fn specular_on_turns(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::model::ComputePrecision;
+    use crate::settings::ComputePrecision;
     use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
     use relight_photo::nets::{Graph, Weights};
     use tch::{Device, Kind};
@@ -460,7 +403,7 @@ mod tests {
         let mask = Tensor::ones([frames, 1, side, side], place);
         let residual = |picture: &Tensor| {
             let reflectance = picture / &shading;
-            crate::data::validation::rank_residual(&reflectance, &mask).unwrap()
+            super::super::validation::rank_residual(&reflectance, &mask).unwrap()
         };
         let (linear, file) = (residual(&picture), residual(&to_srgb(&picture).unwrap()));
         assert!(linear < 1e-6 && file > 0.002, "{linear} {file}");

@@ -4,18 +4,17 @@ use std::path::PathBuf;
 
 use tch::{Kind, Tensor};
 
-use super::agreement::fingerprint;
-use super::losses::Mean;
 use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed};
-use super::paper_phases::PaperPhase;
+use super::validation::{HeldOutSamples, HeldOutTurns};
 use crate::data::photographs::Photographs;
 use crate::data::turn_reader::{TurnGroup, TurnReader};
-use crate::data::validation::{HeldOutSamples, HeldOutTurns};
+use crate::distributed::agreement::fingerprint;
 use crate::distributed::process_group::{ProcessGroup, indivisible};
+use crate::engine::losses::Mean;
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
-use crate::settings::{PaperSettings, first_difference};
+use crate::settings::{PaperPhase, PaperSettings, first_difference};
 use relight_core::reader::Rank;
 use relight_synth::{LeftOut, stream};
 

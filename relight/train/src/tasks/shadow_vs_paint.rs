@@ -5,7 +5,7 @@
 
 use tch::Tensor;
 
-use super::losses::Mean;
+use crate::engine::losses::Mean;
 use crate::error::TrainError;
 
 /// Keeps logarithms of dark values finite.

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use tch::{Kind, Tensor, no_grad};
 
-use super::losses::{Mean, angular_degrees, chord};
-use super::terms::LossTerms;
 use crate::data::turn_samples::{TurnBatch, TurnViews};
 use crate::distributed::process_group::{ProcessGroup, indivisible};
+use crate::engine::losses::{Mean, angular_degrees, chord};
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};
+use crate::engine::terms::LossTerms;
 use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
 use crate::settings::{TurnNetworkSettings, first_difference};

@@ -8,8 +8,8 @@ use tch::Tensor;
 use super::camera::{Photographed, percentile};
 use super::lit::{Lit, PlannedPhoto, upload};
 use crate::data::sample::TruthBatch;
+use crate::data::symmetry::Symmetry;
 use crate::error::TrainError;
-use crate::tasks::symmetry::Symmetry;
 
 /// The power of the encoded colour.
 const ENCODED: f64 = 1.0 / 2.2;

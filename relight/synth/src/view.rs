@@ -4,9 +4,9 @@
 use glam::{Affine3A, Mat3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::Mesh;
-use crate::random::Random;
-use crate::shape::ShapeKind;
+use super::mesh::Mesh;
+use super::random::Random;
+use super::shape::ShapeKind;
 
 /// How points become places in the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crc::{CRC_64_XZ, Crc};
 use tch::{Kind, Tensor};
 
-use crate::distributed::process_group::ProcessGroup;
+use super::process_group::ProcessGroup;
 use crate::error::TrainError;
 
 const HASH: Crc<u64> = Crc::<u64>::new(&CRC_64_XZ);

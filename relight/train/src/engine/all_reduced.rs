@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use tch::Tensor;
 
-use super::process_group::ProcessGroup;
-use crate::engine::task::StepLosses;
+use super::task::StepLosses;
+use crate::distributed::process_group::ProcessGroup;
 use crate::error::TrainError;
 
 /// The losses of a step, the same in every process.

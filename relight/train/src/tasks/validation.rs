@@ -6,11 +6,11 @@ use std::path::Path;
 
 use tch::{Device, Kind, Tensor, no_grad};
 
-use super::sample::{Linearisation, TruthArrays, TruthBatch};
-use super::turn_reader::{TurnReader, TurnTensors, no_frames};
+use super::low_rank::rank_one;
+use super::paper_phases::equal_rows;
+use crate::data::sample::{Linearisation, TruthArrays, TruthBatch};
+use crate::data::turn_reader::{TurnReader, TurnTensors, no_frames};
 use crate::error::TrainError;
-use crate::tasks::low_rank::rank_one;
-use crate::tasks::paper_phases::equal_rows;
 use relight_synth::{Library, Recipe, stream};
 
 /// Batches of turns that are kept.

@@ -2,9 +2,9 @@
 
 use tch::{Kind, Tensor};
 
-use super::sample::TruthBatch;
+use super::decompose::AnsweredTensors;
+use crate::data::sample::TruthBatch;
 use crate::error::TrainError;
-use crate::tasks::decompose::AnsweredTensors;
 
 /// The first samples of a batch as PNG, a row each: the picture; albedo, shading, normals and highlight, the ground truth left of
 /// each answer. Albedo and shading in the scale that suits the ground truth best.
