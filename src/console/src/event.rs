@@ -117,7 +117,7 @@ pub enum Event {
     Total {
         done: u64,
         of: u64,
-        /// Until all are done, about; not known before one is extracted.
+        /// Until all are done, about; not known before one was worked on.
         seconds_left: Option<u64>,
     },
     Problem {

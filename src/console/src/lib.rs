@@ -35,12 +35,14 @@ mod event;
 mod manual;
 mod options;
 mod progress;
+mod totals;
 
 pub use duration::in_words;
 pub use event::{Check, Done, Event};
 pub use manual::written_manual;
 pub use options::ConsoleOptions;
 pub use progress::ProgressBar;
+pub use totals::RunTotals;
 
 /// The outcome of a command that ran to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,14 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use relit_console::{Console, Done, Event, Outcome, ProgressBar, in_words};
+use relit_console::{Console, Done, Event, Outcome, ProgressBar, RunTotals};
 use relit_data::causes::with_causes;
 use relit_data::counts::count_of;
 use relit_data::shard::SessionEntry;
 use relit_extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract};
 use serde_json::json;
-
-use super::totals::RunTotals;
 
 pub(crate) fn run(
     console: Console,
@@ -23,7 +21,7 @@ pub(crate) fn run(
         console,
         out,
         bar: Mutex::new(ProgressBar::hidden()),
-        totals: Mutex::new(RunTotals::new(Instant::now())),
+        totals: Mutex::new(RunTotals::new(0, Instant::now())),
     };
     if let Some(task) = options.task {
         // It may be the scheduler's variables that say so.
@@ -170,35 +168,11 @@ impl Reporter<'_> {
             },
         );
     }
-
-    /// Says how far all recordings have come, where there are several.
-    fn say_total(&self, was_extracted: bool) {
-        let (done, of, left) = {
-            let mut totals = self.totals();
-            totals.ended(was_extracted, Instant::now());
-            (totals.done, totals.of, totals.left())
-        };
-        if of < 2 {
-            return;
-        }
-        let until = match left {
-            Some(left) if done < of => format!(", about {} left", in_words(left)),
-            _ => String::new(),
-        };
-        self.console.say_phase(
-            &format!("{done} of {of} recordings done{until}"),
-            &Event::Total {
-                done,
-                of,
-                seconds_left: left.map(|left| left.as_secs()),
-            },
-        );
-    }
 }
 
 impl Observer for Reporter<'_> {
     fn planned(&self, recordings: usize) {
-        self.totals().of = recordings as u64;
+        *self.totals() = RunTotals::new(recordings as u64, Instant::now());
     }
 
     fn started(&self, session: &str, samples: u32) {
@@ -226,7 +200,10 @@ impl Observer for Reporter<'_> {
             RecordingOutcome::Failed(error) => self.console.error_in(input, session, error),
         }
         if session.is_some() {
-            self.say_total(matches!(outcome, RecordingOutcome::Extracted(_)));
+            let was_extracted = matches!(outcome, RecordingOutcome::Extracted(_));
+            let mut totals = self.totals();
+            totals.ended(was_extracted, Instant::now());
+            totals.say(self.console);
         }
     }
 }

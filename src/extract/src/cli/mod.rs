@@ -5,7 +5,6 @@ mod converting;
 mod extracting;
 mod merging;
 mod stats;
-mod totals;
 mod verifying;
 
 use std::path::Path;

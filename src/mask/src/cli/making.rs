@@ -2,8 +2,9 @@
 
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Instant;
 
-use relit_console::{Console, Done, Event, Outcome};
+use relit_console::{Console, Done, Event, Outcome, RunTotals};
 use relit_data::counts::count_of;
 use relit_data::session::recording_name;
 use relit_mask::{MaskInputs, MaskOutput, MaskingError, edit, make_mask};
@@ -92,10 +93,13 @@ fn make(
     let found = says_left_out(&inputs, console);
     let paths = std::mem::take(&mut inputs.recordings);
     let bar = console.progress(paths.len() as u64, "masks");
+    let mut totals = RunTotals::new(paths.len() as u64, Instant::now());
     let mut failed = 0;
     for path in &paths {
         let files = inputs.files_of(path, arguments.output.as_ref());
-        match files.and_then(|files| make_mask(path, files, &request)) {
+        let made = files.and_then(|files| make_mask(path, files, &request));
+        totals.ended(made.is_ok(), Instant::now());
+        match made {
             Ok(output) => bar.suspend(|| print(&output, console)),
             Err(error) if paths.len() == 1 && found == Outcome::Success => return Err(error),
             Err(error) => {
@@ -105,6 +109,7 @@ fn make(
             }
         }
         bar.inc(1);
+        bar.suspend(|| totals.say(console));
     }
     bar.finish_and_clear();
     if paths.len() > 1 || found != Outcome::Success {

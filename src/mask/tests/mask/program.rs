@@ -322,6 +322,10 @@ fn each_session_of_a_folder_gets_its_mask_and_a_failing_one_stops_no_other() {
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
+    let (totals, events): (Vec<_>, Vec<_>) = events
+        .into_iter()
+        .partition(|event| event["event"] == "total");
+    assert_eq!(totals.len(), 3);
     let kinds: Vec<_> = events.iter().map(|event| event["event"].clone()).collect();
     assert_eq!(kinds, ["mask", "error", "mask", "done"]);
     assert_eq!(events[0]["session"], names[0]);
