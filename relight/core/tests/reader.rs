@@ -20,10 +20,11 @@ use relight_core::reader::{
 };
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
 use relit_data::shard::{
     Align, Dataset, ExtractionSettings, FrameRecord, ImageSize, Layout, Sample, ShardWriter,
 };
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 const WIDTH: u32 = 9;
 const HEIGHT: u32 = 7;

@@ -18,13 +18,6 @@ pub const SATURATION_LEVEL: u8 = 250;
 /// that level, is saturated too.
 pub const SATURATED_VALUE: f32 = (SATURATION_LEVEL as f32 - 0.5) / 255.0;
 
-/// The Spec-Net gate: highlights are separated where a larger fraction of the object's pixels is saturated, where nobody
-/// asks for another.
-///
-/// The paper, section "Specularity separation": "If the percentage exceeds 5 %, Spec-Net will be performed, otherwise
-/// the object is considered as diffuse".
-pub const SPEC_NET_GATE: f64 = 0.05;
-
 /// An image of another size than the mask that it is measured under.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the image is {}x{} pixels, but {}x{} were expected", size[0], size[1], expected[0], expected[1])]

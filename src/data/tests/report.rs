@@ -8,9 +8,10 @@ use std::f64::consts::TAU;
 
 use image::{Rgb, RgbImage};
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{Measures, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::{Measures, SATURATION_LEVEL};
 use relit_data::report::{Page, render};
 use relit_data::shard::record::FrameRecord;
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 /// A turn of a glossy object: highlights come and go with the lights.
 fn record(index: u32, frames: u32) -> FrameRecord {

@@ -125,14 +125,3 @@ fn loss_coefficients_that_teach_nothing_are_named() {
     let told = error(nothing).unwrap_err();
     assert!(told.contains("all others"), "{told}");
 }
-
-#[test]
-fn the_learning_rate_rises_and_falls() {
-    let run = RunSettings {
-        steps: 1000,
-        ..RunSettings::default()
-    };
-    assert!(run.learning_rate_at(0) < 0.02 * run.learning_rate);
-    assert!(run.learning_rate_at(120) > 0.9 * run.learning_rate);
-    assert!((run.learning_rate_at(999) / run.learning_rate - run.min_lr_ratio).abs() < 1e-3);
-}

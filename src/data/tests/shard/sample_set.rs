@@ -4,12 +4,13 @@ use std::path::Path;
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
 use relit_data::shard::{
     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
     OutputFolder, Sample, SamplingBasis, SessionEntry, SessionQuality, ShardWriter, SourceVideo,
     VerifyProblem, VerifyReport, verify,
 };
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 pub(crate) const SESSION: &str = "20261120T093015Z-mug";
 pub(crate) const SAMPLES: u32 = 14;
