@@ -116,3 +116,32 @@ fn wrong_usage(matches: &ArgMatches, fault: String) -> Error {
     }
     command.error(ErrorKind::ValueValidation, fault)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The most lines of a help without headings.
+    const SCREEN: usize = 50;
+
+    #[test]
+    fn the_options_of_every_verb_fit_together() {
+        CommandLine::command().debug_assert();
+    }
+
+    #[test]
+    fn the_help_of_every_verb_fits_a_screen_or_is_grouped_under_headings() {
+        let mut program = CommandLine::command();
+        program.build();
+        let mut waiting = vec![program];
+        while let Some(mut command) = waiting.pop() {
+            let lines = command.render_long_help().to_string().lines().count();
+            let is_grouped = command
+                .get_arguments()
+                .any(|argument| argument.get_help_heading().is_some());
+            let name = command.get_bin_name().unwrap_or_default();
+            assert!(lines <= SCREEN || is_grouped, "{name}: {lines} lines");
+            waiting.extend(command.get_subcommands().cloned());
+        }
+    }
+}

@@ -93,7 +93,9 @@ fn light_from_above_lights_the_upper_half_whichever_way_y_points_in_the_file() {
 #[test]
 fn a_rotation_into_a_folder_has_a_numbered_frame_for_each_step() {
     let scene = Scene::new();
-    let output = scene.image_of("--normals up.png --light light.txt --rotate 360 --seconds 1 --fps 5 --json -o rotation");
+    let output = scene.image_of(
+        "--normals up.png --light light.txt --rotate 360 --seconds 1 --fps 5 --json -o rotation",
+    );
     assert_eq!(code(&output), 0, "{}", errors(&output));
     let expected: Vec<_> = (0..5).map(|frame| format!("{frame:04}.png")).collect();
     assert_eq!(names_in(&scene.path("rotation")), expected);

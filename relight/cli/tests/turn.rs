@@ -337,7 +337,16 @@ fn wrong_usage_and_several_turns_are_refused() {
         assert_eq!(relight(&arguments).status.code(), Some(2));
     }
     for ball in ["90,80", "90,80,1", "90,80,20,wood"] {
-        let run = relight(&["turn", "a.tar", "-o", "out", "--session", "mug", "--light-ball", ball]);
+        let run = relight(&[
+            "turn",
+            "a.tar",
+            "-o",
+            "out",
+            "--session",
+            "mug",
+            "--light-ball",
+            ball,
+        ]);
         assert_eq!(run.status.code(), Some(2), "{ball}");
     }
     let folder = tempfile::tempdir().unwrap();

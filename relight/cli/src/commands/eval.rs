@@ -317,7 +317,8 @@ fn make(arguments: &MakeArguments, console: Console) -> CommandResult {
     })?;
     let (objects, lights) = (recipe.objects, recipe.lights);
     let text = format!("{}: {objects} objects under {lights} lights", out.display());
-    let event = json!({ "event": "relighting_set", "output": out, "objects": objects, "lights": lights });
+    let event =
+        json!({ "event": "relighting_set", "output": out, "objects": objects, "lights": lights });
     console.say(&text, &event);
     Ok(outcome)
 }

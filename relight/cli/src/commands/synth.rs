@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use relight_synth::{
-    LIBRARY_EXTENSION, Library, LibrarySources, LibrarySummary, LightKind, Recipe,
-    SynthSummary, TurnRecipe, build_library, made_panoramas, write_samples,
-    write_turns,
+    LIBRARY_EXTENSION, Library, LibrarySources, LibrarySummary, LightKind, Recipe, SynthSummary,
+    TurnRecipe, build_library, made_panoramas, write_samples, write_turns,
 };
 use relit_console::{Console, Outcome};
 use serde_json::json;

@@ -92,9 +92,7 @@ impl SceneEnvironment {
         };
         let light = given.unwrap_or_else(|| match background {
             SceneBackground::Panorama(panorama) => LightSource::Panorama(panorama.clone()),
-            SceneBackground::Picture(picture) => {
-                LightSource::from_picture(picture, scene.fov, sun)
-            }
+            SceneBackground::Picture(picture) => LightSource::from_picture(picture, scene.fov, sun),
         });
         let coefficients = light.light()?;
         let tint = scene.white_balance.tint(&coefficients);

@@ -162,8 +162,7 @@ impl<'a> Insertion<'a> {
                 _ => self.film_rotation(scene, output, format, written),
             },
             _ => {
-                let picture =
-                    scene.compose(&self.still(self.angle), &scene.layers(self.angle)?, 0);
+                let picture = scene.compose(&self.still(self.angle), &scene.layers(self.angle)?, 0);
                 write_picture(output.path, &picture)?;
                 Ok(1)
             }
@@ -223,7 +222,8 @@ impl<'a> Insertion<'a> {
         for frame in 0..frames {
             let part = f64::from(frame) / f64::from(frames);
             let angle = self.angle + (output.rotate * part).to_radians();
-            let picture = scene.compose(&self.still(angle), &scene.layers(angle)?, u64::from(frame));
+            let picture =
+                scene.compose(&self.still(angle), &scene.layers(angle)?, u64::from(frame));
             film.push(&picture.encode())?;
             written();
         }

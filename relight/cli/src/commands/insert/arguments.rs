@@ -44,7 +44,10 @@ pub(crate) struct Arguments {
     /// The background: a photograph, a panorama (HDR or EXR, twice as wide as high), or a video.
     #[arg(long, value_name = "FILE", required_unless_present = "scene")]
     into: Option<PathBuf>,
-    #[command(flatten, next_help_heading = "Objects (once for all, or once for each)")]
+    #[command(
+        flatten,
+        next_help_heading = "Objects (once for all, or once for each)"
+    )]
     object: ObjectArguments,
     #[command(flatten, next_help_heading = "Light [default: that of the background]")]
     light: LightArguments,
@@ -191,8 +194,6 @@ fn place(text: &str) -> Result<[f64; 2], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     match numbers.as_deref() {
         Ok(&[x, y]) => Ok([x, y]),
-        _ => {
-            Err("give X,Y: parts of the picture's width and height, such as 0.5,0.9".to_owned())
-        }
+        _ => Err("give X,Y: parts of the picture's width and height, such as 0.5,0.9".to_owned()),
     }
 }

@@ -143,7 +143,9 @@ impl RenderArguments {
         let order = self.order.map(|order| Order::new(order.into()));
         let order = order.transpose()?;
         let light = match self.light.read()? {
-            Some(LightSource::Panorama(panorama)) => panorama.project(order.unwrap_or(Order::RENDER))?,
+            Some(LightSource::Panorama(panorama)) => {
+                panorama.project(order.unwrap_or(Order::RENDER))?
+            }
             Some(LightSource::Lamp(lamp)) => lamp.light(order.unwrap_or(Order::RENDER)),
             Some(LightSource::Coefficients(light)) => {
                 let order = order.unwrap_or(light.order());

@@ -46,7 +46,12 @@ pub(crate) struct Arguments {
     pub(super) light: Option<PathBuf>,
     /// A ball on the table, diffuse grey or chrome, which measures the light: its middle and radius in the video, pixels, and
     /// what it is made of [default: what it looks like]. The albedo of the ball is then 1.
-    #[arg(long, value_name = "X,Y,R[,grey|chrome]", requires = "session", conflicts_with = "light")]
+    #[arg(
+        long,
+        value_name = "X,Y,R[,grey|chrome]",
+        requires = "session",
+        conflicts_with = "light"
+    )]
     light_ball: Option<LightBall>,
     /// With --light-ball: the session from which the shard was made, or its video. Needs the program ffmpeg.
     #[arg(long, value_name = "PATH", requires = "light_ball")]
