@@ -144,7 +144,7 @@ impl RenderArguments {
         let order = order.transpose()?;
         let light = match self.light.read()? {
             Some(LightSource::Panorama(panorama)) => {
-                panorama.project(order.unwrap_or(Order::RENDER))?
+                panorama.project(order.unwrap_or(Order::RENDER))
             }
             Some(LightSource::Lamp(lamp)) => lamp.light(order.unwrap_or(Order::RENDER)),
             Some(LightSource::Coefficients(light)) => {
