@@ -111,7 +111,7 @@ impl Page {
 
 fn scene(light: Value) -> Value {
     json!({
-        "size": [160, 120], "field": 60.0, "down": 10.0, "match": true, "white_balance": "light",
+        "size": [160, 120], "fov": 60.0, "down": 10.0, "match": true, "white_balance": "light",
         "exposure": 0.0,
         "light": light,
         "objects": [{
@@ -124,7 +124,7 @@ fn scene(light: Value) -> Value {
 fn light(kind: &str, turn: f64) -> Value {
     json!({
         "kind": kind, "azimuth": -40.0, "elevation": 35.0, "colour": "#ffcc99", "size": 20.0,
-        "ambient": 0.2, "turn": turn,
+        "ambient": 0.2, "angle": turn,
     })
 }
 

@@ -1,4 +1,4 @@
-//! `relight eval turn` as a user runs it, on turns that `relight synth --turn` makes.
+//! `relight eval turn` as a user runs it, on turns that `relight synth turns` makes.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,8 +22,8 @@ fn relight(arguments: &[&str]) -> Output {
 fn write_turn(folder: &Path) {
     let made = relight(&[
         "synth",
-        "--turn",
-        "--light",
+        "turns",
+        "--light-kind",
         "monte-carlo",
         "--seed",
         "12",

@@ -117,7 +117,7 @@ fn photographs_of_a_folder_are_relit_before_the_panorama_and_what_has_no_mask_is
 #[test]
 fn the_photograph_s_own_light_gives_the_photograph_back_and_exr_is_linear() {
     let folder = Folder::new();
-    let command = "relight photos/one.png --mask masks/one.png --own-light --weights w.safetensors";
+    let command = "relight photos/one.png --mask masks/one.png --light own --weights w.safetensors";
     let (code, errors) = folder.code_and_errors(&format!("{command} -o same.png"));
     assert_eq!((code, errors.as_str()), (0, ""));
     let same = image::open(folder.path("same.png")).unwrap().into_rgb8();
@@ -222,10 +222,10 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
         (
             format!("{one} --lamp 30,40 -o o.mp4"),
             2,
-            "give .png, .jpg or .exr, or --turn DEGREES",
+            "give .png, .jpg or .exr, or --rotate DEGREES",
         ),
         (
-            format!("{one} --lamp 30,40 --turn 360 -o o.png"),
+            format!("{one} --lamp 30,40 --rotate 360 -o o.png"),
             2,
             "give .mp4 or .webm",
         ),
@@ -238,6 +238,16 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
             format!("{one} --lamp 30,40 --background light -o o.png"),
             2,
             "there is no panorama",
+        ),
+        (
+            format!("{one} --light own --background light -o o.png"),
+            2,
+            "there is no panorama",
+        ),
+        (
+            format!("{one} --light own --lamp 30,40 -o o.png"),
+            2,
+            "--lamp",
         ),
     ] {
         let (found, errors) = folder.code_and_errors(&command);
@@ -297,7 +307,7 @@ fn a_video_of_which_ffmpeg_says_that_it_failed_is_not_left() {
         std::env::var("PATH").unwrap()
     );
     let command = "relight photos/one.png --mask masks/one.png --weights w.safetensors \
-                   --lamp 30,40 --turn 90 --seconds 0.1 -o turn.mp4";
+                   --lamp 30,40 --rotate 90 --seconds 0.1 -o turn.mp4";
     let output = Command::new(env!("CARGO_BIN_EXE_relight"))
         .args(command.split_whitespace())
         .env("PATH", path)
@@ -323,13 +333,13 @@ fn huge(path: &std::path::Path) {
 }
 
 #[test]
-fn a_turn_is_a_video_of_as_many_frames() {
+fn a_rotation_of_the_light_is_a_video_of_as_many_frames() {
     if Command::new("ffmpeg").arg("-version").output().is_err() {
         relit_test_support::say_skipped("the program ffmpeg is not installed");
         return;
     }
     let folder = Folder::new();
-    let command = "relight photos/one.png --mask masks/one.png --light sky.exr --turn 360 --seconds 0.5 --fps 12 \
+    let command = "relight photos/one.png --mask masks/one.png --light sky.exr --rotate 360 --seconds 0.5 --fps 12 \
                    --size 32 --weights w.safetensors --json -o turn.mp4";
     let output = folder.run(&command.split_whitespace().collect::<Vec<_>>().join(" "));
     assert!(
@@ -358,38 +368,40 @@ fn a_turn_is_a_video_of_as_many_frames() {
 #[test]
 fn objects_are_inserted_from_back_to_front_by_options_and_by_a_scene_file() {
     let folder = Folder::new();
-    let common = "--weights w.safetensors -o";
-    let options = "insert photos/one.png photos/two.png --mask masks --into sky.exr --size 96,64 --at 0.3,0.9 --at 0.7,0.9 --height 0.5";
-    let (code, errors) = folder.code_and_errors(&format!("{options} {common} options.png"));
-    assert_eq!((code, errors.as_str()), (0, ""));
-    let scene = "background = \"sky.exr\"\nsize = [96, 64]\n\
-                 [[object]]\nphoto = \"photos/one.png\"\nmask = \"masks/one.png\"\nat = [0.3, 0.9]\nheight = 0.5\n\
-                 [[object]]\nphoto = \"photos/two.png\"\nmask = \"masks/two.png\"\nat = [0.7, 0.9]\nheight = 0.5\n";
-    fs::write(folder.path("scene.toml"), scene).unwrap();
+    let scene = |head: &str| {
+        let object = |name: &str, at: f64| {
+            format!(
+                "[[object]]\nphoto = \"photos/{name}.png\"\nmask = \"masks/{name}.png\"\nat = [{at}, 0.9]\nheight = 0.5\n"
+            )
+        };
+        let text = format!("{head}\n{}{}", object("one", 0.3), object("two", 0.7));
+        fs::write(folder.path("scene.toml"), text).unwrap();
+        "--scene scene.toml"
+    };
+    let picture = |what: &str| {
+        let command = format!("insert {what} --weights w.safetensors -o o.png");
+        assert_eq!(folder.code_and_errors(&command), (0, String::new()));
+        read_planes(&folder.path("o.png")).unwrap().0
+    };
+    let by_options = picture(
+        "photos/one.png photos/two.png --mask masks --into photos/two.png --at 0.3,0.9 --at 0.7,0.9 --height 0.5",
+    );
     assert_eq!(
-        folder
-            .code_and_errors(&format!("insert --scene scene.toml {common} file.png"))
-            .0,
-        0
+        by_options,
+        picture(scene("background = \"photos/two.png\""))
     );
-    let [a, b] = ["options.png", "file.png"].map(|name| read_planes(&folder.path(name)).unwrap().0);
-    assert_eq!(a, b);
-    assert_eq!(a.extent(), Extent::new(96, 64));
+    let seen = picture(scene("background = \"sky.exr\"\nsize = [96, 64]"));
+    assert_eq!(seen.extent(), Extent::new(96, 64));
     // The sky is blue, what stands before it is not as blue.
-    assert!(a.pixel(2, 2)[2] > 1.3 * a.pixel(2, 2)[0]);
-    assert_ne!(a.pixel(29, 44), a.pixel(2, 44));
-    // Into a photograph.
-    let command = format!(
-        "insert photos/one.png --mask masks/one.png --into photos/two.png {common} photo.png"
-    );
-    assert_eq!(folder.code_and_errors(&command).0, 0);
+    assert!(seen.pixel(2, 2)[2] > 1.3 * seen.pixel(2, 2)[0]);
+    assert_ne!(seen.pixel(29, 44), seen.pixel(2, 44));
 }
 
 #[test]
 fn a_webp_becomes_a_jpeg_in_a_folder_that_is_made_and_half_a_file_is_refused() {
     let folder = Folder::new();
     photo().save(folder.path("photos/one.webp")).unwrap();
-    let insert = "--mask masks/one.png --into sky.exr --size 96,64 --weights w.safetensors -o";
+    let insert = "--mask masks/one.png --into photos/two.png --weights w.safetensors -o";
     let command = format!("insert photos/one.webp {insert} new/deep/one.jpg");
     assert_eq!(folder.code_and_errors(&command), (0, String::new()));
     let command = format!("insert photos/one.png {insert} new/one.png");
@@ -415,24 +427,23 @@ fn a_webp_becomes_a_jpeg_in_a_folder_that_is_made_and_half_a_file_is_refused() {
 #[test]
 fn linear_photographs_are_inserted_as_such_and_a_warm_lamp_may_be_balanced() {
     let folder = Folder::new();
-    let insert = "insert photos/one.png --mask masks/one.png --into photos/two.png --height 0.7 --lamp 20,40,2700K \
-                  --weights w.safetensors";
-    let picture = |options: &str| {
-        let command = format!("{insert} {options}");
-        assert_eq!(
-            folder.code_and_errors(&command),
-            (0, String::new()),
-            "{command}"
+    let picture = |scene: &str, object: &str| {
+        let scene = format!(
+            "background = \"photos/two.png\"\nlight.lamp = \"20,40,2700K\"\n{scene}\n[[object]]\n\
+             photo = \"photos/one.png\"\nmask = \"masks/one.png\"\nheight = 0.7\n{object}\n"
         );
+        fs::write(folder.path("scene.toml"), scene).unwrap();
+        let command = "insert --scene scene.toml --weights w.safetensors -o o.png";
+        assert_eq!(folder.code_and_errors(command), (0, String::new()));
         read_planes(&folder.path("o.png")).unwrap().0.pixel(32, 26)
     };
-    let warm = picture("-o o.png");
-    let balanced = picture("--white-balance auto -o o.png");
+    let warm = picture("", "");
+    let balanced = picture("white_balance = \"auto\"", "");
     assert!(
         warm[0] / warm[2] > 1.2 * balanced[0] / balanced[2],
         "{warm:?} {balanced:?}"
     );
-    let linear = picture("--transfer linear -o o.png");
+    let linear = picture("", "transfer = \"linear\"");
     assert_ne!(linear, warm);
 }
 
@@ -445,11 +456,11 @@ fn a_captured_object_is_inserted_beside_photographs_and_needs_no_mask() {
     let surface = Surface::new(normals, albedo, None).unwrap();
     let asset = CapturedObject::new("red", surface, full.clone(), full).unwrap();
     asset.write(&folder.path("red.relit")).unwrap();
-    let common = "--into sky.exr --size 96,64 --height 0.5 --weights w.safetensors -o";
+    let common = "--into sky.exr --height 0.5 --weights w.safetensors -o";
     let command = format!("insert photos/one.png red.relit --mask masks {common} both.png");
     assert_eq!(folder.code_and_errors(&command), (0, String::new()));
     let (picture, _) = read_planes(&folder.path("both.png")).unwrap();
-    let red = picture.pixel(72, 42);
+    let red = picture.pixel(960, 630);
     // In light as blue as this, paper would be blue.
     assert!(red[0] > red[2], "{red:?}");
 
@@ -500,8 +511,13 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
         ),
         (
             format!("{one} --into sky.exr --lamp 5 -o o.png"),
-            1,
-            "light.lamp: give AZIMUTH,ELEVATION",
+            2,
+            "give AZIMUTH,ELEVATION",
+        ),
+        (
+            "insert --scene odd.toml --lamp 5,6 -o o.png".to_owned(),
+            2,
+            "--scene",
         ),
         (
             format!("{one} --into photos/two.png -o o.mp4"),
@@ -511,7 +527,7 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
         (
             format!("{one} --into sky.exr -o o.mp4"),
             1,
-            "a panorama moves with --turn DEGREES",
+            "a panorama moves with --rotate DEGREES",
         ),
         (
             format!("{one} --into sky.exr --at 0.1,0.2 --at 0.3,0.4 -o o.png"),

@@ -1,4 +1,4 @@
-//! Whole turns from `relight synth --turn`, through the files and the program.
+//! Whole turns from `relight synth turns`, through the files and the program.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -155,6 +155,7 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
     let light = out.join("light.txt");
     let run = relight(&[
         "render",
+        "image",
         object.to_str().unwrap(),
         "--light",
         light.to_str().unwrap(),
@@ -192,6 +193,7 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
     let lit = folder.path().join("lit.png");
     let run = relight(&[
         "render",
+        "image",
         "--normals",
         &path("normal.png"),
         "--albedo",
@@ -330,8 +332,23 @@ fn wrong_usage_and_several_turns_are_refused() {
     assert!(text(&run.stderr).contains("0 to 89 degrees"));
     let run = relight(&["turn", "a.tar", "--rotation", "left", "-o", "out"]);
     assert_eq!(run.status.code(), Some(2));
-    let run = relight(&["turn", "a.tar", "--session", "mug", "-o", "out"]);
-    assert_eq!(run.status.code(), Some(2));
+    for lone in [["--session", "mug"], ["--light-ball", "90,80,20,grey"]] {
+        let arguments = ["turn", "a.tar", "-o", "out", lone[0], lone[1]];
+        assert_eq!(relight(&arguments).status.code(), Some(2));
+    }
+    for ball in ["90,80", "90,80,1", "90,80,20,wood"] {
+        let run = relight(&[
+            "turn",
+            "a.tar",
+            "-o",
+            "out",
+            "--session",
+            "mug",
+            "--light-ball",
+            ball,
+        ]);
+        assert_eq!(run.status.code(), Some(2), "{ball}");
+    }
     let folder = tempfile::tempdir().unwrap();
     let photo = folder.path().join("photo.jpg");
     fs::write(&photo, [0xff; 2000]).unwrap();

@@ -45,7 +45,7 @@ impl BackgroundFile {
         }
         let bytes = fs::read(path).map_err(ImageError::open(path))?;
         if is_panorama(&bytes) {
-            let view = PanoramaView::new(scene.panorama_extent(), scene.field, scene.down);
+            let view = PanoramaView::new(scene.panorama_extent(), scene.fov, scene.down);
             let panorama = Panorama::from_bytes(path, &bytes)?;
             return Ok(Self::Panorama(Box::new((view, panorama))));
         }

@@ -16,9 +16,6 @@ use crate::compositing::{
 use crate::decompose::{DecomposeOptions, Decomposer, Photo};
 use crate::relighting::{InsertError, LightSource, RelightableObject};
 
-/// The most frames of a video in which a panorama turns.
-const MAX_FRAMES: f64 = 100_000.0;
-
 /// What an object is made of.
 #[derive(Debug)]
 pub enum InsertSource {
@@ -35,8 +32,8 @@ pub struct Insertion<'a> {
     /// The first frame of a video.
     first: Option<Rgb<Linear>>,
     setting: SceneEnvironment,
-    /// How far the light has turned, radians.
-    turned: f64,
+    /// How far the light is rotated, radians.
+    angle: f64,
     decomposer: &'a Decomposer,
     options: DecomposeOptions,
 }
@@ -46,10 +43,10 @@ pub struct Insertion<'a> {
 pub struct InsertionOutput<'a> {
     /// A picture, or a video.
     pub path: &'a Path,
-    /// By how many degrees a panorama turns in a video.
-    pub turn: f64,
-    /// How long that takes.
-    pub seconds: f64,
+    /// By how many degrees a panorama rotates in a video.
+    pub rotate: f64,
+    /// In how many frames.
+    pub frames: u32,
     /// Frames a second of such a video.
     pub frames_per_second: u32,
 }
@@ -109,7 +106,7 @@ impl<'a> Insertion<'a> {
             background,
             first,
             setting,
-            turned: scene.light.turn.to_radians(),
+            angle: scene.light.angle.to_radians(),
             decomposer,
             options,
         })
@@ -144,7 +141,7 @@ impl<'a> Insertion<'a> {
     pub fn frames(&self, output: &InsertionOutput<'_>) -> Option<u32> {
         match (OutputKind::from_path(output.path), &self.background) {
             (Some(OutputKind::Movie(_)), BackgroundFile::Movie(_)) => None,
-            (Some(OutputKind::Movie(_)), _) => Some(output.turn_frames()),
+            (Some(OutputKind::Movie(_)), _) => Some(output.frames),
             _ => Some(1),
         }
     }
@@ -162,22 +159,21 @@ impl<'a> Insertion<'a> {
         match OutputKind::from_path(output.path) {
             Some(OutputKind::Movie(format)) => match &self.background {
                 BackgroundFile::Movie(_) => self.film_over(scene, output.path, format, written),
-                _ => self.film_turn(scene, output, format, written),
+                _ => self.film_rotation(scene, output, format, written),
             },
             _ => {
-                let picture =
-                    scene.compose(&self.still(self.turned), &scene.layers(self.turned)?, 0);
+                let picture = scene.compose(&self.still(self.angle), &scene.layers(self.angle)?, 0);
                 write_picture(output.path, &picture)?;
                 Ok(1)
             }
         }
     }
 
-    /// The background after a panorama has turned.
-    fn still(&self, turn: f64) -> Rgb<Linear> {
+    /// The background after a panorama was rotated.
+    fn still(&self, angle: f64) -> Rgb<Linear> {
         match &self.background {
             BackgroundFile::Photo(picture) => picture.clone(),
-            BackgroundFile::Panorama(parts) => self.setting.seen(&parts.0, &parts.1, turn),
+            BackgroundFile::Panorama(parts) => self.setting.seen(&parts.0, &parts.1, angle),
             BackgroundFile::Movie(_) => self
                 .first
                 .clone()
@@ -193,7 +189,7 @@ impl<'a> Insertion<'a> {
         format: MovieFormat,
         mut written: impl FnMut(),
     ) -> Result<u32, InsertError> {
-        let layers = scene.layers(self.turned)?;
+        let layers = scene.layers(self.angle)?;
         let mut next = Some(self.still(0.0));
         let BackgroundFile::Movie(movie) = &mut self.background else {
             return Err(no_frame());
@@ -212,33 +208,27 @@ impl<'a> Insertion<'a> {
         Ok(frames)
     }
 
-    /// A video in which the panorama turns.
-    fn film_turn(
+    /// A video in which the panorama rotates.
+    fn film_rotation(
         &self,
         scene: &InsertScene<'_>,
         output: &InsertionOutput<'_>,
         format: MovieFormat,
         mut written: impl FnMut(),
     ) -> Result<u32, InsertError> {
-        let frames = output.turn_frames();
+        let frames = output.frames;
         let (extent, rate) = (self.setting.extent, output.frames_per_second);
         let mut film = MovieWriter::create(output.path, format, extent, rate)?;
         for frame in 0..frames {
             let part = f64::from(frame) / f64::from(frames);
-            let turn = self.turned + (output.turn * part).to_radians();
-            let picture = scene.compose(&self.still(turn), &scene.layers(turn)?, u64::from(frame));
+            let angle = self.angle + (output.rotate * part).to_radians();
+            let picture =
+                scene.compose(&self.still(angle), &scene.layers(angle)?, u64::from(frame));
             film.push(&picture.encode())?;
             written();
         }
         film.finish()?;
         Ok(frames)
-    }
-}
-
-impl InsertionOutput<'_> {
-    fn turn_frames(&self) -> u32 {
-        let frames = (self.seconds * f64::from(self.frames_per_second)).round();
-        frames.clamp(1.0, MAX_FRAMES) as u32
     }
 }
 
