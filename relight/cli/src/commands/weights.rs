@@ -46,7 +46,10 @@ const DECOMPOSER_FACTS: [(&str, &str); 7] = [
         "light",
         "batch x 9: coefficients of order 2 of the grey irradiance from all around, in units of the mean shading",
     ),
-    ("colour_space", "linear light in the primaries of sRGB (Rec. 709)"),
+    (
+        "colour_space",
+        "linear light in the primaries of sRGB (Rec. 709)",
+    ),
     (
         "axes",
         "x right, y up, z to the viewer; harmonics (l, m) at l (l + 1) + m, pole at z, without the Condon-Shortley phase",
@@ -125,44 +128,6 @@ impl NetName {
         }
     }
 
-    /// The network that they are for.
-    #[arg(long, value_enum, default_value_t = NetName::Decomposer)]
-    net: NetName,
-    /// Write 32 bits a number in place of 16.
-    #[arg(long)]
-    single: bool,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum NetName {
-    /// Ours of photographs, with the heads that the weights have.
-    Decomposer,
-    /// Ours of turns.
-    TurnNet,
-    /// The paper's Spec-Net.
-    SpecNet,
-    /// The paper's Normal-Net.
-    NormalNet,
-    /// The paper's Light-Net with a pooled head.
-    LightNet,
-    /// The paper's Light-Net as released.
-    LightNetReleased,
-    /// The paper's net for specular reflectance and smoothness, with a pooled head.
-    ReflectanceNet,
-    /// The same with the released head.
-    ReflectanceNetReleased,
-}
-
-impl NetName {
-    /// The weights that come with the program, if any do.
-    fn shipped(self) -> Option<Result<Weights, NetError>> {
-        match self {
-            Self::Decomposer => Some(shipped::weights()),
-            Self::TurnNet => Some(shipped::turn_weights()),
-            _ => None,
-        }
-    }
-
     /// The network that these weights should be of.
     fn graph(self, weights: &Weights) -> Graph {
         match self {
@@ -201,6 +166,7 @@ impl Export {
 }
 
 impl Export {
+    /// The weights that are given, or those that come with the program.
     fn weights(&self) -> Result<Weights, Box<dyn Error>> {
         match (&self.input, self.net.shipped()) {
             (Some(path), _) => Ok(Weights::read(path)?),
