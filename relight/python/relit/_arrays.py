@@ -28,6 +28,8 @@ def picture(given, what="image"):
     array = numpy.asarray(given)
     if array.ndim != 3 or array.shape[2] not in (3, 4):
         raise ValueError(f"the {what} has the shape {array.shape}: give rows x columns x 3 or 4, or a path")
+    if array.size == 0:
+        raise ValueError(f"the {what} has no pixels")
     if array.dtype.kind == "f":
         array = array.astype(numpy.float32, copy=False)
     if array.dtype not in (numpy.uint8, numpy.uint16, numpy.float32):

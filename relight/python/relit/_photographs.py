@@ -252,7 +252,7 @@ def insert(
     image, notes = _relit.insert(
         [photograph(*pair, transfer=transfer) for pair in pairs],
         picture(into, "background"),
-        json.dumps(scene),
+        json.dumps(scene, allow_nan=False),
         light_source(light, lamp, ambient),
         highlights,
     )
@@ -262,7 +262,7 @@ def insert(
 
 def _one_each(name, values, parts, count):
     """A value for each object; none where none is given."""
-    if values is None:
+    if values is None or count == 0:
         return []
     array = numpy.asarray(values, dtype=numpy.float64)
     shape = (count,) if parts == 1 else (count, parts)
