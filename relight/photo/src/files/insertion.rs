@@ -89,19 +89,36 @@ impl<'a> Insertion<'a> {
         decomposer: &'a Decomposer,
         options: DecomposeOptions,
     ) -> Result<Self, InsertError> {
-        let first = match &mut background {
-            BackgroundFile::Movie(movie) => Some(first_frame(movie)?),
-            _ => None,
-        };
-        let still = match (&background, &first) {
-            (BackgroundFile::Panorama(parts), _) => SceneBackground::Panorama(&parts.1),
-            (BackgroundFile::Photo(picture), _) | (BackgroundFile::Movie(_), Some(picture)) => {
-                SceneBackground::Picture(picture)
-            }
-            (BackgroundFile::Movie(_), None) => return Err(no_frame()),
-        };
-        let given = given_light(scene, folder, still, (decomposer, &options))?;
-        let setting = SceneEnvironment::new(scene, still, given)?;
+        let first = first_of(&mut background)?;
+        let still = still_of(&background, first.as_ref())?;
+        let light = given_light(scene, folder, still, (decomposer, &options))?;
+        Self::before(scene, (background, first), light, decomposer, options)
+    }
+
+    /// The same in a light that is given, whatever the scene names, or else in the background's.
+    ///
+    /// # Errors
+    /// Where the first frame of a video cannot be read, or there is no light.
+    pub fn in_light(
+        scene: &SceneDescription,
+        mut background: BackgroundFile,
+        light: Option<LightSource>,
+        decomposer: &'a Decomposer,
+        options: DecomposeOptions,
+    ) -> Result<Self, InsertError> {
+        let first = first_of(&mut background)?;
+        Self::before(scene, (background, first), light, decomposer, options)
+    }
+
+    fn before(
+        scene: &SceneDescription,
+        (background, first): (BackgroundFile, Option<Rgb<Linear>>),
+        light: Option<LightSource>,
+        decomposer: &'a Decomposer,
+        options: DecomposeOptions,
+    ) -> Result<Self, InsertError> {
+        let still = still_of(&background, first.as_ref())?;
+        let setting = SceneEnvironment::new(scene, still, light)?;
         Ok(Self {
             background,
             first,
@@ -162,15 +179,33 @@ impl<'a> Insertion<'a> {
                 _ => self.film_rotation(scene, output, format, written),
             },
             _ => {
+<<<<<<< HEAD
                 let picture = scene.compose(&self.still(self.angle), &scene.layers(self.angle)?, 0);
                 write_picture(output.path, &picture)?;
+=======
+                write_picture(output.path, &self.picture(scene)?)?;
+>>>>>>> python
                 Ok(1)
             }
         }
     }
 
+<<<<<<< HEAD
     /// The background after a panorama was rotated.
     fn still(&self, angle: f64) -> Rgb<Linear> {
+=======
+    /// The picture; of a video its first frame.
+    ///
+    /// # Errors
+    /// Those of the render layers.
+    pub fn picture(&self, scene: &InsertScene<'_>) -> Result<Rgb<Linear>, InsertError> {
+        let layers = scene.layers(self.turned)?;
+        Ok(scene.compose(&self.still(self.turned), &layers, 0))
+    }
+
+    /// The background after a panorama has turned.
+    fn still(&self, turn: f64) -> Rgb<Linear> {
+>>>>>>> python
         match &self.background {
             BackgroundFile::Photo(picture) => picture.clone(),
             BackgroundFile::Panorama(parts) => self.setting.seen(&parts.0, &parts.1, angle),
@@ -234,6 +269,28 @@ impl<'a> Insertion<'a> {
 
 fn no_frame() -> InsertError {
     InsertError::Input("the video has no frame".to_owned())
+}
+
+/// The first frame of a video.
+fn first_of(background: &mut BackgroundFile) -> Result<Option<Rgb<Linear>>, InsertError> {
+    match background {
+        BackgroundFile::Movie(movie) => first_frame(movie).map(Some),
+        BackgroundFile::Photo(_) | BackgroundFile::Panorama(_) => Ok(None),
+    }
+}
+
+/// What of a background stands still.
+fn still_of<'a>(
+    background: &'a BackgroundFile,
+    first: Option<&'a Rgb<Linear>>,
+) -> Result<SceneBackground<'a>, InsertError> {
+    match (background, first) {
+        (BackgroundFile::Panorama(parts), _) => Ok(SceneBackground::Panorama(&parts.1)),
+        (BackgroundFile::Photo(picture), _) | (BackgroundFile::Movie(_), Some(picture)) => {
+            Ok(SceneBackground::Picture(picture))
+        }
+        (BackgroundFile::Movie(_), None) => Err(no_frame()),
+    }
 }
 
 fn first_frame(movie: &mut MovieReader) -> Result<Rgb<Linear>, InsertError> {
