@@ -113,7 +113,8 @@ fn recorded_turns_train_the_networks_by_the_phases_of_the_paper(relight: PathBuf
     bench.train("spec", "spec", "--turns shards");
     bench.falls("spec", "validation/highlight");
 
-    let light = "--turns shards --validation-turns held-out --normal-net normal/normal-net.safetensors";
+    let light =
+        "--turns shards --validation-turns held-out --normal-net normal/normal-net.safetensors";
     bench.train("light", "light", light);
     bench.falls("light", "validation/residual");
 

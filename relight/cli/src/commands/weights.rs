@@ -93,14 +93,7 @@ struct Export {
     /// The network that they are for.
     #[arg(long, value_enum, default_value_t = NetName::Decomposer)]
     net: NetName,
-<<<<<<< HEAD
-    /// The longest side of the pictures that an ONNX file takes, which are square, pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = clap::value_parser!(u16).range(32..=8192))]
-    size: u16,
-    /// Write safetensors of half precision.
-=======
     /// Write 32 bits a number in place of 16.
->>>>>>> python
     #[arg(long)]
     single: bool,
 }

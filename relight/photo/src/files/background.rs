@@ -45,10 +45,6 @@ impl BackgroundFile {
         }
         let bytes = fs::read(path).map_err(ImageError::open(path))?;
         if is_panorama(&bytes) {
-<<<<<<< HEAD
-            let view = PanoramaView::new(scene.panorama_extent(), scene.fov, scene.down);
-=======
->>>>>>> python
             let panorama = Panorama::from_bytes(path, &bytes)?;
             return Ok(Self::from_panorama(panorama, scene));
         }
@@ -59,7 +55,7 @@ impl BackgroundFile {
     /// A panorama, of which the scene shows a part.
     #[must_use]
     pub fn from_panorama(panorama: Panorama, scene: &SceneDescription) -> Self {
-        let view = PanoramaView::new(scene.panorama_extent(), scene.field, scene.down);
+        let view = PanoramaView::new(scene.panorama_extent(), scene.fov, scene.down);
         Self::Panorama(Box::new((view, panorama)))
     }
 

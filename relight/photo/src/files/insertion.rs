@@ -179,33 +179,23 @@ impl<'a> Insertion<'a> {
                 _ => self.film_rotation(scene, output, format, written),
             },
             _ => {
-<<<<<<< HEAD
-                let picture = scene.compose(&self.still(self.angle), &scene.layers(self.angle)?, 0);
-                write_picture(output.path, &picture)?;
-=======
                 write_picture(output.path, &self.picture(scene)?)?;
->>>>>>> python
                 Ok(1)
             }
         }
     }
 
-<<<<<<< HEAD
-    /// The background after a panorama was rotated.
-    fn still(&self, angle: f64) -> Rgb<Linear> {
-=======
     /// The picture; of a video its first frame.
     ///
     /// # Errors
     /// Those of the render layers.
     pub fn picture(&self, scene: &InsertScene<'_>) -> Result<Rgb<Linear>, InsertError> {
-        let layers = scene.layers(self.turned)?;
-        Ok(scene.compose(&self.still(self.turned), &layers, 0))
+        let layers = scene.layers(self.angle)?;
+        Ok(scene.compose(&self.still(self.angle), &layers, 0))
     }
 
-    /// The background after a panorama has turned.
-    fn still(&self, turn: f64) -> Rgb<Linear> {
->>>>>>> python
+    /// The background after a panorama was rotated.
+    fn still(&self, angle: f64) -> Rgb<Linear> {
         match &self.background {
             BackgroundFile::Photo(picture) => picture.clone(),
             BackgroundFile::Panorama(parts) => self.setting.seen(&parts.0, &parts.1, angle),
