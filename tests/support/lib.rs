@@ -36,6 +36,14 @@ pub fn ffmpeg(folder: &Path, arguments: &[&str]) -> Vec<u8> {
     output.stdout
 }
 
+/// Whether a line of `text` names all of these things (files, numbers, options). How it says so is free, so that
+/// messages can be improved without a change of tests.
+#[must_use]
+pub fn is_named(text: &str, things: &[&str]) -> bool {
+    text.lines()
+        .any(|line| things.iter().all(|thing| line.contains(thing)))
+}
+
 /// Says that the test that runs is left out, for a test that shares its target with tests that need nothing: past the
 /// harness, which keeps what a test prints, so that `.ci/totals` finds it. Elsewhere [`trials!`] says it better.
 pub fn say_skipped(reason: &str) {
