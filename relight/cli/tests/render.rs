@@ -141,31 +141,31 @@ fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
     let cases = [
         (
             "--normals none.png --light light.txt -o a.png",
-            "none.png cannot be read",
+            "none.png",
         ),
         (
             "--normals up.png --light short.txt -o a.png",
-            "short.txt holds no light: line 2",
+            "short.txt",
         ),
         (
             "--normals up.png --panorama up.png -o a.png",
-            "up.png holds 8- or 16-bit integers",
+            "up.png",
         ),
         ("--normals up.png --light light.txt -o taken/a.png", "taken"),
         (
             "--normals up.png --light light.txt --turn 2 -o taken",
-            "taken cannot be made",
+            "taken",
         ),
         (
             "--normals up.png --light light.txt --turn 2 -o .",
-            ". is not empty",
+            ". ",
         ),
     ];
-    for (arguments, expected) in cases {
+    for (arguments, named) in cases {
         let output = scene.render(arguments);
         let errors = errors(&output);
         assert_eq!(code(&output), 1, "{arguments}");
-        assert!(errors.contains(expected), "{errors}");
+        assert!(errors.contains(named), "{errors}");
         assert_eq!(errors.lines().count(), 1, "{errors}");
     }
     assert!(!scene.path("a.png").exists());

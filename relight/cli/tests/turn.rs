@@ -15,6 +15,7 @@ use relight_core::image::{Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, Order, ShLight, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::render::Surface;
+use relit_test_support::is_named;
 use relight_synth::{
     Folders, FrameTruth, Library, LightKind, Recipe, TurnDescription, TurnRecipe, write_turns,
 };
@@ -209,7 +210,7 @@ fn the_program_writes_a_folder_that_render_takes_and_replaces_nothing_else() {
     other[4] = foreign.to_str().unwrap();
     let run = relight(&other);
     assert_eq!(run.status.code(), Some(1));
-    assert!(text(&run.stderr).contains("which is no result of a turn"));
+    assert!(is_named(&text(&run.stderr), &["thesis", "thesis.tex"]));
     assert_eq!(fs::read_dir(&foreign).unwrap().count(), 1);
 }
 
@@ -280,14 +281,12 @@ fn places_that_cannot_be_written_are_told_before_the_work() {
     fs::write(folder.path().join("file"), "").unwrap();
     // The shard is not there: were it read first, this would be what is told.
     let shard = path("missing.tar");
-    for (place, says) in [
-        ("thesis", "which is no result of a turn"),
-        ("file", "give the name of a folder, not of a file"),
-    ] {
+    for place in ["thesis", "file"] {
         let run = relight(&["turn", &shard, "-o", &path(place)]);
         assert_eq!(run.status.code(), Some(1), "{place}");
         let said = text(&run.stderr);
-        assert!(said.contains(says), "{place}: {said}");
+        assert!(said.contains(&path(place)), "{place}: {said}");
+        assert!(!said.contains("missing.tar"), "{place}: {said}");
     }
     let mut names: Vec<_> = fs::read_dir(folder.path())
         .unwrap()
@@ -327,7 +326,7 @@ fn a_damaged_frame_is_named_and_the_rest_is_solved() {
 fn wrong_usage_and_several_turns_are_refused() {
     let run = relight(&["turn", "a.tar", "--elevation", "95", "-o", "out"]);
     assert_eq!(run.status.code(), Some(2));
-    assert!(text(&run.stderr).contains("0 to 89 degrees"));
+    assert!(text(&run.stderr).contains("89"));
     let run = relight(&["turn", "a.tar", "--rotation", "left", "-o", "out"]);
     assert_eq!(run.status.code(), Some(2));
     let run = relight(&["turn", "a.tar", "--session", "mug", "-o", "out"]);
@@ -338,7 +337,7 @@ fn wrong_usage_and_several_turns_are_refused() {
     let run = relight(&["turn", photo.to_str().unwrap(), "-o", "missing"]);
     assert_eq!(run.status.code(), Some(1));
     assert!(
-        text(&run.stderr).contains("it is a picture"),
+        text(&run.stderr).contains("photo.jpg"),
         "{}",
         text(&run.stderr)
     );
