@@ -338,7 +338,7 @@ fn processes_that_were_started_with_other_settings_say_so() {
 }
 
 #[test]
-fn settings_that_cannot_be_divided_and_an_incomplete_environment_are_told() {
+fn a_batch_that_the_processes_cannot_divide_is_told() {
     let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let file = scratch.path().join("settings.toml");
     fs::write(&file, settings(3, "single")).unwrap();
@@ -347,7 +347,15 @@ fn settings_that_cannot_be_divided_and_an_incomplete_environment_are_told() {
         let text = stderr(&output);
         assert!(is_named(&text, &["run.batch", "4", "3 processes"]), "{text}");
     }
-    let output = command().env("RANK", "1").output().unwrap();
+}
+
+#[test]
+fn an_incomplete_environment_is_told() {
+    let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let file = scratch.path().join("settings.toml");
+    fs::write(&file, settings(3, "single")).unwrap();
+    let mut command = train("decompose", &file, folder.path());
+    let output = command.env("RANK", "1").output().unwrap();
     let text = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(is_named(&text, &["RANK", "WORLD_SIZE"]), "{text}");

@@ -323,7 +323,7 @@ fn a_damaged_frame_is_named_and_the_rest_is_solved() {
 }
 
 #[test]
-fn wrong_usage_and_several_turns_are_refused() {
+fn wrong_usage_exits_with_2() {
     let run = relight(&["turn", "a.tar", "--elevation", "95", "-o", "out"]);
     assert_eq!(run.status.code(), Some(2));
     assert!(text(&run.stderr).contains("89"));
@@ -331,6 +331,10 @@ fn wrong_usage_and_several_turns_are_refused() {
     assert_eq!(run.status.code(), Some(2));
     let run = relight(&["turn", "a.tar", "--session", "mug", "-o", "out"]);
     assert_eq!(run.status.code(), Some(2));
+}
+
+#[test]
+fn a_photograph_is_no_turn() {
     let folder = tempfile::tempdir().unwrap();
     let photo = folder.path().join("photo.jpg");
     fs::write(&photo, [0xff; 2000]).unwrap();
@@ -341,6 +345,11 @@ fn wrong_usage_and_several_turns_are_refused() {
         "{}",
         text(&run.stderr)
     );
+}
+
+#[test]
+fn several_turns_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
     let (shard, _) = turn(folder.path(), 12);
     fs::copy(&shard, folder.path().join("again.tar")).unwrap();
     fs::remove_file(folder.path().join("dataset.json")).unwrap();

@@ -227,7 +227,7 @@ fn what_is_wrong_in_a_manifest_is_named() {
 }
 
 #[test]
-fn a_truncated_video_is_a_loss_and_a_missing_one_an_error() {
+fn a_truncated_video_is_a_loss() {
     let (_root, folder) = whole();
     fs::write(folder.join("video.mkv"), b"ten").unwrap();
     let recording = Recording::open(&folder).unwrap();
@@ -235,6 +235,11 @@ fn a_truncated_video_is_a_loss_and_a_missing_one_an_error() {
     for named in ["video.mkv", "3 bytes", "10"] {
         assert!(losses(&recording)[0].contains(named), "{named}");
     }
+}
+
+#[test]
+fn a_missing_video_is_an_error() {
+    let (_root, folder) = whole();
     fs::remove_file(folder.join("video.mkv")).unwrap();
     refused(Recording::open(&folder), "video.mkv");
 }
@@ -315,8 +320,15 @@ fn a_folder_with_one_video_and_no_manifest_is_read_with_a_warning() {
     let recording = Recording::open(&folder).unwrap();
     assert_eq!(recording.id, "spot");
     assert!(recording.notices[0].text().contains("session.json"));
-    fs::write(folder.join("other.mp4"), b"").unwrap();
-    refused(Recording::open(&folder), "2 ");
+}
+
+#[test]
+fn a_folder_with_two_videos_and_no_manifest_is_refused() {
+    let root = tempfile::tempdir().unwrap();
+    for video in ["video.mkv", "other.mp4"] {
+        fs::write(root.path().join(video), b"").unwrap();
+    }
+    refused(Recording::open(root.path()), "2 ");
 }
 
 #[test]

@@ -221,7 +221,7 @@ fn a_damaged_table_is_found_and_does_not_hide_damage_in_the_shard() {
 }
 
 #[test]
-fn missing_and_unlisted_files_are_named() {
+fn unlisted_files_are_named() {
     let dir = dataset(Layout::Webdataset);
     fs::create_dir(dir.path().join("imgs")).unwrap();
     let unknown = "dataset.json";
@@ -239,6 +239,11 @@ fn missing_and_unlisted_files_are_named() {
     }
     fs::write(dir.path().join("notes.txt"), b"").unwrap();
     assert_eq!(verified(dir.path()).problems.len(), 6);
+}
+
+#[test]
+fn a_missing_shard_is_named() {
+    let dir = dataset(Layout::Webdataset);
     fs::remove_file(tar_path(dir.path())).unwrap();
     assert_names(dir.path(), TAR, None, "(os error 2)");
 }

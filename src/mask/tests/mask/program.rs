@@ -182,10 +182,9 @@ fn another_file_is_never_overwritten_by_the_record() {
 }
 
 #[test]
-fn wrong_usage_exits_with_2_and_a_failure_with_1() {
+fn wrong_usage_exits_with_2() {
     let folder = clip();
     let path = folder.path();
-    seeds_image(|_, _| 0).save(path.join("black.png")).unwrap();
     let wrong: [&[&str]; 6] = [
         &["clip.y4m"],
         &["check"],
@@ -197,6 +196,14 @@ fn wrong_usage_exits_with_2_and_a_failure_with_1() {
     for arguments in wrong {
         assert_eq!(code(&relit_mask(path, arguments)), 2, "{arguments:?}");
     }
+    assert!(!path.join("mask.png").exists());
+}
+
+#[test]
+fn a_failure_exits_with_1_and_leaves_no_mask() {
+    let folder = clip();
+    let path = folder.path();
+    seeds_image(|_, _| 0).save(path.join("black.png")).unwrap();
     let failed: [&[&str]; 7] = [
         &["clip.y4m", "--auto"],
         &["nothing.mkv", "--rect", AROUND],

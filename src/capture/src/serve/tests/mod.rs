@@ -12,7 +12,6 @@ mod load;
 mod page;
 mod previews;
 mod processing;
-mod rehearsal;
 mod security;
 mod sessions;
 mod states;
