@@ -2,8 +2,11 @@
 
 use image::{GrayImage, Luma};
 
+/// Width, pixels.
 pub const WIDTH: u32 = 96;
+/// Height, pixels.
 pub const HEIGHT: u32 = 64;
+/// A rectangle around the disc, as options have it.
 pub const AROUND: &str = "24,8,50,48";
 
 /// Whether a pixel is in the disc of radius 18 around (48, 32).
@@ -12,6 +15,7 @@ pub fn in_disc(x: u32, y: u32) -> bool {
     dx.hypot(dy) <= 18.0
 }
 
+/// Hints as an image: 255 object, 0 background, else nothing.
 pub fn seeds_image(marks: impl Fn(u32, u32) -> u8) -> GrayImage {
     GrayImage::from_fn(WIDTH, HEIGHT, |x, y| Luma([marks(x, y)]))
 }
@@ -25,6 +29,7 @@ pub fn strokes(x: u32, y: u32) -> u8 {
     }
 }
 
+/// Intersection over union of a mask and the disc.
 pub fn disc_share(mask: &GrayImage) -> f64 {
     let (mut both, mut either) = (0, 0);
     for (x, y, pixel) in mask.enumerate_pixels() {

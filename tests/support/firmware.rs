@@ -22,7 +22,9 @@ const TURN: i32 = 32_000;
 /// A pulse: when, in ticks, and the position after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Edge {
+    /// Timer ticks.
     pub at: u64,
+    /// Steps.
     pub position: i32,
 }
 
@@ -46,28 +48,39 @@ pub fn extremes(edges: &[Edge]) -> (f64, f64) {
 
 /// A board whose time goes on only as the test lets it.
 pub struct FakeBoard {
+    /// The firmware's stepper.
     pub stepper: Stepper,
+    /// The time, timer ticks.
     pub now: u64,
     next: Option<u64>,
     forward: bool,
     /// Where the motor stands, whatever the stepper calls it.
     pub turned: i32,
+    /// All pulses so far.
     pub edges: Vec<Edge>,
     receive: VecDeque<u8>,
+    /// Bytes to the host that were not read yet.
     pub sent: Vec<u8>,
     events: Events,
     /// The index is active from the first to before the second position of every turn.
     pub index: (i32, i32),
     /// Positions at which the index fails to show.
     pub index_gap: Option<i32>,
+    /// Whether the index switch is wired the other way.
     pub inverted_index: bool,
+    /// Whether the emergency stop is pressed.
     pub emergency: bool,
+    /// The supply, millivolts.
     pub battery: u16,
+    /// What outlasts a reset.
     pub eeprom: Vec<u8>,
     /// Writes until the supply goes away.
     pub writes_left: usize,
+    /// Whether the motor's driver is on.
     pub driver: bool,
+    /// What the core last set.
     pub outputs: Option<Outputs>,
+    /// Why the chip was reset.
     pub cause: ResetCause,
     /// Bytes from the host that come one after the other as time goes on.
     wire: VecDeque<u8>,
@@ -75,6 +88,8 @@ pub struct FakeBoard {
 }
 
 impl FakeBoard {
+    /// A board after a power cut, nothing pressed.
+    #[allow(clippy::new_without_default, reason = "made by tests alone")]
     pub fn new() -> FakeBoard {
         FakeBoard {
             stepper: Stepper::new(),
@@ -266,7 +281,9 @@ impl Board for FakeBoard {
 
 /// A table that is switched on.
 pub struct Table {
+    /// The board.
     pub board: FakeBoard,
+    /// The firmware's core.
     pub controller: Controller,
     seen: usize,
     kept: Vec<String>,

@@ -53,7 +53,6 @@ impl SequenceUnwrapper {
 
 /// What is wrong with a frame's data, as far as it shows without decoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum FrameFault {
     /// The driver marked it.
     #[error("the driver marked it as damaged")]

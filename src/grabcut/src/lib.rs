@@ -64,7 +64,7 @@ pub use check::fit::{DoubtfulRegion, MaskCheck, ShapeCheck};
 pub use cut::grab_cut::ITERATIONS;
 pub use cut::pyramid::half_image;
 pub use error::MaskError;
-pub use hints::hints::{Hints, Mark, Seeds};
+pub use hints::marks::{Hints, Mark, Seeds};
 pub use hints::strokes::{Brush, Stroke, Strokes};
 pub use outline::outline;
 pub use preview::{grey_png, preview, rgb_png};

@@ -149,7 +149,7 @@ fn cut_unclosed(
         mask.warnings.push(turn_dropped(why));
         Ok(mask)
     };
-    let by_turn = match turn::segment(frame, turn, hints, effort) {
+    let by_turn = match statistics::segment(frame, turn, hints, effort) {
         Ok(by_turn) => by_turn,
         Err(error) if hints.is_empty() => return Err(error),
         Err(error) => {

@@ -86,8 +86,8 @@ impl Table {
         options: &TableOptions,
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
-        let (link, io_thread) = Link::start(port, &options.clock, greeting::UNKNOWN_CONTROLLER)?;
-        let (identity, was_stopped) = greeting::greet(&link, resets, options)?;
+        let (link, io_thread) = Link::start(port, &options.clock, handshake::UNKNOWN_CONTROLLER)?;
+        let (identity, was_stopped) = handshake::greet(&link, resets, options)?;
         Ok(Table {
             link,
             _io_thread: io_thread,
@@ -354,7 +354,7 @@ impl Table {
 
     /// Opens a checked session if the controller offers one and none is open.
     pub(super) fn secure(&self) -> Result<(), TurntableError> {
-        greeting::secure(&self.link, self.identity.extras)
+        handshake::secure(&self.link, self.identity.extras)
     }
 
     pub(super) fn outcome(

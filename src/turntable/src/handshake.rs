@@ -50,7 +50,7 @@ pub(super) fn greet(
     secure(link, extras)?;
     let settings = settings(link, extras)?;
     let identity = Identity::read(&about, &settings, extras)?;
-    link.cratevisor().set_traits(ControllerTraits {
+    link.supervisor().set_traits(ControllerTraits {
         family: identity.family,
         poll: if extras { POLL_STAMPED } else { POLL_STOCK },
         stamps: extras,
@@ -62,7 +62,7 @@ pub(super) fn greet(
 
 /// Opens a checked session if the controller offers one and none is open.
 pub(super) fn secure(link: &Link, extras: bool) -> Result<(), TurntableError> {
-    if !extras || link.cratevisor().is_checked() {
+    if !extras || link.supervisor().is_checked() {
         return Ok(());
     }
     done(link, "N0", link.open_session()?).map(|_| ())
@@ -72,8 +72,8 @@ pub(super) fn secure(link: &Link, extras: bool) -> Result<(), TurntableError> {
 /// whether it did.
 fn wake(link: &Link, resets: bool) -> Result<bool, TurntableError> {
     let limit = if resets { START_WAIT } else { SHORT_WAIT };
-    link.wait(limit, |cratevisor| {
-        (cratevisor.restarts() > 0).then_some(())
+    link.wait(limit, |supervisor| {
+        (supervisor.restarts() > 0).then_some(())
     });
     let moves = match first_state(link) {
         Some(ControllerState::Idle | ControllerState::Alarm | ControllerState::Check) => false,
@@ -91,19 +91,19 @@ fn wake(link: &Link, resets: bool) -> Result<bool, TurntableError> {
 /// does meanwhile: as long as it does, it is waited for.
 fn first_state(link: &Link) -> Option<ControllerState> {
     for _ in 0..PROBES {
-        let before = heard(&link.cratevisor().counts());
+        let before = heard(&link.supervisor().counts());
         let until_us = link.clock().after(PROBE_WAIT);
-        link.cratevisor().want_reports(until_us);
-        let state = link.wait(PROBE_WAIT, |cratevisor| {
-            if cratevisor.closed().is_some() {
+        link.supervisor().want_reports(until_us);
+        let state = link.wait(PROBE_WAIT, |supervisor| {
+            if supervisor.closed().is_some() {
                 return Some(None);
             }
-            cratevisor.last_report().map(|report| Some(report.state))
+            supervisor.last_report().map(|report| Some(report.state))
         });
         if state.is_some() {
             return state.flatten();
         }
-        if heard(&link.cratevisor().counts()) == before {
+        if heard(&link.supervisor().counts()) == before {
             return None;
         }
     }
@@ -137,9 +137,9 @@ fn recover(link: &Link, fault: LineFault) -> Result<(), TurntableError> {
 }
 
 fn no_controller(link: &Link) -> TurntableError {
-    let cratevisor = link.cratevisor();
-    let counts = cratevisor.counts();
-    let heard = match (cratevisor.closed(), counts.noise) {
+    let supervisor = link.supervisor();
+    let counts = supervisor.counts();
+    let heard = match (supervisor.closed(), counts.noise) {
         (Some(why), _) => format!("the port is gone: {why}"),
         (None, 0) => "nothing was heard".to_owned(),
         (None, lines) => format!(

@@ -1,4 +1,4 @@
-//! The I/O thread between port and cratevisor, and the waits for its results.
+//! The I/O thread between port and supervisor, and the waits for its results.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, MutexGuard};
@@ -28,7 +28,7 @@ const STOP_WAIT: Duration = Duration::from_secs(16);
 /// The connection to a table. Clones share it.
 #[derive(Clone)]
 pub(super) struct Link {
-    cratevisor: Arc<Waitable<Supervisor>>,
+    supervisor: Arc<Waitable<Supervisor>>,
     port_name: Arc<str>,
 }
 
@@ -57,12 +57,12 @@ impl Link {
     ) -> Result<(Link, IoThread), TurntableError> {
         let link = Link {
             port_name: port.name().into(),
-            cratevisor: Arc::new(Waitable::new(clock, Supervisor::new(traits))),
+            supervisor: Arc::new(Waitable::new(clock, Supervisor::new(traits))),
         };
         let quit = Arc::new(AtomicBool::new(false));
         let thread = clock.spawn("turntable", {
-            let (cratevisor, quit) = (Arc::clone(&link.cratevisor), Arc::clone(&quit));
-            move || carry(port, &cratevisor, &quit)
+            let (supervisor, quit) = (Arc::clone(&link.supervisor), Arc::clone(&quit));
+            move || carry(port, &supervisor, &quit)
         });
         let thread = Some(thread.map_err(|source| TurntableError::Open {
             path: link.port_name().into(),
@@ -72,16 +72,16 @@ impl Link {
     }
 
     pub(super) fn clock(&self) -> &Clock {
-        self.cratevisor.clock()
+        self.supervisor.clock()
     }
 
     pub(super) fn port_name(&self) -> &str {
         &self.port_name
     }
 
-    /// Locks the cratevisor.
-    pub(super) fn cratevisor(&self) -> MutexGuard<'_, Supervisor> {
-        self.cratevisor.lock()
+    /// Locks the supervisor.
+    pub(super) fn supervisor(&self) -> MutexGuard<'_, Supervisor> {
+        self.supervisor.lock()
     }
 
     /// Calls `look` now and after each change until it returns something; `None` after `limit`.
@@ -90,7 +90,7 @@ impl Link {
         limit: Duration,
         look: impl FnMut(&mut Supervisor) -> Option<T>,
     ) -> Option<T> {
-        self.cratevisor.wait_for(limit, look)
+        self.supervisor.wait_for(limit, look)
     }
 
     /// Sends a line and waits for its answer.
@@ -100,14 +100,14 @@ impl Link {
         timeout: ReplyTimeout,
     ) -> Result<LineOutcome, TurntableError> {
         let now_us = self.clock().now_us();
-        let sent = self.cratevisor().send(now_us, block, timeout);
+        let sent = self.supervisor().send(now_us, block, timeout);
         self.answer(block, sent, timeout)
     }
 
     /// Opens a checked session.
     pub(super) fn open_session(&self) -> Result<LineOutcome, TurntableError> {
         let now_us = self.clock().now_us();
-        let sent = self.cratevisor().open_session(now_us);
+        let sent = self.supervisor().open_session(now_us);
         self.answer("N0", sent, ReplyTimeout::AtOnce)
     }
 
@@ -125,9 +125,9 @@ impl Link {
             ReplyTimeout::AtOnce => ANSWER_WAIT,
             ReplyTimeout::Within(us) => Duration::from_micros(us.unsigned_abs()) + LATE_ANSWER,
         };
-        let outcome = self.wait(limit, |cratevisor| match port_lost(cratevisor) {
+        let outcome = self.wait(limit, |supervisor| match port_lost(supervisor) {
             Some(error) => Some(Err(error)),
-            None => cratevisor.take_answer(id).map(Ok),
+            None => supervisor.take_answer(id).map(Ok),
         });
         outcome.unwrap_or(Err(TurntableError::Silent {
             milliseconds: limit.as_millis() as u64,
@@ -139,14 +139,14 @@ impl Link {
     pub(super) fn status(&self) -> Result<TableStatus, TurntableError> {
         let asked_us = self.clock().now_us();
         let until_us = self.clock().after(REPORT_WAIT);
-        self.cratevisor().want_reports(until_us);
-        let status = self.wait(REPORT_WAIT, |cratevisor| {
-            if let Some(error) = port_lost(cratevisor) {
+        self.supervisor().want_reports(until_us);
+        let status = self.wait(REPORT_WAIT, |supervisor| {
+            if let Some(error) = port_lost(supervisor) {
                 return Some(Err(error));
             }
-            let report = cratevisor.last_report()?;
+            let report = supervisor.last_report()?;
             let fresh = report.asked_us.is_some_and(|us| us >= asked_us);
-            (fresh && cratevisor.is_confirmed()).then(|| Ok(TableStatus::new(report, cratevisor)))
+            (fresh && supervisor.is_confirmed()).then(|| Ok(TableStatus::new(report, supervisor)))
         });
         status.unwrap_or(Err(TurntableError::Silent {
             milliseconds: REPORT_WAIT.as_millis() as u64,
@@ -156,27 +156,27 @@ impl Link {
     /// Brings the table to a standstill and discards its remaining motions.
     pub(super) fn stop(&self) -> Result<TableStatus, TurntableError> {
         let now_us = self.clock().now_us();
-        self.cratevisor().request_stop(now_us);
+        self.supervisor().request_stop(now_us);
         self.wait_stopped()?;
         self.status()
     }
 
     /// The same, and resets the controller as soon as the table stands.
     pub(super) fn reset(&self) -> Result<TableStatus, TurntableError> {
-        if self.cratevisor().is_stopping() {
+        if self.supervisor().is_stopping() {
             self.wait_stopped()?;
         }
         let now_us = self.clock().now_us();
-        self.cratevisor().request_reset(now_us);
+        self.supervisor().request_reset(now_us);
         self.wait_stopped()?;
         self.status()
     }
 
     /// Waits for the end of a stop.
     pub(super) fn wait_stopped(&self) -> Result<(), TurntableError> {
-        let ended = self.wait(STOP_WAIT, |cratevisor| match port_lost(cratevisor) {
+        let ended = self.wait(STOP_WAIT, |supervisor| match port_lost(supervisor) {
             Some(error) => Some(Err(error)),
-            None => cratevisor.stopped().map(Ok),
+            None => supervisor.stopped().map(Ok),
         });
         match ended.transpose()? {
             Some(StopOutcome::Standing | StopOutcome::Displaced) => Ok(()),
@@ -185,8 +185,8 @@ impl Link {
     }
 }
 
-fn port_lost(cratevisor: &Supervisor) -> Option<TurntableError> {
-    let why = cratevisor.closed()?;
+fn port_lost(supervisor: &Supervisor) -> Option<TurntableError> {
+    let why = supervisor.closed()?;
     Some(MotionFault::PortLost(why.to_owned()).into())
 }
 
@@ -200,16 +200,16 @@ fn carry(mut port: Box<dyn Port>, shared: &Waitable<Supervisor>, quit: &AtomicBo
         let asked_us = clock.now_us();
         let read = written.and_then(|()| port.read(&mut buffer, READ_WAIT));
         let now_us = clock.now_us();
-        let mut cratevisor = shared.lock();
+        let mut supervisor = shared.lock();
         match read {
             // The time at which the read began: this thread may have been paused since, and bytes
             // that arrived during the pause must not count as silence.
-            Ok(0) => cratevisor.on_time(asked_us),
-            Ok(count) => cratevisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default()),
-            Err(error) => cratevisor.close(with_causes(&error)),
+            Ok(0) => supervisor.on_time(asked_us),
+            Ok(count) => supervisor.on_bytes(now_us, buffer.get(..count).unwrap_or_default()),
+            Err(error) => supervisor.close(with_causes(&error)),
         }
-        let (changed, gone) = (cratevisor.take_changed(), cratevisor.closed().is_some());
-        drop(cratevisor);
+        let (changed, gone) = (supervisor.take_changed(), supervisor.closed().is_some());
+        drop(supervisor);
         if changed {
             shared.notify();
         }

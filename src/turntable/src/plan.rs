@@ -19,7 +19,7 @@ const RAMP_SLACK_DEG: f64 = 0.1;
 const PRINTED_DEG: f64 = 0.001;
 
 /// Degrees at constant speed on either side of a turn.
-pub(crate) const MARGIN_DEG: f64 = 2.0;
+pub const MARGIN_DEG: f64 = 2.0;
 
 /// A turn that stays inside the limits, after which the table turns back, so that the cable does not wind up.
 #[derive(Debug, Clone, PartialEq)]

@@ -145,7 +145,7 @@ impl<'table> Turn<'table> {
         let limit = self.table.travel_time(distance, plan.degrees_per_second);
         let arrived = self.table.wait_arrival(limit);
         let reports = self.leave();
-        let track = sync::fit(&reports, &self.expected()).map_err(TurntableError::AngleFit);
+        let track = angle_fit::fit(&reports, &self.expected()).map_err(TurntableError::AngleFit);
         let finished = FinishedTurn {
             table: self.table,
             arrived,
@@ -163,7 +163,7 @@ impl<'table> Turn<'table> {
         let supervisor = self.table.link().supervisor();
         let recorded = supervisor.recorded();
         let new = recorded.get(seen..).unwrap_or_default().iter();
-        let timed = new.filter_map(|report| sync::timed(report, &expected));
+        let timed = new.filter_map(|report| angle_fit::timed(report, &expected));
         (timed.collect(), recorded.len())
     }
 

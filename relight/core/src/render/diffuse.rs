@@ -109,7 +109,7 @@ impl DiffuseLayer {
     #[must_use]
     pub fn shading(&self, normals: &Normals<YUp>) -> Rgb<Linear> {
         let mut shading = Planes::zeros(normals.extent());
-        lanes::run(self, normals.planes().planes(), shading.planes_mut());
+        simd::run(self, normals.planes().planes(), shading.planes_mut());
         Rgb::new(shading)
     }
 

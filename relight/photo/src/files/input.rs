@@ -169,15 +169,15 @@ fn add_folder(
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(DecomposeError::read(folder))? {
         let path = entry.map_err(DecomposeError::read(folder))?.path();
-        match is_hidden(&path) {
-            true => {}
-            false if path.is_file() => files.push(path),
-            // A data set has folders of its own.
-            false if !has_frames && holds_pictures(&path) => {
-                let what = "is not used: it is a folder within; give it by its name";
-                unused.push(UnusedFile::new(path, what));
-            }
-            false => {}
+        if is_hidden(&path) {
+            continue;
+        }
+        // A data set has folders of its own.
+        if path.is_file() {
+            files.push(path);
+        } else if !has_frames && holds_pictures(&path) {
+            let what = "is not used: it is a folder within; give it by its name";
+            unused.push(UnusedFile::new(path, what));
         }
     }
     files.sort();

@@ -17,7 +17,7 @@ mod environment;
 mod lamp;
 mod scene;
 mod shaded;
-mod studio;
+pub(crate) mod studio;
 #[cfg(test)]
 mod tests;
 

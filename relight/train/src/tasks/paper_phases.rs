@@ -8,7 +8,7 @@
 //! | `joint` | Normal-Net | reflectance of rank one on turns, Light-Net as it is (second round) |
 //! | `specular` | the reflectance net | the highlight of Spec-Net, rendered again |
 //!
-//! On turns alone the low-rank loss pulls networks away from what they know: each phase that has both has a cratevised
+//! On turns alone the low-rank loss pulls networks away from what they know: each phase that has both has a supervised
 //! term on composed samples.
 
 use tch::Tensor;

@@ -129,12 +129,12 @@ impl PaperTask {
         Ok(())
     }
 
-    /// The coefficient of the cratevised term on composed samples: 1 where there are no turns.
-    fn cratevised(&self) -> f64 {
+    /// The coefficient of the supervised term on composed samples: 1 where there are no turns.
+    fn supervised(&self) -> f64 {
         match (&self.networks, &self.turns) {
             (PhaseNetworks::Specular { .. }, _) => 0.0,
             (PhaseNetworks::Normal, _) | (_, None) => 1.0,
-            (_, Some(_)) => self.settings.loss.cratevised,
+            (_, Some(_)) => self.settings.loss.supervised,
         }
     }
 }
@@ -174,7 +174,7 @@ impl TrainingTask for PaperTask {
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
         let (rank, groups) = (group.rank(), self.settings.turns.groups);
-        if self.cratevised() > 0.0 {
+        if self.supervised() > 0.0 {
             self.photographs.set_rank(rank)?;
         }
         if let Some(reader) = &mut self.turns {
@@ -190,11 +190,11 @@ impl TrainingTask for PaperTask {
 
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let mut losses = StepLosses::default();
-        let cratevised = self.cratevised();
-        if cratevised > 0.0 {
+        let supervised = self.supervised();
+        if supervised > 0.0 {
             let batch = self.photographs.batch(step)?;
             if let Some(loss) = self.networks.on_truth(&self.learner.model, &batch)? {
-                losses.terms.add_mean("cratevised", cratevised, loss.mean);
+                losses.terms.add_mean("supervised", supervised, loss.mean);
                 losses.spreads.insert(loss.head, loss.spread);
             }
         }

@@ -37,7 +37,7 @@ pub(super) async fn video(
 ) -> Result<Response, Failure> {
     let name = attachment(&id, "mkv");
     let file = permits.run(Work::Listing, move || {
-        SentFile::open(library.video_file(&id)?.path).map_err(unread)
+        SentFile::from_path(library.video_file(&id)?.path).map_err(unread)
     });
     let file = file.await?;
     send(&permits, &name, "video/x-matroska", file.bytes, move |to| {
@@ -121,7 +121,7 @@ struct SentFile {
 }
 
 impl SentFile {
-    fn open(path: PathBuf) -> io::Result<Self> {
+    fn from_path(path: PathBuf) -> io::Result<Self> {
         let data = fs::metadata(&path)?;
         let since_epoch = data.modified()?.duration_since(UNIX_EPOCH);
         Ok(Self {
@@ -134,7 +134,7 @@ impl SentFile {
     /// Its content, if it is still the same. One that becomes shorter while it is sent breaks the promise of the
     /// length, which ends the connection.
     fn open(&self) -> io::Result<impl Read + use<>> {
-        let now = Self::open(self.path.clone())?;
+        let now = Self::from_path(self.path.clone())?;
         if (now.bytes, now.modified_s) == (self.bytes, self.modified_s) {
             Ok(File::open(&self.path)?.take(self.bytes))
         } else {
@@ -177,7 +177,9 @@ fn files_of(folder: &FilePath) -> io::Result<Vec<SentFile>> {
         first.position(|&first| first == name).unwrap_or(usize::MAX)
     };
     names.sort_by_key(|name| (rank(name), name.clone()));
-    let files = names.iter().map(|name| SentFile::open(folder.join(name)));
+    let files = names
+        .iter()
+        .map(|name| SentFile::from_path(folder.join(name)));
     files.collect()
 }
 

@@ -274,10 +274,14 @@ fn one_colour_on_black_is_the_object() {
 #[test]
 fn several_labels_are_listed() {
     let third = |a: u8, b: u8| {
-        grey(move |x, y| match is_inside(x, y) {
-            true if x < 38 => a,
-            true => b,
-            false => 0,
+        grey(move |x, y| {
+            if !is_inside(x, y) {
+                0
+            } else if x < 38 {
+                a
+            } else {
+                b
+            }
         })
     };
     assert_labels(third(1, 2), &["0", "1", "2"]);

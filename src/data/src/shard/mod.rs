@@ -14,7 +14,7 @@
 //! | [`ShardWriter`] | writes one session (layouts: `spool` for the tar, `folder` for images) |
 //! | [`SessionQuality`] | a session's figures summed, with a verdict |
 //! | [`Dataset`], [`ExtractionSettings`] | `dataset.json`; `file` compares the files with it |
-//! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tarball`) |
+//! | [`ShardReader`] | reads any WebDataset shard as a stream of samples (`tar_reader`) |
 //! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
 //! | [`ArrayTask`], [`PartialManifest`], [`merge`] | a data set that several tasks write |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |

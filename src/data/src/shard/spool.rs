@@ -96,8 +96,8 @@ impl SpoolStore {
         path: &str,
         data: &[u8],
     ) -> Result<(), ShardError> {
-        let written =
-            tarball::header(path, data.len() as u64).and_then(|header| tar.append(&header, data));
+        let written = tar_reader::header(path, data.len() as u64)
+            .and_then(|header| tar.append(&header, data));
         written.map_err(ShardError::io("write", &self.path()))
     }
 

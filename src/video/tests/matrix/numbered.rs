@@ -21,11 +21,13 @@ impl Planes {
         let mut luma = Vec::with_capacity(WIDTH * HEIGHT);
         for y in 0..HEIGHT {
             for x in 0..WIDTH {
-                luma.push(match y < 2 * BLOCK {
-                    true if number >> (x / BLOCK) & 1 == 1 => 200,
-                    true => 50,
+                luma.push(if y >= 2 * BLOCK {
                     // The same in every picture of a field stream's group, whose lower half is repeated.
-                    false => (70 + (7 * x + 13 * y) % 90) as u8,
+                    (70 + (7 * x + 13 * y) % 90) as u8
+                } else if number >> (x / BLOCK) & 1 == 1 {
+                    200
+                } else {
+                    50
                 });
             }
         }
