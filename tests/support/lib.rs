@@ -11,6 +11,7 @@ pub mod chromium;
 pub mod disc;
 pub mod editor_canvas;
 pub mod firmware;
+pub mod help;
 mod programs;
 pub mod trials;
 
