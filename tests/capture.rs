@@ -16,8 +16,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use relit_camera::{
-    Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, FrameFault, Mode,
-    Rates, open,
+    Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, FrameFault,
+    Mode, Rates, open,
 };
 use relit_capture::capture::{End, Recorder, RecordingPlan, Window, recover, recover_session};
 use relit_capture::preview::Preview;
@@ -818,7 +818,10 @@ fn kill_and_recover(clock: &str, frames: u64) -> Lost {
         panic!("{status:?}");
     };
     let counts = [format!("{frames} frames"), format!("{:.1}", saved.seconds)];
-    assert!(is_named(&reason, &counts.each_ref().map(|count| &**count)), "{reason}");
+    assert!(
+        is_named(&reason, &counts.each_ref().map(|count| &**count)),
+        "{reason}"
+    );
     let last = *recording.frames.unwrap().entries().last().unwrap();
     assert_eq!(last.n + 1, frames as u64);
     assert!(recover(root.path()).unwrap().is_empty());
@@ -871,7 +874,10 @@ fn a_recording_killed_before_its_first_frame_is_recovered_as_such() {
     let saved = recover_session(&folder).unwrap();
     assert_eq!((saved.frames, saved.lines_cut), (0, 0));
     let manifest = Manifest::from_json(&fs::read(folder.join("session.json")).unwrap()).unwrap();
-    assert!(matches!(manifest.status, Status::Aborted(_)), "{manifest:?}");
+    assert!(
+        matches!(manifest.status, Status::Aborted(_)),
+        "{manifest:?}"
+    );
 
     // It is left out of a batch, with its reason, and is no failure.
     let output = Command::new(relit_tests::program("relit-extract"))

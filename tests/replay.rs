@@ -146,7 +146,10 @@ fn check_entry(name: &str, expect: &Expect, dataset: &Dataset) {
     );
     for (found, things) in entry.warnings.iter().zip(&expect.warnings) {
         let things: Vec<&str> = things.iter().map(String::as_str).collect();
-        assert!(is_named(found, &things), "{name}: {found:?} lacks {things:?}");
+        assert!(
+            is_named(found, &things),
+            "{name}: {found:?} lacks {things:?}"
+        );
     }
 }
 

@@ -112,7 +112,11 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
     once(&daemon, |state| state.phase == Phase::Idle);
     let state = once(&daemon, |state| !state.faults.is_empty());
     let stopped = MotionFault::Stopped.to_string();
-    assert!(state.faults[0].what.contains(&stopped), "{:?}", state.faults);
+    assert!(
+        state.faults[0].what.contains(&stopped),
+        "{:?}",
+        state.faults
+    );
     once(&daemon, |state| state.table.state == "Idle");
     assert!(!moves(&daemon));
 

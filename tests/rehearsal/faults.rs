@@ -164,7 +164,10 @@ fn dropped_and_damaged_frames_within_the_limit_are_listed_and_kept() {
         .collect();
     // One frame that is lost, and one that is damaged.
     assert_eq!(faults.len(), 2, "{faults:?}");
-    assert!(faults.iter().all(|what| what.contains("frame ")), "{faults:?}");
+    assert!(
+        faults.iter().all(|what| what.contains("frame ")),
+        "{faults:?}"
+    );
 }
 
 #[test]
@@ -265,7 +268,10 @@ fn an_emergency_stop_while_the_table_turns_back_costs_no_take() {
     check_whole(&rig, &take, "ALARM:10");
     let error = rig.capture().unwrap_err();
     assert!(
-        matches!(error, CaptureError::Turntable(TurntableError::EmergencyStop)),
+        matches!(
+            error,
+            CaptureError::Turntable(TurntableError::EmergencyStop)
+        ),
         "{error:?}"
     );
 }

@@ -14,8 +14,8 @@ use std::process::Command;
 use relight_core::files::{write_exr, write_png};
 use relight_core::image::{Depth, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::NormalsFrame;
-use relight_core::metrics::MetricError;
 use relight_core::light::{Direction, Normals, Rotation, ShLight, YDown, YUp};
+use relight_core::metrics::MetricError;
 use relight_core::reader::{TruthLayout, TruthSet};
 use relight_core::render::{DiffuseForm, DiffuseLayer, Gloss, Layers, SpecularForm, Surface};
 use relight_eval::{

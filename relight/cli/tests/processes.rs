@@ -332,7 +332,10 @@ fn processes_that_were_started_with_other_settings_say_so() {
     for output in processes.outputs() {
         let text = stderr(&output);
         assert_eq!(output.status.code(), Some(1), "{text}");
-        assert!(is_named(&text, &["settings", "process 0", "process 1"]), "{text}");
+        assert!(
+            is_named(&text, &["settings", "process 0", "process 1"]),
+            "{text}"
+        );
     }
     assert!(table(folder.path()).is_empty());
 }
@@ -345,7 +348,10 @@ fn a_batch_that_the_processes_cannot_divide_is_told() {
     let command = || train("decompose", &file, folder.path());
     for output in Processes::launch(3, |_| command()).outputs() {
         let text = stderr(&output);
-        assert!(is_named(&text, &["run.batch", "4", "3 processes"]), "{text}");
+        assert!(
+            is_named(&text, &["run.batch", "4", "3 processes"]),
+            "{text}"
+        );
     }
 }
 

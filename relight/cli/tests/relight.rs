@@ -154,11 +154,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
     let one = "relight photos/one.png";
     let dark = InsertError::Dark.to_string();
     for (command, code, named) in [
-        (
-            format!("{one} --lamp 30,40 -o o.png"),
-            1,
-            "photos/one.png",
-        ),
+        (format!("{one} --lamp 30,40 -o o.png"), 1, "photos/one.png"),
         (
             format!("{one} --mask empty.png --lamp 30,40 -o o.png"),
             1,
@@ -213,26 +209,14 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
             "none.png",
         ),
         (format!("{one} -o o.png"), 2, "--lamp AZIMUTH,ELEVATION"),
-        (
-            format!("{one} --lamp 30 -o o.png"),
-            2,
-            "AZIMUTH,ELEVATION",
-        ),
-        (
-            format!("{one} --lamp 30,40 -o o.mp4"),
-            2,
-            ".exr",
-        ),
+        (format!("{one} --lamp 30 -o o.png"), 2, "AZIMUTH,ELEVATION"),
+        (format!("{one} --lamp 30,40 -o o.mp4"), 2, ".exr"),
         (
             format!("{one} --lamp 30,40 --turn 360 -o o.png"),
             2,
             ".webm",
         ),
-        (
-            format!("{one} --lamp 30,40 -o o.bmp"),
-            2,
-            ".exr",
-        ),
+        (format!("{one} --lamp 30,40 -o o.bmp"), 2, ".exr"),
         (
             format!("{one} --lamp 30,40 --background light -o o.png"),
             2,
@@ -271,7 +255,10 @@ fn no_file_that_is_read_is_overwritten() {
     ] {
         let (code, errors) = folder.code_and_errors(&command);
         assert_eq!(code, 1, "{command}: {errors}");
-        assert!(errors.contains(command.rsplit(' ').next().unwrap()), "{command}: {errors}");
+        assert!(
+            errors.contains(command.rsplit(' ').next().unwrap()),
+            "{command}: {errors}"
+        );
         let after = files.map(|name| fs::read(folder.path(name)).unwrap());
         assert!(before == after, "{command}");
     }
@@ -404,10 +391,7 @@ fn a_webp_becomes_a_jpeg_in_a_folder_that_is_made_and_half_a_file_is_refused() {
     let relit =
         "relight half.jpg --mask masks/one.png --lamp 10,20 --weights w.safetensors -o o.png";
     let (code, errors) = folder.code_and_errors(relit);
-    assert!(
-        code == 1 && errors.contains("half.jpg"),
-        "{errors}"
-    );
+    assert!(code == 1 && errors.contains("half.jpg"), "{errors}");
     assert!(!folder.path("o.png").exists());
 }
 
@@ -472,11 +456,7 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
     fs::write(folder.path("none.toml"), "background = \"none.exr\"\n[[object]]\nphoto = \"photos/one.png\"\nmask = \"masks/one.png\"\n").unwrap();
     let one = "insert photos/one.png --mask masks/one.png";
     for (command, code, named) in [
-        (
-            "insert --scene odd.toml -o o.png".to_owned(),
-            1,
-            "`hight`",
-        ),
+        ("insert --scene odd.toml -o o.png".to_owned(), 1, "`hight`"),
         (
             "insert --scene none.toml -o o.png".to_owned(),
             1,
@@ -502,16 +482,8 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
             1,
             "light.lamp",
         ),
-        (
-            format!("{one} --into photos/two.png -o o.mp4"),
-            1,
-            "o.mp4",
-        ),
-        (
-            format!("{one} --into sky.exr -o o.mp4"),
-            1,
-            "o.mp4",
-        ),
+        (format!("{one} --into photos/two.png -o o.mp4"), 1, "o.mp4"),
+        (format!("{one} --into sky.exr -o o.mp4"), 1, "o.mp4"),
         (
             format!("{one} --into sky.exr --at 0.1,0.2 --at 0.3,0.4 -o o.png"),
             2,
@@ -523,11 +495,7 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
             2,
             "--mask",
         ),
-        (
-            format!("{one} --into sky.exr -o o.bmp"),
-            2,
-            ".webm",
-        ),
+        (format!("{one} --into sky.exr -o o.bmp"), 2, ".webm"),
     ] {
         let (found, errors) = folder.code_and_errors(&command);
         assert_eq!(found, code, "{command}: {errors}");

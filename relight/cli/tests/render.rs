@@ -139,27 +139,15 @@ fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
     fs::write(scene.path("short.txt"), "1 2 3\n4 5\n").unwrap();
     fs::write(scene.path("taken"), "a file").unwrap();
     let cases = [
-        (
-            "--normals none.png --light light.txt -o a.png",
-            "none.png",
-        ),
-        (
-            "--normals up.png --light short.txt -o a.png",
-            "short.txt",
-        ),
-        (
-            "--normals up.png --panorama up.png -o a.png",
-            "up.png",
-        ),
+        ("--normals none.png --light light.txt -o a.png", "none.png"),
+        ("--normals up.png --light short.txt -o a.png", "short.txt"),
+        ("--normals up.png --panorama up.png -o a.png", "up.png"),
         ("--normals up.png --light light.txt -o taken/a.png", "taken"),
         (
             "--normals up.png --light light.txt --turn 2 -o taken",
             "taken",
         ),
-        (
-            "--normals up.png --light light.txt --turn 2 -o .",
-            ". ",
-        ),
+        ("--normals up.png --light light.txt --turn 2 -o .", ". "),
     ];
     for (arguments, named) in cases {
         let output = scene.render(arguments);

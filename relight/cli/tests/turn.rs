@@ -15,7 +15,6 @@ use relight_core::image::{Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, Order, ShLight, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::render::Surface;
-use relit_test_support::is_named;
 use relight_synth::{
     Folders, FrameTruth, Library, LightKind, Recipe, TurnDescription, TurnRecipe, write_turns,
 };
@@ -23,6 +22,7 @@ use relight_turn::{
     Elevation, MaterialKind, TableFrame, TableRotation, TurnError, fit_turn_light, read_curves,
     solve_in_light,
 };
+use relit_test_support::is_named;
 
 /// The light of this seed is positive on every normal: of others the shading is cut off at 0, which no light of order 2 does.
 const SEED: u64 = 8;

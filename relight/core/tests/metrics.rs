@@ -151,7 +151,10 @@ fn images_and_masks_that_hold_no_window_are_told_apart() {
     let extent = Extent::new(20, 20);
     let pair = Comparison::new(extent, &[&values], &[&values], &mask).unwrap();
     let error = pair.ssim().unwrap_err().to_string();
-    assert!(error.contains("11x11") && !error.contains("20x20"), "{error}");
+    assert!(
+        error.contains("11x11") && !error.contains("20x20"),
+        "{error}"
+    );
     let extent = Extent::new(40, 10);
     let pair = Comparison::new(extent, &[&values], &[&values], &mask).unwrap();
     for found in [pair.ssim(), pair.lmse(ScaleFit::Image, Windows::GROSSE)] {

@@ -228,7 +228,10 @@ fn a_sample_that_does_not_decode_is_told_and_the_others_are_given() {
     fs::write(&path, bytes).unwrap();
     let (given, damaged) = given_and_damaged(&path);
     assert_eq!((given.len(), damaged.len()), (29, 1), "{damaged:?}");
-    assert!(damaged[0].contains("turn.tar") && damaged[0].contains("sample 0"), "{damaged:?}");
+    assert!(
+        damaged[0].contains("turn.tar") && damaged[0].contains("sample 0"),
+        "{damaged:?}"
+    );
 }
 
 #[test]
@@ -290,11 +293,7 @@ fn samples_that_the_description_tells_of_and_no_shard_holds_are_told() {
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     let (given, damaged) = given_and_damaged(dir.path());
     assert_eq!(given.len() + damaged.len(), 20);
-    assert!(
-        damaged
-            .iter()
-            .any(|told| told.contains("20 samples"))
-    );
+    assert!(damaged.iter().any(|told| told.contains("20 samples")));
 
     fs::remove_file(&path).unwrap();
     assert!(matches!(

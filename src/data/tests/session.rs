@@ -169,7 +169,10 @@ fn a_session_is_marked_as_recording_until_it_ends() {
     assert_eq!(losses(&recording).len(), 1);
     assert!(losses(&recording)[0].contains("the camera was unplugged"));
     let status = recording.manifest.unwrap().status;
-    assert_eq!(status, Status::Aborted("the camera was unplugged".to_owned()));
+    assert_eq!(
+        status,
+        Status::Aborted("the camera was unplugged".to_owned())
+    );
 }
 
 #[test]
@@ -276,7 +279,10 @@ fn dropped_frames_and_faults_are_reported() {
     let texts: Vec<_> = recording.notices.iter().map(Notice::text).collect();
     assert_eq!(texts.len(), 2);
     assert!(texts[0].contains("the table was slow"), "{texts:?}");
-    assert!(texts[1].contains("2 frames") && texts[1].contains("frame 9"), "{texts:?}");
+    assert!(
+        texts[1].contains("2 frames") && texts[1].contains("frame 9"),
+        "{texts:?}"
+    );
 }
 
 #[test]

@@ -141,7 +141,10 @@ mod tests {
         assert!(is_named(&text, &["1", "2 frames", "frame 6"]), "{text}");
         steadiness.add(5, &lost, None);
         let text = steadiness.notices(0.5).remove(0).text().to_owned();
-        assert!(is_named(&text, &["2", "3 frames", "frame 5", "0.50"]), "{text}");
+        assert!(
+            is_named(&text, &["2", "3 frames", "frame 5", "0.50"]),
+            "{text}"
+        );
         steadiness.add(7, &moved_by(0.3), Some(0.14));
         let text = steadiness.notices(0.5).remove(1).text().to_owned();
         assert!(is_named(&text, &["1", "4 frames", "0.14 pixels"]), "{text}");

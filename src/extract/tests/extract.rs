@@ -135,7 +135,10 @@ fn native_size_keeps_source_pixels_and_its_statistics_are_recomputed_by_verify()
     );
     let events = bench.verified(0, "out");
     let verified = events.last().unwrap();
-    assert_eq!((&verified["samples"], &verified["problems"]), (&30.into(), &0.into()));
+    assert_eq!(
+        (&verified["samples"], &verified["problems"]),
+        (&30.into(), &0.into())
+    );
     let record = &bench.records("out/clip.tar")[7];
     assert_eq!(record.size, [record.crop.w, record.crop.h]);
     assert_eq!(record.crop.w, 43 + 2 * 2);
@@ -161,7 +164,10 @@ fn the_relit_layout_has_gap_free_names_and_is_verified() {
     .unwrap();
     let events = bench.verified(1, "out");
     let mut problems = events.iter().filter(|event| event["event"] == "problem");
-    assert!(problems.any(|problem| problem["sample"] == "clip/0004"), "{events:?}");
+    assert!(
+        problems.any(|problem| problem["sample"] == "clip/0004"),
+        "{events:?}"
+    );
 }
 
 #[test]

@@ -248,7 +248,9 @@ fn what_lies_beside_sessions_is_named_once() {
     let lines = said.lines().map(serde_json::from_str::<serde_json::Value>);
     let events: Vec<_> = lines.map(Result::unwrap).collect();
     let left_out = events.iter().filter(|event| event["event"] == "left_out");
-    let mut left_out: Vec<&str> = left_out.map(|event| event["input"].as_str().unwrap()).collect();
+    let mut left_out: Vec<&str> = left_out
+        .map(|event| event["input"].as_str().unwrap())
+        .collect();
     left_out.sort_unstable();
     assert_eq!(left_out, ["sessions/cup", "sessions/notes.txt"]);
     assert_eq!(events.last().unwrap()["left_out"], 2);
@@ -291,7 +293,11 @@ fn masks_of_other_programs_mark_the_object_or_are_refused() {
     ] {
         let (code, errors) = inputs.extract(&["clip.mkv", "--mask", mask, "-o", "out"]);
         assert_eq!(code, Some(0), "{mask}: {errors}");
-        assert_eq!(is_named(&errors, &["warning", "mask"]), noted, "{mask}: {errors}");
+        assert_eq!(
+            is_named(&errors, &["warning", "mask"]),
+            noted,
+            "{mask}: {errors}"
+        );
         assert_eq!(inputs.mask_px(), OBJECT_PX, "{mask}");
         fs::remove_dir_all(inputs.path("out")).unwrap();
     }
@@ -302,7 +308,10 @@ fn masks_of_other_programs_mark_the_object_or_are_refused() {
     ] {
         let (code, errors) = inputs.extract(&["clip.mkv", "--mask", mask, "-o", "out"]);
         assert_eq!(code, Some(1), "{mask}: {errors}");
-        assert!(is_named(&errors, &[&[mask], values].concat()), "{mask}: {errors}");
+        assert!(
+            is_named(&errors, &[&[mask], values].concat()),
+            "{mask}: {errors}"
+        );
         assert!(!inputs.path("out").join("clip.tar").exists(), "{mask}");
     }
 }

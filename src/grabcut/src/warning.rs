@@ -161,7 +161,10 @@ mod tests {
     fn a_mask_at_the_border_gives_a_warning_with_its_sides() {
         let rows = [".......", ".....##", "......#"];
         let found = warnings_of(&rows, Rect::new(1, 1, 9, 2));
-        assert!(are(&found, &[&["1,1,9,2", "1,1,6,2"], &["right, lower"]]), "{found:?}");
+        assert!(
+            are(&found, &[&["1,1,9,2", "1,1,6,2"], &["right, lower"]]),
+            "{found:?}"
+        );
     }
 
     #[test]

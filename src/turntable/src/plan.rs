@@ -223,7 +223,10 @@ mod tests {
         };
         assert_eq!((from_deg, high_deg), (100.0, 400.0));
         assert!(is_named(way_out, &["-259.180", "37.180"]), "{way_out}");
-        assert!(is_named(&error.to_string(), &["100.000", "400.000", way_out]));
+        assert!(is_named(
+            &error.to_string(),
+            &["100.000", "400.000", way_out]
+        ));
         let error = TurnPlan::new(&identity(-100.0, 100.0), &here, 7.2, 360.0).unwrap_err();
         let TurntableError::NoRoom { way_out, .. } = error else {
             panic!("{error}");

@@ -731,7 +731,11 @@ fn a_file_without_time_stamps_is_spread_by_its_rate_and_says_so() {
     let video = Video::open(&path).unwrap();
     let times: Vec<i64> = video.frames().iter().map(|frame| frame.t_us).collect();
     assert!(times.windows(2).all(|pair| pair[1] > pair[0]), "{times:?}");
-    assert!(video.notes()[0].contains("time stamps"), "{:?}", video.notes());
+    assert!(
+        video.notes()[0].contains("time stamps"),
+        "{:?}",
+        video.notes()
+    );
     check_against_the_ffmpeg_program(&video, &path);
 }
 

@@ -269,7 +269,11 @@ fn every_slice_of_ffv1_is_checked_by_its_checksum() {
     fs::write(&path, bytes).unwrap();
     let video = Video::open(&path).unwrap();
     assert_eq!(video.damage().len(), 1, "{:?}", video.damage());
-    assert!(video.damage()[0].contains("frame 2"), "{:?}", video.damage());
+    assert!(
+        video.damage()[0].contains("frame 2"),
+        "{:?}",
+        video.damage()
+    );
 }
 
 #[test]

@@ -219,7 +219,10 @@ mod tests {
             other => panic!("{other:?}"),
         };
         let (path, why) = incomplete();
-        assert!(path.ends_with("a.wasm") && why.contains('3') && why.contains('4'), "{why}");
+        assert!(
+            path.ends_with("a.wasm") && why.contains('3') && why.contains('4'),
+            "{why}"
+        );
         fs::remove_file(built.join("a.wasm")).unwrap();
         assert!(incomplete().0.ends_with("a.wasm"));
         fs::write(built.join(LIST), r#"{"files": {"../secret": 1}}"#).unwrap();

@@ -67,16 +67,28 @@ fn what_is_wrong_with_a_photograph_is_said_in_a_sentence() {
     };
     let plain = PhotoReading::default();
     for (path, reading, named) in [
-        (&grey, plain.clone(), &["grey.png", "relit-mask", "--mask", "--rect"][..]),
+        (
+            &grey,
+            plain.clone(),
+            &["grey.png", "relit-mask", "--mask", "--rect"][..],
+        ),
         (&black, plain.clone(), &["black.png"]),
         (&cup, in_corner, &["0,0,2,2"]),
         (&grey, with_mask(small), &["8 x 8", "60 x 48"]),
         (&grey, with_mask(none), &["none.png"]),
-        (&grey, with_mask(folder.path("no.png")), &["no.png", "(os error 2)"]),
+        (
+            &grey,
+            with_mask(folder.path("no.png")),
+            &["no.png", "(os error 2)"],
+        ),
         (&grey, with_mask(full), &["full/grey.png"]),
         (&grey, beside, &["100,0,5,5"]),
         (&text, plain.clone(), &["text.png"]),
-        (&folder.path("gone.png"), plain, &["gone.png", "(os error 2)"]),
+        (
+            &folder.path("gone.png"),
+            plain,
+            &["gone.png", "(os error 2)"],
+        ),
     ] {
         let error = load(path, &reading).map(|photo| photo.name).unwrap_err();
         let found = with_causes(&error);

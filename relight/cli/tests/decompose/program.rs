@@ -82,11 +82,7 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
     fs::create_dir(folder.path("shards")).unwrap();
     write_shard(&folder.path("shards"));
     for (command, code, named) in [
-        (
-            "decompose shards --rect 1,2,3,4 -o o",
-            2,
-            "--rect",
-        ),
+        ("decompose shards --rect 1,2,3,4 -o o", 2, "--rect"),
         (
             "decompose shards/20261120T093015Z-mug.tar --transfer linear -o o",
             2,
@@ -97,11 +93,7 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
             2,
             "relight decompose",
         ),
-        (
-            "decompose photos --count 3 -o o",
-            2,
-            "--count",
-        ),
+        ("decompose photos --count 3 -o o", 2, "--count"),
         (
             "weights export w.safetensors -o w.txt",
             2,
@@ -117,22 +109,10 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
             1,
             "none.safetensors",
         ),
-        (
-            "decompose photos --mask w.safetensors -o o",
-            2,
-            "--mask",
-        ),
-        (
-            "decompose photos/black.png --rect 1,2,3 -o o",
-            2,
-            "X,Y,W,H",
-        ),
+        ("decompose photos --mask w.safetensors -o o", 2, "--mask"),
+        ("decompose photos/black.png --rect 1,2,3 -o o", 2, "X,Y,W,H"),
         ("decompose photos/black.png", 2, "--output"),
-        (
-            "weights export w.safetensors -o w.txt",
-            2,
-            ".safetensors",
-        ),
+        ("weights export w.safetensors -o w.txt", 2, ".safetensors"),
         (
             "weights export w.safetensors --net normal-net -o w.onnx",
             1,

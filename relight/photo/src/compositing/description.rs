@@ -383,25 +383,14 @@ mod tests {
         assert!(fault("").contains("`object`"));
         assert!(fault("object = []").contains("0 objects"));
         assert!(fault(&format!("feild = 3\n{object}")).contains("`feild`"));
-        assert!(
-            fault(&format!("field = nan\n{object}"))
-                .contains("NaN")
-        );
+        assert!(fault(&format!("field = nan\n{object}")).contains("NaN"));
         assert!(fault(&format!("size = [1, 1]\n{object}")).contains("size is 1"));
-        assert!(
-            fault(&format!("light = {{ lamp = \"1\" }}\n{object}"))
-                .contains("light.lamp")
-        );
-        assert!(
-            fault(&format!("light = {{ turn = inf }}\n{object}")).contains("light.turn")
-        );
+        assert!(fault(&format!("light = {{ lamp = \"1\" }}\n{object}")).contains("light.lamp"));
+        assert!(fault(&format!("light = {{ turn = inf }}\n{object}")).contains("light.turn"));
         let both = "light = { lamp = \"1,2\", panorama = \"c.hdr\" }";
         assert!(fault(&format!("{both}\n{object}")).contains("panorama"));
         assert!(fault(&format!("{object}height = 0")).contains("height"));
-        assert!(
-            fault(&format!("{object}gloss = [2, 5]"))
-                .contains("gloss")
-        );
+        assert!(fault(&format!("{object}gloss = [2, 5]")).contains("gloss"));
         assert!(fault(&format!("{object}shadow = -1")).contains("shadow"));
         assert!(fault(&format!("{object}transfer = \"log\"")).contains("`log`"));
         assert!(fault("= 3").contains("line 2"));

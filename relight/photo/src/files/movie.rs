@@ -534,10 +534,7 @@ mod tests {
         let error = MovieReader::open(&path, FrameTiming::Each)
             .unwrap_err()
             .to_string();
-        assert!(
-            error.contains("clip.mp4"),
-            "{error}"
-        );
+        assert!(error.contains("clip.mp4"), "{error}");
     }
 
     /// A video of one colour, made by `ffmpeg`.

@@ -164,13 +164,15 @@ fn pasted_edges_do_not_show_the_old_background() {
 fn what_is_no_photograph_is_refused() {
     let refused = |photo: Rgb<Linear>, mask: Planes<1>| {
         let options = DecomposeOptions::default();
-        RelightableObject::new(&photo, &mask, None, &untrained(), &options)
-            .unwrap_err()
+        RelightableObject::new(&photo, &mask, None, &untrained(), &options).unwrap_err()
     };
     let mut odd = photo();
     odd.planes_mut().set_pixel(7, 5, [0.1, f32::NAN, 0.1]);
     let odd = refused(odd, mask());
-    assert!(matches!(odd, InsertError::NotLight { x: 7, y: 5 }), "{odd:?}");
+    assert!(
+        matches!(odd, InsertError::NotLight { x: 7, y: 5 }),
+        "{odd:?}"
+    );
     let empty = refused(photo(), Planes::zeros(EXTENT));
     assert!(
         matches!(empty, InsertError::Decompose(DecomposeError::EmptyMask)),

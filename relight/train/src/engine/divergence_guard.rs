@@ -116,7 +116,10 @@ mod tests {
         ]);
         let error = DivergenceGuard::default().check(7, &losses, &BTreeMap::new());
         let text = error.unwrap_err().to_string();
-        assert!(text.contains("loss/normals") && text.contains("NaN"), "{text}");
+        assert!(
+            text.contains("loss/normals") && text.contains("NaN"),
+            "{text}"
+        );
     }
 
     #[test]

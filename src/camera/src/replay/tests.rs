@@ -86,7 +86,10 @@ fn a_replay_says_what_it_is() {
     assert_eq!(info.modes[0].to_string(), "MJPG 480x360, 30 frames/s");
     assert_eq!(info.problems.len(), 3, "{:?}", info.problems);
     let gap = &info.problems[0];
-    assert!(gap.contains("2 frames") && gap.contains("frame 40"), "{gap}");
+    assert!(
+        gap.contains("2 frames") && gap.contains("frame 40"),
+        "{gap}"
+    );
 }
 
 #[test]
@@ -95,7 +98,10 @@ fn a_cut_session_ends_after_its_last_whole_frame_and_says_so() {
     // That the capture was aborted, and that the video is truncated.
     let problems = &camera.info().problems;
     assert!(problems.len() >= 2, "{problems:?}");
-    assert!(problems.iter().any(|problem| problem.contains("byte")), "{problems:?}");
+    assert!(
+        problems.iter().any(|problem| problem.contains("byte")),
+        "{problems:?}"
+    );
     let (frames, end) = play(&mut *camera);
     assert_eq!(frames.len(), 85);
     assert!(frames.iter().all(|frame| frame.fault().is_none()));

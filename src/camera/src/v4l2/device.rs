@@ -217,7 +217,10 @@ mod tests {
         for errno in [Errno::NODEV, Errno::BUSY, Errno::NOSPC, Errno::IO] {
             let text = with_causes(&device.error("its stream was started", errno.into()));
             let answer = io::Error::from(errno).to_string();
-            assert!(text.contains("/dev/video9") && text.ends_with(&answer), "{text}");
+            assert!(
+                text.contains("/dev/video9") && text.ends_with(&answer),
+                "{text}"
+            );
             let text = with_causes(&device.stream_error("read", errno.into()));
             assert!(text.ends_with(&answer), "{text}");
             let text = with_causes(&open_error(Path::new("/dev/video9"), errno.into()));

@@ -118,7 +118,10 @@ fn a_table_is_looked_at_moved_and_stopped_from_the_command_line() {
     assert_eq!(ready["event"], "ready");
     let status = event(&ask(&port, &["status", "--json"]));
     assert_eq!(status["event"], "status");
-    assert_eq!((&status["state"], &status["angle_deg"]), (&"idle".into(), &0.0.into()));
+    assert_eq!(
+        (&status["state"], &status["angle_deg"]),
+        (&"idle".into(), &0.0.into())
+    );
     let volts = status["battery_v"].as_f64().unwrap();
     assert!((volts - 12.0).abs() < 0.1, "{volts}");
     let jogged = event(&ask(&port, &["jog", "-12.5", "--speed", "20", "--json"]));
@@ -147,7 +150,10 @@ fn a_second_program_is_told_who_has_the_table_and_a_stop_ends_that_one() {
         );
     }
     let stopped = event(&table.ask(&["stop", "--json"]));
-    assert_eq!((&stopped["event"], &stopped["state"]), (&"stopped".into(), &"idle".into()));
+    assert_eq!(
+        (&stopped["event"], &stopped["state"]),
+        (&"stopped".into(), &"idle".into())
+    );
     assert_eq!(jog.wait().unwrap().code(), Some(1));
 }
 
@@ -224,7 +230,10 @@ fn where_each_opening_resets_and_locks_the_controller_a_jog_can_home_first() {
     assert_eq!(locked.status.code(), Some(1));
     assert!(err(&locked).contains("Alarm"), "{}", err(&locked));
     let jogged = event(&table.ask(&["jog", "--home", "5", "--json"]));
-    assert_eq!((&jogged["state"], &jogged["homed"]), (&"idle".into(), &true.into()));
+    assert_eq!(
+        (&jogged["state"], &jogged["homed"]),
+        (&"idle".into(), &true.into())
+    );
     let angle = jogged["angle_deg"].as_f64().unwrap();
     assert!((angle - 5.0).abs() < 0.01, "{angle}");
 }
@@ -237,7 +246,11 @@ fn a_moving_table_that_nobody_has_is_stopped_and_that_is_said() {
     jog.wait().unwrap();
     let status = table.ask(&["status", "--json"]);
     assert_eq!(event(&status)["state"], "idle");
-    assert!(out(&status).contains(r#""event":"warning""#), "{}", out(&status));
+    assert!(
+        out(&status).contains(r#""event":"warning""#),
+        "{}",
+        out(&status)
+    );
     assert_eq!(err(&status).lines().count(), 1, "{}", err(&status));
     let again = table.ask(&["status", "--json"]);
     assert_eq!(err(&again), "");

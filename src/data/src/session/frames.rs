@@ -264,7 +264,10 @@ mod tests {
         ] {
             let read = FrameIndex::parse(text(&[entry(0), second]).as_bytes());
             let fault = read.unwrap_err().to_string();
-            assert!(fault.contains("line 2 ") && fault.contains(wanted), "{fault}");
+            assert!(
+                fault.contains("line 2 ") && fault.contains(wanted),
+                "{fault}"
+            );
         }
     }
 }

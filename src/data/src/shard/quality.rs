@@ -273,7 +273,10 @@ mod tests {
         assert_eq!(partly.verdict, QualityVerdict::Usable);
         let other = of(Some(MaskMisfit::AsAWhole));
         assert_eq!(other.verdict, QualityVerdict::Broken);
-        assert_eq!((other.reasons.len(), other.mask_misfit), (1, Some(MaskMisfit::AsAWhole)));
+        assert_eq!(
+            (other.reasons.len(), other.mask_misfit),
+            (1, Some(MaskMisfit::AsAWhole))
+        );
     }
 
     #[test]

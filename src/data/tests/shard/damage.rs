@@ -167,7 +167,10 @@ fn a_tar_truncated_anywhere_is_found() {
         assert_names(dir.path(), TAR, None, "bytes");
         let shard = fs::File::open(tar_path(dir.path())).unwrap();
         let mut faults = ShardReader::new(shard).filter_map(Result::err);
-        assert!(matches!(faults.next(), Some(ShardError::ShardTruncated(_))), "{end}");
+        assert!(
+            matches!(faults.next(), Some(ShardError::ShardTruncated(_))),
+            "{end}"
+        );
     }
     fs::write(tar_path(dir.path()), &whole[..whole.len() / 2]).unwrap();
     assert_names(dir.path(), TAR, at(SAMPLES as usize - 1), "sample");
@@ -295,7 +298,10 @@ fn a_record_that_contradicts_itself_is_named() {
     };
     names(|s| s.record.duplicate = true, "duplicate");
     names(|s| s.record.source_frame = 3, "duplicate");
-    names(|s| s.record.saturated_fraction += 1e-9, "saturated_fraction");
+    names(
+        |s| s.record.saturated_fraction += 1e-9,
+        "saturated_fraction",
+    );
     names(|s| s.record.spec_net = !s.record.spec_net, "spec_net");
     names(|s| s.record.saturated_any_px = 0, "saturated_any_px");
     names(|s| s.record.mask_px = 1, "saturated");

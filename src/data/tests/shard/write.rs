@@ -130,7 +130,10 @@ fn an_incomplete_session_is_refused_with_the_first_missing_sample() {
         let error = writer.finish().unwrap_err();
         assert!(matches!(error, ShardError::Refused(_)), "{error:?}");
         let text = error.to_string();
-        assert!(text.contains("11 samples") && text.contains("sample 2"), "{text}");
+        assert!(
+            text.contains("11 samples") && text.contains("sample 2"),
+            "{text}"
+        );
         assert!(files(dir.path()).is_empty());
     }
 }

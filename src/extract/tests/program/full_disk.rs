@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use relit_data::disk::DISK_FULL;
-use relit_test_support::{is_named, trials};
 use relit_test_support::trials::Trial;
+use relit_test_support::{is_named, trials};
 
 use crate::support::{PROGRAM, SETTINGS, Workshop, files};
 
@@ -173,6 +173,9 @@ fn a_folder_that_may_not_be_looked_into_is_named_and_the_others_go_on() {
     fs::set_permissions(&open, fs::Permissions::from_mode(0o777)).unwrap();
     let (code, errors) = as_nobody(&workshop, &format!("sessions {SETTINGS} -o open/out"));
     assert_eq!(code, Some(3), "{errors}");
-    assert!(is_named(&errors, &["sessions/b", NOT_PERMITTED]), "{errors}");
+    assert!(
+        is_named(&errors, &["sessions/b", NOT_PERMITTED]),
+        "{errors}"
+    );
     assert!(open.join("out/a.tar").is_file());
 }

@@ -64,7 +64,10 @@ pub(crate) fn what_is_not_there_and_credentials_in_a_url_are_refused_in_one_sent
     let errors = workshop.errors(1, &format!("{url}/nowhere {SETTINGS} -o {url}/out"));
     assert!(is_named(&errors, &[&format!("{url}/nowhere")]), "{errors}");
     let errors = workshop.errors(1, &format!("s3://key:secret@lab/in {SETTINGS} -o out"));
-    assert!(is_named(&errors, &["s3://"]) && !errors.contains("secret"), "{errors}");
+    assert!(
+        is_named(&errors, &["s3://"]) && !errors.contains("secret"),
+        "{errors}"
+    );
     let errors = workshop.errors(1, &format!("verify {url}/out"));
     assert!(is_named(&errors, &[&url]), "{errors}");
     assert_eq!(errors.lines().count(), 1, "{errors}");

@@ -86,7 +86,10 @@ pub(crate) fn doubles_failures_and_tasks_of_different_inputs_are_refused() {
         &format!("b.mkv d.mkv {SETTINGS} -o out --task-id 1 --task-count 2"),
     );
     let errors = workshop.errors(1, "merge out");
-    assert!(is_named(&errors, &["task", "0", "1", "recordings"]), "{errors}");
+    assert!(
+        is_named(&errors, &["task", "0", "1", "recordings"]),
+        "{errors}"
+    );
 }
 
 pub(crate) fn a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed() {
@@ -100,7 +103,10 @@ pub(crate) fn a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed() 
     fs::copy(workshop.path("a.mkv"), workshop.path("e.mkv")).unwrap();
     workshop.errors(0, &format!("e.mkv {SETTINGS} -o out"));
     let errors = workshop.errors(1, "merge out");
-    assert!(is_named(&errors, &["session e", "dataset.json"]), "{errors}");
+    assert!(
+        is_named(&errors, &["session e", "dataset.json"]),
+        "{errors}"
+    );
 }
 
 fn warnings(events: &[Value]) -> impl Iterator<Item = &str> {
@@ -112,10 +118,16 @@ pub(crate) fn a_task_without_recordings_says_so() {
     let workshop = workshop();
     let events = workshop.events(0, &part(7, 100));
     assert_eq!(events[0]["task"], "7-of-100");
-    assert!(warnings(&events).any(|text| is_named(text, &["7-of-100"])), "{events:?}");
+    assert!(
+        warnings(&events).any(|text| is_named(text, &["7-of-100"])),
+        "{events:?}"
+    );
     let events = workshop.events(0, &part(0, 1));
     assert_eq!(events[0]["task"], "0-of-1");
-    assert!(!warnings(&events).any(|text| is_named(text, &["0-of-1"])), "{events:?}");
+    assert!(
+        !warnings(&events).any(|text| is_named(text, &["0-of-1"])),
+        "{events:?}"
+    );
 }
 
 #[cfg(not(feature = "object-store"))]
@@ -128,6 +140,9 @@ pub(crate) fn a_url_is_refused_by_a_program_without_object_stores() {
         "stats s3://lab/out",
     ] {
         let errors = workshop.errors(1, line);
-        assert!(is_named(&errors, &["s3://lab/", "object-store"]), "{errors}");
+        assert!(
+            is_named(&errors, &["s3://lab/", "object-store"]),
+            "{errors}"
+        );
     }
 }

@@ -15,8 +15,8 @@ use relit_grabcut::{
     segment_with,
 };
 
-use relit_test_support::is_named;
 use relit_test_support::disc::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
+use relit_test_support::is_named;
 
 /// A bright disc of radius 18 around (48, 32) on a dark ground, both with some texture.
 fn disc() -> RgbImage {

@@ -139,10 +139,7 @@ fn a_stroke_over_the_opening_of_a_handle_is_told() {
     let told = segment_turn(&scene.frames[0], &turn, &seeds)
         .unwrap()
         .warnings;
-    assert!(
-        told.iter().any(|text| text.contains("hole")),
-        "{told:?}"
-    );
+    assert!(told.iter().any(|text| text.contains("hole")), "{told:?}");
     let plain = segment_turn(&scene.frames[0], &turn, &Hints::default()).unwrap();
     assert!(plain.warnings.is_empty(), "{:?}", plain.warnings);
 }

@@ -129,16 +129,8 @@ fn what_cannot_be_cut_is_answered_with_a_sentence_and_the_editor_goes_on() {
     for (change, status, named) in [
         (&none[..], 422, ""),
         (&[("rect", json!([900, 0, 9, 9]))], 422, "96 x 64"),
-        (
-            &[("rect", json!([0, 0, 96, 64])), none[1].clone()],
-            422,
-            "",
-        ),
-        (
-            &[("rect", Value::Null), ("strokes", background)],
-            422,
-            "",
-        ),
+        (&[("rect", json!([0, 0, 96, 64])), none[1].clone()], 422, ""),
+        (&[("rect", Value::Null), ("strokes", background)], 422, ""),
         (
             &[("auto", json!(true)), none[0].clone(), none[1].clone()],
             422,

@@ -183,16 +183,8 @@ fn a_photograph_in_a_format_that_is_not_read_is_named() {
             &b"\0\0\0\x18ftypheic\0\0\0\0mif1heic"[..],
             "HEIC",
         ),
-        (
-            "phone.jpg",
-            b"\0\0\0\x18ftypmif1\0\0\0\0mif1heic",
-            "HEIC",
-        ),
-        (
-            "canon.cr3",
-            b"\0\0\0\x18ftypcrx \0\0\0\0crx isom",
-            "raw",
-        ),
+        ("phone.jpg", b"\0\0\0\x18ftypmif1\0\0\0\0mif1heic", "HEIC"),
+        ("canon.cr3", b"\0\0\0\x18ftypcrx \0\0\0\0crx isom", "raw"),
         ("nikon.nef", &nef, "raw"),
         (
             "drawing.svg",

@@ -121,7 +121,11 @@ fn strokes_are_applied_to_the_mask_that_replaces_theirs_and_the_old_recipe_is_ke
     let old = read(path, "mask.json");
     let output = relit_mask(path, &["clip.y4m", "--rect", "22,6,54,52"]);
     assert_eq!(code(&output), 0, "{}", said(&output));
-    assert!(is_named(&said(&output), &["1 stroke", "--force"]), "{}", said(&output));
+    assert!(
+        is_named(&said(&output), &["1 stroke", "--force"]),
+        "{}",
+        said(&output)
+    );
     assert!(!is_object(path, 48, 32), "the stroke is lost");
     let record: serde_json::Value = serde_json::from_slice(&read(path, "mask.json")).unwrap();
     assert_eq!(record["hints"]["strokes"], painted["hints"]["strokes"]);
@@ -158,7 +162,11 @@ fn strokes_of_another_recording_are_neither_applied_nor_lost() {
     fs::write(path.join("other.y4m"), other).unwrap();
     let output = relit_mask(path, &["other.y4m", "--rect", AROUND]);
     assert_eq!(code(&output), 1);
-    assert!(is_named(&said(&output), &["mask.json", "--force"]), "{}", said(&output));
+    assert!(
+        is_named(&said(&output), &["mask.json", "--force"]),
+        "{}",
+        said(&output)
+    );
     assert_eq!(read(path, "mask.json"), old);
 }
 
@@ -228,7 +236,11 @@ fn a_frame_beyond_the_end_is_reported_with_the_last_one() {
         folder.path(),
         &["clip.y4m", "--rect", AROUND, "--frame", "3"],
     );
-    assert!(is_named(&said(&output), &["clip.y4m", "3", "0", "2"]), "{}", said(&output));
+    assert!(
+        is_named(&said(&output), &["clip.y4m", "3", "0", "2"]),
+        "{}",
+        said(&output)
+    );
 }
 
 /// A turn of 16 frames: the disc before stripes that move.

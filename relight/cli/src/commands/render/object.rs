@@ -227,7 +227,10 @@ mod tests {
                     _ => files.smoothness = Map::File(path.clone()),
                 }
                 let error = files.read().unwrap_err().to_string();
-                assert!(error.contains("strange.exr") && error.contains(what), "{error}");
+                assert!(
+                    error.contains("strange.exr") && error.contains(what),
+                    "{error}"
+                );
             }
         }
     }
@@ -264,6 +267,9 @@ mod tests {
         write_png(&path, &Planes::zeros(Extent::new(5, 2)), Depth::Eight).unwrap();
         files.mask = Some(path);
         let error = files.read().unwrap_err().to_string();
-        assert!(error.contains("5 x 2") && error.contains("4 x 2"), "{error}");
+        assert!(
+            error.contains("5 x 2") && error.contains("4 x 2"),
+            "{error}"
+        );
     }
 }
