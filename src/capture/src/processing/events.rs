@@ -246,16 +246,9 @@ mod tests {
                 "it is empty",
                 false,
             ),
-            (Extract, 0, good, Good, "1500 samples", true),
+            (Extract, 0, good, Good, "good", true),
             (Extract, 3, good, Doubtful, "1500 samples", true),
-            (
-                Extract,
-                3,
-                usable,
-                Doubtful,
-                "the camera dropped 3 frames",
-                true,
-            ),
+            (Extract, 3, usable, Doubtful, "3 frames are lost", true),
             (
                 Extract,
                 0,
@@ -287,6 +280,9 @@ mod tests {
             assert_eq!((found, on), (outcome, goes_on), "{line}: {what}");
             assert!(!what.is_empty() && what.contains(named), "{line}: {what}");
         }
+        // Warnings follow the reasons.
+        let (_, what, _) = end(Extract, Some(3), &[usable]);
+        assert!(what.contains("the camera dropped 3 frames"), "{what}");
     }
 
     #[test]
@@ -304,7 +300,8 @@ mod tests {
     fn a_program_that_says_nothing_is_reported_by_what_ended_it() {
         let heard = ProgramEvent::default();
         assert!(heard.failure(Some(7), "").contains("7"));
-        assert!(!heard.failure(None, "\n").trim().is_empty());
+        let signal = heard.failure(None, "\n");
+        assert!(!signal.trim().is_empty() && signal != heard.failure(Some(0), ""));
         assert_eq!(heard.failure(Some(1), "error: a\n\n"), "a");
     }
 }

@@ -61,7 +61,7 @@ fn a_mask_that_fits_is_said_to_fit_and_its_page_is_written() {
     let (code, report) = check(folder.path());
     assert_eq!((code, &report["verdict"]), (0, &"fits".into()), "{report}");
     let page = fs::read_to_string(folder.path().join("mask-check.html")).unwrap();
-    assert!(page.contains("data:image/jpeg;base64,"));
+    assert!(page.contains("class=\"verdict fits\"") && page.contains("data:image/jpeg;base64,"));
     assert!(!page.contains("<script"));
 }
 
