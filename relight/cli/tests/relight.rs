@@ -185,7 +185,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
                 "{one} --mask masks/one.png --light black.exr --weights w.safetensors -o o.png"
             ),
             1,
-            &dark,
+            dark.as_str(),
         ),
         (
             format!("{one} --mask masks/one.png --light text.txt -o o.png"),
