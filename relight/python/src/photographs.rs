@@ -167,7 +167,7 @@ enum Behind {
     Even(f32),
 }
 
-/// A picture for each angle, and what was said of the white balance or the light.
+/// A picture for each angle, and what is to be known of the mask.
 type RelitPictures<'py> = (Vec<Bound<'py, PyArrayDyn<f32>>>, Option<String>);
 
 /// A photograph's object in another light: a picture for each angle by which it has turned, degrees.
