@@ -158,7 +158,7 @@ fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
             "--normals up.png --light light.txt --rotate 90 -o .",
             "not empty",
         ),
-        ("--normals up.png --light light.txt --turn 2 -o .", ". "),
+        ("--normals up.png --light light.txt --rotate 90 -o .", ". "),
     ];
     for (arguments, named) in cases {
         let output = scene.image_of(arguments);

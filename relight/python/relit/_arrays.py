@@ -87,11 +87,11 @@ def within(what, value, least, most):
     return value
 
 
-def angles(turned):
+def angles(light_angle):
     """Angles in a list, and whether one alone was given."""
-    is_one = numpy.ndim(turned) == 0
-    listed = [turned] if is_one else list(turned)
-    return [within("turned", angle, -36000.0, 36000.0) for angle in listed], is_one
+    is_one = numpy.ndim(light_angle) == 0
+    listed = [light_angle] if is_one else list(light_angle)
+    return [within("light_angle", angle, -36000.0, 36000.0) for angle in listed], is_one
 
 
 def frames(pictures, is_one):

@@ -117,9 +117,9 @@ def relight(
     light=None,
     lamp=None,
     ambient=0.15,
-    turned=0.0,
+    light_angle=0.0,
     background=None,
-    field=60.0,
+    fov=60.0,
     white_balance="light",
     exposure=0.0,
     size=None,
@@ -135,11 +135,11 @@ def relight(
     lamp: (azimuth, elevation[, colour][, size]), or "60,30,3200K,10": degrees about the vertical (0 at the viewer's side,
         90 on the right, 180 behind) and above the horizon; "#ffd9b0" or "3200K"; degrees across.
     ambient: even light beside a lamp, as a part of it, 0 to 10.
-    turned: degrees by which the light has turned about the vertical, from the viewer to the right; or several, for
+    light_angle: degrees by which the light is rotated about the vertical, from the viewer to the right; or several, for
         frames x rows x columns x 3.
     background: "photo", "light" (the panorama), "grey", "black" or "white"; by default the panorama that lights the
         object, the photograph for its own light, or grey.
-    field: degrees of a panorama that the picture's longer side shows, 1 to 150.
+    fov: degrees of a panorama that the picture's longer side shows, 1 to 150.
     white_balance: "light", or "auto" as by a camera that is balanced for it.
     exposure: stops. With 0 the strongest light is as strong as in the photograph.
     size: the longest side of the result, pixels; by default the photograph's.
@@ -154,13 +154,13 @@ def relight(
         source = light_source(light, lamp, ambient)
         if source is None:
             raise ValueError('give the new light: light=, or lamp=(azimuth, elevation); "own" keeps the photograph\'s')
-    listed, is_one = angles(turned)
+    listed, is_one = angles(light_angle)
     pictures, note = _relit.relight(
         photograph(image, mask, box, transfer),
         source,
         listed,
         background,
-        within("field", field, 1.0, 150.0),
+        within("fov", fov, 1.0, 150.0),
         white_balance,
         within("exposure", exposure, -20.0, 20.0),
         None if size is None else int(within("size", size, 16, 16384)),
@@ -185,9 +185,9 @@ def insert(
     light=None,
     lamp=None,
     ambient=0.15,
-    turned=0.0,
+    light_angle=0.0,
     size=(1280, 960),
-    field=60.0,
+    fov=60.0,
     down=10.0,
     tilt=None,
     match=True,
@@ -213,8 +213,8 @@ def insert(
 
     For the picture:
     light, lamp, ambient: see `relight`; by default the light is taken from `into`.
-    turned: degrees by which the light, and a panorama behind the objects with it, has turned.
-    size, field, down: width and height of the picture of a panorama in pixels, the degrees that its longer side shows,
+    light_angle: degrees by which the light, and a panorama behind the objects with it, is rotated.
+    size, fov, down: width and height of the picture of a panorama in pixels, the degrees that its longer side shows,
         and how many degrees the camera looks down.
     tilt: degrees that the camera looks down on the ground; by default by the panorama and `at`, or 20.
     match: whether brightness, white balance and grain of the objects follow the picture.
@@ -240,10 +240,10 @@ def insert(
     scene = {
         "background": "",
         "size": [int(side) for side in size],
-        "field": float(field),
+        "fov": float(fov),
         "down": float(down),
         "tilt": None if tilt is None else float(tilt),
-        "light": {"turn": float(turned)},
+        "light": {"angle": float(light_angle)},
         "match": bool(match),
         "white_balance": white_balance,
         "exposure": float(exposure),

@@ -63,7 +63,7 @@ def render(
     light,
     *,
     specular=None,
-    turned=0.0,
+    light_angle=0.0,
     exposure="auto",
     order=48,
     diffuse_form="irradiance",
@@ -77,7 +77,7 @@ def render(
     albedo: linear: one value, red, green and blue, or rows x columns x 3; not negative.
     light: coefficients (n x 3), a panorama (rows x columns x 3), or a path to either.
     specular: reflectance (as albedo) and smoothness (a value, or rows x columns), the exponent of Blinn and Phong.
-    turned: degrees by which the light has turned about the vertical, from the viewer to the right; or several, for
+    light_angle: degrees by which the light is rotated about the vertical, from the viewer to the right; or several, for
         frames x rows x columns x 3.
     exposure: stops beyond a white diffuse surface under even light of radiance 1; or "auto": a white diffuse surface that
         faces the strongest light is white.
@@ -97,7 +97,7 @@ def render(
     source = light_source(light)
     if source is None:
         raise ValueError("give the light: coefficients, a panorama or a path")
-    listed, is_one = angles(turned)
+    listed, is_one = angles(light_angle)
     pictures = _relit.render(
         normals,
         _map("albedo", albedo, normals.shape),

@@ -109,11 +109,11 @@ LIGHTS = {
     "lamp": (["--lamp", "60,30"], {"lamp": (60, 30)}),
     "warm lamp": (["--lamp", "-45,40,3200K,10", "--ambient", "0.4"], {"lamp": (-45, 40, "3200K", 10), "ambient": 0.4}),
     "panorama": (["--light", "room.hdr"], {"light": "array"}),
-    "panorama, turned": (["--light", "room.hdr", "--turned", "70", "--field", "80"], {"light": "array", "turned": 70, "field": 80}),
+    "panorama, rotated": (["--light", "room.hdr", "--light-angle", "70", "--fov", "80"], {"light": "array", "light_angle": 70, "fov": 80}),
     "coefficients": (["--light", "light.txt", "--white-balance", "auto"], {"light": "rows", "white_balance": "auto"}),
-    "own": (["--own-light", "--exposure", "-1"], {"light": "own", "exposure": -1}),
+    "own": (["--light", "own", "--exposure", "-1"], {"light": "own", "exposure": -1}),
     "white": (["--lamp", "10,80", "--background", "white", "--size", "100"], {"lamp": "10,80", "background": "white", "size": 100}),
-    "in place": (["--lamp", "200,10", "--keep-background"], {"lamp": (200, 10), "background": "photo"}),
+    "in place": (["--lamp", "200,10", "--background", "photo"], {"lamp": (200, 10), "background": "photo"}),
 }
 
 
@@ -138,24 +138,30 @@ def test_a_relit_photograph_is_the_program_s(tmp_path, monkeypatch, photo, light
 
 
 def test_several_angles_are_several_pictures(photo):
-    frames = relit.relight(*photo, lamp=(60, 30), turned=[0, 90])
+    frames = relit.relight(*photo, lamp=(60, 30), light_angle=[0, 90])
     assert frames.shape == (2, *photo[0].shape)
-    assert numpy.array_equal(frames[1], relit.relight(*photo, lamp=(60, 30), turned=90))
+    assert numpy.array_equal(frames[1], relit.relight(*photo, lamp=(60, 30), light_angle=90))
 
 
 @needs_relight
 def test_objects_in_another_picture_are_the_program_s(tmp_path, monkeypatch, photo, lights):
     monkeypatch.chdir(tmp_path)
     path, mask_path = files(tmp_path, *photo)
-    object = [path, "--mask", mask_path]
-    run(RELIGHT, "insert", *object, "--into", "room.hdr", "--at", "0.4,0.8", "--height", "0.5", "--size", "160,120", "-o", "room.exr")
+    object = f'[[object]]\nphoto = "{path}"\nmask = "{mask_path}"\n'
+
+    def inserted(scene):
+        (tmp_path / "scene.toml").write_text(scene)
+        run(RELIGHT, "insert", "--scene", "scene.toml", "-o", "inserted.exr")
+        return relit.read_image("inserted.exr")
+
+    scene = 'background = "room.hdr"\nsize = [160, 120]\n' + object + "at = [0.4, 0.8]\nheight = 0.5\n"
     found = relit.insert([photo], lights["array"], (0.4, 0.8), 0.5, size=(160, 120))
-    assert numpy.array_equal(found, relit.read_image("room.exr"))
+    assert numpy.array_equal(found, inserted(scene))
     table = write_png(tmp_path / "table.png", ball(150, 200, 20)[0])
-    two = [path, path, "--mask", mask_path, "--mask", mask_path, "--at", "0.3,0.9", "--at", "0.7,0.9", "--shadow", "0.5"]
-    run(RELIGHT, "insert", *two, "--into", table, "--lamp", "60,30", "-o", "table.exr")
+    two = [object + f"at = [{across}, 0.9]\nshadow = 0.5\n" for across in (0.3, 0.7)]
+    scene = f'background = "{table}"\nlight.lamp = "60,30"\n' + "".join(two)
     found = relit.insert([photo, photo], ball(150, 200, 20)[0], [(0.3, 0.9), (0.7, 0.9)], shadow=0.5, lamp=(60, 30))
-    assert numpy.array_equal(found, relit.read_image("table.exr"))
+    assert numpy.array_equal(found, inserted(scene))
 
 
 @needs_mask
@@ -181,21 +187,21 @@ def test_a_mask_follows_seeds(photo):
 
 @needs_relight
 @pytest.mark.parametrize("specular", [None, (0.3, 60)])
-@pytest.mark.parametrize("forms", [("irradiance", "lobe"), ("released", "power")])
-def test_a_rendering_is_the_program_s(tmp_path, photo, lights, specular, forms):
+@pytest.mark.parametrize("model, forms", [("physical", ("irradiance", "lobe")), ("paper", ("released", "power"))])
+def test_a_rendering_is_the_program_s(tmp_path, photo, lights, specular, model, forms):
     found = relit.decompose(*photo)
     normals = numpy.where(found.mask[..., None], 65535 * (found.normals + 1) / 2, 0)
     path = write_png(tmp_path / "normal.png", numpy.round(normals).astype(numpy.uint16))
     gloss = ["--reflectance", specular[0], "--smoothness", specular[1]] if specular else []
-    form = ["--diffuse", forms[0], "--specular", forms[1]]
+    form = ["--shading-model", model]
     colours = relit.read_image(path, transfer="linear")
     given = numpy.where((colours == 0).all(2, keepdims=True), 0, 2 * colours - 1)
-    for light, option in (("array", ["--panorama", "room.hdr"]), ("rows", ["--light", "light.txt"])):
+    for light, option in (("array", ["--light", "room.hdr"]), ("rows", ["--light", "light.txt"])):
         option[1] = tmp_path / option[1]
-        arguments = ["--normals", path, "--albedo", "0.8,0.5,0.3", *gloss, *form, *option, "--turned", "40"]
-        run(RELIGHT, "render", *arguments, "-o", tmp_path / "lit.exr")
+        arguments = ["--normals", path, "--albedo", "0.8,0.5,0.3", *gloss, *form, *option, "--light-angle", "40"]
+        run(RELIGHT, "render", "image", *arguments, "-o", tmp_path / "lit.exr")
         options = {"specular": specular, "diffuse_form": forms[0], "specular_form": forms[1]}
-        image = relit.render(given, (0.8, 0.5, 0.3), lights[light], turned=40, **options)
+        image = relit.render(given, (0.8, 0.5, 0.3), lights[light], light_angle=40, **options)
         assert numpy.array_equal(image, relit.read_image(tmp_path / "lit.exr"))
 
 
