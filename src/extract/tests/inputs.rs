@@ -303,7 +303,7 @@ fn masks_of_other_programs_mark_the_object_or_are_refused() {
     }
     for (mask, values) in [
         ("photo.png", &[][..]),
-        ("labels.png", &["0", "1", "2"]),
+        ("labels.png", &["0, 1, 2"]),
         ("lying.png", &["48 x 64", "64 x 48"]),
     ] {
         let (code, errors) = inputs.extract(&["clip.mkv", "--mask", mask, "-o", "out"]);
