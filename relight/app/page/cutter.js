@@ -10,6 +10,7 @@ const HINTS = {
   background: "Paint over what does not belong to it.",
   eraser: "Wipe strokes away.",
 };
+const FOUND = "Found by its plain background. If it is wrong, correct it with a brush, or drag a rectangle.";
 /** The sketch of a photograph whose plain background shows the object. */
 const BY_BACKGROUND = { ...EMPTY, auto: true };
 const OUTSIDE = [12, 12, 16, 170];
@@ -57,7 +58,7 @@ export class Cutter {
     this.#photo = photo;
     $("cut-name").textContent = photo.name;
     document.body.classList.add("cutting");
-    this.#sketcher.open(photo, sketch, photo.mask ? "object" : "rect");
+    this.#sketcher.open(photo, sketch, photo.sketch ? "object" : "rect");
     this.#cutOf = photo.mask ? this.#sketcher.sketch : null;
     this.#showMask();
     this.#warn([]);
@@ -120,7 +121,8 @@ export class Cutter {
   }
 
   #show() {
-    $("cut-hint").textContent = HINTS[this.#sketcher.tool];
+    const { auto, rect, strokes } = this.#sketcher.sketch;
+    $("cut-hint").textContent = auto && !rect && strokes.length === 0 ? FOUND : HINTS[this.#sketcher.tool];
     $("cut-done").disabled = this.#cutting || !this.#photo.mask || this.#cutOf !== this.#sketcher.sketch;
   }
 

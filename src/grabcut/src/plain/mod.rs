@@ -27,7 +27,7 @@ const MIN_OVERLAP: f64 = 0.8;
 pub struct PlainCut {
     /// The mask.
     pub mask: Mask,
-    /// The seeds that were found, with the strokes over them: [`segment`](crate::segment) makes the same mask of them.
+    /// The seeds that were found, with the strokes over them: [`segment`](crate::segment()) makes the same mask of them.
     pub hints: Hints,
 }
 
@@ -35,7 +35,7 @@ pub struct PlainCut {
 /// What is not clearly so is refused: then a person has to say where the object is. Strokes overrule what is found.
 ///
 /// # Errors
-/// [`MaskError::NotPlain`]; those of [`segment`](crate::segment).
+/// [`MaskError::NotPlain`]; those of [`segment`](crate::segment()).
 pub fn segment_on_plain(
     frame: &RgbImage,
     strokes: &Strokes,

@@ -18,7 +18,8 @@ const COVERED: f32 = 0.45;
 const MIXTURE: f32 = 0.25;
 /// Allowed noise of a mixture, 8-bit values.
 const NOISE: f32 = 3.0;
-/// Where shadow-like pixels are a smaller share of the object, they may be a shadow at its foot, and are left to the cut.
+/// Shadow-like pixels up to this share of the object may be a shadow at its foot, and are left to the cut. With more, the
+/// object has the background's colour, and its shadow cannot be told from it.
 const SHADOW_LIKE: f64 = 0.6;
 /// Fewer marked pixels of the object do not show its colours.
 const MIN_OBJECT: u64 = 10;
@@ -28,7 +29,7 @@ const MIN_OBJECT: u64 = 10;
 /// # Errors
 /// [`MaskError::NotPlain`] where hardly anything is surely object.
 pub(super) fn seeds(frame: &RgbImage, regions: &Regions) -> Result<Seeds, MaskError> {
-    let object = sure_object(regions);
+    let object = sure_object(regions)?;
     let background = eroded(&regions.background);
     let nothing = || MaskError::NotPlain {
         why: "hardly anything differs from it",
@@ -56,13 +57,14 @@ pub(super) fn seeds(frame: &RgbImage, regions: &Regions) -> Result<Seeds, MaskEr
 }
 
 /// What is object without doubt: away from the edge, unlike the background, and unlike a shadow on it.
-fn sure_object(regions: &Regions) -> Bitmap {
+fn sure_object(regions: &Regions) -> Result<Bitmap, MaskError> {
     let sure = eroded(&regions.object).minus(&regions.alike);
-    if sure.share_in(&regions.shadow_like) < SHADOW_LIKE {
-        sure.minus(&regions.shadow_like)
-    } else {
-        sure
+    if sure.share_in(&regions.shadow_like) > SHADOW_LIKE {
+        return Err(MaskError::NotPlain {
+            why: "the object has the same colour, so that its shadow looks like it",
+        });
     }
+    Ok(sure.minus(&regions.shadow_like))
 }
 
 fn eroded(region: &Bitmap) -> Bitmap {
