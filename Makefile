@@ -150,10 +150,10 @@ lint: setup ## Check formatting, lints and documentation
 	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps $(EXTRAS)
 	@if cargo tree --locked -p relight -e normal --prefix none \
-	    | grep -E '^(ffmpeg|opencv|relit-(video|mask|rig))'; then \
+	    | grep -E '^(ffmpeg|opencv|relit-(video|mask|capture|camera|turntable))'; then \
 	    echo "relight must not depend on these"; exit 1; fi
 	@if cargo tree --locked -p relit-extract -e normal --prefix none \
-	    | grep -E '^(opencv|v4l|axum|hyper|tokio|relit-(mask|rig|web))'; then \
+	    | grep -E '^(opencv|v4l|axum|hyper|tokio|relit-(mask|capture|camera|turntable|web))'; then \
 	    echo "relit-extract must not depend on these"; exit 1; fi
 	@if cargo tree --locked -p relit-grabcut -e normal --prefix none \
 	    | grep -E '^(opencv|rayon|rustix|parquet|tar|clap|indicatif|relit-(video|web|mask))'; then \

@@ -146,33 +146,25 @@ fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
     fs::write(scene.path("short.txt"), "1 2 3\n4 5\n").unwrap();
     fs::write(scene.path("taken"), "a file").unwrap();
     let cases = [
-        (
-            "--normals none.png --light light.txt -o a.png",
-            "none.png cannot be read",
-        ),
-        (
-            "--normals up.png --light short.txt -o a.png",
-            "short.txt holds no light: line 2",
-        ),
-        (
-            "--normals up.png --light up.png -o a.png",
-            "up.png holds 8- or 16-bit integers",
-        ),
+        ("--normals none.png --light light.txt -o a.png", "none.png"),
+        ("--normals up.png --light short.txt -o a.png", "short.txt"),
+        ("--normals up.png --light up.png -o a.png", "up.png"),
         ("--normals up.png --light light.txt -o taken/a.png", "taken"),
         (
             "--normals up.png --light light.txt --rotate 90 -o taken",
-            "taken cannot be made",
+            "taken",
         ),
         (
             "--normals up.png --light light.txt --rotate 90 -o .",
-            ". is not empty",
+            "not empty",
         ),
+        ("--normals up.png --light light.txt --turn 2 -o .", ". "),
     ];
-    for (arguments, expected) in cases {
+    for (arguments, named) in cases {
         let output = scene.image_of(arguments);
         let errors = errors(&output);
         assert_eq!(code(&output), 1, "{arguments}");
-        assert!(errors.contains(expected), "{errors}");
+        assert!(errors.contains(named), "{errors}");
         assert_eq!(errors.lines().count(), 1, "{errors}");
     }
     assert!(!scene.path("a.png").exists());

@@ -167,6 +167,9 @@ enum Behind {
     Even(f32),
 }
 
+/// A picture for each angle, and what is to be known of the mask.
+type RelitPictures<'py> = (Vec<Bound<'py, PyArrayDyn<f32>>>, Option<String>);
+
 /// A photograph's object in another light: a picture for each angle by which it has turned, degrees.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -181,7 +184,7 @@ pub(crate) fn relight<'py>(
     exposure: f32,
     size: Option<usize>,
     highlights: &str,
-) -> PyResult<(Vec<Bound<'py, PyArrayDyn<f32>>>, Option<String>)> {
+) -> PyResult<RelitPictures<'py>> {
     let photograph = photograph.owned()?;
     let light = light.map(|light| light.owned()).transpose()?;
     let white_balance = balance(white_balance)?;

@@ -570,13 +570,18 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_image_has_no_sharpness_and_an_empty_mask_no_figures() {
+    fn a_flat_image_has_no_sharpness() {
         let image = RgbImage::from_pixel(9, 9, Rgb([250, 251, 10]));
         let full = MaskSpans::from_mask(&GrayImage::from_pixel(9, 9, Luma([255])));
         let measures = full.measure(&image, 250).unwrap();
         assert_eq!(measures.sharpness, 0.0);
         assert_eq!((measures.saturated_px, measures.saturated_any_px), (0, 81));
         assert_eq!(measures.mean_rgb, [250.0, 251.0, 10.0]);
+    }
+
+    #[test]
+    fn an_empty_mask_has_no_figures() {
+        let image = RgbImage::from_pixel(9, 9, Rgb([250, 251, 10]));
         let empty = MaskSpans::from_mask(&GrayImage::new(9, 9))
             .measure(&image, 250)
             .unwrap();

@@ -218,7 +218,7 @@ impl<'a> Run<'a> {
         stop: bool,
         observer: &mut dyn TrainObserver,
     ) -> Result<bool, TrainError> {
-        let learning_rate = learning_rate(&self.settings, self.step);
+        let learning_rate = learning_rate(self.settings, self.step);
         let losses = self.task.step(self.step)?;
         if let Some(damage) = &losses.damage {
             self.damaged = true;

@@ -230,8 +230,10 @@ mod tests {
                     _ => files.smoothness = Map::File(path.clone()),
                 }
                 let error = files.read().unwrap_err().to_string();
-                let expected = format!("strange.exr is no map of {what}");
-                assert!(error.contains(&expected), "{error}");
+                assert!(
+                    error.contains("strange.exr") && error.contains(what),
+                    "{error}"
+                );
             }
         }
     }
@@ -257,10 +259,7 @@ mod tests {
         write_png(&path, &Planes::zeros(Extent::new(4, 2)), Depth::Eight).unwrap();
         files.mask = Some(path.clone());
         let error = files.read().unwrap_err().to_string();
-        assert!(
-            error.starts_with("the mask ") && error.contains("mask.png"),
-            "{error}"
-        );
+        assert!(error.contains("mask.png"), "{error}");
     }
 
     #[test]
@@ -271,6 +270,9 @@ mod tests {
         write_png(&path, &Planes::zeros(Extent::new(5, 2)), Depth::Eight).unwrap();
         files.mask = Some(path);
         let error = files.read().unwrap_err().to_string();
-        assert_eq!(error, "the mask has 5 x 2 pixels where 4 x 2 are needed");
+        assert!(
+            error.contains("5 x 2") && error.contains("4 x 2"),
+            "{error}"
+        );
     }
 }
