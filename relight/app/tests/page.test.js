@@ -427,6 +427,17 @@ test("photographs are opened as they are displayed, of every kind that cameras w
   await close();
 });
 
+test("an object before a plain background is found, and stands in the scene without being drawn", async () => {
+  const { page, close } = await keptPage("phone");
+  await steps.choose(page, await ball(browser));
+  await page.waitForSelector("body.cutting");
+  await steps.cutIsDone(page);
+  await page.click("#cut-done");
+  await page.waitForSelector("#objects .entry");
+  assert.equal(await page.isHidden("#alert"), true, await alertText(page));
+  await close();
+});
+
 test("a captured object stands in the scene without being cut out", async () => {
   const { page, close } = await keptPage("phone");
   const empty = await steps.stagePicture(page);

@@ -79,7 +79,7 @@ async function cut(draft) {
     return showTools();
   }
   cutting = true;
-  say("busy", sketch.auto && cutOf?.auto !== true ? "looking at the turn" : "cutting");
+  say("busy", sketch.auto && cutOf?.auto !== true ? `looking at the ${about.auto}` : "cutting");
   try {
     const mask = await (await send(`api/v1/mask?draft=${draft}`, sketch)).json();
     if (sketcher.sketch === sketch) {
@@ -162,7 +162,7 @@ function showTools() {
   $("cut-here").disabled = wanted === sketch.frame;
   let hint = "";
   if (shown !== sketch.frame) hint = `Frame ${shown}. The mask is made on frame ${sketch.frame}.`;
-  else if (!canCut(sketch)) hint = about.turn ? "Draw a box around the object, or press “By the turn”." : "Draw a box around the object.";
+  else if (!canCut(sketch)) hint = about.auto ? `Draw a box around the object, or press “${$("auto").textContent}”.` : "Draw a box around the object.";
   $("hint").textContent = hint;
   $("hint").hidden = !hint;
 }
@@ -240,7 +240,8 @@ async function begin() {
   $("title").textContent = recording;
   $("scrub").max = frames - 1;
   $("scrub").disabled = frames < 2;
-  $("auto").disabled = !about.turn;
+  $("auto").disabled = !about.auto;
+  if (about.auto === "background") $("auto").textContent = "By the background";
   listen();
   changed();
 }
