@@ -96,6 +96,7 @@ fn step(serving: &Serving, tick: u64) {
                 verdict: Verdict::Clean,
                 frames: TURN,
                 dropped: 0,
+                is_stopped: false,
                 reason: None,
             });
         }
