@@ -188,8 +188,10 @@ impl<'a> Day<'a> {
         for link in links {
             phone.wait_for(&format!(
                 "(() => {{ const link = document.querySelector({link:?}); \
-                    fetch(link.href).then((answer) => answer.blob()).then(({{ size }}) => link.dataset.size = size); \
-                    return !link.hidden && link.dataset.size === '{bytes}'; }})()"
+                    if (!link.hidden && !link.dataset.size) {{ \
+                        link.dataset.size = 'asked'; \
+                        fetch(link.href).then((answer) => answer.blob()).then(({{ size }}) => link.dataset.size = size); }} \
+                    return link.dataset.size === '{bytes}'; }})()"
             ));
         }
     }

@@ -54,12 +54,10 @@ impl StopRequest {
     /// # Errors
     /// [`CaptureError::Stopped`], or the error itself.
     pub fn explain<T>(&self, result: Result<T, CaptureError>) -> Result<T, CaptureError> {
-        match (self.asked(), &result) {
-            (_, Ok(_) | Err(CaptureError::Turntable(TurntableError::NotStopped))) | (None, _) => {
-                result
-            }
-            (Some(who), Err(_)) => Err(who.into()),
-        }
+        result.map_err(|error| match (self.asked(), &error) {
+            (Some(_), CaptureError::Turntable(TurntableError::NotStopped)) | (None, _) => error,
+            (Some(who), _) => who.into(),
+        })
     }
 
     /// Runs `motion`, and stops the table as soon as somebody asks, so that what waits for the table

@@ -36,7 +36,7 @@ pub(super) async fn video(
     Path(id): Path<String>,
 ) -> Result<Response, Failure> {
     let name = attachment(&id, "mkv");
-    let path = move || Ok(library.video_file(&id)?.path);
+    let path = move || library.video_file(&id).map(|video| video.path);
     send_file(&permits, &name, "video/x-matroska", path).await
 }
 

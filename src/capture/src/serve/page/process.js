@@ -8,6 +8,7 @@ const path = (id) => `/api/v1/sessions/${encodeURIComponent(id)}`;
 const STEPS = { mask: "Making the mask", check: "Checking the mask", extract: "Extracting" };
 const DONE = { mask: "Mask", check: "Check", extract: "Extraction" };
 const ORIGINS = { turn: "automatic", hints: "drawn by hand", hand: "from another program" };
+const CHECKS = { fits: "the mask fits", wrong: "the mask is wrong", unknown: "not certain" };
 const STATUS = { waiting: "waiting", running: "", held: "paused while the rig is busy", ending: "stopping" };
 
 let processing = null;
@@ -56,7 +57,7 @@ export function showSteps(detail, say) {
   const old = "outdated: the mask has changed since";
   if (!check) step("check", "not checked", "");
   else if (!check.is_current) step("check", old, "warn");
-  else step("check", check.verdict, check.verdict === "fits" ? "good" : "warn", check.reasons);
+  else step("check", CHECKS[check.verdict] ?? check.verdict, check.verdict === "fits" ? "good" : "warn", check.reasons);
   if (!extraction) step("extract", "not extracted", "");
   else if (!extraction.is_current) step("extract", old, "warn");
   else step("extract", `${extraction.samples} samples, ${extraction.verdict}`, extraction.verdict === "good" && !extraction.is_lossy ? "good" : "warn", extraction.reasons);
@@ -108,6 +109,8 @@ function showJob() {
   const [canMask, canExtract] = [idle && !isMissing("mask"), idle && !isMissing("extract")];
   for (const [button, on] of [["make-mask", canMask], ["edit-mask", canMask], ["make-check", canMask && results.mask], ["make-extract", canExtract && results.mask]]) $(button).disabled = !on;
   $("make-mask").textContent = results.mask ? "Make again" : "Make";
+  $("make-check").textContent = results.check ? "Check again" : "Check";
+  $("make-extract").textContent = results.extraction ? "Extract again" : "Extract";
   const finished = results.stage === "extracted";
   $("make-all").hidden = finished || !canMask || !canExtract;
 }
