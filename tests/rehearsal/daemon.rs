@@ -119,7 +119,7 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
     daemon.end();
     let take = daemon.monitor().state().last_take.unwrap();
     assert_eq!(take.verdict, Verdict::Aborted);
-    assert!(take.reason.unwrap().contains("told to end"));
+    assert!(take.reason.unwrap().contains("is ending"));
     assert!(daemon.command(start("mug")).is_err());
 }
 

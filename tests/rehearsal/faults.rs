@@ -218,7 +218,7 @@ fn a_stop_ends_the_take_within_five_seconds_and_stops_the_table() {
     });
     let took_us = clock.now_us() - asked_us;
     assert!(took_us < 5_000_000, "{took_us} us");
-    check_aborted(&rig, &take, "the program was told to end");
+    check_aborted(&rig, &take, "the program is ending");
     assert!(take.is_stopped);
     // Another capture while the program ends is refused.
     let error = rig.capture().unwrap_err();

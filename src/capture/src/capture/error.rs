@@ -74,6 +74,6 @@ pub enum Stopped {
     #[error("stopped by a person")]
     Person,
     /// The program is to end.
-    #[error("stopped because the program was told to end")]
+    #[error("stopped because the program is ending")]
     Shutdown,
 }

@@ -146,7 +146,7 @@ fn warm_up(camera: &mut dyn Camera, stop: &StopRequest) -> Result<f64, CaptureEr
     }
 }
 
-/// What is held; `None` where nothing is, which the plan's missing controls say.
+/// The controls that are held; `None` if there are none: the plan names those that are missing.
 fn settings_check(plan: &ManualPlan) -> Option<Check> {
     let steps = plan.steps.iter();
     let held: Vec<String> = steps

@@ -49,7 +49,7 @@ impl StopRequest {
     }
 
     /// The result of something that may have been stopped: that a stop was asked for explains an
-    /// error better than what came of it, unless the table did not obey.
+    /// error better than its consequences do, unless the table did not obey.
     ///
     /// # Errors
     /// [`CaptureError::Stopped`], or the error itself.

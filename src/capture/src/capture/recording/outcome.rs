@@ -21,7 +21,7 @@ pub enum End {
     /// Something other than the recorder ended the take, such as the table.
     #[error("{0}")]
     Interrupted(String),
-    /// Somebody ended the take on purpose: that is no fault.
+    /// Somebody ended the take on purpose, which is not a fault.
     #[error("{0}")]
     OnPurpose(String),
 }
