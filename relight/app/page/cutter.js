@@ -5,10 +5,10 @@ import { attempt } from "./notices.js";
 import { EMPTY, isEnough, Sketcher } from "./sketcher.js";
 
 const HINTS = {
-  rect: "Drag a rectangle around the object.",
+  rect: "Draw a box around the object.",
   object: "Paint over what belongs to the object.",
-  background: "Paint over what does not belong to it.",
-  eraser: "Wipe strokes away.",
+  background: "Paint over what does not belong to the object.",
+  eraser: "Erase strokes.",
 };
 const FOUND = "Found by its plain background. If it is wrong, correct it with a brush, or drag a rectangle.";
 /** The sketch of a photograph whose plain background shows the object. */
@@ -102,11 +102,11 @@ export class Cutter {
   }
 
   async #cutOnce(sketch) {
-    $("cut-state").textContent = "cutting …";
+    $("cut-state").textContent = "making the mask …";
     try {
       const { warnings, seconds } = await this.#library.cut(this.#photo, sketch);
       this.#warn(warnings);
-      $("cut-state").textContent = `${seconds.toFixed(2)} s`;
+      $("cut-state").textContent = `mask made in ${seconds.toFixed(1)} s`;
     } catch (error) {
       this.#photo.mask = null;
       this.#warn([error.message]);

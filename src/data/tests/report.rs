@@ -169,6 +169,21 @@ fn the_same_session_gives_the_same_page() {
 }
 
 #[test]
+fn the_contact_sheet_is_labelled() {
+    let records = turn(240);
+    let thumbnails = thumbnails(&records, 24);
+    let html = render(&page(&records, &thumbnails)).unwrap();
+    let sheet = html.split("<h2>Contact sheet</h2>").nth(1).unwrap();
+    let (label, figures) = sheet.split_once("<div").unwrap();
+    assert!(label.contains("24 of 240") && label.contains("table angle"));
+    for (index, _) in &thumbnails {
+        let angle = 360 * index / 240;
+        let label = format!("<b>{angle}.0°</b> <span>sample {index}</span>");
+        assert!(figures.contains(&label), "{label}");
+    }
+}
+
+#[test]
 fn the_contact_sheet_marks_frames_in_which_spec_net_is_on() {
     let records = turn(240);
     let thumbnails = thumbnails(&records, 24);
