@@ -11,7 +11,6 @@ use relit_camera::{
 };
 use relit_capture::capture::{CaptureError, Settings, Stopped};
 use relit_capture::state::{LogLine, Phase, TakeSummary, Verdict};
-use relit_data::causes::with_causes;
 use relit_data::session::{Status, recordings};
 use relit_turntable::simulator::{SimulatedPort, SimulatedTable, SimulatorOptions};
 use relit_turntable::{self as turntable, MotionFault, Port, Table, TurntableError};

@@ -241,7 +241,7 @@ async function begin() {
   $("scrub").max = frames - 1;
   $("scrub").disabled = frames < 2;
   $("auto").disabled = !about.auto;
-  if (about.auto === "background") $("auto").textContent = "By the background";
+  if (about.auto === "background") $("auto").title = "Find the object by its plain background";
   listen();
   changed();
 }
