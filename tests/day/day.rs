@@ -1,6 +1,7 @@
 //! The steps of a day, each by taps, and what they leave on the disk.
 
 use std::fs;
+use std::path::Path;
 
 use relit_data::shard::Dataset;
 use relit_tests::editor_canvas::EditorCanvas;
@@ -44,22 +45,33 @@ impl<'a> Day<'a> {
         self.find_all_of_it_done(&calf);
     }
 
-    /// A name that cannot be is refused before anything turns.
+    /// The button asks for a name, and a name with a space gets a dash.
     fn name_the_object(&mut self) {
         let phone = &mut self.phone;
         phone.wait_text("#phase", "Ready");
         phone.wait_text("#go", "Name the object");
-        phone.wait_text("#no-sessions", "There are no sessions");
+        phone.wait_text("#no-sessions", "No sessions yet");
         phone.wait_for("!document.getElementById('preview').classList.contains('stale')");
         phone.see("empty-table");
-        phone.write("#object", "spotted cow");
-        phone.wait_text("#wrong-name", "no spaces");
-        assert_eq!(phone.value("document.getElementById('go').disabled"), true);
+        phone.tap("#go");
+        phone.wait_for("document.activeElement.id === 'object'");
+        for (typed, name) in [
+            ("spotted  cow (2)", "spotted-cow-2"),
+            ("  .blue / red mug ", "blue-red-mug"),
+            ("M\u{fc}sli bowl_1.5", "M\u{fc}sli-bowl_1.5"),
+        ] {
+            phone.page().type_text(typed);
+            phone.wait_button(&format!("Start {name}"), true);
+            phone.wait_text("#saved-as", name);
+            phone.page().erase(typed.chars().count());
+        }
+        phone.wait_text("#go", "Name the object");
+        phone.page().type_text("...");
+        phone.wait_text("#wrong-name", "letter");
         phone.see("wrong-name");
-        phone.page().erase("spotted cow".len());
-        phone.write("#object", "cow");
-        phone.wait_text("#go", "Start cow");
-        phone.wait_for("document.getElementById('wrong-name').hidden");
+        phone.page().erase("...".len());
+        phone.write("#object", "spotted cow");
+        phone.wait_button("Start spotted-cow", true);
         phone.see("named");
     }
 
@@ -72,27 +84,33 @@ impl<'a> Day<'a> {
         phone.wait_for("document.getElementById('progress').value > 0.1");
         phone.wait_text("#go", "Stop");
         phone.see("recording");
-        phone.wait_text_so_long("#last-text", "clean", longest);
+        phone.wait_text_so_long("#last-open", "clean", longest);
         phone.wait_text_so_long("#phase", "Ready", longest);
-        phone.wait_text("#go", "Start cow");
+        phone.wait_text("#go", "Start spotted-cow");
+        assert_eq!(
+            phone.value("document.getElementById('object').value"),
+            "spotted-cow"
+        );
         phone.wait_text("#sessions .day", "1 recorded");
         phone.see("recorded");
         let sessions = self.sessions();
         assert_eq!(sessions.len(), 1, "{sessions:?}");
         let cow = sessions[0].clone();
-        assert!(cow.ends_with("Z-cow"), "{cow}");
+        assert!(cow.ends_with("Z-spotted-cow"), "{cow}");
         assert_eq!(self.manifest(&cow)["video"]["frames"], self.rig.turn.frames);
         cow
     }
 
-    /// It is made as soon as the session is opened.
+    /// It is made as soon as the session is opened, here by a tap on the last take.
     fn see_the_mask_by_the_turn(&mut self, session: &str) {
         let longest = self.rig.turn.longest;
         let phone = &mut self.phone;
-        phone.tap("#sessions li button");
+        phone.tap("#last-open");
         phone.wait_text("#player-title", "cow");
         phone.wait_so_long(OUTLINE, longest);
-        phone.wait_text("#mask-text", "made by the turn");
+        phone.wait_text("#mask-text", "automatic");
+        phone.wait_text("#make-mask", "Make again");
+        phone.wait_for("document.getElementById('player-shard').hidden");
         phone.see("mask-by-the-turn");
         phone.value("document.getElementById('made').scrollIntoView()");
         phone.see("steps");
@@ -156,6 +174,26 @@ impl<'a> Day<'a> {
         phone.see("extracted");
         phone.tap("#report-page");
         phone.look_into_opened("report", session);
+        let shard = format!("{session}.tar");
+        self.download_is(
+            &["#player-shard", "#last-shard"],
+            &self.rig.dataset().join(shard),
+        );
+    }
+
+    /// The links lead to the bytes of this file.
+    fn download_is(&mut self, links: &[&str], file: &Path) {
+        let phone = &mut self.phone;
+        let bytes = fs::metadata(file).unwrap().len();
+        for link in links {
+            phone.wait_for(&format!(
+                "(() => {{ const link = document.querySelector({link:?}); \
+                    if (!link.hidden && !link.dataset.size) {{ \
+                        link.dataset.size = 'asked'; \
+                        fetch(link.href).then((answer) => answer.blob()).then(({{ size }}) => link.dataset.size = size); }} \
+                    return link.dataset.size === '{bytes}'; }})()"
+            ));
+        }
     }
 
     /// Stars and a note, and the list afterwards.
@@ -207,7 +245,7 @@ impl<'a> Day<'a> {
         phone.page().reload();
         phone.wait_text("#trash-title", "Trash (1)");
         phone.wait_text("#trash", "cow");
-        phone.wait_text("#no-sessions", "There are no sessions");
+        phone.wait_text("#no-sessions", "No sessions yet");
         phone.value("document.getElementById('trash-card').scrollIntoView()");
         phone.see("trash-after-reload");
         assert!(!folder.exists());
@@ -243,17 +281,17 @@ impl<'a> Day<'a> {
         phone.tap("#sessions li button:enabled");
         phone.wait_text("#player-title", "cow");
         phone.tap("#make-extract");
-        phone.wait_text("#job-text", "Extracting: waits");
+        phone.wait_text("#job-text", "Extracting: waiting");
         phone.value("document.getElementById('made').scrollIntoView()");
         phone.see("waits-for-the-rig");
         phone.tap("#job-cancel");
-        phone.wait_text("#job-failed", "Extraction: it was cancelled");
+        phone.wait_text("#job-failed", "Extraction: cancelled");
         phone.tap("#player-close");
         // The next that opens is not shown with the steps of this one.
         phone.wait_for("document.getElementById('make-extract').disabled");
         assert_eq!(phone.text("#mask-text"), "…");
-        phone.wait_text_so_long("#last-text", "Z-calf", longest);
-        assert!(phone.text("#last-text").starts_with("clean"));
+        phone.wait_text_so_long("#last-open", "calf", longest);
+        phone.wait_text("#last-open", "clean");
         let sessions = self.sessions();
         let calf = sessions.iter().find(|session| *session != before).unwrap();
         assert!(calf.ends_with("Z-calf"), "{calf}");

@@ -45,6 +45,27 @@ pub(crate) fn what_is_not_there_is_named_by_headline_and_button(browser: PathBuf
     phone.wait_for("document.getElementById('message').hidden");
 }
 
+pub(crate) fn a_take_that_a_person_stopped_is_no_fault(browser: PathBuf) {
+    let rig = Rig::start(&SLOW_TURN);
+    let mut phone = Phone::open(&browser, &rig.url, "stopped");
+    phone.write("#object", "calf");
+    phone.wait_button("Start calf", true);
+    phone.tap("#go");
+    phone.wait_text("#phase", "Recording");
+    phone.wait_for("document.getElementById('progress').value > 0.02");
+    phone.tap("#go");
+    phone.wait_text_so_long("#phase", "The take of calf was stopped", SLOW_TURN.longest);
+    phone.wait_button("Record calf again", true);
+    phone.wait_text("#last-open", "stopped");
+    phone.wait_for("document.getElementById('faults').hidden");
+    phone.wait_text("#sessions .day", "1 recorded");
+    let red = "[...document.querySelectorAll('#work .bad, .take .bad')].filter((part) => part.checkVisibility() && part.textContent).length";
+    assert_eq!(phone.value(red), 0);
+    phone.see("stopped");
+    phone.value("document.getElementById('sessions-title').scrollIntoView()");
+    phone.see("stopped-in-the-list");
+}
+
 pub(crate) fn the_emergency_stop_comes_first_and_the_aborted_object_after_it(browser: PathBuf) {
     let longest = SLOW_TURN.longest;
     let table = "sim:?fault=estop@30s:10s";
@@ -63,6 +84,6 @@ pub(crate) fn the_emergency_stop_comes_first_and_the_aborted_object_after_it(bro
     phone.see("released");
     phone.tap("#go");
     phone.wait_text_so_long("#phase", "The take of calf was aborted", longest);
-    phone.wait_button("Again: calf", true);
+    phone.wait_button("Record calf again", true);
     phone.see("again");
 }

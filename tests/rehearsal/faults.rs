@@ -10,7 +10,7 @@ use relit_camera::{
     self as camera, Camera, CameraError, CameraMode, Control, DeviceInfo, Frame, Mode,
 };
 use relit_capture::capture::{CaptureError, Settings, Stopped};
-use relit_capture::state::{Phase, TakeSummary, Verdict};
+use relit_capture::state::{LogLine, Phase, TakeSummary, Verdict};
 use relit_data::session::{Status, recordings};
 use relit_turntable::simulator::{SimulatedPort, SimulatedTable, SimulatorOptions};
 use relit_turntable::{self as turntable, MotionFault, Port, Table, TurntableError};
@@ -163,11 +163,8 @@ fn dropped_and_damaged_frames_within_the_limit_are_listed_and_kept() {
         .map(|fault| fault.what.as_str())
         .collect();
     // One frame that is lost, and one that is damaged.
-    assert_eq!(faults.len(), 2, "{faults:?}");
-    assert!(
-        faults.iter().all(|what| what.contains("frame ")),
-        "{faults:?}"
-    );
+    let of_frames = faults.iter().filter(|what| what.contains("frame "));
+    assert_eq!(of_frames.count(), 2, "{faults:?}");
 }
 
 #[test]
@@ -225,13 +222,14 @@ fn a_stop_ends_the_take_within_five_seconds_and_stops_the_table() {
     let took_us = clock.now_us() - asked_us;
     assert!(took_us < 5_000_000, "{took_us} us");
     check_aborted(&rig, &take, &Stopped::Shutdown.to_string());
+    assert!(take.is_stopped);
     // Another capture while the program ends is refused.
     let error = rig.capture().unwrap_err();
     assert!(matches!(error, CaptureError::Stopped(Stopped::Shutdown)));
 }
 
 /// Checks that a take is whole although its table did not turn back.
-fn check_whole(rig: &Rehearsal, take: &TakeSummary, why: &str) {
+fn check_whole(rig: &Rehearsal, take: &TakeSummary) {
     assert_eq!(take.verdict, Verdict::Clean, "{take:?}");
     let session = rig.session(take);
     assert_eq!(session.manifest.unwrap().status, Status::Complete);
@@ -243,8 +241,6 @@ fn check_whole(rig: &Rehearsal, take: &TakeSummary, why: &str) {
             .iter()
             .all(|entry| entry.angle_deg.is_some())
     );
-    let fault = rig.monitor.state().faults.back().unwrap().what.clone();
-    assert!(fault.contains(why), "{fault}");
     assert!(rig.table_stands());
 }
 
@@ -253,7 +249,11 @@ fn a_stop_while_the_table_turns_back_stops_the_table_and_costs_no_take() {
     let mut rig = Rehearsal::whole(SHORT, "");
     let stop = rig.stop.clone();
     let take = interfere_in(Phase::Unwinding, &mut rig, || stop.ask(Stopped::Shutdown));
-    check_whole(&rig, &take, &Stopped::Shutdown.to_string());
+    check_whole(&rig, &take);
+    let state = rig.monitor.state();
+    assert!(state.faults.is_empty(), "{:?}", state.faults);
+    let is_noted = |line: &LogLine| line.what.contains("did not turn back");
+    assert!(state.log.iter().any(is_noted), "{:?}", state.log);
     let at = rig.equipment.simulator().unwrap();
     assert!(at.angle_at(rig.equipment.clock().now_us()) > 30.0);
 }
@@ -265,7 +265,9 @@ fn an_emergency_stop_while_the_table_turns_back_costs_no_take() {
     let take = interfere_in(Phase::Unwinding, &mut rig, || {
         table.press_emergency_stop(true)
     });
-    check_whole(&rig, &take, "ALARM:10");
+    check_whole(&rig, &take);
+    let fault = rig.monitor.state().faults.back().unwrap().what.clone();
+    assert!(fault.contains("ALARM:10"), "{fault}");
     let error = rig.capture().unwrap_err();
     assert!(
         matches!(
@@ -282,6 +284,7 @@ fn a_take_that_was_stopped_in_its_turn_keeps_the_angles_it_had() {
     let stop = rig.stop.clone();
     let take = interfere_in_the_turn(&mut rig, || stop.ask(Stopped::Person));
     check_aborted(&rig, &take, &Stopped::Person.to_string());
+    assert!(take.is_stopped);
     let session = rig.session(&take);
     let entries = session.frames.as_ref().unwrap().entries();
     let table = rig.equipment.simulator().unwrap();

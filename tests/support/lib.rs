@@ -14,12 +14,14 @@ pub mod firmware;
 pub mod help;
 mod programs;
 pub mod trials;
+mod turning;
 
 use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 
 pub use programs::{beside_this_test, program};
+pub use turning::turning;
 
 /// Runs `ffmpeg` in `folder` with these arguments and returns what it wrote to standard output.
 ///

@@ -5,11 +5,14 @@ import { attempt } from "./notices.js";
 import { EMPTY, isEnough, Sketcher } from "./sketcher.js";
 
 const HINTS = {
-  rect: "Drag a rectangle around the object.",
+  rect: "Draw a box around the object.",
   object: "Paint over what belongs to the object.",
-  background: "Paint over what does not belong to it.",
-  eraser: "Wipe strokes away.",
+  background: "Paint over what does not belong to the object.",
+  eraser: "Erase strokes.",
 };
+const FOUND = "Found by its plain background. If it is wrong, correct it with a brush, or drag a rectangle.";
+/** The sketch of a photograph whose plain background shows the object. */
+const BY_BACKGROUND = { ...EMPTY, auto: true };
 const OUTSIDE = [12, 12, 16, 170];
 const EDGE = [255, 214, 120, 255];
 
@@ -36,11 +39,26 @@ export class Cutter {
   }
 
   /** Cuts a photograph; true when its mask is new, false when everything stays as it was. */
-  open(photo) {
+  async open(photo) {
+    const found = photo.mask || photo.sketch ? null : await this.#find(photo);
+    return this.#draw(photo, photo.sketch ?? found ?? EMPTY);
+  }
+
+  /** The sketch of a photograph that needs none; null where a person has to say where the object is. */
+  async #find(photo) {
+    try {
+      await this.#library.cut(photo, BY_BACKGROUND);
+      return BY_BACKGROUND;
+    } catch {
+      return null;
+    }
+  }
+
+  #draw(photo, sketch) {
     this.#photo = photo;
     $("cut-name").textContent = photo.name;
     document.body.classList.add("cutting");
-    this.#sketcher.open(photo, photo.sketch ?? EMPTY, photo.mask ? "object" : "rect");
+    this.#sketcher.open(photo, sketch, photo.sketch ? "object" : "rect");
     this.#cutOf = photo.mask ? this.#sketcher.sketch : null;
     this.#showMask();
     this.#warn([]);
@@ -78,17 +96,17 @@ export class Cutter {
     this.#show();
     if (this.#cutting) return;
     this.#cutting = true;
-    while (this.isOpen && this.#cutOf !== this.#sketcher.sketch && isEnough(this.#sketcher.sketch)) await this.#cutOnce(this.#sketcher.sketch);
+    while (this.isOpen && this.#cutOf !== this.#sketcher.sketch && canCut(this.#sketcher.sketch)) await this.#cutOnce(this.#sketcher.sketch);
     this.#cutting = false;
     this.#show();
   }
 
   async #cutOnce(sketch) {
-    $("cut-state").textContent = "cutting …";
+    $("cut-state").textContent = "making the mask …";
     try {
       const { warnings, seconds } = await this.#library.cut(this.#photo, sketch);
       this.#warn(warnings);
-      $("cut-state").textContent = `${seconds.toFixed(2)} s`;
+      $("cut-state").textContent = `mask made in ${seconds.toFixed(1)} s`;
     } catch (error) {
       this.#photo.mask = null;
       this.#warn([error.message]);
@@ -103,7 +121,8 @@ export class Cutter {
   }
 
   #show() {
-    $("cut-hint").textContent = HINTS[this.#sketcher.tool];
+    const { auto, rect, strokes } = this.#sketcher.sketch;
+    $("cut-hint").textContent = auto && !rect && strokes.length === 0 ? FOUND : HINTS[this.#sketcher.tool];
     $("cut-done").disabled = this.#cutting || !this.#photo.mask || this.#cutOf !== this.#sketcher.sketch;
   }
 
@@ -117,6 +136,8 @@ export class Cutter {
     if (this.#sketcher.cursorKey(event) || this.#sketcher.toolKey(event)) event.preventDefault();
   }
 }
+
+const canCut = (sketch) => sketch.auto || isEnough(sketch);
 
 /** Dark outside of the mask, and a line at its edge. */
 function overlay({ mask, width, height }) {

@@ -95,7 +95,7 @@ export class Engine extends EventTarget {
     performance.measure(`relight:${request.fields.op}`, { start: began, end });
     if (fault !== undefined) {
       this.#restart(fault);
-      return reject(new Fault(`The engine gave up (${fault}).`));
+      return reject(new Fault(`The engine crashed (${fault}).`));
     }
     this.memory = memory ?? this.memory;
     if (reply.error) return reject(new Error(reply.error));
@@ -108,7 +108,7 @@ export class Engine extends EventTarget {
     const open = [...this.#open.values()];
     this.#open.clear();
     this.#restart(event.message);
-    for (const { reject } of open) reject(new Fault("The engine gave up."));
+    for (const { reject } of open) reject(new Fault("The engine crashed."));
   }
 
   #restart(fault) {
@@ -116,9 +116,9 @@ export class Engine extends EventTarget {
     this.#restarting = this.#rebuild()
       .then((lost) => {
         const loss = lost.length > 0 ? ` These could not be opened again: ${lost.join(", ")}.` : "";
-        this.dispatchEvent(new CustomEvent("restart", { detail: `The engine gave up and was started again (${fault}).${loss}` }));
+        this.dispatchEvent(new CustomEvent("restart", { detail: `The engine crashed and was started again (${fault}).${loss}` }));
       })
-      .catch((error) => this.dispatchEvent(new CustomEvent("restart", { detail: `The engine cannot be started again: ${error.message}` })))
+      .catch((error) => this.dispatchEvent(new CustomEvent("restart", { detail: `The engine could not be started again: ${error.message}` })))
       .finally(() => (this.#restarting = null));
   }
 

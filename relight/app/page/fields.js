@@ -63,5 +63,5 @@ function arrived(field, file) {
   const copy = copyOf(file);
   copy.catch(() => {});
   waiting.push({ field, name: file.name, copy });
-  return say(`Kept until the engine is loaded: ${waiting.map(({ name }) => name).join(", ")}`);
+  return say(`Waiting for the engine to load: ${waiting.map(({ name }) => name).join(", ")}`);
 }

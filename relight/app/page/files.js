@@ -15,7 +15,7 @@ const READ_BY_ENGINE = [[0, "\xff\xd8\xff"], [0, "\x89PNG"], [8, "WEBP"], [0, "\
 /** Whether the engine reads a file itself. Refuses what is too much or nothing. */
 export async function openable(file) {
   if (file.size === 0) throw new Error(`${file.name} is empty.`);
-  if (file.size > MOST_BYTES) throw new Error(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB: at most ${MOST_BYTES / 1e6} MB are opened.`);
+  if (file.size > MOST_BYTES) throw new Error(`${file.name} is too large: ${(file.size / 1e6).toFixed(0)} MB; the limit is ${MOST_BYTES / 1e6} MB.`);
   const head = await headOf(file);
   if (isCaptured(file)) return true;
   if (isSvg(file, head)) throw new Error(`${file.name} is a drawing (SVG): choose a photograph.`);
@@ -30,9 +30,9 @@ export async function isZip(file) {
 /** A picture that the browser decodes, as it is to be looked at and not too large: { fields: { name, width, height }, rgba }. */
 export async function asPixels(file) {
   const [wide, high] = declaredSize(await headOf(file)) ?? [0, 0];
-  if (wide * high > MOST_PIXELS) throw new Error(`${file.name} says that it has ${wide} x ${high} pixels: at most ${MOST_PIXELS / 1e6} million are opened.`);
+  if (wide * high > MOST_PIXELS) throw new Error(`${file.name} is too large: ${wide} × ${high} pixels; the limit is ${MOST_PIXELS / 1e6} million.`);
   const image = await createImageBitmap(file, { imageOrientation: "from-image" }).catch(() => null);
-  if (!image) throw new Error(`${file.name} is no picture that this browser can read.`);
+  if (!image) throw new Error(`${file.name} is not a picture that this browser can read.`);
   const scale = Math.min(1, Math.sqrt(KEPT_PIXELS / (image.width * image.height)));
   const [width, height] = [image.width, image.height].map((side) => Math.max(1, Math.floor(side * scale)));
   const context = new OffscreenCanvas(width, height).getContext("2d");

@@ -38,9 +38,9 @@ export class Library {
     return photo;
   }
 
-  /** Cuts a photograph by a sketch: { rect, strokes }. */
-  async cut(photo, { rect, strokes }) {
-    const answer = await this.#engine.ask("mask", { object: photo.object, rect, strokes });
+  /** Cuts a photograph by a sketch: { rect, strokes }, and auto where its plain background may show the object. */
+  async cut(photo, { rect, strokes, auto = false }) {
+    const answer = await this.#engine.ask("mask", { object: photo.object, rect, auto, strokes });
     photo.mask = answer.parts[0];
     return answer;
   }

@@ -96,7 +96,7 @@ async function get(name, cache) {
 
 async function next(reader) {
   return reader.read().catch(() => {
-    throw new Error("the connection broke.");
+    throw new Error("the connection was lost.");
   });
 }
 

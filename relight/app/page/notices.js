@@ -38,7 +38,7 @@ export function listen() {
   $("alert-close").addEventListener("click", calm);
   window.addEventListener("error", (event) => {
     event.preventDefault();
-    alert(`Something in the page failed: ${event.message}.`);
+    alert(`Something went wrong in the page: ${event.message}.`);
   });
   window.addEventListener("unhandledrejection", (event) => {
     event.preventDefault();

@@ -44,7 +44,7 @@ export class Objects {
   async #open(file) {
     say(`Opening ${file.name} …`);
     const photo = await this.#library.open(file);
-    say(photo.reduced ? `${file.name} is used at ${photo.width} × ${photo.height} pixels.` : "");
+    say(photo.reduced ? `${file.name} was reduced to ${photo.width} × ${photo.height} pixels.` : "");
     if (!photo.masked && !(await this.#cutter.open(photo))) {
       await this.#library.closeAllBut(this.#work.reachable);
       return say("");
@@ -52,7 +52,7 @@ export class Objects {
     await this.#decompose(photo);
     this.#work.add(added(this.#work.scene, newObject(photo.object, placeFor(photo, this.#work.scene))));
     await this.#library.closeAllBut(this.#work.reachable);
-    return say(`${photo.name} stands in the scene.`);
+    return say(`${photo.name} is in the scene.`);
   }
 
   async #cutAgain() {

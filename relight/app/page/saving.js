@@ -58,14 +58,14 @@ export class Saving {
     const { parts } = await this.#library.askBefore(scene.background, "export", { scene: forEngine(scene), name: "scene" });
     download(new File(parts, "relight-scene.zip", { type: "application/zip" }));
     this.#work.kept(scene);
-    say("The scene is kept, with its photographs.");
+    say("The scene is saved, with its photographs.");
   }
 
   /** Opens a kept scene in place of this one. */
   async reopen(file) {
     calm();
-    if (!(await isZip(file))) throw new Error(`${file.name} is no kept scene: choose a zip file of this page.`);
-    if (this.#work.unsaved && !confirm("Open another scene? This one is not kept.")) return;
+    if (!(await isZip(file))) throw new Error(`${file.name} is not a saved scene: choose a zip file that this page saved.`);
+    if (this.#work.unsaved && !confirm("Open another scene? This one is not saved.")) return;
     say(`Opening ${file.name} …`);
     const { scene, background } = await this.#library.reopen(await copyOf(file));
     this.#work.begin(fromEngine(scene, background));

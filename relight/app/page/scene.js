@@ -30,7 +30,7 @@ export function fromEngine(scene, background) {
 }
 
 export function added(scene, object) {
-  if (scene.objects.length >= MOST_OBJECTS) throw new Error(`A scene has at most ${MOST_OBJECTS} objects: remove one first.`);
+  if (scene.objects.length >= MOST_OBJECTS) throw new Error(`A scene can have at most ${MOST_OBJECTS} objects: remove one first.`);
   return { ...scene, objects: [...scene.objects, object] };
 }
 

@@ -36,7 +36,7 @@ async function answer({ id, fields, parts }) {
   try {
     bytes = await Promise.all(parts.map(bytesOf));
   } catch {
-    return self.postMessage({ id, reply: { error: "The file cannot be read any more: choose it again." }, parts: [] });
+    return self.postMessage({ id, reply: { error: "The file can no longer be read: choose it again." }, parts: [] });
   }
   try {
     const [text, ...rest] = ask([new TextEncoder().encode(JSON.stringify(fields)), ...bytes]);

@@ -116,6 +116,10 @@ fn an_object_is_read_from_a_file_or_a_folder_and_from_nothing_else() {
     let empty = tempfile::tempdir().unwrap();
     let error = read_object(empty.path()).unwrap_err();
     assert!(matches!(error, ExportError::Source { .. }));
+    for missing in ["missing.relit", "missing"] {
+        let error = read_object(&empty.path().join(missing)).unwrap_err();
+        assert!(matches!(error, ExportError::Missing(_)), "{error}");
+    }
 }
 
 /// The maps of a decomposition as `relight decompose` writes them.

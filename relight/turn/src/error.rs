@@ -69,6 +69,9 @@ pub enum TurnError {
     /// The session whose video shows the ball cannot be read.
     #[error(transparent)]
     Session(#[from] SessionError),
+    /// The session from which a shard was made is not near it.
+    #[error("no session or video of which {} was made lies beside its data set: give it with --session", .0.display())]
+    NoSession(PathBuf),
     /// The ball is under the object's mask.
     #[error(
         "the object's mask covers {percent:.0} % of the ball at {given}: measure the ball's place in the video again, or take the ball out of the mask"

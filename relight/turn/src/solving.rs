@@ -7,7 +7,6 @@ use relight_core::light::ShLight;
 use relight_photo::nets::Weights;
 use relit_data::rig::{RigFacts, RotationDirection};
 use relit_data::session::Recording;
-use relit_data::shard::Dataset;
 
 use crate::error::TurnError;
 use crate::fit::known_light::solve_in_light;
@@ -19,6 +18,7 @@ use crate::model::frame::{Elevation, FactSource};
 use crate::model::material::MaterialKind;
 use crate::network::predict::{NetworkFigures, TurnNetwork, TurnPrediction};
 use crate::observe::film::film;
+use crate::observe::origin::{dataset_of, recording_of, session_of};
 use crate::observe::probe::{Probe, ProbeBall};
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::reading::{ReadTurn, TableRotation, read_curves};
@@ -47,8 +47,8 @@ pub enum TurnLight<'a> {
     Given(ShLight),
     /// A ball on the table measures it.
     Ball {
-        /// The session of the turn, or its video.
-        session: &'a Path,
+        /// The session of the turn, or its video; looked for by `dataset.json` where it is not given.
+        session: Option<&'a Path>,
         /// Where the ball is in the video.
         place: ProbePlace,
         /// What it is made of; what it looks like where that is not known.
@@ -92,7 +92,11 @@ pub fn solve_turn(
     progress: &dyn Fn(u64, u64),
 ) -> Result<SolvedTurn, TurnError> {
     let recording = match &options.light {
-        TurnLight::Ball { session, .. } => Some(Recording::open(session)?),
+        TurnLight::Ball {
+            session: Some(given),
+            ..
+        } => Some(Recording::open(given)?),
+        TurnLight::Ball { session: None, .. } => Some(recording_of(shard)?),
         TurnLight::Unknown | TurnLight::Given(_) => None,
     };
     let rig = rig_of(shard, recording.as_ref());
@@ -151,21 +155,8 @@ fn rig_of(shard: &Path, recording: Option<&Recording>) -> RigFacts {
 }
 
 fn rig_of_dataset(shard: &Path) -> Option<RigFacts> {
-    let is_dataset = shard.is_dir();
-    let folder = if is_dataset { shard } else { shard.parent()? };
-    let dataset = Dataset::read(folder).ok()?;
-    let is_of = |id: &str| {
-        let mut shards = dataset.shards_of(id);
-        shards.any(|entry| {
-            shard
-                .file_name()
-                .is_some_and(|name| name == entry.file.as_str())
-        })
-    };
-    let mut sessions = dataset.sessions.iter();
-    sessions
-        .find(|session| is_dataset || is_of(&session.id))?
-        .rig
+    let (dataset, _) = dataset_of(shard)?;
+    session_of(&dataset, shard)?.rig
 }
 
 fn rotation(options: &TurnOptions<'_>, rig: RigFacts) -> TableRotation {

@@ -255,10 +255,13 @@ fn a_camera_is_made_to_hold_still() {
     };
     let plan = ManualPlan::new(&camera.controls().unwrap(), &wanted);
     assert_eq!(plan.apply(&mut *camera).unwrap(), []);
-    let missing = ["exposure", "white balance", "focus", "power-line filter"];
-    assert_eq!(plan.missing.len(), missing.len(), "{:?}", plan.missing);
-    for (found, aspect) in plan.missing.iter().zip(missing) {
-        assert!(found.contains(aspect), "{aspect}: {found}");
+    assert_eq!(plan.missing.len(), 1, "{:?}", plan.missing);
+    for aspect in ["exposure", "white balance", "focus", "power-line filter"] {
+        assert!(
+            plan.missing[0].contains(aspect),
+            "{aspect}: {:?}",
+            plan.missing
+        );
     }
     set(&mut *camera, "gain", 34);
     let moved = plan.check(&camera.controls().unwrap());

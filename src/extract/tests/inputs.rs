@@ -8,7 +8,7 @@ use std::process::Command;
 
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 use relit_data::shard::Dataset;
-use relit_test_support::{ffmpeg, is_named};
+use relit_test_support::{ffmpeg, is_named, turning};
 use tempfile::TempDir;
 
 const OBJECT_PX: u64 = 24 * 30;
@@ -38,7 +38,8 @@ impl Inputs {
     fn video(&self, name: &str, hue: u32, encoding: &str) {
         let path = self.path(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
-        let source = format!("testsrc2=size=64x48:rate=10:duration=0.8,hue=h={hue}");
+        let object = "between(X,20,43)*between(Y,10,39)";
+        let source = turning([64, 48], 10, 8, hue, object);
         let made = format!("made.{}", path.extension().unwrap().to_str().unwrap());
         let mut arguments = vec!["-f", "lavfi", "-i", &source];
         arguments.extend(encoding.split_whitespace());
@@ -303,7 +304,7 @@ fn masks_of_other_programs_mark_the_object_or_are_refused() {
     }
     for (mask, values) in [
         ("photo.png", &[][..]),
-        ("labels.png", &["0", "1", "2"]),
+        ("labels.png", &["0, 1, 2"]),
         ("lying.png", &["48 x 64", "64 x 48"]),
     ] {
         let (code, errors) = inputs.extract(&["clip.mkv", "--mask", mask, "-o", "out"]);

@@ -26,6 +26,14 @@ pub enum MaskError {
         /// Number of frames.
         found: usize,
     },
+    /// The background does not show where the object is.
+    #[error(
+        "the object cannot be found by its background ({why}): give a rectangle around the object"
+    )]
+    NotPlain {
+        /// What is not plain about it, of "it", the background.
+        why: &'static str,
+    },
     /// GrabCut classified every pixel as background.
     #[error(
         "no object was found: it does not differ enough from its background for this hint; draw the rectangle closer, or mark the object white in seeds"

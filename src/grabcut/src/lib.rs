@@ -32,6 +32,8 @@
 //! # Ok::<(), relit_grabcut::MaskError>(())
 //! ```
 //!
+//! Before a plain background no hint is needed: [`segment_on_plain`].
+//!
 //! # How it decides
 //!
 //! With a rectangle, pixels outside are background; seeds overrule that. Two cuts are made: in one the half of the
@@ -54,6 +56,7 @@ mod cut;
 mod error;
 mod hints;
 mod outline;
+mod plain;
 mod preview;
 mod segment;
 mod settings;
@@ -67,6 +70,7 @@ pub use error::MaskError;
 pub use hints::marks::{Hints, Mark, Seeds};
 pub use hints::strokes::{Brush, Stroke, Strokes};
 pub use outline::outline;
+pub use plain::{PlainCut, segment_on_plain};
 pub use preview::{grey_png, preview, rgb_png};
 pub use segment::{Mask, MaskStatistics, check_hints, clean_cut, segment, segment_with};
 pub use settings::{Effort, MAX_PIXELS, MIN_SIDE, SegmentSettings};

@@ -311,7 +311,7 @@ fn finish(
     }
 }
 
-fn check_size((width, height): (u32, u32)) -> Result<(), MaskError> {
+pub(crate) fn check_size((width, height): (u32, u32)) -> Result<(), MaskError> {
     let pixels = u64::from(width) * u64::from(height);
     if width.min(height) >= MIN_SIDE && pixels <= MAX_PIXELS {
         Ok(())

@@ -68,8 +68,9 @@ pub(super) fn check_same_input(
     recording: &Recording,
     video: &Video,
 ) -> Result<(), MaskingError> {
-    let own = recording.folder.as_deref();
-    if own.is_some() && own == files.mask.parent() || !files.mask.exists() {
+    let folder = recording.folder.as_deref();
+    let is_own = folder.is_some() && folder == files.mask.parent();
+    if is_own || !files.mask.exists() {
         return Ok(());
     }
     match read_record(&files.record)? {

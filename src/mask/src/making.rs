@@ -1,16 +1,17 @@
 //! From a recording and a request to the files of a mask.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use image::RgbImage;
 use relit_data::session::{MASK_FILE, Notice, Recording};
-use relit_grabcut::{Effort, Mask, grey_png, preview, rgb_png, segment_with};
+use relit_grabcut::{Effort, Mask, grey_png, preview, rgb_png, segment_on_plain, segment_with};
 use relit_video::Video;
 
 use super::earlier::{check_same_input, keep_recipe, with_strokes};
 use super::engine::cut_by_opencv;
 use super::files::{check_replaceable, make_folder, write};
-use super::request::Recipe;
+use super::request::{Recipe, TurnRequest};
 use super::sampling::{SampledTurn, read_frame, read_turn, same_image};
 use super::{
     MASK_SCHEMA, MaskEngine, MaskFiles, MaskRecord, MaskRequest, MaskSoftware, MaskingError,
@@ -88,25 +89,36 @@ fn segment_and_write(
         )));
     }
     let turn = read_turn(video, frame.dimensions(), &request.turn)?;
-    let mask = cut(&frame, turn.as_ref(), request, Effort::Fine)?;
-    write_files(&frame, source, turn.as_ref(), &mask, files, request)
+    let (mask, request) = cut(&frame, turn.as_ref(), request, Effort::Fine)?;
+    write_files(&frame, source, turn.as_ref(), &mask, files, &request)
 }
 
-/// Cuts the object out of `frame` as the request wants it.
-pub(super) fn cut(
+/// Cuts the object out of `frame` as the request wants it, and says by which request the same mask is made again: of a
+/// photograph whose plain background was all there was to go by, with what that showed.
+pub(super) fn cut<'a>(
     frame: &RgbImage,
     turn: Option<&SampledTurn>,
-    request: &MaskRequest,
+    request: &'a MaskRequest,
     effort: Effort,
-) -> Result<Mask, MaskingError> {
+) -> Result<(Mask, Cow<'a, MaskRequest>), MaskingError> {
     let (hints, settings) = (&request.hints, &request.settings);
-    match request.engine {
+    if turn.is_none() && request.is_unhinted() {
+        let cut = segment_on_plain(frame, &hints.strokes, settings, effort)?;
+        let request = MaskRequest {
+            hints: cut.hints,
+            turn: TurnRequest::None,
+            ..request.clone()
+        };
+        return Ok((cut.mask, Cow::Owned(request)));
+    }
+    let mask = match request.engine {
         MaskEngine::Relit => {
             let statistics = turn.map(|turn| &turn.statistics);
-            Ok(segment_with(frame, statistics, hints, settings, effort)?)
+            segment_with(frame, statistics, hints, settings, effort)?
         }
-        MaskEngine::OpenCv => cut_by_opencv(frame, hints, settings),
-    }
+        MaskEngine::OpenCv => cut_by_opencv(frame, hints, settings)?,
+    };
+    Ok((mask, Cow::Borrowed(request)))
 }
 
 /// Writes a mask that was made by [`cut`] on `frame`, with its record and its preview: each file appears

@@ -66,13 +66,19 @@ impl MaskRequest {
         }
     }
 
-    /// The same by what the whole video shows, too.
+    /// The same by what the whole video shows, too; without other hints, of a photograph by its plain background.
     #[must_use]
     pub fn by_turn(self) -> Self {
         Self {
             turn: TurnRequest::Sampled,
             ..self
         }
+    }
+
+    /// Whether the object is to be found without a hint where it is; strokes correct what is found.
+    pub(super) fn is_unhinted(&self) -> bool {
+        let Hints { rect, seeds, .. } = &self.hints;
+        self.turn == TurnRequest::Sampled && rect.is_none() && seeds.is_none()
     }
 
     /// The mask that the record `path` describes, to the same bytes.

@@ -17,7 +17,7 @@ pub(super) struct SampledTurn {
     pub(super) statistics: TurnStatistics,
 }
 
-/// Reads the frames of a turn that are asked for; none where one frame is enough.
+/// Reads the frames of a turn that are asked for; none where one frame is enough, and of a photograph, which is no turn.
 pub(super) fn read_turn(
     video: &Video,
     size: (u32, u32),
@@ -25,9 +25,15 @@ pub(super) fn read_turn(
 ) -> Result<Option<SampledTurn>, MaskingError> {
     match request {
         TurnRequest::None => Ok(None),
+        TurnRequest::Sampled if is_photograph(video) => Ok(None),
         TurnRequest::Sampled => sampled(video, size, &video.spread(TURN_FRAMES)).map(Some),
         TurnRequest::Frames(frames) => sampled(video, size, frames).map(Some),
     }
+}
+
+/// Whether there is one picture and no turn.
+pub(super) fn is_photograph(video: &Video) -> bool {
+    video.frames().len() == 1
 }
 
 /// Reads these frames. Those that cannot be decoded are left out.

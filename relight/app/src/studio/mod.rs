@@ -123,9 +123,10 @@ impl Studio {
             Request::Mask {
                 object,
                 rect,
+                auto,
                 strokes,
             } => {
-                let made = self.objects.get(object)?.cut_out(rect, strokes)?;
+                let made = self.objects.get(object)?.cut_out(rect, auto, strokes)?;
                 let says = json!({ "area": made.statistics.area_px, "warnings": made.warnings });
                 Ok((says, vec![made.image.into_raw()]))
             }

@@ -12,7 +12,9 @@ use relight_photo::decompose::{
 };
 use relight_photo::relighting::RelightableObject;
 use relit_data::geometry::Rect;
-use relit_grabcut::{Hints, Mask, SegmentSettings, Stroke, Strokes, segment};
+use relit_grabcut::{
+    Effort, Hints, Mask, SegmentSettings, Stroke, Strokes, segment, segment_on_plain,
+};
 
 use super::error::{Refusal, refused};
 use super::pixels::{levels, on_screen, opaque, shown, stored, without_alpha};
@@ -165,13 +167,14 @@ impl StudioObject {
         }
     }
 
-    /// Cuts the object out by hints.
+    /// Cuts the object out by hints; with `auto` and without a rectangle by its plain background.
     ///
     /// # Errors
-    /// Where the hints do not fit, or nothing is left.
+    /// Where the hints do not fit, the background is not plain, or nothing is left.
     pub(super) fn cut_out(
         &mut self,
         rect: Option<[i32; 4]>,
+        auto: bool,
         strokes: Vec<Stroke>,
     ) -> Result<Mask, Refusal> {
         let Content::Photo(cut) = &mut self.content else {
@@ -180,12 +183,18 @@ impl StudioObject {
         let rect = rect.map(|[x, y, width, height]| {
             Rect::new(x, y, width.max(0) as u32, height.max(0) as u32)
         });
-        let hints = Hints {
-            rect,
-            seeds: None,
-            strokes: Strokes::new(strokes)?,
+        let strokes = Strokes::new(strokes)?;
+        let settings = SegmentSettings::default();
+        let mask = if auto && rect.is_none() {
+            segment_on_plain(&cut.shown, &strokes, &settings, Effort::Fine)?.mask
+        } else {
+            let hints = Hints {
+                rect,
+                seeds: None,
+                strokes,
+            };
+            segment(&cut.shown, &hints, &settings)?
         };
-        let mask = segment(&cut.shown, &hints, &SegmentSettings::default())?;
         cut.mask = Some(mask.image.clone());
         (cut.photo, cut.preview) = (None, None);
         Ok(mask)

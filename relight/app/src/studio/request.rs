@@ -24,6 +24,9 @@ pub(super) enum Request {
     Mask {
         object: u32,
         rect: Option<[i32; 4]>,
+        /// Without a rectangle the plain background says where the object is.
+        #[serde(default)]
+        auto: bool,
         #[serde(default)]
         strokes: Vec<Stroke>,
     },

@@ -34,6 +34,8 @@ pub struct CapturedObject {
 impl CapturedObject {
     /// The largest file that is read, bytes.
     pub const MAX_BYTES: u64 = 1 << 29;
+    /// What the file is called in a folder of results.
+    pub const FILE: &'static str = "object.relit";
 
     /// An object of these maps. Coverage and confidence are brought to 0 to 1, what is not a number to 0.
     ///

@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use relit_data::durable::write_whole;
 use relit_data::text;
@@ -183,18 +183,21 @@ impl ShLight {
 }
 
 impl CapturedObject {
-    /// Whether a file is called as a captured object (`.relit`).
+    /// Whether a path is that of a captured object: a file that is called so (`.relit`), or a folder with one
+    /// ([`Self::FILE`]).
     #[must_use]
     pub fn is_named(path: &Path) -> bool {
         path.extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("relit"))
+            || path.join(Self::FILE).is_file()
     }
 
-    /// Reads a file.
+    /// Reads a file, or that in a folder of `relight turn`.
     ///
     /// # Errors
     /// Where it cannot be read or is no captured object that this program knows.
     pub fn read(path: &Path) -> Result<Self, CapturedObjectError> {
+        let path = &file_of(path);
         let read = CapturedObjectError::file(path, "cannot be read");
         let mut content = Vec::new();
         let mut file = File::open(path).map_err(&read)?.take(Self::MAX_BYTES + 1);
@@ -213,10 +216,17 @@ impl CapturedObject {
     }
 }
 
+/// The captured object's file at a path, which may be that of its folder.
+fn file_of(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join(CapturedObject::FILE)
+    } else {
+        path.to_owned()
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use relit_data::still::StillError;
-
     use super::*;
 
     fn ramp() -> Planes<3> {
@@ -321,9 +331,10 @@ mod tests {
         drop(writer);
         std::fs::write(&path, bytes).unwrap();
         let error = read_planes(&path).unwrap_err();
-        let large = StillError::TooLarge.to_string();
-        assert!(error.to_string().contains(&large), "{error}");
-        assert!(error.to_string().contains("vast.png"), "{error}");
+        assert!(
+            matches!(&error, ImageError::Form { path: vast, .. } if *vast == path),
+            "{error}"
+        );
     }
 
     #[test]

@@ -9,6 +9,9 @@ use relight_core::image::ImageError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
+    /// There is nothing at the path.
+    #[error("{} does not exist: give object.relit, or a folder that relight turn or relight decompose has written", .0.display())]
+    Missing(PathBuf),
     /// The input holds no object, or its figures cannot be read.
     #[error("{} {fault}", path.display())]
     Source {

@@ -12,8 +12,6 @@ use serde::Deserialize;
 
 use super::ExportError;
 
-/// A captured object in the folder of `relight turn`.
-const OBJECT: &str = "object.relit";
 /// The figures of a decomposition, and those of a turn.
 const FIGURES: [&str; 2] = ["decomposition.json", "turn.json"];
 
@@ -44,11 +42,11 @@ struct EvenGloss {
 /// # Errors
 /// Where it holds no object, or where a file cannot be read.
 pub fn read_object(path: &Path) -> Result<CapturedObject, ExportError> {
-    if path.is_file() {
-        return Ok(CapturedObject::read(path)?);
+    if !path.exists() {
+        return Err(ExportError::Missing(path.to_owned()));
     }
-    if path.join(OBJECT).is_file() {
-        return Ok(CapturedObject::read(&path.join(OBJECT))?);
+    if path.is_file() || path.join(CapturedObject::FILE).is_file() {
+        return Ok(CapturedObject::read(path)?);
     }
     let is_there = |name: &&str| path.join(name).is_file();
     let Some(figures) = FIGURES.into_iter().find(is_there) else {

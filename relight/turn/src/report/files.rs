@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use relight_core::captured_object::CapturedObject;
 use relight_core::files::{ResultFolder, write_png};
 use relight_core::image::{Depth, Extent};
 use relight_photo::files::write_light;
@@ -14,9 +15,6 @@ use crate::solving::SolvedTurn;
 
 /// The file of figures.
 const FIGURES: &str = "turn.json";
-/// The object as a file that can be lit.
-const OBJECT: &str = "object.relit";
-
 /// What is written beside the figures.
 const FILES: [&str; 8] = [
     "normal.png",
@@ -26,7 +24,7 @@ const FILES: [&str; 8] = [
     "mask.png",
     "light.txt",
     "contact.png",
-    OBJECT,
+    CapturedObject::FILE,
 ];
 
 const RESULTS: ResultFolder = ResultFolder {
@@ -88,7 +86,9 @@ impl TurnFiles<'_> {
         light.write(&path("light.txt"))?;
         let sheet = contact_sheet(turn, solution, (&surface, &light))?;
         write_png(&path("contact.png"), &sheet, Depth::Eight)?;
-        solution.captured_object(turn)?.write(&path(OBJECT))?;
+        solution
+            .captured_object(turn)?
+            .write(&path(CapturedObject::FILE))?;
         let figures = self.figures(&white);
         let text = format!("{figures:#}\n");
         let path = path(FIGURES);

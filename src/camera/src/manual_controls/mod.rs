@@ -170,18 +170,26 @@ impl ManualPlan {
     pub fn new(controls: &[Control], wanted: &ManualValues) -> Self {
         let mut plan = Self::default();
         let mut values = Vec::new();
+        let mut absent = Vec::new();
         for aspect in &ASPECTS {
             let before = plan.missing.len();
             let switched = plan.switch_off(controls, aspect);
             let held = plan.hold(controls, wanted, aspect, &mut values);
             if aspect.is_needed && plan.missing.len() == before && !held {
                 let name = aspect.name;
-                plan.missing.push(if switched {
-                    format!("the camera's {name} can be switched to manual, but not set")
+                if switched {
+                    let what =
+                        format!("the camera's {name} can be switched to manual, but not set");
+                    plan.missing.push(what);
                 } else {
-                    format!("the camera has no control of its {name}")
-                });
+                    absent.push(name);
+                }
             }
+        }
+        if !absent.is_empty() {
+            let names = absent.join(", ");
+            plan.missing
+                .push(format!("the camera has no control for {names}"));
         }
         plan.steps.extend(values);
         plan

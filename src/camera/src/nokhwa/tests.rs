@@ -280,7 +280,7 @@ fn a_number_that_is_no_camera_is_told() {
     let text = with_causes(&error);
     assert!(matches!(error, CameraError::Refused { .. }), "{error:?}");
     assert!(text.contains("nokhwa:4000000"), "{text}");
-    assert!(text.contains("os error 2"), "{text}");
+    assert!(text.contains("No such file"), "{text}");
 }
 
 #[test]

@@ -21,8 +21,8 @@ pub enum CaptureError {
     /// The table.
     #[error(transparent)]
     Turntable(#[from] TurntableError),
-    /// Somebody asked for it.
-    #[error("the capture was stopped")]
+    /// It was stopped on purpose.
+    #[error(transparent)]
     Stopped(#[from] Stopped),
     /// The recording.
     #[error(transparent)]
@@ -71,9 +71,9 @@ impl CaptureError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Stopped {
     /// A person.
-    #[error("somebody asked for it")]
+    #[error("stopped by a person")]
     Person,
     /// The program is to end.
-    #[error("the program was told to end")]
+    #[error("stopped because the program is ending")]
     Shutdown,
 }

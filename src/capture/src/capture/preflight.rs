@@ -27,7 +27,7 @@ pub(super) fn check_disk(root: &Path, expected: u64) -> Result<Check, CaptureErr
     let needed = (expected as f64 * (1.0 + RESERVE)).ceil() as u64;
     if free < needed {
         return Err(CaptureError::Refused(format!(
-            "{} has {} MB free and the take needs {} MB (a fifth in reserve): free some space, or give another --root",
+            "{} has {} MB free, but the take needs {} MB, including a reserve of 20 %: free some space, or give another --root",
             root.display(),
             free / 1_000_000,
             needed.div_ceil(1_000_000)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::error::{CaptureError, Stopped};
 use relit_clock::{Clock, Waitable};
-use relit_turntable::Table;
+use relit_turntable::{Table, TurntableError};
 
 /// A stop that may be asked for at any time, from any thread; clones are the same request.
 #[derive(Debug, Clone)]
@@ -49,15 +49,15 @@ impl StopRequest {
     }
 
     /// The result of something that may have been stopped: that a stop was asked for explains an
-    /// error better than what came of it.
+    /// error better than its consequences do, unless the table did not obey.
     ///
     /// # Errors
     /// [`CaptureError::Stopped`], or the error itself.
     pub fn explain<T>(&self, result: Result<T, CaptureError>) -> Result<T, CaptureError> {
-        match self.asked() {
-            Some(who) if result.is_err() => Err(who.into()),
-            _ => result,
-        }
+        result.map_err(|error| match (self.asked(), &error) {
+            (Some(_), CaptureError::Turntable(TurntableError::NotStopped)) | (None, _) => error,
+            (Some(who), _) => who.into(),
+        })
     }
 
     /// Runs `motion`, and stops the table as soon as somebody asks, so that what waits for the table
@@ -101,6 +101,18 @@ impl Drop for EndAtDrop<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stop_explains_every_error_but_that_of_a_table_that_did_not_obey() {
+        let stop = StopRequest::new(&Clock::monotonic());
+        let fails = |error: TurntableError| stop.explain(Err::<(), _>(error.into())).unwrap_err();
+        let is_stopped = |error| matches!(error, CaptureError::Stopped(Stopped::Person));
+        assert!(!is_stopped(fails(TurntableError::NotHomed)));
+        stop.ask(Stopped::Person);
+        assert!(is_stopped(fails(TurntableError::NotHomed)));
+        assert!(!is_stopped(fails(TurntableError::NotStopped)));
+        assert!(stop.explain(Ok(())).is_ok());
+    }
 
     #[test]
     fn the_end_of_the_program_outranks_a_person() {

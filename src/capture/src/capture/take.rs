@@ -105,7 +105,11 @@ fn run_take(
         // A camera that failed by itself explains the take better than the table that was stopped
         // for it.
         if matches!(recorded.end(), End::Over | End::Stopped) {
-            recorded.interrupted(with_causes(&error));
+            let why = with_causes(&error);
+            recorded.ended_by(match error {
+                CaptureError::Stopped(_) => End::OnPurpose(why),
+                _ => End::Interrupted(why),
+            });
         }
         recorded
             .journal()

@@ -136,8 +136,12 @@ pub(super) fn unwind(
     let unwound = stop.explain(stop.over(table, || finished.unwind()));
     if let Err(error) = &unwound {
         let why = with_causes(error);
-        let fault = format!("the table did not turn back after the take, look at its cable: {why}");
-        context.monitor.fault(clock.now_us(), fault);
+        let what = format!("the table did not turn back after the take, look at its cable: {why}");
+        if matches!(error, CaptureError::Stopped(_)) {
+            context.monitor.update(|state| state.note(what));
+        } else {
+            context.monitor.fault(clock.now_us(), what);
+        }
     }
     unwound
 }

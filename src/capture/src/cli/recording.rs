@@ -217,6 +217,7 @@ mod tests {
                 verdict,
                 frames: 0,
                 dropped: 0,
+                is_stopped: false,
                 reason: None,
             };
             assert_eq!(judgement(&Captured { take, repeated }).1, outcome);

@@ -49,8 +49,11 @@ impl Worker {
     }
 
     fn work(&mut self, job: Job, stop: &StopRequest) {
-        if let Err(error) = self.do_job(job, stop) {
-            self.report(with_causes(&error));
+        match self.do_job(job, stop) {
+            Ok(()) => {}
+            // Whoever stopped it knows: that is no fault.
+            Err(CaptureError::Stopped(who)) => self.note(who.to_string()),
+            Err(error) => self.report(with_causes(&error)),
         }
         self.idle.restart();
         self.dispatcher.finish();
@@ -82,9 +85,18 @@ impl Worker {
         monitor.update(|state| state.session = None);
         let summary = captured?.take;
         if let Some(reason) = summary.reason {
-            self.report(format!("{}: {reason}", summary.session));
+            let what = format!("{}: {reason}", summary.session);
+            if summary.is_stopped {
+                self.note(what);
+            } else {
+                self.report(what);
+            }
         }
         Ok(())
+    }
+
+    fn note(&self, what: String) {
+        self.dispatcher.monitor().update(|state| state.note(what));
     }
 
     fn report(&self, fault: String) {
@@ -105,7 +117,7 @@ impl Worker {
         let clock = self.equipment.clock();
         let (camera, idle) = (&mut self.equipment.camera, &mut self.idle);
         let monitor = self.dispatcher.monitor();
-        stop.over(table, || {
+        let moved = stop.over(table, || {
             clock.scope(|scope| {
                 let moving = scope.spawn("relit-motion", || motion(table));
                 let moving = moving.map_err(CaptureError::system("a thread", "started"))?;
@@ -121,7 +133,8 @@ impl Worker {
                 let moved = moving.join();
                 Ok::<_, CaptureError>(moved.unwrap_or(Err(TurntableError::NotStopped))?)
             })
-        })
+        });
+        stop.explain(moved)
     }
 
     fn set_control(&mut self, name: &str, value: i64) -> Result<(), CaptureError> {

@@ -115,12 +115,7 @@ impl ProcessingQueue {
         if let Some(entry) = self.waiting.remove(at)
             && let Some(&step) = entry.work.steps.first()
         {
-            self.remember(
-                entry,
-                step,
-                ProcessingOutcome::Cancelled,
-                "it was cancelled",
-            );
+            self.remember(entry, step, ProcessingOutcome::Cancelled, "cancelled");
         }
         true
     }
@@ -191,7 +186,7 @@ impl ProcessingQueue {
         // What was done before the cancel arrived is done.
         let stopped = is_cancelled && end.outcome == ProcessingOutcome::Failed;
         let (outcome, what) = if stopped {
-            (ProcessingOutcome::Cancelled, "it was cancelled")
+            (ProcessingOutcome::Cancelled, "cancelled")
         } else {
             (end.outcome, end.what.as_str())
         };

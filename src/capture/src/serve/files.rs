@@ -1,5 +1,5 @@
-//! What was recorded as files: a session's mask, its video, and a session as one tar file that is made while it is
-//! sent. The length is known beforehand, so that a download that broke off shows.
+//! What was recorded as files: a session's mask, its video, its shard, and a session as one tar file that is made while
+//! it is sent. The length is known beforehand, so that a download that broke off shows.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Write};
@@ -36,11 +36,36 @@ pub(super) async fn video(
     Path(id): Path<String>,
 ) -> Result<Response, Failure> {
     let name = attachment(&id, "mkv");
+    let path = move || library.video_file(&id).map(|video| video.path);
+    send_file(&permits, &name, "video/x-matroska", path).await
+}
+
+/// The shard
+///
+/// The session's samples in the data set, for download.
+pub(super) async fn shard(
+    State(library): State<Arc<Library>>,
+    State(permits): State<Arc<Permits>>,
+    Path(id): Path<String>,
+) -> Result<Response, Failure> {
+    // The session itself is saved as `<session>.tar`.
+    let name = attachment(&id, "shard.tar");
+    let path = move || library.shard_file(&id);
+    send_file(&permits, &name, "application/x-tar", path).await
+}
+
+/// Sends the file that `path` finds.
+async fn send_file(
+    permits: &Permits,
+    name: &str,
+    kind: &str,
+    path: impl FnOnce() -> Result<PathBuf, Failure> + Send + 'static,
+) -> Result<Response, Failure> {
     let file = permits.run(Work::Listing, move || {
-        SentFile::from_path(library.video_file(&id)?.path).map_err(unread)
+        SentFile::from_path(path()?).map_err(unread)
     });
     let file = file.await?;
-    send(&permits, &name, "video/x-matroska", file.bytes, move |to| {
+    send(permits, name, kind, file.bytes, move |to| {
         io::copy(&mut file.open()?, to).map(drop)
     })
 }

@@ -14,6 +14,7 @@ use relit_data::naming::is_session_name;
 use relit_data::session::{
     self, FrameIndex, INDEX_FILE, MANIFEST_FILE, MASK_FILE, Manifest, Status, object_of,
 };
+use relit_data::shard::Dataset;
 use relit_web::Failure;
 
 /// Longest note, characters.
@@ -224,6 +225,19 @@ impl Library {
         self.folder(id)?;
         let path = (self.dataset)().join(format!("{id}.html"));
         fs::read(path).map_err(|_| Failure::not_found(format!("{id} is not in the data set")))
+    }
+
+    /// The file with a session's samples in the data set.
+    pub(super) fn shard_file(&self, id: &str) -> Result<PathBuf, Failure> {
+        self.folder(id)?;
+        let folder = (self.dataset)();
+        let dataset = Dataset::read(&folder).ok();
+        let shard = dataset.and_then(|dataset| {
+            let mut shards = dataset.shards_of(id);
+            shards.next().map(|shard| folder.join(&shard.file))
+        });
+        let shard = shard.filter(|path| path.is_file());
+        shard.ok_or_else(|| Failure::not_found(format!("{id} has no shard: extract it first")))
     }
 
     /// Writes note and rating of a session to its manifest.

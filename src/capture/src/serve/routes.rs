@@ -120,6 +120,7 @@ fn of_a_session() -> Router<App> {
         .route(&path("/thumbnail.jpg"), get(sessions::thumbnail))
         .route(&path("/frames/{frame}"), get(sessions::frame))
         .route(&path("/video"), get(files::video))
+        .route(&path("/shard.tar"), get(files::shard))
         .route(&path("/process"), post(processing::process))
         .route(&path("/check.html"), get(processing::check_page))
         .route(&path("/report.html"), get(processing::report_page))

@@ -48,7 +48,7 @@ impl Obstacle {
     /// The obstacle that a table's highest speed is to a turn at the speed that is set, where it is one.
     pub(crate) fn from_speed(set: f64, highest: f64) -> Option<Self> {
         let why = format!(
-            "the table turns at {} degrees/s at most, and {} degrees/s are set: set a lower speed",
+            "the table can turn at up to {} degrees/s, but {} degrees/s is set: set a lower speed",
             rounded(highest),
             rounded(set)
         );
@@ -56,7 +56,7 @@ impl Obstacle {
     }
 
     fn no_camera(why: Option<&str>) -> Self {
-        let none = "there is no camera yet: it is being looked for";
+        let none = "no camera was found yet: the rig keeps looking";
         Self::new("No camera", why.unwrap_or(none))
     }
 
@@ -122,7 +122,7 @@ impl Advice {
         }
         match &state.obstacle_to_take() {
             Some(alarm) if alarm.is_alarm() => Self::against(alarm),
-            _ if state.table.moves() => Self::stopping("The table moves"),
+            _ if state.table.moves() => Self::stopping("The table is moving"),
             Some(other) => Self::against(other),
             None => Self::from_ready(state),
         }
@@ -171,11 +171,16 @@ impl Advice {
     /// What failed still stands on the table: it comes again before anything else.
     fn after_an_abort(take: &TakeSummary) -> Self {
         let object = object_of(&take.session);
+        let how = if take.is_stopped {
+            "stopped"
+        } else {
+            "aborted"
+        };
         Self {
-            headline: format!("The take of {object} was aborted"),
+            headline: format!("The take of {object} was {how}"),
             explanation: take.reason.as_deref().map(capitalised),
             button: AdvisedButton {
-                text: format!("Again: {object}"),
+                text: format!("Record {object} again"),
                 action: Some(AdvisedAction::Again),
                 object: Some(object.to_owned()),
             },
@@ -233,7 +238,7 @@ impl RigState {
                 )
             });
         }
-        let none = "there is no turntable yet: it is being looked for";
+        let none = "no turntable was found yet: the rig keeps looking";
         (self.has_table() && !table.present)
             .then(|| Obstacle::new("No turntable", fault.unwrap_or(none)))
     }
@@ -254,7 +259,7 @@ impl RigState {
         }
         let needed = (self.needed_bytes as f64 * RESERVE).ceil() as u64;
         let why = format!(
-            "{} MB are free and a take needs {} MB (a fifth in reserve): free some space",
+            "{} MB free, but a take needs {} MB, including a reserve of 20 %: free some space",
             self.free_bytes / 1_000_000,
             needed.div_ceil(1_000_000)
         );
@@ -272,7 +277,7 @@ fn doing(phase: Phase) -> &'static str {
         Phase::Idle => "Ready",
         Phase::Preflight => "Checking camera, table and disk",
         Phase::MovingBack => "Moving back for the run-up",
-        Phase::Starting => "Gathering speed",
+        Phase::Starting => "Speeding up",
         Phase::Recording => "Recording",
         Phase::Unwinding => "Turning back",
         Phase::Checking => "Checking the take",

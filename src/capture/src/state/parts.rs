@@ -28,12 +28,12 @@ pub enum Phase {
 impl fmt::Display for Phase {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Idle => "waiting",
+            Self::Idle => "ready",
             Self::Preflight => "checking camera, table and disk",
-            Self::MovingBack => "the table goes back by its ramp",
-            Self::Starting => "the table gathers speed",
+            Self::MovingBack => "the table moves back for the run-up",
+            Self::Starting => "the table speeds up",
             Self::Recording => "recording",
-            Self::Unwinding => "the table goes back to where it began",
+            Self::Unwinding => "the table turns back",
             Self::Checking => "checking the take",
         })
     }
@@ -62,6 +62,8 @@ pub struct TakeSummary {
     pub frames: u64,
     /// Frames missing of the turn.
     pub dropped: u64,
+    /// Whether it ended early because somebody stopped it: that is no fault.
+    pub is_stopped: bool,
     /// Why, in a sentence, where the verdict is not clean.
     pub reason: Option<String>,
 }

@@ -34,7 +34,7 @@ fn figure(record: &FrameRecord, angle: &str, image: &RgbImage) -> Result<String,
     Ok(format!(
         "<figure class=\"{class}\"><img src=\"{uri}\" width=\"{width}\" height=\"{height}\" \
          alt=\"Sample {index} at {angle}, {saturated} saturated\">\
-         <figcaption><b>{angle}</b> <span>{index}</span>{marks}</figcaption></figure>\n",
+         <figcaption><b>{angle}</b> <span>sample {index}</span>{marks}</figcaption></figure>\n",
         uri = data_uri(image)?,
         width = image.width(),
         height = image.height(),

@@ -24,7 +24,7 @@ pub(super) fn document(page: &Page<'_>, turn: &Turn, contact: &str) -> String {
         "{header}{warnings}{contact}{plots}<div class=\"tables\">\n{settings}{facts}</div>\n",
         header = header(page),
         warnings = warnings(page.warnings),
-        contact = contact_sheet(contact),
+        contact = contact_sheet(page, turn, contact),
         plots = plots(page, turn),
         settings = table("Settings", page.settings),
         facts = table("Facts", page.facts),
@@ -92,13 +92,19 @@ fn share(part: usize, whole: usize) -> f64 {
     part as f64 / whole.max(1) as f64
 }
 
-fn contact_sheet(figures: &str) -> String {
+/// The figures below what they show: nobody has to guess what a number means.
+fn contact_sheet(page: &Page<'_>, turn: &Turn, figures: &str) -> String {
     if figures.is_empty() {
         return String::new();
     }
     format!(
-        "<section>\n<h2>Frames over the turn</h2>\n<div class=\"contact\">\n{figures}</div>\n\
-         <p class=\"note\">Angle, sample, and a mark where Spec-Net is on.</p>\n</section>\n"
+        "<section>\n<h2>Contact sheet</h2>\n<p class=\"note\">{shown} of {all} samples, evenly \
+         spread over the turn, without background. Below each: {angle} and number of the sample. A \
+         coloured frame and \u{201c}Spec-Net\u{201d} mark samples with strong highlights.</p>\n\
+         <div class=\"contact\">\n{figures}</div>\n</section>\n",
+        shown = page.thumbnails.len(),
+        all = page.records.len(),
+        angle = turn.angle(),
     )
 }
 

@@ -48,6 +48,15 @@ impl Turn {
         }
     }
 
+    /// What each position is.
+    pub(super) fn angle(&self) -> &'static str {
+        if self.measured {
+            "table angle"
+        } else {
+            "angle by its place in the turn"
+        }
+    }
+
     /// The origin of the positions, as a sentence.
     pub(super) fn origin(&self) -> &'static str {
         if self.measured {

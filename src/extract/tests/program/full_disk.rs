@@ -12,9 +12,9 @@ use relit_test_support::{is_named, trials};
 
 use crate::support::{PROGRAM, SETTINGS, Workshop, files};
 
-/// The system's numbers of its reasons, which stand behind its words.
-const NO_SPACE: &str = "(os error 28)";
-const NOT_PERMITTED: &str = "(os error 13)";
+/// The system's own words.
+const NO_SPACE: &str = "No space left on device";
+const NOT_PERMITTED: &str = "Permission denied";
 
 /// A file system in memory; unmounted when dropped.
 struct SmallDisk {

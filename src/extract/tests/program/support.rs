@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use relit_test_support::ffmpeg;
+use relit_test_support::{ffmpeg, turning};
 use tempfile::TempDir;
 
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_relit-extract");
@@ -21,14 +21,8 @@ impl Workshop {
     pub(crate) fn with(videos: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         for (number, video) in videos.iter().enumerate() {
-            // The pattern moves around a disc, the object, and the light changes.
-            let pattern = format!(
-                "testsrc2=size=96x72:rate=24:duration=1,hue=h={},split[a][b];\
-                 [b]trim=end_frame=1,loop=23:1:0,setpts=N/24/TB,format=yuva444p,\
-                 geq=lum='lum(X,Y)':cb='cb(X,Y)':cr='cr(X,Y)':a='255*lt(hypot(X-50,Y-35),22.5)'[o];\
-                 [a][o]overlay=shortest=1,eq=brightness='0.1*sin(5*t)':eval=frame",
-                40 * number
-            );
+            let object = "lt(hypot(X-50,Y-35),22)";
+            let pattern = turning([96, 72], 24, 24, 40 * number as u32, object);
             let path = folder.path().join(video);
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             let arguments = ["-f", "lavfi", "-i", &pattern, "-pix_fmt", "yuvj422p"];

@@ -4,6 +4,7 @@
     reason = "a test fails by a panic, in its helpers too"
 )]
 
+mod plain;
 mod turn_scene;
 mod turns;
 

@@ -20,6 +20,7 @@ Examples:
   relit-mask clip.mp4 --seeds seeds.png --frame 30 -o masks/mug.png
   relit-mask sessions/ --rect 610,240,420,380 --keep-all
   relit-mask videos/ --auto -o masks/
+  relit-mask photographs/ --auto -o masks/
   relit-mask cup.jpg bowl.jpg --rect 120,40,260,420 -o masks/
   relit-mask check 20261120T093015Z-mug
 
@@ -76,7 +77,8 @@ pub(crate) struct MaskArguments {
     #[arg(long, value_name = "PNG")]
     seeds: Option<PathBuf>,
 
-    /// Find the object by what stands still while the turntable turns; alone or with --rect or --seeds
+    /// Find the object without a hint: in a video by what stands still while the turntable turns, also with --rect or
+    /// --seeds; in a photograph by its plain background
     #[arg(long)]
     auto: bool,
 

@@ -1,7 +1,7 @@
 //! What the page asks for: the recording, its frames, the mask of a sketch, and that it be written.
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use axum::extract::{FromRef, Path, State};
 use axum::http::{StatusCode, header};
@@ -150,7 +150,6 @@ async fn mask(
     let effort = if draft { Effort::Draft } else { Effort::Fine };
     let exact = !draft || app.session.is_small();
     let shown = app.work(move |session| {
-        let began = Instant::now();
         let mask = session.cut(sketch, effort)?;
         Ok(json!({
             "outline": outline(&mask.image),
@@ -159,7 +158,6 @@ async fn mask(
             "warnings": mask.warnings,
             // Whether accepting writes just this mask.
             "exact": exact,
-            "ms": began.elapsed().as_millis() as u64,
         }))
     });
     Ok(Json(shown.await?))

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::super::files::{check_replaceable, make_folder};
 use super::super::making::{cut, write_files};
 use super::super::request::TurnRequest;
-use super::super::sampling::{SampledTurn, read_frame, read_turn};
+use super::super::sampling::{SampledTurn, is_photograph, read_frame, read_turn};
 use super::super::{MaskFiles, MaskRecord, MaskRequest, MaskingError, SourceFrame};
 
 /// JPEG quality of the frames that are shown, 1 to 100.
@@ -81,8 +81,12 @@ impl EditorSession {
             "width": facts.width,
             "height": facts.height,
             "frames": frames,
-            // Whether there are enough frames to look at the turn.
-            "turn": frames >= MIN_TURN_FRAMES,
+            // What shows the object without a hint: enough frames of a turn, or a photograph's plain background.
+            "auto": if frames >= MIN_TURN_FRAMES {
+                Some("turn")
+            } else {
+                is_photograph(&self.video).then_some("background")
+            },
             // Whether painted seeds apply besides what is drawn.
             "seeds": hints.seeds.is_some(),
             "output": self.files.mask.display().to_string(),
@@ -109,12 +113,9 @@ impl EditorSession {
     pub(super) fn cut(&self, sketch: Sketch, effort: Effort) -> Result<Mask, MaskingError> {
         let frame = self.frame(sketch.frame)?;
         let turn = self.turn(&sketch)?;
-        cut(
-            &frame.picture,
-            turn.as_deref(),
-            &self.request_of(sketch),
-            effort,
-        )
+        let request = self.request_of(sketch);
+        let (mask, _) = cut(&frame.picture, turn.as_deref(), &request, effort)?;
+        Ok(mask)
     }
 
     /// Makes the mask of a sketch and writes its files.
@@ -122,7 +123,7 @@ impl EditorSession {
         let frame = self.frame(sketch.frame)?;
         let turn = self.turn(&sketch)?;
         let request = self.request_of(sketch);
-        let mask = cut(&frame.picture, turn.as_deref(), &request, Effort::Fine)?;
+        let (mask, request) = cut(&frame.picture, turn.as_deref(), &request, Effort::Fine)?;
         let _made = make_folder(&self.files)?;
         // Somebody may have painted one meanwhile.
         check_replaceable(&self.files, request.force)?;

@@ -29,7 +29,11 @@ fn grey(bytes: &[u8]) -> GrayImage {
 fn check_engine(engine: &str, folder: &Path, input: &str, hints: &[&str], truth: &GrayImage) {
     let output = relit_mask(
         folder,
-        &[&[input, "--engine", engine, "-o", "a.png"], hints].concat(),
+        &[
+            &[input, "--engine", engine, "-o", "a.png", "--force"],
+            hints,
+        ]
+        .concat(),
     );
     assert_eq!(code(&output), 0, "{}", said(&output));
     let share = iou(&grey(&read(folder, "a.png")), truth);
@@ -40,7 +44,8 @@ fn check_engine(engine: &str, folder: &Path, input: &str, hints: &[&str], truth:
         record["software"].get("opencv").is_some(),
         engine == "opencv"
     );
-    let output = relit_mask(folder, &[input, "--recipe", "a.json", "-o", "b.png"]);
+    let arguments = [input, "--recipe", "a.json", "-o", "b.png", "--force"];
+    let output = relit_mask(folder, &arguments);
     assert_eq!(code(&output), 0, "{}", said(&output));
     assert!(
         read(folder, "a.png") == read(folder, "b.png"),

@@ -203,3 +203,88 @@ fn a_photograph_in_a_format_that_is_not_read_is_named() {
         );
     }
 }
+
+/// The same object before squares.
+fn cluttered() -> RgbImage {
+    let mut picture = displayed();
+    for (x, y, pixel) in picture.enumerate_pixels_mut() {
+        if pixel.0[0] < 200 && (x / 10 + y / 10) % 2 == 0 {
+            *pixel = Rgb([180, 200, 90]);
+        }
+    }
+    picture
+}
+
+fn is_disc(mask: &[u8]) -> bool {
+    let mask = image::load_from_memory(mask).unwrap().into_luma8();
+    let wrong = mask.enumerate_pixels().filter(|(x, y, pixel)| {
+        let in_disc = (f64::from(*x) - 35.0).hypot(f64::from(*y) - 30.0) < 16.0;
+        in_disc != (pixel.0[0] >= 128)
+    });
+    wrong.count() < 20
+}
+
+#[test]
+fn the_object_of_a_photograph_is_found_by_its_plain_background_and_by_its_recipe_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    displayed().save(folder.join("cup.png")).unwrap();
+    let done = relit_mask(folder, &["cup.png", "--auto", "-o", "mask.png"]);
+    assert_eq!(code(&done), 0, "{}", said(&done));
+    assert!(is_disc(&read(folder, "mask.png")));
+    let done = relit_mask(
+        folder,
+        &["cup.png", "--recipe", "mask.json", "-o", "again.png"],
+    );
+    assert_eq!(code(&done), 0, "{}", said(&done));
+    assert_eq!(read(folder, "mask.png"), read(folder, "again.png"));
+}
+
+#[test]
+fn a_photograph_whose_background_is_not_plain_gets_a_mask_only_by_a_rectangle() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    cluttered().save(folder.join("cup.png")).unwrap();
+    let done = relit_mask(folder, &["cup.png", "--auto", "-o", "mask.png"]);
+    assert_eq!(code(&done), 1, "{}", said(&done));
+    assert!(!folder.join("mask.png").exists());
+    let arguments = [
+        "cup.png",
+        "--auto",
+        "--rect",
+        "12,8,46,44",
+        "-o",
+        "mask.png",
+    ];
+    let done = relit_mask(folder, &arguments);
+    assert_eq!(code(&done), 0, "{}", said(&done));
+    assert!(folder.join("mask.png").exists());
+}
+
+#[test]
+fn in_a_folder_photographs_without_a_plain_background_are_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::create_dir(folder.join("photographs")).unwrap();
+    displayed()
+        .save(folder.join("photographs/cup.png"))
+        .unwrap();
+    cluttered()
+        .save(folder.join("photographs/desk.png"))
+        .unwrap();
+    let done = relit_mask(folder, &["photographs", "--auto", "-o", "masks/", "--json"]);
+    assert_eq!(code(&done), 3, "{}", said(&done));
+    assert!(is_disc(&read(folder, "masks/cup.png")));
+    assert!(!folder.join("masks/desk.png").exists());
+    let lines = String::from_utf8_lossy(&done.stdout).into_owned();
+    let events: Vec<Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let failed: Vec<&str> = events
+        .iter()
+        .filter(|event| event["event"] == "error")
+        .filter_map(|event| event["session"].as_str())
+        .collect();
+    assert_eq!(failed, ["desk"]);
+}

@@ -21,14 +21,14 @@ Examples:
       two objects, from back to front, in a panorama; their masks are masks/bear.png and masks/cup.png
   relight insert cup.jpg --mask cup-mask.png --into room.jpg --lamp 60,30 -o out.exr
       in the light of a lamp
-  relight insert object.relit --into room.hdr -o out.png
-      an object that relight turn has written (object.relit)
+  relight insert mug --into room.hdr -o out.png
+      an object that relight turn has captured: its folder, or mug/object.relit
   relight insert --scene scene.toml -o out.png
       all of it from a file (docs/relight-insert.md)";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs of the objects, from back to front, or captured objects (.relit).
+    /// Photographs of the objects, from back to front, or captured objects (object.relit, or the folder of relight turn).
     #[arg(value_name = "PHOTO", required_unless_present = "scene")]
     photos: Vec<PathBuf>,
     /// A scene, which describes background, light and objects in full, in place of the options below.

@@ -25,8 +25,8 @@ pub(super) enum Map {
 
 #[derive(Args)]
 pub(super) struct ObjectArguments {
-    /// A captured object, which relight turn has written (object.relit), in place of maps.
-    #[arg(value_name = "OBJECT.relit", help_heading = None::<&'static str>, conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
+    /// A captured object in place of maps: object.relit, or the folder of relight turn.
+    #[arg(value_name = "OBJECT", help_heading = None::<&'static str>, conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
     object: Option<PathBuf>,
     /// Normals: PNG of 8 or 16 bits, colours (n + 1) / 2, black outside; or EXR of vectors. x right, z to the viewer.
     #[arg(long, value_name = "FILE", required_unless_present = "object")]
@@ -74,7 +74,9 @@ impl ObjectArguments {
 
     fn read_normals(&self) -> Result<Normals<YUp>, Box<dyn Error>> {
         let Some(path) = &self.normals else {
-            return Err("give an object (.relit), or --normals".into());
+            return Err(
+                "give an object (object.relit, or the folder of relight turn), or --normals".into(),
+            );
         };
         let normals = match self.normals_frame.or_up() {
             NormalsFrame::YUp => Normals::<YUp>::read(path)?,

@@ -49,12 +49,12 @@ pub(crate) struct Arguments {
     #[arg(
         long,
         value_name = "X,Y,R[,grey|chrome]",
-        requires = "session",
         conflicts_with = "light",
         help_heading = "Light"
     )]
     light_ball: Option<LightBall>,
-    /// With --light-ball: the session from which the shard was made, or its video. Needs the program ffmpeg.
+    /// With --light-ball: the session from which the shard was made, or its video [default: what dataset.json names, beside
+    /// the data set]. Needs the program ffmpeg.
     #[arg(
         long,
         value_name = "PATH",
@@ -79,14 +79,14 @@ struct LightBall {
 impl Arguments {
     /// What is known of the turn beforehand.
     pub(super) fn options(&self) -> Result<TurnOptions<'_>, Box<dyn Error>> {
-        let light = match (&self.light, &self.session, self.light_ball) {
-            (Some(path), ..) => TurnLight::Given(read_given_light(path)?),
-            (None, Some(session), Some(ball)) => TurnLight::Ball {
-                session,
+        let light = match (&self.light, self.light_ball) {
+            (Some(path), _) => TurnLight::Given(read_given_light(path)?),
+            (None, Some(ball)) => TurnLight::Ball {
+                session: self.session.as_deref(),
                 place: ball.place,
                 ball: ball.kind,
             },
-            _ => TurnLight::Unknown,
+            (None, None) => TurnLight::Unknown,
         };
         Ok(TurnOptions {
             rotation: self.rotation,

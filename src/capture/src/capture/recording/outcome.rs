@@ -18,9 +18,12 @@ pub enum End {
     /// Camera or disk failed.
     #[error("{0}")]
     Failed(String),
-    /// Something other than the recorder ended the take, such as the table or a person.
+    /// Something other than the recorder ended the take, such as the table.
     #[error("{0}")]
     Interrupted(String),
+    /// Somebody ended the take on purpose, which is not a fault.
+    #[error("{0}")]
+    OnPurpose(String),
 }
 
 /// What the camera's thread leaves.

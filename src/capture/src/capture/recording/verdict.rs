@@ -32,10 +32,10 @@ impl Recorded {
         &self.camera.end
     }
 
-    /// Notes that something other than the recorder ended the take, which is unusable then, for
-    /// this reason.
-    pub fn interrupted(&mut self, reason: String) {
-        self.camera.end = End::Interrupted(reason);
+    /// Notes that something other than the recorder ended the take, which is unusable then:
+    /// [`End::Interrupted`] or [`End::OnPurpose`].
+    pub fn ended_by(&mut self, end: End) {
+        self.camera.end = end;
     }
 
     /// How much the light on what stands in the middle of the picture changes over the turn, as
@@ -79,6 +79,7 @@ impl Recorded {
             (None, None) => (Verdict::Clean, None),
         };
         faults.splice(0..0, self.lead_note());
+        let is_stopped = self.is_stopped();
         let (frames, count) = (self.recorded(), &self.camera.count);
         let (mut session, delivered) = (self.writer.session, self.writer.delivered);
         session.amend(|entry| amended(entry, count, &delivered, angle))?;
@@ -92,6 +93,7 @@ impl Recorded {
             verdict,
             frames,
             dropped: lost(&findings),
+            is_stopped,
             reason,
         })
     }
@@ -150,9 +152,14 @@ impl Recorded {
         let whole = *expected > 0 && last.is_none_or(|end| end < *expected);
         match self.camera.end {
             End::Over => false,
-            End::Interrupted(_) => true,
+            End::Interrupted(_) | End::OnPurpose(_) => true,
             _ => !whole,
         }
+    }
+
+    /// Whether nothing but a stop on purpose keeps the take from being whole.
+    fn is_stopped(&self) -> bool {
+        self.writer.failure.is_none() && matches!(self.camera.end, End::OnPurpose(_))
     }
 
     /// Why the take cannot be used; `None` where it can.
@@ -164,7 +171,7 @@ impl Recorded {
             let end = with_causes(&self.camera.end);
             return Some(match self.camera.count.expected {
                 0 => format!("{end}; the turn had not begun"),
-                all => format!("{end}; {} of {all} frames are there", self.recorded()),
+                all => format!("{end}; {} of {all} frames are kept", self.recorded()),
             });
         }
         let decisive = findings.iter().find(|finding| {

@@ -19,7 +19,7 @@ export async function request(path, { wait = 10_000, ...options } = {}) {
   try {
     response = await fetch(path, { ...options, signal: AbortSignal.timeout(wait) });
   } catch {
-    throw new Problem(0, "The rig does not answer. Is it on, and is this phone in its network?");
+    throw new Problem(0, "The rig does not answer. Is it on, and is this phone on the same network?");
   }
   if (response.ok) return response;
   const problem = await response.json().catch(() => ({}));

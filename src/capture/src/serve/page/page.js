@@ -3,14 +3,16 @@
 import { follow, give } from "./link.js";
 import { startPreview } from "./preview.js";
 import { make } from "./elements.js";
-import { showProcessing, startProcessing } from "./process.js";
-import { listSessions, openSession, refreshStages, sessionChanged } from "./sessions.js";
+import { shardOf, showProcessing, standing, startProcessing } from "./process.js";
+import { listedSession, listSessions, openSession, refreshStages, sessionChanged } from "./sessions.js";
 
 const $ = (id) => document.getElementById(id);
 
 /** Longest name of an object, bytes. */
 const LONGEST_NAME = 80;
-const VERDICTS = { clean: "clean", tolerated: "kept, with dropped frames", aborted: "aborted" };
+/** How a take came out, in words and as a class. */
+const VERDICTS = { clean: ["clean", "good"], tolerated: ["usable, with dropped frames", "warn"], aborted: ["aborted", "bad"] };
+const STOPPED = ["stopped", ""];
 /** Controls that can be set here, and by how much a step moves them. */
 const STEPS = [
   [/auto|dynamic|priority/, null],
@@ -22,7 +24,7 @@ const STEPS = [
 let state = null;
 let seenFault = -Infinity;
 
-/** Gives a command; what the rig has against it is shown. */
+/** Gives a command; why the rig refuses it is shown. */
 async function order(command) {
   try {
     show(await give(command));
@@ -56,7 +58,8 @@ function show(next) {
   const finished = before && JSON.stringify(before.last_take) !== JSON.stringify(state.last_take);
   const folder = Boolean(before?.disk_fault) !== Boolean(state.disk_fault);
   if (!before || finished || folder || before.session !== state.session) refresh();
-  if (before && finished) signal(state.last_take.verdict === "clean");
+  // Whoever stopped a take knows that it has ended.
+  if (before && finished && !state.last_take.is_stopped) signal(state.last_take.verdict === "clean");
   showSettings();
   showLog();
   const jobs = JSON.stringify(before?.processing.jobs.map(({ number, step, status }) => [number, step, status]));
@@ -64,6 +67,7 @@ function show(next) {
     refresh();
     sessionChanged(ended.map(({ session }) => session));
   });
+  showLast();
   if (before && jobs !== JSON.stringify(state.processing.jobs.map(({ number, step, status }) => [number, step, status]))) refreshStages();
 }
 
@@ -115,24 +119,47 @@ function showTake() {
   const angle = table.angle_deg;
   $("hand").setAttribute("transform", `rotate(${angle ?? 0} 50 50)`);
   $("ring-text").textContent = phase === "recording" ? `${Math.floor(part * 100)} %` : angle === null ? "" : `${angle.toFixed(0)}°`;
-  const counts = busy ? [make("span", { text: `${frames} / ${wanted} · ` }), make("span", { text: `${dropped} dropped`, className: dropped > 0 ? "bad" : "" })] : [];
+  const counts = busy ? [make("span", { text: `${frames} of ${wanted} frames · ` }), make("span", { text: `${dropped} dropped`, className: dropped > 0 ? "bad" : "" })] : [];
   $("counts").replaceChildren(...counts);
+}
+
+/** The object's name follows the time in a session's name. */
+const objectOf = (session) => session.replace(/^\d{8}T\d{6}Z-/, "");
+
+/** The last take: a tap opens it. */
+function showLast() {
   const take = state.last_take;
   $("last").hidden = !take || alarmed();
-  // Where the big button captures it again, there is no second one.
+  // Where the big button records it again, there is no second one.
   $("again").hidden = take?.verdict !== "tolerated" || state.advice.button.action !== "start";
   if (!take) return;
-  const words = make("b", { text: VERDICTS[take.verdict] ?? take.verdict, className: take.verdict === "clean" ? "good" : "bad" });
-  const rest = `: ${take.frames} frames, ${take.dropped} dropped, ${take.session}.${take.reason ? ` ${take.reason}` : ""}`;
-  $("last-text").replaceChildren(words, rest);
+  const session = listedSession(take.session);
+  $("last-shard").hidden = !session?.results?.extraction;
+  $("last-shard").href = shardOf(take.session);
+  const [verdict, className] = take.is_stopped ? STOPPED : VERDICTS[take.verdict];
+  const [stage, stageClass] = session ? standing(session) : ["", ""];
+  // A part that is replaced while a finger is on it swallows the tap.
+  const key = JSON.stringify([take, stage]);
+  if ($("last-open").dataset.key === key) return;
+  $("last-open").dataset.key = key;
+  $("last-open").replaceChildren(
+    make("b", { text: objectOf(take.session) }),
+    make("small", {}, make("span", { text: verdict, className }), make("span", { text: ` · ${take.frames} frames · ${take.dropped} dropped` })),
+    make("small", { className: "reason", text: take.reason ?? "" }),
+    make("small", { className: `standing ${stageClass}`, text: stage }),
+  );
+}
+
+/** The typed name as sessions can have it: whatever else stands between letters and digits becomes a dash. */
+function nameOf(typed) {
+  const dashed = typed.normalize("NFC").replace(/-*[^\p{Alphabetic}\p{N}\-_.][^\p{Alphabetic}\p{N}_.]*/gu, "-");
+  return dashed.replace(/^[-.]+|[-.]+$/g, "");
 }
 
 /** Why an object cannot have this name, by the rule of the server; "" where it can. */
-function wrongName(object) {
-  if (object.startsWith(".")) return "A name does not begin with a dot.";
-  if (!/^[\p{Alphabetic}\p{N}\-_.]*$/u.test(object)) return "A name has letters, digits, “-”, “_” and “.”, and no spaces.";
-  if (new TextEncoder().encode(object).length > LONGEST_NAME) return "This name is too long.";
-  return "";
+function wrongName(name, typed) {
+  if (typed && !name) return "A name needs a letter or a digit.";
+  return new TextEncoder().encode(name).length > LONGEST_NAME ? "This name is too long." : "";
 }
 
 /** The commands behind the advised actions; `start` needs a name. */
@@ -146,18 +173,22 @@ const ACTIONS = {
 function action() {
   if (!state) return { text: "Start" };
   const { text, action, object } = state.advice.button;
-  const typed = $("object").value.trim();
-  const names = action === "start" || (action === "again" && typed && typed !== object);
+  const name = nameOf($("object").value);
+  const names = action === "start" || (action === "again" && name && name !== object);
   if (names) {
-    if (!typed) return { text: "Name the object" };
-    if (wrongName(typed)) return { text: "Another name, please" };
-    return { text: `Start ${typed}`, command: { command: "start", object: typed } };
+    if (!name) return { text: "Name the object", asks: true };
+    if (wrongName(name)) return { text: "Shorten the name", asks: true };
+    return { text: `Start ${name}`, command: { command: "start", object: name } };
   }
   return { text, stop: action === "stop", command: ACTIONS[action]?.(object) };
 }
 
 function showName() {
-  const why = wrongName($("object").value.trim());
+  const typed = $("object").value.trim();
+  const name = nameOf(typed);
+  const why = wrongName(name, typed);
+  $("saved-as").textContent = `Saved as ${name}`;
+  $("saved-as").hidden = name === typed || Boolean(why);
   $("wrong-name").textContent = why;
   $("wrong-name").hidden = !why;
   $("object").setAttribute("aria-invalid", Boolean(why));
@@ -165,10 +196,17 @@ function showName() {
 
 function showGo() {
   showName();
-  const { text, stop, command } = action();
+  const { text, stop, asks, command } = action();
   $("go").textContent = text;
-  $("go").disabled = !command || document.body.className !== "";
+  $("go").disabled = !(command || asks) || document.body.className !== "";
   $("go").classList.toggle("stop", Boolean(stop));
+  $("go").classList.toggle("asks", Boolean(asks));
+}
+
+/** The button that cannot start for want of a name leads to the field. */
+function askName() {
+  $("object").focus({ preventScroll: true });
+  $("object").scrollIntoView({ block: "center" });
 }
 
 function showFaults() {
@@ -199,8 +237,8 @@ function showTable() {
 function showCamera() {
   const { present, name, mode, fps, controls, clipped, focus, fault } = state.camera;
   $("camera").textContent = present ? [name, mode].filter(Boolean).join(" · ") : "No camera";
-  $("focus").textContent = focus === null ? "" : `focus ${focus.toFixed(0)}`;
-  $("clipped").textContent = clipped === null ? "" : `clipped ${(clipped * 100).toFixed(clipped < 0.1 ? 2 : 0)} %`;
+  $("focus").textContent = focus === null ? "" : `sharpness ${focus.toFixed(0)}`;
+  $("clipped").textContent = clipped === null ? "" : `overexposed ${(clipped * 100).toFixed(clipped < 0.1 ? 1 : 0)} %`;
   $("clipped").className = clipped > 0.005 ? "bad" : "";
   $("fps").textContent = fps === null ? "" : `${fps.toFixed(1)} frames/s`;
   warn("camera-fault", fault);
@@ -247,9 +285,15 @@ function showDisk() {
 
 function showSettings() {
   const { settings } = state;
-  $("devices").textContent = [settings.camera, settings.turntable, settings.root].filter(Boolean).join(" · ");
+  $("devices").textContent = [`Camera ${settings.camera}`, `turntable ${settings.turntable}`, `sessions in ${settings.root}`].join(" · ");
   const { size, fps, degrees_per_second: speed, max_dropped: dropped, retries } = settings;
-  $("settings").textContent = `${size?.join(" × ") ?? "largest frames"} · ${fps} frames/s · ${speed}°/s · ${dropped} frames may be missing · a bad take is repeated ${retries} times`;
+  $("settings").textContent = [
+    size?.join(" × ") ?? "largest frame size",
+    `${fps} frames/s`,
+    `${speed}°/s`,
+    `${dropped || "no"} dropped frames allowed`,
+    `${retries || "no"} ${retries === 1 ? "retry" : "retries"} after a failed take`,
+  ].join(" · ");
 }
 
 function showLog() {
@@ -282,6 +326,7 @@ async function refresh() {
   try {
     const names = await listSessions();
     $("objects").replaceChildren(...names.map((value) => make("option", { value })));
+    if (state) showLast();
     sayOfList("");
   } catch (problem) {
     // The folder may have gone while the list was on its way.
@@ -295,19 +340,23 @@ function link(word, className) {
 }
 
 $("object").addEventListener("input", showGo);
+$("object").addEventListener("change", () => {
+  $("object").value = nameOf($("object").value) || $("object").value;
+  showGo();
+});
 $("object-form").addEventListener("submit", (event) => {
   event.preventDefault();
   $("object").blur();
 });
 $("go").addEventListener("click", () => {
-  const { command } = action();
+  const { asks, command } = action();
+  if (asks) return askName();
   if (command) order(command);
 });
+$("last-open").addEventListener("click", () => openSession(state.last_take.session).catch((problem) => say(problem.message)));
 $("home").addEventListener("click", () => order({ command: "home" }));
 $("again").addEventListener("click", () => {
-  // The object is what follows the time in a session's name.
-  const object = state.last_take.session.replace(/^\d{8}T\d{6}Z-/, "");
-  order({ command: "start", object });
+  order({ command: "start", object: objectOf(state.last_take.session) });
 });
 document.addEventListener("pointerdown", unmute);
 document.addEventListener("sessions-changed", refresh);

@@ -7,8 +7,9 @@ const $ = (id) => document.getElementById(id);
 const path = (id) => `/api/v1/sessions/${encodeURIComponent(id)}`;
 const STEPS = { mask: "Making the mask", check: "Checking the mask", extract: "Extracting" };
 const DONE = { mask: "Mask", check: "Check", extract: "Extraction" };
-const ORIGINS = { turn: "made by the turn", hints: "drawn by hand", hand: "from another program" };
-const STATUS = { waiting: "waits", running: "", held: "held until the rig rests", ending: "ends" };
+const ORIGINS = { turn: "automatic", hints: "drawn by hand", hand: "from another program" };
+const CHECKS = { fits: "the mask fits", wrong: "the mask is wrong", unknown: "not certain" };
+const STATUS = { waiting: "waiting", running: "", held: "paused while the rig is busy", ending: "stopping" };
 
 let processing = null;
 /** The session in the player, as the server described it last. */
@@ -30,19 +31,22 @@ async function order(method, where, body) {
   }
 }
 
+/** The address of a session's samples in the data set. */
+export const shardOf = (id) => `${path(id)}/shard.tar`;
+
 export const isMissing = (step) => !processing || !(step === "extract" ? processing.has_extract_program : processing.has_mask_program);
 const jobOf = (id) => processing?.jobs.find(({ session }) => session === id);
 
 /** How a session stands, in words and with a class: for the list and its days. */
 export function standing({ results, id }) {
   const job = jobOf(id);
-  if (job) return [job.status === "waiting" ? "waits for its turn" : `${STEPS[job.step].toLowerCase()}…`, "busy"];
+  if (job) return [job.status === "waiting" ? "waiting for other sessions" : `${STEPS[job.step].toLowerCase()}…`, "busy"];
   if (!results) return ["", ""];
   const { stage, is_doubtful: doubtful } = results;
-  if (doubtful === null) return [stage, ""];
-  if (stage === "masked") return [doubtful ? "masked: look at it" : "masked", doubtful ? "warn" : ""];
-  if (stage === "checked") return [doubtful ? "checked: doubtful" : "checked: fits", doubtful ? "warn" : ""];
-  return [doubtful ? "extracted: doubtful" : "extracted: good", doubtful ? "warn" : "good"];
+  if (doubtful === null) return ["no mask yet", ""];
+  if (stage === "masked") return [doubtful ? "masked: please check the mask" : "masked", doubtful ? "warn" : ""];
+  if (stage === "checked") return [doubtful ? "checked: the mask may be wrong" : "checked: the mask fits", doubtful ? "warn" : ""];
+  return [doubtful ? "extracted: please look at the report" : "extracted: good", doubtful ? "warn" : "good"];
 }
 
 /** Shows the steps of a session; `say` tells what went wrong. */
@@ -50,15 +54,17 @@ export function showSteps(detail, say) {
   [shown, tell] = [detail, say];
   const { mask, check, extraction } = detail.results;
   step("mask", mask ? ORIGINS[mask.origin] : "none yet", mask ? (mask.warnings.length ? "warn" : "good") : "", mask?.warnings);
-  const old = "of an earlier mask";
+  const old = "outdated: the mask has changed since";
   if (!check) step("check", "not checked", "");
   else if (!check.is_current) step("check", old, "warn");
-  else step("check", check.verdict, check.verdict === "fits" ? "good" : "warn", check.reasons);
+  else step("check", CHECKS[check.verdict] ?? check.verdict, check.verdict === "fits" ? "good" : "warn", check.reasons);
   if (!extraction) step("extract", "not extracted", "");
   else if (!extraction.is_current) step("extract", old, "warn");
   else step("extract", `${extraction.samples} samples, ${extraction.verdict}`, extraction.verdict === "good" && !extraction.is_lossy ? "good" : "warn", extraction.reasons);
   $("check-page").hidden = !check;
   $("check-page").href = `${path(detail.id)}/check.html`;
+  $("player-shard").hidden = !extraction;
+  $("player-shard").href = shardOf(detail.id);
   $("report-page").hidden = !extraction;
   $("report-page").href = `${path(detail.id)}/report.html`;
   showJob();
@@ -70,7 +76,7 @@ function step(name, words, className, reasons = []) {
   $(`${name}-why`).replaceChildren(...reasons.slice(0, 4).map((text) => make("li", { text })));
 }
 
-/** The mask by the turn is made at once, unless that was tried before. */
+/** The automatic mask is made at once, unless that was tried before. */
 function begin() {
   const { id, status, results } = shown;
   const tried = processing?.finished.some(({ session }) => session === id);
@@ -94,14 +100,17 @@ function showJob() {
     $("job-cancel").onclick = () => order("DELETE", `/api/v1/processing/jobs/${job.number}`);
   }
   const last = processing?.finished.findLast(({ session }) => session === id);
-  const bad = !job && last && (last.outcome === "failed" || last.outcome === "cancelled");
-  $("job-failed").hidden = !bad;
-  $("job-failed").textContent = bad ? `${DONE[last.step]}: ${last.what}` : "";
+  const ends = { failed: "bad", cancelled: "quiet" };
+  const className = job ? undefined : ends[last?.outcome];
+  $("job-failed").hidden = !className;
+  Object.assign($("job-failed"), { className: className ?? "", textContent: className ? `${DONE[last.step]}: ${last.what}` : "" });
   const ended = status === "complete" || status === "aborted";
   const idle = ended && !job;
   const [canMask, canExtract] = [idle && !isMissing("mask"), idle && !isMissing("extract")];
   for (const [button, on] of [["make-mask", canMask], ["edit-mask", canMask], ["make-check", canMask && results.mask], ["make-extract", canExtract && results.mask]]) $(button).disabled = !on;
-  $("make-mask").textContent = results.mask ? "Anew" : "By the turn";
+  $("make-mask").textContent = results.mask ? "Make again" : "Make";
+  $("make-check").textContent = results.check ? "Check again" : "Check";
+  $("make-extract").textContent = results.extraction ? "Extract again" : "Extract";
   const finished = results.stage === "extracted";
   $("make-all").hidden = finished || !canMask || !canExtract;
 }
@@ -134,7 +143,7 @@ function showSettings() {
   $("dataset-folder").textContent = folder;
   const missing = [isMissing("mask") && "relit-mask", isMissing("extract") && "relit-extract"].filter(Boolean);
   $("missing").hidden = missing.length === 0;
-  $("missing").textContent = `${missing.join(" and ")} ${missing.length > 1 ? "are" : "is"} not installed on the rig’s computer. Install the package relit there, or take the sessions to another computer.`;
+  $("missing").textContent = `${missing.join(" and ")} ${missing.length > 1 ? "are" : "is"} not installed on the rig’s computer. Install the package relit there, or process the sessions on another computer.`;
 }
 
 function showQueue() {
@@ -152,7 +161,7 @@ function showQueue() {
 /** Forgets the session: the player is closed, and what it opens with next is not known yet. */
 export function hideSteps() {
   shown = null;
-  for (const part of ["job", "job-failed", "make-all", "check-page", "report-page"]) $(part).hidden = true;
+  for (const part of ["job", "job-failed", "make-all", "check-page", "report-page", "player-shard"]) $(part).hidden = true;
   for (const button of ["make-mask", "edit-mask", "make-check", "make-extract"]) $(button).disabled = true;
   for (const name of ["mask", "check", "extract"]) step(name, "…", "");
 }

@@ -14,10 +14,11 @@ const path = (id) => `/api/v1/sessions/${encodeURIComponent(id)}`;
 /** A session's verdict in words, and its class. */
 function verdict(session) {
   const dropped = session.dropped ?? 0;
-  if (session.status === "recording") return ["being recorded", ""];
+  if (session.status === "recording") return ["recording", ""];
   if (session.status === "unreadable") return ["unreadable", "bad"];
-  if (session.status === "aborted") return ["aborted", "bad"];
-  return dropped > 0 ? [`${dropped} dropped`, "bad"] : ["clean", "good"];
+  // What ended a take early is past: only its data is incomplete.
+  if (session.status === "aborted") return ["aborted", "warn"];
+  return dropped > 0 ? [`${dropped} frames dropped`, "warn"] : ["clean", "good"];
 }
 
 function facts(session) {
@@ -44,6 +45,7 @@ function entry(session) {
     make("b", { text: session.object }),
     make("small", { text: when(session) }),
     make("small", {}, make("span", { text: words, className }), make("span", { text: facts(session) && ` · ${facts(session)}` })),
+    make("small", { className: "reason", text: session.reason ?? "" }),
     make("small", { className: `standing ${stageClass}`, text: stage }),
   );
   const button = make("button", { type: "button", disabled: !ended }, image, text);
@@ -79,7 +81,10 @@ function grouped() {
   return [...days];
 }
 
-/** Fills the list anew, or with `before` goes on with older ones; gives the names of the objects in it. */
+/** The session of this name, where the list has it. */
+export const listedSession = (id) => listed.find((session) => session.id === id);
+
+/** Fills the list again, or with `before` continues with older sessions; gives the names of the objects in it. */
 export async function listSessions(before) {
   const query = before ? `&before=${encodeURIComponent(before)}` : "";
   const sessions = await ask(`/api/v1/sessions?limit=${PART}${query}`);

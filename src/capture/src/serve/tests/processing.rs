@@ -7,6 +7,9 @@ use std::path::Path;
 use std::sync::{Arc, mpsc};
 use std::thread;
 
+use relit_data::shard::{
+    Align, Dataset, Digest, ExtractionSettings, ImageSize, Layout, ShardEntry,
+};
 use serde_json::{Value, json};
 
 use super::{Fake, Serving, wait_until};
@@ -340,6 +343,7 @@ fn a_usable_take_is_processed_by_itself_where_that_is_set_and_another_is_not() {
                 verdict,
                 frames: 1500,
                 dropped: 0,
+                is_stopped: false,
                 reason: None,
             });
         });
@@ -379,6 +383,55 @@ fn the_page_about_a_session_in_the_data_set_runs_no_scripts() {
     assert_eq!(report.body, b"<p>fine");
     let policy = report.header("content-security-policy").unwrap();
     assert!(policy.contains("sandbox") && policy.contains("default-src 'none'"));
+}
+
+/// The description of a data set that has these samples of a session.
+fn describe(session: &str, samples: &[u8]) -> Dataset {
+    let mut dataset = Dataset::new(ExtractionSettings {
+        frames: 1500,
+        size: ImageSize::Pixels(256),
+        margin: 0.05,
+        saturation_level: 250,
+        gate: 0.05,
+        align: Align::Off,
+        align_tolerance: None,
+        layout: Layout::Webdataset,
+        scaling: "area".to_owned(),
+    });
+    dataset.shards.push(ShardEntry {
+        file: format!("{session}.tar"),
+        session: session.to_owned(),
+        samples: 1,
+        bytes: samples.len() as u64,
+        blake3: Digest::hash(samples),
+        mask: None,
+        mean_img: None,
+    });
+    dataset
+}
+
+#[test]
+fn the_shard_of_a_session_is_served_for_download_once_it_is_extracted() {
+    let folder = tempfile::tempdir().unwrap();
+    let serving = serving(folder.path(), ALL_WELL);
+    let shard = |session: &str| serving.get(&format!("/api/v1/sessions/{session}/shard.tar"));
+    assert_eq!(shard(COW).status, 404);
+    let dataset = state(&serving)["dataset_folder"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    let dataset = Path::new(&dataset);
+    fs::create_dir_all(dataset).unwrap();
+    describe(COW, b"samples").write(dataset).unwrap();
+    assert_eq!(shard(COW).status, 404, "it is described, and not there");
+    fs::write(dataset.join(format!("{COW}.tar")), b"samples").unwrap();
+    let answer = shard(COW);
+    assert_eq!((answer.status, &*answer.body), (200, &b"samples"[..]));
+    assert_eq!(answer.header("content-length"), Some("7"));
+    // The session itself has the shorter name.
+    let name = answer.header("content-disposition").unwrap();
+    assert!(name.ends_with(&format!("{COW}.shard.tar")), "{name}");
+    assert_eq!(shard(BUST).status, 404);
 }
 
 #[test]

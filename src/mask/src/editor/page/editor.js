@@ -79,15 +79,15 @@ async function cut(draft) {
     return showTools();
   }
   cutting = true;
-  say("busy", sketch.auto && cutOf?.auto !== true ? "looking at the turn" : "cutting");
+  say("busy", sketch.auto && cutOf?.auto !== true ? `reading the ${about.auto}` : "making the mask");
   try {
     const mask = await (await send(`api/v1/mask?draft=${draft}`, sketch)).json();
     if (sketcher.sketch === sketch) {
       [cutOf, exact] = [sketch, mask.exact];
       showOutline(new Path2D(mask.outline.map((corners) => `M${corners.map((corner) => corner.join(" ")).join("L")}Z`).join("")));
       warn(mask.warnings);
-      const share = (100 * mask.area_px) / (about.width * about.height);
-      say(mask.exact ? "ready" : "draft", `${share.toFixed(1)} %, ${(mask.ms / 1000).toFixed(2)} s`);
+      const part = (100 * mask.area_px) / (about.width * about.height);
+      say(mask.exact ? "ready" : "draft", `object ${part.toFixed(part < 1 ? 1 : 0)} % of frame`);
     }
   } catch (error) {
     if (sketcher.sketch === sketch) {
@@ -162,7 +162,7 @@ function showTools() {
   $("cut-here").disabled = wanted === sketch.frame;
   let hint = "";
   if (shown !== sketch.frame) hint = `Frame ${shown}. The mask is made on frame ${sketch.frame}.`;
-  else if (!canCut(sketch)) hint = about.turn ? "Draw a box around the object, or press “By the turn”." : "Draw a box around the object.";
+  else if (!canCut(sketch)) hint = about.auto ? "Draw a box around the object, or press “Automatic”." : "Draw a box around the object.";
   $("hint").textContent = hint;
   $("hint").hidden = !hint;
 }
@@ -193,28 +193,28 @@ function key(event) {
 
 async function accept() {
   $("accept").disabled = true;
-  say("busy", "writing");
+  say("busy", "saving");
   try {
     const written = await (await send("api/v1/accept", sketcher.sketch)).json();
-    end("accepted", "The mask is written", `${about.output}, ${written.area_px} pixels. ${CLOSED}`);
+    end("accepted", "Mask saved", `${about.output}, ${written.area_px} pixels. ${CLOSED}`);
   } catch (error) {
-    say("wrong", "not written");
+    say("wrong", "not saved");
     warn([error.message]);
     showTools();
   }
 }
 
 async function discard() {
-  if (sketcher.canUndo && !confirm("End without writing a mask?")) return;
+  if (sketcher.canUndo && !confirm("Close without saving the mask?")) return;
   try {
     await request("api/v1/discard", { method: "POST" });
-    end("discarded", "Nothing was written", CLOSED);
+    end("discarded", "Nothing was saved", CLOSED);
   } catch (error) {
     warn([error.message]);
   }
 }
 
-const CLOSED = within ? "" : "The program has ended; this page can be closed.";
+const CLOSED = within ? "" : "The program has ended. You can close this page.";
 
 function end(state, title, text) {
   say(state, state);
@@ -240,7 +240,8 @@ async function begin() {
   $("title").textContent = recording;
   $("scrub").max = frames - 1;
   $("scrub").disabled = frames < 2;
-  $("auto").disabled = !about.turn;
+  $("auto").disabled = !about.auto;
+  if (about.auto === "background") $("auto").title = "Find the object by its plain background";
   listen();
   changed();
 }

@@ -29,6 +29,9 @@ struct Row {
     speed: f64,
     /// The last take's session, and whether it was aborted, and why.
     last: Option<(String, Option<String>)>,
+    /// Whether somebody stopped it.
+    #[serde(default)]
+    stopped: bool,
     headline: String,
     /// Words of the explanation; none is to be given if left out.
     explanation: Option<String>,
@@ -157,6 +160,7 @@ fn set(serving: &Serving, row: Row) {
             },
             frames: 1500,
             dropped: 0,
+            is_stopped: row.stopped,
             reason: aborted,
         });
     });
