@@ -498,11 +498,6 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
             2,
             "--scene",
         ),
-        (
-            format!("{one} --into photos/two.png -o o.mp4"),
-            1,
-            "two.png",
-        ),
         (format!("{one} --into sky.exr -o o.mp4"), 1, "--rotate"),
         (format!("{one} --into photos/two.png -o o.mp4"), 1, "o.mp4"),
         (format!("{one} --into sky.exr -o o.mp4"), 1, "o.mp4"),
