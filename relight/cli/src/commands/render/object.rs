@@ -26,7 +26,7 @@ pub(super) enum Map {
 #[derive(Args)]
 pub(super) struct ObjectArguments {
     /// A captured object in place of maps: object.relit, or the folder of relight turn.
-    #[arg(value_name = "OBJECT", conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
+    #[arg(value_name = "OBJECT", help_heading = None::<&'static str>, conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
     object: Option<PathBuf>,
     /// Normals: PNG of 8 or 16 bits, colours (n + 1) / 2, black outside; or EXR of vectors. x right, z to the viewer.
     #[arg(long, value_name = "FILE", required_unless_present = "object")]

@@ -34,23 +34,33 @@ pub(crate) struct Arguments {
     pub(super) folder: OutputFolder,
     /// How high the camera looks down on the table, degrees: 0 from the side, 90 from above [default: as the data set or the
     /// session says; else 18 ± 8].
-    #[arg(long, value_name = "DEGREES", value_parser = elevation)]
+    #[arg(long, value_name = "DEGREES", value_parser = elevation, help_heading = "Rig")]
     elevation: Option<Elevation>,
     /// Which way the table turns as its angle grows, seen from above [default: as the data set or the session says; else the one
     /// in which the network is clearly surer; else counter-clockwise].
-    #[arg(long, value_name = "WAY", value_parser = one_of(ROTATIONS))]
+    #[arg(long, value_name = "WAY", value_parser = one_of(ROTATIONS), help_heading = "Rig")]
     rotation: Option<RotationDirection>,
     /// The light where it is known, in the viewer's frame at the angle 0 of the table: a panorama (.hdr, .exr), or coefficients
     /// of spherical harmonics up to order 6 (.txt).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Light")]
     pub(super) light: Option<PathBuf>,
     /// A ball on the table, diffuse grey or chrome, which measures the light: its middle and radius in the video, pixels, and
     /// what it is made of [default: what it looks like]. The albedo of the ball is then 1.
-    #[arg(long, value_name = "X,Y,R[,grey|chrome]", conflicts_with = "light")]
+    #[arg(
+        long,
+        value_name = "X,Y,R[,grey|chrome]",
+        conflicts_with = "light",
+        help_heading = "Light"
+    )]
     light_ball: Option<LightBall>,
     /// With --light-ball: the session from which the shard was made, or its video [default: what dataset.json names, beside
     /// the data set]. Needs the program ffmpeg.
-    #[arg(long, value_name = "PATH", requires = "light_ball")]
+    #[arg(
+        long,
+        value_name = "PATH",
+        requires = "light_ball",
+        help_heading = "Light"
+    )]
     session: Option<PathBuf>,
     /// The object's material.
     #[arg(long, value_name = "KIND", value_parser = one_of(MATERIALS), default_value = "diffuse")]
