@@ -120,9 +120,11 @@ wheel: $(PYTHON_VENV)/ready ## Make the Python package, one wheel for Python 3.9
 	$(PYTHON_VENV)/bin/maturin build --release --locked -m relight/python/Cargo.toml -i $(PYTHON_VENV)/bin/python \
 	    --out target/packages
 
-test-python: wheel $(DEMO)/mask.png ## Install the Python package and test it; tests of torch run where it is installed
+test-python: wheel $(DEMO)/mask.png ## Install the Python package and test it against the programs, with its notebooks; tests of torch run where it is installed
+	cargo build --locked --release -p relight -p relit-mask
 	$(PYTHON_VENV)/bin/pip install --quiet --force-reinstall --no-deps target/packages/relit-*.whl
-	cd relight/python/tests && RELIT_DATA=$(abspath $(DEMO))/out $(abspath $(PYTHON_VENV))/bin/python -m pytest -q -rs .
+	cd relight/python/tests && RELIT_DATA=$(abspath $(DEMO))/out RELIGHT=$(abspath $(TARGET))/release/relight \
+	    RELIT_MASK=$(abspath $(TARGET))/release/relit-mask $(abspath $(PYTHON_VENV))/bin/python -m pytest -q -rs .
 
 bench-python: wheel $(DEMO)/mask.png ## Measure the reader through Python against webdataset
 	$(PYTHON_VENV)/bin/pip install --quiet --force-reinstall --no-deps target/packages/relit-*.whl
@@ -148,10 +150,10 @@ lint: setup ## Check formatting, lints and documentation
 	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps $(EXTRAS)
 	@if cargo tree --locked -p relight -e normal --prefix none \
-	    | grep -E '^(ffmpeg|opencv|relit-(video|mask|rig))'; then \
+	    | grep -E '^(ffmpeg|opencv|relit-(video|mask|capture|camera|turntable))'; then \
 	    echo "relight must not depend on these"; exit 1; fi
 	@if cargo tree --locked -p relit-extract -e normal --prefix none \
-	    | grep -E '^(opencv|v4l|axum|hyper|tokio|relit-(mask|rig|web))'; then \
+	    | grep -E '^(opencv|v4l|axum|hyper|tokio|relit-(mask|capture|camera|turntable|web))'; then \
 	    echo "relit-extract must not depend on these"; exit 1; fi
 	@if cargo tree --locked -p relit-grabcut -e normal --prefix none \
 	    | grep -E '^(opencv|rayon|rustix|parquet|tar|clap|indicatif|relit-(video|web|mask))'; then \

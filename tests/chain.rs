@@ -113,12 +113,13 @@ fn recorded_turns_train_the_networks_by_the_phases_of_the_paper(relight: PathBuf
     bench.train("spec", "spec", "--turns shards");
     bench.falls("spec", "validation/highlight");
 
-    let light = "--turns shards --held-out held-out --normal normal/normal-net.safetensors";
+    let light =
+        "--turns shards --validation-turns held-out --normal-net normal/normal-net.safetensors";
     bench.train("light", "light", light);
     bench.falls("light", "validation/residual");
 
     // The round of the paper that follows begins with the warm-up's weights.
-    let joint = "--turns shards --held-out held-out --light light/light-net.safetensors \
+    let joint = "--turns shards --validation-turns held-out --light-net light/light-net.safetensors \
                  --weights normal/normal-net.safetensors";
     bench.train("joint", "joint", joint);
     let (light, joint) = (
@@ -127,8 +128,8 @@ fn recorded_turns_train_the_networks_by_the_phases_of_the_paper(relight: PathBuf
     );
     assert!(joint.last() < light.first(), "{light:?} {joint:?}");
 
-    let specular = "--turns shards --spec spec/spec-net.safetensors \
-                    --normal joint/normal-net.safetensors --light light/light-net.safetensors";
+    let specular = "--turns shards --spec-net spec/spec-net.safetensors \
+                    --normal-net joint/normal-net.safetensors --light-net light/light-net.safetensors";
     bench.train("specular", "specular", specular);
     assert!(bench.path("specular/reflectance-net.safetensors").exists());
 }

@@ -105,10 +105,7 @@ fn a_tokens_file_that_others_can_read_is_refused_with_the_way_out() {
     let mut said = String::new();
     let mut output = running.0.stderr.take().unwrap();
     output.read_to_string(&mut said).unwrap();
-    assert!(
-        said.contains("mode 644") && said.contains("chmod 600"),
-        "{said}"
-    );
+    assert!(said.contains("644") && said.contains("chmod 600"), "{said}");
 }
 
 #[test]

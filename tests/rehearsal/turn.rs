@@ -118,6 +118,5 @@ fn a_take_says_whether_the_room_is_too_even() {
         settings.degrees_per_second = 36.0;
     });
     let (good, found) = room_check(&mut rig);
-    assert!(!good);
-    assert!(found.contains("turn on one lamp"), "{found}");
+    assert!(!good, "{found}");
 }

@@ -11,6 +11,7 @@ pub mod chromium;
 pub mod disc;
 pub mod editor_canvas;
 pub mod firmware;
+pub mod help;
 mod programs;
 pub mod trials;
 mod turning;
@@ -36,6 +37,14 @@ pub fn ffmpeg(folder: &Path, arguments: &[&str]) -> Vec<u8> {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "ffmpeg {arguments:?}: {errors}");
     output.stdout
+}
+
+/// Whether a line of `text` names all of these things (files, numbers, options). How it says so is free, so that
+/// messages can be improved without a change of tests.
+#[must_use]
+pub fn is_named(text: &str, things: &[&str]) -> bool {
+    text.lines()
+        .any(|line| things.iter().all(|thing| line.contains(thing)))
 }
 
 /// Says that the test that runs is left out, for a test that shares its target with tests that need nothing: past the

@@ -2,16 +2,16 @@
 
 export const MOST_OBJECTS = 12;
 /** A scene's fields that the engine knows, besides its objects'. */
-const FIELDS = ["size", "field", "down", "tilt", "match", "white_balance", "exposure", "light"];
+const FIELDS = ["size", "fov", "down", "tilt", "match", "white_balance", "exposure", "light"];
 const OBJECT_FIELDS = ["object", "at", "height", "rotation", "tint", "gloss", "exposure", "shadow"];
-const LIGHT = { kind: "background", azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, turn: 0 };
+const LIGHT = { kind: "background", azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, angle: 0 };
 /** Of a copy, beside that of which it was made, in parts of the picture. */
 const BESIDE = 0.08;
 
 let keys = 0;
 
 export const emptyScene = (background) => ({
-  background, size: [1280, 960], field: 60, down: 10, match: true, white_balance: "light", exposure: 0, light: LIGHT, objects: [],
+  background, size: [1280, 960], fov: 60, down: 10, match: true, white_balance: "light", exposure: 0, light: LIGHT, objects: [],
 });
 
 /** An object as it comes into a scene. `key` names it in the page for as long as it stays. */
@@ -60,10 +60,10 @@ export function reordered(scene, key, step) {
 }
 
 /** Where the lamp is seen: all light is turned, and it with all. */
-export const lampAzimuth = ({ azimuth, turn }) => around(azimuth + turn);
+export const lampAzimuth = ({ azimuth, angle }) => around(azimuth + angle);
 
 /** A lamp that is seen at an azimuth. */
-export const lampAt = (azimuth, { turn }) => ({ azimuth: around(azimuth - turn) });
+export const lampAt = (azimuth, { angle }) => ({ azimuth: around(azimuth - angle) });
 
 const around = (degrees) => Math.round(((degrees % 360) + 360) % 360) % 360;
 

@@ -92,10 +92,10 @@ export class Stage {
 
   /** A panorama is looked around in, and its light turns with it. */
   #turn(dx) {
-    const { light, field, size } = this.#work.scene;
+    const { light, fov, size } = this.#work.scene;
     if (!this.#rendering.turns) return;
-    const across = size[0] >= size[1] ? field : (field * size[0]) / size[1];
-    this.#work.changeLight({ turn: turned(light.turn + dx * across) }, this.#join);
+    const across = size[0] >= size[1] ? fov : (fov * size[0]) / size[1];
+    this.#work.changeLight({ angle: turned(light.angle + dx * across) }, this.#join);
   }
 
   #placed({ at: [x, y] }, dx, dy) {

@@ -46,8 +46,8 @@ export class Video {
     Object.assign($("video-progress"), { hidden: false, max: count, value: 0 });
     const frames = [];
     for (let index = 0; index < count && this.#making; index++) {
-      const turn = scene.light.turn + (360 * index) / count;
-      const turned = { ...scene, light: { ...scene.light, turn: ((turn + 180) % 360) - 180 } };
+      const angle = scene.light.angle + (360 * index) / count;
+      const turned = { ...scene, light: { ...scene.light, angle: ((angle + 180) % 360) - 180 } };
       const fields = { scene: forEngine(turned), longest: LONGEST, before: false };
       const { width, height, parts } = await this.#library.askBefore(scene.background, "render", fields);
       frames.push(await compressed(parts[0], width, height));

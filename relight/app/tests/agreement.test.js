@@ -104,8 +104,8 @@ async function agreeOnPicture(t, object, folder) {
 }
 
 const sceneOf = (object) => ({
-  size: [1280, 960], field: 60, down: 10, match: true, white_balance: "light", exposure: 0,
-  light: { kind: "background", azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, turn: 40 },
+  size: [1280, 960], fov: 60, down: 10, match: true, white_balance: "light", exposure: 0,
+  light: { kind: "background", azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, angle: 40 },
   objects: [{ object, at: [0.55, 0.92], height: 0.5, rotation: 5, tint: [1, 0.9, 0.8], gloss: [0.3, 60], exposure: 0.2, shadow: 0.9 }],
 });
 

@@ -78,7 +78,7 @@ async function turned({ scene, frames }) {
   const times = [];
   for (let index = 0; index <= frames; index++) {
     const began = performance.now();
-    const light = { ...scene.light, turn: 6 * index - 180 };
+    const light = { ...scene.light, angle: 6 * index - 180 };
     await window.testedEngine.ask("layers", { scene: { ...scene, light }, longest: 512 });
     if (index > 0) times.push(performance.now() - began);
   }
@@ -150,8 +150,8 @@ async function residentOf(id) {
 
 function sceneOf(kind) {
   return {
-    size: [1280, 960], field: 60, down: 10, match: true, white_balance: "light", exposure: 0,
-    light: { kind, azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, turn: 0 },
+    size: [1280, 960], fov: 60, down: 10, match: true, white_balance: "light", exposure: 0,
+    light: { kind, azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, angle: 0 },
     objects: [{ object: 1, at: [0.5, 0.9], height: 0.5, rotation: 0, tint: [1, 1, 1], gloss: null, exposure: 0, shadow: 1 }],
   };
 }

@@ -142,7 +142,7 @@ async function sizeAndTurn(page) {
 async function turnLight(page) {
   await steps.tab(page, "light");
   const before = await steps.stagePicture(page);
-  await steps.slide(page, "turn", 120);
+  await steps.slide(page, "light-angle", 120);
   assert.notEqual(await steps.stagePicture(page), before, "turned light is seen");
   await page.click("#undo");
   assert.equal(await steps.stagePicture(page), before, "undo brings the picture back");
@@ -473,7 +473,7 @@ test("after a fault the engine is started again with all that it held", async ()
   assert.match(await alertText(page), /made by the test/);
   assert.equal(await steps.stagePicture(page), before);
   await page.click("#tab-light");
-  await steps.slide(page, "turn", 90);
+  await steps.slide(page, "light-angle", 90);
   assert.notEqual(await steps.stagePicture(page), before);
   await page.context().close();
   await server.stop();

@@ -30,16 +30,16 @@ enum Verb {
     /// Decompose photographs: normals, albedo, shading, highlight and light.
     #[command(after_help = decompose::EXAMPLES)]
     Decompose(decompose::Arguments),
-    /// Show the objects of photographs in another light: a picture, or a video in which the light turns.
-    #[command(after_help = relight::EXAMPLES)]
+    /// Show the objects of photographs in another light: a picture, or a video in which the light rotates.
+    #[command(after_help = relight::EXAMPLES, mut_arg("light", relight::or_own))]
     Relight(Box<relight::Arguments>),
     /// Put the objects of photographs into another picture, a panorama or a video.
     #[command(after_help = insert::EXAMPLES)]
     Insert(Box<insert::Arguments>),
-    /// Light an object that is given by its maps: an image, a turn, or a sweep of materials.
+    /// Light an object that is given by its maps: an image, a video, or a sheet of materials.
     #[command(after_help = render::EXAMPLES)]
     Render(render::Arguments),
-    /// Measure estimates, and baselines beside them, by the protocols of the paper's tables.
+    /// Measure estimates and baselines by the protocols of the paper's tables.
     #[command(after_help = eval::EXAMPLES)]
     Eval(eval::Arguments),
     /// Render synthetic objects with their ground truth: samples, whole turns, panoramas.
@@ -48,13 +48,13 @@ enum Verb {
     /// Train networks (in a build with the feature `train`).
     #[command(after_help = train::EXAMPLES)]
     Train(train::Arguments),
-    /// Decompose a whole turn: normals, albedo and light from the angle that the light turns by.
+    /// Decompose a whole turn of the table: normals, albedo and light.
     #[command(after_help = turn::EXAMPLES)]
     Turn(turn::Arguments),
     /// Write objects for other programs: GLB, layered EXR, a Blender script.
     #[command(after_help = export::EXAMPLES)]
     Export(export::Arguments),
-    /// Hand out the app: a page that cuts objects out of photographs, relights them and puts them into scenes.
+    /// Serve the app: a page that cuts objects out of photographs, relights them and puts them into scenes.
     #[command(after_help = serve::EXAMPLES)]
     Serve(serve::Arguments),
     /// Convert weights of networks.
@@ -115,4 +115,33 @@ fn wrong_usage(matches: &ArgMatches, fault: String) -> Error {
         (command, matches) = (verb, inner);
     }
     command.error(ErrorKind::ValueValidation, fault)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The most lines of a help without headings.
+    const SCREEN: usize = 50;
+
+    #[test]
+    fn the_options_of_every_verb_fit_together() {
+        CommandLine::command().debug_assert();
+    }
+
+    #[test]
+    fn the_help_of_every_verb_fits_a_screen_or_is_grouped_under_headings() {
+        let mut program = CommandLine::command();
+        program.build();
+        let mut waiting = vec![program];
+        while let Some(mut command) = waiting.pop() {
+            let lines = command.render_long_help().to_string().lines().count();
+            let is_grouped = command
+                .get_arguments()
+                .any(|argument| argument.get_help_heading().is_some());
+            let name = command.get_bin_name().unwrap_or_default();
+            assert!(lines <= SCREEN || is_grouped, "{name}: {lines} lines");
+            waiting.extend(command.get_subcommands().cloned());
+        }
+    }
 }

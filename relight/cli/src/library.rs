@@ -1,8 +1,39 @@
-//! The library of the verbs that make objects: what a user brings.
+//! Options and the library of the verbs that make objects: what a user brings.
 
+use std::path::PathBuf;
+
+use clap::Args;
 use relight_synth::{Folders, Library, SynthError};
 use relit_console::{Console, Outcome};
 use serde_json::json;
+
+/// What synthetic objects and their light are drawn from.
+#[derive(Args)]
+pub(crate) struct ObjectSources {
+    /// The same seed gives the same bytes.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Let light pass through objects: neither cast shadows nor dark hollows.
+    #[arg(long)]
+    pub(crate) no_shadows: bool,
+    /// Objects of one's own besides procedural shapes: .obj, .gltf, .glb, also in folders within; or a packed library, .relib.
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) meshes: Option<PathBuf>,
+    /// Light: .hdr, .exr; or a packed library, .relib [default: synthetic panoramas].
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) panoramas: Option<PathBuf>,
+}
+
+impl ObjectSources {
+    /// The folders, with one of pictures to lay onto objects.
+    pub(crate) fn folders(&self, textures: Option<PathBuf>) -> Folders {
+        Folders {
+            meshes: self.meshes.clone(),
+            textures,
+            panoramas: self.panoramas.clone(),
+        }
+    }
+}
 
 /// Reads a library, of packed ones a part, and names what of its folders is not used; then what comes of it is incomplete.
 pub(crate) fn read_library(

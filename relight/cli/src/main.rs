@@ -3,7 +3,9 @@
 mod command_line;
 mod commands;
 mod folder;
+mod inputs;
 mod library;
+mod lighting;
 mod photos;
 mod shipped;
 mod values;

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use relight_core::image::Transfer;
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, SpecularGate};
 use relight_photo::files::{FoundPhotos, PhotoInput, PhotoReading, UnusedFile};
 use relight_photo::nets::{NetError, Weights};
@@ -12,8 +11,9 @@ use relit_data::geometry::Rect;
 use serde_json::json;
 
 use crate::commands::CommandResult;
+use crate::inputs::{TransferArgument, WeightsArgument};
 use crate::shipped;
-use crate::values::{GATES, TRANSFERS, one_of};
+use crate::values::{GATES, one_of};
 
 /// Photographs, and where their objects are.
 #[derive(Args)]
@@ -21,16 +21,15 @@ pub(crate) struct PhotoArguments {
     /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
     #[arg(required = true, value_name = "PHOTO")]
     pub(crate) photos: Vec<PathBuf>,
-    /// A grey image as large as the photograph, white on the object; or a folder of such, <photo's name>.png
-    /// [default: the photograph's alpha, or what is not black before a black background].
+    /// A grey image as large as the photograph, white on the object; or a folder of such, PHOTO.png [default: the
+    /// photograph's alpha, or what is not black before a black background].
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) mask: Option<PathBuf>,
-    /// A rectangle around the object, pixels. Where nothing else says where the object is, it is all of it.
+    /// A rectangle around the object, pixels. If nothing else says where the object is, the whole rectangle is the object.
     #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
     pub(crate) rect: Option<Rect>,
-    /// How PNG, JPEG and WebP photographs are encoded; EXR and HDR are linear [default: what the file says, or sRGB].
-    #[arg(long, value_parser = one_of(TRANSFERS))]
-    pub(crate) transfer: Option<Transfer>,
+    #[command(flatten)]
+    pub(crate) encoding: TransferArgument,
 }
 
 impl PhotoArguments {
@@ -45,7 +44,7 @@ impl PhotoArguments {
         PhotoReading {
             mask: self.mask.clone(),
             rectangle: self.rect,
-            transfer: self.transfer,
+            transfer: self.encoding.transfer,
         }
     }
 
@@ -86,9 +85,8 @@ pub(crate) fn name_lost(input: &PhotoInput, message: &str, console: Console) {
 /// How photographs are decomposed.
 #[derive(Args)]
 pub(crate) struct NetworkArguments {
-    /// The network's weights (.safetensors) [default: those that come with the program].
-    #[arg(long, value_name = "FILE")]
-    weights: Option<PathBuf>,
+    #[command(flatten)]
+    weights: WeightsArgument,
     /// Separate highlights.
     #[arg(long, default_value = "auto", value_parser = one_of(GATES))]
     specular: SpecularGate,
@@ -111,11 +109,7 @@ impl NetworkArguments {
 
     /// The weights, and how they are named.
     pub(crate) fn weights(&self) -> Result<(Weights, String), NetError> {
-        let Some(path) = &self.weights else {
-            return Ok((shipped::weights()?, "shipped".to_owned()));
-        };
-        let name = path.file_name().unwrap_or(path.as_os_str());
-        Ok((Weights::read(path)?, name.to_string_lossy().into_owned()))
+        self.weights.read_or(shipped::weights)
     }
 
     pub(crate) fn options(&self) -> DecomposeOptions {

@@ -1,6 +1,5 @@
 //! The weights that come with the program.
 
-use relight_photo::decompose::{DecomposeError, Decomposer};
 use relight_photo::nets::{NetError, Weights};
 
 /// The weights of the decomposing network.
@@ -27,12 +26,4 @@ fn read(path: &str, bytes: &[u8]) -> Result<Weights, NetError> {
         path: path.into(),
         fault,
     })
-}
-
-/// The decomposing network with these weights.
-///
-/// # Errors
-/// As [`weights`].
-pub(crate) fn decomposer() -> Result<Decomposer, DecomposeError> {
-    Decomposer::new(&weights()?)
 }

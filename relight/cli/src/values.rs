@@ -7,7 +7,6 @@ use std::str::FromStr;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use relight_core::image::Transfer;
 use relight_core::light::NormalsFrame;
-use relight_core::render::DiffuseForm;
 use relight_photo::decompose::SpecularGate;
 use relight_photo::relighting::WhiteBalance;
 
@@ -52,20 +51,6 @@ pub(crate) const GATES: Choices<SpecularGate> = &[
     ("off", "Never", SpecularGate::Off),
 ];
 
-/// How shading follows from coefficients of light.
-pub(crate) const DIFFUSE_FORMS: Choices<DiffuseForm> = &[
-    (
-        "irradiance",
-        "The light that arrives at the surface",
-        DiffuseForm::Irradiance,
-    ),
-    (
-        "released",
-        "As the paper's released code has it: |L00| and 0.1 more",
-        DiffuseForm::Released,
-    ),
-];
-
 /// The parser of an option that takes one of these values; the help lists them.
 pub(crate) fn one_of<T: Copy + Send + Sync>(
     choices: Choices<T>,
@@ -81,7 +66,7 @@ pub(crate) fn one_of<T: Copy + Send + Sync>(
     })
 }
 
-/// An angle that a light is turned by.
+/// An angle that a light is rotated by.
 pub(crate) fn degrees() -> impl Fn(&str) -> Result<f64, String> + Clone {
     within(-36_000.0..=36_000.0, "degrees")
 }

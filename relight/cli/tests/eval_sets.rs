@@ -99,7 +99,7 @@ fn folders_of_relight_decompose_say_themselves_how_they_are_encoded() {
     assert!(text.contains("other/1"), "{text}");
     fs::write(cup.join("decomposition.json"), "{").unwrap();
     let text = with_causes(&evaluated(&set, &found).unwrap_err());
-    assert!(text.contains("does not describe"), "{text}");
+    assert!(text.contains("decomposition.json"), "{text}");
 }
 
 #[test]

@@ -38,6 +38,11 @@ impl Scene {
         self.folder.path().join(name)
     }
 
+    /// Runs `relight render image` in the folder.
+    fn image_of(&self, arguments: &str) -> Output {
+        self.render(&format!("image {arguments}"))
+    }
+
     /// Runs `relight render` in the folder.
     fn render(&self, arguments: &str) -> Output {
         Command::new(env!("CARGO_BIN_EXE_relight"))
@@ -74,7 +79,7 @@ fn names_in(folder: &Path) -> Vec<String> {
 fn light_from_above_lights_the_upper_half_whichever_way_y_points_in_the_file() {
     let scene = Scene::new();
     for (map, way) in [("up.png", "up"), ("down.png", "down")] {
-        let output = scene.render(&format!(
+        let output = scene.image_of(&format!(
             "--normals {map} --normals-y {way} --light light.txt -o {way}-lit.png"
         ));
         assert_eq!(code(&output), 0, "{}", errors(&output));
@@ -86,12 +91,14 @@ fn light_from_above_lights_the_upper_half_whichever_way_y_points_in_the_file() {
 }
 
 #[test]
-fn a_turn_into_a_folder_has_a_numbered_frame_for_each_step() {
+fn a_rotation_into_a_folder_has_a_numbered_frame_for_each_step() {
     let scene = Scene::new();
-    let output = scene.render("--normals up.png --light light.txt --turn 5 --json -o turn");
+    let output = scene.image_of(
+        "--normals up.png --light light.txt --rotate 360 --seconds 1 --fps 5 --json -o rotation",
+    );
     assert_eq!(code(&output), 0, "{}", errors(&output));
     let expected: Vec<_> = (0..5).map(|frame| format!("{frame:04}.png")).collect();
-    assert_eq!(names_in(&scene.path("turn")), expected);
+    assert_eq!(names_in(&scene.path("rotation")), expected);
     let event: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(event["event"], "rendered");
     assert_eq!(event["frames"], 5);
@@ -101,7 +108,7 @@ fn a_turn_into_a_folder_has_a_numbered_frame_for_each_step() {
 fn an_exr_holds_light_in_the_exposure_that_was_asked_for() {
     let scene = Scene::new();
     let red = |stops: &str| {
-        let output = scene.render(&format!(
+        let output = scene.image_of(&format!(
             "--normals up.png --albedo 1 --light light.txt --exposure {stops} -o lit.exr"
         ));
         assert_eq!(code(&output), 0, "{}", errors(&output));
@@ -112,9 +119,9 @@ fn an_exr_holds_light_in_the_exposure_that_was_asked_for() {
 }
 
 #[test]
-fn a_sweep_is_one_sheet_of_six_by_four() {
+fn materials_are_one_sheet_of_six_by_four() {
     let scene = Scene::new();
-    let output = scene.render("--normals up.png --light light.txt --sweep -o sheet.png");
+    let output = scene.render("materials --normals up.png --light light.txt -o sheet.png");
     assert_eq!(code(&output), 0, "{}", errors(&output));
     let extent = scene.image("sheet.png").planes().extent();
     assert_eq!((extent.width, extent.height), (6 * 24, 4 * 24));
@@ -123,10 +130,10 @@ fn a_sweep_is_one_sheet_of_six_by_four() {
 #[test]
 fn the_light_that_is_saved_gives_the_same_picture() {
     let scene = Scene::new();
-    let first = scene.render(
-        "--normals up.png --light light.txt --turned 70 --save-light turned.txt -o first.png",
+    let first = scene.image_of(
+        "--normals up.png --light light.txt --light-angle 70 --save-light rotated.txt -o first.png",
     );
-    let second = scene.render("--normals up.png --light turned.txt -o second.png");
+    let second = scene.image_of("--normals up.png --light rotated.txt -o second.png");
     assert_eq!((code(&first), code(&second)), (0, 0));
     let [first, second] =
         ["first.png", "second.png"].map(|name| fs::read(scene.path(name)).unwrap());
@@ -139,33 +146,25 @@ fn a_file_that_is_missing_or_wrong_is_named_in_one_line_and_the_code_is_1() {
     fs::write(scene.path("short.txt"), "1 2 3\n4 5\n").unwrap();
     fs::write(scene.path("taken"), "a file").unwrap();
     let cases = [
-        (
-            "--normals none.png --light light.txt -o a.png",
-            "none.png cannot be read",
-        ),
-        (
-            "--normals up.png --light short.txt -o a.png",
-            "short.txt holds no light: line 2",
-        ),
-        (
-            "--normals up.png --panorama up.png -o a.png",
-            "up.png holds 8- or 16-bit integers",
-        ),
+        ("--normals none.png --light light.txt -o a.png", "none.png"),
+        ("--normals up.png --light short.txt -o a.png", "short.txt"),
+        ("--normals up.png --light up.png -o a.png", "up.png"),
         ("--normals up.png --light light.txt -o taken/a.png", "taken"),
         (
-            "--normals up.png --light light.txt --turn 2 -o taken",
-            "taken cannot be made",
+            "--normals up.png --light light.txt --rotate 90 -o taken",
+            "taken",
         ),
         (
-            "--normals up.png --light light.txt --turn 2 -o .",
-            ". is not empty",
+            "--normals up.png --light light.txt --rotate 90 -o .",
+            "not empty",
         ),
+        ("--normals up.png --light light.txt --turn 2 -o .", ". "),
     ];
-    for (arguments, expected) in cases {
-        let output = scene.render(arguments);
+    for (arguments, named) in cases {
+        let output = scene.image_of(arguments);
         let errors = errors(&output);
         assert_eq!(code(&output), 1, "{arguments}");
-        assert!(errors.contains(expected), "{errors}");
+        assert!(errors.contains(named), "{errors}");
         assert_eq!(errors.lines().count(), 1, "{errors}");
     }
     assert!(!scene.path("a.png").exists());
@@ -176,16 +175,28 @@ fn wrong_usage_is_told_with_code_2() {
     let scene = Scene::new();
     for arguments in [
         "--normals up.png -o a.png",
-        "--normals up.png --light light.txt --turn 5 -o a.png",
+        "--normals up.png --light light.txt --rotate 360 -o a.png",
         "--normals up.png --light light.txt -o folder",
         "--normals up.png --light light.txt --albedo 1,2 -o a.png",
-        "--normals up.png --light light.txt --turned nan -o a.png",
-        "--normals up.png --light light.txt --panorama a.hdr -o a.png",
-        "--normals up.png --light light.txt --sweep --turn 4 -o a.mp4",
-        "--normals up.png --light light.txt --turn 4 -o a.gif",
+        "--normals up.png --light light.txt --light-angle nan -o a.png",
+        "--normals up.png --light light.txt --lamp 1,2 -o a.png",
+        "--normals up.png --light light.txt --seconds 3 -o a.png",
+        "--normals up.png --light light.txt --rotate 90 -o a.gif",
         "--normals up.png --light light.txt --smoothness 5,6,7 -o a.png",
     ] {
-        let output = scene.render(arguments);
+        let output = scene.image_of(arguments);
         assert_eq!(code(&output), 2, "{arguments}: {}", errors(&output));
     }
+    let output = scene.render("materials --normals up.png --light light.txt -o a.mp4");
+    assert_eq!(code(&output), 2, "{}", errors(&output));
+}
+
+#[test]
+fn a_lamp_from_the_right_lights_the_right_half() {
+    let scene = Scene::new();
+    let output = scene.image_of("--normals up.png --lamp 90,0 -o lit.png");
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let image = scene.image("lit.png");
+    let [left, right] = [3, 20].map(|x| image.planes().pixel(x, 12)[0]);
+    assert!(right > 1.5 * left, "{left} {right}");
 }

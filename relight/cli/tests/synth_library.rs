@@ -38,7 +38,7 @@ fn a_library_is_packed_and_samples_are_drawn_from_it() {
         "author = \"Ann\"\nlicence = \"CC0-1.0\"\nvalidation = false\n",
     )
     .unwrap();
-    let made = relight(&["synth", "--write-panoramas", "-o", text(&light)]);
+    let made = relight(&["synth", "panoramas", "-o", text(&light)]);
     assert!(made.status.success(), "{made:?}");
     fs::write(
         light.join("origin.toml"),
@@ -76,6 +76,7 @@ fn a_library_is_packed_and_samples_are_drawn_from_it() {
     let out = at("samples");
     let drawn = relight(&[
         "synth",
+        "samples",
         "--count",
         "1",
         "--size",

@@ -151,13 +151,15 @@ fn images_and_masks_that_hold_no_window_are_told_apart() {
     let extent = Extent::new(20, 20);
     let pair = Comparison::new(extent, &[&values], &[&values], &mask).unwrap();
     let error = pair.ssim().unwrap_err().to_string();
-    assert!(error.starts_with("no window of 11x11"), "{error}");
+    assert!(
+        error.contains("11x11") && !error.contains("20x20"),
+        "{error}"
+    );
     let extent = Extent::new(40, 10);
     let pair = Comparison::new(extent, &[&values], &[&values], &mask).unwrap();
-    let said = "an image of 40x10 pixels holds no window of";
     for found in [pair.ssim(), pair.lmse(ScaleFit::Image, Windows::GROSSE)] {
         let error = found.unwrap_err().to_string();
-        assert!(error.starts_with(said), "{error}");
+        assert!(error.contains("40x10"), "{error}");
     }
 }
 
@@ -169,8 +171,9 @@ fn a_normal_without_length_is_named() {
     estimate[2] = &hole;
     assert!(angular_error(Extent::new(2, 2), truth, estimate, &[true; 4]).is_ok());
     let error = angular_error(Extent::new(2, 2), truth, [&zeros; 3], &[true; 4]).unwrap_err();
-    let said = "the estimate has a normal of length zero at pixel (0, 0)";
-    assert_eq!(error.to_string(), said);
+    for named in ["estimate", "normal", "(0, 0)"] {
+        assert!(error.to_string().contains(named), "{named}: {error}");
+    }
 }
 
 /// Two planes of 24 x 22 pixels and a mask that holds some of them.

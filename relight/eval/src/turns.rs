@@ -64,7 +64,7 @@ pub struct TurnScores {
     lines: [TurnLine; METHODS.len()],
 }
 
-/// Turns in the layout of `relight synth --turn`, with their ground truth.
+/// Turns in the layout of `relight synth turns`, with their ground truth.
 struct TurnSet {
     folder: PathBuf,
     turns: Vec<(String, PathBuf)>,
@@ -81,7 +81,7 @@ struct TrueTurn {
 
 impl TurnSet {
     fn open(folder: &Path) -> Result<Self, EvalError> {
-        let fault = "holds no turns of relight synth --turn";
+        let fault = "holds no turns of relight synth turns";
         let dataset = Dataset::read(folder).map_err(EvalError::file(folder, fault))?;
         let shard = |id: &str| {
             dataset
@@ -117,7 +117,7 @@ impl TurnSet {
     }
 }
 
-/// Solves every turn of a data set of `relight synth --turn` by every method; `split` is what the table calls them. `progress`
+/// Solves every turn of a data set of `relight synth turns` by every method; `split` is what the table calls them. `progress`
 /// is told each turn and method.
 ///
 /// # Errors

@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use relight_photo::nets::paper::{self, Head};
-use relight_photo::nets::{Graph, Inference, Tensor, Weights, decomposer};
+use relight_photo::nets::{
+    Graph, Inference, Tensor, WeightPrecision, Weights, decomposer, decomposer_with_heads, to_onnx,
+};
 
 const SIDE: usize = 128;
 /// Of each output every thirteenth pixel is kept, in both directions.
@@ -93,6 +95,25 @@ fn the_papers_networks_answer_as_in_pytorch() {
 #[test]
 fn our_network_answers_as_in_pytorch() {
     answers_as_pytorch(&decomposer());
+}
+
+#[test]
+fn one_file_of_half_precision_answers_pictures_of_any_size() {
+    let graph = decomposer_with_heads();
+    let weights = Weights::initial(&graph, 5);
+    let bytes = weights.to_safetensors(WeightPrecision::Half, None).unwrap();
+    let weights = Weights::from_bytes(&bytes).unwrap();
+    let facts = [("axes", "y up")];
+    let file = to_onnx(&graph, &weights, WeightPrecision::Half, &facts).unwrap();
+    assert!(file.len() < bytes.len() + 300_000, "{}", file.len());
+    let path = Path::new("relight.onnx");
+    for size in [(64, 32), (96, 128)] {
+        let input = &picture(graph.input_channels())[..graph.input_channels() * size.0 * size.1];
+        let channels = graph.input_channels();
+        let read = Inference::from_onnx(path, &file, channels, size, &[]).unwrap();
+        let own = Inference::new(&graph, &weights, size).unwrap();
+        assert_eq!(read.run(input).unwrap(), own.run(input).unwrap());
+    }
 }
 
 #[test]

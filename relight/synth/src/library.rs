@@ -439,7 +439,7 @@ mod tests {
         };
         let error = Library::read(&folders).unwrap_err().to_string();
         assert!(
-            error.contains("no panoramas") && error.contains("exr"),
+            error.contains("panoramas") && error.contains("exr"),
             "{error}"
         );
     }

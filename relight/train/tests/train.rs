@@ -277,16 +277,11 @@ fn a_folder_with_a_run_is_not_overwritten_and_another_runs_checkpoint_is_refused
     let (mut task, settings) = decompose_task(1);
     make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap();
     let again = make_run(&mut task, &settings, folder.path(), (false, u64::MAX));
-    let text = again.unwrap_err().to_string();
-    assert!(text.contains("holds a run already"), "{text}");
+    let again = again.unwrap_err();
+    assert!(matches!(again, TrainError::Refused(_)), "{again:?}");
     let (mut other, settings) = decompose_task(2);
     let error = make_run(&mut other, &settings, folder.path(), (true, u64::MAX)).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("its settings are others: run.steps"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("run.steps"), "{error}");
 }
 
 #[test]
@@ -647,7 +642,8 @@ fn a_run_does_not_go_on_with_other_turns_or_another_network_beside_it() {
     make_run(&mut task(&turns, 1), &run, folder.path(), (false, 1)).unwrap();
     for mut other in [task(&others, 1), task(&turns, 2)] {
         let error = make_run(&mut other, &run, folder.path(), (true, u64::MAX)).unwrap_err();
-        assert!(error.to_string().contains("other turns"), "{error}");
+        assert!(matches!(error, TrainError::Refused(_)), "{error:?}");
+        assert!(error.to_string().contains("turns"), "{error}");
     }
     make_run(&mut task(&turns, 1), &run, folder.path(), (true, u64::MAX)).unwrap();
 }
@@ -689,8 +685,7 @@ fn a_run_that_another_program_makes_is_left_alone() {
     let (mut task, settings) = decompose_task(1);
     let open = MetricsLog::open(folder.path(), 0).unwrap();
     let error = make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap_err();
-    let text = error.to_string();
-    assert!(text.contains("is being made by another program"), "{text}");
+    assert!(matches!(error, TrainError::Refused(_)), "{error:?}");
     drop(open);
     make_run(&mut task, &settings, folder.path(), (false, u64::MAX)).unwrap();
 }
@@ -704,7 +699,7 @@ fn turns_are_refused_where_they_teach_nothing() {
     let (settings, resources) = (PaperSettings::default(), resources());
     let task = PaperTask::new(PaperPhase::Normal, settings, resources, &turns);
     let error = task.unwrap_err().to_string();
-    assert!(error.contains("leave --turns away"), "{error}");
+    assert!(error.contains("--turns"), "{error}");
 }
 
 #[test]

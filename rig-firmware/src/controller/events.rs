@@ -1,4 +1,4 @@
-//! Real-time bytes, emergency stop, lease, resets and alarms.
+//! Real-time bytes, emergency stop, resets and alarms.
 
 use super::{Alarm, Controller, Driver, Job, Mode, Stop};
 use crate::board::{Board, Events};
@@ -120,17 +120,6 @@ impl Controller {
         self.drop_plans(board);
         self.raise(board, Alarm::Emergency);
         self.finish(board, Err(Error::Locked));
-    }
-
-    /// Stops a moving table whose host has fallen silent.
-    pub(super) fn watch_lease<B: Board>(&mut self, board: &mut B) {
-        let lease = self.settings.amount(Key::Lease).saturating_mul(1_000_000);
-        let (moving, now) = board.with_stepper(|stepper, now| (stepper.is_moving(), now));
-        if !moving {
-            self.heard = now;
-        } else if lease > 0 && now.wrapping_sub(self.heard) >= lease && self.stopping.is_none() {
-            self.stop(board, Stop::Alarm(Alarm::LeaseExpired));
-        }
     }
 
     /// 0x18: starts anew. The interrupt has stopped the steps already.

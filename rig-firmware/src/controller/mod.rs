@@ -5,6 +5,7 @@
 //! the driver go on.
 
 mod events;
+mod lease;
 mod lines;
 mod motion;
 mod status;

@@ -12,6 +12,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![cfg(target_os = "linux")]
 
+use std::collections::HashSet;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -232,13 +233,15 @@ fn controls_are_set_and_read_back() {
             other => panic!("{other}"),
         };
     let locked = fault("read_only_integer_32_bits", 1);
-    assert!(locked.contains("read-only"), "{locked}");
     let hole = fault("menu", 9);
-    assert!(hole.contains("takes one of"), "{hole}");
     let too_wide = fault("brightness", 1 << 40);
-    assert!(too_wide.contains("takes values from"), "{too_wide}");
+    assert!(too_wide.contains("255"), "{too_wide}");
     let unknown = camera.set_control(0x0098_09ff, 1).unwrap_err();
-    assert!(unknown.to_string().contains("no such control"), "{unknown}");
+    let CameraError::Control { fault: unknown, .. } = unknown else {
+        panic!("{unknown}");
+    };
+    let faults = HashSet::from([locked, hole, too_wide, unknown]);
+    assert_eq!(faults.len(), 4, "{faults:?}");
 }
 
 #[test]
@@ -253,11 +256,14 @@ fn a_camera_is_made_to_hold_still() {
     let plan = ManualPlan::new(&camera.controls().unwrap(), &wanted);
     assert_eq!(plan.apply(&mut *camera).unwrap(), []);
     let missing = ["exposure", "white balance", "focus", "power-line filter"];
-    let missing = missing.map(|aspect| format!("the camera has no control of its {aspect}"));
-    assert_eq!(plan.missing, missing);
+    assert_eq!(plan.missing.len(), missing.len(), "{:?}", plan.missing);
+    for (found, aspect) in plan.missing.iter().zip(missing) {
+        assert!(found.contains(aspect), "{aspect}: {found}");
+    }
     set(&mut *camera, "gain", 34);
     let moved = plan.check(&camera.controls().unwrap());
-    assert_eq!(moved[0].to_string(), "gain is 34 where 33 was set");
+    let moved = (&*moved[0].name, moved[0].should, moved[0].is);
+    assert_eq!(moved, ("gain", 33, Some(34)));
 }
 
 #[test]

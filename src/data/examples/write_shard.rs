@@ -8,12 +8,13 @@ use std::path::PathBuf;
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
 use relit_data::shard::{
     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
     OutputFolder, Sample, SamplingBasis, SessionEntry, SessionQuality, ShardFiles, ShardWriter,
     SourceVideo,
 };
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 const SESSION: &str = "20261120T093015Z-disc";
 const OBJECT: &str = "disc";

@@ -18,13 +18,6 @@ pub const SATURATION_LEVEL: u8 = 250;
 /// that level, is saturated too.
 pub const SATURATED_VALUE: f32 = (SATURATION_LEVEL as f32 - 0.5) / 255.0;
 
-/// The Spec-Net gate: highlights are separated where a larger fraction of the object's pixels is saturated, where nobody
-/// asks for another.
-///
-/// The paper, section "Specularity separation": "If the percentage exceeds 5 %, Spec-Net will be performed, otherwise
-/// the object is considered as diffuse".
-pub const SPEC_NET_GATE: f64 = 0.05;
-
 /// An image of another size than the mask that it is measured under.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the image is {}x{} pixels, but {}x{} were expected", size[0], size[1], expected[0], expected[1])]
@@ -577,13 +570,18 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_image_has_no_sharpness_and_an_empty_mask_no_figures() {
+    fn a_flat_image_has_no_sharpness() {
         let image = RgbImage::from_pixel(9, 9, Rgb([250, 251, 10]));
         let full = MaskSpans::from_mask(&GrayImage::from_pixel(9, 9, Luma([255])));
         let measures = full.measure(&image, 250).unwrap();
         assert_eq!(measures.sharpness, 0.0);
         assert_eq!((measures.saturated_px, measures.saturated_any_px), (0, 81));
         assert_eq!(measures.mean_rgb, [250.0, 251.0, 10.0]);
+    }
+
+    #[test]
+    fn an_empty_mask_has_no_figures() {
+        let image = RgbImage::from_pixel(9, 9, Rgb([250, 251, 10]));
         let empty = MaskSpans::from_mask(&GrayImage::new(9, 9))
             .measure(&image, 250)
             .unwrap();

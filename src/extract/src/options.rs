@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 use std::thread::available_parallelism;
 
-use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::SATURATION_LEVEL;
 use relit_data::shard::{Align, ArrayTask, ExtractionSettings, ImageSize, Layout};
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 use super::scale;
 

@@ -141,7 +141,8 @@ pub(super) use tests::record;
 mod tests {
     use super::*;
     use relit_data::geometry::Rect;
-    use relit_data::image_stats::{Measures, SPEC_NET_GATE};
+    use relit_data::image_stats::Measures;
+    use relit_data::spec_net_gate::SPEC_NET_GATE;
 
     /// A sample whose brightness is `level`, of its own picture.
     pub(in super::super) fn record(index: u32, level: f64) -> FrameRecord {

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 use relit_data::shard::Dataset;
-use relit_test_support::{ffmpeg, turning};
+use relit_test_support::{ffmpeg, is_named, turning};
 use tempfile::TempDir;
 
 const OBJECT_PX: u64 = 24 * 30;
@@ -239,20 +239,22 @@ fn what_lies_beside_sessions_is_named_once() {
             "--size",
             "16",
             "--align=off",
+            "--json",
         ])
         .current_dir(inputs.0.path())
         .output()
         .unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(3), "{said}");
-    for name in ["sessions/cup", "sessions/notes.txt"] {
-        assert_eq!(
-            said.matches(&format!("{name}: left out")).count(),
-            1,
-            "{said}"
-        );
-    }
-    assert!(said.contains("2 left out"), "{said}");
+    let lines = said.lines().map(serde_json::from_str::<serde_json::Value>);
+    let events: Vec<_> = lines.map(Result::unwrap).collect();
+    let left_out = events.iter().filter(|event| event["event"] == "left_out");
+    let mut left_out: Vec<&str> = left_out
+        .map(|event| event["input"].as_str().unwrap())
+        .collect();
+    left_out.sort_unstable();
+    assert_eq!(left_out, ["sessions/cup", "sessions/notes.txt"]);
+    assert_eq!(events.last().unwrap()["left_out"], 2);
 }
 
 #[test]
@@ -292,20 +294,25 @@ fn masks_of_other_programs_mark_the_object_or_are_refused() {
     ] {
         let (code, errors) = inputs.extract(&["clip.mkv", "--mask", mask, "-o", "out"]);
         assert_eq!(code, Some(0), "{mask}: {errors}");
-        assert_eq!(errors.contains("the mask"), noted, "{mask}: {errors}");
+        assert_eq!(
+            is_named(&errors, &["warning", "mask"]),
+            noted,
+            "{mask}: {errors}"
+        );
         assert_eq!(inputs.mask_px(), OBJECT_PX, "{mask}");
         fs::remove_dir_all(inputs.path("out")).unwrap();
     }
-    for (mask, why) in [
-        ("photo.png", "not a mask"),
-        ("labels.png", "0, 1, 2"),
-        ("lying.png", "side"),
+    for (mask, values) in [
+        ("photo.png", &[][..]),
+        ("labels.png", &["0", "1", "2"]),
+        ("lying.png", &["48 x 64", "64 x 48"]),
     ] {
         let (code, errors) = inputs.extract(&["clip.mkv", "--mask", mask, "-o", "out"]);
         assert_eq!(code, Some(1), "{mask}: {errors}");
         assert!(
-            errors.contains(mask) && errors.contains(why),
+            is_named(&errors, &[&[mask], values].concat()),
             "{mask}: {errors}"
         );
+        assert!(!inputs.path("out").join("clip.tar").exists(), "{mask}");
     }
 }

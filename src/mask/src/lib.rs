@@ -37,7 +37,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod checking;
+mod against_turn;
 mod earlier;
 mod editor;
 mod engine;
@@ -51,7 +51,7 @@ mod record;
 mod request;
 mod sampling;
 
-pub use checking::{CheckOutput, MaskReport, MaskVerdict, check_mask};
+pub use against_turn::{CheckOutput, MaskReport, MaskVerdict, check_mask};
 pub use editor::edit;
 pub use engine::{MaskEngine, OPENCV_KNOWS_NO_TURN};
 pub use error::MaskingError;

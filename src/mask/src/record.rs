@@ -293,8 +293,8 @@ mod tests {
             turn_frames: Vec::new(),
         };
         let refused = |seeds| of(None, seeds).hints().unwrap_err().to_string();
-        assert_eq!(refused(None), "it records no hints");
-        assert!(refused(Some("%")).starts_with("its seeds are not valid"));
-        assert!(refused(Some("aaaa")).contains("not a PNG"));
+        assert!(refused(None).contains("hints"));
+        assert!(refused(Some("%")).contains("seeds"));
+        assert!(refused(Some("aaaa")).contains("PNG"));
     }
 }

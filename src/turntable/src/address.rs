@@ -222,12 +222,14 @@ mod tests {
         ));
         let found = the_one(vec![mouse, uno.clone()]).unwrap();
         assert_eq!(found, PathBuf::from("/dev/ttyACM0"));
-        let error = the_one(vec![clone, uno]).unwrap_err().to_string();
-        assert!(
-            error.contains("/dev/ttyACM0 (USB Serial, 2341:0043), /dev/ttyUSB0"),
-            "{error}"
-        );
-        assert!(error.ends_with("serial:/dev/ttyACM0"), "{error}");
+        let error = the_one(vec![clone, uno]).unwrap_err();
+        let text = error.to_string();
+        let TurntableError::SeveralCandidates(ports) = error else {
+            panic!("{error}");
+        };
+        assert_eq!(ports[0], "/dev/ttyACM0 (USB Serial, 2341:0043)");
+        assert!(ports[1].starts_with("/dev/ttyUSB0 "), "{ports:?}");
+        assert!(text.contains("serial:/dev/ttyACM0"), "{text}");
     }
 
     proptest! {

@@ -151,6 +151,7 @@ impl Identity {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
+    use relit_test_support::is_named;
 
     use super::super::protocol::ControllerState;
     use super::*;
@@ -211,14 +212,27 @@ mod tests {
     fn a_turn_without_room_is_refused_with_the_numbers_and_a_way_out() {
         let here = status(100.0, 100.0);
         let error = TurnPlan::new(&identity(-262.0, 400.0), &here, 7.2, 360.0).unwrap_err();
-        let text = error.to_string();
-        assert!(
-            text.contains("from 100.000") && text.contains("400.000"),
-            "{text}"
-        );
-        assert!(text.contains("between -259.180 and 37.180"), "{text}");
+        let TurntableError::NoRoom {
+            from_deg,
+            high_deg,
+            ref way_out,
+            ..
+        } = error
+        else {
+            panic!("{error}");
+        };
+        assert_eq!((from_deg, high_deg), (100.0, 400.0));
+        assert!(is_named(way_out, &["-259.180", "37.180"]), "{way_out}");
+        assert!(is_named(
+            &error.to_string(),
+            &["100.000", "400.000", way_out]
+        ));
         let error = TurnPlan::new(&identity(-100.0, 100.0), &here, 7.2, 360.0).unwrap_err();
-        assert!(error.to_string().contains("no place has room"), "{error}");
+        let TurntableError::NoRoom { way_out, .. } = error else {
+            panic!("{error}");
+        };
+        // There is none to go to.
+        assert!(!way_out.contains(".180"), "{way_out}");
     }
 
     #[test]

@@ -142,19 +142,20 @@ mod tests {
 
     #[test]
     fn what_is_no_address_is_refused_for_what_it_is() {
-        let says = |text: &str, words: &[&str]| {
+        // By what is to be given instead.
+        let asks_for = |text: &str, ways_out: &[&str]| {
             let said = fault(text);
             assert!(
-                words.iter().any(|word| said.contains(word)),
+                ways_out.iter().any(|way_out| said.contains(way_out)),
                 "{text}: {said}"
             );
         };
-        let (port, brackets) = ("is not a port", "stands in brackets");
+        let (port, brackets) = ("65535", "]:PORT");
         for text in ["http://localhost:8430", "https://0.0.0.0"] {
-            says(text, &["is a URL"]);
+            asks_for(text, &[" localhost:8430"]);
         }
         for text in ["localhost", "0.0.0.0", "::1", "[::1]", "", "rig.local"] {
-            says(text, &["the port is missing"]);
+            asks_for(text, &["ADDRESS:PORT"]);
         }
         for text in [
             "localhost:",
@@ -165,12 +166,12 @@ mod tests {
             "[::1]:",
             "::1:x",
         ] {
-            says(text, &[port, brackets]);
+            asks_for(text, &[port, brackets]);
         }
         for text in ["::1:8430", "::1:84300", "fe80::1:8430"] {
-            says(text, &[brackets]);
+            asks_for(text, &[brackets]);
         }
-        says("fe80::1:8430x", &[port, brackets]);
-        says("a b:8430", &["is not the name of this machine"]);
+        asks_for("fe80::1:8430x", &[port, brackets]);
+        asks_for("a b:8430", &["\"a b\""]);
     }
 }

@@ -209,12 +209,9 @@ mod tests {
         assert_eq!(mode, 0o600);
         assert_eq!(Token::from_file_or_new(&path).unwrap(), token);
         let nowhere = Token::from_file_or_new(&folder.path().join("none/token"));
-        assert!(
-            nowhere
-                .unwrap_err()
-                .to_string()
-                .contains("could not be made")
-        );
+        let error = nowhere.unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::NotFound);
+        assert!(error.to_string().contains("none/token"), "{error}");
     }
 
     #[test]

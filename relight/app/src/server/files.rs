@@ -215,17 +215,21 @@ mod tests {
         page(&built);
         fs::write(built.join("a.wasm"), b"\0as").unwrap();
         let incomplete = || match PageFiles::read(&built) {
-            Err(PageFault::Incomplete { path, why }) => format!("{} {why}", path.display()),
+            Err(PageFault::Incomplete { path, why }) => (path, why),
             other => panic!("{other:?}"),
         };
-        assert!(incomplete().ends_with("a.wasm has 3 bytes instead of 4"));
+        let (path, why) = incomplete();
+        assert!(
+            path.ends_with("a.wasm") && why.contains('3') && why.contains('4'),
+            "{why}"
+        );
         fs::remove_file(built.join("a.wasm")).unwrap();
-        assert!(incomplete().contains("a.wasm cannot be read"));
+        assert!(incomplete().0.ends_with("a.wasm"));
         fs::write(built.join(LIST), r#"{"files": {"../secret": 1}}"#).unwrap();
         fs::write(folder.path().join("secret"), "x").unwrap();
-        assert!(incomplete().contains("secret cannot be read"));
+        assert!(incomplete().0.ends_with("secret"));
         fs::write(built.join(LIST), "[").unwrap();
-        assert!(incomplete().contains("is not a list"));
+        assert!(incomplete().0.ends_with(LIST));
     }
 
     #[test]

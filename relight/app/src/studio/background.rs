@@ -227,10 +227,10 @@ impl StudioBackground {
                 }
             }
             Content::Panorama(panorama) => {
-                let key = (scene.size, [scene.field, scene.down].map(f64::to_bits));
+                let key = (scene.size, [scene.fov, scene.down].map(f64::to_bits));
                 if panorama.view.as_ref().is_none_or(|(was, _)| *was != key) {
                     let extent = scene.panorama_extent();
-                    let view = PanoramaView::new(extent, scene.field, scene.down);
+                    let view = PanoramaView::new(extent, scene.fov, scene.down);
                     panorama.view = Some((key, view));
                 }
             }

@@ -35,7 +35,7 @@ impl KeptEnvironment {
         background.prepare(scene, longest);
         let mut bare = scene.clone();
         bare.objects.clear();
-        bare.light.turn = 0.0;
+        bare.light.angle = 0.0;
         let key = (bare, longest);
         let tilt = SceneEnvironment::ground_tilt(scene, background.for_scene());
         let kept = self.0.take().filter(|(was, _)| *was == key);
@@ -70,7 +70,7 @@ pub(super) struct Drawing<'a> {
     pub(super) setting: &'a SceneEnvironment,
     pub(super) background: &'a StudioBackground,
     scene: InsertScene<'a>,
-    turn: f64,
+    angle: f64,
 }
 
 impl<'a> Drawing<'a> {
@@ -98,7 +98,7 @@ impl<'a> Drawing<'a> {
             scene: setting.scene(objects.collect())?,
             setting,
             background,
-            turn: scene.light.turn.to_radians(),
+            angle: scene.light.angle.to_radians(),
         })
     }
 
@@ -107,8 +107,8 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// Those of the render layers.
     pub(super) fn picture(&self) -> Result<(Rgb<Linear>, Vec<Value>), Refusal> {
-        let layers = self.scene.layers(self.turn)?;
-        let background = self.background.seen(self.setting, self.turn);
+        let layers = self.scene.layers(self.angle)?;
+        let background = self.background.seen(self.setting, self.angle);
         let boxes = layers.iter().map(|layer| json!({ "box": seen(layer) }));
         let picture = self.scene.compose(&background, &layers, 0);
         Ok((picture, boxes.collect()))
@@ -119,9 +119,9 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// Those of the render layers.
     pub(super) fn layers(&self) -> Result<(Vec<Vec<u8>>, Vec<Value>), Refusal> {
-        let background = self.background.seen(self.setting, self.turn);
+        let background = self.background.seen(self.setting, self.angle);
         let (mut parts, mut objects) = (vec![shown(&background)], Vec::new());
-        for layer in &self.scene.layers(self.turn)? {
+        for layer in &self.scene.layers(self.angle)? {
             parts.push(covering(layer.colours(), layer.alpha()));
             let mut lies = placed(layer.place(), layer.alpha().extent());
             lies["box"] = json!(seen(layer));

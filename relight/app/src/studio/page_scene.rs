@@ -29,7 +29,7 @@ struct PageLight {
     colour: String,
     size: f64,
     ambient: f64,
-    turn: f64,
+    angle: f64,
 }
 
 /// Where the light comes from.
@@ -141,7 +141,7 @@ impl PageLight {
         LightDescription {
             lamp: is_lamp.then(|| format!("{azimuth},{elevation},{colour},{size}")),
             ambient: is_lamp.then_some(self.ambient),
-            turn: self.turn,
+            angle: self.angle,
             ..LightDescription::default()
         }
     }
@@ -171,7 +171,7 @@ impl PageLight {
             colour: colour.unwrap_or("#ffffff").to_owned(),
             size: lamp.size,
             ambient: found.map_or(DiscLamp::default().ambient, |lamp| lamp.ambient),
-            turn: light.turn,
+            angle: light.angle,
         })
     }
 }
@@ -197,9 +197,9 @@ mod tests {
     fn a_scene_comes_back_from_the_page_as_it_was() {
         for light in [
             "",
-            "turn = 30.0",
+            "angle = 30.0",
             "lamp = \"60,-30,#ff8000,12\", ambient = 0.4",
-            "lamp = \"-20,10,3200K,30\", ambient = 0.15, turn = -5.5",
+            "lamp = \"-20,10,3200K,30\", ambient = 0.15, angle = -5.5",
         ] {
             let scene = parsed(light);
             let page = PageScene::new(&scene, &[7]).unwrap();
@@ -227,14 +227,15 @@ mod tests {
     #[test]
     fn light_that_the_page_has_not_is_refused_by_name() {
         let refused = |light: &str| PageScene::new(&parsed(light), &[1]).unwrap_err().0;
-        assert!(refused("panorama = \"c.hdr\"").contains("a file of its own"));
-        assert!(refused("object = \"m.png\"").contains("object of the background"));
+        let [file, object] = ["panorama = \"c.hdr\"", "object = \"m.png\""].map(refused);
+        assert!(file.contains("file"), "{file}");
+        assert!(object.contains("object"), "{object}");
     }
 
     #[test]
     fn numbers_out_of_range_are_refused() {
         let mut page = PageScene::new(&parsed(""), &[1]).unwrap();
-        page.rest.insert("field".to_owned(), 1e9.into());
+        page.rest.insert("fov".to_owned(), 1e9.into());
         let described = page.described("a.jpg".into(), vec![ObjectFiles::default()]);
         assert!(described.is_err());
     }

@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
-use relight_core::light::NormalsFrame;
 use relight_core::parallel;
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, MaskSource};
 use relight_photo::files::{DecompositionFigures, DecompositionFiles, PhotoInput, PhotoReading};
@@ -15,8 +14,9 @@ use relit_data::causes::with_causes;
 use serde_json::{Value, json};
 
 use crate::commands::CommandResult;
+use crate::folder::OutputFolder;
+use crate::inputs::NormalsArgument;
 use crate::photos::{NetworkArguments, PhotoArguments, name_lost, outcome};
-use crate::values::{NORMALS_Y, one_of};
 
 /// Each photograph takes its memory, gigabytes where it is large.
 const MAX_SIDE_BY_SIDE: usize = 4;
@@ -36,33 +36,37 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     photos: PhotoArguments,
-    /// The folder for the results; several photographs have a folder each in it.
-    #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
     #[command(flatten)]
+    folder: OutputFolder,
+    /// Of each shard the first so many samples, which are spread over the turn.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    count: Option<u32>,
+    /// How many photographs are decomposed in parallel [default: one a core, at most 4].
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    threads: Option<usize>,
+    #[command(flatten, next_help_heading = "Network")]
     network: NetworkArguments,
     /// Leave out the mirror image: faster, and a little worse.
     #[arg(long)]
     no_mirror: bool,
-    /// Another network's normals: MoGe-2's or Metric3D's published file, or 1 x 3 x 256 x 256 in, (x - 0.5) / 0.5 of
-    /// sRGB values; 1 x 3 x 256 x 256 (vectors) or 1 x 2 x 256 x 256 (slopes) out.
+    /// Take the normals of another network: the published file of MoGe-2 or Metric3D, or one of 256 x 256 pixels (see the
+    /// manual).
     #[arg(long, value_name = "FILE.onnx")]
     normals: Option<PathBuf>,
-    /// Which way y points in that network's normals [default: as MoGe-2 and Metric3D have it, else up].
-    #[arg(long, value_parser = one_of(NORMALS_Y), value_name = "WAY", requires = "normals")]
-    normals_y: Option<NormalsFrame>,
-    /// Of each shard the first so many samples, which are spread over the turn.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    count: Option<u32>,
-    /// How many photographs are decomposed side by side [default: as many as there are cores, at most 4].
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
-    threads: Option<usize>,
+    #[command(flatten)]
+    normals_frame: NormalsArgument,
 }
 
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
-        self.frames_fault().or_else(|| self.mask_fault())
+        let faults = self.frames_fault().or_else(|| self.mask_fault());
+        faults.or_else(|| self.normals_fault())
+    }
+
+    fn normals_fault(&self) -> Option<String> {
+        let is_lone = self.normals.is_none() && self.normals_frame.normals_y.is_some();
+        is_lone.then(|| "--normals-y is for --normals, and that is not given".to_owned())
     }
 
     fn frames_fault(&self) -> Option<String> {
@@ -78,7 +82,7 @@ impl Arguments {
         let given = [
             ("--mask", self.photos.mask.is_some()),
             ("--rect", self.photos.rect.is_some()),
-            ("--transfer", self.photos.transfer.is_some()),
+            ("--transfer", self.photos.encoding.transfer.is_some()),
         ];
         let (option, _) = given.into_iter().find(|(_, is_given)| *is_given)?;
         let frames = frames.display();
@@ -108,7 +112,7 @@ impl Arguments {
         let (weights, name) = self.network.weights()?;
         let mut decomposer = Decomposer::new(&weights)?;
         if let Some(path) = &self.normals {
-            decomposer.read_normals(path, self.normals_y)?;
+            decomposer.read_normals(path, self.normals_frame.normals_y)?;
             let name = decomposer.normals_network().unwrap_or_default();
             let event = json!({ "event": "normals", "file": path, "network": name });
             console.say(&format!("{}: taken for {name}", path.display()), &event);
@@ -118,7 +122,7 @@ impl Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let found = (arguments.photos).find(arguments.count, &arguments.output, console)?;
+    let found = (arguments.photos).find(arguments.count, &arguments.folder.output, console)?;
     let inputs = &found.inputs;
     let own_folders = inputs.len() > 1 || arguments.photos.has_set();
     let run = Run::new(arguments, own_folders, console)?;
@@ -180,7 +184,7 @@ impl Run {
             weights,
             options: arguments.options(),
             reading: arguments.photos.reading(),
-            output: arguments.output.clone(),
+            output: arguments.folder.output.clone(),
             own_folders,
         })
     }

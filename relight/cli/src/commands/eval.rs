@@ -1,21 +1,21 @@
 //! `relight eval`: the protocols of the paper's tables.
 
+use std::borrow::Cow;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::fmt::Display;
+use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
-use relight_core::light::NormalsFrame;
 use relight_core::reader::{TruthLayout, TruthSet};
-use relight_core::render::{DiffuseForm, SpecularForm};
+use relight_core::render::SpecularForm;
 use relight_eval::{
     EvalProgress, IntrinsicInput, Predictions, RelightMethod, RelightingRecipe, RelightingSet,
     ScoreTable, evaluate_highlights, evaluate_intrinsic, evaluate_light, evaluate_normals,
     evaluate_relighting, evaluate_turns, make_relighting,
 };
 use relight_photo::decompose::Decomposer;
-use relight_photo::nets::Weights;
-use relight_synth::{Folders, Library};
+use relight_synth::Library;
 use relight_turn::{TurnNetwork, TurnNetworks};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
@@ -23,21 +23,25 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::commands::CommandResult;
-use crate::library::read_library;
+use crate::folder::OutputFolder;
+use crate::inputs::{NormalsArgument, WeightsArgument};
+use crate::library::{ObjectSources, read_library};
+use crate::lighting::ShadingArgument;
 use crate::shipped;
-use crate::values::{Choices, DIFFUSE_FORMS, NORMALS_Y, one_of};
+use crate::values::{Choices, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight eval mit --data MIT-intrinsic
       albedo and shading of the baselines, by both conventions
   relight eval mit --data MIT-intrinsic --predictions out/net -o mit.json
-      the same beside the estimates out/net/<object>/{albedo,shading}.png
+      the same and the estimates out/net/<object>/{albedo,shading}.png
   relight eval normals --layout janner --data intrinsics --count 500 --predictions out/net
       estimates out/net/<name>/normal.png on 500 images, spread over the set
-  relight eval relighting --data relighting --make
-      100 objects under 30 lights each, made by the renderer of `relight synth`
-  relight synth --turn --light monte-carlo --count 24 --frames 60 --size 128 --seed 2611 -o turns
+  relight eval relighting make -o relighting
+  relight eval relighting --data relighting
+      100 objects under 30 lights each, made by the renderer of relight synth
+  relight synth turns --light-kind monte-carlo --count 24 --frames 60 --size 128 --seed 2611 -o turns
   relight eval turn --data turns
       24 synthetic turns in rooms that no network was trained in";
 
@@ -66,54 +70,71 @@ enum Protocol {
     Light {
         #[command(flatten)]
         set: SetArguments,
-        /// How shading follows from coefficients.
-        #[arg(long, default_value = "irradiance", value_parser = one_of(DIFFUSE_FORMS))]
-        diffuse: DiffuseForm,
+        #[command(flatten)]
+        shading: ShadingArgument,
     },
-    /// Highlights: MSE and DSSIM of the highlight and of what it leaves.
+    /// Highlights: MSE and DSSIM of the highlight and of the rest.
     Highlight {
         #[command(flatten)]
         set: SetArguments,
     },
     /// Relighting: MSE and DSSIM of an object under many lights, from its image under one.
-    Relighting(RelightingArguments),
-    /// Whole turns in unknown rooms: normals, albedo, and whether what is said to be sure is right.
+    #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+    Relighting {
+        #[command(subcommand)]
+        step: Option<RelightingStep>,
+        #[command(flatten)]
+        table: Option<TableArguments>,
+        #[command(flatten)]
+        estimates: EstimateArguments,
+        #[command(flatten)]
+        weights: WeightsArgument,
+    },
+    /// Whole turns in unknown rooms: normals, albedo, and whether what is confident is right.
     Turn(TurnArguments),
+}
+
+#[derive(Subcommand)]
+enum RelightingStep {
+    /// Make the set: objects, each under many lights. Objects that are there are kept.
+    Make(MakeArguments),
+}
+
+/// The ground truth, and the table of how far it is met.
+#[derive(Args)]
+struct TableArguments {
+    /// The folder of the ground truth.
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Write the table as JSON, with all single scores, to this file.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
 }
 
 #[derive(Args)]
 struct TurnArguments {
-    /// Turns with their ground truth, as relight synth --turn writes them.
-    #[arg(long, value_name = "DIR")]
-    data: PathBuf,
-    /// Weights of the network of turns [default: those that come with the program].
-    #[arg(long, value_name = "FILE")]
-    turn_network: Option<PathBuf>,
-    /// Write the table as JSON, with the scores of each turn, to this file.
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    table: TableArguments,
+    #[command(flatten)]
+    weights: WeightsArgument,
 }
 
+/// The estimates that are measured besides the baselines.
 #[derive(Args)]
-struct CommonArguments {
-    /// The folder of the ground truth.
-    #[arg(long, value_name = "DIR")]
-    data: PathBuf,
+struct EstimateArguments {
     /// A folder of estimates, with a folder for each image. May be given several times.
     #[arg(long, value_name = "DIR")]
     predictions: Vec<PathBuf>,
-    /// Which way y points in estimated normals.
-    #[arg(long, value_name = "WAY", default_value = "up", value_parser = one_of(NORMALS_Y))]
-    normals_y: NormalsFrame,
-    /// Write the table as JSON, with the scores of each image, to this file.
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    #[command(flatten)]
+    normals_frame: NormalsArgument,
 }
 
 #[derive(Args)]
 struct SetArguments {
     #[command(flatten)]
-    common: CommonArguments,
+    table: TableArguments,
+    #[command(flatten)]
+    estimates: EstimateArguments,
     /// How the folder of the ground truth is laid out.
     #[arg(long, value_name = "LAYOUT", default_value = TruthLayout::Mit.name(), value_parser = layout_parser())]
     layout: TruthLayout,
@@ -129,36 +150,20 @@ fn layout_parser() -> impl TypedValueParser<Value = TruthLayout> {
 }
 
 #[derive(Args)]
-struct RelightingArguments {
+struct MakeArguments {
     #[command(flatten)]
-    common: CommonArguments,
-    /// Make the set first, in the folder --data; objects that are there are kept.
-    #[arg(long)]
-    make: bool,
+    folder: OutputFolder,
     /// How many objects to make.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=999))]
     objects: u16,
     /// Under how many lights.
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(2..=99))]
     lights: u16,
-    /// Width and height of the images.
+    /// The longest side of the pictures, which are square, pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=2048))]
     size: u32,
-    /// What objects, materials and lights are drawn from.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
-    /// Make objects that cast no shadows on themselves.
-    #[arg(long, requires = "make")]
-    no_shadows: bool,
-    /// The network's weights [default: those that come with the program].
-    #[arg(long, value_name = "FILE")]
-    weights: Option<PathBuf>,
-    /// Meshes to draw from besides procedural shapes (.obj, .gltf, .glb).
-    #[arg(long, value_name = "DIR", requires = "make")]
-    meshes: Option<PathBuf>,
-    /// Panoramas (.hdr, .exr) in place of the synthetic ones.
-    #[arg(long, value_name = "DIR", requires = "make")]
-    panoramas: Option<PathBuf>,
+    #[command(flatten)]
+    sources: ObjectSources,
 }
 
 const INPUTS: Choices<IntrinsicInput> = &[
@@ -176,65 +181,83 @@ impl Arguments {
             | Protocol::Highlight { set } => {
                 (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
             }
-            Protocol::Relighting(_) | Protocol::Turn(_) => None,
+            Protocol::Relighting { .. } | Protocol::Turn(_) => None,
         }
-    }
-
-    /// The file for the table.
-    fn output(&self) -> Option<&Path> {
-        let common = match &self.protocol {
-            Protocol::Turn(arguments) => return arguments.output.as_deref(),
-            Protocol::Mit { set, .. }
-            | Protocol::Normals { set }
-            | Protocol::Light { set, .. }
-            | Protocol::Highlight { set } => &set.common,
-            Protocol::Relighting(arguments) => &arguments.common,
-        };
-        common.output.as_deref()
     }
 }
 
-impl CommonArguments {
-    /// What the table calls the images.
-    fn split(&self, which: &str) -> String {
+impl EstimateArguments {
+    fn predictions(&self) -> Vec<Predictions> {
+        let frame = self.normals_frame.or_up();
+        let folder = |path: &PathBuf| Predictions::new(path.clone(), frame);
+        self.predictions.iter().map(folder).collect()
+    }
+}
+
+impl TableArguments {
+    fn name(&self) -> Cow<'_, str> {
         let name = self.data.file_name().unwrap_or(self.data.as_os_str());
-        format!("{which} {}", name.to_string_lossy())
+        name.to_string_lossy()
     }
 
-    fn predictions(&self) -> Vec<Predictions> {
-        let folder = |path: &PathBuf| Predictions::new(path.clone(), self.normals_y);
-        self.predictions.iter().map(folder).collect()
+    /// What the table calls the images.
+    fn split(&self, which: &str) -> String {
+        format!("{which} {}", self.name())
+    }
+
+    /// Prints the table, and writes it where that is asked for.
+    fn report(&self, table: &(impl Serialize + Display), console: Console) -> CommandResult {
+        if let Some(path) = &self.output {
+            let mut bytes = serde_json::to_vec_pretty(table)?;
+            bytes.push(b'\n');
+            write_whole(path, &bytes)
+                .map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
+        }
+        let event = json!({ "event": "table", "table": table });
+        console.say(table.to_string().trim_end(), &event);
+        Ok(Outcome::Success)
     }
 }
 
 impl SetArguments {
     fn open(&self) -> Result<(TruthSet, String), Box<dyn Error>> {
-        let set = TruthSet::open(&self.common.data, self.layout)?;
+        let set = TruthSet::open(&self.table.data, self.layout)?;
         let all = set.names().len();
         let set = set.spread(self.count.unwrap_or(all));
         let count = set.names().len();
         let split = if count == all {
-            self.common.split("all of")
+            self.table.split("all of")
         } else {
-            self.common.split(&format!("{count} spread over"))
+            self.table.split(&format!("{count} spread over"))
         };
         Ok((set, split))
     }
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let (table, outcome) = match &arguments.protocol {
+    match &arguments.protocol {
         Protocol::Mit { set, .. }
         | Protocol::Normals { set }
         | Protocol::Light { set, .. }
         | Protocol::Highlight { set } => {
-            (images(&arguments.protocol, set, console)?, Outcome::Success)
+            let table = images(&arguments.protocol, set, console)?;
+            set.table.report(&table, console)
         }
-        Protocol::Relighting(arguments) => relighting(arguments, console)?,
-        Protocol::Turn(arguments) => return turns(arguments, console),
-    };
-    report(&table, arguments.output(), console)?;
-    Ok(outcome)
+        Protocol::Relighting {
+            step: Some(RelightingStep::Make(arguments)),
+            ..
+        } => make(arguments, console),
+        Protocol::Relighting {
+            step: None,
+            table,
+            estimates,
+            weights,
+        } => {
+            let table = table.as_ref().ok_or("--data is missing")?;
+            relighting(table, estimates, weights, console)
+        }
+        Protocol::Turn(arguments) => turns(arguments, console),
+    }
 }
 
 /// The table of a protocol over single images.
@@ -243,30 +266,26 @@ fn images(
     arguments: &SetArguments,
     console: Console,
 ) -> Result<ScoreTable, Box<dyn Error>> {
-    let ((set, split), found) = (arguments.open()?, arguments.common.predictions());
+    let ((set, split), found) = (arguments.open()?, arguments.estimates.predictions());
     with_progress("evaluating", console, |progress| match protocol {
         Protocol::Mit { input, .. } => evaluate_intrinsic(&set, &split, *input, &found, progress),
-        Protocol::Light { diffuse, .. } => evaluate_light(&set, &split, *diffuse, &found, progress),
+        Protocol::Light { shading, .. } => {
+            evaluate_light(&set, &split, shading.diffuse(), &found, progress)
+        }
         Protocol::Highlight { .. } => evaluate_highlights(&set, &split, &found, progress),
         _ => evaluate_normals(&set, &split, &found, progress),
     })
 }
 
 fn relighting(
-    arguments: &RelightingArguments,
+    table: &TableArguments,
+    estimates: &EstimateArguments,
+    weights: &WeightsArgument,
     console: Console,
-) -> Result<(ScoreTable, Outcome), Box<dyn Error>> {
-    let outcome = if arguments.make {
-        make(arguments, console)?
-    } else {
-        Outcome::Success
-    };
-    let common = &arguments.common;
-    let set = RelightingSet::open(&common.data)?;
-    let network = match &arguments.weights {
-        None => shipped::decomposer()?,
-        Some(path) => Decomposer::new(&Weights::read(path)?)?,
-    };
+) -> CommandResult {
+    let set = RelightingSet::open(&table.data)?;
+    let (weights, _) = weights.read_or(shipped::weights)?;
+    let network = Decomposer::new(&weights)?;
     let mut methods = vec![
         RelightMethod::Naive,
         RelightMethod::Photograph(&network),
@@ -274,55 +293,47 @@ fn relighting(
         RelightMethod::Oracle(SpecularForm::Power),
         RelightMethod::Oracle(SpecularForm::Lobe),
     ];
-    let found = common.predictions().into_iter();
+    let found = estimates.predictions().into_iter();
     methods.extend(found.map(RelightMethod::Predictions));
-    let table = with_progress("evaluating", console, |progress| {
-        evaluate_relighting(&set, &common.split("all of"), &methods, progress)
+    let scores = with_progress("evaluating", console, |progress| {
+        evaluate_relighting(&set, &table.split("all of"), &methods, progress)
     })?;
-    Ok((table, outcome))
+    table.report(&scores, console)
 }
 
-fn make(arguments: &RelightingArguments, console: Console) -> CommandResult {
+fn make(arguments: &MakeArguments, console: Console) -> CommandResult {
+    let sources = &arguments.sources;
     let recipe = RelightingRecipe {
         objects: arguments.objects.into(),
         lights: arguments.lights.into(),
         size: arguments.size,
-        seed: arguments.seed,
-        shadows: !arguments.no_shadows,
+        seed: sources.seed,
+        shadows: !sources.no_shadows,
     };
-    let folders = Folders {
-        meshes: arguments.meshes.clone(),
-        textures: None,
-        panoramas: arguments.panoramas.clone(),
-    };
-    let (library, outcome) = read_library(&folders, Library::validation, console)?;
+    let (library, outcome) = read_library(&sources.folders(None), Library::validation, console)?;
+    let out = &arguments.folder.output;
     with_progress("making objects", console, |progress| {
-        make_relighting(&recipe, &library, &arguments.common.data, progress)
+        make_relighting(&recipe, &library, out, progress)
     })?;
+    let (objects, lights) = (recipe.objects, recipe.lights);
+    let text = format!("{}: {objects} objects under {lights} lights", out.display());
+    let event =
+        json!({ "event": "relighting_set", "output": out, "objects": objects, "lights": lights });
+    console.say(&text, &event);
     Ok(outcome)
 }
 
 fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
-    let weights = match &arguments.turn_network {
-        Some(path) => Weights::read(path)?,
-        None => shipped::turn_weights()?,
-    };
+    let (weights, _) = arguments.weights.read_or(shipped::turn_weights)?;
     let networks = TurnNetworks {
         photo: shipped::weights()?,
         turn: TurnNetwork::new(&weights)?,
     };
-    let name = arguments
-        .data
-        .file_name()
-        .unwrap_or(arguments.data.as_os_str());
-    let split = name.to_string_lossy();
-    let table = with_progress("solving", console, |progress| {
-        evaluate_turns(&arguments.data, &split, &networks, progress)
+    let table = &arguments.table;
+    let scores = with_progress("solving", console, |progress| {
+        evaluate_turns(&table.data, &table.name(), &networks, progress)
     })?;
-    write_json(&table, arguments.output.as_deref())?;
-    let event = json!({ "event": "table", "table": table });
-    console.say(table.to_string().trim_end(), &event);
-    Ok(Outcome::Success)
+    table.report(&scores, console)
 }
 
 fn with_progress<T, E: Error + 'static>(
@@ -337,25 +348,4 @@ fn with_progress<T, E: Error + 'static>(
     });
     bar.finish_and_clear();
     Ok(result?)
-}
-
-fn write_json(table: &impl Serialize, output: Option<&Path>) -> Result<(), Box<dyn Error>> {
-    if let Some(path) = output {
-        let mut bytes = serde_json::to_vec_pretty(table)?;
-        bytes.push(b'\n');
-        write_whole(path, &bytes)
-            .map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
-    }
-    Ok(())
-}
-
-fn report(
-    table: &ScoreTable,
-    output: Option<&Path>,
-    console: Console,
-) -> Result<(), Box<dyn Error>> {
-    write_json(table, output)?;
-    let event = json!({ "event": "table", "table": table });
-    console.say(table.to_string().trim_end(), &event);
-    Ok(())
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use relight_core::image::Extent;
 use relight_photo::files::{
     MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading, write_picture,
@@ -20,70 +20,40 @@ use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
+use crate::lighting::{LightArguments, RotationArguments};
 use crate::photos::{Network, NetworkArguments, PhotoArguments, name_lost, not_an_input, outcome};
-use crate::values::{WHITE_BALANCES, degrees, one_of, within};
+use crate::values::{WHITE_BALANCES, one_of, within};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight relight mug.jpg --mask mug-mask.png --light studio.hdr -o relit.png
       the mug in the light of a panorama, and before it
-  relight relight mug.jpg --mask mug-mask.png --lamp 60,30,3200K --keep-background -o relit.png
+  relight relight mug.jpg --mask mug-mask.png --lamp 60,30,3200K --background photo -o relit.png
       in the light of a warm lamp from the right, at its own place
-  relight relight mug.jpg --mask mug-mask.png --light studio.hdr --turn 360 --seconds 10 -o turn.mp4
-      a video in which the light turns once
+  relight relight mug.jpg --mask mug-mask.png --light studio.hdr --rotate 360 -o rotation.mp4
+      a video in which the light rotates once
   relight relight photos --mask masks --lamp -45,40 -o relit
       many photographs: relit/<name>.png";
 
 /// The longest side of a video's frames where nothing is said.
 const MOVIE_SIDE: usize = 1080;
+/// What `--light` takes for the light that the photograph was taken in.
+const OWN: &str = "own";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     photos: PhotoArguments,
-    /// The picture (.png, .jpg, .exr), or for --turn a video (.mp4, .webm); of several photographs a folder. It is made where
-    /// there is none.
+    /// The picture (.png, .jpg, .exr), or for --rotate a video (.mp4, .webm); of several photographs a folder. It is made
+    /// where it is missing.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// The light: an HDR or EXR panorama, whose middle is what the viewer sees behind the object, or a text file of
-    /// coefficients as relight writes them.
-    #[arg(long, value_name = "FILE", conflicts_with = "lamp")]
-    light: Option<PathBuf>,
-    /// The light: a lamp at so many degrees about the vertical (0 at the viewer's side, 90 on the right, 180 behind) and above
-    /// the horizon, in a colour (#ffd9b0 or 3200K), so many degrees large [default: white, 30].
-    #[arg(
-        long,
-        value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
-        allow_hyphen_values = true
-    )]
-    lamp: Option<DiscLamp>,
-    /// Even light beside a lamp, as a part of it.
-    #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = within(0.0..=10.0, "a part"), requires = "lamp")]
-    ambient: f64,
-    /// Keep the photograph's own light, as it was estimated, to change its exposure or to turn it.
-    #[arg(long, conflicts_with_all = ["light", "lamp"])]
-    own_light: bool,
-    /// Turn the light about the vertical first, from the viewer to the right.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = degrees(), allow_hyphen_values = true)]
-    turned: f64,
-    /// Turn the light by so many degrees, in a video.
-    #[arg(long, value_name = "DEGREES", value_parser = degrees(), allow_hyphen_values = true)]
-    turn: Option<f64>,
-    /// How long the turn takes.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = within(0.01..=3600.0, "seconds"), requires = "turn")]
-    seconds: f64,
-    /// Frames a second of a video.
-    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
-    fps: u32,
-    /// What is behind the object [default: the panorama that lights it; grey where there is none].
-    #[arg(long, value_enum, conflicts_with = "keep_background")]
+    /// What is behind the object [default: the panorama that lights it; with --light own the photograph; else grey].
+    #[arg(long, value_enum)]
     background: Option<BackgroundName>,
-    /// Leave the object where it is, before what its photograph shows.
-    #[arg(long)]
-    keep_background: bool,
-    /// How many degrees of a panorama the picture's longer side shows.
+    /// How many degrees of a panorama the longer side of the picture shows.
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = within(1.0..=150.0, "degrees"))]
-    field: f64,
+    fov: f64,
     /// How the colour of the light is shown.
     #[arg(long, value_parser = one_of(WHITE_BALANCES), default_value = "light")]
     white_balance: WhiteBalance,
@@ -93,12 +63,21 @@ pub(crate) struct Arguments {
     /// The longest side of the result, pixels [default: the photograph's; of a video at most 1080].
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=16_384))]
     size: Option<u32>,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Light")]
+    light: LightArguments,
+    /// Even light besides the lamp, as a part of it.
+    #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = within(0.0..=10.0, "a part"), requires = "lamp")]
+    ambient: f64,
+    #[command(flatten, next_help_heading = "Video")]
+    rotation: RotationArguments,
+    #[command(flatten, next_help_heading = "Network")]
     network: NetworkArguments,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum BackgroundName {
+    /// The photograph: the object stays where it is.
+    Photo,
     /// The panorama that lights it.
     Light,
     /// Grey of 18 %.
@@ -109,16 +88,24 @@ enum BackgroundName {
     White,
 }
 
+/// `--light` as this verb takes it.
+pub(crate) fn or_own(light: Arg) -> Arg {
+    light.value_name("FILE|own").help(
+        "The light: a panorama (.hdr, .exr) with what is behind the object in its middle, or coefficients (.txt); or own, the \
+         photograph's light as it was estimated, to change its exposure or to rotate it",
+    )
+}
+
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
-        if self.light.is_none() && self.lamp.is_none() && !self.own_light {
+        if self.light.is_empty() {
             return Some(
                 "give the new light by --light FILE or --lamp AZIMUTH,ELEVATION".to_owned(),
             );
         }
-        let has_panorama = self.light.is_some();
-        if matches!(self.background, Some(BackgroundName::Light)) && !has_panorama {
+        let has_file = self.light.light.is_some() && !self.is_own_light();
+        if self.background == Some(BackgroundName::Light) && !has_file {
             return Some(
                 "--background light: there is no panorama; give one by --light".to_owned(),
             );
@@ -126,14 +113,13 @@ impl Arguments {
         if self.is_set() {
             return None;
         }
+        let rotates = self.rotation.rotate.is_some();
         let wanted = match OutputKind::from_path(&self.output) {
-            Some(OutputKind::Movie(_)) if self.turn.is_none() => {
-                ".png, .jpg or .exr, or --turn DEGREES"
+            Some(OutputKind::Movie(_)) if !rotates => ".png, .jpg or .exr, or --rotate DEGREES",
+            Some(OutputKind::Png | OutputKind::Jpeg | OutputKind::Exr) if rotates => {
+                ".mp4 or .webm for --rotate"
             }
-            Some(OutputKind::Png | OutputKind::Jpeg | OutputKind::Exr) if self.turn.is_some() => {
-                ".mp4 or .webm for --turn"
-            }
-            None if self.turn.is_some() => ".mp4 or .webm",
+            None if rotates => ".mp4 or .webm",
             None => ".png, .jpg or .exr",
             Some(_) => return None,
         };
@@ -145,17 +131,26 @@ impl Arguments {
         self.photos.photos.len() > 1 || self.photos.has_set()
     }
 
-    /// The light that is asked for, if any is.
+    fn is_own_light(&self) -> bool {
+        self.light.light.as_deref() == Some(Path::new(OWN))
+    }
+
+    /// The new light, unless the photograph's own is asked for.
     fn new_light(&self) -> Result<Option<LightSource>, InsertError> {
-        if let Some(lamp) = self.lamp {
-            let ambient = self.ambient;
-            return Ok(Some(LightSource::Lamp(DiscLamp { ambient, ..lamp })));
+        if self.is_own_light() {
+            return Ok(None);
         }
-        self.light.as_deref().map(LightSource::read).transpose()
+        Ok(self.light.read()?.map(|light| match light {
+            LightSource::Lamp(lamp) => LightSource::Lamp(DiscLamp {
+                ambient: self.ambient,
+                ..lamp
+            }),
+            other => other,
+        }))
     }
 
     fn longest(&self) -> Option<usize> {
-        match (self.size, self.turn) {
+        match (self.size, self.rotation.rotate) {
             (Some(size), _) => Some(size as usize),
             (None, Some(_)) => Some(MOVIE_SIDE),
             (None, None) => None,
@@ -166,7 +161,10 @@ impl Arguments {
         if !self.is_set() {
             return self.output.clone();
         }
-        let ending = if self.turn.is_some() { "mp4" } else { "png" };
+        let ending = match self.rotation.rotate {
+            Some(_) => "mp4",
+            None => "png",
+        };
         self.output.join(format!("{name}.{ending}"))
     }
 }
@@ -241,7 +239,7 @@ impl Run<'_> {
         let frames = match OutputKind::from_path(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
             _ => {
-                let picture = shot.picture(arguments.turned.to_radians())?;
+                let picture = shot.picture(arguments.light.angle())?;
                 write_picture(&output, &picture)?;
                 1
             }
@@ -279,7 +277,9 @@ impl Run<'_> {
             .map(|mask| PhotoReading::mask_path(mask, name));
         let mut inputs: Vec<PathBuf> = mask.into_iter().collect();
         inputs.extend(self.photos.iter().cloned());
-        inputs.extend(arguments.light.clone());
+        if !arguments.is_own_light() {
+            inputs.extend(arguments.light.light.clone());
+        }
         not_an_input(output, &inputs)?;
         // What lies in the way of a folder is told before the work.
         if let Some(folder) = output.parent()
@@ -295,14 +295,14 @@ impl Run<'_> {
         let grey = Backdrop::Even([0.18; 3]);
         let panorama = || match &self.light {
             Some(LightSource::Panorama(panorama)) => {
-                let view = PanoramaView::new(extent, arguments.field, 0.0);
+                let view = PanoramaView::new(extent, arguments.fov, 0.0);
                 Some(Backdrop::Panorama(view, panorama.clone()))
             }
             _ => None,
         };
         match arguments.background {
-            _ if arguments.keep_background => Backdrop::Photo,
-            None if arguments.own_light => Backdrop::Photo,
+            Some(BackgroundName::Photo) => Backdrop::Photo,
+            None if arguments.is_own_light() => Backdrop::Photo,
             None | Some(BackgroundName::Light) => panorama().unwrap_or(grey),
             Some(BackgroundName::Grey) => grey,
             Some(BackgroundName::Black) => Backdrop::Even([0.0; 3]),
@@ -310,7 +310,7 @@ impl Run<'_> {
         }
     }
 
-    /// Writes the turn; how many frames it has.
+    /// Writes the video; how many frames it has.
     fn film(
         &self,
         shot: &Shot<'_>,
@@ -318,18 +318,15 @@ impl Run<'_> {
         format: MovieFormat,
         console: Console,
     ) -> Result<u32, InsertError> {
-        let arguments = self.arguments;
-        let frames = (arguments.seconds * f64::from(arguments.fps))
-            .round()
-            .max(1.0) as u32;
-        let all = arguments.turn.unwrap_or(360.0);
+        let rotation = &self.arguments.rotation;
+        let start = self.arguments.light.light_angle;
+        let frames = rotation.frames();
         let bar = console.progress(frames.into(), "frames");
         let frame = |frame: u32| {
-            let part = f64::from(frame) / f64::from(frames);
-            let turn = (arguments.turned + all * part).to_radians();
-            Ok::<_, InsertError>(shot.picture(turn)?.encode())
+            let angle = (start + rotation.degrees_at(frame)).to_radians();
+            Ok::<_, InsertError>(shot.picture(angle)?.encode())
         };
-        let encoding = (format, arguments.fps);
+        let encoding = (format, rotation.fps);
         MovieWriter::write_frames(output, encoding, frames, frame, || bar.inc(1))?;
         bar.finish_and_clear();
         Ok(frames)

@@ -1,47 +1,50 @@
 //! `relight synth`.
 
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use relight_synth::{
-    Folders, LIBRARY_EXTENSION, Library, LibrarySources, LibrarySummary, LightKind, Recipe,
-    SynthError, SynthSummary, TurnRecipe, build_library, made_panoramas, write_samples,
-    write_turns,
+    LIBRARY_EXTENSION, Library, LibrarySources, LibrarySummary, LightKind, Recipe, SynthSummary,
+    TurnRecipe, build_library, made_panoramas, write_samples, write_turns,
 };
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
 use crate::commands::CommandResult;
-use crate::folder::make_folder;
-use crate::library::read_library;
+use crate::folder::{OutputFolder, make_folder};
+use crate::library::{ObjectSources, read_library};
 use crate::values::{Choices, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  relight synth --count 50000 -o warmup
-      procedural objects under random light, each with its truth
-  relight synth --count 50000 --meshes meshes --panoramas hdri --textures photos -o warmup
+  relight synth samples --count 50000 -o warmup
+      procedural objects under random light, each with its ground truth
+  relight synth samples --count 50000 --meshes meshes --panoramas hdri --textures photos -o warmup
       with files of one's own
-  relight synth --turn --count 20 --panoramas hdri -o turns
-      whole turns as shards, with their truth beside them
-  relight synth --write-panoramas -o panoramas
+  relight synth turns --count 20 --panoramas hdri -o turns
+      whole turns as shards, with their ground truth
+  relight synth panoramas -o panoramas
       the panoramas that are used where none are given, as EXR
   relight synth library --meshes furniture meshes --panoramas hdri -o library.relib
       objects and panoramas packed into one file, for --meshes and --panoramas";
 
 #[derive(Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
-    mode: Option<Mode>,
-    #[command(flatten)]
-    samples: Option<SampleArguments>,
+    product: Product,
 }
 
 #[derive(Subcommand)]
-enum Mode {
-    /// Pack objects and panoramas into one file to learn from, with a table of their authors and licences.
+enum Product {
+    /// Pictures of objects, each with its ground truth.
+    Samples(SampleArguments),
+    /// Whole turns as shards, as relit-extract writes them: the object stands still, the light rotates.
+    Turns(TurnArguments),
+    /// Objects and panoramas, packed into one file to learn from, with a table of their authors and licences.
     Library(LibraryArguments),
+    /// The synthetic panoramas.
+    Panoramas(OutputFolder),
 }
 
 #[derive(Args)]
@@ -59,63 +62,62 @@ struct LibraryArguments {
 
 #[derive(Args)]
 struct SampleArguments {
-    /// The folder to write into; made where it is missing.
-    #[arg(short, long, value_name = "OUT")]
-    output: PathBuf,
-    /// How many samples or turns [default: 1000; with --turn 1].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
-    count: Option<u64>,
-    /// The same seed gives the same bytes.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
-    /// Width and height of the pictures.
-    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = clap::value_parser!(u32).range(16..=2048))]
-    size: u32,
-    /// What light there is.
-    #[arg(long, default_value = "mixed", value_parser = one_of(LIGHTS))]
-    light: LightKind,
-    /// Let light pass through objects: neither cast shadows nor dark hollows.
-    #[arg(long)]
-    no_shadows: bool,
-    /// An sRGB camera without noise, clipping on purpose, or compression.
-    #[arg(long)]
-    plain_camera: bool,
-    /// Keep what the files of meshes say of their albedo [default: of half of the samples].
-    #[arg(long, value_name = "own", value_parser = ["own"])]
-    albedo: Option<String>,
+    /// How many samples.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    count: u64,
     /// Views of each object.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
-    /// Materials and lightings of each view.
+    /// Samples of each view, in other materials and light.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     lightings: u32,
-    /// Objects of one's own, also in folders within it: .obj, .gltf, .glb; or a packed library, .relib.
-    #[arg(long, value_name = "FOLDER")]
-    meshes: Option<PathBuf>,
+    /// An sRGB camera without noise, clipping on purpose, or compression.
+    #[arg(long)]
+    plain_camera: bool,
+    #[command(flatten)]
+    pictures: PictureArguments,
+}
+
+#[derive(Args)]
+struct TurnArguments {
+    /// How many turns.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    count: u64,
+    /// Frames of a turn.
+    #[arg(long, value_name = "N", default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    frames: u32,
+    #[command(flatten)]
+    pictures: PictureArguments,
+}
+
+/// What pictures of objects are made of.
+#[derive(Args)]
+struct PictureArguments {
+    #[command(flatten)]
+    folder: OutputFolder,
+    /// The longest side of the pictures, which are square, pixels.
+    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = clap::value_parser!(u32).range(16..=2048))]
+    size: u32,
+    /// What light there is.
+    #[arg(long, value_name = "KIND", default_value = "mixed", value_parser = one_of(LIGHT_KINDS))]
+    light_kind: LightKind,
+    #[command(flatten, next_help_heading = "Objects and light")]
+    sources: ObjectSources,
     /// Pictures to lay onto objects: .png, .jpg.
     #[arg(long, value_name = "FOLDER")]
     textures: Option<PathBuf>,
-    /// Light: .hdr, .exr; or a packed library, .relib [default: synthetic panoramas].
-    #[arg(long, value_name = "FOLDER")]
-    panoramas: Option<PathBuf>,
+    /// Keep the albedo that files of meshes have [default: in half of the samples].
+    #[arg(long)]
+    own_albedo: bool,
     /// Take from packed libraries what is for validation only [default: what is for training].
     #[arg(long)]
     validation: bool,
-    /// Write whole turns as shards, as relit-extract does: the object stands still, the light turns.
-    #[arg(long, group = "mode")]
-    turn: bool,
-    /// Frames a turn.
-    #[arg(long, value_name = "N", default_value_t = 1500, requires = "turn", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    frames: u32,
-    /// Write the synthetic panoramas, and nothing else.
-    #[arg(long, group = "mode")]
-    write_panoramas: bool,
 }
 
-const LIGHTS: Choices<LightKind> = &[
+const LIGHT_KINDS: Choices<LightKind> = &[
     (
         "mixed",
-        "Lamps mostly, panoramas else, with ambient and bounced light",
+        "Mostly lamps, else panoramas, with ambient and bounced light",
         LightKind::Mixed,
     ),
     (
@@ -128,10 +130,11 @@ const LIGHTS: Choices<LightKind> = &[
 ];
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    match (&arguments.mode, &arguments.samples) {
-        (Some(Mode::Library(arguments)), _) => library(arguments, console),
-        (None, Some(arguments)) => synthesise(arguments, console),
-        (None, None) => Err("--output is missing".into()),
+    match &arguments.product {
+        Product::Samples(arguments) => samples(arguments, console),
+        Product::Turns(arguments) => turns(arguments, console),
+        Product::Library(arguments) => library(arguments, console),
+        Product::Panoramas(folder) => panoramas(&folder.output, console),
     }
 }
 
@@ -202,32 +205,6 @@ fn report_library(out: &Path, summary: &LibrarySummary, console: Console) {
     console.say(&text, &event);
 }
 
-fn synthesise(arguments: &SampleArguments, console: Console) -> CommandResult {
-    if arguments.write_panoramas {
-        return panoramas(&arguments.output, console);
-    }
-    let folders = Folders {
-        meshes: arguments.meshes.clone(),
-        textures: arguments.textures.clone(),
-        panoramas: arguments.panoramas.clone(),
-    };
-    let part = if arguments.validation {
-        Library::validation
-    } else {
-        Library::training
-    };
-    let (library, outcome) = read_library(&folders, part, console)?;
-    if arguments.albedo.is_some() {
-        tell_of_plain_meshes(&library, console)?;
-    }
-    if arguments.turn {
-        turns(arguments, &library, console)?;
-    } else {
-        samples(arguments, &library, console)?;
-    }
-    Ok(outcome)
-}
-
 /// Warns of meshes whose files do not say how they look.
 fn tell_of_plain_meshes(library: &Library, console: Console) -> Result<(), &'static str> {
     let plain = library
@@ -237,7 +214,7 @@ fn tell_of_plain_meshes(library: &Library, console: Console) -> Result<(), &'sta
     let plain: Vec<&str> = plain.map(|(name, _)| name.as_str()).collect();
     if plain.len() == library.meshes.len() {
         return Err(
-            "--albedo own: no mesh says how it looks: give a folder with some whose files have materials, by --meshes",
+            "--own-albedo: no mesh says how it looks: give a folder with some whose files have materials, by --meshes",
         );
     }
     if !plain.is_empty() {
@@ -253,57 +230,73 @@ fn tell_of_plain_meshes(library: &Library, console: Console) -> Result<(), &'sta
     Ok(())
 }
 
-fn recipe(arguments: &SampleArguments) -> Recipe {
-    Recipe {
-        seed: arguments.seed,
-        size: arguments.size,
-        light: arguments.light,
-        shadows: !arguments.no_shadows,
-        views: arguments.views,
-        lightings: arguments.lightings,
-        random_camera: !arguments.plain_camera,
-        own_albedo: arguments.albedo.is_some(),
+impl PictureArguments {
+    /// The library that the pictures are made of.
+    fn library(&self, console: Console) -> Result<(Library, Outcome), Box<dyn Error>> {
+        let part = if self.validation {
+            Library::validation
+        } else {
+            Library::training
+        };
+        let folders = self.sources.folders(self.textures.clone());
+        let (library, outcome) = read_library(&folders, part, console)?;
+        if self.own_albedo {
+            tell_of_plain_meshes(&library, console)?;
+        }
+        Ok((library, outcome))
+    }
+
+    fn recipe(&self) -> Recipe {
+        Recipe {
+            seed: self.sources.seed,
+            size: self.size,
+            light: self.light_kind,
+            shadows: !self.sources.no_shadows,
+            own_albedo: self.own_albedo,
+            ..Recipe::default()
+        }
+    }
+
+    fn report(&self, console: Console, what: &str, written: &SynthSummary) {
+        let SynthSummary { new, kept, .. } = written;
+        let out = &self.folder.output;
+        console.say(
+            &format!("{}: {new} {what} written, {kept} were there", out.display()),
+            &json!({ "event": what, "out": out, "new": new, "kept": kept }),
+        );
     }
 }
 
-fn samples(
-    arguments: &SampleArguments,
-    library: &Library,
-    console: Console,
-) -> Result<(), SynthError> {
-    let count = arguments.count.unwrap_or(1000);
-    let bar = console.progress(count, "samples");
-    let recipe = recipe(arguments);
-    let written = write_samples(&recipe, library, count, &arguments.output, &|| bar.inc(1));
+fn samples(arguments: &SampleArguments, console: Console) -> CommandResult {
+    let pictures = &arguments.pictures;
+    let (library, outcome) = pictures.library(console)?;
+    let recipe = Recipe {
+        views: arguments.views,
+        lightings: arguments.lightings,
+        random_camera: !arguments.plain_camera,
+        ..pictures.recipe()
+    };
+    let bar = console.progress(arguments.count, "samples");
+    let out = &pictures.folder.output;
+    let written = write_samples(&recipe, &library, arguments.count, out, &|| bar.inc(1));
     bar.finish_and_clear();
-    report(arguments, console, "samples", written?);
-    Ok(())
+    pictures.report(console, "samples", &written?);
+    Ok(outcome)
 }
 
-fn turns(
-    arguments: &SampleArguments,
-    library: &Library,
-    console: Console,
-) -> Result<(), SynthError> {
-    let count = arguments.count.unwrap_or(1);
-    let bar = console.progress(count * u64::from(arguments.frames), "frames");
+fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
+    let pictures = &arguments.pictures;
+    let (library, outcome) = pictures.library(console)?;
     let turns = TurnRecipe {
-        recipe: recipe(arguments),
+        recipe: pictures.recipe(),
         frames: arguments.frames,
     };
-    let written = write_turns(&turns, library, count, &arguments.output, &|| bar.inc(1));
+    let bar = console.progress(arguments.count * u64::from(arguments.frames), "frames");
+    let out = &pictures.folder.output;
+    let written = write_turns(&turns, &library, arguments.count, out, &|| bar.inc(1));
     bar.finish_and_clear();
-    report(arguments, console, "turns", written?);
-    Ok(())
-}
-
-fn report(arguments: &SampleArguments, console: Console, what: &str, written: SynthSummary) {
-    let SynthSummary { new, kept, .. } = written;
-    let out = &arguments.output;
-    console.say(
-        &format!("{}: {new} {what} written, {kept} were there", out.display()),
-        &json!({ "event": what, "out": out, "new": new, "kept": kept }),
-    );
+    pictures.report(console, "turns", &written?);
+    Ok(outcome)
 }
 
 fn panoramas(out: &Path, console: Console) -> CommandResult {

@@ -39,8 +39,8 @@ Examples:
   relight train decompose --settings my.toml -o run --resume
       goes on with a run that was stopped, to the same losses
   relight train normal -o normal
-  relight train light --turns shards --normal normal/normal-net.safetensors -o light
-  relight train joint --turns shards --light light/light-net.safetensors \
+  relight train light --turns shards --normal-net normal/normal-net.safetensors -o light
+  relight train joint --turns shards --light-net light/light-net.safetensors \
       --weights normal/normal-net.safetensors -o joint
       the paper's phases: a warm-up, and two rounds on turns
   relight train turn -o turn
@@ -77,16 +77,7 @@ enum TaskName {
     /// The net for specular reflectance and smoothness, on the highlights of turns.
     Specular(PaperArguments),
     /// The network of whole turns: normals from the harmonics of a turn in an unknown room.
-    Turn(TurnArguments),
-}
-
-#[derive(Args)]
-struct TurnArguments {
-    #[command(flatten)]
-    run: RunArguments,
-    /// The folder in which views are kept, each of which is cast once; runs can share it [default: RUN/views].
-    #[arg(long, value_name = "FOLDER")]
-    views: Option<PathBuf>,
+    Turn(RunArguments),
 }
 
 #[derive(Args)]
@@ -94,20 +85,20 @@ struct PaperArguments {
     #[command(flatten)]
     run: RunArguments,
     /// Turns: a shard, or a folder that relit-extract has written.
-    #[arg(long, value_name = "SHARDS")]
+    #[arg(long, value_name = "SHARDS", help_heading = "Turns and networks")]
     turns: Option<PathBuf>,
-    /// Turns that are not trained on: validations say how near to rank one their reflectance is.
-    #[arg(long, value_name = "SHARDS")]
-    held_out: Option<PathBuf>,
-    /// Spec-Net's weights, for light, joint and specular.
-    #[arg(long, value_name = "FILE")]
-    spec: Option<PathBuf>,
-    /// Normal-Net's weights, for light and specular.
-    #[arg(long, value_name = "FILE")]
-    normal: Option<PathBuf>,
-    /// Light-Net's weights, for joint and specular.
-    #[arg(long, value_name = "FILE")]
-    light: Option<PathBuf>,
+    /// Turns to validate on: how near to rank one their reflectance is.
+    #[arg(long, value_name = "SHARDS", help_heading = "Turns and networks")]
+    validation_turns: Option<PathBuf>,
+    /// The weights of Spec-Net, for light, joint and specular.
+    #[arg(long, value_name = "FILE", help_heading = "Turns and networks")]
+    spec_net: Option<PathBuf>,
+    /// The weights of Normal-Net, for light and specular.
+    #[arg(long, value_name = "FILE", help_heading = "Turns and networks")]
+    normal_net: Option<PathBuf>,
+    /// The weights of Light-Net, for joint and specular.
+    #[arg(long, value_name = "FILE", help_heading = "Turns and networks")]
+    light_net: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -120,7 +111,7 @@ struct RunArguments {
         required_unless_present = "print_settings"
     )]
     output: Option<PathBuf>,
-    /// Settings, a TOML file; what it does not name has its default.
+    /// Settings, a TOML file. What it does not name has its default.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Go on with the run in the folder; where there is none, one begins.
@@ -198,21 +189,27 @@ fn decompose(arguments: &RunArguments, console: Console) -> CommandResult {
     )
 }
 
-fn turn(arguments: &TurnArguments, console: Console) -> CommandResult {
-    let TurnArguments { run: own, views } = arguments;
-    let settings: TurnNetworkSettings = own.settings()?;
+fn turn(arguments: &RunArguments, console: Console) -> CommandResult {
+    let settings: TurnNetworkSettings = arguments.settings()?;
     let run = settings.run.clone();
-    train((settings, run), own, console, |settings, resources| {
-        let weights = read_weights(own.weights.as_deref())?;
-        let beside = own.folder()?.join("views");
-        let views = views.as_deref().unwrap_or(&beside);
-        Ok(TurnNetworkTask::new(
-            settings,
-            views,
-            resources,
-            weights.as_ref(),
-        )?)
-    })
+    train(
+        (settings, run),
+        arguments,
+        console,
+        |settings, resources| {
+            let weights = read_weights(arguments.weights.as_deref())?;
+            let views = match &settings.data.view_folder {
+                Some(folder) => folder.clone(),
+                None => arguments.folder()?.join("views"),
+            };
+            Ok(TurnNetworkTask::new(
+                settings,
+                &views,
+                resources,
+                weights.as_ref(),
+            )?)
+        },
+    )
 }
 
 fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> CommandResult {
@@ -222,11 +219,11 @@ fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> Com
     train((settings, run), own, console, |settings, resources| {
         let inputs = PaperInputs {
             turns: arguments.turns.clone(),
-            held_out: arguments.held_out.clone(),
+            held_out: arguments.validation_turns.clone(),
             weights: read_weights(own.weights.as_deref())?,
-            spec: read_weights(arguments.spec.as_deref())?,
-            normal: read_weights(arguments.normal.as_deref())?,
-            light: read_weights(arguments.light.as_deref())?,
+            spec: read_weights(arguments.spec_net.as_deref())?,
+            normal: read_weights(arguments.normal_net.as_deref())?,
+            light: read_weights(arguments.light_net.as_deref())?,
         };
         Ok(PaperTask::new(phase, settings, resources, &inputs)?)
     })

@@ -1,11 +1,13 @@
 //! `relight weights`: weights of networks from one format into another.
 
-use std::path::PathBuf;
-use std::slice;
+use std::error::Error;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use relight_photo::nets::paper::{self, Head};
-use relight_photo::nets::{Graph, WeightPrecision, Weights, decomposer_of, to_onnx, turn_network};
+use relight_photo::nets::{
+    Graph, NetError, WeightPrecision, Weights, decomposer_of, to_onnx, turn_network,
+};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
 use serde_json::json;
@@ -13,13 +15,60 @@ use serde_json::json;
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
 use crate::photos::not_an_input;
+use crate::shipped;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  relight weights export net.safetensors -o half.safetensors --half
-      in half precision
+  relight weights export -o relight.onnx
+      the network of relight decompose for any ONNX engine, for pictures of any size
   relight weights export net.safetensors --net normal-net -o normal-net.onnx
-      the paper's Normal-Net for any ONNX engine, for pictures of 256 x 256 pixels";
+      the paper's Normal-Net";
+
+/// What a file of our network of photographs says of itself: the same for all of its weights.
+const DECOMPOSER_FACTS: [(&str, &str); 7] = [
+    (
+        "input",
+        "batch x 7 x height x width, multiples of 32; 0 outside the mask. v: linear light over its 99th percentile (of the brightest \
+         channel, under the mask), cut off at 1.5; m: mean of v. 2 v^(1/2.2) - 1 of red, green and blue; the mask, 1; \
+         (ln(m + 0.01) + 2) / 2; 4 (v - m) / (3 m + 0.03) of red and green",
+    ),
+    (
+        "maps",
+        "batch x 9 x height x width: normal x, y, z, where z becomes softplus(z) + 0.02 before the length is made 1; albedo, logit of \
+         red, green and blue; highlight, softplus(h - 3.5) in units of the percentile; shading, exp of a + sigmoid(b) (2 c - 2), \
+         between exp(-6) and exp(3), where c is channel 4 of the input. Albedo and shading are right up to a factor",
+    ),
+    (
+        "paint",
+        "batch x 1 x height x width: logit of how much of a pixel's darkness is paint, not shadow",
+    ),
+    (
+        "light",
+        "batch x 9: coefficients of order 2 of the grey irradiance from all around, in units of the mean shading",
+    ),
+    (
+        "colour_space",
+        "linear light in the primaries of sRGB (Rec. 709)",
+    ),
+    (
+        "axes",
+        "x right, y up, z to the viewer; harmonics (l, m) at l (l + 1) + m, pole at z, without the Condon-Shortley phase",
+    ),
+    (
+        "use",
+        "an object that fills 128 x 128 to 256 x 256 pixels. relight decompose blends two such looks and fits light to them",
+    ),
+];
+
+/// What a file of the weights that come with the program says beside.
+const SHIPPED_FACTS: [(&str, &str); 2] = [
+    ("licence", "MIT OR Apache-2.0"),
+    (
+        "attribution",
+        "learned from procedural shapes, panoramas of Poly Haven (CC0) and meshes of odedstein/meshes (public domain, CC BY 3.0 and \
+         CC BY 4.0), whose authors relight/cli/weights/README.md names",
+    ),
+];
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -35,21 +84,18 @@ enum Verb {
 
 #[derive(Args)]
 struct Export {
-    /// The weights (.safetensors).
+    /// The weights (.safetensors) [default: those that come with the program].
     #[arg(value_name = "IN")]
-    input: PathBuf,
+    input: Option<PathBuf>,
     /// The file to write: .onnx or .safetensors.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// The network that they are for.
     #[arg(long, value_enum, default_value_t = NetName::Decomposer)]
     net: NetName,
-    /// Width and height of the pictures that an ONNX file takes.
-    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = clap::value_parser!(u16).range(32..=8192))]
-    size: u16,
-    /// Write safetensors of half precision.
+    /// Write 32 bits a number in place of 16.
     #[arg(long)]
-    half: bool,
+    single: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -73,6 +119,15 @@ enum NetName {
 }
 
 impl NetName {
+    /// What reads the weights that come with the program, if any do.
+    fn shipped(self) -> Option<fn() -> Result<Weights, NetError>> {
+        match self {
+            Self::Decomposer => Some(shipped::weights),
+            Self::TurnNet => Some(shipped::turn_weights),
+            _ => None,
+        }
+    }
+
     /// The network that these weights should be of.
     fn graph(self, weights: &Weights) -> Graph {
         match self {
@@ -92,12 +147,12 @@ impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
         let Verb::Export(export) = &self.verb;
-        let output = export.output.display();
-        match export.ending() {
-            Some("onnx") if export.half => Some("--half is for .safetensors".to_owned()),
-            Some(_) => None,
-            None => Some(format!("--output {output}: give .onnx or .safetensors")),
+        if export.input.is_none() && export.net.shipped().is_none() {
+            return Some("give the weights: none of this network come with the program".to_owned());
         }
+        let output = export.output.display();
+        let is_known = export.ending().is_some();
+        (!is_known).then(|| format!("--output {output}: give .onnx or .safetensors"))
     }
 }
 
@@ -110,27 +165,51 @@ impl Export {
     }
 }
 
+impl Export {
+    /// The weights that are given, or those that come with the program.
+    fn weights(&self) -> Result<Weights, Box<dyn Error>> {
+        match (&self.input, self.net.shipped()) {
+            (Some(path), _) => Ok(Weights::read(path)?),
+            (None, Some(shipped)) => Ok(shipped()?),
+            (None, None) => Err("give the weights".into()),
+        }
+    }
+
+    /// What an ONNX file says of itself.
+    fn facts(&self) -> Vec<(&'static str, &'static str)> {
+        let mut facts = Vec::new();
+        if matches!(self.net, NetName::Decomposer) {
+            facts.extend(DECOMPOSER_FACTS);
+        }
+        if self.input.is_none() {
+            facts.extend(SHIPPED_FACTS);
+        }
+        facts
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let Verb::Export(export) = &arguments.verb;
-    not_an_input(&export.output, slice::from_ref(&export.input))?;
-    let weights = Weights::read(&export.input)?;
+    not_an_input(&export.output, export.input.as_slice())?;
+    let weights = export.weights()?;
     let graph = export.net.graph(&weights);
-    let weights = weights.fitted_to(&graph);
-    let weights = weights.map_err(|fault| format!("{}: {fault}", export.input.display()))?;
+    let weights = weights.fitted_to(&graph).map_err(|fault| {
+        let input = export.input.as_deref().unwrap_or(Path::new("the weights"));
+        format!("{}: {fault}", input.display())
+    })?;
     if let Some(folder) = export.output.parent() {
         make_folder(folder)?;
     }
+    let precision = if export.single {
+        WeightPrecision::Single
+    } else {
+        WeightPrecision::Half
+    };
     if export.ending() == Some("onnx") {
-        let side = usize::from(export.size);
-        let bytes = to_onnx(&graph, &weights, 1, (side, side))?;
+        let bytes = to_onnx(&graph, &weights, precision, &export.facts())?;
         write_whole(&export.output, &bytes)
             .map_err(|error| format!("{}: {error}", export.output.display()))?;
     } else {
-        let precision = if export.half {
-            WeightPrecision::Half
-        } else {
-            WeightPrecision::Single
-        };
         weights.write(&export.output, precision)?;
     }
     let count: usize = weights

@@ -139,7 +139,12 @@ fn a_photograph_that_is_held_otherwise_is_turned_and_a_mask_of_how_it_is_stored_
         std::fs::write(path, stored(&object(90), 6)).unwrap();
     });
     let error = load(&held, &with_mask(side)).unwrap_err().to_string();
-    assert!(error.contains("as the photograph is stored"), "{error}");
+    let sizes = [format!("{HEIGHT} x {WIDTH}"), format!("{WIDTH} x {HEIGHT}")];
+    assert!(sizes.iter().all(|size| error.contains(size)), "{error}");
+    // More is said than of a mask of just any other size.
+    let small = folder.save("small.png", |path| GrayImage::new(8, 8).save(path).unwrap());
+    let other = load(&held, &with_mask(small)).unwrap_err().to_string();
+    assert_ne!(other.replace("8 x 8", &sizes[0]), error);
 }
 
 fn mask_of_displayed(folder: &Folder) -> std::path::PathBuf {

@@ -7,6 +7,7 @@ use relight_core::image::{Extent, Rgb, Transfer};
 use relight_core::light::{Normals, Panorama, ShLight, YUp};
 use relight_photo::decompose::MaskSource;
 use relight_photo::files::PhotoReading;
+use relit_test_support::is_named;
 
 use crate::support::{Folder, HEIGHT, WIDTH, load, names_in, object, write};
 
@@ -77,10 +78,7 @@ fn an_earlier_decomposition_is_replaced_and_nothing_else() {
     fs::write(out.join("notes.txt"), "mine").unwrap();
     fs::write(out.join("albedo.png"), "old").unwrap();
     let text = write(&photo, &out).unwrap_err().to_string();
-    assert!(
-        text.contains("out holds notes.txt, which is no file of"),
-        "{text}"
-    );
+    assert!(is_named(&text, &["out", "notes.txt"]), "{text}");
     assert_eq!(fs::read(out.join("notes.txt")).unwrap(), b"mine");
     assert_eq!(fs::read(out.join("albedo.png")).unwrap(), b"old");
     fs::remove_file(out.join("notes.txt")).unwrap();
@@ -91,11 +89,11 @@ fn an_earlier_decomposition_is_replaced_and_nothing_else() {
     fs::create_dir(&foreign).unwrap();
     fs::write(foreign.join("albedo.png"), "mine").unwrap();
     let text = write(&photo, &foreign).unwrap_err().to_string();
-    assert!(text.contains("foreign holds albedo.png"), "{text}");
+    assert!(is_named(&text, &["foreign", "albedo.png"]), "{text}");
     assert_eq!(names_in(&foreign), ["albedo.png"]);
     for path in [path.clone(), path.join("in")] {
         let text = write(&photo, &path).unwrap_err().to_string();
-        assert!(text.contains("cup.png cannot be the folder"), "{text}");
+        assert!(text.contains("cup.png"), "{text}");
     }
     let empty = folder.path("empty");
     fs::create_dir(&empty).unwrap();

@@ -7,8 +7,9 @@ use image::{Rgb as Pixel, RgbImage};
 use relight_photo::decompose::{MaskSource, SpecularGate};
 use relight_photo::files::{PhotoInput, PhotoReading};
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
 use relit_data::shard::{FrameRecord, Layout, Sample, ShardWriter};
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 use crate::support::{Folder, HEIGHT, WIDTH, decomposed, is_inside, mask, object};
 

@@ -91,11 +91,11 @@ fn writing_twice_gives_the_same_bytes() {
 #[test]
 fn what_is_no_object_is_refused_with_what_is_wrong() {
     let object = ball(true);
-    assert!(refusal(b"no archive at all").contains("no ZIP archive"));
+    assert!(refusal(b"no archive at all").contains("ZIP"));
     let later = br#"{"schema": "relight.asset/2", "shape": "mesh"}"#;
     assert!(refusal(&changed(&object, MANIFEST, Some(later))).contains("relight.asset/2"));
-    assert!(refusal(&changed(&object, MANIFEST, None)).contains("asset.json is missing"));
-    assert!(refusal(&changed(&object, "alpha.png", None)).contains("alpha.png is missing"));
+    assert!(refusal(&changed(&object, MANIFEST, None)).contains("asset.json"));
+    assert!(refusal(&changed(&object, "alpha.png", None)).contains("alpha.png"));
     assert!(refusal(&changed(&object, "smoothness.png", None)).contains("smoothness.png"));
     assert!(refusal(&changed(&object, "normal.png", Some(b"text"))).contains("normal.png"));
     let bytes = object.to_bytes().unwrap();
@@ -121,12 +121,12 @@ fn sizes_that_cannot_be_are_refused_before_anything_is_decoded() {
     }
     let json = manifest(8000, whole);
     let refused = refusal(&changed(&object, MANIFEST, Some(json.as_bytes())));
-    assert!(refused.contains("12 x 12 pixels"), "{refused}");
+    assert!(refused.contains("12 x 12"), "{refused}");
     let json = manifest(12, r#"{"albedo": -1.0}"#);
     let refused = refusal(&changed(&object, MANIFEST, Some(json.as_bytes())));
     assert!(refused.contains("white.albedo"), "{refused}");
     let long = vec![b' '; 70_000];
-    assert!(refusal(&changed(&object, MANIFEST, Some(&long))).contains("more than 65536 bytes"));
+    assert!(refusal(&changed(&object, MANIFEST, Some(&long))).contains("65536"));
 }
 
 #[test]
@@ -139,5 +139,10 @@ fn maps_of_other_sizes_make_no_object() {
         small,
         object.confidence().clone(),
     );
-    assert!(refused.unwrap_err().to_string().contains("map of coverage"));
+    let refused = refused.unwrap_err();
+    assert!(
+        matches!(refused, CapturedObjectError::Image(_)),
+        "{refused:?}"
+    );
+    assert!(refused.to_string().contains("coverage"), "{refused}");
 }

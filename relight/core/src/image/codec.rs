@@ -92,7 +92,21 @@ impl StoredImage {
     /// # Errors
     /// Where it is no image of a known format, too large, or cut off.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ImageError> {
-        let image = decode(path, bytes)?;
+        let mut image = decode(path, bytes)?;
+        if let DynamicImage::ImageRgba32F(pixels) = &mut image {
+            for pixel in pixels.pixels_mut() {
+                let alpha = if pixel[3] > 0.0 { pixel[3] } else { 1.0 };
+                pixel.0[..3].iter_mut().for_each(|value| *value /= alpha);
+            }
+        }
+        Self::from_image(image)
+    }
+
+    /// A picture in memory, whose colours are not multiplied with its alpha.
+    ///
+    /// # Errors
+    /// None for a picture as it comes from the crate `image`.
+    pub fn from_image(image: DynamicImage) -> Result<Self, ImageError> {
         let samples = match image {
             DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Samples::Float,
             _ => Samples::Integer,
@@ -106,14 +120,7 @@ impl StoredImage {
         }
         let with_alpha: Planes<4> = split(&image.into_rgba32f());
         let extent = with_alpha.extent();
-        let [mut red, mut green, mut blue, alpha] = with_alpha.into_planes();
-        if samples == Samples::Float {
-            for plane in [&mut red, &mut green, &mut blue] {
-                for (value, &alpha) in plane.iter_mut().zip(&alpha) {
-                    *value /= if alpha > 0.0 { alpha } else { 1.0 };
-                }
-            }
-        }
+        let [red, green, blue, alpha] = with_alpha.into_planes();
         let is_opaque = alpha.iter().all(|&alpha| alpha >= 1.0);
         Ok(Self {
             planes: Planes::from_planes(extent, [red, green, blue])?,

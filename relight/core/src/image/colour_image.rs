@@ -42,6 +42,16 @@ impl ColourImage {
         Ok(Self { stored, colour })
     }
 
+    /// A picture in memory. Its integers are encoded as `transfer` says; floating point values are light in Rec. 709.
+    #[must_use]
+    pub const fn new(stored: StoredImage, transfer: Transfer) -> Self {
+        let colour = match stored.samples {
+            Samples::Integer => of_transfer(transfer),
+            Samples::Float => Colour::LINEAR,
+        };
+        Self { stored, colour }
+    }
+
     /// The numbers and alpha as they are stored.
     #[must_use]
     pub const fn stored(&self) -> &StoredImage {
@@ -102,12 +112,18 @@ pub(super) fn colour_of(
     transfer: Option<Transfer>,
 ) -> Result<Colour, ImageError> {
     match transfer {
-        Some(Transfer::Linear) => Ok(Colour::LINEAR),
-        Some(Transfer::Srgb) => Ok(Colour::SRGB),
-        Some(Transfer::Gamma22) => Ok(Colour::GAMMA22),
+        Some(transfer) => Ok(of_transfer(transfer)),
         None => Colour::from_file(bytes).map_err(|fault| ImageError::Colour {
             path: path.to_owned(),
             fault,
         }),
+    }
+}
+
+const fn of_transfer(transfer: Transfer) -> Colour {
+    match transfer {
+        Transfer::Linear => Colour::LINEAR,
+        Transfer::Srgb => Colour::SRGB,
+        Transfer::Gamma22 => Colour::GAMMA22,
     }
 }

@@ -278,8 +278,10 @@ mod tests {
         let [batch] = &damaged[..] else {
             panic!("{damaged:?}")
         };
-        let said = "1 samples of a batch are damaged: seven: it is gone";
-        assert_eq!(batch.to_string(), said);
+        assert_eq!((batch.damage.len(), &*batch.damage[0].sample), (1, "seven"));
+        for named in ["1 samples", "seven", "it is gone"] {
+            assert!(batch.to_string().contains(named), "{named}: {batch}");
+        }
         assert!(!batch.rest.batch.is_empty());
     }
 

@@ -92,9 +92,7 @@ impl SceneEnvironment {
         };
         let light = given.unwrap_or_else(|| match background {
             SceneBackground::Panorama(panorama) => LightSource::Panorama(panorama.clone()),
-            SceneBackground::Picture(picture) => {
-                LightSource::from_picture(picture, scene.field, sun)
-            }
+            SceneBackground::Picture(picture) => LightSource::from_picture(picture, scene.fov, sun),
         });
         let coefficients = light.light()?;
         let tint = scene.white_balance.tint(&coefficients);
@@ -198,7 +196,7 @@ fn exposed(
     let side = |side: usize| (side * LOOK / width.max(height).max(1)).max(1);
     let view = PanoramaView::new(
         Extent::new(side(width), side(height)),
-        scene.field,
+        scene.fov,
         scene.down,
     );
     let seen = shown(&view, panorama, 0.0, scale);
@@ -216,7 +214,7 @@ fn tilt_of(scene: &SceneDescription, background: SceneBackground<'_>) -> f64 {
         return TILT;
     };
     let [width, height] = scene.size.map(f64::from);
-    let tangent = (scene.field / 2.0).to_radians().tan();
+    let tangent = (scene.fov / 2.0).to_radians().tan();
     let below = (object.at[1] - 0.5) * height * 2.0 * tangent / width.max(height);
     (scene.down + below.atan().to_degrees()).clamp(TILTS.0, TILTS.1)
 }
@@ -258,7 +256,7 @@ mod tests {
         assert!(exposure.clipped == 0.0 && !exposure.for_objects);
         assert_eq!(plain.matching.level, exposure.stops.exp2());
         assert_eq!(plain.matching.balance, [1.0; 3]);
-        let view = PanoramaView::new(plain.extent, scene.field, scene.down);
+        let view = PanoramaView::new(plain.extent, scene.fov, scene.down);
         let shown = |setting: &SceneEnvironment| {
             let seen = setting.seen(&view, &panorama, 0.0);
             seen.planes().pixel(100, 50)[1]
@@ -278,7 +276,7 @@ mod tests {
         let scene = described("size = [200, 100]");
         let set = SceneEnvironment::new(&scene, background, Some(lamp)).unwrap();
         assert_eq!(set.matching.level, 1.0);
-        let view = PanoramaView::new(set.extent, scene.field, scene.down);
+        let view = PanoramaView::new(set.extent, scene.fov, scene.down);
         let shown = set.seen(&view, &panorama, 0.0).planes().pixel(100, 50)[1];
         assert!((shown - 0.8).abs() < 0.01, "{shown}");
         assert!(set.exposure.unwrap().clipped == 0.0);

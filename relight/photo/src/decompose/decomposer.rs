@@ -17,8 +17,9 @@ use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, NormalsFrame, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer};
-use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
+use relit_data::image_stats::SATURATED_VALUE;
 use relit_data::mask::size_hint;
+use relit_data::spec_net_gate::{self, SPEC_NET_GATE};
 
 /// Most pixels of a photograph: 16 million take 1.3 GB of memory, so these more than 5 GB.
 pub const MAX_PIXELS: usize = 64_000_000;
@@ -235,7 +236,7 @@ impl Decomposer {
             .saturated_fraction
             .unwrap_or_else(|| object.saturated(options.saturated_from));
         let is_glossy = match options.specular {
-            SpecularGate::Auto => saturated_fraction > SPEC_NET_GATE,
+            SpecularGate::Auto => spec_net_gate::opens(saturated_fraction, SPEC_NET_GATE),
             SpecularGate::On => true,
             SpecularGate::Off => false,
         };

@@ -56,12 +56,29 @@ impl Photo {
             check_size(extent)?;
         }
         let image = ColourImage::from_bytes(path, bytes, hints.transfer)?;
+        if let Some((_, mask)) = hints.mask {
+            let expected = image.stored().planes.extent();
+            check_extent(mask.planes.extent(), expected, bytes)?;
+        }
+        Self::from_image(path, image, hints)
+    }
+
+    /// The same of a picture in memory, called `path`.
+    ///
+    /// # Errors
+    /// Where it is too large, or nothing says where the object is.
+    pub fn from_image(
+        path: &Path,
+        image: ColourImage,
+        hints: &PhotoHints<'_>,
+    ) -> Result<Self, DecomposeError> {
         let extent = image.stored().planes.extent();
+        check_size(extent)?;
         let alpha = image.stored().alpha.clone();
         let mut mask_note = None;
         let (mask, mask_source) = match hints.mask {
             Some((path, mask)) => {
-                check_extent(mask.planes.extent(), extent, bytes)?;
+                check_mask_size(mask.planes.extent(), extent)?;
                 let (mask, note) = mask.object_mask(path)?;
                 mask_note = note;
                 (mask, MaskSource::File)

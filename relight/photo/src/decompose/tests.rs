@@ -300,16 +300,15 @@ fn a_mask_that_is_empty_or_of_another_size_is_refused() {
     let picture = Rgb::new(smooth(extent));
     let decompose = |mask: Planes<1>| {
         let found = net.decompose(&picture, &mask, &DecomposeOptions::default());
-        found.unwrap_err().to_string()
+        found.unwrap_err()
     };
-    assert_eq!(
-        decompose(Planes::filled(extent, [0.4])),
-        "the mask is empty: it is nowhere at least one half"
-    );
-    assert_eq!(
-        decompose(Planes::filled(Extent::new(64, 63), [1.0])),
-        "the mask has 64 x 63 pixels, and the photograph 64 x 64"
-    );
+    let empty = decompose(Planes::filled(extent, [0.4]));
+    assert!(matches!(empty, DecomposeError::EmptyMask), "{empty:?}");
+    let other = decompose(Planes::filled(Extent::new(64, 63), [1.0]));
+    assert!(matches!(other, DecomposeError::Photo(_)), "{other:?}");
+    for size in ["64 x 63", "64 x 64"] {
+        assert!(other.to_string().contains(size), "{other}");
+    }
 }
 
 #[test]

@@ -45,11 +45,25 @@ impl BackgroundFile {
         }
         let bytes = fs::read(path).map_err(ImageError::open(path))?;
         if is_panorama(&bytes) {
-            let view = PanoramaView::new(scene.panorama_extent(), scene.field, scene.down);
             let panorama = Panorama::from_bytes(path, &bytes)?;
-            return Ok(Self::Panorama(Box::new((view, panorama))));
+            return Ok(Self::from_panorama(panorama, scene));
         }
         let picture = ColourImage::from_bytes(path, &bytes, None)?.into_light();
+        Self::from_picture(path, picture)
+    }
+
+    /// A panorama, of which the scene shows a part.
+    #[must_use]
+    pub fn from_panorama(panorama: Panorama, scene: &SceneDescription) -> Self {
+        let view = PanoramaView::new(scene.panorama_extent(), scene.fov, scene.down);
+        Self::Panorama(Box::new((view, panorama)))
+    }
+
+    /// A photograph, which errors name as `path`.
+    ///
+    /// # Errors
+    /// Where it has values that are no light.
+    pub fn from_picture(path: &Path, picture: Rgb<Linear>) -> Result<Self, InsertError> {
         let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
         if !picture.planes().planes().into_iter().all(is_light) {
             return Err(InsertError::Input(format!(

@@ -16,9 +16,6 @@ use crate::compositing::{
 use crate::decompose::{DecomposeOptions, Decomposer, Photo};
 use crate::relighting::{InsertError, LightSource, RelightableObject};
 
-/// The most frames of a video in which a panorama turns.
-const MAX_FRAMES: f64 = 100_000.0;
-
 /// What an object is made of.
 #[derive(Debug)]
 pub enum InsertSource {
@@ -35,8 +32,8 @@ pub struct Insertion<'a> {
     /// The first frame of a video.
     first: Option<Rgb<Linear>>,
     setting: SceneEnvironment,
-    /// How far the light has turned, radians.
-    turned: f64,
+    /// How far the light is rotated, radians.
+    angle: f64,
     decomposer: &'a Decomposer,
     options: DecomposeOptions,
 }
@@ -46,10 +43,10 @@ pub struct Insertion<'a> {
 pub struct InsertionOutput<'a> {
     /// A picture, or a video.
     pub path: &'a Path,
-    /// By how many degrees a panorama turns in a video.
-    pub turn: f64,
-    /// How long that takes.
-    pub seconds: f64,
+    /// By how many degrees a panorama rotates in a video.
+    pub rotate: f64,
+    /// In how many frames.
+    pub frames: u32,
     /// Frames a second of such a video.
     pub frames_per_second: u32,
 }
@@ -92,24 +89,41 @@ impl<'a> Insertion<'a> {
         decomposer: &'a Decomposer,
         options: DecomposeOptions,
     ) -> Result<Self, InsertError> {
-        let first = match &mut background {
-            BackgroundFile::Movie(movie) => Some(first_frame(movie)?),
-            _ => None,
-        };
-        let still = match (&background, &first) {
-            (BackgroundFile::Panorama(parts), _) => SceneBackground::Panorama(&parts.1),
-            (BackgroundFile::Photo(picture), _) | (BackgroundFile::Movie(_), Some(picture)) => {
-                SceneBackground::Picture(picture)
-            }
-            (BackgroundFile::Movie(_), None) => return Err(no_frame()),
-        };
-        let given = given_light(scene, folder, still, (decomposer, &options))?;
-        let setting = SceneEnvironment::new(scene, still, given)?;
+        let first = first_of(&mut background)?;
+        let still = still_of(&background, first.as_ref())?;
+        let light = given_light(scene, folder, still, (decomposer, &options))?;
+        Self::before(scene, (background, first), light, decomposer, options)
+    }
+
+    /// The same in a light that is given, whatever the scene names, or else in the background's.
+    ///
+    /// # Errors
+    /// Where the first frame of a video cannot be read, or there is no light.
+    pub fn in_light(
+        scene: &SceneDescription,
+        mut background: BackgroundFile,
+        light: Option<LightSource>,
+        decomposer: &'a Decomposer,
+        options: DecomposeOptions,
+    ) -> Result<Self, InsertError> {
+        let first = first_of(&mut background)?;
+        Self::before(scene, (background, first), light, decomposer, options)
+    }
+
+    fn before(
+        scene: &SceneDescription,
+        (background, first): (BackgroundFile, Option<Rgb<Linear>>),
+        light: Option<LightSource>,
+        decomposer: &'a Decomposer,
+        options: DecomposeOptions,
+    ) -> Result<Self, InsertError> {
+        let still = still_of(&background, first.as_ref())?;
+        let setting = SceneEnvironment::new(scene, still, light)?;
         Ok(Self {
             background,
             first,
             setting,
-            turned: scene.light.turn.to_radians(),
+            angle: scene.light.angle.to_radians(),
             decomposer,
             options,
         })
@@ -144,7 +158,7 @@ impl<'a> Insertion<'a> {
     pub fn frames(&self, output: &InsertionOutput<'_>) -> Option<u32> {
         match (OutputKind::from_path(output.path), &self.background) {
             (Some(OutputKind::Movie(_)), BackgroundFile::Movie(_)) => None,
-            (Some(OutputKind::Movie(_)), _) => Some(output.turn_frames()),
+            (Some(OutputKind::Movie(_)), _) => Some(output.frames),
             _ => Some(1),
         }
     }
@@ -162,22 +176,29 @@ impl<'a> Insertion<'a> {
         match OutputKind::from_path(output.path) {
             Some(OutputKind::Movie(format)) => match &self.background {
                 BackgroundFile::Movie(_) => self.film_over(scene, output.path, format, written),
-                _ => self.film_turn(scene, output, format, written),
+                _ => self.film_rotation(scene, output, format, written),
             },
             _ => {
-                let picture =
-                    scene.compose(&self.still(self.turned), &scene.layers(self.turned)?, 0);
-                write_picture(output.path, &picture)?;
+                write_picture(output.path, &self.picture(scene)?)?;
                 Ok(1)
             }
         }
     }
 
-    /// The background after a panorama has turned.
-    fn still(&self, turn: f64) -> Rgb<Linear> {
+    /// The picture; of a video its first frame.
+    ///
+    /// # Errors
+    /// Those of the render layers.
+    pub fn picture(&self, scene: &InsertScene<'_>) -> Result<Rgb<Linear>, InsertError> {
+        let layers = scene.layers(self.angle)?;
+        Ok(scene.compose(&self.still(self.angle), &layers, 0))
+    }
+
+    /// The background after a panorama was rotated.
+    fn still(&self, angle: f64) -> Rgb<Linear> {
         match &self.background {
             BackgroundFile::Photo(picture) => picture.clone(),
-            BackgroundFile::Panorama(parts) => self.setting.seen(&parts.0, &parts.1, turn),
+            BackgroundFile::Panorama(parts) => self.setting.seen(&parts.0, &parts.1, angle),
             BackgroundFile::Movie(_) => self
                 .first
                 .clone()
@@ -193,7 +214,7 @@ impl<'a> Insertion<'a> {
         format: MovieFormat,
         mut written: impl FnMut(),
     ) -> Result<u32, InsertError> {
-        let layers = scene.layers(self.turned)?;
+        let layers = scene.layers(self.angle)?;
         let mut next = Some(self.still(0.0));
         let BackgroundFile::Movie(movie) = &mut self.background else {
             return Err(no_frame());
@@ -212,21 +233,22 @@ impl<'a> Insertion<'a> {
         Ok(frames)
     }
 
-    /// A video in which the panorama turns.
-    fn film_turn(
+    /// A video in which the panorama rotates.
+    fn film_rotation(
         &self,
         scene: &InsertScene<'_>,
         output: &InsertionOutput<'_>,
         format: MovieFormat,
         mut written: impl FnMut(),
     ) -> Result<u32, InsertError> {
-        let frames = output.turn_frames();
+        let frames = output.frames;
         let (extent, rate) = (self.setting.extent, output.frames_per_second);
         let mut film = MovieWriter::create(output.path, format, extent, rate)?;
         for frame in 0..frames {
             let part = f64::from(frame) / f64::from(frames);
-            let turn = self.turned + (output.turn * part).to_radians();
-            let picture = scene.compose(&self.still(turn), &scene.layers(turn)?, u64::from(frame));
+            let angle = self.angle + (output.rotate * part).to_radians();
+            let picture =
+                scene.compose(&self.still(angle), &scene.layers(angle)?, u64::from(frame));
             film.push(&picture.encode())?;
             written();
         }
@@ -235,15 +257,30 @@ impl<'a> Insertion<'a> {
     }
 }
 
-impl InsertionOutput<'_> {
-    fn turn_frames(&self) -> u32 {
-        let frames = (self.seconds * f64::from(self.frames_per_second)).round();
-        frames.clamp(1.0, MAX_FRAMES) as u32
+fn no_frame() -> InsertError {
+    InsertError::Input("the video has no frame".to_owned())
+}
+
+/// The first frame of a video.
+fn first_of(background: &mut BackgroundFile) -> Result<Option<Rgb<Linear>>, InsertError> {
+    match background {
+        BackgroundFile::Movie(movie) => first_frame(movie).map(Some),
+        BackgroundFile::Photo(_) | BackgroundFile::Panorama(_) => Ok(None),
     }
 }
 
-fn no_frame() -> InsertError {
-    InsertError::Input("the video has no frame".to_owned())
+/// What of a background stands still.
+fn still_of<'a>(
+    background: &'a BackgroundFile,
+    first: Option<&'a Rgb<Linear>>,
+) -> Result<SceneBackground<'a>, InsertError> {
+    match (background, first) {
+        (BackgroundFile::Panorama(parts), _) => Ok(SceneBackground::Panorama(&parts.1)),
+        (BackgroundFile::Photo(picture), _) | (BackgroundFile::Movie(_), Some(picture)) => {
+            Ok(SceneBackground::Picture(picture))
+        }
+        (BackgroundFile::Movie(_), None) => Err(no_frame()),
+    }
 }
 
 fn first_frame(movie: &mut MovieReader) -> Result<Rgb<Linear>, InsertError> {

@@ -477,8 +477,8 @@ mod tests {
         movie.push(&grey(32)).unwrap();
         movie.finish().unwrap();
         assert!(path.is_file());
-        let below = create(&path.join("turn.mp4"));
-        assert!(below.unwrap_err().to_string().contains("cannot be written"));
+        let below = create(&path.join("turn.mp4")).map(|_| ());
+        assert!(matches!(below, Err(MovieError::File { .. })), "{below:?}");
     }
 
     #[test]
@@ -492,13 +492,13 @@ mod tests {
             MovieWriter::create(&path, MovieFormat::Webm, Extent::new(32, 32), 30).unwrap();
         movie.push(&grey(32)).unwrap();
         let fault = movie.push(&grey(16)).unwrap_err().to_string();
-        assert!(fault.contains("a frame of 16 x 16 pixels"), "{fault}");
+        assert!(fault.contains("16 x 16"), "{fault}");
         drop(movie);
         assert!(names_in(folder.path()).is_empty());
     }
 
     #[test]
-    fn what_is_written_is_read_frame_by_frame_and_what_is_no_video_is_refused() {
+    fn what_is_written_is_read_frame_by_frame() {
         if !has_ffmpeg() {
             return;
         }
@@ -521,14 +521,20 @@ mod tests {
             assert!((frame.planes().pixel(9, 9)[1] - level).abs() < 0.02);
         }
         assert!(clip.frame().unwrap().is_none());
+    }
+
+    #[test]
+    fn what_is_no_video_is_refused() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("clip.mp4");
         fs::write(&path, "no video").unwrap();
         let error = MovieReader::open(&path, FrameTiming::Each)
             .unwrap_err()
             .to_string();
-        assert!(
-            error.contains("clip.mp4 is not a readable video"),
-            "{error}"
-        );
+        assert!(error.contains("clip.mp4"), "{error}");
     }
 
     /// A video of one colour, made by `ffmpeg`.
@@ -621,7 +627,7 @@ mod tests {
         let path = clip(folder.path(), &encoded("log100"));
         let refused = MovieReader::open(&path, FrameTiming::Each);
         assert!(
-            matches!(&refused, Err(fault) if fault.to_string().contains("cannot be converted to sRGB")),
+            matches!(&refused, Err(MovieError::File { path: clip, .. }) if *clip == path),
             "{refused:?}"
         );
     }

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use super::codec::WeightPrecision;
 use super::error::NetError;
 use super::graph::Graph;
-use super::onnx::to_onnx;
+use super::onnx::{check_size, to_onnx};
 use super::tract::TractPlan;
 use super::weights::{Tensor, Weights};
 
@@ -34,7 +35,8 @@ impl Inference {
         weights: &Weights,
         (width, height): (usize, usize),
     ) -> Result<Self, NetError> {
-        let bytes = to_onnx(graph, weights, 1, (width, height))?;
+        check_size(graph, (width, height))?;
+        let bytes = to_onnx(graph, weights, WeightPrecision::Single, &[])?;
         let shape = [1, graph.input_channels(), height, width];
         let plan = TractPlan::new(&bytes, shape, &[]).map_err(|fault| {
             NetError::Run(format!("tract could not prepare {}: {fault}", graph.name()))

@@ -1,8 +1,8 @@
-//! A network as an ONNX file: the graph in ONNX's operators for one size of picture, with its
-//! weights.
+//! A network as an ONNX file: the graph in ONNX's operators for pictures of any size that it can take, with its weights.
 //!
 //! Only what [`Graph`] can hold is written, in IR version 8 and operator set 13. Normalisation of groups is written as
-//! instance normalisation of a reshaped tensor, since operator set 13 has no other.
+//! instance normalisation of a reshaped tensor, since operator set 13 has no other. Shapes name what they leave as it is (0)
+//! and infer one side (-1), so that no number of a file depends on the picture.
 
 use prost::Message;
 use tract_onnx::pb::attribute_proto::AttributeType;
@@ -10,10 +10,11 @@ use tract_onnx::pb::tensor_proto::DataType;
 use tract_onnx::pb::tensor_shape_proto::{Dimension, dimension};
 use tract_onnx::pb::type_proto::{Tensor, Value};
 use tract_onnx::pb::{
-    AttributeProto, GraphProto, ModelProto, NodeProto, OperatorSetIdProto, TensorProto,
-    TensorShapeProto, TypeProto, ValueInfoProto,
+    AttributeProto, GraphProto, ModelProto, NodeProto, OperatorSetIdProto, StringStringEntryProto,
+    TensorProto, TensorShapeProto, TypeProto, ValueInfoProto,
 };
 
+use super::codec::WeightPrecision;
 use super::error::NetError;
 use super::graph::{EPSILON, Graph, Node, Operation};
 use super::weights::Weights;
@@ -23,46 +24,49 @@ pub const INPUT: &str = "input";
 
 const IR_VERSION: i64 = 8;
 const OPERATOR_SET: i64 = 13;
+/// A side that a shape leaves as it is.
+const SAME: i64 = 0;
+/// The side that follows from the others.
+const INFERRED: i64 = -1;
 
-/// The graph with its weights as the bytes of an ONNX file, for a batch of `batch` pictures of
-/// `width` x `height` pixels.
+/// The graph with its weights as the bytes of an ONNX file. In half precision weights are kept so, and computed with as 32 bits.
+/// `facts` are what the file says of itself.
 ///
 /// # Errors
-/// [`NetError::Run`], or what [`Weights::fitted_to`] answers.
+/// What [`Weights::fitted_to`] answers, or [`NetError::Weights`] where half precision cannot hold a weight.
 pub fn to_onnx(
     graph: &Graph,
     weights: &Weights,
-    batch: usize,
-    (width, height): (usize, usize),
+    precision: WeightPrecision,
+    facts: &[(&str, &str)],
 ) -> Result<Vec<u8>, NetError> {
-    check_size(graph, (width, height))?;
     let weights = weights.fitted_to(graph)?;
-    let mut writer = Writer {
-        batch,
-        size: (width, height),
-        nodes: Vec::new(),
-        tensors: weights
-            .iter()
-            .map(|(name, tensor)| float_tensor(name, tensor.shape(), tensor.values()))
-            .collect(),
-    };
+    weights.check_range(precision)?;
+    let mut writer = Writer::default();
+    for (name, tensor) in weights.iter() {
+        writer.write_weight(name, tensor.shape(), tensor.values(), precision);
+    }
     for (at, node) in graph.nodes().iter().enumerate().skip(1) {
         writer.write(graph, at, node);
     }
     let outputs = graph.outputs().iter().map(|output| {
         let node = graph.node(output.value);
-        let shape = writer.shape(node);
         let name = name_of(output.value.index());
         let identity = operator("Identity", vec![name], output.name.to_owned());
-        (identity, value_info(output.name, &shape))
+        (identity, value_info(output.name, &sides(graph, node)))
     });
     let (identities, outputs): (Vec<_>, Vec<_>) = outputs.unzip();
     writer.nodes.extend(identities);
-    let input = writer.shape(&graph.nodes()[0]);
+    let input = sides(graph, &graph.nodes()[0]);
+    let fact = |&(key, value): &(&str, &str)| StringStringEntryProto {
+        key: key.to_owned(),
+        value: value.to_owned(),
+    };
     let model = ModelProto {
         ir_version: IR_VERSION,
         producer_name: "relight".to_owned(),
         producer_version: env!("CARGO_PKG_VERSION").to_owned(),
+        metadata_props: facts.iter().map(fact).collect(),
         graph: Some(GraphProto {
             node: writer.nodes,
             name: graph.name().to_owned(),
@@ -100,23 +104,51 @@ pub fn check_size(graph: &Graph, (width, height): (usize, usize)) -> Result<(), 
     )))
 }
 
+/// The sides of a node's value: how many, or the name of what may differ.
+fn sides(graph: &Graph, node: &Node) -> Vec<dimension::Value> {
+    let known = |side: usize| dimension::Value::DimValue(side as i64);
+    let open = |name: &str| dimension::Value::DimParam(name.to_owned());
+    let mut sides = vec![open("batch"), known(node.channels)];
+    if let Some(scale) = node.scale {
+        sides.extend(["height", "width"].map(|name| match graph.fixed_side() {
+            Some(side) => known(side / scale),
+            None if scale == 1 => open(name),
+            None => open(&format!("{name}/{scale}")),
+        }));
+    }
+    sides
+}
+
 /// Collects the nodes and tensors of a file.
+#[derive(Default)]
 struct Writer {
-    batch: usize,
-    size: (usize, usize),
     nodes: Vec<NodeProto>,
     tensors: Vec<TensorProto>,
 }
 
 impl Writer {
-    fn shape(&self, node: &Node) -> Vec<usize> {
-        match node.scale {
-            Some(scale) => {
-                let (width, height) = self.size;
-                vec![self.batch, node.channels, height / scale, width / scale]
-            }
-            None => vec![self.batch, node.channels],
+    fn write_weight(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: &[f32],
+        precision: WeightPrecision,
+    ) {
+        if precision == WeightPrecision::Single {
+            self.tensors.push(float_tensor(name, shape, values));
+            return;
         }
+        let half = format!("{name}.half");
+        let bytes = values
+            .iter()
+            .flat_map(|&value| half::f16::from_f32(value).to_le_bytes());
+        self.tensors.push(TensorProto {
+            data_type: DataType::Float16 as i32,
+            raw_data: bytes.collect(),
+            ..float_tensor(&half, shape, &[])
+        });
+        let cast = operator("Cast", vec![half], name.to_owned());
+        self.push(cast, vec![integer("to", DataType::Float as i64)]);
     }
 
     fn push(&mut self, node: NodeProto, attribute: Vec<AttributeProto>) {
@@ -147,7 +179,8 @@ impl Writer {
                 self.push(with_parameters(plain("Conv"), name), attributes);
             }
             Operation::GroupNorm { name, groups } => {
-                self.write_norm(node, &inputs[0], &output, name.as_deref(), *groups);
+                let groups = (node.channels, *groups);
+                self.write_norm(&inputs[0], &output, name.as_deref(), groups);
             }
             Operation::Relu => self.nodes.push(plain("Relu")),
             Operation::Tanh => self.nodes.push(plain("Tanh")),
@@ -159,14 +192,15 @@ impl Writer {
                 self.write_upsample(&inputs[0], &output, *align_corners);
             }
             Operation::PixelUnshuffle { factor } => {
-                self.write_unshuffle(node, &inputs[0], &output, *factor);
+                let channels = graph.node(node.inputs[0]).channels;
+                self.write_unshuffle(&inputs[0], &output, channels, *factor);
             }
             Operation::PixelShuffle { factor } => {
-                let of = graph.node(node.inputs[0]);
-                self.write_shuffle(node, of, &inputs[0], &output, *factor);
+                let attributes = vec![integer("blocksize", *factor as i64), text("mode", "CRD")];
+                self.push(plain("DepthToSpace"), attributes);
             }
-            Operation::MeanPool => self.write_pool("GlobalAveragePool", node, &inputs[0], &output),
-            Operation::MaxPool => self.write_pool("GlobalMaxPool", node, &inputs[0], &output),
+            Operation::MeanPool => self.write_pool("GlobalAveragePool", &inputs[0], &output),
+            Operation::MaxPool => self.write_pool("GlobalMaxPool", &inputs[0], &output),
             Operation::Flatten { .. } => {
                 self.push(plain("Flatten"), vec![integer("axis", 1)]);
             }
@@ -179,19 +213,13 @@ impl Writer {
 
     fn write_norm(
         &mut self,
-        node: &Node,
         input: &str,
         output: &str,
         name: Option<&str>,
-        groups: usize,
+        (channels, groups): (usize, usize),
     ) {
-        let shape = self.shape(node);
-        let pixels = shape[1] / groups * shape[2] * shape[3];
-        let grouped = self.reshape(
-            input,
-            &format!("{output}.grouped"),
-            &[shape[0], groups, pixels],
-        );
+        let grouped = [SAME, groups as i64, INFERRED, SAME];
+        let grouped = self.reshape(input, &format!("{output}.grouped"), &grouped);
         let ones = self.constant(&format!("{output}.one"), &[groups], &vec![1.0; groups]);
         let zeros = self.constant(&format!("{output}.zero"), &[groups], &vec![0.0; groups]);
         let normal = format!("{output}.normal");
@@ -205,12 +233,13 @@ impl Writer {
             ..attribute("epsilon", AttributeType::Float)
         };
         self.push(proto, vec![epsilon]);
+        let back = [SAME, channels as i64, INFERRED, SAME];
         let Some(name) = name else {
-            self.reshape(&normal, output, &shape);
+            self.reshape(&normal, output, &back);
             return;
         };
-        let back = self.reshape(&normal, &format!("{output}.back"), &shape);
-        let column = [1, shape[1], 1, 1];
+        let back = self.reshape(&normal, &format!("{output}.back"), &back);
+        let column = [1, channels as i64, 1, 1];
         let gain = self.reshape(
             &format!("{name}.weight"),
             &format!("{output}.gain"),
@@ -243,50 +272,40 @@ impl Writer {
         self.push(operator("Resize", inputs, output.to_owned()), attributes);
     }
 
-    fn write_unshuffle(&mut self, node: &Node, input: &str, output: &str, factor: usize) {
-        let shape = self.shape(node);
-        let [batch, channels, height, width] = [shape[0], shape[1], shape[2], shape[3]];
-        let blocks = [
-            batch,
-            channels / (factor * factor),
-            height,
-            factor,
-            width,
-            factor,
+    /// A convolution that takes each pixel of a block into a channel of its own.
+    fn write_unshuffle(&mut self, input: &str, output: &str, channels: usize, factor: usize) {
+        let block = factor * factor;
+        let taps = channels * block;
+        let mut kernel = vec![0.0; taps * taps];
+        for tap in 0..taps {
+            // Output channel, then input channel and place in the block.
+            kernel[tap * taps + tap] = 1.0;
+        }
+        let shape = [taps, channels, factor, factor];
+        let kernel = self.constant(&format!("{output}.kernel"), &shape, &kernel);
+        let side = factor as i64;
+        let attributes = vec![
+            integers("kernel_shape", vec![side; 2]),
+            integers("strides", vec![side; 2]),
         ];
-        let split = self.reshape(input, &format!("{output}.blocks"), &blocks);
-        let turned = self.transpose(&split, &format!("{output}.turned"), &[0, 1, 3, 5, 2, 4]);
-        self.reshape(&turned, output, &shape);
+        let inputs = vec![input.to_owned(), kernel];
+        self.push(operator("Conv", inputs, output.to_owned()), attributes);
     }
 
-    fn write_shuffle(&mut self, node: &Node, of: &Node, input: &str, output: &str, factor: usize) {
-        let (shape, before) = (self.shape(node), self.shape(of));
-        let blocks = [shape[0], shape[1], factor, factor, before[2], before[3]];
-        let split = self.reshape(input, &format!("{output}.blocks"), &blocks);
-        let turned = self.transpose(&split, &format!("{output}.turned"), &[0, 1, 4, 2, 5, 3]);
-        self.reshape(&turned, output, &shape);
-    }
-
-    fn write_pool(&mut self, kind: &str, node: &Node, input: &str, output: &str) {
+    fn write_pool(&mut self, kind: &str, input: &str, output: &str) {
         let pooled = format!("{output}.pooled");
         self.nodes
             .push(operator(kind, vec![input.to_owned()], pooled.clone()));
-        let shape = self.shape(node);
-        self.reshape(&pooled, output, &shape);
+        let flat = operator("Flatten", vec![pooled], output.to_owned());
+        self.push(flat, vec![integer("axis", 1)]);
     }
 
-    fn reshape(&mut self, input: &str, output: &str, shape: &[usize]) -> String {
+    fn reshape(&mut self, input: &str, output: &str, shape: &[i64]) -> String {
         let target = format!("{output}.shape");
         self.tensors.push(integer_tensor(&target, shape));
         let inputs = vec![input.to_owned(), target];
         self.nodes
             .push(operator("Reshape", inputs, output.to_owned()));
-        output.to_owned()
-    }
-
-    fn transpose(&mut self, input: &str, output: &str, order: &[i64]) -> String {
-        let proto = operator("Transpose", vec![input.to_owned()], output.to_owned());
-        self.push(proto, vec![integers("perm", order.to_vec())]);
         output.to_owned()
     }
 
@@ -303,15 +322,15 @@ fn name_of(node: usize) -> String {
     }
 }
 
-fn value_info(name: &str, shape: &[usize]) -> ValueInfoProto {
-    let dimension = |&side: &usize| Dimension {
-        value: Some(dimension::Value::DimValue(side as i64)),
+fn value_info(name: &str, sides: &[dimension::Value]) -> ValueInfoProto {
+    let dimension = |side: &dimension::Value| Dimension {
+        value: Some(side.clone()),
         ..Dimension::default()
     };
     let tensor = Tensor {
         elem_type: DataType::Float as i32,
         shape: Some(TensorShapeProto {
-            dim: shape.iter().map(dimension).collect(),
+            dim: sides.iter().map(dimension).collect(),
         }),
     };
     ValueInfoProto {
@@ -383,10 +402,8 @@ fn float_tensor(name: &str, shape: &[usize], values: &[f32]) -> TensorProto {
     }
 }
 
-fn integer_tensor(name: &str, values: &[usize]) -> TensorProto {
-    let bytes = values
-        .iter()
-        .flat_map(|&value| (value as i64).to_le_bytes());
+fn integer_tensor(name: &str, values: &[i64]) -> TensorProto {
+    let bytes = values.iter().flat_map(|value| value.to_le_bytes());
     TensorProto {
         dims: vec![values.len() as i64],
         data_type: DataType::Int64 as i32,

@@ -71,18 +71,19 @@ impl OnnxValue {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Weights, decomposer_with_heads, to_onnx};
+    use super::super::{WeightPrecision, Weights, decomposer_with_heads, to_onnx};
     use super::*;
 
     #[test]
     fn our_own_files_say_what_they_take_and_answer() {
         let graph = decomposer_with_heads();
-        let bytes = to_onnx(&graph, &Weights::initial(&graph, 1), 1, (64, 32)).unwrap();
+        let weights = Weights::initial(&graph, 1);
+        let bytes = to_onnx(&graph, &weights, WeightPrecision::Half, &[]).unwrap();
         let found = OnnxSignature::read(&bytes).unwrap();
         let names = |of: &[OnnxValue]| of.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
         assert_eq!(names(&found.inputs), ["input"]);
         assert_eq!(names(&found.outputs), ["maps", "paint", "light"]);
-        assert_eq!(found.inputs[0].sides, [1, 7, 32, 64].map(Some));
+        assert_eq!(found.inputs[0].sides, [None, Some(7), None, None]);
         assert_eq!(found.inputs[0].element, DataType::Float);
         assert_eq!(found.output("paint"), Some(1));
         assert!(found.input("image").is_none());

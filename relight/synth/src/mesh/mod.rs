@@ -405,12 +405,14 @@ mod tests {
     fn numbers_that_are_no_mesh_are_refused_and_named() {
         let mut raw = cube();
         raw.positions[3].y = f32::NAN;
-        let fault = "vertex 3 is not at a finite place";
-        assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), fault);
+        let fault = Mesh::new(raw, CREASE).unwrap_err();
+        assert!(fault.contains("vertex 3 "), "{fault}");
         let mut raw = cube();
         raw.triangles[2][1] = 99;
-        let fault = "triangle 2 names vertex 99 of 24";
-        assert_eq!(Mesh::new(raw, CREASE).unwrap_err(), fault);
+        let fault = Mesh::new(raw, CREASE).unwrap_err();
+        for named in ["triangle 2", "99", "24"] {
+            assert!(fault.contains(named), "{named}: {fault}");
+        }
         let mut raw = cube();
         for position in &mut raw.positions {
             position.x = 0.0;

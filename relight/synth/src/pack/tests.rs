@@ -180,22 +180,14 @@ fn what_cannot_be_used_is_left_out_and_named_and_the_rest_is_packed() {
     assert_eq!(chair.origin, "Test catalog 1.8");
     assert_eq!(summary.objects[2].licence, "CC0-1.0");
     assert_eq!(summary.panoramas.len(), 4);
-    let reasons: Vec<(&str, usize)> = summary
-        .left_out
-        .iter()
-        .map(|(reason, &count)| (reason.as_str(), count))
-        .collect();
-    assert_eq!(
-        reasons,
-        [
-            ("objects: cannot be read", 1),
-            ("objects: flat", 1),
-            ("objects: the same as another one", 1),
-            ("objects: walls, windows and doors", 1),
-            ("panoramas: cannot be read", 1),
-            ("panoramas: the same as another one", 1),
-        ]
-    );
+    // Of objects a damaged one, a flat one, one that is there already, and a window; of panoramas two.
+    let of_kind = |kind: &str| {
+        let reasons = summary.left_out.iter();
+        let counts = reasons.filter(|(reason, _)| reason.starts_with(kind));
+        counts.map(|(_, &count)| count).collect::<Vec<usize>>()
+    };
+    assert_eq!(of_kind("objects: "), [1; 4], "{:?}", summary.left_out);
+    assert_eq!(of_kind("panoramas: "), [1; 2], "{:?}", summary.left_out);
     let faults: Vec<String> = summary.faults.iter().map(ToString::to_string).collect();
     for (name, what) in [
         ("lamp", "p.png"),
@@ -210,10 +202,10 @@ fn what_cannot_be_used_is_left_out_and_named_and_the_rest_is_packed() {
     assert_eq!(table.lines().count(), 1 + 7 + 6);
     assert!(table.contains("object,test/t/chair/chair.obj,Chair,Office,\"Ann, of \"\"B\"\"\",CC-BY-3.0,Test catalog 1.8,"));
     let card = fs::read_to_string(case.out().with_extension("md")).unwrap();
-    assert!(
-        card.contains("CC-BY-3.0") && card.contains("1 objects: flat"),
-        "{card}"
-    );
+    assert!(card.contains("CC-BY-3.0"), "{card}");
+    for reason in summary.left_out.keys() {
+        assert!(card.contains(reason.as_str()), "{reason}: {card}");
+    }
 }
 
 #[test]

@@ -162,7 +162,7 @@ fn soft_panorama() -> Panorama {
     Panorama::new(Rgb::new(Planes::from_fn(extent, pixel))).unwrap()
 }
 
-/// Ninety frames of a turn, rendered with rays as `synth --turn` renders them.
+/// Ninety frames of a turn, rendered with rays as `synth turns` renders them.
 const FRAMES: u32 = 90;
 
 /// Mean and first harmonics of rendered frames: shading of a white object, or its highlights, pixel by pixel.

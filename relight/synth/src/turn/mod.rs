@@ -20,11 +20,12 @@ use std::path::Path;
 use image::GrayImage;
 use rayon::prelude::*;
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
 use relit_data::shard::{
     self, Align, Dataset, Digest, ExtractionSettings, ImageSize, Layout, MaskInfo, OutputFolder,
     SamplingBasis, SessionEntry, SessionQuality, ShardEntry, ShardWriter,
 };
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 use super::SynthError;
 use super::library::Library;

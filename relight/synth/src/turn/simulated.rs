@@ -6,8 +6,9 @@ use glam::Vec3;
 use image::RgbImage;
 use rayon::prelude::*;
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
 use relit_data::shard::{Digest, FrameRecord, Sample, SourceVideo};
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 use super::description::{FrameTruth, TurnDescription, TurnRecipe};
 use super::stand::{Stand, standing_object};

@@ -11,7 +11,8 @@ use relight_core::image::{ColourSpace, Srgb};
 use relight_core::reader::{
     Cursor, DrawPlan, Encoding, Rank, Source, Stream, Streaming, TurnBatch, TurnFrame, Turns,
 };
-use relit_data::image_stats::{SATURATED_VALUE, SPEC_NET_GATE};
+use relit_data::image_stats::SATURATED_VALUE;
+use relit_data::spec_net_gate::{self, SPEC_NET_GATE};
 
 /// Batches that are decoded ahead of the network.
 const AHEAD: usize = 3;
@@ -187,7 +188,8 @@ fn is_saturated(batch: &TurnBatch, frame: usize) -> bool {
     let mask = &batch.masks[pixels * frame..pixels * (frame + 1)];
     let inside = || (0..pixels).filter(|&at| mask[at] >= 0.5);
     let is_white = |at: &usize| (0..3).all(|channel| picture[channel * pixels + at] >= level);
-    inside().filter(is_white).count() as f64 > SPEC_NET_GATE * inside().count() as f64
+    let saturated = inside().filter(is_white).count() as f64 / inside().count() as f64;
+    spec_net_gate::opens(saturated, SPEC_NET_GATE)
 }
 
 #[cfg(test)]

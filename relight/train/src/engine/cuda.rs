@@ -58,11 +58,9 @@ mod tests {
     #[test]
     fn a_gpu_that_is_not_there_is_told_in_one_sentence() {
         let error = cuda_device(4711).unwrap_err();
+        assert!(matches!(error, TrainError::Refused(_)), "{error:?}");
         let text = error.to_string();
-        let told = [
-            "libtorch's library for CUDA cannot be loaded",
-            "there is no GPU 4711",
-        ];
-        assert!(told.iter().any(|told| text.starts_with(told)), "{text}");
+        let named = ["CUDA", "4711"];
+        assert!(named.iter().any(|named| text.contains(named)), "{text}");
     }
 }

@@ -15,6 +15,7 @@ use relit_data::causes::with_causes;
 use super::all_reduced::AllReducedLosses;
 use super::checkpoint::Checkpoint;
 use super::divergence_guard::DivergenceGuard;
+use super::learning_rate::learning_rate;
 use super::metrics_log::MetricsLog;
 use super::task::{StepLosses, TrainingTask, Validation};
 use crate::distributed::agreement::{Fact, agree, fingerprint};
@@ -217,7 +218,7 @@ impl<'a> Run<'a> {
         stop: bool,
         observer: &mut dyn TrainObserver,
     ) -> Result<bool, TrainError> {
-        let learning_rate = self.settings.learning_rate_at(self.step);
+        let learning_rate = learning_rate(self.settings, self.step);
         let losses = self.task.step(self.step)?;
         if let Some(damage) = &losses.damage {
             self.damaged = true;

@@ -9,7 +9,11 @@ use serde::de::DeserializeOwned;
 use crate::error::TrainError;
 
 /// Settings that a run may change when it goes on: what it learns does not depend on them.
-const HOW_OFTEN: [&str; 2] = ["run.log_every", "run.checkpoint_minutes"];
+const CHANGEABLE: [&str; 3] = [
+    "run.log_every",
+    "run.checkpoint_minutes",
+    "data.view_folder",
+];
 
 /// Reads settings from a TOML file; what it does not name has its default, and an unknown name is an error.
 ///
@@ -41,7 +45,7 @@ pub(crate) fn first_difference<S: Serialize + DeserializeOwned>(
 fn differing_name(within: &str, one: &toml::Table, two: &toml::Table) -> Option<String> {
     one.keys().chain(two.keys()).find_map(|key| {
         let name = format!("{within}{key}");
-        if HOW_OFTEN.contains(&name.as_str()) {
+        if CHANGEABLE.contains(&name.as_str()) {
             return None;
         }
         match (one.get(key), two.get(key)) {

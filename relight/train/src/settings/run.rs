@@ -91,15 +91,4 @@ impl RunSettings {
             1e-3..=MAX_MINUTES,
         )
     }
-
-    /// The learning rate of a step, from 0: it grows evenly at first, and falls along a cosine.
-    #[must_use]
-    pub fn learning_rate_at(&self, step: u64) -> f64 {
-        let warm = (step + 1) as f64 / self.warmup_steps.max(1) as f64;
-        let part = step as f64 / self.steps as f64;
-        let cosine = 0.5 + 0.5 * (std::f64::consts::PI * part).cos();
-        self.learning_rate
-            * warm.min(1.0)
-            * (self.min_lr_ratio + (1.0 - self.min_lr_ratio) * cosine)
-    }
 }

@@ -64,6 +64,8 @@ fn the_setting_that_differs_is_named() {
     let often = whole.replace("log_every = 20\n", "log_every = 5\n");
     assert_ne!(often, whole);
     assert_eq!(first_difference(&own, &often), None);
+    let turn = TurnNetworkSettings::default();
+    assert_eq!(first_difference(&turn, "[data]\nview_folder = \"v\""), None);
     let unknown = "[run]\nspeed = 3";
     assert!(first_difference(&own, unknown).unwrap().contains("speed"));
 }
@@ -86,12 +88,8 @@ fn a_number_out_of_range_is_named() {
         size: 100,
         ..DataSettings::default()
     };
-    assert!(
-        data.check()
-            .unwrap_err()
-            .to_string()
-            .contains("multiple of 32")
-    );
+    let error = data.check().unwrap_err().to_string();
+    assert!(error.contains("size") && error.contains("32"), "{error}");
 }
 
 #[test]
@@ -123,16 +121,5 @@ fn loss_coefficients_that_teach_nothing_are_named() {
         light: 0.0,
     };
     let told = error(nothing).unwrap_err();
-    assert!(told.contains("all others"), "{told}");
-}
-
-#[test]
-fn the_learning_rate_rises_and_falls() {
-    let run = RunSettings {
-        steps: 1000,
-        ..RunSettings::default()
-    };
-    assert!(run.learning_rate_at(0) < 0.02 * run.learning_rate);
-    assert!(run.learning_rate_at(120) > 0.9 * run.learning_rate);
-    assert!((run.learning_rate_at(999) / run.learning_rate - run.min_lr_ratio).abs() < 1e-3);
+    assert!(told.contains("loss"), "{told}");
 }

@@ -17,6 +17,9 @@ pub struct TransferSettings {
     pub size: u32,
     /// Views in all; each is cast once.
     pub views: u64,
+    /// The folder in which views are kept; runs can share it. `views` in the folder of the run where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub view_folder: Option<PathBuf>,
     /// Views that are there from the first step on.
     pub first_views: u64,
     /// Views that join at each step, until all have.
@@ -46,6 +49,7 @@ impl Default for TransferSettings {
         Self {
             size: 128,
             views: 3000,
+            view_folder: None,
             first_views: 64,
             new_views: 2,
             rays: 144,

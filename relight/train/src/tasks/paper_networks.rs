@@ -79,10 +79,10 @@ impl PhaseNetworks {
         };
         let spec = || optional(spec_net(), &inputs.spec);
         let normal =
-            || optional(normal_net(), &inputs.normal)?.ok_or_else(|| needed(phase, "--normal"));
+            || optional(normal_net(), &inputs.normal)?.ok_or_else(|| needed(phase, "--normal-net"));
         let light = || {
             let model = optional(light_net(Head::Pooled), &inputs.light)?;
-            model.ok_or_else(|| needed(phase, "--light"))
+            model.ok_or_else(|| needed(phase, "--light-net"))
         };
         Ok(match phase {
             PaperPhase::Spec => Self::Spec,
@@ -96,7 +96,7 @@ impl PhaseNetworks {
                 spec: spec()?,
             },
             PaperPhase::Specular => Self::Specular {
-                spec: spec()?.ok_or_else(|| needed(phase, "--spec"))?,
+                spec: spec()?.ok_or_else(|| needed(phase, "--spec-net"))?,
                 normal: normal()?,
                 light: light()?,
             },

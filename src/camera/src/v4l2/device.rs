@@ -163,6 +163,8 @@ fn open_error(path: &Path, error: io::Error) -> CameraError {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashSet;
+
     use super::*;
 
     fn device(node: Node) -> Device {
@@ -212,15 +214,13 @@ mod tests {
     #[test]
     fn the_systems_error_is_part_of_every_message() {
         let device = null();
-        for (errno, words) in [
-            (Errno::NODEV, "was unplugged"),
-            (Errno::BUSY, "is in use by"),
-            (Errno::NOSPC, "USB bus of /dev/video9 is full"),
-            (Errno::IO, "refused when its stream was started"),
-        ] {
+        for errno in [Errno::NODEV, Errno::BUSY, Errno::NOSPC, Errno::IO] {
             let text = with_causes(&device.error("its stream was started", errno.into()));
             let answer = io::Error::from(errno).to_string();
-            assert!(text.contains(words) && text.ends_with(&answer), "{text}");
+            assert!(
+                text.contains("/dev/video9") && text.ends_with(&answer),
+                "{text}"
+            );
             let text = with_causes(&device.stream_error("read", errno.into()));
             assert!(text.ends_with(&answer), "{text}");
             let text = with_causes(&open_error(Path::new("/dev/video9"), errno.into()));
@@ -234,9 +234,13 @@ mod tests {
             Err(CameraError::NotACamera { why, .. }) => why,
             answer => panic!("{answer:?}"),
         };
-        assert!(why(sys::V4L2_CAP_META_CAPTURE).contains("no pictures"));
-        assert!(why(sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE).contains("several planes"));
-        assert!(why(sys::V4L2_CAP_VIDEO_CAPTURE).contains("stream"));
+        let reasons = [
+            sys::V4L2_CAP_META_CAPTURE,
+            sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE,
+            sys::V4L2_CAP_VIDEO_CAPTURE,
+        ];
+        let reasons: HashSet<String> = reasons.into_iter().map(why).collect();
+        assert_eq!(reasons.len(), 3, "{reasons:?}");
         let camera = sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_STREAMING;
         assert!(null().check_capabilities(camera).is_ok());
     }

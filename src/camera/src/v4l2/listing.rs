@@ -71,7 +71,8 @@ mod tests {
         };
         let info = unreadable("/dev/video3".into(), &error);
         assert_eq!(info.address.to_string(), "v4l2:/dev/video3");
-        assert!(info.problems[0].contains("group `video`"), "{info:?}");
-        assert!(info.problems[0].contains("permission denied"), "{info:?}");
+        assert!(info.problems[0].contains("`video`"), "{info:?}");
+        let answer = io::Error::from(io::ErrorKind::PermissionDenied).to_string();
+        assert!(info.problems[0].contains(&answer), "{info:?}");
     }
 }

@@ -274,10 +274,7 @@ mod tests {
             .choose(&modes)
             .unwrap_err()
             .to_string();
-        assert!(
-            error.contains("any format of any size at 30 frames/s"),
-            "{error}"
-        );
+        assert!(error.contains("30 frames/s"), "{error}");
         assert!(error.contains("MJPG 640x480, 25 frames/s"), "{error}");
     }
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use relit_turntable::simulator::{Simulator, SimulatorOptions};
 use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
 use tempfile::TempDir;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_relit-capture");
@@ -87,6 +88,14 @@ fn out(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
+/// The event that a command with `--json` printed.
+#[track_caller]
+fn event(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", err(output));
+    let printed = out(output);
+    serde_json::from_str(printed.lines().last().unwrap()).unwrap()
+}
+
 fn err(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
@@ -105,29 +114,26 @@ fn a_table_is_looked_at_moved_and_stopped_from_the_command_line() {
     BufReader::new(program.0.stdout.as_mut().unwrap())
         .read_line(&mut ready)
         .unwrap();
-    assert!(ready.contains("\"ready\""), "{ready}");
+    let ready: Value = serde_json::from_str(&ready).unwrap();
+    assert_eq!(ready["event"], "ready");
+    let status = event(&ask(&port, &["status", "--json"]));
+    assert_eq!(status["event"], "status");
+    assert_eq!(
+        (&status["state"], &status["angle_deg"]),
+        (&"idle".into(), &0.0.into())
+    );
+    let volts = status["battery_v"].as_f64().unwrap();
+    assert!((volts - 12.0).abs() < 0.1, "{volts}");
+    let jogged = event(&ask(&port, &["jog", "-12.5", "--speed", "20", "--json"]));
+    let angle = jogged["angle_deg"].as_f64().unwrap();
+    assert!((angle + 12.499).abs() < 6e-4, "{angle}");
+    let home = ask(&port, &["home", "--json"]);
+    assert_eq!(event(&home)["event"], "homed");
+    // Zero is where it stands, as it has no index: a person is told.
+    assert!(err(&home).contains("$22=0"), "{}", err(&home));
+    // The same for a person.
     let status = ask(&port, &["status"]);
-    assert!(status.status.success(), "{}", err(&status));
-    assert!(
-        out(&status).starts_with("Idle, 0.000 degrees"),
-        "{}",
-        out(&status)
-    );
-    assert!(out(&status).contains("battery 12.0"), "{}", out(&status));
-    let jogged = ask(&port, &["jog", "-12.5", "--speed", "20"]);
-    assert!(jogged.status.success(), "{}", err(&jogged));
-    assert!(out(&jogged).contains("-12.499 degrees"), "{}", out(&jogged));
-    let home = ask(&port, &["home"]);
-    assert!(home.status.success(), "{}", err(&home));
-    assert!(
-        err(&home).contains("where the table stands"),
-        "{}",
-        err(&home)
-    );
-    let json = ask(&port, &["status", "--json"]);
-    let value: serde_json::Value = serde_json::from_str(&out(&json)).unwrap();
-    assert_eq!(value["event"], "status");
-    assert_eq!(value["state"], "idle");
+    assert!(out(&status).contains("Idle"), "{}", out(&status));
 }
 
 #[test]
@@ -138,14 +144,16 @@ fn a_second_program_is_told_who_has_the_table_and_a_stop_ends_that_one() {
         let refused = table.ask(words);
         assert_eq!(refused.status.code(), Some(1));
         assert!(
-            err(&refused).contains(&format!("process {}", jog.id())),
+            err(&refused).contains(&jog.id().to_string()),
             "{}",
             err(&refused)
         );
     }
-    let stopped = table.ask(&["stop"]);
-    assert!(stopped.status.success(), "{}", err(&stopped));
-    assert!(out(&stopped).starts_with("Idle"), "{}", out(&stopped));
+    let stopped = event(&table.ask(&["stop", "--json"]));
+    assert_eq!(
+        (&stopped["event"], &stopped["state"]),
+        (&"stopped".into(), &"idle".into())
+    );
     assert_eq!(jog.wait().unwrap().code(), Some(1));
 }
 
@@ -185,9 +193,9 @@ fn a_jog_that_is_interrupted_stops_the_table() {
     let mut jog = table.jog(&["300", "--speed", "10"]);
     kill_process(Pid::from_child(&jog), Signal::INT).unwrap();
     assert_eq!(jog.wait().unwrap().code(), Some(1));
-    let first = out(&table.ask(&["status"]));
-    let second = out(&table.ask(&["status"]));
-    assert!(first.starts_with("Idle"), "{first}");
+    let first = event(&table.ask(&["status", "--json"]));
+    let second = event(&table.ask(&["status", "--json"]));
+    assert_eq!(first["state"], "idle", "{first}");
     assert_eq!(first, second);
 }
 
@@ -220,16 +228,14 @@ fn where_each_opening_resets_and_locks_the_controller_a_jog_can_home_first() {
     assert!(home.status.success(), "{}", err(&home));
     let locked = table.ask(&["jog", "5"]);
     assert_eq!(locked.status.code(), Some(1));
-    assert!(err(&locked).contains("locked"), "{}", err(&locked));
-    let jogged = table.ask(&["jog", "--home", "5"]);
-    assert!(jogged.status.success(), "{}", err(&jogged));
-    let said = out(&jogged);
-    let last = said.lines().last().unwrap();
-    assert!(
-        last.starts_with("Idle, 5.00") || last.starts_with("Idle, 4.99"),
-        "{said}"
+    assert!(err(&locked).contains("Alarm"), "{}", err(&locked));
+    let jogged = event(&table.ask(&["jog", "--home", "5", "--json"]));
+    assert_eq!(
+        (&jogged["state"], &jogged["homed"]),
+        (&"idle".into(), &true.into())
     );
-    assert!(!last.contains("not homed"), "{said}");
+    let angle = jogged["angle_deg"].as_f64().unwrap();
+    assert!((angle - 5.0).abs() < 0.01, "{angle}");
 }
 
 #[test]
@@ -238,10 +244,15 @@ fn a_moving_table_that_nobody_has_is_stopped_and_that_is_said() {
     let mut jog = table.jog(&["390", "--speed", "5"]);
     jog.kill().unwrap();
     jog.wait().unwrap();
-    let status = table.ask(&["status"]);
-    assert!(out(&status).starts_with("Idle"), "{}", out(&status));
-    assert!(err(&status).contains("it was stopped"), "{}", err(&status));
-    let again = table.ask(&["status"]);
+    let status = table.ask(&["status", "--json"]);
+    assert_eq!(event(&status)["state"], "idle");
+    assert!(
+        out(&status).contains(r#""event":"warning""#),
+        "{}",
+        out(&status)
+    );
+    assert_eq!(err(&status).lines().count(), 1, "{}", err(&status));
+    let again = table.ask(&["status", "--json"]);
     assert_eq!(err(&again), "");
 }
 
@@ -255,6 +266,6 @@ fn what_is_no_angle_is_refused_in_words() {
             .unwrap();
         assert_eq!(refused.status.code(), Some(2));
         let said = err(&refused);
-        assert!(said.contains("give degrees as a number"), "{said}");
+        assert!(said.contains(words[1]), "{said}");
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use relit_turntable::{Alarm, ControllerState, Homed, Port, Table, TurntableError};
+use relit_turntable::{Alarm, ControllerState, Homed, MotionFault, Port, Table, TurntableError};
 
 use crate::rig::{Rig, turn_by};
 
@@ -14,8 +14,12 @@ fn pressed_in_a_turn() -> (Rig, Table) {
     let mut turn = table.start_turn(turn_by(&table, 90.0)).unwrap();
     turn.wait_constant().unwrap();
     rig.simulated.press_emergency_stop(true);
-    let error = turn.wait_end().unwrap_err().to_string();
-    assert!(error.contains("ALARM:10"), "{error}");
+    let error = turn.wait_end().unwrap_err();
+    let alarm = |error: &TurntableError| match error {
+        TurntableError::Motion(MotionFault::Alarm(alarm)) => alarm.code,
+        _ => None,
+    };
+    assert_eq!(alarm(&error), Some(10), "{error}");
     (rig, table)
 }
 
@@ -39,11 +43,6 @@ fn while_the_emergency_stop_is_pressed_everything_says_so() {
         table.jog(1.0, None).unwrap_err(),
     ] {
         assert!(matches!(error, TurntableError::EmergencyStop), "{error}");
-        let text = error.to_string();
-        assert!(
-            text.contains("pressed: release it") && !text.contains("error:9"),
-            "{text}"
-        );
     }
     // A stop is no way out of it either, and does no harm.
     table.stop().unwrap();

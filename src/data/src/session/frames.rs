@@ -239,20 +239,14 @@ mod tests {
         let (index, fault) = FrameIndex::parse_until_fault(&zeros);
         assert_eq!(index.entries().len(), 2);
         let fault = fault.unwrap();
-        assert!(
-            fault.starts_with("line 3 is not a frame's entry"),
-            "{fault}"
-        );
+        assert!(fault.contains("line 3 "), "{fault}");
     }
 
     #[test]
     fn a_broken_line_in_the_middle_is_named() {
         let broken = text(&[entry(0)]) + "{\"n\":\n" + &text(&[entry(1)]);
         let fault = FrameIndex::parse(broken.as_bytes()).unwrap_err();
-        assert!(
-            fault.starts_with("line 2 is not a frame's entry"),
-            "{fault}"
-        );
+        assert!(fault.contains("line 2 "), "{fault}");
     }
 
     #[test]
@@ -263,15 +257,17 @@ mod tests {
         early.t_us = 0;
         let mut repeated = entry(1);
         repeated.sequence = 0;
-        let clock = "line 2 is not later than the line before (0 us after 0 us)";
-        let counter = "line 2 repeats or goes back in the driver's sequence (0 after 0)";
         for (second, wanted) in [
-            (skipped, "line 2 says n = 2, but 1 was expected"),
-            (early, clock),
-            (repeated, counter),
+            (skipped, "n = 2"),
+            (early, "0 us after 0 us"),
+            (repeated, "sequence (0 after 0)"),
         ] {
             let read = FrameIndex::parse(text(&[entry(0), second]).as_bytes());
-            assert_eq!(read.unwrap_err().to_string(), wanted);
+            let fault = read.unwrap_err().to_string();
+            assert!(
+                fault.contains("line 2 ") && fault.contains(wanted),
+                "{fault}"
+            );
         }
     }
 }

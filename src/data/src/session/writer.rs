@@ -378,10 +378,8 @@ mod tests {
         let path = writer.folder().join(INDEX_FILE);
         let wrong = |entry: &FrameEntry| FrameEntry { n: 7, ..*entry };
         let error = writer.amend(wrong).unwrap_err();
-        assert!(
-            error.to_string().contains("frame 7 cannot follow"),
-            "{error}"
-        );
+        assert!(matches!(error, SessionError::Unusable(_)), "{error:?}");
+        assert!(error.to_string().contains("frame 7 "), "{error}");
         writer.amend(with_angle).unwrap();
         writer.finish().unwrap();
         let index = FrameIndex::parse(&fs::read(path).unwrap()).unwrap();

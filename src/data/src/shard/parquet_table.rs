@@ -295,7 +295,8 @@ fn row_of(fields: &HashMap<String, Field>) -> Result<TableRow, String> {
 mod tests {
     use super::*;
     use crate::geometry::Rect;
-    use crate::image_stats::{Measures, SPEC_NET_GATE};
+    use crate::image_stats::Measures;
+    use crate::spec_net_gate::SPEC_NET_GATE;
 
     fn row(index: u32) -> TableRow {
         let even = index.is_multiple_of(2);

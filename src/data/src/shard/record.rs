@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::Rect;
 use crate::image_stats::Measures;
+use crate::spec_net_gate;
 
 /// The record of one sample, as it is in `<session>/<kkkk>.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -106,7 +107,7 @@ impl FrameRecord {
             saturated_px: measures.saturated_px,
             saturated_fraction,
             saturated_any_px: measures.saturated_any_px,
-            spec_net: saturated_fraction > gate,
+            spec_net: spec_net_gate::opens(saturated_fraction, gate),
             mean_rgb: measures.mean_rgb,
             sharpness: measures.sharpness,
             exposure_step: None,
@@ -122,7 +123,7 @@ pub(super) use tests::record;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image_stats::SPEC_NET_GATE;
+    use crate::spec_net_gate::SPEC_NET_GATE;
 
     /// A record of which nothing is to say.
     pub(in crate::shard) fn record(index: u32) -> FrameRecord {

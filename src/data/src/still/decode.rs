@@ -2,10 +2,10 @@
 
 use std::io::Cursor;
 
-use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use crate::still::{Format, StillError, exr, isobmff, jpeg, png_exif, radiance};
+use crate::still::orientation::orientation;
+use crate::still::{Format, StillError, exr, jpeg, radiance};
 
 /// Decodes the content of a file, turned as it is displayed. The numbers stay as they are stored; what they stand for
 /// says [`crate::still::Colour::from_file`].
@@ -42,24 +42,6 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
         image.apply_orientation(orientation);
     }
     Ok(image)
-}
-
-/// How a picture is turned for display: by Exif, TIFF's tag, or the properties of AVIF and HEIF. None where it stands as
-/// it is stored, or where its orientation cannot be read.
-#[must_use]
-pub fn orientation(bytes: &[u8]) -> Option<Orientation> {
-    let stated = match Format::sniff(bytes)? {
-        Format::Avif | Format::Heic => isobmff::orientation(bytes)?,
-        Format::Png => Orientation::from_exif_chunk(png_exif::find(bytes)?)?,
-        Format::Jpeg | Format::WebP | Format::Tiff => {
-            let reader = ImageReader::new(Cursor::new(bytes))
-                .with_guessed_format()
-                .ok()?;
-            reader.into_decoder().ok()?.orientation().ok()?
-        }
-        _ => return None,
-    };
-    (stated != Orientation::NoTransforms).then_some(stated)
 }
 
 /// Width and height that a file says it has, before it is turned; none where they cannot be read.

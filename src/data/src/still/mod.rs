@@ -17,13 +17,15 @@ mod format;
 mod isobmff;
 mod jpeg;
 mod names;
+mod orientation;
 mod png_exif;
 mod radiance;
 mod tiff;
 
 pub use colour::Colour;
-pub use decode::{decode, orientation, stored_size};
+pub use decode::{decode, stored_size};
 pub use error::{ColourError, StillError};
 pub use format::{ENDINGS, Format};
 pub use image::metadata::Orientation;
 pub use names::is_named;
+pub use orientation::orientation;

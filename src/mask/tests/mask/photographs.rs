@@ -181,25 +181,17 @@ fn a_photograph_in_a_format_that_is_not_read_is_named() {
         (
             "phone.HEIC",
             &b"\0\0\0\x18ftypheic\0\0\0\0mif1heic"[..],
-            "a HEIC image",
+            "HEIC",
         ),
-        (
-            "phone.jpg",
-            b"\0\0\0\x18ftypmif1\0\0\0\0mif1heic",
-            "a HEIC image",
-        ),
-        (
-            "canon.cr3",
-            b"\0\0\0\x18ftypcrx \0\0\0\0crx isom",
-            "raw file",
-        ),
-        ("nikon.nef", &nef, "raw file"),
+        ("phone.jpg", b"\0\0\0\x18ftypmif1\0\0\0\0mif1heic", "HEIC"),
+        ("canon.cr3", b"\0\0\0\x18ftypcrx \0\0\0\0crx isom", "raw"),
+        ("nikon.nef", &nef, "raw"),
         (
             "drawing.svg",
             b"<svg xmlns=\"http://www.w3.org/2000/svg\"/>",
-            "an SVG",
+            "SVG",
         ),
-        ("layers.xcf", b"gimp xcf v011\0", "a GIMP file"),
+        ("layers.xcf", b"gimp xcf v011\0", "GIMP"),
     ] {
         fs::write(folder.join(name), content).unwrap();
         let done = relit_mask(folder, &[name, "--rect", "2,2,20,20", "-o", "mask.png"]);

@@ -5,14 +5,12 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
 use relight_core::captured_object::CapturedObject;
-use relight_core::image::Transfer;
 use relight_photo::compositing::{LightDescription, ObjectDescription, SceneDescription};
 use relight_photo::files::{InsertionOutput, OutputKind, PhotoReading};
-use relight_photo::relighting::{LightSource, WhiteBalance};
 use relit_data::text;
 
+use crate::lighting::{LightArguments, RotationArguments};
 use crate::photos::NetworkArguments;
-use crate::values::{TRANSFERS, WHITE_BALANCES, degrees, one_of};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -30,92 +28,47 @@ Examples:
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs of the objects, from back to front.
-    #[arg(
-        value_name = "PHOTO",
-        required_unless_present = "scene",
-        conflicts_with = "scene"
-    )]
+    /// Photographs of the objects, from back to front, or captured objects (.relit).
+    #[arg(value_name = "PHOTO", required_unless_present = "scene")]
     photos: Vec<PathBuf>,
-    /// A scene: background, light and objects in a TOML file.
-    #[arg(long, value_name = "FILE.toml")]
+    /// A scene, which describes background, light and objects in full, in place of the options below.
+    #[arg(
+        long,
+        value_name = "FILE.toml",
+        conflicts_with_all = ["photos", "into", "mask", "at", "height", "light", "lamp", "light_angle"]
+    )]
     scene: Option<PathBuf>,
     /// The picture (.png, .jpg, .exr), or a video (.mp4, .webm). Its folder is made where there is none.
     #[arg(short, long, value_name = "OUT")]
     pub(super) output: PathBuf,
     /// The background: a photograph, a panorama (HDR or EXR, twice as wide as high), or a video.
-    #[arg(
-        long,
-        value_name = "FILE",
-        required_unless_present = "scene",
-        conflicts_with = "scene"
-    )]
+    #[arg(long, value_name = "FILE", required_unless_present = "scene")]
     into: Option<PathBuf>,
-    #[command(flatten)]
+    #[command(
+        flatten,
+        next_help_heading = "Objects (once for all, or once for each)"
+    )]
     object: ObjectArguments,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Light [default: that of the background]")]
     light: LightArguments,
-    /// Width and height of the picture that shows a part of a panorama.
-    #[arg(long, value_name = "W,H", value_parser = size, conflicts_with = "scene")]
-    size: Option<[u32; 2]>,
-    /// Leave brightness, white balance and grain of the objects as they are.
-    #[arg(long, conflicts_with = "scene")]
-    no_match: bool,
-    /// How the colour of the light is shown [default: light].
-    #[arg(long, value_parser = one_of(WHITE_BALANCES), conflicts_with = "scene")]
-    white_balance: Option<WhiteBalance>,
-    /// Turn the light about the vertical first, from the viewer to the right, and a panorama behind the objects with it.
-    #[arg(long, value_name = "DEGREES", value_parser = number, allow_hyphen_values = true, conflicts_with = "scene")]
-    turned: Option<f64>,
-    /// Turn a panorama and its light by so many degrees about the vertical, in a video.
-    #[arg(long, value_name = "DEGREES", value_parser = degrees(), allow_hyphen_values = true)]
-    pub(super) turn: Option<f64>,
-    /// How long the turn takes, seconds.
-    #[arg(long, value_name = "SECONDS", value_parser = number, default_value_t = 10.0, requires = "turn")]
-    seconds: f64,
-    /// Frames a second of a turn.
-    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
-    fps: u32,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Video before a panorama")]
+    pub(super) rotation: RotationArguments,
+    #[command(flatten, next_help_heading = "Network")]
     pub(super) network: NetworkArguments,
 }
 
 /// What is said of the objects; what is given once holds for all, what is given as often as there are objects for one each.
 #[derive(Args)]
 struct ObjectArguments {
-    /// How the photograph is encoded, where it is a PNG, JPEG or WebP; EXR and HDR are linear [default: what the file says, or
-    /// sRGB].
-    #[arg(long, value_parser = one_of(TRANSFERS), action = ArgAction::Append, conflicts_with = "scene")]
-    transfer: Vec<Transfer>,
-    /// A mask, white on the object, or a folder of masks, <photo's name>.png.
-    #[arg(long, value_name = "FILE|DIR", action = ArgAction::Append, conflicts_with = "scene")]
+    /// A mask, white on the object, or a folder of masks, PHOTO.png.
+    #[arg(long, value_name = "FILE|DIR", action = ArgAction::Append)]
     mask: Vec<PathBuf>,
-    /// The middle of the object's lower edge in the picture, in parts of its width and height from the upper left corner.
-    #[arg(long, value_name = "X,Y", value_parser = place, action = ArgAction::Append, conflicts_with = "scene")]
+    /// The middle of the lower edge of the object in the picture, in parts of its width and height from the upper left.
+    #[arg(long, value_name = "X,Y", value_parser = place, action = ArgAction::Append)]
     at: Vec<[f64; 2]>,
-    /// The object's height in parts of the picture's.
-    #[arg(long, value_name = "PART", value_parser = number, action = ArgAction::Append, conflicts_with = "scene")]
+    /// The height of the object in parts of that of the picture.
+    #[arg(long, value_name = "PART", value_parser = number, action = ArgAction::Append)]
     height: Vec<f64>,
-    /// How much of the object's shadow is seen, 0 to 1.
-    #[arg(long, value_name = "PART", value_parser = number, action = ArgAction::Append, conflicts_with = "scene")]
-    shadow: Vec<f64>,
-}
-
-/// The light; without any it is taken from the background.
-#[derive(Args)]
-#[group(multiple = false)]
-struct LightArguments {
-    /// The light: a panorama, or a text file of coefficients [default: taken from the background].
-    #[arg(long, value_name = "FILE", conflicts_with = "scene")]
-    light: Option<PathBuf>,
-    /// The light: a lamp (see relight relight --help).
-    #[arg(
-        long,
-        value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
-        allow_hyphen_values = true,
-        conflicts_with = "scene"
-    )]
-    lamp: Option<String>,
 }
 
 impl Arguments {
@@ -125,10 +78,8 @@ impl Arguments {
         let object = &self.object;
         let lists = [
             ("--mask", object.mask.len()),
-            ("--transfer", object.transfer.len()),
             ("--at", object.at.len()),
             ("--height", object.height.len()),
-            ("--shadow", object.shadow.len()),
         ];
         let odd = lists
             .into_iter()
@@ -157,9 +108,9 @@ impl Arguments {
             OutputKind::from_path(&self.output),
             Some(OutputKind::Movie(_))
         );
-        (self.turn.is_some() && !is_movie).then(|| {
+        (self.rotation.rotate.is_some() && !is_movie).then(|| {
             format!(
-                "--output {}: give .mp4 or .webm for --turn",
+                "--output {}: give .mp4 or .webm for --rotate",
                 self.output.display()
             )
         })
@@ -169,9 +120,9 @@ impl Arguments {
     pub(super) fn written(&self) -> InsertionOutput<'_> {
         InsertionOutput {
             path: &self.output,
-            turn: self.turn.unwrap_or(360.0),
-            seconds: self.seconds,
-            frames_per_second: self.fps,
+            rotate: self.rotation.rotate.unwrap_or(0.0),
+            frames: self.rotation.frames(),
+            frames_per_second: self.rotation.fps,
         }
     }
 
@@ -188,28 +139,16 @@ impl Arguments {
         let objects = (0..self.photos.len())
             .map(|number| self.object.describe(&self.photos, number))
             .collect();
-        let (coefficients, panorama) = match &self.light.light {
-            Some(path) if LightSource::is_text(path) => (Some(path.clone()), None),
-            other => (None, other.clone()),
-        };
+        let (coefficients, panorama) = self.light.files();
         let scene = SceneDescription {
-            background: self.into.clone().unwrap_or_default(),
-            size: self.size.unwrap_or([1280, 960]),
-            field: 60.0,
-            down: 10.0,
-            tilt: None,
             light: LightDescription {
-                panorama,
-                lamp: self.light.lamp.clone(),
-                ambient: None,
-                coefficients,
-                object: None,
-                turn: self.turned.unwrap_or(0.0),
+                panorama: panorama.map(Path::to_owned),
+                lamp: self.light.lamp.as_ref().map(|lamp| lamp.text.clone()),
+                coefficients: coefficients.map(Path::to_owned),
+                angle: self.light.light_angle,
+                ..LightDescription::default()
             },
-            matches: !self.no_match,
-            white_balance: self.white_balance.unwrap_or(WhiteBalance::Light),
-            exposure: 0.0,
-            objects,
+            ..SceneDescription::new(self.into.clone().unwrap_or_default(), objects)
         };
         scene.check()?;
         Ok((scene, PathBuf::new()))
@@ -221,23 +160,19 @@ impl ObjectArguments {
         let photo = photos[number].clone();
         // Beside each other, where nothing is said.
         let across = (number as f64 + 0.5) / photos.len() as f64;
+        let mask = of(&self.mask, number)
+            // A folder of masks is for the photographs.
+            .filter(|mask| !(CapturedObject::is_named(&photo) && mask.is_dir()))
+            .map(|mask| {
+                let name = photo.file_stem().unwrap_or_default();
+                PhotoReading::mask_path(&mask, &name.to_string_lossy())
+            });
+        let default = ObjectDescription::new(photo);
         ObjectDescription {
-            mask: of(&self.mask, number)
-                // A folder of masks is for the photographs.
-                .filter(|mask| !(CapturedObject::is_named(&photo) && mask.is_dir()))
-                .map(|mask| {
-                    let name = photo.file_stem().unwrap_or_default();
-                    PhotoReading::mask_path(&mask, &name.to_string_lossy())
-                }),
-            transfer: of(&self.transfer, number),
-            at: of(&self.at, number).unwrap_or([across, 0.9]),
-            height: of(&self.height, number).unwrap_or(0.4),
-            rotation: 0.0,
-            tint: [1.0; 3],
-            gloss: None,
-            exposure: 0.0,
-            shadow: of(&self.shadow, number).unwrap_or(1.0) as f32,
-            photo,
+            mask,
+            at: of(&self.at, number).unwrap_or([across, default.at[1]]),
+            height: of(&self.height, number).unwrap_or(default.height),
+            ..default
         }
     }
 }
@@ -255,20 +190,10 @@ fn number(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "give a number".to_owned())
 }
 
-fn pair<T: std::str::FromStr>(text: &str) -> Option<[T; 2]> {
-    let numbers: Vec<T> = text
-        .split(',')
-        .map(|part| part.trim().parse().ok())
-        .collect::<Option<_>>()?;
-    numbers.try_into().ok()
-}
-
 fn place(text: &str) -> Result<[f64; 2], String> {
-    pair(text).ok_or_else(|| {
-        "give X,Y: parts of the picture's width and height, such as 0.5,0.9".to_owned()
-    })
-}
-
-fn size(text: &str) -> Result<[u32; 2], String> {
-    pair(text).ok_or_else(|| "give W,H in pixels".to_owned())
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y]) => Ok([x, y]),
+        _ => Err("give X,Y: parts of the picture's width and height, such as 0.5,0.9".to_owned()),
+    }
 }

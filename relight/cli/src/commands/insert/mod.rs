@@ -127,14 +127,18 @@ fn check_output(background: &BackgroundFile, arguments: &Arguments) -> Result<()
         BackgroundFile::Photo(_) if is_movie => Err(format!(
             "{output}: a photograph does not move; give .png, .jpg or .exr"
         )),
-        BackgroundFile::Panorama(_) if is_movie && arguments.turn.is_none() => Err(format!(
-            "{output}: a panorama moves with --turn DEGREES; give it, or .png, .jpg or .exr"
-        )),
+        BackgroundFile::Panorama(_) if is_movie && arguments.rotation.rotate.is_none() => {
+            Err(format!(
+                "{output}: a panorama moves with --rotate DEGREES; give it, or .png, .jpg or .exr"
+            ))
+        }
         BackgroundFile::Movie(_) if !is_movie => {
             Err(format!("{output}: give .mp4 or .webm for a video"))
         }
-        BackgroundFile::Photo(_) | BackgroundFile::Movie(_) if arguments.turn.is_some() => {
-            Err("--turn: only a panorama can be turned".to_owned())
+        BackgroundFile::Photo(_) | BackgroundFile::Movie(_)
+            if arguments.rotation.rotate.is_some() =>
+        {
+            Err("--rotate: only a panorama can be rotated".to_owned())
         }
         _ => Ok(()),
     }

@@ -1,33 +1,33 @@
-//! `relight render`: from maps and light to an image, a turn, a sweep of materials.
+//! `relight render`: from maps and light to an image, a video in which the light rotates, a sheet of materials.
 
 mod object;
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use rayon::prelude::*;
-use relight_core::image::{ImageError, Linear, Rgb, Srgb};
-use relight_core::light::{Direction, Order, Panorama, Rotation, ShLight};
-use relight_core::render::{DiffuseForm, Look, SpecularForm, Surface, exposure_for};
+use relight_core::light::{Direction, Order, Rotation, ShLight};
+use relight_core::render::{Look, Surface, exposure_for};
 use relight_photo::files::{MovieWriter, OutputKind, write_picture};
-use relight_photo::relighting::InsertError;
+use relight_photo::relighting::{InsertError, LightSource};
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
 use self::object::{Map, ObjectArguments};
 use crate::commands::CommandResult;
 use crate::folder::make_empty_folder;
-use crate::values::{Choices, DIFFUSE_FORMS, degrees, one_of, within};
+use crate::lighting::{LightArguments, RotationArguments, ShadingArgument};
+use crate::values::within;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  relight render --normals normal.png --albedo albedo.png --panorama studio.hdr -o lit.png
+  relight render image --normals normal.png --albedo albedo.png --light studio.hdr -o lit.png
       the object in the light of a panorama
-  relight render --normals normal.png --albedo albedo.png --reflectance 0.3 --smoothness 60 \\
-      --light light.txt --turn 240 -o turn.mp4
-      a glossy object, while the light turns once about the vertical
-  relight render --normals normal.png --normals-y down --panorama studio.hdr --sweep -o materials.png
+  relight render image --normals normal.png --albedo albedo.png --reflectance 0.3 --smoothness 60 \\
+      --light light.txt --rotate 360 --seconds 8 -o rotation.mp4
+      a glossy object, while the light rotates once about the vertical
+  relight render materials --normals normal.png --normals-y down --light studio.hdr -o materials.png
       the object in many materials; its map of normals has y down";
 
 /// How many decimal places frames have in their names.
@@ -35,77 +35,59 @@ const PLACES: usize = 4;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    #[command(flatten)]
-    object: ObjectArguments,
-    #[command(flatten)]
-    light: LightArguments,
-    /// The image (.png, .exr), or for --turn a video (.mp4, .webm) or a folder for PNG frames.
+    #[command(subcommand)]
+    result: RenderedResult,
+}
+
+#[derive(Subcommand)]
+enum RenderedResult {
+    /// An image, or with --rotate a video in which the light rotates.
+    Image(Box<ImageArguments>),
+    /// A sheet of the object in many materials: smoothness 5 to 200 across, from 0 to 40 % of reflected light down.
+    Materials(Box<MaterialsArguments>),
+}
+
+#[derive(Args)]
+struct ImageArguments {
+    /// The image (.png, .exr), or for --rotate a video (.mp4, .webm) or a folder for PNG frames.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Render this many frames, while the light turns once about the vertical, from the viewer to the right.
-    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "sweep")]
-    turn: Option<u32>,
-    /// Frames a second of a video.
-    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240))]
-    fps: u32,
-    /// Render one sheet of the object in many materials: smoothness 5 to 200 across, from 0 to 40 % of reflected light down.
-    #[arg(long)]
-    sweep: bool,
+    #[command(flatten)]
+    render: RenderArguments,
+    #[command(flatten, next_help_heading = "Video")]
+    rotation: RotationArguments,
+}
+
+#[derive(Args)]
+struct MaterialsArguments {
+    /// The image (.png, .exr).
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    #[command(flatten)]
+    render: RenderArguments,
+}
+
+/// The object, its light, and how it is shown.
+#[derive(Args)]
+struct RenderArguments {
     /// Brightness in stops beyond a white diffuse surface under even light of radiance 1, or "auto": a white diffuse
     /// surface that faces the strongest light is white.
     #[arg(long, value_name = "STOPS", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     exposure: Exposure,
-    /// The specular layer.
-    #[arg(long, default_value = "lobe", value_parser = one_of(SPECULAR_FORMS))]
-    specular: SpecularForm,
-    /// The diffuse layer.
-    #[arg(long, default_value = "irradiance", value_parser = one_of(DIFFUSE_FORMS))]
-    diffuse: DiffuseForm,
-}
-
-#[derive(Args)]
-struct LightArguments {
-    /// The light: an HDR or EXR panorama, whose middle is what the viewer sees behind the object.
-    #[arg(
-        long,
-        value_name = "FILE",
-        required_unless_present = "light",
-        conflicts_with = "light"
-    )]
-    panorama: Option<PathBuf>,
-    /// The light: coefficients of spherical harmonics, one line each of red, green, blue (nine for order 2).
-    #[arg(long, value_name = "FILE")]
-    light: Option<PathBuf>,
-    /// The order of spherical harmonics to which a panorama is brought; the paper's is 2. Highlights need
-    /// more, the smoother the surface is.
-    #[arg(long, value_name = "0-64", default_value_t = Order::RENDER.get() as u8, value_parser = clap::value_parser!(u8).range(0..=Order::MAX as i64))]
-    order: u8,
-    /// Turn the light about the vertical first, from the viewer to the right.
-    #[arg(
-        long,
-        value_name = "DEGREES",
-        default_value_t = 0.0,
-        value_parser = degrees(),
-        allow_hyphen_values = true
-    )]
-    turned: f64,
+    #[command(flatten)]
+    shading: ShadingArgument,
+    #[command(flatten, next_help_heading = "Object")]
+    object: ObjectArguments,
+    #[command(flatten, next_help_heading = "Light")]
+    light: LightArguments,
+    /// The order of spherical harmonics to which the light is brought; the paper's is 2, highlights need more
+    /// [default: that of a file of coefficients, else 48].
+    #[arg(long, value_name = "0-64", value_parser = clap::value_parser!(u8).range(0..=Order::MAX as i64))]
+    order: Option<u8>,
     /// Write the coefficients of the light to this file, too.
     #[arg(long, value_name = "FILE")]
     save_light: Option<PathBuf>,
 }
-
-const SPECULAR_FORMS: Choices<SpecularForm> = &[
-    (
-        "lobe",
-        "The Blinn-Phong lobe in zonal harmonics: close to the ground truth",
-        SpecularForm::Lobe,
-    ),
-    (
-        "power",
-        "The paper's formula, for the first nine coefficients",
-        SpecularForm::Power,
-    ),
-];
 
 #[derive(Clone, Copy)]
 enum Exposure {
@@ -116,27 +98,72 @@ enum Exposure {
 impl Arguments {
     /// What is wrong with the combination of arguments, if anything is.
     pub(crate) fn fault(&self) -> Option<String> {
-        let is_turn = self.turn.is_some();
-        if let Map::Even([first, others @ ..]) = &self.object.smoothness
-            && others.iter().any(|value| value != first)
-        {
-            return Some("--smoothness: give one value or a file".to_owned());
+        match &self.result {
+            RenderedResult::Image(arguments) => {
+                let rotates = arguments.rotation.rotate.is_some();
+                let fault = arguments.render.fault();
+                fault.or_else(|| output_fault(&arguments.output, rotates))
+            }
+            RenderedResult::Materials(arguments) => {
+                let fault = arguments.render.fault();
+                fault.or_else(|| output_fault(&arguments.output, false))
+            }
         }
-        let is_folder = self.output.extension().is_none();
-        let wanted = match OutputKind::from_path(&self.output) {
-            Some(OutputKind::Png | OutputKind::Exr) if !is_turn => return None,
-            Some(OutputKind::Movie(_)) if is_turn => return None,
-            None if is_turn && is_folder => return None,
-            _ if is_turn => "a folder without an extension, .mp4 or .webm for --turn",
-            _ => ".png or .exr",
+    }
+}
+
+/// What is wrong with the name of what is written.
+fn output_fault(output: &Path, rotates: bool) -> Option<String> {
+    let is_folder = output.extension().is_none();
+    let wanted = match OutputKind::from_path(output) {
+        Some(OutputKind::Png | OutputKind::Exr) if !rotates => return None,
+        Some(OutputKind::Movie(_)) if rotates => return None,
+        None if rotates && is_folder => return None,
+        _ if rotates => "a folder without an extension, .mp4 or .webm for --rotate",
+        _ => ".png or .exr",
+    };
+    Some(format!("--output {}: give {wanted}", output.display()))
+}
+
+impl RenderArguments {
+    fn fault(&self) -> Option<String> {
+        if self.light.is_empty() {
+            return Some("give the light by --light FILE or --lamp AZIMUTH,ELEVATION".to_owned());
+        }
+        match &self.object.smoothness {
+            Map::Even([first, others @ ..]) if others.iter().any(|value| value != first) => {
+                Some("--smoothness: give one value or a file".to_owned())
+            }
+            _ => None,
+        }
+    }
+
+    /// The light, rotated; it is written where that is asked for.
+    fn read_light(&self) -> Result<ShLight, Box<dyn Error>> {
+        let order = self.order.map(|order| Order::new(order.into()));
+        let order = order.transpose()?;
+        let light = match self.light.read()? {
+            Some(LightSource::Panorama(panorama)) => {
+                panorama.project(order.unwrap_or(Order::RENDER))
+            }
+            Some(LightSource::Lamp(lamp)) => lamp.light(order.unwrap_or(Order::RENDER)),
+            Some(LightSource::Coefficients(light)) => {
+                let order = order.unwrap_or(light.order());
+                light.with_order(order)
+            }
+            None => return Err("give --light or --lamp".into()),
         };
-        Some(format!("--output {}: give {wanted}", self.output.display()))
+        let light = light.rotated(&Rotation::about(Direction::UP, self.light.angle()));
+        if let Some(path) = &self.save_light {
+            light.write(path)?;
+        }
+        Ok(light)
     }
 
     fn look(&self, light: &ShLight) -> Look {
         Look {
-            diffuse: self.diffuse,
-            specular: self.specular,
+            diffuse: self.shading.diffuse(),
+            specular: self.shading.specular(),
             exposure: match self.exposure {
                 Exposure::Auto => exposure_for(light),
                 Exposure::Stops(stops) => stops.exp2() * relight_core::render::EXPOSURE,
@@ -145,70 +172,83 @@ impl Arguments {
     }
 }
 
-impl LightArguments {
-    fn read(&self) -> Result<ShLight, Box<dyn Error>> {
-        let light = match (&self.panorama, &self.light) {
-            (Some(path), _) => Panorama::read(path)?.project(Order::new(self.order.into())?),
-            (None, Some(path)) => ShLight::read(path)?,
-            (None, None) => return Err("give --panorama or --light".into()),
-        };
-        let turn = Rotation::about(Direction::UP, self.turned.to_radians());
-        let light = light.rotated(&turn);
-        if let Some(path) = &self.save_light {
-            light.write(path)?;
-        }
-        Ok(light)
+pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
+    match &arguments.result {
+        RenderedResult::Image(arguments) => image(arguments, console),
+        RenderedResult::Materials(arguments) => materials(arguments, console),
     }
 }
 
-pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
-    let surface = arguments.object.read()?;
-    let light = arguments.light.read()?;
-    let look = arguments.look(&light);
-    let path = &arguments.output;
-    if let Some(frames) = arguments.turn {
-        turn(arguments, frames, console, |part| {
-            Ok(look.turned(&surface, &light, part)?.encode())
-        })?;
+fn image(arguments: &ImageArguments, console: Console) -> CommandResult {
+    let scene = LitObject::read(&arguments.render)?;
+    let frames = if arguments.rotation.rotate.is_some() {
+        rotation(arguments, &scene, console)?;
+        arguments.rotation.frames()
     } else {
-        write_picture(path, &still(arguments, &look, &surface, &light)?)?;
-    }
-    let output = path.display().to_string();
-    console.say(
-        &output,
-        &json!({ "event": "rendered", "output": output, "frames": arguments.turn.unwrap_or(1), "exposure": look.exposure }),
-    );
+        let picture = scene.look.image(&scene.surface, &scene.light)?;
+        write_picture(&arguments.output, &picture)?;
+        1
+    };
+    report(&arguments.output, frames, &scene.look, console);
     Ok(Outcome::Success)
 }
 
-/// The one image that is asked for.
-fn still(
-    arguments: &Arguments,
-    look: &Look,
-    surface: &Surface,
-    light: &ShLight,
-) -> Result<Rgb<Linear>, ImageError> {
+fn materials(arguments: &MaterialsArguments, console: Console) -> CommandResult {
     const REFLECTED: [f32; 4] = [0.0, 0.04, 0.15, 0.4];
     const SMOOTHNESSES: [f32; 6] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
-    if arguments.sweep {
-        look.sweep(surface, light, &REFLECTED, &SMOOTHNESSES)
-    } else {
-        look.image(surface, light)
+    let LitObject {
+        surface,
+        light,
+        look,
+    } = LitObject::read(&arguments.render)?;
+    let sheet = look.sweep(&surface, &light, &REFLECTED, &SMOOTHNESSES)?;
+    write_picture(&arguments.output, &sheet)?;
+    report(&arguments.output, 1, &look, console);
+    Ok(Outcome::Success)
+}
+
+/// An object in its light.
+struct LitObject {
+    surface: Surface,
+    light: ShLight,
+    look: Look,
+}
+
+impl LitObject {
+    fn read(arguments: &RenderArguments) -> Result<Self, Box<dyn Error>> {
+        let surface = arguments.object.read()?;
+        let light = arguments.read_light()?;
+        let look = arguments.look(&light);
+        Ok(Self {
+            surface,
+            light,
+            look,
+        })
     }
 }
 
-/// Writes the frames of a turn; `frame` makes one, after a part of the turn.
-fn turn(
-    arguments: &Arguments,
-    frames: u32,
+fn report(output: &Path, frames: u32, look: &Look, console: Console) {
+    let output = output.display().to_string();
+    let event = json!({ "event": "rendered", "output": output, "frames": frames, "exposure": look.exposure });
+    console.say(&output, &event);
+}
+
+/// Writes the frames of a video in which the light rotates.
+fn rotation(
+    arguments: &ImageArguments,
+    scene: &LitObject,
     console: Console,
-    frame: impl Fn(f64) -> Result<Rgb<Srgb>, InsertError> + Sync,
 ) -> Result<(), Box<dyn Error>> {
-    let frame = |at: u32| frame(f64::from(at) / f64::from(frames));
-    let path = &arguments.output;
+    let rotation = &arguments.rotation;
+    let frame = |at: u32| {
+        let part = rotation.degrees_at(at) / 360.0;
+        let image = scene.look.turned(&scene.surface, &scene.light, part)?;
+        Ok::<_, InsertError>(image.encode())
+    };
+    let (path, frames) = (&arguments.output, rotation.frames());
     let bar = console.progress(frames.into(), "frames");
     if let Some(OutputKind::Movie(format)) = OutputKind::from_path(path) {
-        let encoding = (format, arguments.fps);
+        let encoding = (format, rotation.fps);
         MovieWriter::write_frames(path, encoding, frames, frame, || bar.inc(1))?;
     } else {
         make_empty_folder(path)?;

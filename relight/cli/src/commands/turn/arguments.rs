@@ -2,15 +2,17 @@
 
 use std::error::Error;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::Args;
-use relight_photo::nets::Weights;
 use relight_turn::{
     Elevation, MaterialKind, ProbeBall, ProbePlace, TurnLight, TurnNetwork, TurnNetworks,
     TurnOptions, read_given_light,
 };
 use relit_data::rig::RotationDirection;
 
+use crate::folder::OutputFolder;
+use crate::inputs::WeightsArgument;
 use crate::shipped;
 use crate::values::{Choices, one_of};
 
@@ -28,49 +30,55 @@ pub(crate) struct Arguments {
     /// The shard of one turn (.tar), or a folder that holds one turn.
     #[arg(value_name = "SHARD")]
     pub(super) shard: PathBuf,
-    /// The folder for the results.
-    #[arg(short, long, value_name = "DIR")]
-    pub(super) output: PathBuf,
-    /// How high the camera looks down on the table, degrees: 0 from the side, 90 from above [default: as the data set
-    /// or the session says; else 18, and 8 either way].
+    #[command(flatten)]
+    pub(super) folder: OutputFolder,
+    /// How high the camera looks down on the table, degrees: 0 from the side, 90 from above [default: as the data set or the
+    /// session says; else 18 ± 8].
     #[arg(long, value_name = "DEGREES", value_parser = elevation)]
     elevation: Option<Elevation>,
-    /// Which way the table turns as its angle grows, seen from above: the background moves to the right, or to
-    /// the left [default: as the data set or the session says; else the one in which the network of turns is clearly surer; else
-    /// counter-clockwise].
+    /// Which way the table turns as its angle grows, seen from above [default: as the data set or the session says; else the one
+    /// in which the network is clearly surer; else counter-clockwise].
     #[arg(long, value_name = "WAY", value_parser = one_of(ROTATIONS))]
     rotation: Option<RotationDirection>,
-    /// The light where it is known, in the viewer's frame at the table's angle 0: coefficients of spherical harmonics
-    /// (nine lines of red, green and blue, or more, up to order 6), or a panorama (.hdr, .exr).
+    /// The light where it is known, in the viewer's frame at the angle 0 of the table: a panorama (.hdr, .exr), or coefficients
+    /// of spherical harmonics up to order 6 (.txt).
     #[arg(long, value_name = "FILE")]
     pub(super) light: Option<PathBuf>,
-    /// With --probe: the session from which the shard was made, or its video. Needs the program ffmpeg.
-    #[arg(long, value_name = "PATH", requires = "probe")]
+    /// A ball on the table, diffuse grey or chrome, which measures the light: its middle and radius in the video, pixels, and
+    /// what it is made of [default: what it looks like]. The albedo of the ball is then 1.
+    #[arg(
+        long,
+        value_name = "X,Y,R[,grey|chrome]",
+        requires = "session",
+        conflicts_with = "light"
+    )]
+    light_ball: Option<LightBall>,
+    /// With --light-ball: the session from which the shard was made, or its video. Needs the program ffmpeg.
+    #[arg(long, value_name = "PATH", requires = "light_ball")]
     session: Option<PathBuf>,
-    /// A ball on the table, diffuse grey or chrome, which measures the light: its middle and radius in the video,
-    /// pixels. The light is then in units in which the ball's albedo is 1.
-    #[arg(long, value_name = "X,Y,R", value_parser = probe, requires = "session", conflicts_with = "light")]
-    probe: Option<ProbePlace>,
-    /// What the ball is made of: without it, what it looks like.
-    #[arg(long, value_name = "KIND", value_parser = one_of(BALLS), requires = "probe")]
-    probe_ball: Option<ProbeBall>,
-    /// Weights of the network of turns, as relight train turn writes them [default: those that come with the program].
-    #[arg(long, value_name = "FILE")]
-    turn_network: Option<PathBuf>,
     /// The object's material.
     #[arg(long, value_name = "KIND", value_parser = one_of(MATERIALS), default_value = "diffuse")]
     material: MaterialKind,
+    #[command(flatten)]
+    weights: WeightsArgument,
+}
+
+/// A ball that measures the light.
+#[derive(Debug, Clone, Copy)]
+struct LightBall {
+    place: ProbePlace,
+    kind: Option<ProbeBall>,
 }
 
 impl Arguments {
     /// What is known of the turn beforehand.
     pub(super) fn options(&self) -> Result<TurnOptions<'_>, Box<dyn Error>> {
-        let light = match (&self.light, &self.session, self.probe) {
+        let light = match (&self.light, &self.session, self.light_ball) {
             (Some(path), ..) => TurnLight::Given(read_given_light(path)?),
-            (None, Some(session), Some(place)) => TurnLight::Ball {
+            (None, Some(session), Some(ball)) => TurnLight::Ball {
                 session,
-                place,
-                ball: self.probe_ball,
+                place: ball.place,
+                ball: ball.kind,
             },
             _ => TurnLight::Unknown,
         };
@@ -83,10 +91,7 @@ impl Arguments {
     }
 
     pub(super) fn networks(&self) -> Result<TurnNetworks, Box<dyn Error>> {
-        let weights = match &self.turn_network {
-            Some(path) => Weights::read(path)?,
-            None => shipped::turn_weights()?,
-        };
+        let (weights, _) = self.weights.read_or(shipped::turn_weights)?;
         Ok(TurnNetworks {
             turn: TurnNetwork::new(&weights)?,
             photo: shipped::weights()?,
@@ -107,11 +112,6 @@ const ROTATIONS: Choices<RotationDirection> = &[
     ),
 ];
 
-const BALLS: Choices<ProbeBall> = &[
-    ("grey", "It is diffuse", ProbeBall::Grey),
-    ("chrome", "It mirrors", ProbeBall::Chrome),
-];
-
 const MATERIALS: Choices<MaterialKind> = &[
     (
         "diffuse",
@@ -130,10 +130,23 @@ fn elevation(text: &str) -> Result<Elevation, String> {
     Elevation::given(degrees).map_err(|error| error.to_string())
 }
 
-fn probe(text: &str) -> Result<ProbePlace, String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(str::parse).collect();
-    match numbers.as_deref() {
-        Ok(&[x, y, radius]) => ProbePlace::new([x, y], radius).map_err(|error| error.to_string()),
-        _ => Err("give X,Y,R: middle and radius of the ball, pixels".to_owned()),
+impl FromStr for LightBall {
+    type Err = String;
+
+    /// Reads `X,Y,R[,grey|chrome]`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wanted = "give X,Y,R: middle and radius of the ball in pixels, and grey or chrome";
+        let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+        let (numbers, kind) = match parts.as_slice() {
+            [numbers @ .., "grey"] => (numbers, Some(ProbeBall::Grey)),
+            [numbers @ .., "chrome"] => (numbers, Some(ProbeBall::Chrome)),
+            numbers => (numbers, None),
+        };
+        let numbers: Result<Vec<f64>, _> = numbers.iter().map(|part| part.parse()).collect();
+        let Ok(&[x, y, radius]) = numbers.as_deref() else {
+            return Err(wanted.to_owned());
+        };
+        let place = ProbePlace::new([x, y], radius).map_err(|error| error.to_string())?;
+        Ok(Self { place, kind })
     }
 }

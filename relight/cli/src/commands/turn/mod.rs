@@ -14,18 +14,18 @@ use crate::commands::CommandResult;
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let start = Instant::now();
-    TurnFiles::check(&arguments.output)?;
+    TurnFiles::check(&arguments.folder.output)?;
     let solved = solve(arguments, console)?;
     let figures = TurnFiles {
         solved: &solved,
         light_source: light_source(arguments, &solved).as_deref(),
     }
-    .write(&arguments.output)?;
+    .write(&arguments.folder.output)?;
     let (seconds, reading_seconds) = (start.elapsed().as_secs_f64(), solved.reading.as_secs_f64());
     let text = text(arguments, &solved, [reading_seconds, seconds]);
     let event = json!({
         "event": "turned",
-        "output": arguments.output,
+        "output": arguments.folder.output,
         "seconds": seconds,
         "reading_seconds": reading_seconds,
         "figures": figures,
@@ -69,7 +69,7 @@ fn text(arguments: &Arguments, solved: &SolvedTurn, [reading, all]: [f64; 2]) ->
     format!(
         "{}: {} frames over {:.0} degrees in {reading:.1} s, all in {all:.1} s; normals expected within {:.0} degrees (median), \
          light {}, material {}",
-        arguments.output.display(),
+        arguments.folder.output.display(),
         solved.turn.curves.frames(),
         solved.turn.curves.coverage_deg(),
         solved.solution.expected_error_deg(),

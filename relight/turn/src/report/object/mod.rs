@@ -22,7 +22,7 @@ impl TurnSolution {
     ///
     /// # Errors
     /// None for maps of one size.
-    pub(crate) fn surface(&self, curves: &TurnCurves) -> Result<Surface, TurnError> {
+    pub fn surface(&self, curves: &TurnCurves) -> Result<Surface, TurnError> {
         let extent = curves.extent();
         let (normals, albedo) = (self.normals(curves), self.albedo(curves));
         Ok(match (self.material(), self.gloss) {

@@ -12,7 +12,6 @@ mod load;
 mod page;
 mod previews;
 mod processing;
-mod rehearsal;
 mod security;
 mod sessions;
 mod states;
@@ -38,6 +37,11 @@ const ASKED_EVERY: Duration = Duration::from_millis(5);
 /// What begins and ends as a JPEG does.
 const PICTURE: &[u8] = &[0xFF, 0xD8, 1, 2, 3, 4, 0xFF, 0xD9];
 
+/// What the rig says where it refuses.
+const NO_TABLE: &str = "there is no table";
+const TOO_FAR: &str = "no table turns so far";
+const BUSY: &str = "a capture is under way: stop it first";
+
 /// A rig that takes one start at a time and notes what it is told.
 struct Fake {
     monitor: Monitor,
@@ -56,8 +60,8 @@ impl Rig for Fake {
         }
         match command {
             Command::Start { object, .. } => self.start(&object),
-            Command::Home => Err(Refused::Unavailable("there is no table".to_owned())),
-            Command::Jog { .. } => Err(Refused::Invalid("no table turns so far".to_owned())),
+            Command::Home => Err(Refused::Unavailable(NO_TABLE.to_owned())),
+            Command::Jog { .. } => Err(Refused::Invalid(TOO_FAR.to_owned())),
             Command::Stop => {
                 self.monitor.update(|state| state.phase = Phase::Idle);
                 Ok(())
@@ -89,7 +93,7 @@ impl Fake {
                 state.object = Some(object.to_owned());
             }
         });
-        let busy = || Refused::Busy("a capture is under way: stop it first".to_owned());
+        let busy = || Refused::Busy(BUSY.to_owned());
         taken.then_some(()).ok_or_else(busy)
     }
 }

@@ -28,7 +28,7 @@ fn without_the_token_only_the_bare_page_is_served() {
         let refused = serving.get(path);
         assert_eq!(refused.status, 401, "{path}");
         assert_eq!(refused.header("www-authenticate"), Some("Bearer"));
-        assert!(refused.error().contains("needs the token"));
+        assert!(refused.error().contains("token"), "{path}");
     }
     let start = r#"{"command":"start","object":"mug"}"#;
     assert_eq!(serving.command(start).status, 401);
@@ -152,7 +152,7 @@ fn oversized_requests_are_refused() {
     let body = vec![b' '; 17 * 1024];
     let refused = serving.ask("POST", "/api/v1/command", &[json], &body);
     assert_eq!(refused.status, 413);
-    assert!(refused.error().contains("16384 bytes"));
+    assert!(refused.error().contains("16384"));
     let many = vec!["X-Filler: 1"; 200];
     assert_eq!(serving.ask("GET", "/", &many, b"").status, 431);
     let long = format!("/{}", "a".repeat(100_000));

@@ -7,6 +7,7 @@ use crate::shard::dataset::SessionEntry;
 use crate::shard::quality::SessionQuality;
 use crate::shard::record::FrameRecord;
 use crate::shard::settings::{ExtractionSettings, ImageSize};
+use crate::spec_net_gate;
 
 /// The problems with the records of a session, given by index (`None` if one could not be read).
 /// A problem with a sample has its index, one with the session has none.
@@ -120,7 +121,7 @@ fn record_problems(
             ),
         ),
         (
-            r.spec_net == (r.saturated_fraction > settings.gate),
+            r.spec_net == spec_net_gate::opens(r.saturated_fraction, settings.gate),
             format!(
                 "spec_net is {} at a fraction of {} and a gate of {}",
                 r.spec_net, r.saturated_fraction, settings.gate

@@ -11,11 +11,13 @@
 
 mod anomaly;
 mod line;
+mod missing_frames;
 mod numbering;
 mod period_fit;
 
 pub(crate) use anomaly::TimingAnomaly;
 use line::FARTHEST;
+pub(crate) use missing_frames::{MissingFrames, gaps};
 use numbering::Numbering;
 
 /// Largest relative difference between the camera's rate and the agreed one.
@@ -29,17 +31,6 @@ pub(crate) struct FrameStamp {
     pub sequence: Option<u64>,
     /// The time stamp, microseconds.
     pub t_us: i64,
-}
-
-/// Frames that were exposed and not delivered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct MissingFrames {
-    /// The first missing exposure.
-    pub exposure: u64,
-    /// How many in a row.
-    pub count: u64,
-    /// The delivered frame that comes after them, from 0.
-    pub before: usize,
 }
 
 /// What the stamps of a row of frames show.
@@ -119,23 +110,6 @@ fn wrong_rates(found: &Numbering, agreed: f64) -> Vec<TimingAnomaly> {
         .chain(median.map(|&median| exposed / median as f64))
         .map(|measured| TimingAnomaly::Rate { measured, agreed })
         .collect()
-}
-
-/// The exposures up to, but not with, `end` that are none of the delivered frames', in order.
-pub(crate) fn gaps(exposures: &[u64], end: u64) -> Vec<MissingFrames> {
-    let mut due = 0;
-    let mut missing = Vec::new();
-    for (before, &exposure) in exposures.iter().chain([&end]).enumerate() {
-        if exposure > due {
-            missing.push(MissingFrames {
-                exposure: due,
-                count: exposure - due,
-                before,
-            });
-        }
-        due = exposure.saturating_add(1);
-    }
-    missing
 }
 
 #[cfg(test)]

@@ -124,7 +124,9 @@ const PHASES: [Phase; 7] = [
 fn rows() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/serve/tests/states");
     let entries = std::fs::read_dir(folder).unwrap();
-    let mut rows: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    let is_row = |path: &PathBuf| path.extension().is_some_and(|name| name == "json");
+    let mut rows: Vec<_> = paths.filter(is_row).collect();
     rows.sort();
     rows
 }

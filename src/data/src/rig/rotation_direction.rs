@@ -1,12 +1,8 @@
-//! What is known of a rig: constants that are measured once, and which each of its sessions carries.
+//! Which way a table turns.
 
 use std::fmt;
-use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
-
-/// Elevations that a camera over a table can have, degrees: 0 from the side, 90 from above.
-pub const CAMERA_ELEVATIONS_DEG: RangeInclusive<f64> = 0.0..=89.0;
 
 /// Which way the table turns as its angle grows, seen from above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -46,15 +42,4 @@ impl fmt::Display for RotationDirection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
-}
-
-/// What is known of a rig. Each field is `None` where it was not measured.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct RigFacts {
-    /// Which way the table turns.
-    #[serde(default)]
-    pub rotation: Option<RotationDirection>,
-    /// How high the camera looks down on the table, degrees.
-    #[serde(default)]
-    pub camera_elevation_deg: Option<f64>,
 }

@@ -260,6 +260,8 @@ fn escaped(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashSet;
+
     use super::*;
     use relit_data::geometry::Rect;
     use relit_grabcut::DoubtfulRegion;
@@ -285,41 +287,31 @@ mod tests {
     fn each_verdict_has_its_reason() {
         let fits = MaskReport::from_shape(Some(shape()));
         assert_eq!((fits.verdict, fits.reasons.len()), (MaskVerdict::Fits, 0));
-        for (changed, word) in [
-            (
-                ShapeCheck {
-                    leaks: region(500),
-                    ..shape()
-                },
-                "background in the mask",
-            ),
-            (
-                ShapeCheck {
-                    missing: region(500),
-                    ..shape()
-                },
-                "object outside",
-            ),
-            (
-                ShapeCheck {
-                    holes: region(500),
-                    ..shape()
-                },
-                "holes",
-            ),
-            (
-                ShapeCheck {
-                    outline: 0.5,
-                    ..shape()
-                },
-                "does not follow",
-            ),
+        let mut reasons = HashSet::new();
+        for changed in [
+            ShapeCheck {
+                leaks: region(500),
+                ..shape()
+            },
+            ShapeCheck {
+                missing: region(500),
+                ..shape()
+            },
+            ShapeCheck {
+                holes: region(500),
+                ..shape()
+            },
+            ShapeCheck {
+                outline: 0.5,
+                ..shape()
+            },
         ] {
             let found = MaskReport::from_shape(Some(changed));
-            assert_eq!(found.verdict, MaskVerdict::Wrong, "{word}");
-            assert_eq!(found.reasons.len(), 1, "{word}");
-            assert!(found.reasons[0].contains(word), "{}", found.reasons[0]);
+            assert_eq!(found.verdict, MaskVerdict::Wrong, "{:?}", found.reasons);
+            assert_eq!(found.reasons.len(), 1, "{:?}", found.reasons);
+            reasons.extend(found.reasons);
         }
+        assert_eq!(reasons.len(), 4, "{reasons:?}");
         let unknown = MaskReport::from_shape(None);
         assert_eq!(
             (unknown.verdict, unknown.reasons.len()),

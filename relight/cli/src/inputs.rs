@@ -1,0 +1,55 @@
+//! Options of how files and networks are to be read, which several verbs take.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use relight_core::image::Transfer;
+use relight_core::light::NormalsFrame;
+use relight_photo::nets::{NetError, Weights};
+
+use crate::values::{NORMALS_Y, TRANSFERS, one_of};
+
+/// How files of colour are encoded.
+#[derive(Args)]
+pub(crate) struct TransferArgument {
+    /// How integers in files of colour are encoded; EXR and HDR are linear [default: what a photograph says, or sRGB].
+    #[arg(long, value_parser = one_of(TRANSFERS))]
+    pub(crate) transfer: Option<Transfer>,
+}
+
+/// Which way maps of normals have y.
+#[derive(Args)]
+pub(crate) struct NormalsArgument {
+    /// Which way y points in the normals that are read [default: as the network is known to have it, else up].
+    #[arg(long, value_name = "WAY", value_parser = one_of(NORMALS_Y))]
+    pub(crate) normals_y: Option<NormalsFrame>,
+}
+
+impl NormalsArgument {
+    /// The frame of normals that nobody knows by their file.
+    pub(crate) fn or_up(&self) -> NormalsFrame {
+        self.normals_y.unwrap_or(NormalsFrame::YUp)
+    }
+}
+
+/// The weights of the network that a verb runs.
+#[derive(Args)]
+pub(crate) struct WeightsArgument {
+    /// The network's weights (.safetensors) [default: those that come with the program].
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+}
+
+impl WeightsArgument {
+    /// The weights, or else the shipped ones, and how they are named.
+    pub(crate) fn read_or(
+        &self,
+        shipped: fn() -> Result<Weights, NetError>,
+    ) -> Result<(Weights, String), NetError> {
+        let Some(path) = &self.weights else {
+            return Ok((shipped()?, "shipped".to_owned()));
+        };
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        Ok((Weights::read(path)?, name.to_string_lossy().into_owned()))
+    }
+}

@@ -1,0 +1,149 @@
+//! Options of new light, of videos in which it rotates and of what it makes of surfaces, which several verbs take.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::Args;
+use relight_core::render::{DiffuseForm, SpecularForm};
+use relight_photo::relighting::{DiscLamp, InsertError, LightSource};
+
+use crate::values::{Choices, degrees, one_of, within};
+
+/// New light.
+#[derive(Args)]
+pub(crate) struct LightArguments {
+    /// The light: a panorama (.hdr, .exr) with what is behind the object in its middle, or coefficients (.txt).
+    #[arg(long, value_name = "FILE", conflicts_with = "lamp")]
+    pub(crate) light: Option<PathBuf>,
+    /// The light: a lamp at degrees about the vertical (0 at the viewer's side, 90 on the right) and above the horizon; its
+    /// colour, such as #ffd9b0 or 3200K; its size in degrees [default: white, 30].
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
+        allow_hyphen_values = true
+    )]
+    pub(crate) lamp: Option<Lamp>,
+    /// Rotate the light about the vertical first, from the viewer to the right.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = degrees(), allow_hyphen_values = true)]
+    pub(crate) light_angle: f64,
+}
+
+/// A lamp, as it was given and as it was read.
+#[derive(Debug, Clone)]
+pub(crate) struct Lamp {
+    pub(crate) text: String,
+    pub(crate) disc: DiscLamp,
+}
+
+impl FromStr for Lamp {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(Self {
+            text: text.to_owned(),
+            disc: text.parse()?,
+        })
+    }
+}
+
+impl LightArguments {
+    /// Whether no light is given.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.light.is_none() && self.lamp.is_none()
+    }
+
+    /// The light that is given, before it is rotated.
+    pub(crate) fn read(&self) -> Result<Option<LightSource>, InsertError> {
+        match (&self.lamp, &self.light) {
+            (Some(lamp), _) => Ok(Some(LightSource::Lamp(lamp.disc))),
+            (None, Some(path)) => LightSource::read(path).map(Some),
+            (None, None) => Ok(None),
+        }
+    }
+
+    /// Its angle, radians.
+    pub(crate) fn angle(&self) -> f64 {
+        self.light_angle.to_radians()
+    }
+
+    /// The file of coefficients and that of a panorama, of which at most one is given.
+    pub(crate) fn files(&self) -> (Option<&Path>, Option<&Path>) {
+        match self.light.as_deref() {
+            Some(path) if LightSource::is_text(path) => (Some(path), None),
+            other => (None, other),
+        }
+    }
+}
+
+/// A video in which light rotates.
+#[derive(Args)]
+pub(crate) struct RotationArguments {
+    /// Rotate the light by so many degrees about the vertical, in a video.
+    #[arg(long, value_name = "DEGREES", value_parser = degrees(), allow_hyphen_values = true)]
+    pub(crate) rotate: Option<f64>,
+    /// How long that takes.
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = within(0.01..=3600.0, "seconds"), requires = "rotate")]
+    pub(crate) seconds: f64,
+    /// Frames a second.
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240), requires = "rotate")]
+    pub(crate) fps: u32,
+}
+
+impl RotationArguments {
+    /// How many frames the video has.
+    pub(crate) fn frames(&self) -> u32 {
+        let frames = (self.seconds * f64::from(self.fps)).round();
+        frames.max(1.0) as u32
+    }
+
+    /// How far light has rotated at a frame, degrees.
+    pub(crate) fn degrees_at(&self, frame: u32) -> f64 {
+        let part = f64::from(frame) / f64::from(self.frames());
+        self.rotate.unwrap_or(0.0) * part
+    }
+}
+
+/// How light becomes shading and highlights.
+#[derive(Args)]
+pub(crate) struct ShadingArgument {
+    /// How light becomes shading and highlights.
+    #[arg(long, value_name = "MODEL", default_value = "physical", value_parser = one_of(SHADING_MODELS))]
+    shading_model: ShadingModel,
+}
+
+#[derive(Clone, Copy)]
+enum ShadingModel {
+    Physical,
+    Paper,
+}
+
+const SHADING_MODELS: Choices<ShadingModel> = &[
+    (
+        "physical",
+        "Irradiance, and the Blinn-Phong lobe in zonal harmonics",
+        ShadingModel::Physical,
+    ),
+    (
+        "paper",
+        "The paper's formulas, as its released code has them, from the first nine coefficients",
+        ShadingModel::Paper,
+    ),
+];
+
+impl ShadingArgument {
+    /// The diffuse layer.
+    pub(crate) fn diffuse(&self) -> DiffuseForm {
+        match self.shading_model {
+            ShadingModel::Physical => DiffuseForm::Irradiance,
+            ShadingModel::Paper => DiffuseForm::Released,
+        }
+    }
+
+    /// The specular layer.
+    pub(crate) fn specular(&self) -> SpecularForm {
+        match self.shading_model {
+            ShadingModel::Physical => SpecularForm::Lobe,
+            ShadingModel::Paper => SpecularForm::Power,
+        }
+    }
+}

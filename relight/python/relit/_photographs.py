@@ -1,0 +1,311 @@
+"""Photographs: decomposed, relit, put into other pictures; their masks."""
+
+from __future__ import annotations
+
+import collections
+import concurrent.futures
+import dataclasses
+import json
+import os
+
+import numpy
+
+from . import _relit
+from ._arrays import (
+    RelitWarning,
+    angles,
+    frames,
+    is_path,
+    light_source,
+    mask_picture,
+    photograph,
+    picture,
+    rectangle,
+    warn,
+    within,
+)
+
+#: Each photograph takes its memory, gigabytes where it is large.
+_MAX_SIDE_BY_SIDE = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class Decomposition:
+    """A photograph in layers, image = albedo x shading + highlight. Everything is as large as the photograph, and 0
+    outside the mask."""
+
+    #: rows x columns x 3, float32: unit vectors, x right, y up, z to the viewer.
+    normals: numpy.ndarray
+    #: rows x columns x 3, float32, linear, from 0: in units in which the mean shading is 1, with the light's colour.
+    albedo: numpy.ndarray
+    #: rows x columns, float32, linear, from 0: mean 1 under the mask.
+    shading: numpy.ndarray
+    #: rows x columns, float32, linear, from 0, in the photograph's units; 0 where none was separated.
+    highlight: numpy.ndarray
+    #: rows x columns, float32, 0 to 1: how sure the network is what of a pixel's darkness is paint and what is shadow.
+    #: Where it is low, albedo and shading may be wrong by the same factor.
+    confidence: numpy.ndarray
+    #: rows x columns, bool: the object.
+    mask: numpy.ndarray
+    #: 9 x 3, float64: the light around the object, grey, in units in which the mean shading is 1.
+    light: numpy.ndarray
+    #: Reflectance and smoothness of the whole object for `render`; None where no highlight tells them.
+    specular: tuple | None
+    #: The part of the object's pixels that are saturated, 0 to 1.
+    saturated_fraction: float
+    #: How far the layers together are from the photograph, root mean square over that of the photograph.
+    residual: float
+
+
+def decompose(image, mask=None, *, box=None, transfer=None, highlights="auto", mirror=True):
+    """A photograph of an object into normals, albedo, shading, highlight and light: a `Decomposition`.
+
+    image: a path, or rows x columns x 3 or 4: uint8 or uint16 (sRGB), float32 (linear).
+    mask: a path, or rows x columns. Without one the image's alpha counts, or what is not black before black.
+    box: x, y, width and height of a rectangle around the object, pixels.
+    transfer: "srgb", "gamma22" or "linear": how integers are encoded, where the file is not to be asked.
+    highlights: "auto" separates them where more than 5 % of the object is saturated; "on", "off".
+    mirror: False leaves out the look at the mirror image: faster, and a little worse.
+
+    The same as `relight decompose`, number by number.
+    """
+    found, note = _relit.decompose(photograph(image, mask, box, transfer), highlights, mirror)
+    if note:
+        warn([f"the mask {note}"])
+    return Decomposition(**found)
+
+
+def decompose_many(photographs, *, threads=None, return_exceptions=False, **options):
+    """Decompositions of many photographs, in their order, while further ones are under way.
+
+    photographs: any iterable of images, or of pairs of image and mask. It is read as far ahead as there are threads.
+    threads: how many photographs are decomposed side by side; as many as there are cores, at most 4.
+    return_exceptions: gives the exception in place of a decomposition, and goes on; else it is raised.
+    options: those of `decompose`.
+    """
+    threads = threads or min(_cores(), _MAX_SIDE_BY_SIDE)
+    with concurrent.futures.ThreadPoolExecutor(threads, "relit") as pool:
+        waiting = collections.deque()
+        try:
+            for one in photographs:
+                pair = one if isinstance(one, tuple) else (one,)
+                waiting.append(pool.submit(decompose, *pair, **options))
+                if len(waiting) > 2 * threads:
+                    yield _result(waiting.popleft(), return_exceptions)
+            while waiting:
+                yield _result(waiting.popleft(), return_exceptions)
+        finally:
+            for future in waiting:
+                future.cancel()
+
+
+def _cores():
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _result(future, return_exceptions):
+    error = future.exception()
+    if error is None or not return_exceptions:
+        return future.result()
+    return error
+
+
+def relight(
+    image,
+    mask=None,
+    *,
+    light=None,
+    lamp=None,
+    ambient=0.15,
+    turned=0.0,
+    background=None,
+    field=60.0,
+    white_balance="light",
+    exposure=0.0,
+    size=None,
+    box=None,
+    transfer=None,
+    highlights="auto",
+):
+    """The object of a photograph in another light: rows x columns x 3, float32, linear.
+
+    image, mask, box, transfer, highlights: see `decompose`.
+    light: a panorama (rows x columns x 3, or a path to .hdr or .exr), coefficients (n x 3, or a path to .txt), or "own",
+        the photograph's own light as it was estimated.
+    lamp: (azimuth, elevation[, colour][, size]), or "60,30,3200K,10": degrees about the vertical (0 at the viewer's side,
+        90 on the right, 180 behind) and above the horizon; "#ffd9b0" or "3200K"; degrees across.
+    ambient: even light beside a lamp, as a part of it, 0 to 10.
+    turned: degrees by which the light has turned about the vertical, from the viewer to the right; or several, for
+        frames x rows x columns x 3.
+    background: "photo", "light" (the panorama), "grey", "black" or "white"; by default the panorama that lights the
+        object, the photograph for its own light, or grey.
+    field: degrees of a panorama that the picture's longer side shows, 1 to 150.
+    white_balance: "light", or "auto" as by a camera that is balanced for it.
+    exposure: stops. With 0 the strongest light is as strong as in the photograph.
+    size: the longest side of the result, pixels; by default the photograph's.
+
+    The same as `relight relight`.
+    """
+    if isinstance(light, str) and light == "own":
+        if lamp is not None:
+            raise ValueError("light and lamp are given: give one")
+        source = None
+    else:
+        source = light_source(light, lamp, ambient)
+        if source is None:
+            raise ValueError('give the new light: light=, or lamp=(azimuth, elevation); "own" keeps the photograph\'s')
+    listed, is_one = angles(turned)
+    pictures, note = _relit.relight(
+        photograph(image, mask, box, transfer),
+        source,
+        listed,
+        background,
+        within("field", field, 1.0, 150.0),
+        white_balance,
+        within("exposure", exposure, -20.0, 20.0),
+        None if size is None else int(within("size", size, 16, 16384)),
+        highlights,
+    )
+    if note:
+        warn([f"the mask {note}"])
+    return frames(pictures, is_one)
+
+
+def insert(
+    objects,
+    into,
+    at=None,
+    height=None,
+    *,
+    rotation=None,
+    tint=None,
+    gloss=None,
+    shadow=None,
+    brightness=None,
+    light=None,
+    lamp=None,
+    ambient=0.15,
+    turned=0.0,
+    size=(1280, 960),
+    field=60.0,
+    down=10.0,
+    tilt=None,
+    match=True,
+    white_balance="light",
+    exposure=0.0,
+    transfer=None,
+    highlights="auto",
+):
+    """Objects of photographs in another picture, with their shadows: rows x columns x 3, float32, linear.
+
+    objects: from back to front: images, pairs of image and mask, or paths of captured objects (.relit).
+    into: a photograph, or a panorama: a file of it, or a float32 array twice as wide as high.
+
+    For all objects, or a list with one for each:
+    at: the middle of an object's lower edge, (x, y) in parts of the picture's sides from the upper left corner; by default
+        beside each other at 0.9.
+    height: in parts of the picture's, 0.4 by default.
+    rotation: degrees in the plane, counter-clockwise.
+    tint: (red, green, blue) that its albedo is multiplied with.
+    gloss: (part of even light that it reflects, smoothness), in place of what was found.
+    shadow: how much of its shadow is seen, 0 to 1.
+    brightness: stops.
+
+    For the picture:
+    light, lamp, ambient: see `relight`; by default the light is taken from `into`.
+    turned: degrees by which the light, and a panorama behind the objects with it, has turned.
+    size, field, down: width and height of the picture of a panorama in pixels, the degrees that its longer side shows,
+        and how many degrees the camera looks down.
+    tilt: degrees that the camera looks down on the ground; by default by the panorama and `at`, or 20.
+    match: whether brightness, white balance and grain of the objects follow the picture.
+    white_balance, exposure: of the light, and of a panorama in stops from the one that is found.
+    transfer, highlights: of the objects' photographs, see `decompose`.
+
+    The same as `relight insert`.
+    """
+    pairs = [one if isinstance(one, tuple) else (one,) for one in objects]
+    beside = [((place + 0.5) / len(pairs), 0.9) for place in range(len(pairs))]
+    described = [{"photo": ""} for _ in pairs]
+    for name, values, parts in (
+        ("at", beside if at is None else at, 2),
+        ("height", height, 1),
+        ("rotation", rotation, 1),
+        ("tint", tint, 3),
+        ("gloss", gloss, 2),
+        ("shadow", shadow, 1),
+        ("exposure", brightness, 1),
+    ):
+        for one, value in zip(described, _one_each(name, values, parts, len(pairs))):
+            one[name] = value
+    scene = {
+        "background": "",
+        "size": [int(side) for side in size],
+        "field": float(field),
+        "down": float(down),
+        "tilt": None if tilt is None else float(tilt),
+        "light": {"turn": float(turned)},
+        "match": bool(match),
+        "white_balance": white_balance,
+        "exposure": float(exposure),
+        "object": described,
+    }
+    image, notes = _relit.insert(
+        [photograph(*pair, transfer=transfer) for pair in pairs],
+        picture(into, "background"),
+        json.dumps(scene, allow_nan=False),
+        light_source(light, lamp, ambient),
+        highlights,
+    )
+    warn(f"the mask {note}" for note in notes)
+    return image
+
+
+def _one_each(name, values, parts, count):
+    """A value for each object; none where none is given."""
+    if values is None or count == 0:
+        return []
+    array = numpy.asarray(values, dtype=numpy.float64)
+    shape = (count,) if parts == 1 else (count, parts)
+    if array.shape == shape[1:]:
+        array = numpy.broadcast_to(array, shape)
+    if array.shape != shape:
+        raise ValueError(f"{name} is given for {len(array)} objects, and there are {count}: give one, or one for each")
+    return array.tolist()
+
+
+def mask(image, box=None, *, seeds=None, keep_all=False):
+    """The object's mask by GrabCut: rows x columns, bool.
+
+    image: see `decompose`.
+    box: x, y, width and height of a rectangle around the object, pixels.
+    seeds: a painted image of the same size, or a path to a PNG: white is object, black background, all else is open.
+        Or rows x columns: 255, 0, and 128 for open.
+    keep_all: keeps every part, not only the largest.
+
+    The same as `relit-mask` makes of one frame.
+    """
+    if seeds is not None:
+        painted = is_path(seeds) or numpy.ndim(seeds) == 3
+        seeds = picture(seeds, "picture of seeds") if painted else mask_picture(seeds)
+    found, warnings = _relit.mask(picture(image), rectangle(box), seeds, keep_all)
+    warn(warnings)
+    return found
+
+
+def read_image(path, *, transfer=None):
+    """A picture's light as the programs read it: rows x columns x 3 (or 4, with alpha), float32, linear.
+
+    PNG, JPEG, WebP, TIFF, BMP, GIF, OpenEXR and Radiance HDR, turned as they are displayed, in the primaries of sRGB.
+    transfer: "srgb", "gamma22" or "linear": how integers are encoded, where the file is not to be asked.
+    """
+    return _relit.read_image(os.fspath(path), transfer)
+
+
+def to_srgb(image, dtype=numpy.uint8):
+    """Linear light of any shape as a screen takes it: sRGB, uint8 or uint16, cut off beyond 0 to 1."""
+    image = numpy.ascontiguousarray(image, dtype=numpy.float32)
+    if numpy.dtype(dtype) == numpy.uint8:
+        return _relit.to_srgb8(image)
+    if numpy.dtype(dtype) == numpy.uint16:
+        return _relit.to_srgb16(image)
+    raise ValueError(f"dtype is {dtype}: give uint8 or uint16")

@@ -1,0 +1,26 @@
+//! The orientation of a picture: Exif, TIFF's tag, or the properties of AVIF and HEIF.
+
+use std::io::Cursor;
+
+use image::metadata::Orientation;
+use image::{ImageDecoder, ImageReader};
+
+use crate::still::{Format, isobmff, png_exif};
+
+/// How a picture is turned for display: by Exif, TIFF's tag, or the properties of AVIF and HEIF. None where it stands as
+/// it is stored, or where its orientation cannot be read.
+#[must_use]
+pub fn orientation(bytes: &[u8]) -> Option<Orientation> {
+    let stated = match Format::sniff(bytes)? {
+        Format::Avif | Format::Heic => isobmff::orientation(bytes)?,
+        Format::Png => Orientation::from_exif_chunk(png_exif::find(bytes)?)?,
+        Format::Jpeg | Format::WebP | Format::Tiff => {
+            let reader = ImageReader::new(Cursor::new(bytes))
+                .with_guessed_format()
+                .ok()?;
+            reader.into_decoder().ok()?.orientation().ok()?
+        }
+        _ => return None,
+    };
+    (stated != Orientation::NoTransforms).then_some(stated)
+}
