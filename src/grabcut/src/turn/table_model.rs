@@ -250,7 +250,7 @@ struct ObjectDensity(Vec<f32>);
 
 impl ObjectDensity {
     fn learn(logs: impl Iterator<Item = f32>, table: &TableDensity) -> Self {
-        let mut counts = vec![0.0_f32; BINS];
+        let mut counts = [0.0_f32; BINS];
         logs.for_each(|log| counts[bin(log)] += 1.0);
         let all: f32 = counts.iter().sum();
         let density = |count: f32| count / (all.max(1.0) * BIN);
