@@ -7,9 +7,9 @@ use relit_capture::capture::{CaptureError, Settings, Stopped};
 use relit_capture::command::{Command, Refused, Rig};
 use relit_capture::daemon::Daemon;
 use relit_capture::state::{LogLine, Phase, RigState, Verdict};
+use relit_data::causes::with_causes;
 use relit_data::session::{Manifest, SessionWriter};
 use relit_tests::is_named;
-use relit_turntable::MotionFault;
 use relit_turntable::lockfile::{LockError, use_folder};
 
 use crate::support::{SHORT, fixture};

@@ -293,7 +293,7 @@ def mask(image, box=None, *, seeds=None, keep_all=False):
 
 
 def read_image(path, *, transfer=None):
-    """A picture's light as the programs read it: rows x columns x 3 (or 4, with alpha), float32, linear.
+    """The light of the picture at `path`, as the programs read it: rows x columns x 3 (or 4, with alpha), float32, linear.
 
     PNG, JPEG, WebP, TIFF, BMP, GIF, OpenEXR and Radiance HDR, turned as they are displayed, in the primaries of sRGB.
     transfer: "srgb", "gamma22" or "linear": how integers are encoded, where the file is not to be asked.
@@ -302,7 +302,7 @@ def read_image(path, *, transfer=None):
 
 
 def to_srgb(image, dtype=numpy.uint8):
-    """Linear light of any shape as a screen takes it: sRGB, uint8 or uint16, cut off beyond 0 to 1."""
+    """image: linear light of any shape. What a screen takes: sRGB of `dtype` uint8 or uint16, cut off beyond 0 to 1."""
     image = numpy.ascontiguousarray(image, dtype=numpy.float32)
     if numpy.dtype(dtype) == numpy.uint8:
         return _relit.to_srgb8(image)

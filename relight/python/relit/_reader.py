@@ -107,5 +107,6 @@ class Dataset:
 
 
 def open(path, *, linear=False):
-    """Opens a data set. `linear` gives values in proportion to light in place of sRGB."""
+    """Opens a data set: the `path` of a shard, of a folder of shards, or of what relit-extract has written. `linear` gives values
+    in proportion to light in place of sRGB."""
     return Dataset(path, linear)

@@ -55,7 +55,10 @@ def test_a_picture_is_the_one_of_rust(order, forms):
 
 @pytest.mark.parametrize("forms", FORMS)
 def test_gradients_are_those_of_the_values(forms):
-    given = tensors(*case(2, 2, 3))
+    arrays = case(2, 2, 3)
+    # Where there is no surface nothing can be derived.
+    arrays[0][0, 0] = [0, 0.6, 0.8]
+    given = tensors(*arrays)
     assert torch.autograd.gradcheck(lambda *given: render(forms, *given), given, eps=1e-6, atol=1e-4)
 
 

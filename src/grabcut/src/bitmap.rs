@@ -125,6 +125,21 @@ impl Bitmap {
         }
     }
 
+    /// The bitmap `factor` times as large, cut to `width` x `height`.
+    pub(super) fn enlarged(&self, factor: usize, (width, height): (usize, usize)) -> Self {
+        let is_set = |at: usize| {
+            let (x, y) = (at % width / factor, at / width / factor);
+            x < self.width && self.bits.get(y * self.width + x) == Some(&true)
+        };
+        let bits = (0..width * height).map(is_set);
+        Self::new((width as u32, height as u32), bits)
+    }
+
+    /// Erosion: the set pixels whose neighbours within `radius` rows and columns are all set.
+    pub(super) fn eroded(&self, radius: usize) -> Self {
+        self.inverted().dilated(radius).inverted()
+    }
+
     /// The set pixels of which another one is set as well.
     pub(super) fn and(&self, other: &Self) -> Self {
         self.map(|at, bit| bit && other.bits[at])

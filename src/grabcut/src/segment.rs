@@ -13,7 +13,9 @@ use super::hints::trimap::Trimap;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::turn::statistics;
 use super::turn::statistics::TurnStatistics;
-use super::warning::{NOTHING_MOVES, OPENING, filled, hole_filled, turn_dropped, warnings};
+use super::warning::{
+    IMPLAUSIBLE, NOTHING_MOVES, OPENING, filled, hole_filled, turn_dropped, warnings,
+};
 use super::{Effort, Hints, Mark, MaskError, SegmentSettings, cleanup};
 
 /// On one frame a hole of this share of the object may be a highlight, and is filled.
@@ -27,6 +29,12 @@ const REACHES: f64 = 0.04;
 /// By how much a cut has to be better than that of GrabCut's own start where that reaches all sides of the rectangle, in
 /// units of the log-likelihood of a pixel.
 const MARGIN: f64 = 0.2;
+/// An object covers at least this share of its rectangle.
+const LEAST_OF_RECT: f64 = 0.18;
+/// And what is kept of a cut is at least this share of it: a cut in many small pieces is none.
+const LEAST_KEPT: f64 = 0.6;
+/// Of what else is tried, the share of the rectangle that is background at first.
+const OTHER_SHARE: f64 = 0.25;
 /// A narrower change by marks is one of the edge, pixels to each side.
 const NARROW: usize = 1;
 
@@ -41,6 +49,8 @@ pub struct Mask {
     pub warnings: Vec<String>,
     /// Whether one of them names a hole that was filled.
     names_hole: bool,
+    /// The share of the cut that was kept in the clean-up.
+    kept_share: f64,
 }
 
 /// Numbers about a mask.
@@ -225,7 +235,8 @@ fn initial(hints: &Hints, size: (u32, u32)) -> Result<Trimap, MaskError> {
 /// The share is right for a rectangle with much background in it, and cuts a part off an object that fills its
 /// rectangle and is in places like what is around it. So the cut of the lower energy counts. Where that of GrabCut's
 /// own start reaches all four sides of its rectangle, as the object of a tight one does, the other has to be better by
-/// a margin.
+/// a margin. A cut that is no object by its size or its pieces has a low energy too, because it says little: then
+/// others count, and a warning says so.
 fn by_hints(
     frame: &RgbImage,
     hints: &Hints,
@@ -246,24 +257,61 @@ fn by_hints(
     let Some(rect) = rect else {
         return cut(labels, first);
     };
-    let plain = cut(labels.clone(), FirstModels::All);
-    let ranked = cut(labels, first);
-    let (plain, ranked) = match (plain, ranked) {
-        (Ok(plain), Ok(ranked)) => (plain, ranked),
-        (plain, ranked) => return plain.or(ranked),
-    };
     let energy = CutEnergy::new(frame, rect);
     let energy = |mask: &Mask| energy.of(&Bitmap::from_mask(&mask.image));
-    let margin = if fills(plain.statistics.bounding_box, rect) {
-        MARGIN
-    } else {
-        0.0
+    let (chosen, other) = match (
+        cut(labels.clone(), FirstModels::All),
+        cut(labels.clone(), first),
+    ) {
+        (Ok(plain), Ok(ranked)) => {
+            let fills = fills(plain.statistics.bounding_box, rect);
+            let margin = if fills { MARGIN } else { 0.0 };
+            if energy(&plain) - energy(&ranked) <= margin {
+                (plain, Some(ranked))
+            } else {
+                (ranked, Some(plain))
+            }
+        }
+        (plain, ranked) => (plain.or(ranked)?, None),
     };
-    if energy(&plain) - energy(&ranked) <= margin {
-        Ok(plain)
-    } else {
-        Ok(ranked)
+    if is_plausible(&chosen, rect) {
+        return Ok(chosen);
     }
+    let middle = in_ellipse(&labels, rect, size.0);
+    let more = [
+        cut(labels, FirstModels::Ranked(OTHER_SHARE)),
+        cut(middle, FirstModels::All),
+    ];
+    let others = other.into_iter().chain(more.into_iter().flatten());
+    let best = others
+        .filter(|mask| is_plausible(mask, rect))
+        .min_by(|a, b| energy(a).total_cmp(&energy(b)));
+    let mut mask = best.unwrap_or(chosen);
+    mask.warnings.push(IMPLAUSIBLE.to_owned());
+    Ok(mask)
+}
+
+/// Whether a cut is an object by its size and its pieces.
+fn is_plausible(mask: &Mask, rect: Rect) -> bool {
+    let area = f64::from(rect.w) * f64::from(rect.h);
+    mask.statistics.area_px as f64 >= LEAST_OF_RECT * area && mask.kept_share >= LEAST_KEPT
+}
+
+/// The labels with the corners of a rectangle, outside its inscribed ellipse, as background at first.
+fn in_ellipse(labels: &[Label], rect: Rect, width: u32) -> Vec<Label> {
+    let from_middle = |at: u32, begin: i32, length: u32| {
+        2.0 * (f64::from(at) + 0.5 - f64::from(begin)) / f64::from(length) - 1.0
+    };
+    let pixels = labels.iter().enumerate();
+    let labels = pixels.map(|(at, &label)| {
+        let (x, y) = (at as u32 % width, at as u32 / width);
+        let far = from_middle(x, rect.x, rect.w).hypot(from_middle(y, rect.y, rect.h));
+        match label {
+            Label::ProbablyObject if far > 1.0 => Label::ProbablyBackground,
+            other => other,
+        }
+    });
+    labels.collect()
 }
 
 /// Whether a cut reaches all four sides of its rectangle.
@@ -307,6 +355,7 @@ fn finish(
             holes_filled_px: cleaned.holes.iter().map(|hole| hole.area).sum(),
         },
         names_hole: filled(&cleaned, area_px as f64).is_some(),
+        kept_share: area_px as f64 / raw.count().max(1) as f64,
         warnings: warnings(hints, rect, &cleaned, size),
     }
 }
@@ -330,6 +379,42 @@ mod tests {
         assert!(fills(Rect::new(12, 11, 96, 48), rect));
         assert!(!fills(Rect::new(18, 11, 90, 48), rect));
         assert!(!fills(Rect::new(12, 11, 96, 40), rect));
+    }
+
+    #[test]
+    fn a_start_from_the_middle_leaves_the_corners_out_and_keeps_what_is_sure() {
+        let mut labels = vec![Label::ProbablyObject; 100];
+        labels[0] = Label::Object;
+        let found = in_ellipse(&labels, Rect::new(0, 0, 10, 10), 10);
+        assert_eq!(found[0], Label::Object);
+        assert_eq!(found[9], Label::ProbablyBackground);
+        assert_eq!([found[44], found[4]], [Label::ProbablyObject; 2]);
+    }
+
+    #[test]
+    fn a_cut_that_covers_little_of_its_rectangle_or_is_in_pieces_is_not_plausible() {
+        let rect = Rect::new(0, 0, 10, 10);
+        let plausible = |rows: [&str; 10]| {
+            let raw = Bitmap::drawn(&rows);
+            let settings = SegmentSettings::default();
+            let mask = finish(&raw, (10, 10), &rect.into(), Some(rect), &settings, 0.0);
+            is_plausible(&mask, rect)
+        };
+        let whole = "..######..";
+        assert!(plausible([whole; 10]));
+        let little = [whole, whole, "", "", "", "", "", "", "", ""];
+        assert!(!plausible(little.map(|row| if row.is_empty() {
+            ".........."
+        } else {
+            row
+        })));
+        let (none, pieces) = ("..........", "#.#.#.#.#.");
+        assert!(plausible([
+            whole, whole, whole, none, none, none, none, none, none, none
+        ]));
+        assert!(!plausible([
+            whole, whole, whole, none, pieces, none, pieces, none, pieces, none
+        ]));
     }
 
     #[test]

@@ -18,9 +18,10 @@ const COVERED: f32 = 0.45;
 const MIXTURE: f32 = 0.25;
 /// Allowed noise of a mixture, 8-bit values.
 const NOISE: f32 = 3.0;
-/// Shadow-like pixels up to this share of the object may be a shadow at its foot, and are left to the cut. With more, the
-/// object has the background's colour, and its shadow cannot be told from it.
-const SHADOW_LIKE: f64 = 0.6;
+/// Where shadow-like pixels are a smaller share of the object, they may be a shadow at its foot, and are left to the cut.
+const SHADOW_AT_FOOT: f64 = 0.6;
+/// Where they are a larger share, the object has the background's colour, and its shadow cannot be told from it.
+const MAX_SHADOW_LIKE: f64 = 0.8;
 /// Fewer marked pixels of the object do not show its colours.
 const MIN_OBJECT: u64 = 10;
 
@@ -59,12 +60,17 @@ pub(super) fn seeds(frame: &RgbImage, regions: &Regions) -> Result<Seeds, MaskEr
 /// What is object without doubt: away from the edge, unlike the background, and unlike a shadow on it.
 fn sure_object(regions: &Regions) -> Result<Bitmap, MaskError> {
     let sure = eroded(&regions.object).minus(&regions.alike);
-    if sure.share_in(&regions.shadow_like) > SHADOW_LIKE {
+    let share = sure.share_in(&regions.shadow_like);
+    if share > MAX_SHADOW_LIKE {
         return Err(MaskError::NotPlain {
             why: "the object has the same colour, so that its shadow looks like it",
         });
     }
-    Ok(sure.minus(&regions.shadow_like))
+    Ok(if share < SHADOW_AT_FOOT {
+        sure.minus(&regions.shadow_like)
+    } else {
+        sure
+    })
 }
 
 fn eroded(region: &Bitmap) -> Bitmap {

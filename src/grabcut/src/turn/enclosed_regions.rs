@@ -37,27 +37,49 @@ impl TurnField {
             return None;
         }
         let rest = object.minus(part);
-        let ground = self.ground(part, object);
         let beside = self.beside(part, &rest);
-        let moves = self.witness.moves(part, &beside, &ground);
+        let like_table = self.is_like_table(part, &beside);
+        // Through one opening both the table and what is behind it may be seen.
+        let above = self.like_table.as_ref().map(|table| part.minus(table));
+        let above = above.filter(|above| above.count() > 0 && !like_table);
+        let above = above.as_ref().unwrap_or(part);
+        let moves = self
+            .witness
+            .moves(above, &beside, &self.ground(above, object));
         if moves == Some(true) {
             return Some(true);
+        }
+        let white = above.share_in(&self.white) > MOSTLY && beside.share_in(&self.white) < MOSTLY;
+        // What does not move is not the room, where the room moves.
+        let like_room = moves.is_none()
+            && above.share_in(&self.backdrop) > MOSTLY
+            && !self.witness.together(above, &beside);
+        if !like_table && !like_room && !white {
+            return Some(false);
+        }
+        // What does not touch the rest has no outline to compare.
+        let own = self.boundary(part, &rest);
+        Some(own.is_none_or(|own| own >= OPENING_OUTLINE * self.outline(object)))
+    }
+
+    /// Whether a part behaves like the table over the turn.
+    fn is_like_table(&self, part: &Bitmap, beside: &Bitmap) -> bool {
+        if let Some(like_table) = &self.like_table {
+            return part.share_in(like_table) > MOSTLY;
         }
         // What lies before the table brightens with it, and a dark part of the object with the object.
         let surface = &self.table.surface;
         let as_dark = self.table.plain.or(surface).or(&self.table.shadow);
-        let like_table = surface.count() > 0
+        surface.count() > 0
             && part.share_in(&as_dark) > MOSTLY
-            && self.witness.nearer(part, surface, &beside).unwrap_or(true);
-        // What does not move is not the room, where the room moves.
-        let like_room = moves.is_none()
-            && part.share_in(&self.backdrop) > MOSTLY
-            && !self.witness.together(part, &beside);
-        if !like_table && !like_room {
-            return Some(false);
-        }
-        let own = self.boundary(part, &rest).unwrap_or(0.0);
-        Some(own >= OPENING_OUTLINE * self.outline(object))
+            && self.witness.nearer(part, surface, beside).unwrap_or(true)
+    }
+
+    /// The parts of a mask that look like the table or the room.
+    pub(crate) fn suspects(&self, object: &Bitmap) -> Bitmap {
+        let none = || object.map(|_, _| false);
+        let table = self.like_table.clone().unwrap_or_else(none);
+        object.and(&table.or(&self.backdrop).or(&self.white))
     }
 
     /// Whether a part outside the object shows that it belongs to it: it does not move, is neither room nor table,

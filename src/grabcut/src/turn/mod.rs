@@ -1,9 +1,15 @@
 //! What a whole turn says of each pixel: the object stands still, the room passes by, the table lies below.
 
 pub(crate) mod backdrop;
+pub(crate) mod courses;
+pub(crate) mod disc;
+pub(crate) mod edge;
 pub(crate) mod enclosed_regions;
 pub(crate) mod registration;
 pub(crate) mod rim;
 pub(crate) mod statistics;
+pub(crate) mod subspace;
 pub(crate) mod table;
+pub(crate) mod table_model;
 pub(crate) mod temporal_evidence;
+pub(crate) mod whiskers;

@@ -9,10 +9,14 @@
 use image::RgbImage;
 
 use super::backdrop::Backdrop;
+use super::courses::Courses;
+use super::edge;
 use super::registration;
 use super::rim::without_rim;
 use super::table::{Turntable, find_turntable};
-use super::temporal_evidence::{Curves, TemporalEvidence};
+use super::table_model::{Seen, TableModel};
+use super::temporal_evidence::{Curves, TemporalEvidence, luminance};
+use super::whiskers::whiskers;
 use crate::MaskError;
 use crate::bitmap::Bitmap;
 use crate::cut::grab_cut;
@@ -55,6 +59,14 @@ const CONSTANT_WEIGHT: f32 = 0.25;
 const STILL: f32 = 1.0;
 /// A larger contrast counts as this.
 const MAX_CONTRAST: f32 = 100.0;
+/// A pixel is white where all channels have at least this level.
+const WHITE: u8 = 250;
+/// And is so in this share of the frames.
+const WHITE_FRAMES: f64 = 0.9;
+/// Shorter thin parts of the object stay, pixels.
+const MIN_WHISKER: usize = 6;
+/// What the table's model says at least of a pixel that is background at first, as a logarithm.
+const SURELY_TABLE: f32 = 2.0;
 
 /// Frames of a turn, all of one size, reduced to what the statistics need.
 #[derive(Debug, Clone)]
@@ -99,6 +111,7 @@ pub struct TurnStatistics {
     pub(crate) fine: TurnField,
     /// At half the size; none where the fine one is small enough for the first cut.
     coarse: Option<TurnField>,
+    pub(crate) courses: Courses,
 }
 
 impl TurnStatistics {
@@ -106,16 +119,29 @@ impl TurnStatistics {
     #[must_use]
     pub fn new(turn: &TurnFrames) -> Self {
         let colours = LabTable::new();
-        let fine = TurnField::new(&turn.frames, &colours);
-        let coarse = (fine.size.0 * fine.size.1 > COARSE_PIXELS).then(|| {
+        let mut fine = TurnField::new(&turn.frames, &colours);
+        let mut coarse = (fine.size.0 * fine.size.1 > COARSE_PIXELS).then(|| {
             let half: Vec<RgbImage> = turn.frames.iter().map(half_image).collect();
             TurnField::new(&half, &colours)
         });
+        let courses = Courses::new(&turn.frames, fine.size);
+        let object = match &coarse {
+            Some(coarse) => coarse.own_cut().map(|object| object.enlarged(2, fine.size)),
+            None => fine.own_cut(),
+        };
+        let model = object.and_then(|object| fine.table_model(&courses, &object));
+        if let Some(model) = &model {
+            fine.learn_table(model);
+            if let Some(coarse) = &mut coarse {
+                coarse.learn_table(&model.halved());
+            }
+        }
         Self {
             frames: turn.frames.len(),
             full: turn.full,
             fine,
             coarse,
+            courses,
         }
     }
 
@@ -145,6 +171,12 @@ impl TurnStatistics {
             (columns as u32, rows as u32),
             (0..columns * rows).map(is_set),
         )
+    }
+
+    /// A bitmap of the size of the statistics in that of the frames.
+    pub(crate) fn enlarged(&self, object: &Bitmap) -> Bitmap {
+        let full = (self.full.0 as usize, self.full.1 as usize);
+        object.enlarged(self.factor(), full)
     }
 
     /// How well an outline follows what moves differently: the mean over its edges of the strength of
@@ -179,6 +211,10 @@ pub(crate) struct TurnField {
     pub(crate) table: Turntable,
     evidence: Vec<f32>,
     pub(crate) witness: TemporalEvidence,
+    /// Pixels that are more likely table than object by the table's model; none without one.
+    pub(crate) like_table: Option<Bitmap>,
+    /// Pixels that are white in nearly every frame.
+    pub(crate) white: Bitmap,
 }
 
 impl TurnField {
@@ -238,6 +274,8 @@ impl TurnField {
             backdrop: backdrop.alike,
             evidence: backdrop.evidence,
             witness: curves.finish(),
+            like_table: None,
+            white: white(frames, size),
             table,
             features,
             contrasts,
@@ -246,6 +284,63 @@ impl TurnField {
 }
 
 impl TurnField {
+    /// The object as the turn shows it before the table is known.
+    fn own_cut(&self) -> Option<Bitmap> {
+        let size = (self.size.0 as u32, self.size.1 as u32);
+        let border = ring(size, BORDER);
+        let open = (0..self.features.len()).map(|at| {
+            if border(at) {
+                Label::Background
+            } else {
+                Label::ProbablyObject
+            }
+        });
+        let mut labels: Vec<Label> = open.collect();
+        self.begin(&mut labels, SHARE).ok()?;
+        Some(grab_cut::object_of(&labels, self.size))
+    }
+
+    /// Cuts at this size.
+    fn begin(&self, labels: &mut [Label], share: f64) -> Result<Models<5>, MaskError> {
+        if !self.start_from_backdrop(labels) {
+            let size = (self.size.0 as u32, self.size.1 as u32);
+            grab_cut::rank(self, labels, share, ring(size, RING));
+        }
+        start(self, labels, FirstModels::All, SMOOTHNESS)
+    }
+
+    /// The table's model, with what is known before it.
+    fn table_model(&self, courses: &Courses, object: &Bitmap) -> Option<TableModel> {
+        let light: Vec<f32> = self.light().into_iter().map(luminance).collect();
+        let change: Vec<f32> = self
+            .features
+            .iter()
+            .map(|f| (f[3] / CHANGE_WEIGHT).exp_m1())
+            .collect();
+        let seen = Seen {
+            object,
+            surface: &self.table.surface,
+            light: &light,
+            change: &change,
+        };
+        TableModel::learn(courses, &seen)
+    }
+
+    /// Takes what the table's model says as evidence.
+    fn learn_table(&mut self, model: &TableModel) {
+        for (at, evidence) in self.evidence.iter_mut().enumerate() {
+            let ratio = model.ratio[at];
+            *evidence = match (model.on_disc.bits()[at], self.table.surface.bits()[at]) {
+                (true, true) => ratio.min(-SURELY_TABLE),
+                (true, false) => ratio,
+                (false, _) => evidence.min(ratio),
+            };
+        }
+        let surely = model.alike(SURELY_TABLE).or(&self.table.surface);
+        self.backdrop = self.backdrop.minus(&model.on_disc).or(&surely);
+        self.like_table = Some(model.alike(0.0));
+    }
+
     /// The average brightness L of each pixel.
     pub(crate) fn light(&self) -> Vec<f32> {
         let features = self.features.iter();
@@ -304,6 +399,20 @@ impl TurnField {
         }
         true
     }
+}
+
+/// The pixels that are white in nearly every frame: overexposed.
+fn white(frames: &[RgbImage], (width, height): (usize, usize)) -> Bitmap {
+    let mut times = vec![0_usize; width * height];
+    for frame in frames {
+        let pixels = frame.as_raw().chunks_exact(3);
+        for (times, pixel) in times.iter_mut().zip(pixels) {
+            *times += usize::from(pixel.iter().all(|&channel| channel >= WHITE));
+        }
+    }
+    let least = (WHITE_FRAMES * frames.len() as f64).max(1.0);
+    let often = times.iter().map(|&times| times as f64 >= least);
+    Bitmap::new((width as u32, height as u32), often)
 }
 
 /// The largest contrast of each pixel to its eight neighbours.
@@ -408,6 +517,12 @@ pub(crate) fn segment(
         without_rim(object, &fine.table, fine.size)
     });
     change(&mut labels, fine.size, |object| fine.completed(object));
+    change(&mut labels, fine.size, |object| {
+        edge::along_courses(&turn.courses, object)
+    });
+    change(&mut labels, fine.size, |object| {
+        object.minus(&whiskers(&turn.courses, object, MIN_WHISKER))
+    });
     // From where the object is on average to where it is in the frame.
     change(&mut labels, fine.size, |object| {
         let pixels = levels[at_fine].image.pixels();
@@ -464,20 +579,13 @@ fn cut_turn(
     levels: &[Level<'_>],
     share: f64,
 ) -> Result<(Vec<Label>, Models<5>), MaskError> {
-    let begin = |field: &TurnField, labels: &mut Vec<Label>| {
-        if !field.start_from_backdrop(labels) {
-            let size = (field.size.0 as u32, field.size.1 as u32);
-            grab_cut::rank(field, labels, share, ring(size, RING));
-        }
-        start(field, labels, FirstModels::All, SMOOTHNESS)
-    };
     let mut labels = levels[0].labels.clone();
     let (Some(coarser), Some(coarse)) = (levels.get(1), &turn.coarse) else {
-        let models = begin(&turn.fine, &mut labels)?;
+        let models = turn.fine.begin(&mut labels, share)?;
         return Ok((labels, models));
     };
     let mut coarse_labels = coarser.labels.clone();
-    let mut models = begin(coarse, &mut coarse_labels)?;
+    let mut models = coarse.begin(&mut coarse_labels, share)?;
     let size = coarse.size;
     refine(&turn.fine, &mut labels, &coarse_labels, size, &mut models);
     Ok((labels, models))

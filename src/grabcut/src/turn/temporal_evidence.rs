@@ -151,7 +151,7 @@ impl TemporalEvidence {
 }
 
 /// The luminance, 0..=1, of a lightness L.
-fn luminance(light: f32) -> f32 {
+pub(crate) fn luminance(light: f32) -> f32 {
     if light > 8.0 {
         ((light + 16.0) / 116.0).powi(3)
     } else {

@@ -27,11 +27,14 @@ fn truth() -> GrayImage {
     })
 }
 
+/// A background's name, and its linear colour at a place.
+type Background<'a> = (&'a str, &'a dyn Fn(f64, f64) -> [f64; 3]);
+
 /// The cup, striped, before a background; in linear light, with noise.
 fn photograph(background: impl Fn(f64, f64) -> [f64; 3]) -> RgbImage {
     RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
         let (x, y) = (f64::from(x), f64::from(y));
-        let stripe = if (y / 12.0) as u32 % 2 == 0 {
+        let stripe = if ((y / 12.0) as u32).is_multiple_of(2) {
             [0.5, 0.1, 0.05]
         } else {
             [0.05, 0.12, 0.4]
@@ -71,7 +74,7 @@ fn overlap(a: &GrayImage, b: &GrayImage) -> f64 {
 
 #[test]
 fn an_object_before_a_plain_or_graded_background_is_found_without_its_shadow() {
-    let backgrounds: [(&str, &dyn Fn(f64, f64) -> [f64; 3]); 4] = [
+    let backgrounds: [Background<'_>; 4] = [
         ("white", &|_, _| [0.85; 3]),
         ("black", &|_, _| [0.01; 3]),
         ("green", &|_, _| [0.1, 0.5, 0.15]),
@@ -109,9 +112,9 @@ fn strokes_overrule_what_the_background_shows() {
 
 #[test]
 fn a_background_that_is_not_plain_asks_for_a_rectangle() {
-    let backgrounds: [(&str, &dyn Fn(f64, f64) -> [f64; 3]); 4] = [
+    let backgrounds: [Background<'_>; 4] = [
         ("squares", &|x, y| {
-            if (x as u32 / 20 + y as u32 / 20) % 2 == 0 {
+            if (x as u32 / 20 + y as u32 / 20).is_multiple_of(2) {
                 [0.8; 3]
             } else {
                 [0.2; 3]

@@ -25,9 +25,13 @@ pub(crate) enum Trouble {
     OpenShade,
     /// A handle, and a camera that shakes.
     Shaken,
+    /// A lower part as black as the table before which it stands.
+    BlackFoot,
+    /// A handle before a room that is white in every frame.
+    WhiteRoom,
 }
 
-pub(crate) const TROUBLES: [Trouble; 8] = [
+pub(crate) const TROUBLES: [Trouble; 10] = [
     Trouble::Handle,
     Trouble::LowHandle,
     Trouble::Hole,
@@ -36,6 +40,8 @@ pub(crate) const TROUBLES: [Trouble; 8] = [
     Trouble::Shade,
     Trouble::OpenShade,
     Trouble::Shaken,
+    Trouble::BlackFoot,
+    Trouble::WhiteRoom,
 ];
 
 /// A turn and its truth.
@@ -102,9 +108,12 @@ impl Shape {
     /// What is seen of the object at a place, if it is there.
     fn at(&self, x: f64, y: f64) -> Option<Surface> {
         let x = self.side * x;
-        use Trouble::{DarkPart, Handle, Hole, LowHandle, OpenShade, Shade, Shaken, TwoHoles};
+        use Trouble::{
+            BlackFoot, DarkPart, Handle, Hole, LowHandle, OpenShade, Shade, Shaken, TwoHoles,
+            WhiteRoom,
+        };
         let handle = match self.trouble {
-            Handle | Shaken => ring(x - 0.72, y - 0.15, 0.38, 0.1),
+            Handle | Shaken | WhiteRoom => ring(x - 0.72, y - 0.15, 0.38, 0.1),
             LowHandle => ring(x - 0.72, y + 0.5, 0.38, 0.1),
             _ => None,
         };
@@ -127,6 +136,7 @@ impl Shape {
             _ => false,
         };
         Some(match self.trouble {
+            BlackFoot if y < -0.35 => self.surface([0.03; 3], normal, 1.0),
             DarkPart if spot < 1.0 => self.surface([0.02; 3], normal, 1.0),
             _ if shaded => {
                 // A hollow: its depth grows from its rim.
@@ -151,7 +161,10 @@ impl Shape {
     fn is_critical(&self, x: f64, y: f64) -> bool {
         let x = self.side * x;
         match self.trouble {
-            Trouble::Handle | Trouble::Shaken => (x - 0.72).hypot(y - 0.15) < 0.2 && x > 0.72,
+            Trouble::Handle | Trouble::Shaken | Trouble::WhiteRoom => {
+                (x - 0.72).hypot(y - 0.15) < 0.2 && x > 0.72
+            }
+            Trouble::BlackFoot => x.abs() < 0.3 && (y + 0.5).abs() < 0.1,
             Trouble::LowHandle => (x - 0.72).hypot(y + 0.5) < 0.2 && x > 0.72,
             Trouble::Hole => (x - 0.05).hypot(y - 0.1) < 0.2,
             Trouble::TwoHoles => x.hypot(y - 0.42) < 0.14 || x.hypot(y + 0.42) < 0.14,
@@ -274,6 +287,7 @@ pub(crate) fn scene(
                     let open = 1.0 - 0.6 * (-near).exp();
                     [0.03 * open * lit([0.0, 1.0, 0.0]); 3]
                 }
+                None if trouble == Trouble::WhiteRoom => [1.2; 3],
                 None => room.light(turn + 0.13 * x / f64::from(width), y / f64::from(height)),
             }
         };

@@ -1,0 +1,91 @@
+//! Where an object's edge runs, to the pixel.
+//!
+//! A pixel at the edge shows a mixture of object and background. Over a turn the background, the light, or both change,
+//! so that the mixture can be told: its course lies between that of the object beside it and that of the background
+//! beside it. The pixel belongs to what it shows more of.
+
+use crate::bitmap::Bitmap;
+
+use super::courses::{Courses, dot};
+
+/// So many pixels on each side of the edge are decided.
+const BAND: usize = 2;
+/// Object and background are looked for within so many pixels.
+const REACH: usize = 4;
+/// A mean needs at least so many pixels.
+const MIN_PIXELS: usize = 3;
+/// Courses that differ by less than this, as a root of the mean square, say nothing.
+const NOISE: f32 = 0.004;
+
+/// The object with its edge where the courses show it.
+pub(crate) fn along_courses(courses: &Courses, object: &Bitmap) -> Bitmap {
+    let outside = object.inverted();
+    let band = object.dilated(BAND).and(&outside.dilated(BAND));
+    let inner = [object.eroded(BAND), object.eroded(1)];
+    let outer = [outside.eroded(BAND), outside.eroded(1)];
+    object.map(|at, bit| {
+        if !band.bits()[at] {
+            return bit;
+        }
+        let (inside, outside) = (near(&inner, at, courses), near(&outer, at, courses));
+        match inside.zip(outside) {
+            Some((inside, outside)) => share(courses, at, &inside, &outside).unwrap_or(bit),
+            None => bit,
+        }
+    })
+}
+
+/// Whether most of what a pixel shows is the one and not the other; none where they hardly differ.
+fn share(courses: &Courses, at: usize, inside: &[f32], outside: &[f32]) -> Option<bool> {
+    let apart: Vec<f32> = inside.iter().zip(outside).map(|(i, o)| i - o).collect();
+    let length = dot(&apart, &apart);
+    if length < NOISE * NOISE * apart.len() as f32 {
+        return None;
+    }
+    let own = courses.mean(&[at]);
+    let beyond: Vec<f32> = own.iter().zip(outside).map(|(own, o)| own - o).collect();
+    Some(dot(&beyond, &apart) > 0.5 * length)
+}
+
+/// The mean course of what is near a pixel of the first of some parts of which there is enough.
+fn near(parts: &[Bitmap], at: usize, courses: &Courses) -> Option<Vec<f32>> {
+    let (width, height) = courses.size();
+    let (x, y) = (at % width, at / width);
+    let within = |part: &Bitmap| {
+        let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(height);
+        let columns = x.saturating_sub(REACH)..(x + REACH + 1).min(width);
+        let pixels = rows.flat_map(|row| columns.clone().map(move |column| row * width + column));
+        pixels.filter(|&at| part.bits()[at]).collect::<Vec<_>>()
+    };
+    let mut found = parts.iter().map(within);
+    let enough = found.find(|pixels| pixels.len() >= MIN_PIXELS);
+    enough.map(|pixels| courses.mean(&pixels))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{Rgb, RgbImage};
+
+    #[test]
+    fn an_edge_that_lies_beside_the_objects_is_moved_there() {
+        let frames = [30_u8, 220, 90, 150].map(|room| {
+            RgbImage::from_fn(40, 20, |x, _| {
+                let level = |object: f64| {
+                    let mixed = object * 120.0 + (1.0 - object) * f64::from(room);
+                    Rgb([mixed as u8; 3])
+                };
+                match x {
+                    0..15 => level(0.0),
+                    15 => level(0.2),
+                    16 => level(0.8),
+                    _ => level(1.0),
+                }
+            })
+        });
+        let courses = Courses::new(&frames, (40, 20));
+        let from = |left: usize| Bitmap::new((40, 20), (0..800).map(move |at| at % 40 >= left));
+        assert_eq!(along_courses(&courses, &from(15)), from(16));
+        assert_eq!(along_courses(&courses, &from(18)), from(16));
+    }
+}
