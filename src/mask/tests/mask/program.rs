@@ -163,7 +163,7 @@ fn strokes_of_another_recording_are_neither_applied_nor_lost() {
     let output = relit_mask(path, &["other.y4m", "--rect", AROUND]);
     assert_eq!(code(&output), 1);
     assert!(
-        is_named(&said(&output), &["mask.json", "--force"]),
+        is_named(&said(&output), &["mask.png", "--force"]),
         "{}",
         said(&output)
     );
