@@ -273,7 +273,6 @@ mod tests {
             outline_of_turn: 0.8,
             contradicted: false,
             leaks: Vec::new(),
-            whiskers: Vec::new(),
             missing: Vec::new(),
             holes: Vec::new(),
         }

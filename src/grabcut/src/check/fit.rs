@@ -1,7 +1,7 @@
 //! Whether a mask fits a turn: where its shape differs from what the turn shows.
 //!
-//! The mask that the turn alone gives ([`segment_with`](crate::segment_with)) shows where to look, and so does what
-//! looks like the table, the room or the rim, whatever a cut says; what the curves of brightness there show decides.
+//! The mask that the turn alone gives ([`segment_with`](crate::segment_with)) shows where to look; what the curves of
+//! brightness there show decides.
 
 use image::{GrayImage, RgbImage};
 use relit_data::geometry::Rect;
@@ -9,15 +9,12 @@ use serde::Serialize;
 
 use crate::bitmap::{Bitmap, Component, Connectivity};
 use crate::turn::statistics::TurnField;
-use crate::turn::whiskers::whiskers;
 use crate::{Effort, Hints, MaskError, SegmentSettings, TurnStatistics, segment_with};
 
 /// Narrower differences of the shape are differences of the edge, pixels of the turn's statistics.
 const NARROW: usize = 2;
 /// Smaller differences of the shape, as a share of the mask's area, are not regions.
 const SMALL: f64 = 0.001;
-/// A thin part of the mask that is no object is a whisker from this length on, as a share of the frame's width.
-const WHISKER: f64 = 0.04;
 /// A part of the mask of which more than this share is table is no object that the frame's border cuts off.
 const ON_TABLE: f64 = 0.5;
 
@@ -43,9 +40,6 @@ pub struct ShapeCheck {
     pub contradicted: bool,
     /// Parts of the mask that show the background, largest first.
     pub leaks: Vec<DoubtfulRegion>,
-    /// Long thin parts of the mask that show what lies on both sides of them, as pieces of the table's rim do, largest
-    /// first.
-    pub whiskers: Vec<DoubtfulRegion>,
     /// Parts outside the mask that show the object, largest first.
     pub missing: Vec<DoubtfulRegion>,
     /// Holes in the mask that show the object, largest first.
@@ -58,12 +52,7 @@ impl ShapeCheck {
     pub fn enlarged(mut self, by: u32) -> Self {
         let area = u64::from(by) * u64::from(by);
         self.area_px *= area;
-        let regions = [
-            &mut self.leaks,
-            &mut self.whiskers,
-            &mut self.missing,
-            &mut self.holes,
-        ];
+        let regions = [&mut self.leaks, &mut self.missing, &mut self.holes];
         for region in regions.into_iter().flatten() {
             let Rect { x, y, w, h } = region.bounds;
             let signed = i32::try_from(by).unwrap_or(i32::MAX);
@@ -130,8 +119,7 @@ impl<'a> MaskCheck<'a> {
             })
         };
         let undecided = background(&leaks, None);
-        let seen = background(&self.suspects(), Some(true));
-        let leaks = background(&leaks, Some(true)).or(&seen);
+        let leaks = background(&leaks, Some(true));
         let missing = self.shown(&missing, TurnField::belongs);
         // Whatever the turn's own mask says of a hole, the picture in it decides.
         let filled = background(&in_hole.opened(wide), Some(false));
@@ -143,29 +131,9 @@ impl<'a> MaskCheck<'a> {
             outline_of_turn: self.turn.outline(&own),
             contradicted: witnessed && differing > 0 && undisputed,
             leaks: regions(&leaks, least),
-            whiskers: regions(&self.whiskers(), 0.0),
             missing: regions(&missing, least),
             holes: regions(&filled, least),
         }))
-    }
-
-    /// Wide parts of the mask that look like the table or the room, but for those at the frame's border.
-    fn suspects(&self) -> Bitmap {
-        let object = self.turn.reduced(&self.mask);
-        let suspects = self.turn.fine.suspects(&object).opened(1);
-        self.turn
-            .enlarged(&suspects)
-            .and(&self.mask)
-            .parts_where(Connectivity::Eight, |component, _| {
-                self.mask.is_inside(component)
-            })
-    }
-
-    fn whiskers(&self) -> Bitmap {
-        let object = self.turn.reduced(&self.mask);
-        let least = (object.width() as f64 * WHISKER).round() as usize;
-        let found = whiskers(&self.turn.courses, &object, least);
-        self.turn.enlarged(&found).and(&self.mask)
     }
 
     /// Of parts in which the mask may be wrong, those of which the turn shows that they are background, or object. The
@@ -246,7 +214,6 @@ mod tests {
             outline_of_turn: 0.6,
             contradicted: false,
             leaks: vec![region],
-            whiskers: Vec::new(),
             missing: Vec::new(),
             holes: vec![region],
         };

@@ -2,11 +2,9 @@
 
 use crate::{DoubtfulRegion, ShapeCheck};
 
-/// Parts of the object that are not in the mask, or holes in it, may have this share of its area, where all of the turn
-/// is looked at.
+/// Parts of the mask that are background, of the object that are not in it, or holes in it may have this
+/// share of its area, where all of the turn is looked at.
 const MAX_REGION: f64 = 0.01;
-/// The same of parts of the mask that are background: what they show is known better.
-const MAX_LEAK: f64 = 0.003;
 /// The same of a look at a few frames, which takes shadows for parts of the object.
 const MAX_REGION_OF_A_LOOK: f64 = 0.03;
 /// The mask's outline follows what moves at least so well, compared with the turn's own.
@@ -26,13 +24,13 @@ impl ShapeCheck {
     /// at as a whole.
     #[must_use]
     pub fn faults(&self) -> Vec<String> {
-        faults(self, MAX_LEAK, MAX_REGION, 0)
+        faults(self, MAX_REGION)
     }
 
     /// [`Self::faults`] of a turn of which only a few frames were looked at.
     #[must_use]
     pub fn faults_at_a_look(&self) -> Vec<String> {
-        faults(self, MAX_REGION_OF_A_LOOK, MAX_REGION_OF_A_LOOK, usize::MAX)
+        faults(self, MAX_REGION_OF_A_LOOK)
     }
 
     /// Whether the mask is that of another object or recording, rather than one with a flaw: much of it is background,
@@ -57,9 +55,7 @@ impl ShapeCheck {
     }
 }
 
-/// The faults of a shape of which parts of the mask may be background up to the share `most_leak`, other parts wrong up
-/// to `most_region`, and so many whiskers are passed over.
-fn faults(shape: &ShapeCheck, most_leak: f64, most_region: f64, passed_over: usize) -> Vec<String> {
+fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
     if shape.outline > BETTER_OUTLINE * shape.outline_of_turn {
         return Vec::new();
     }
@@ -72,40 +68,23 @@ fn faults(shape: &ShapeCheck, most_leak: f64, most_region: f64, passed_over: usi
     }
     let area = shape.area_px as f64;
     let named = [
-        (
-            &shape.leaks,
-            most_leak,
-            "background in the mask",
-            "mark it black",
-        ),
-        (
-            &shape.missing,
-            most_region,
-            "object outside the mask",
-            "mark it white",
-        ),
+        (&shape.leaks, "background in the mask", "mark it black"),
+        (&shape.missing, "object outside the mask", "mark it white"),
         (
             &shape.holes,
-            most_region,
             "holes in the mask where there is object",
             "mark them white",
         ),
     ];
-    for (regions, most, what, remedy) in named {
+    for (regions, what, remedy) in named {
         let px: u64 = regions.iter().map(|region| region.px).sum();
-        if px as f64 > most * area {
+        if px as f64 > most_region * area {
             faults.push(format!(
                 "{what}, {px} pixels ({:.1} % of it), at {}: {remedy}, in --edit or in seeds",
                 100.0 * px as f64 / area,
                 places(regions)
             ));
         }
-    }
-    if shape.whiskers.len() > passed_over {
-        faults.push(format!(
-            "thin parts of the mask that are no object, as pieces of the table's rim are, at {}: mark them black, in --edit or in seeds",
-            places(&shape.whiskers)
-        ));
     }
     faults
 }
@@ -142,7 +121,6 @@ mod tests {
             outline_of_turn: 0.9,
             contradicted: false,
             leaks: of(leaks),
-            whiskers: Vec::new(),
             missing: of(missing),
             holes: of(holes),
         }
