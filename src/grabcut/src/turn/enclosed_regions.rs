@@ -75,13 +75,6 @@ impl TurnField {
             && self.witness.nearer(part, surface, beside).unwrap_or(true)
     }
 
-    /// The parts of a mask that look like the table or the room.
-    pub(crate) fn suspects(&self, object: &Bitmap) -> Bitmap {
-        let none = || object.map(|_, _| false);
-        let table = self.like_table.clone().unwrap_or_else(none);
-        object.and(&table.or(&self.backdrop).or(&self.white))
-    }
-
     /// Whether a part outside the object shows that it belongs to it: it does not move, is neither room nor table,
     /// becomes brighter with the object, and its outline is stronger where it does not touch it.
     pub(crate) fn belongs(&self, part: &Bitmap, object: &Bitmap) -> bool {

@@ -173,12 +173,6 @@ impl TurnStatistics {
         )
     }
 
-    /// A bitmap of the size of the statistics in that of the frames.
-    pub(crate) fn enlarged(&self, object: &Bitmap) -> Bitmap {
-        let full = (self.full.0 as usize, self.full.1 as usize);
-        object.enlarged(self.factor(), full)
-    }
-
     /// How well an outline follows what moves differently: the mean over its edges of the strength of
     /// the contrast there, 0..=1.
     pub(crate) fn outline(&self, object: &Bitmap) -> f32 {
