@@ -26,19 +26,16 @@ impl<'a> CropView<'a> {
         }
     }
 
-    /// The part of the picture that begins this far to the right and down. It has no rows where it reaches beyond.
+    /// The picture without `by` pixels on each side; empty where there are no more.
     #[must_use]
-    pub fn part(
-        picture: &'a RgbaImage,
-        [left, top]: [u32; 2],
-        (width, height): (u32, u32),
-    ) -> Self {
+    pub fn within(picture: &'a RgbaImage, by: u32) -> Self {
+        let (width, height) = picture.dimensions();
         Self {
             picture,
-            left,
-            top,
-            width,
-            height,
+            left: by,
+            top: by,
+            width: width.saturating_sub(by.saturating_mul(2)),
+            height: height.saturating_sub(by.saturating_mul(2)),
         }
     }
 
@@ -96,7 +93,7 @@ mod tests {
     #[test]
     fn a_moved_view_shows_the_pixels_there() {
         let picture = picture();
-        let view = CropView::part(&picture, [3, 3], (3, 2));
+        let view = CropView::within(&picture, 3);
         assert_eq!(view.dimensions(), (3, 2));
         assert_eq!(view.row(0, 0)[..2], [3, 3]);
         let moved = view.moved([1, -1], 2).unwrap();
@@ -109,16 +106,12 @@ mod tests {
     #[test]
     fn what_the_picture_does_not_have_is_not_shown() {
         let picture = picture();
-        let view = CropView::part(&picture, [3, 3], (3, 2));
+        let view = CropView::within(&picture, 3);
         assert!(view.moved([2, 0], 2).is_none());
         assert!(view.moved([-4, 0], 0).is_none());
         assert!(view.row(5, 0).is_empty());
         assert!(view.row(0, 4).is_empty());
-        assert!(
-            CropView::part(&picture, [5, 5], (5, 2))
-                .row(0, 0)
-                .is_empty()
-        );
+        assert_eq!(CropView::within(&picture, 5).dimensions(), (0, 0));
         assert_eq!(CropView::whole(&picture).row(7, 0).len(), 36);
     }
 }

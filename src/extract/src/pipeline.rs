@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::thread::{self, Scope};
+use std::thread;
 
 use image::imageops::replace;
 use image::{DynamicImage, RgbImage, RgbaImage};
@@ -24,12 +24,6 @@ use super::scale::{APRON, Scaling};
 use super::{
     AlignBuffers, AlignSample, Aligner, Alignment, CropView, ExtractError, ScaleBuffers, Scaler,
 };
-
-/// Columns that decoders make together.
-const BLOCK: u32 = 32;
-
-/// Frames that are read ahead of their processing: each may be a whole decoded picture.
-const READ_AHEAD: usize = 2;
 
 /// The processing of the frames of one video.
 pub(super) struct Stage<'a> {
@@ -109,7 +103,7 @@ impl Early<'_, '_> {
     fn take(&mut self, part: &RgbaImage, rows: Range<u32>) {
         let stage = self.stage;
         let border = stage.border();
-        let crop = stage.crop_of(part);
+        let crop = CropView::within(part, border);
         if rows.start == 0 {
             let scaling = stage.scaler.begin(crop, self.scale).ok();
             let scaling = scaling.filter(|_| !self.expect_moved);
@@ -153,17 +147,15 @@ impl Stage<'_> {
         let reader = self.video.read(&wanted, threads)?;
         let (sender, receiver) = sync_channel(2 * threads);
         thread::scope(|scope| {
-            let frames = read_ahead(reader, scope);
-            scope.spawn(|| pool.install(|| self.work(frames, sender)));
+            scope.spawn(|| pool.install(|| self.work(reader, sender)));
             collect(receiver, &mut accept)
         })
     }
 
     /// Processes frames until they end or the receiver is gone.
-    fn work(&self, frames: Receiver<Pending>, sender: SyncSender<Finished>) {
+    fn work(&self, reader: Reader<'_>, sender: SyncSender<Finished>) {
         // An error means that the receiver has stopped after an error of its own.
-        let _ = frames
-            .into_iter()
+        let _ = reader
             .par_bridge()
             .try_for_each_init(Buffers::default, |buffers, pending| {
                 sender.send(self.process(pending, buffers)).map_err(drop)
@@ -208,7 +200,7 @@ impl Stage<'_> {
             early.take(region, 0..region.height());
         }
         let scaled = early.scaled;
-        let crop = self.crop_of(region);
+        let crop = CropView::within(region, self.border());
         let alignment = self.align.as_ref();
         let alignment = alignment.map(|by| by.aligner.measure_rows(&mut buffers.align));
         let (alignment, interpolated) = self.completed(number, alignment);
@@ -317,32 +309,19 @@ impl Stage<'_> {
     /// The part of a frame that is decoded.
     fn region(&self) -> Rect {
         let border = self.border();
-        in_blocks(
-            Rect::new(
-                self.crop.x.saturating_sub_unsigned(border),
-                self.crop.y.saturating_sub_unsigned(border),
-                self.crop.w + 2 * border,
-                self.crop.h + 2 * border,
-            ),
-            self.frame().0,
+        Rect::new(
+            self.crop.x.saturating_sub_unsigned(border),
+            self.crop.y.saturating_sub_unsigned(border),
+            self.crop.w + 2 * border,
+            self.crop.h + 2 * border,
         )
-    }
-
-    /// The crop in a picture of that part.
-    fn crop_of<'v>(&self, part: &'v RgbaImage) -> CropView<'v> {
-        let region = self.region();
-        let (left, top) = (
-            self.crop.x.abs_diff(region.x),
-            self.crop.y.abs_diff(region.y),
-        );
-        CropView::part(part, [left, top], (self.crop.w, self.crop.h))
     }
 
     /// What of that counts: all of it where the object is looked for, else what lies under the mask.
     fn needed(&self) -> Rect {
         match &self.align {
             Some(_) => self.region(),
-            None => in_blocks(self.object, self.frame().0),
+            None => self.object,
         }
     }
 
@@ -360,12 +339,9 @@ impl Stage<'_> {
             repeat_edge(crop, self.crop, self.frame());
             Some((number, AlignSample::from_crop(CropView::whole(crop))))
         };
-        let mut samples: Vec<(u64, AlignSample)> = thread::scope(|scope| {
-            let frames = read_ahead(reader, scope).into_iter();
-            pool.install(|| {
-                let samples = frames.par_bridge().map_init(RgbaImage::default, sample);
-                samples.flatten().collect()
-            })
+        let mut samples: Vec<(u64, AlignSample)> = pool.install(|| {
+            let samples = reader.par_bridge().map_init(RgbaImage::default, sample);
+            samples.flatten().collect()
         });
         samples.sort_by_key(|(number, _)| *number);
         Ok(samples)
@@ -385,38 +361,6 @@ impl Stage<'_> {
         repeat_edge(&mut crop, self.crop, self.frame());
         Some((frame, AlignSample::from_crop(CropView::whole(&crop))))
     }
-}
-
-/// With the columns that decoders make anyway, up to whole blocks, so that rows are decoded where they stay: of what lies in
-/// a frame of this width.
-fn in_blocks(rect: Rect, width: u32) -> Rect {
-    let ends = u32::try_from(rect.x)
-        .ok()
-        .zip(u32::try_from(rect.right()).ok());
-    let Some((left, right)) = ends.filter(|&(_, right)| right <= width) else {
-        return rect;
-    };
-    let left = left - left % BLOCK;
-    let right = right.next_multiple_of(BLOCK).min(width);
-    Rect::new(left.cast_signed(), rect.y, right - left, rect.h)
-}
-
-/// Reads frames on a thread of its own, up to a few ahead: a decoder of frames that build on each other goes on while the
-/// workers are busy, and no worker waits in it.
-fn read_ahead<'scope>(
-    reader: Reader<'scope>,
-    scope: &'scope Scope<'scope, '_>,
-) -> Receiver<Pending> {
-    let (sender, receiver) = sync_channel(READ_AHEAD);
-    scope.spawn(move || {
-        for pending in reader {
-            // An error means that nobody wants more.
-            if sender.send(pending).is_err() {
-                return;
-            }
-        }
-    });
-    receiver
 }
 
 fn collect(

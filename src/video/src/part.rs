@@ -58,7 +58,8 @@ impl Video {
             let size = self.track.coded;
             let rows = Rows::new(part, size, (region, needed), &mut seen);
             let decoded = rows.and_then(|mut rows| {
-                decode_part(jpeg, size, rows.inside, &mut rows).ok()?;
+                let inside = rows.inside;
+                decode_part(jpeg, size, inside, &mut |row| rows.push(row)).ok()?;
                 rows.end();
                 Some(())
             });
@@ -69,7 +70,8 @@ impl Video {
         let picture = self.picture(pending)?;
         let rows = Rows::new(part, picture.size(), (region, needed), &mut seen);
         let converted = rows.and_then(|mut rows| {
-            picture.direct_rgba(rows.inside, &mut rows)?;
+            let inside = rows.inside;
+            picture.direct_rgba(inside, &mut |row| rows.push(row))?;
             rows.end();
             Some(())
         });
@@ -79,16 +81,6 @@ impl Video {
         }
         Ok(())
     }
-}
-
-/// Where the rows of a part go, from the top to the bottom.
-pub(super) trait RowSink {
-    /// The bytes from the first pixel of the next row to the last of the last of `count` rows, and how many lie between
-    /// the beginnings of two. `None` if there are no more rows.
-    fn next(&mut self, count: u32) -> Option<(&mut [u8], usize)>;
-
-    /// As many rows have come.
-    fn came(&mut self, count: u32);
 }
 
 /// A part that comes row by row.
@@ -129,33 +121,22 @@ impl<'a, F: FnMut(&RgbaImage, Range<u32>)> Rows<'a, F> {
         })
     }
 
-    /// Bytes between the beginnings of two rows.
-    fn stride(&self) -> usize {
-        4 * self.part.width() as usize
+    /// `None` if it is a row too many.
+    fn push(&mut self, row: &[u8]) -> Option<()> {
+        let to = self.part.get_mut(self.next..self.next + row.len())?;
+        to.copy_from_slice(row);
+        self.next += 4 * self.part.width() as usize;
+        self.come += 1;
+        if self.come - self.told >= BAND {
+            (self.seen)(self.part, self.told..self.come);
+            self.told = self.come;
+        }
+        Some(())
     }
 
     /// No more rows come.
     fn end(self) {
         (self.seen)(self.part, self.told..self.part.height());
-    }
-}
-
-impl<F: FnMut(&RgbaImage, Range<u32>)> RowSink for Rows<'_, F> {
-    fn next(&mut self, count: u32) -> Option<(&mut [u8], usize)> {
-        let stride = self.stride();
-        let before_last = self.next + stride * (count as usize).checked_sub(1)?;
-        let end = before_last + 4 * self.inside.w as usize;
-        let rows = self.part.get_mut(self.next..end)?;
-        Some((rows, stride))
-    }
-
-    fn came(&mut self, count: u32) {
-        self.next += self.stride() * count as usize;
-        self.come += count;
-        if self.come - self.told >= BAND {
-            (self.seen)(self.part, self.told..self.come);
-            self.told = self.come;
-        }
     }
 }
 

@@ -9,7 +9,6 @@ use yuv::{YuvGrayImage, YuvPlanarImage};
 use super::DecodeFault;
 use super::colour::Colour;
 use super::display::Display;
-use super::part::RowSink;
 use relit_data::geometry::Rect;
 
 pub(super) fn is_jpeg_format(format: Pixel) -> bool {
@@ -127,9 +126,13 @@ impl Picture {
 }
 
 impl Picture {
-    /// Converts `rect`, which lies inside the picture, to `rows`: red, green, blue and 255. `None` if that takes more than
-    /// a conversion of its planes, or if there are not so many rows.
-    pub(super) fn direct_rgba(&self, rect: Rect, rows: &mut dyn RowSink) -> Option<()> {
+    /// Gives `take` the rows of `rect`, which lies inside the picture, one after the other: red, green, blue and 255.
+    /// `None` if that takes more than a conversion of its planes, or from `take`.
+    pub(super) fn direct_rgba(
+        &self,
+        rect: Rect,
+        take: &mut dyn FnMut(&[u8]) -> Option<()>,
+    ) -> Option<()> {
         let format = self.frame.format();
         let direct = is_planar(format) && strides_are_forward(&self.frame);
         if !direct || !self.display.is_plain() || !self.colour.is_srgb() {
@@ -142,36 +145,17 @@ impl Picture {
         let width = end.min(self.frame.width() as usize) - x;
         let (_, shift_y) = chroma_shifts(format);
         let (skipped, bytes) = (4 * (left - x), 4 * rect.w as usize);
-        let is_place = 4 * width == bytes;
-        let mut strip = Vec::new();
+        let mut strip = vec![0; 4 * width * STRIP];
         let mut y = top - (top & shift_y);
         while y < top + rect.h as usize {
             let height = STRIP.min(top + rect.h as usize - y);
-            let (at, above) = ((x, y), top.saturating_sub(y));
+            let strip = &mut strip[..4 * width * height];
             let size = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
+            planes_to_rgba(&self.frame, format, &self.colour, (x, y), size, strip)?;
+            for row in strip.chunks_exact(4 * width).skip(top.saturating_sub(y)) {
+                take(row.get(skipped..skipped + bytes)?)?;
+            }
             y += height;
-            if is_place && above == 0 {
-                planes_to_rgba(
-                    &self.frame,
-                    format,
-                    &self.colour,
-                    at,
-                    size,
-                    rows.next(size.1)?,
-                )?;
-                rows.came(size.1);
-                continue;
-            }
-            strip.resize(4 * width * STRIP, 0);
-            let strip = strip.get_mut(..4 * width * height)?;
-            let to = (&mut *strip, 4 * width);
-            planes_to_rgba(&self.frame, format, &self.colour, at, size, to)?;
-            for row in strip.chunks_exact(4 * width).skip(above) {
-                let (to, _) = rows.next(1)?;
-                to.get_mut(..bytes)?
-                    .copy_from_slice(row.get(skipped..skipped + bytes)?);
-                rows.came(1);
-            }
         }
         Some(())
     }
@@ -180,17 +164,15 @@ impl Picture {
 /// Rows that are converted at a time: few enough for the processor's cache.
 const STRIP: usize = 16;
 
-/// RGBA of part of a planar YUV picture, from a pixel on that a chroma sample begins with; `stride` bytes lie between the
-/// beginnings of two rows.
+/// RGBA of part of a planar YUV picture, from a pixel on that a chroma sample begins with.
 fn planes_to_rgba(
     frame: &frame::Video,
     format: Pixel,
     colour: &Colour,
     (x, y): (usize, usize),
     (width, height): (u32, u32),
-    (rgba, stride): (&mut [u8], usize),
+    rgba: &mut [u8],
 ) -> Option<()> {
-    let stride = u32::try_from(stride).ok()?;
     let shifts = chroma_shifts(format);
     let planes = yuv_planes(frame, shifts, (x, y), (width, height))?;
     let to_rgba = match shifts {
@@ -198,7 +180,7 @@ fn planes_to_rgba(
         (1, 0) => yuv::yuv422_to_rgba,
         _ => yuv::yuv444_to_rgba,
     };
-    to_rgba(&planes, rgba, stride, colour.range(), colour.matrix).ok()
+    to_rgba(&planes, rgba, 4 * width, colour.range(), colour.matrix).ok()
 }
 
 /// Part of a planar YUV picture, from a pixel on that a chroma sample begins with.

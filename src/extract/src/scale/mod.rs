@@ -391,12 +391,6 @@ mod tests {
         }
     }
 
-    /// A picture without its apron.
-    fn inside(picture: &RgbaImage) -> CropView<'_> {
-        let (width, height) = picture.dimensions();
-        CropView::part(picture, [APRON; 2], (width - 2 * APRON, height - 2 * APRON))
-    }
-
     /// A crop with its apron, of an object of smooth colours that lies by `shift` beside the mask, in front
     /// of a bright background.
     fn around(mask: &GrayImage, [dx, dy]: [f64; 2]) -> RgbaImage {
@@ -424,11 +418,11 @@ mod tests {
         for side in [None, Some(24)] {
             let scaler = Scaler::new(mask.clone(), side).unwrap();
             let unmoved = around(&mask, [0.0; 2]);
-            let wanted = still(&scaler, inside(&unmoved));
+            let wanted = still(&scaler, CropView::within(&unmoved, APRON));
             let mut buffers = ScaleBuffers::default();
             for part in [[0.5, -0.25], [-0.4, 0.5], [0.2, 0.0]] {
                 let around = around(&mask, part);
-                let crop = inside(&around);
+                let crop = CropView::within(&around, APRON);
                 let spans = MaskSpans::from_mask(&mask);
                 let found = scaler
                     .scale_moved(
@@ -451,7 +445,7 @@ mod tests {
         let around = RgbaImage::from_fn(20 + 2 * APRON, 20 + 2 * APRON, |x, y| {
             opaque([(9 * x) as u8, (8 * y * y) as u8, (x * y) as u8])
         });
-        let crop = inside(&around);
+        let crop = CropView::within(&around, APRON);
         let spans = MaskSpans::from_mask(&mask);
         let rgb = image::DynamicImage::from(around.clone()).to_rgb8();
         let rgb = image::imageops::crop_imm(&rgb, APRON, APRON, 20, 20).to_image();

@@ -17,7 +17,6 @@ use mozjpeg_sys::{
 
 use super::Refused;
 use super::layout::size_of_plain;
-use crate::part::RowSink;
 use relit_data::geometry::Rect;
 
 /// Bytes of a pixel: red, green, blue, 255.
@@ -35,19 +34,20 @@ fn cached_start(buffer: *const u8) -> usize {
     }
 }
 
-/// Decodes the pixels of a JPEG of this size under `part`, which lies inside, to `rows`: red, green, blue and 255.
+/// Decodes the pixels of a JPEG of this size under `part`, which lies inside, and gives `take` row after row: red,
+/// green, blue and 255. `None` from there ends the decoding.
 pub(in super::super) fn decode_part(
     jpeg: &[u8],
     size: (u32, u32),
     part: Rect,
-    rows: &mut dyn RowSink,
+    take: &mut dyn FnMut(&[u8]) -> Option<()>,
 ) -> Result<(), Refused> {
     if size_of_plain(jpeg)? != size || part.clipped_to(size.0, size.1) != Some(part) {
         return Err(Refused);
     }
     let mut library = Library::new();
     // What was unwound through is only freed afterwards.
-    catch_unwind(AssertUnwindSafe(|| library.decode(jpeg, part, rows))).unwrap_or(Err(Refused))
+    catch_unwind(AssertUnwindSafe(|| library.decode(jpeg, part, take))).unwrap_or(Err(Refused))
 }
 
 /// The library's state for one picture. It is freed when this is dropped.
@@ -79,7 +79,12 @@ impl Library {
         }
     }
 
-    fn decode(&mut self, jpeg: &[u8], part: Rect, rows: &mut dyn RowSink) -> Result<(), Refused> {
+    fn decode(
+        &mut self,
+        jpeg: &[u8],
+        part: Rect,
+        take: &mut dyn FnMut(&[u8]) -> Option<()>,
+    ) -> Result<(), Refused> {
         let state = &mut *self.state;
         let (x, y) = (part.x.unsigned_abs(), part.y.unsigned_abs());
         let length = c_ulong::try_from(jpeg.len()).map_err(|_| Refused)?;
@@ -113,21 +118,12 @@ impl Library {
         let start = cached_start(line.as_ptr());
         let line = line.get_mut(start..).ok_or(Refused)?;
         for _ in 0..part.h {
-            let (row, _) = rows.next(1).ok_or(Refused)?;
-            // A row of the part is written in its place where nothing speaks against it.
-            let is_place = width == part.w && row.len() == bytes && cached_start(row.as_ptr()) == 0;
-            let to = if is_place { &mut *row } else { &mut *line };
-            let mut at = to.as_mut_ptr();
-            // SAFETY: both hold `width` pixels of the output's format.
+            let mut at = line.as_mut_ptr();
+            // SAFETY: the line holds `width` pixels of the output's format.
             if unsafe { jpeg_read_scanlines(state, &mut at, 1) } != 1 {
                 return Err(Refused);
             }
-            if !is_place {
-                let part = line.get(surplus..surplus + bytes);
-                let part = part.filter(|part| part.len() == row.len());
-                row.copy_from_slice(part.ok_or(Refused)?);
-            }
-            rows.came(1);
+            take(line.get(surplus..surplus + bytes).ok_or(Refused)?).ok_or(Refused)?;
         }
         finish(state, line)
     }

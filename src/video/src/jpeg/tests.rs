@@ -10,7 +10,6 @@ use relit_test_support::ffmpeg;
 
 use super::decode_part;
 use crate::Video;
-use crate::part::RowSink;
 use relit_data::geometry::Rect;
 
 /// Encodings: sampling of chroma, restart markers (by slices), blocks of 8 and 16 rows.
@@ -52,27 +51,14 @@ fn first(path: &Path) -> Vec<u8> {
 
 const SIZE: (u32, u32) = (149, 101);
 
-/// An image, and the rows of it that came.
-struct Filled(RgbaImage, u32);
-
-impl RowSink for Filled {
-    fn next(&mut self, count: u32) -> Option<(&mut [u8], usize)> {
-        let stride = 4 * self.0.width() as usize;
-        let start = stride * self.1 as usize;
-        let rows = self.0.get_mut(start..start + stride * count as usize)?;
-        Some((rows, stride))
-    }
-
-    fn came(&mut self, count: u32) {
-        self.1 += count;
-    }
-}
-
 fn part(jpeg: &[u8], rect: Rect) -> Result<RgbaImage, super::Refused> {
-    let mut filled = Filled(RgbaImage::new(rect.w, rect.h), 0);
-    decode_part(jpeg, SIZE, rect, &mut filled)?;
-    assert_eq!(filled.1, rect.h);
-    Ok(filled.0)
+    let mut image = RgbaImage::new(rect.w, rect.h);
+    let mut rows = image.chunks_exact_mut((4 * rect.w as usize).max(1));
+    decode_part(jpeg, SIZE, rect, &mut |row| {
+        rows.next()?.copy_from_slice(row);
+        Some(())
+    })?;
+    Ok(image)
 }
 
 fn whole(jpeg: &[u8]) -> RgbaImage {
