@@ -1,10 +1,7 @@
 //! The extraction of one recording, from its files to its entry in the data set.
 
 use std::collections::HashMap;
-use std::mem::take;
-use std::panic::resume_unwind;
 use std::path::Path;
-use std::thread;
 
 use image::RgbImage;
 use image::imageops::thumbnail;
@@ -56,13 +53,11 @@ impl Job {
     /// Opens recording, video and mask, and checks that they belong together.
     pub(super) fn open(path: &Path, options: &ExtractOptions) -> Result<Self, ExtractError> {
         let recording = Recording::open(path)?;
-        // The file is hashed while it is looked through.
-        let (found, hashed) = thread::scope(|scope| {
-            let hashed = scope.spawn(|| digest(&recording.video));
-            (open_video(&recording, options), hashed.join())
-        });
-        let (video, mask) = found?;
-        let (bytes, blake3) = hashed.unwrap_or_else(|panic| resume_unwind(panic))?;
+        let video = Video::open(&recording.video)?;
+        let size = (video.facts().width, video.facts().height);
+        let stored = video.facts().stored_size;
+        let mask = ObjectMask::open(&recording, options.mask.as_deref(), size, stored)?;
+        let (bytes, blake3) = digest(&recording.video)?;
         let name = recording.video.file_name().unwrap_or_default();
         let input = SourceVideo {
             video: name.to_string_lossy().into_owned(),
@@ -172,9 +167,8 @@ impl Job {
             }
             let mut all_known = false;
             while !assignments.is_empty() {
-                let newly_lost = stage.run(&assignments, pool, |mut frame| {
-                    let assigned = assignments.get(&frame.number);
-                    let assigned = assigned.map(Vec::as_slice).unwrap_or_default();
+                let newly_lost = stage.run(&assignments, pool, |frame| {
+                    let assigned = assignments.get(&frame.number).into_iter().flatten();
                     if let Some(alignment) = &frame.alignment {
                         course.add(frame.number, alignment);
                         if alignment.shift.is_none() && !all_known {
@@ -184,16 +178,12 @@ impl Job {
                         }
                         steadiness.add(frame.number, alignment, frame.interpolated);
                     }
-                    for (at, &sample) in assigned.iter().enumerate() {
+                    for &sample in assigned {
                         let record = self.record(&stage, &plan, &frame, sample, options);
                         if is_thumbnail(record.index, samples) {
                             thumbnails.push((record.index, small(&frame.image)));
                         }
-                        let (image, png) = if at + 1 < assigned.len() {
-                            (frame.image.clone(), frame.png.clone())
-                        } else {
-                            (take(&mut frame.image), take(&mut frame.png))
-                        };
+                        let (image, png) = (frame.image.clone(), frame.png.clone());
                         writer.push(Sample { record, image, png })?;
                         observer.advanced();
                     }
@@ -204,7 +194,7 @@ impl Job {
                 lost.extend(newly_lost);
                 if assignments.is_empty() && !all_known {
                     all_known = true;
-                    assignments = take(&mut waiting);
+                    assignments = std::mem::take(&mut waiting);
                     if let Some(align) = &mut stage.align {
                         align.interpolated = course.fill(assignments.keys().copied());
                     }
@@ -560,18 +550,6 @@ fn notices_of_lost(lost: &[LostFrame]) -> Vec<Notice> {
         )));
     }
     notices
-}
-
-/// The video and its mask.
-fn open_video(
-    recording: &Recording,
-    options: &ExtractOptions,
-) -> Result<(Video, ObjectMask), ExtractError> {
-    let video = Video::open(&recording.video)?;
-    let size = (video.facts().width, video.facts().height);
-    let stored = video.facts().stored_size;
-    let mask = ObjectMask::open(recording, options.mask.as_deref(), size, stored)?;
-    Ok((video, mask))
 }
 
 /// BLAKE3 of the frame index, if it was used.

@@ -212,18 +212,17 @@ pub fn half_image<P: Pixel<Subpixel = u8>>(
         return half;
     }
     let to = half.chunks_exact_mut(channels * width.div_ceil(2) as usize);
-    let mut line = vec![0_u16; row_bytes];
     for (to, pair) in to.zip(image.as_raw().chunks(2 * row_bytes)) {
         let (above, below) = pair.split_at(row_bytes);
         let below = if below.is_empty() { above } else { below };
-        for (sum, (above, below)) in line.iter_mut().zip(above.iter().zip(below)) {
-            *sum = u16::from(*above) + u16::from(*below);
-        }
-        for (to, pair) in to.chunks_exact_mut(channels).zip(line.chunks(2 * channels)) {
+        let pairs = above.chunks(2 * channels).zip(below.chunks(2 * channels));
+        for (to, (above, below)) in to.chunks_exact_mut(channels).zip(pairs) {
             // Of a last column alone, both pixels are one.
-            let (left, right) = (&pair[..channels], &pair[pair.len() - channels..]);
-            for (to, (left, right)) in to.iter_mut().zip(left.iter().zip(right)) {
-                *to = ((left + right + 2) / 4) as u8;
+            let right = above.len() - channels;
+            for (channel, to) in to.iter_mut().enumerate() {
+                let four = [above, below].map(|row| [row[channel], row[right + channel]]);
+                let sum: u16 = four.as_flattened().iter().copied().map(u16::from).sum();
+                *to = ((sum + 2) / 4) as u8;
             }
         }
     }
