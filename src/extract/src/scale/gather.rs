@@ -17,9 +17,6 @@ use relit_data::image_stats::Measuring;
 /// Red, green, blue and the mask's share.
 const PLANES: usize = 4;
 
-/// Sums that are made side by side.
-const LANES: usize = 4;
-
 /// Pixels that are needed around a crop to move it by part of a pixel.
 pub const APRON: u32 = 3;
 
@@ -36,6 +33,11 @@ pub(super) struct SourceMask {
 
 impl SourceMask {
     pub(super) fn new(image: GrayImage) -> Self {
+        let hull = |row: &[u8]| {
+            let start = row.iter().position(|&m| m != 0).unwrap_or_default();
+            let end = row.iter().rposition(|&m| m != 0);
+            start..end.map_or(start, |last| last + 1)
+        };
         let width = image.width().max(1) as usize;
         let rows = || image.as_raw().chunks_exact(width);
         Self {
@@ -44,13 +46,6 @@ impl SourceMask {
             image,
         }
     }
-}
-
-/// The columns of a mask's row from the first that is not 0 to the last.
-fn hull(row: &[u8]) -> Range<usize> {
-    let start = row.iter().position(|&m| m != 0).unwrap_or_default();
-    let end = row.iter().rposition(|&m| m != 0);
-    start..end.map_or(start, |last| last + 1)
 }
 
 /// The runs of a mask's row that are not 0.
@@ -73,11 +68,8 @@ pub struct ScaleBuffers {
     light: [Vec<f32>; PLANES],
     /// Output rows before they are filtered across; each is used again for later ones.
     sums: Vec<[Vec<f32>; PLANES]>,
-    /// An output row's light, each as the sums of every fourth source pixel, channel by channel.
-    across: Vec<[f32; LANES]>,
-    /// What the light of its pixels is multiplied by, and then the light itself.
-    gains: Vec<f32>,
-    /// Its levels, channel by channel.
+    /// An output row's light, and its levels, channel by channel.
+    across: Vec<f32>,
     levels: Vec<u16>,
 }
 
@@ -131,7 +123,7 @@ impl Gather<'_> {
         buffers.reset(
             source + self.across.taps(),
             self.down.overlap().max(1),
-            self.mask.width() as usize,
+            3 * self.mask.width() as usize,
         );
         Progress {
             scaled: RgbImage::new(self.mask.width(), self.mask.height()),
@@ -268,7 +260,6 @@ impl Gather<'_> {
         let ScaleBuffers {
             sums,
             across,
-            gains,
             levels,
             ..
         } = buffers;
@@ -276,38 +267,28 @@ impl Gather<'_> {
         let width = self.mask.width() as usize;
         let row = output * width..(output + 1) * width;
         let mask = self.mask.as_raw().get(row.clone()).unwrap_or_default();
-        let [colours @ .., shares] = sums;
-        // What lies beyond the object stays 0.
-        let hull = hull(mask);
-        let values = 3 * hull.start..3 * hull.end;
-        let across = &mut across[values.clone()];
-        let (gains, levels) = (&mut gains[values.clone()], &mut levels[values]);
-        let pixels = across.as_chunks_mut::<3>().0.iter_mut();
-        for ((x, lanes), to) in hull.clone().zip(pixels).zip(gains.as_chunks_mut::<3>().0) {
+        let [red, green, blue, shares] = sums;
+        for (x, pixel) in across.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             if mask[x] == 0 {
-                *to = [0.0; 3];
+                *pixel = [0.0; 3];
                 continue;
             }
             let (start, weights) = self.across.window(x);
-            let window = start..start + weights.len();
+            let filtered = |plane: &[f32]| dot(weights, &plane[start..start + weights.len()]);
             let gain = match self.gain {
                 Some(gain) => gain[row.start + x],
                 // Where nothing of the moved object is left, the pixel stays 0.
-                None => 1.0 / sum(dot(weights, &shares[window.clone()])).max(1e-5),
+                None => 1.0 / filtered(shares).max(1e-5),
             };
-            for (lanes, plane) in lanes.iter_mut().zip(colours) {
-                *lanes = dot(weights, &plane[window.clone()]);
+            for (light, channel) in pixel.iter_mut().zip([red, green, blue]) {
+                *light = gain * filtered(channel);
             }
-            *to = [gain; 3];
         }
-        // In loops of their own: the first two become vector instructions, the last waits for the table only.
-        for (light, lanes) in gains.iter_mut().zip(&*across) {
-            *light *= sum(*lanes);
-        }
-        for (level, light) in levels.iter_mut().zip(&*gains) {
+        // In loops of their own: the first of them becomes vector instructions, the second waits for the table only.
+        for (level, light) in levels.iter_mut().zip(&*across) {
             *level = Srgb::level(*light);
         }
-        let values = scaled.get_mut(3 * (row.start + hull.start)..3 * (row.start + hull.end));
+        let values = scaled.get_mut(3 * row.start..3 * row.end);
         for (value, level) in values.unwrap_or_default().iter_mut().zip(&*levels) {
             *value = self.srgb.value(*level);
         }
@@ -315,10 +296,9 @@ impl Gather<'_> {
 }
 
 impl ScaleBuffers {
-    fn reset(&mut self, length: usize, ring: usize, outputs: usize) {
-        self.across.resize(3 * outputs, [0.0; LANES]);
-        self.gains.resize(3 * outputs, 0.0);
-        self.levels.resize(3 * outputs, 0);
+    fn reset(&mut self, length: usize, ring: usize, values: usize) {
+        self.across.resize(values, 0.0);
+        self.levels.resize(values, 0);
         let all = self.sums.iter_mut().flatten().chain(&mut self.light);
         for plane in all.filter(|plane| plane.len() != length) {
             plane.clear();
@@ -396,21 +376,15 @@ fn add_scaled(to: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
-/// The sums of the products of every fourth value; the lengths are a multiple of that.
+/// The sum of products; the lengths are a multiple of four.
 #[inline(always)]
-fn dot(weights: &[f32], values: &[f32]) -> [f32; LANES] {
-    let mut lanes = [0.0; LANES];
-    let values = values.as_chunks::<LANES>().0;
-    for (weights, values) in weights.as_chunks::<LANES>().0.iter().zip(values) {
+fn dot(weights: &[f32], values: &[f32]) -> f32 {
+    let mut lanes = [0.0; 4];
+    for (weights, values) in weights.chunks_exact(4).zip(values.chunks_exact(4)) {
         for ((lane, weight), value) in lanes.iter_mut().zip(weights).zip(values) {
             *lane += weight * value;
         }
     }
-    lanes
-}
-
-#[inline(always)]
-fn sum(lanes: [f32; LANES]) -> f32 {
     (lanes[0] + lanes[2]) + (lanes[1] + lanes[3])
 }
 
