@@ -58,23 +58,20 @@ fn resize(image: &mut GrayImage, (width, height): (u32, u32)) {
     }
 }
 
-/// Makes the runs of these rows of a picture that are needed.
-#[inline(always)]
-fn make_parts(
-    image: &mut GrayImage,
+/// These rows of a picture with the columns of each that are needed.
+fn parts<'a>(
+    image: &'a mut GrayImage,
     rows: Range<usize>,
-    needed: &Region,
-    mut make: impl FnMut(usize, Range<usize>, &mut [u8]),
-) {
+    needed: &'a Region,
+) -> impl Iterator<Item = (usize, Range<usize>, &'a mut [u8])> {
     let width = (image.width() as usize).max(1);
     let all = image.as_flat_samples_mut().samples.chunks_exact_mut(width);
-    for (y, row) in all.enumerate().take(rows.end).skip(rows.start) {
-        for columns in needed.row(y, [0, 0]) {
-            if let Some(part) = row.get_mut(columns.clone()) {
-                make(y, columns, part);
-            }
-        }
-    }
+    let rows = all.enumerate().take(rows.end).skip(rows.start);
+    rows.filter_map(|(y, row)| {
+        let columns = needed.row(y);
+        let part = row.get_mut(columns.clone())?;
+        Some((y, columns, part)).filter(|(_, columns, _)| !columns.is_empty())
+    })
 }
 
 /// These loops are compiled for the kind of processor.
@@ -90,12 +87,16 @@ impl WithSimd for Whole<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let picture = self.picture;
-        make_parts(self.grey, self.rows, self.needed, |y, columns, to| {
-            for (to, pixel) in to.iter_mut().zip(pixels(picture, y, columns)) {
-                *to = (weighted(parts_of(*pixel)) >> 2) as u8;
+        for (y, columns, to) in parts(self.grey, self.rows, self.needed) {
+            let row = self.picture.row(y as i64, 0);
+            let pixels = row.get(4 * columns.start..4 * columns.end);
+            for (to, pixel) in to
+                .iter_mut()
+                .zip(pixels.unwrap_or_default().chunks_exact(4))
+            {
+                *to = (sum_of(pixel) >> 8) as u8;
             }
-        });
+        }
     }
 }
 
@@ -112,44 +113,31 @@ impl WithSimd for HalfOfPicture<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let mut line = vec![0_u16; 2 * self.grey.width() as usize];
-        let picture = self.picture;
-        make_parts(self.grey, self.rows, self.needed, |y, columns, to| {
+        let mut line = vec![0_u32; 2 * self.grey.width() as usize];
+        for (y, columns, to) in parts(self.grey, self.rows, self.needed) {
             let pair = 2 * columns.start..2 * columns.end;
+            let row = |y: usize| {
+                let row = self.picture.row(y as i64, 0);
+                let pixels = row.get(4 * pair.start..4 * pair.end).unwrap_or_default();
+                pixels.chunks_exact(4)
+            };
             let line = &mut line[..pair.len()];
-            let (above, below) = (2 * y, 2 * y + 1);
-            let rows = line.iter_mut().zip(pixels(picture, above, pair.clone()));
-            for ((sum, above), below) in rows.zip(pixels(picture, below, pair)) {
-                let ([a, b], [c, d]) = (parts_of(*above), parts_of(*below));
-                *sum = weighted([a + c, b + d]);
+            let rows = line.iter_mut().zip(row(2 * y)).zip(row(2 * y + 1));
+            for ((sum, above), below) in rows {
+                *sum = sum_of(above) + sum_of(below);
             }
-            for (to, [left, right]) in to.iter_mut().zip(line.as_chunks().0) {
-                *to = ((left + right) >> 4) as u8;
+            for (to, pair) in to.iter_mut().zip(line.chunks_exact(2)) {
+                *to = ((pair[0] + pair[1]) >> 10) as u8;
             }
-        });
+        }
     }
 }
 
-/// These pixels of a row.
+/// 256 times a pixel's brightness.
 #[inline(always)]
-fn pixels(picture: CropView<'_>, y: usize, columns: Range<usize>) -> &[[u8; 4]] {
-    let row = picture.row(y as i64, 0);
-    let part = row.get(4 * columns.start..4 * columns.end);
-    part.unwrap_or_default().as_chunks().0
-}
-
-/// Red and blue of a pixel, and green and what follows blue, each pair in the two halves of a word: pixels are added in
-/// both halves at once.
-#[inline(always)]
-fn parts_of(pixel: [u8; 4]) -> [u32; 2] {
-    let all = u32::from_le_bytes(pixel);
-    [all & 0x00FF_00FF, (all >> 8) & 0x00FF_00FF]
-}
-
-/// Four times the brightness of (sums of) pixels: red, green twice, and blue.
-#[inline(always)]
-fn weighted([red_blue, green]: [u32; 2]) -> u16 {
-    (red_blue + (red_blue >> 16) + 2 * green) as u16
+fn sum_of(pixel: &[u8]) -> u32 {
+    let all = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+    77 * (all & 255) + 150 * ((all >> 8) & 255) + 29 * ((all >> 16) & 255)
 }
 
 struct HalfOfGrey<'a> {
@@ -166,17 +154,17 @@ impl WithSimd for HalfOfGrey<'_> {
         let source = self.image.width() as usize;
         let bytes = self.image.as_raw();
         let rows = 0..self.small.height() as usize;
-        make_parts(self.small, rows, self.needed, |y, columns, to| {
+        for (y, columns, to) in parts(self.small, rows, self.needed) {
             let row = |y: usize| {
                 let start = y * source;
                 let part = bytes.get(start + 2 * columns.start..start + 2 * columns.end);
-                part.unwrap_or_default().as_chunks::<2>().0
+                part.unwrap_or_default().chunks_exact(2)
             };
             for ((to, a), b) in to.iter_mut().zip(row(2 * y)).zip(row(2 * y + 1)) {
                 let sum: u16 = [a[0], a[1], b[0], b[1]].into_iter().map(u16::from).sum();
                 *to = ((sum + 2) / 4) as u8;
             }
-        });
+        }
     }
 }
 
@@ -208,9 +196,7 @@ mod tests {
         let [mut whole, mut part] = [GrayImage::default(), GrayImage::default()];
         let check = |part: &GrayImage, whole: &GrayImage, needed: &Region| {
             for (x, y, pixel) in part.enumerate_pixels() {
-                let is_needed = needed
-                    .row(y as usize, [0, 0])
-                    .any(|run| run.contains(&(x as usize)));
+                let is_needed = needed.row(y as usize).contains(&(x as usize));
                 let wanted = if is_needed {
                     whole.get_pixel(x, y).0
                 } else {

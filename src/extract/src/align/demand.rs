@@ -6,9 +6,12 @@ use image::GrayImage;
 
 use super::brightness::{half, half_luma, luma};
 use super::region::Region;
-use super::structure::{AROUND, Needs};
+use super::structure::Needs;
 use super::template::Template;
 use crate::CropView;
+
+/// Pixels around a place that are read to know its gradient between pixels.
+const BETWEEN: usize = 3;
 
 /// What is needed of the pictures in which one object is looked for.
 #[derive(Debug, Default)]
@@ -17,8 +20,7 @@ pub(super) struct Demand {
     halvings: usize,
     /// Of the brightness, from the largest picture that is made to the smallest.
     lumas: Vec<Region>,
-    /// Of each template's picture, from the finest on: around the object's place, which the coarser ones tell. Of the
-    /// coarsest it is all that lies within the largest shift.
+    /// Of each template's picture, from the finest on.
     pub(super) needs: Vec<Needs>,
 }
 
@@ -30,30 +32,24 @@ impl Demand {
         let sizes = (halvings - larger..halvings + templates.len())
             .map(|by| (crop.0 >> by, crop.1 >> by))
             .collect::<Vec<_>>();
-        let coarsest = templates.len() - 1;
-        let far = |scale: usize| (reach.ceil() as usize) << (coarsest - scale);
+        let far = |scale: usize| (reach.ceil() as usize) << (templates.len() - 1 - scale);
         let needs: Vec<Needs> = templates
             .iter()
             .enumerate()
             .map(|(scale, template)| {
                 let pixels = template.pixels.iter().map(|pixel| (pixel.x, pixel.y));
                 let size = sizes.get(larger + scale).copied().unwrap_or_default();
-                let by = if scale == coarsest { far(scale) } else { 0 };
-                Needs::from_gradients(Region::around(pixels, by + AROUND, size))
+                Needs::from_gradients(Region::around(pixels, far(scale) + BETWEEN, size))
             })
             .collect();
         let mut lumas: Vec<Region> = Vec::new();
         for (level, &size) in sizes.iter().enumerate().rev() {
-            let scale = level.checked_sub(larger);
-            let own = scale.and_then(|scale| Some((scale, needs.get(scale)?)));
-            let own = own.map(|(scale, needs)| {
-                let by = if scale == coarsest { 0 } else { far(scale) };
-                needs.luma.grown(by, by)
-            });
+            let own = level.checked_sub(larger).and_then(|scale| needs.get(scale));
             let smaller = lumas.last().map(|smaller| smaller.doubled(size));
-            let both = match (own, smaller) {
+            let both = match (own.map(|needs| &needs.luma), smaller) {
                 (Some(own), Some(smaller)) => own.or(&smaller),
-                (own, smaller) => own.or(smaller).unwrap_or_default(),
+                (Some(own), None) => own.clone(),
+                (None, smaller) => smaller.unwrap_or_default(),
             };
             lumas.push(both);
         }

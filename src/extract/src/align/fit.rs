@@ -19,8 +19,10 @@ const OUTLIER: f32 = 1.5;
 const FAR_OUTLIER: f32 = 6.0;
 /// Fewest pixels from which a shift is measured.
 const MIN_PIXELS: usize = 60;
+/// Pixels from which a rotation and a growth are measured.
+const SIMILARITY_PIXELS: usize = 3000;
 /// Pixels that are looked at in a search.
-const SEARCH_PIXELS: usize = 400;
+const SEARCH_PIXELS: usize = 1000;
 /// The object has structure in one direction only if the other has less than this part of its weight.
 const MIN_CROSS: f64 = 1e-3;
 
@@ -52,7 +54,7 @@ const TERMS: usize = 8;
 /// The first of the right side.
 const RIGHT: usize = 3;
 /// Pixels that lie together, whose errors are taken for one: light that passes pulls at all of them.
-const PIECE: usize = 64;
+const PIECE: usize = 128;
 
 /// The normal equations of one step, and what goes with them.
 #[derive(Default)]
@@ -74,14 +76,11 @@ impl Template {
         still: f64,
     ) -> Option<Fit> {
         let mut shift = start;
-        if !frame.reach(shift) {
-            return None;
-        }
         let mut sums = self.sums(frame, shift);
         for step in 1..=MAX_STEPS {
             let [dx, dy] = sums.step()?;
             shift = [shift[0] - dx, shift[1] - dy];
-            if shift[0].abs().max(shift[1].abs()) > reach || !frame.reach(shift) {
+            if shift[0].abs().max(shift[1].abs()) > reach {
                 return None;
             }
             // So small a last step changes nothing that the sums say.
@@ -122,19 +121,18 @@ impl Template {
 
     /// What a rotation and a growth about the object's centre explain beyond the shift.
     pub(super) fn similarity(&self, frame: &Gradients, shift: [f64; 2]) -> Option<Similarity> {
-        if !frame.reach(shift) {
-            return None;
-        }
-        let count = self.pixels.len().max(1) as f64;
+        let every = self.pixels.len().div_ceil(SIMILARITY_PIXELS).max(1);
+        let pixels = || self.pixels.iter().step_by(every);
+        let count = pixels().count().max(1) as f64;
         let sum = |of: fn(&TemplatePixel) -> u32| -> f64 {
-            self.pixels.iter().map(|pixel| f64::from(of(pixel))).sum()
+            pixels().map(|pixel| f64::from(of(pixel))).sum()
         };
         let centre = (sum(|p| p.x) / count, sum(|p| p.y) / count);
         let mut normal = [[0.0; 4]; 4];
         let mut right = [0.0; 4];
         let mut distance = 0.0;
         let sampler = Sampler::new(frame, shift);
-        for pixel in &self.pixels {
+        for pixel in pixels() {
             let Some(found) = sampler.at(pixel) else {
                 continue;
             };

@@ -15,7 +15,6 @@ mod region;
 mod structure;
 mod template;
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 use image::GrayImage;
@@ -183,13 +182,8 @@ impl Aligner {
             } else {
                 2
             }];
-            let mut inner = Cow::Borrowed(inner);
             for round in 0..rounds {
-                let template = Template::from_planes(&planes, &shifts, &inner);
-                if round == 0 {
-                    // The next ones need no other patches.
-                    inner = Cow::Owned(template.in_patches(&inner));
-                }
+                let template = Template::from_planes(&planes, &shifts, inner);
                 // The first template of all is too blurred to search with.
                 let search = coarsest && round > 0;
                 fit_all(&template, &planes, &mut shifts, reach, search, still(scale));
@@ -202,7 +196,7 @@ impl Aligner {
                     *shift = [shift[0] - origin[0], shift[1] - origin[1]];
                 }
             }
-            templates.push(Template::from_planes(&planes, &shifts, &inner));
+            templates.push(Template::from_planes(&planes, &shifts, inner));
             if scale > 0 {
                 for shift in &mut shifts {
                     let doubled = shift.map(|part| 2.0 * part);
@@ -271,8 +265,12 @@ impl Aligner {
     }
 
     fn located(&self, lumas: &[GrayImage], buffers: &mut GradientBuffers) -> Alignment {
+        let gradients = self.gradients(lumas, buffers);
         let sure = |fit: &Fit| fit.correlation >= self.least_confidence;
-        let fit = self.fitted(lumas, buffers);
+        let coarsest = self.templates.len() - 1;
+        let reach = self.reach / (1_u32 << coarsest) as f64;
+        let start = self.templates[coarsest].search(&gradients[coarsest], reach);
+        let fit = self.refine(gradients, start);
         let confidence = fit.map_or(0.0, |fit| fit.correlation.clamp(0.0, 1.0));
         let fit = fit.filter(sure);
         let in_pixels = |length: f64| self.unit * length;
@@ -282,33 +280,37 @@ impl Aligner {
             shift: shift.map(|shift| self.motion.against_mask(shift, uncertainty)),
             uncertainty,
             confidence,
-            turned: fit.and_then(|fit| self.turned(&buffers.scales, fit)),
+            turned: fit.and_then(|fit| self.turned(gradients, fit)),
         }
     }
 
-    /// From the coarsest scale, which is searched, to the finest. At each but the coarsest, gradients are made where the
-    /// object is by the coarser one.
-    fn fitted(&self, lumas: &[GrayImage], buffers: &mut GradientBuffers) -> Option<Fit> {
+    /// A frame's gradients at all scales, where they are needed.
+    fn gradients<'b>(
+        &self,
+        lumas: &[GrayImage],
+        buffers: &'b mut GradientBuffers,
+    ) -> &'b [Gradients] {
         let GradientBuffers { extractor, scales } = buffers;
         scales.resize_with(self.templates.len(), Gradients::default);
-        let mut start = [0.0_f64; 2];
+        for ((luma, needs), gradients) in lumas.iter().zip(&self.demand.needs).zip(&mut *scales) {
+            extractor.gradients(luma, needs, gradients);
+        }
+        scales
+    }
+
+    /// From the coarsest scale to the finest; `start` is in the coarsest's pixels.
+    fn refine(&self, gradients: &[Gradients], start: [f64; 2]) -> Option<Fit> {
+        let mut start = start;
         let mut found = None;
         let mut apart = 0.0;
         for (scale, template) in self.templates.iter().enumerate().rev() {
             let pixels = f64::from(1_u32 << scale);
             let reach = self.reach / pixels;
-            let has_coarser = scale + 1 < self.templates.len();
-            let (luma, needs) = (lumas.get(scale)?, self.demand.needs.get(scale)?);
-            let gradients = scales.get_mut(scale)?;
-            let near = has_coarser.then(|| start.map(|part| part.round() as i32));
-            extractor.gradients(luma, needs, near, gradients);
-            if !has_coarser {
-                start = template.search(gradients, reach);
-            }
-            let fit = template.fit(gradients, start, reach, still(scale));
+            let fit = template.fit(gradients.get(scale)?, start, reach, still(scale));
             // A scale at which the object has no structure says nothing.
             if let Some(fit) = fit {
                 let [dx, dy] = [fit.shift[0] - start[0], fit.shift[1] - start[1]];
+                let has_coarser = scale + 1 < self.templates.len();
                 if has_coarser && scale < COMPARED {
                     apart += pixels * pixels * (dx * dx + dy * dy);
                 }

@@ -16,9 +16,9 @@ const DARK: f32 = 8.0;
 /// Standard deviations of the two Gaussians of the band-pass, pixels.
 const FINE: f32 = 0.5;
 const COARSE: f32 = 1.2;
-/// Values of the finer one, and of the one that makes the coarser of it: up to two deviations or more.
-const FINE_TAPS: usize = 3;
-const REST_TAPS: usize = 7;
+/// Values of the finer one, and of the one that makes the coarser of it: up to three deviations.
+const FINE_TAPS: usize = 5;
+const REST_TAPS: usize = 9;
 const FINE_RADIUS: usize = FINE_TAPS / 2;
 const REST_RADIUS: usize = REST_TAPS / 2;
 /// Columns that a row has on both sides of the picture's, to be filtered.
@@ -49,14 +49,7 @@ pub(super) struct Gradients {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) values: Vec<[f32; 2]>,
-    /// The shift near which they are known, pixels; `None` if they are known at all that are looked at.
-    near: Option<[i32; 2]>,
 }
-
-/// Where an object's place is known roughly, shifts of less than this from there are looked at, pixels.
-const NEAR: f64 = 2.0;
-/// Pixels around a place that are read to know its gradient at such a shift, between pixels.
-pub(super) const AROUND: usize = 3;
 
 /// What is needed of a picture, and of what is made of it on the way, for gradients at some places.
 #[derive(Debug, Clone)]
@@ -159,24 +152,16 @@ impl Extractor {
         (out.width, out.height) = (width, height);
         out.values.resize(width * height, 0.0);
         let needs = Needs::from_gradients(Region::whole(luma.dimensions()));
-        self.run(luma, Moved(&needs, [0; 2]), out);
+        self.run(luma, &needs, out);
     }
 
-    /// The gradients of the fine structure, where they are needed; 0 at the picture's border. With `near`, the places are
-    /// moved by so many pixels, and only shifts near that are looked at.
-    pub(super) fn gradients(
-        &mut self,
-        luma: &GrayImage,
-        needs: &Needs,
-        near: Option<[i32; 2]>,
-        out: &mut Gradients,
-    ) {
+    /// The gradients of the fine structure, where they are needed; 0 at the picture's border.
+    pub(super) fn gradients(&mut self, luma: &GrayImage, needs: &Needs, out: &mut Gradients) {
         out.resize(luma.width() as usize, luma.height() as usize);
-        out.near = near;
-        self.run(luma, Moved(needs, near.unwrap_or_default()), out);
+        self.run(luma, needs, out);
     }
 
-    fn run<T: TakesRows>(&mut self, luma: &GrayImage, needs: Moved<'_>, sink: &mut T) {
+    fn run<T: TakesRows>(&mut self, luma: &GrayImage, needs: &Needs, sink: &mut T) {
         if luma.width() == 0 || luma.height() == 0 {
             return;
         }
@@ -196,19 +181,15 @@ impl Extractor {
     }
 }
 
-/// What is needed, when it is moved by so many pixels.
-#[derive(Clone, Copy)]
-struct Moved<'a>(&'a Needs, [i32; 2]);
-
 /// What is done with a plane's rows, from top to bottom.
 trait TakesRows {
     /// Row `y` is made; of those before it two are there.
-    fn take(&mut self, y: usize, rows: &Rows, needs: Moved<'_>);
+    fn take(&mut self, y: usize, rows: &Rows, needs: &Needs);
 }
 
 impl TakesRows for Plane {
     #[inline(always)]
-    fn take(&mut self, y: usize, rows: &Rows, _: Moved<'_>) {
+    fn take(&mut self, y: usize, rows: &Rows, _: &Needs) {
         let row = &rows.row(y)[MARGIN..MARGIN + self.width];
         self.values[y * self.width..(y + 1) * self.width].copy_from_slice(row);
     }
@@ -216,26 +197,23 @@ impl TakesRows for Plane {
 
 impl TakesRows for Gradients {
     #[inline(always)]
-    fn take(&mut self, y: usize, rows: &Rows, Moved(needs, by): Moved<'_>) {
+    fn take(&mut self, y: usize, rows: &Rows, needs: &Needs) {
         let (width, height) = (self.width, self.height);
         if y == 0 || y + 1 == height {
-            for columns in needs.gradients.row(y, by) {
-                self.row_mut(y)[columns].fill([0.0; 2]);
-            }
+            let columns = needs.gradients.row(y);
+            self.row_mut(y)[columns].fill([0.0; 2]);
         }
         // That of the row before is known now.
         let Some(y) = y.checked_sub(1).filter(|&y| y > 0) else {
             return;
         };
-        for columns in needs.gradients.row(y, by) {
-            let row = self.row_mut(y);
-            if width < 3 {
-                row[columns].fill([0.0; 2]);
-                continue;
-            }
-            let around = [y - 1, y, y + 1].map(|y| &rows.row(y)[MARGIN..MARGIN + width]);
-            gradients(columns, around, row);
+        let columns = needs.gradients.row(y);
+        let row = self.row_mut(y);
+        if width < 3 {
+            return row[columns].fill([0.0; 2]);
         }
+        let [above, here, below] = [y - 1, y, y + 1].map(|y| &rows.row(y)[MARGIN..MARGIN + width]);
+        gradients(columns, [above, here, below], row);
     }
 }
 
@@ -244,7 +222,7 @@ impl TakesRows for Gradients {
 struct Structure<'a, T> {
     extractor: &'a mut Extractor,
     luma: &'a GrayImage,
-    needs: Moved<'a>,
+    needs: &'a Needs,
     sink: &'a mut T,
 }
 
@@ -278,50 +256,44 @@ impl<T: TakesRows> WithSimd for Structure<'_, T> {
 impl Extractor {
     /// A row's light, and what is finer of it across.
     #[inline(always)]
-    fn take_row(&mut self, luma: &GrayImage, y: usize, Moved(needs, by): Moved<'_>) {
+    fn take_row(&mut self, luma: &GrayImage, y: usize, needs: &Needs) {
         let width = luma.width() as usize;
+        let columns = needs.luma.row(y);
         let levels = luma.as_raw().get(y * width..(y + 1) * width);
-        let levels = levels.unwrap_or_default();
+        let levels = levels.unwrap_or_default().get(columns.clone());
         let light = self.light.row_mut(0);
-        for columns in needs.luma.row(y, by) {
-            let levels = levels.get(columns.clone()).unwrap_or_default();
-            let values = light[MARGIN + columns.start..].iter_mut();
-            for (value, &level) in values.zip(levels) {
-                *value = self.logarithms[usize::from(level)];
-            }
-            continue_beyond(light, &columns, width);
+        let values = light[MARGIN + columns.start..].iter_mut();
+        for (value, &level) in values.zip(levels.unwrap_or_default()) {
+            *value = self.logarithms[usize::from(level)];
         }
-        for columns in needs.fine_rows.row(y, by) {
-            filter_across(light, &self.fine, columns, self.fine_rows.row_mut(y));
-        }
+        continue_beyond(light, &columns, width);
+        let columns = needs.fine_rows.row(y);
+        filter_across(light, &self.fine, columns, self.fine_rows.row_mut(y));
     }
 
     /// The finer light of a row, and what is coarser of it across.
     #[inline(always)]
-    fn blur_row(&mut self, y: usize, luma: &GrayImage, Moved(needs, by): Moved<'_>) {
+    fn blur_row(&mut self, y: usize, luma: &GrayImage, needs: &Needs) {
+        let columns = needs.fine.row(y);
         let lines = self.fine_rows.around(y, luma.height() as usize);
         let blurred = self.blurred.row_mut(y);
-        for columns in needs.fine.row(y, by) {
-            filter_down(lines, &self.fine, &columns, blurred);
-            continue_beyond(blurred, &columns, luma.width() as usize);
-        }
-        for columns in needs.coarse_rows.row(y, by) {
-            filter_across(blurred, &self.rest, columns, self.coarse_rows.row_mut(y));
-        }
+        filter_down(lines, &self.fine, &columns, blurred);
+        continue_beyond(blurred, &columns, luma.width() as usize);
+        let columns = needs.coarse_rows.row(y);
+        filter_across(blurred, &self.rest, columns, self.coarse_rows.row_mut(y));
     }
 
     /// What the finer light of a row has and the coarser has not.
     #[inline(always)]
-    fn finish_row(&mut self, y: usize, height: usize, Moved(needs, by): Moved<'_>) {
+    fn finish_row(&mut self, y: usize, height: usize, needs: &Needs) {
+        let columns = needs.plane.row(y);
         let lines = self.coarse_rows.around(y, height);
         let plane = self.plane.row_mut(y);
-        for columns in needs.plane.row(y, by) {
-            filter_down(lines, &self.rest, &columns, plane);
-            let columns = MARGIN + columns.start..MARGIN + columns.end;
-            let fine = &self.blurred.row(y)[columns.clone()];
-            for (coarse, fine) in plane[columns].iter_mut().zip(fine) {
-                *coarse = fine - *coarse;
-            }
+        filter_down(lines, &self.rest, &columns, plane);
+        let columns = MARGIN + columns.start..MARGIN + columns.end;
+        let fine = &self.blurred.row(y)[columns.clone()];
+        for (coarse, fine) in plane[columns].iter_mut().zip(fine) {
+            *coarse = fine - *coarse;
         }
     }
 }
@@ -381,13 +353,6 @@ impl Gradients {
         found.copied()
     }
 
-    /// Whether they are known at this shift of the places that were needed.
-    pub(super) fn reach(&self, shift: [f64; 2]) -> bool {
-        let near = |(shift, near): (f64, i32)| (shift - f64::from(near)).abs() < NEAR;
-        self.near
-            .is_none_or(|place| shift.into_iter().zip(place).all(near))
-    }
-
     fn resize(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width, height);
         self.values.resize(width * height, [0.0; 2]);
@@ -400,7 +365,6 @@ impl Gradients {
     /// Replaces these by the gradients of `plane`; 0 at its border.
     pub(super) fn take(&mut self, plane: &Plane) {
         self.resize(plane.width, plane.height);
-        self.near = None;
         Arch::new().dispatch(Taking(self, plane));
     }
 }
@@ -576,7 +540,6 @@ mod tests {
             seed in prop::collection::vec(any::<u8>(), 1200),
             pixels in prop::collection::vec((0_u32..40, 0_u32..30), 1..6),
             by in 0_usize..4,
-            moved in prop::array::uniform2(-9_i32..9),
         ) {
             let size = (width, height);
             let luma = GrayImage::from_fn(width, height, |x, y| Luma([seed[(40 * y + x) as usize]]));
@@ -592,9 +555,9 @@ mod tests {
             some.resize(width as usize, height as usize);
             // What is not made must not be read.
             some.values.fill([f32::NAN; 2]);
-            extractor.gradients(&luma, &Needs::from_gradients(region.clone()), Some(moved), &mut some);
+            extractor.gradients(&luma, &Needs::from_gradients(region.clone()), &mut some);
             for y in 0..height as usize {
-                for x in region.row(y, moved).flatten() {
+                for x in region.row(y) {
                     let at = (x as u32, y as u32);
                     prop_assert_eq!(some.at(at.0, at.1), all.at(at.0, at.1), "{:?}", at);
                 }

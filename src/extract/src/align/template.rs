@@ -4,7 +4,6 @@
 //! images from image sequences", 2001). How far single frames are from it says how much a pixel can be
 //! trusted: where highlights and shadows pass, little.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -12,11 +11,10 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use super::median::{LANES, Medians};
 use super::structure::{Plane, add_scaled, cubic};
 
-/// Side of the patches of a template, pixels.
-const PATCH: u32 = 24;
-/// Patches of a template, and pixels in them; those that say most about a shift are kept.
-const MAX_PATCHES: usize = 30;
-const MAX_PIXELS: usize = 1_000;
+/// Pixels of a template; those that say most about a shift are kept.
+const MAX_PIXELS: usize = 4_000;
+/// Side of the squares in whose order the pixels stand, so that neighbours are near each other.
+const TILE: u32 = 24;
 /// Rows of a template that a thread makes at a time.
 const BAND: usize = 16;
 /// Deviation of the gradients by noise.
@@ -40,10 +38,8 @@ pub(super) struct TemplatePixel {
 /// The object's lasting structure.
 #[derive(Debug, Default)]
 pub(super) struct Template {
-    /// Patch by patch.
+    /// In an order in which neighbours are near each other.
     pub(super) pixels: Vec<TemplatePixel>,
-    /// Of the pictures that it was made of.
-    width: usize,
 }
 
 /// Median and deviation of the gradients of one row.
@@ -74,17 +70,9 @@ impl Template {
             }
         }
         keep_most_telling(&mut pixels);
-        pixels.sort_unstable_by_key(|pixel| (patch_of(pixel), pixel.y, pixel.x));
-        Self { pixels, width }
-    }
-
-    /// What of the object (row by row) lies in the template's patches.
-    pub(super) fn in_patches(&self, inner: &[bool]) -> Vec<bool> {
-        let patches: BTreeSet<(u32, u32)> = self.pixels.iter().map(patch_of).collect();
-        let width = self.width.max(1);
-        let is_in = |at: usize| patches.contains(&patch_at(at % width, at / width));
-        let pixels = inner.iter().enumerate();
-        pixels.map(|(at, inner)| *inner && is_in(at)).collect()
+        let tile = |pixel: &TemplatePixel| (pixel.y / TILE, pixel.x / TILE, pixel.y, pixel.x);
+        pixels.sort_unstable_by_key(tile);
+        Self { pixels }
     }
 }
 
@@ -115,25 +103,7 @@ fn information(pixel: &TemplatePixel) -> f32 {
     pixel.weight * (xx * xx + 2.0 * xy * xy + yy * yy)
 }
 
-/// The row and column of the patch in which a pixel lies.
-fn patch_of(pixel: &TemplatePixel) -> (u32, u32) {
-    patch_at(pixel.x as usize, pixel.y as usize)
-}
-
-fn patch_at(x: usize, y: usize) -> (u32, u32) {
-    (y as u32 / PATCH, x as u32 / PATCH)
-}
-
 fn keep_most_telling(pixels: &mut Vec<TemplatePixel>) {
-    let mut patches: BTreeMap<(u32, u32), f32> = BTreeMap::new();
-    for pixel in &*pixels {
-        *patches.entry(patch_of(pixel)).or_default() += information(pixel);
-    }
-    let mut patches: Vec<_> = patches.into_iter().collect();
-    patches.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let best = patches.into_iter().take(MAX_PATCHES);
-    let best: BTreeSet<(u32, u32)> = best.map(|(patch, _)| patch).collect();
-    pixels.retain(|pixel| best.contains(&patch_of(pixel)));
     if pixels.len() <= MAX_PIXELS {
         return;
     }
