@@ -10,6 +10,7 @@ use super::CameraError;
 /// Fastest possible replay, times real time.
 const FASTEST: f64 = 1000.0;
 const NO_SCHEME: &str = "write v4l2:/dev/video0, nokhwa:0 or replay:PATH";
+const NO_REST: &str = "nothing follows the colon";
 const NO_PATH: &str = "a device is named by its path, such as /dev/video0";
 /// Most frames in a list.
 const MAX_FRAMES: usize = 10_000;
@@ -107,9 +108,7 @@ impl FromStr for CameraAddress {
 fn parse(text: &str) -> Result<CameraAddress, String> {
     let (scheme, rest) = text.split_once(':').ok_or(NO_SCHEME)?;
     match scheme {
-        "v4l2" | "nokhwa" | "replay" if rest.is_empty() => {
-            Err("nothing follows the colon".to_owned())
-        }
+        "v4l2" | "nokhwa" | "replay" if rest.is_empty() => Err(NO_REST.to_owned()),
         "v4l2" if rest.contains('\0') => Err(NO_PATH.to_owned()),
         "v4l2" => Ok(CameraAddress::V4l2(rest.into())),
         "nokhwa" => rest
@@ -124,7 +123,7 @@ fn parse(text: &str) -> Result<CameraAddress, String> {
 fn parse_replay(text: &str) -> Result<ReplayAddress, String> {
     let (path, options) = text.rsplit_once('?').unwrap_or((text, ""));
     if path.is_empty() {
-        return Err("nothing follows the colon".to_owned());
+        return Err(NO_REST.to_owned());
     }
     if path.contains('\0') {
         return Err(NO_PATH.to_owned());
@@ -244,8 +243,8 @@ mod tests {
         for (text, fault) in [
             ("/dev/video0", NO_SCHEME),
             ("usb:0", NO_SCHEME),
-            ("v4l2:", "v4l2:"),
-            ("replay:?speed=1", "replay:"),
+            ("v4l2:", NO_REST),
+            ("replay:?speed=1", NO_REST),
             ("v4l2:a\0b", NO_PATH),
             ("nokhwa:-1", "nokhwa:"),
             ("replay:a?fast=1", "\"fast\""),
