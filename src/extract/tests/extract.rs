@@ -691,7 +691,7 @@ fn frames_that_cannot_be_registered_are_placed_by_the_frames_around() {
     ffmpeg(bench.folder.path(), &options);
     fs::copy(session.join("mask_gt.png"), bench.path("mask.png")).unwrap();
     let line = "dark.avi --mask mask.png --frames 150 --size 40 --align correct -o out";
-    let errors = bench.errors(0, line);
+    let errors = bench.errors(3, line);
     bench.assert_warned(&errors, "out", &["3", "150"]);
     let records = bench.records("out/dark.tar");
     let truth = true_shifts();

@@ -25,13 +25,11 @@ pub(crate) enum Trouble {
     OpenShade,
     /// A handle, and a camera that shakes.
     Shaken,
-    /// A lower part as black as the table before which it stands.
-    BlackFoot,
     /// A handle before a room that is white in every frame.
     WhiteRoom,
 }
 
-pub(crate) const TROUBLES: [Trouble; 10] = [
+pub(crate) const TROUBLES: [Trouble; 9] = [
     Trouble::Handle,
     Trouble::LowHandle,
     Trouble::Hole,
@@ -40,7 +38,6 @@ pub(crate) const TROUBLES: [Trouble; 10] = [
     Trouble::Shade,
     Trouble::OpenShade,
     Trouble::Shaken,
-    Trouble::BlackFoot,
     Trouble::WhiteRoom,
 ];
 
@@ -109,8 +106,7 @@ impl Shape {
     fn at(&self, x: f64, y: f64) -> Option<Surface> {
         let x = self.side * x;
         use Trouble::{
-            BlackFoot, DarkPart, Handle, Hole, LowHandle, OpenShade, Shade, Shaken, TwoHoles,
-            WhiteRoom,
+            DarkPart, Handle, Hole, LowHandle, OpenShade, Shade, Shaken, TwoHoles, WhiteRoom,
         };
         let handle = match self.trouble {
             Handle | Shaken | WhiteRoom => ring(x - 0.72, y - 0.15, 0.38, 0.1),
@@ -136,7 +132,6 @@ impl Shape {
             _ => false,
         };
         Some(match self.trouble {
-            BlackFoot if y < -0.35 => self.surface([0.03; 3], normal, 1.0),
             DarkPart if spot < 1.0 => self.surface([0.02; 3], normal, 1.0),
             _ if shaded => {
                 // A hollow: its depth grows from its rim.
@@ -164,7 +159,6 @@ impl Shape {
             Trouble::Handle | Trouble::Shaken | Trouble::WhiteRoom => {
                 (x - 0.72).hypot(y - 0.15) < 0.2 && x > 0.72
             }
-            Trouble::BlackFoot => x.abs() < 0.3 && (y + 0.5).abs() < 0.1,
             Trouble::LowHandle => (x - 0.72).hypot(y + 0.5) < 0.2 && x > 0.72,
             Trouble::Hole => (x - 0.05).hypot(y - 0.1) < 0.2,
             Trouble::TwoHoles => x.hypot(y - 0.42) < 0.14 || x.hypot(y + 0.42) < 0.14,
