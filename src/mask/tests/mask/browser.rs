@@ -61,8 +61,8 @@ fn drawn_undone_drawn_again_and_accepted_with_the_mouse() {
     page.wait_for(READY);
     let share = |page: &mut Chromium| {
         let text = page.value("document.getElementById('state').textContent");
-        let text = text.as_str().unwrap().split(' ').next().unwrap().to_owned();
-        text.parse::<f64>().unwrap()
+        let mut words = text.as_str().unwrap().split(' ');
+        words.find_map(|word| word.parse::<f64>().ok()).unwrap()
     };
     let parted = share(&mut page);
     page.key("z", 2);
