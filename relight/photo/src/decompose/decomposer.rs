@@ -14,7 +14,8 @@ use super::tiled_compose::{Enlargement, LayerPlan};
 use crate::nets::{Inference, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 #[cfg(feature = "files")]
-use relight_core::light::{Normals, NormalsFrame, ShLight, YUp};
+use relight_core::light::NormalsFrame;
+use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer};
 use relit_data::image_stats::SATURATED_VALUE;

@@ -42,7 +42,8 @@ mod white_balance;
 pub use error::InsertError;
 pub use exposure::PanoramaExposure;
 #[cfg(feature = "files")]
-pub(crate) use height_field::{BLOCK, HeightField, HeightSolver};
+pub(crate) use height_field::HeightSolver;
+pub(crate) use height_field::{BLOCK, HeightField};
 pub use lamp::{DiscLamp, colour_of_temperature};
 pub use material::{MaterialChange, ObjectGloss};
 pub(crate) use placed_object::PlacedObject;
