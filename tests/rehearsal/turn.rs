@@ -109,22 +109,6 @@ fn room_check(rig: &mut Rehearsal) -> (bool, String) {
 }
 
 #[test]
-fn what_a_replay_cannot_hold_is_noted_in_one_line() {
-    let mut rig = Rehearsal::short("", |_| {});
-    rig.capture().unwrap();
-    let checks = rig.monitor.state().checks;
-    let of_settings = checks
-        .iter()
-        .filter(|check| check.what == "camera settings");
-    let found: Vec<(bool, &str)> = of_settings
-        .map(|check| (check.good, check.found.as_str()))
-        .collect();
-    assert_eq!(found.len(), 1, "{found:?}");
-    let (is_good, words) = found[0];
-    assert!(!is_good && words.contains("exposure") && words.contains("focus"));
-}
-
-#[test]
 fn a_take_says_whether_the_room_is_too_even() {
     let (good, found) = room_check(&mut Rehearsal::short("", |_| {}));
     assert!(good, "{found}");
