@@ -16,6 +16,8 @@ pub fn cuda_device(number: usize) -> Result<Device, TrainError> {
     load()?;
     let count = Cuda::device_count();
     if i64::try_from(number).is_ok_and(|number| number < count) {
+        // Pictures of a run have one size: what is fastest for the first is so for all.
+        Cuda::cudnn_set_benchmark(true);
         Ok(Device::Cuda(number))
     } else {
         Err(TrainError::Refused(format!(

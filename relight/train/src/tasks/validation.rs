@@ -1,9 +1,10 @@
 //! What networks are judged by while they train: turns and composed samples on which none of them trains.
 
-use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::OnceLock;
 
+use rayon::prelude::*;
 use tch::{Device, Kind, Tensor, no_grad};
 
 use super::low_rank::rank_one;
@@ -81,7 +82,7 @@ pub(crate) struct HeldOutSamples {
     library: Library,
     count: u64,
     /// Made when they are needed first: only one process of several looks at them.
-    samples: OnceCell<Vec<TruthArrays>>,
+    samples: OnceLock<Vec<TruthArrays>>,
 }
 
 impl HeldOutSamples {
@@ -98,14 +99,14 @@ impl HeldOutSamples {
             },
             library: library.without_meshes(),
             count,
-            samples: OnceCell::new(),
+            samples: OnceLock::new(),
         }
     }
 
     fn samples(&self) -> &[TruthArrays] {
         let made = |number| self.sample(number);
         self.samples
-            .get_or_init(|| (0..self.count).map(made).collect())
+            .get_or_init(|| (0..self.count).into_par_iter().map(made).collect())
     }
 
     fn sample(&self, number: u64) -> TruthArrays {

@@ -62,8 +62,8 @@ pub(super) fn compressed(values: &Tensor, cameras: &[&PhotoCamera]) -> Result<Te
 
 /// Channels mixed by the rows of a matrix.
 fn mixed(of: &Tensor, rows: &[f32; 9]) -> Result<Tensor, TrainError> {
-    let weights = upload(rows, &[3, 3, 1, 1], of)?;
-    Ok(of.f_conv2d(&weights, None::<&Tensor>, [1], [0], [1], 1)?)
+    let mixed = upload(rows, &[3, 3], of)?.f_matmul(&of.f_flatten(2, -1)?)?;
+    Ok(mixed.f_reshape(of.size())?)
 }
 
 /// The steps of each camera's quality, `batch x 1 x 1 x 1 x 8 x 8`, as libjpeg scales them.
