@@ -31,7 +31,7 @@
 //! modules but `session`, `shard`, `report` and `durable`.
 //!
 //! `shard` knows `geometry`, `image_stats`, `naming` and `durable`; `report` knows the records of `shard`
-//! and `image_stats`; both know `rig`; `session` and `shard` do not know each other. `docs/formats.md` describes every
+//! and `image_stats`; both know `rig`; `session` and `shard` do not know each other. `docs/reference/formats.md` describes every
 //! file and field.
 //!
 //! The folder `examples/` has programs: `session_angles` prints the angle of each frame of a session, `shard_arrays`
