@@ -214,7 +214,8 @@ bench-network: setup-train $(BENCH_VENV)/torch-ready ## Measure relight's traini
 	$(BENCH_VENV)/bin/python tests/bench/network.py --program $(TARGET)/release/examples/network_speed \
 	    --runs $(BENCH_RUNS)
 
-docs: setup ## Build the libraries' reference
+docs: setup ## Write the options of all programs into docs/reference, and build the libraries' reference
+	RELIT_WRITE_HELP=1 cargo test --quiet --locked $(PROGRAMS) -p relight --test help
 	cargo doc --locked --no-deps
 	@echo "$(TARGET)/doc/relit_data/index.html"
 

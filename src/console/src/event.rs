@@ -8,7 +8,10 @@ use serde_json::Value;
 /// A line for a machine. Values that only their program knows the type of are left as JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
-#[allow(missing_docs, reason = "docs/reference/json-lines.md explains the fields")]
+#[allow(
+    missing_docs,
+    reason = "docs/reference/json-lines.md explains the fields"
+)]
 pub enum Event {
     // Every program. `session` is missing where an event concerns none.
     Warning {
@@ -163,7 +166,10 @@ pub enum Event {
 /// Something was checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-#[allow(missing_docs, reason = "docs/reference/json-lines.md explains the fields")]
+#[allow(
+    missing_docs,
+    reason = "docs/reference/json-lines.md explains the fields"
+)]
 pub enum Check {
     /// A mask, by `relit-mask check`.
     Mask {
@@ -184,7 +190,10 @@ pub enum Check {
 /// A program has come to its end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-#[allow(missing_docs, reason = "docs/reference/json-lines.md explains the fields")]
+#[allow(
+    missing_docs,
+    reason = "docs/reference/json-lines.md explains the fields"
+)]
 pub enum Done {
     /// `relit-capture record`.
     Capture { session: String, take: Value },
