@@ -1,7 +1,7 @@
 //! `--help` of a program and of all its verbs, compared with a file of the manual in `docs/reference`, so that each
 //! change of the command line shows in a review.
 //!
-//! After a change: `make docs` writes these files, and so does `RELIT_WRITE_HELP=1 cargo test -p relit-mask --test help` for
+//! After a change: `make docs` writes these files; `RELIT_WRITE_HELP=1 cargo test -p relit-mask --test help` writes that of
 //! one program.
 
 use std::fmt::Write;

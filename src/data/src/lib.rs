@@ -31,8 +31,8 @@
 //! modules but `session`, `shard`, `report` and `durable`.
 //!
 //! `shard` knows `geometry`, `image_stats`, `naming` and `durable`; `report` knows the records of `shard`
-//! and `image_stats`; both know `rig`; `session` and `shard` do not know each other. `docs/reference/formats.md` describes every
-//! file and field.
+//! and `image_stats`; both know `rig`; `session` and `shard` do not know each other. `docs/reference/formats.md`
+//! describes every file and field.
 //!
 //! The folder `examples/` has programs: `session_angles` prints the angle of each frame of a session, `shard_arrays`
 //! reads a shard as arrays, `write_shard` writes a small data set, and `verify_dataset` checks one.
