@@ -21,7 +21,7 @@ pub enum Realtime {
     Hold,
     /// `~`: go on.
     Resume,
-    /// 0x18: stop at once and start anew.
+    /// 0x18: stop at once and start again.
     Reset,
     /// 0x85: ramp to a stop and drop the jog.
     JogCancel,

@@ -124,7 +124,7 @@ impl Stepper {
         }
     }
 
-    /// Takes over settings; at rest only, for the ramp starts anew.
+    /// Takes over settings. Only at rest: the ramp starts again.
     pub(crate) fn configure(&mut self, settings: StepperSettings) {
         self.settings = settings;
         self.ramp = Ramp::at_rest(settings.first_interval);
@@ -199,7 +199,7 @@ impl Stepper {
         (place < self.length).then(|| self.queue.get(at)).flatten()
     }
 
-    /// Adds a move to the queue and plans anew.
+    /// Adds a move to the queue and plans again.
     ///
     /// # Errors
     /// [`Full`] where the queue has no place, or after a halt that nobody cleared yet.

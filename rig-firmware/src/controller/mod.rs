@@ -123,7 +123,7 @@ pub struct Controller {
     session: Session,
     /// The sequence number of the line that is under way.
     sequence: Option<u32>,
-    /// When the host was heard last, or the table began to move.
+    /// When the host last sent something, or the table began to move.
     heard: u32,
     store: Store,
     profile: Profile,

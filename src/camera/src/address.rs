@@ -65,7 +65,7 @@ pub struct ReplayFaults {
     pub damage: BTreeSet<u64>,
     /// Frames that the driver marks as damaged.
     pub flag: BTreeSet<u64>,
-    /// The frame instead of which the camera is unplugged.
+    /// The camera is unplugged instead of delivering this frame.
     pub unplug: Option<u64>,
     /// The frame from which on none is delivered.
     pub stall: Option<u64>,

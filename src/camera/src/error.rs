@@ -30,7 +30,7 @@ pub enum CameraError {
     },
     /// No such device.
     #[error(
-        "there is no camera at {device}: plug it in, or give another one; `relit-capture devices` lists those that are there"
+        "no camera at {device}: plug it in, or give another; `relit-capture devices` lists them"
     )]
     NotThere {
         /// The device.

@@ -151,7 +151,7 @@ fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
 }
 
 /// Removes the padding of a raw frame's rows, which are `stride` bytes apart and have `row` bytes
-/// each. The data stay as they are if there is no padding, or if they do not have all rows.
+/// each. Data without padding, or without all rows, stay as they are.
 #[cfg(any(target_os = "linux", test))]
 pub(super) fn without_padding(data: Vec<u8>, stride: usize, row: usize, rows: usize) -> Vec<u8> {
     let needed = rows

@@ -66,7 +66,7 @@ impl Command {
     pub fn check(&self, state: &RigState) -> Result<(), Refused> {
         let moves = matches!(self, Self::Home | Self::Jog { .. } | Self::Reset);
         if moves && !state.has_table() {
-            let none = "there is no turntable: give --turntable".to_owned();
+            let none = "no turntable is known: give --turntable".to_owned();
             return Err(Refused::Unavailable(none));
         }
         let obstacle = match self {

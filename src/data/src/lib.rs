@@ -23,7 +23,7 @@
 //! | [`file_names`] | the names of files: videos, hidden ones, and those that are one file where case is ignored |
 //! | [`mask`] | which pixels a picture of a mask marks |
 //! | [`durable`] | files that appear whole or not at all |
-//! | [`disk`] | a full disk, and what is said of it |
+//! | [`disk`] | the error of a full disk |
 //! | [`causes`] | errors as text, with their causes |
 //! | [`counts`] | numbers of things in sentences |
 //!

@@ -6,7 +6,7 @@ const MAX_LENGTH: usize = 120;
 
 /// Names that Windows keeps for devices, whatever extension follows.
 const DEVICES: [&str; 4] = ["aux", "con", "nul", "prn"];
-/// Devices of which Windows has several, each with a digit.
+/// Windows devices with a number.
 const NUMBERED_DEVICES: [&str; 2] = ["com", "lpt"];
 
 /// Whether `name` can be a session's name, which becomes a folder's name, a file's stem and part of
@@ -32,7 +32,7 @@ pub(crate) fn not_a_name(name: &str) -> String {
     )
 }
 
-/// Whether Windows takes a file of this name for a device.
+/// Whether the name is that of a device in Windows.
 fn is_device(name: &str) -> bool {
     let stem = name.split('.').next().unwrap_or_default();
     let is = |device: &&str| stem.eq_ignore_ascii_case(device);

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 pub const MIN_MODULATION: f64 = 0.08;
 /// Fewest angles that tell two harmonics.
 const MIN_SAMPLES: usize = 8;
-/// Light of which nothing can be said, 0 to 1.
+/// Light too dark to judge, 0 to 1.
 const DARK: f64 = 1e-5;
 
 /// The effective value of the first two harmonics of some light over the table's angle, over its mean. `light`:

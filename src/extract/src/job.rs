@@ -496,7 +496,7 @@ fn thousandths(value: f64) -> f64 {
     (1000.0 * value).round() / 1000.0
 }
 
-/// The degrees that are there, where they are no whole turn.
+/// The degrees of a part of a turn; `None` for a whole one.
 fn part_of_turn(plan: &Plan) -> Option<f64> {
     let partial = plan.selection.is_partial();
     plan.selection.covered_deg().filter(|_| partial)

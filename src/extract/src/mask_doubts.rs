@@ -30,7 +30,7 @@ type MaskDoubts = (Vec<String>, Option<MaskMisfit>);
 /// What is worth a warning about a mask; nothing if the video says nothing about it. `frame` is the one on which the
 /// mask was made, if that is known: in others the object may lie elsewhere.
 ///
-/// The first look takes a few frames. What it finds may be a shadow, so that all the frames decide of which the check
+/// The first look takes a few frames. What it finds may be a shadow: then all the frames decide with which the check
 /// of relit-mask decides.
 ///
 /// # Errors

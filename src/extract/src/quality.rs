@@ -28,7 +28,7 @@ pub(super) struct TurnFinding {
     pub(super) blur: Option<f64>,
 }
 
-/// The samples of which there is something to say; `samples` are sorted by index, each with the digest of its
+/// The samples with something to report; `samples` are sorted by index, each with the digest of its
 /// image. A whole turn would have `whole_turn` of them.
 pub(super) fn findings(samples: &[(&FrameRecord, Digest)], whole_turn: u32) -> Vec<TurnFinding> {
     // Several samples of one source frame are one picture, in which nothing changes.

@@ -235,7 +235,7 @@ fn initial(hints: &Hints, size: (u32, u32)) -> Result<Trimap, MaskError> {
 /// The share is right for a rectangle with much background in it, and cuts a part off an object that fills its
 /// rectangle and is in places like what is around it. So the cut of the lower energy counts. Where that of GrabCut's
 /// own start reaches all four sides of its rectangle, as the object of a tight one does, the other has to be better by
-/// a margin. A cut that is no object by its size or its pieces has a low energy too, because it says little: then
+/// a margin. A cut whose size or pieces are not those of an object has a low energy too, because it says little: then
 /// others count, and a warning says so.
 fn by_hints(
     frame: &RgbImage,

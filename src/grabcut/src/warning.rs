@@ -20,7 +20,7 @@ const NEARLY_RECT: f64 = 0.97;
 /// Hardly anything changes over the video.
 pub(super) const NOTHING_MOVES: &str = "hardly anything changes over the video: without a moving background the mask rests on the average colours alone; check it, or give a rectangle";
 
-/// A cut was no object by its size or its pieces.
+/// The size or the pieces of a cut were not those of an object.
 pub(super) const IMPLAUSIBLE: &str = "object and background look alike: the first cut covered little of the rectangle or was in pieces, so that others were tried; check the mask, and mark object and background in seeds";
 
 /// What the turn shows was not used; the hints alone decided.

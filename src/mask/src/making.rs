@@ -37,7 +37,7 @@ pub struct MaskOutput {
 /// anything before fails.
 ///
 /// # Errors
-/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Recording`] around the cause.
+/// [`MaskingError::Session`] without a recording; otherwise [`MaskingError::Recording`] around the cause.
 pub fn make_mask(
     input: &Path,
     output: Option<MaskFiles>,

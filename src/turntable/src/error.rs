@@ -13,7 +13,7 @@ use crate::lockfile::LockError;
 pub enum TurntableError {
     /// The text is not an address.
     #[error(
-        "{text:?} is no turntable's address: {why}; use serial:/dev/ttyUSB0, serial: (looks for one), sim:, or none"
+        "{text:?} is not a turntable's address: {why}; use serial:/dev/ttyUSB0, serial: (looks for one), sim:, or none"
     )]
     Address {
         /// The text.
@@ -175,7 +175,7 @@ pub enum TurntableError {
     Motion(#[from] MotionFault),
     /// The table was not reported at rest after a stop.
     #[error(
-        "the table was told to stop and could not be seen at rest: cut its power, then check the cable"
+        "the table did not report that it stopped: cut its power, then check the cable"
     )]
     NotStopped,
     /// The reports of a turn do not determine its angles; why.

@@ -141,9 +141,9 @@ fn no_controller(link: &Link) -> TurntableError {
     let counts = supervisor.counts();
     let heard = match (supervisor.closed(), counts.noise) {
         (Some(why), _) => format!("the port is gone: {why}"),
-        (None, 0) => "nothing was heard".to_owned(),
+        (None, 0) => "no answer came".to_owned(),
         (None, lines) => format!(
-            "{lines} lines were heard that are none of Grbl's, or have no machine position ($10=1)"
+            "{lines} lines came that are not Grbl's, or lack the machine position ($10=1)"
         ),
     };
     TurntableError::NoController {

@@ -42,7 +42,7 @@
 //! # }
 //! ```
 //!
-//! A [`simulator`] stands for the table where there is none. This crate knows nothing of cameras and sessions. Its client
+//! A [`simulator`] replaces the table. This crate knows nothing of cameras and sessions. Its client
 //! shares no code with the firmware, which the simulator runs: both sides implement the published interface.
 
 mod address;

@@ -1,5 +1,5 @@
 //! How coded pixels become a picture as it is displayed: pixels that are not square are stretched, then the picture is turned.
-//! This is the one place that knows it, for all that decode.
+//! All decoders use this module.
 
 use ffmpeg_next::codec::packet;
 use ffmpeg_next::format::context::Input;

@@ -191,7 +191,7 @@ pub enum DecodeFault {
     /// The decoder refused its data.
     #[error("its data are damaged ({0})")]
     Damaged(ffmpeg_next::Error),
-    /// There is no picture of it that can be trusted, or none of the right kind: why.
+    /// A picture cannot be trusted or is of the wrong kind: why.
     #[error("{0}")]
     Unusable(String),
     /// The pixel format cannot be converted to RGB.
@@ -215,8 +215,8 @@ impl DecodeFault {
     }
 }
 
-/// Opens a file, and only this file: FFmpeg takes a name with a colon for a URL, and that of a picture with a per cent sign
-/// for those of many.
+/// Opens a file, and only this file: FFmpeg treats a name with a colon as a URL, and a picture's name with a per cent sign
+/// as a pattern of many.
 fn open_input(path: &Path) -> Result<Input, VideoError> {
     initialise();
     let name = path.to_str().filter(|name| !name.contains('\0'));

@@ -13,7 +13,7 @@ use super::track::Track;
 use super::{DecodeFault, Picture};
 use relit_data::geometry::Rect;
 
-/// Rows that are told together: few enough to be in the processor's cache still.
+/// Rows that are reported together: few enough to be in the processor's cache still.
 const BAND: u32 = 16;
 
 impl Video {
@@ -90,7 +90,7 @@ struct Rows<'a, F> {
     inside: Rect,
     /// The first byte of the next row.
     next: usize,
-    /// The rows of the part that have come, and those of them that were told.
+    /// The rows of the part that have come, and those of them that were reported.
     come: u32,
     told: u32,
     seen: &'a mut F,

@@ -361,7 +361,7 @@ fn find_damage(
     damage
 }
 
-/// Whether the file is shorter than it promises. A slow last frame is no damage; a tenth of the length is.
+/// Whether the file is shorter than it promises. A slow last frame is not damage; a tenth of the length is.
 fn shorter(frames: &[FrameInfo], end_us: i64, promised_us: i64) -> Option<String> {
     let [first, .., last] = frames else {
         return None;

@@ -78,7 +78,7 @@ pub async fn run(
 }
 
 /// Serves a page from threads of its own until `shutdown` is cancelled, with the usual limits. The address's port may be 0 for any
-/// free one. Where there is no token, and others than this machine can reach the address, it is random. `names` are those
+/// free one. Without a token, a random one is made if other machines can reach the address. `names` are those
 /// by which the machine is known, `open_paths` need no token, `announce` is called once, when a browser can connect.
 ///
 /// # Errors

@@ -174,7 +174,7 @@ mod tests {
         }
     }
 
-    /// A node that is no camera: every call is refused.
+    /// A node that is not a camera: every call is refused.
     fn null() -> Device {
         device(Node::open(Path::new("/dev/null")).unwrap())
     }

@@ -19,7 +19,7 @@ use crate::preview::whole;
 use relit_camera::Frame;
 use relit_turntable::TurntableError;
 
-/// The file's name. It begins with a dot: nobody takes it for a recording.
+/// The file's name. Its leading dot keeps it apart from recordings.
 const FILE: &str = ".rig.json";
 /// How far the table turns for a measurement, degrees, and how fast, degrees/s.
 const JOG_DEG: f64 = 10.0;
@@ -32,7 +32,7 @@ const MIN_SHIFT: f64 = 0.02;
 const MIN_PICTURES: usize = 8;
 const AGREED: f64 = 0.8;
 
-/// What is known of the rig whose sessions lie in `root`; `None` where nothing was measured.
+/// What is known of the rig whose sessions lie in `root`; `None` before the first measurement.
 ///
 /// # Errors
 /// Where the file cannot be read: sessions would lack what a person has measured.

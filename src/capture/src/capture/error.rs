@@ -8,7 +8,7 @@ use relit_turntable::TurntableError;
 use relit_turntable::lockfile::LockError;
 use relit_turntable::simulator;
 
-/// Why there is no capture.
+/// Why a capture failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CaptureError {
@@ -63,7 +63,7 @@ impl CaptureError {
     }
 
     pub(crate) fn no_camera() -> Self {
-        Self::Missing("there is no camera at the moment: plug it in".to_owned())
+        Self::Missing("no camera is connected: plug it in".to_owned())
     }
 }
 

@@ -41,7 +41,7 @@ impl Default for ModePreference {
     }
 }
 
-/// Read as a camera's mode is written, `MJPG:1920x1080@30`, of which each part may be left out.
+/// Parses a camera's mode, such as `MJPG:1920x1080@30`; each part may be left out.
 impl FromStr for ModePreference {
     type Err = CaptureError;
 

@@ -54,7 +54,7 @@ pub(crate) fn make_root(settings: &Settings) -> Result<MadeFolder, CaptureError>
     MadeFolder::make(&settings.root).map_err(CaptureError::system(root, "made"))
 }
 
-/// Asks the person at the terminal whether a real table may turn; where there is none, nobody agrees.
+/// Asks the person at the terminal whether a real table may turn; without a terminal the answer is no.
 pub(crate) fn agreed(console: Console, settings: &Settings) -> Result<bool, CaptureError> {
     if !matches!(settings.turntable, TurntableAddress::Serial(_)) {
         return Ok(true);

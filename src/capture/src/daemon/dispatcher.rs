@@ -80,7 +80,7 @@ impl Dispatcher {
         &self.monitor
     }
 
-    /// Makes this the job, where there is none.
+    /// Makes this the job, unless one is running.
     pub(super) fn submit(&self, job: Job) -> Result<(), Refused> {
         let mut plan = self.lock();
         if plan.is_ending {

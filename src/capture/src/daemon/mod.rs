@@ -175,7 +175,7 @@ fn check_object(object: &str) -> Result<(), Refused> {
     preflight::check_object(object).map_err(Refused::Invalid)
 }
 
-/// Recovers what an earlier run left, and shows what came of it.
+/// Recovers what an earlier run left, and reports the result.
 fn report_recovered(root: &Path, clock: &Clock, monitor: &Monitor) -> Result<(), CaptureError> {
     for found in recover(root)? {
         monitor.fault(clock.now_us(), found.to_string());

@@ -62,7 +62,7 @@ pub(super) struct EditorPlace {
     pub(super) url: String,
 }
 
-/// All that was heard of a program.
+/// All that a program reported.
 #[derive(Debug, Default)]
 pub(super) struct ProgramEvent {
     progress: Option<(u64, u64)>,
@@ -153,7 +153,7 @@ impl ProgramEvent {
         })
     }
 
-    /// The check looks at a mask of which its maker is unsure.
+    /// Doubts of relit-mask about its own mask count too.
     fn masked(&self) -> StepEnd {
         match self.warnings.first() {
             None => good("the mask is made"),

@@ -135,7 +135,7 @@ impl Processing {
         })
     }
 
-    /// Cancels a job; its program is ended. False where there is none of that number.
+    /// Cancels a job; its program is ended. False if no job has that number.
     pub fn cancel(&self, number: u64) -> bool {
         self.shared.change(|plan| plan.queue.cancel(number))
     }

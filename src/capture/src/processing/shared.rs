@@ -56,7 +56,7 @@ pub(super) struct Plan {
     pub(super) programs: ProcessingPrograms,
 }
 
-/// What is said of the editor while the rig is busy.
+/// The editor's message while the rig is busy.
 pub(super) const HELD: &str = "the rig is capturing: the editor goes on when it rests";
 
 /// Whether the rig captures or moves, so that nothing may take its processor or disk.
@@ -115,7 +115,7 @@ impl Shared {
         })
     }
 
-    /// Changes the plan, keeps on disk what is to outlast the program, and shows what came of it.
+    /// Changes the plan, saves what is to outlast the program, and shows the result.
     pub(super) fn change<T>(&self, change: impl FnOnce(&mut Plan) -> T) -> T {
         let mut plan = self.plan();
         let before = plan.settings;

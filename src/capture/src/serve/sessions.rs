@@ -153,7 +153,7 @@ pub(super) async fn frame(
     QueryParams(Size { width }): QueryParams<Size>,
 ) -> Result<Response, Failure> {
     let number = frame.strip_suffix(".jpg").and_then(|n| n.parse().ok());
-    let unknown = || Failure::not_found("there is no such frame: ask for a number and \".jpg\"");
+    let unknown = || Failure::not_found("no such frame: ask for a number and \".jpg\"");
     let number: u64 = number.ok_or_else(unknown)?;
     let width = width.unwrap_or(WIDTH).clamp(*WIDTHS.start(), *WIDTHS.end());
     let jpeg = permits.run(Work::Decoding, move || {

@@ -10,7 +10,7 @@ use relit_web::Failure;
 
 use super::library::{Library, SessionSummary, read_names};
 
-/// Where sessions go that were put away. It begins with a dot: nobody takes it for a session.
+/// Where deleted sessions go. Its leading dot keeps it apart from sessions.
 const TRASH: &str = ".trash";
 
 impl Library {

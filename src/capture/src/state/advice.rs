@@ -97,7 +97,7 @@ pub struct AdvisedButton {
     pub object: Option<String>,
 }
 
-/// What a person at the rig is told, and the one thing to do next.
+/// The message for the person at the rig, and the one thing to do next.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Advice {
     /// How the rig stands, in a few words.
@@ -108,7 +108,7 @@ pub struct Advice {
     pub button: AdvisedButton,
 }
 
-/// The advice of a rig of which nothing is known yet.
+/// The advice before anything is known of the rig.
 impl Default for Advice {
     fn default() -> Self {
         Self::against(&Obstacle::no_camera(None))

@@ -62,7 +62,7 @@ pub struct TakeSummary {
     pub frames: u64,
     /// Frames missing of the turn.
     pub dropped: u64,
-    /// Whether it ended early because somebody stopped it: that is no fault.
+    /// Whether it ended early because somebody stopped it, which is not a fault.
     pub is_stopped: bool,
     /// Why, in a sentence, where the verdict is not clean.
     pub reason: Option<String>,

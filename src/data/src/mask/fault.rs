@@ -3,7 +3,7 @@
 /// How many labels a message lists.
 const LISTED: usize = 6;
 
-/// Why a picture is no mask of an object. Each begins with a verb, after "the mask PATH".
+/// Why a picture is not a mask of an object. Each begins with a verb, after "the mask PATH".
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MaskFault {

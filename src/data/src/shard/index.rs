@@ -98,7 +98,7 @@ impl<R: Read + Seek> SampleSpans<R> {
         })
     }
 
-    /// Goes on behind damage, or ends where nothing follows.
+    /// Goes on behind damage, or ends if it was the last.
     fn pass_over(&mut self, error: ShardError) {
         self.ended = error.ends_the_shard() || !self.tar.resume().unwrap_or(false);
         self.failed = Some(error);

@@ -11,7 +11,7 @@ use crate::still::{Format, StillError, exr, jpeg, radiance};
 /// says [`crate::still::Colour::from_file`].
 ///
 /// # Errors
-/// Where it is no picture of a format that is read, too large, or cut off.
+/// If the format is not supported, or the picture is too large or cut off.
 pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     let format = Format::sniff(bytes);
     match format {

@@ -3,7 +3,7 @@
 use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage};
 
-/// Boxes of one file are no more.
+/// The most boxes of one file.
 const MAX_BOXES: usize = 4096;
 
 /// The orientation for display; none where the picture stands as it is stored, or the file cannot be read.

@@ -192,7 +192,7 @@ fn array_task(text: &str) -> Result<ArrayTask, String> {
 
 fn new_task(index: u32, count: u32) -> Result<ArrayTask, String> {
     ArrayTask::new(index, count).ok_or_else(|| {
-        format!("there is no task {index} of {count}: they count from 0, and at most {MAX_TASKS}")
+        format!("task {index} of {count} does not exist: tasks count from 0, and are at most {MAX_TASKS}")
     })
 }
 

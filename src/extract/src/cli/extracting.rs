@@ -40,7 +40,7 @@ pub(crate) fn run(
         && tally == Tally::default()
     {
         console.warn(&format!(
-            "task {task} has none of the recordings: name all of them to each task, or give --task 0/1 for all that are named"
+            "task {task} has no recording: give all recordings to each task, or --task 0/1 to extract all that are given"
         ));
     }
     let summary = summary(&tally);

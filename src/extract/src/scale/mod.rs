@@ -106,7 +106,7 @@ impl Scaler {
         Ok(scaling.into_image())
     }
 
-    /// Begins to mask and scale a crop, which has the size of the mask, and of which rows come by and by.
+    /// Begins to mask and scale a crop, which has the size of the mask and arrives row by row.
     ///
     /// # Errors
     /// [`ExtractError::Refused`] if the crop has another size.

@@ -15,7 +15,7 @@ const ORDER: usize = 2;
 const WAVES: usize = 2 * ORDER;
 /// With fewer frames a curve has no residual.
 const MIN_FRAMES: usize = 2 * (WAVES + 1);
-/// Added to a luminance, 0..=1, of which the logarithm is taken: noise counts little below.
+/// Added to a luminance, 0..=1, before its logarithm: noise counts little below.
 const DARK: f32 = 0.01;
 /// Residual variance by noise.
 const NOISE: f32 = 1e-4;
@@ -92,8 +92,8 @@ impl Curves {
 }
 
 impl TemporalEvidence {
-    /// Where the brightness of the pixels of `part` changes as what is behind the object does, and not as the object
-    /// beside it; none where the curves say nothing.
+    /// Whether the brightness of the pixels of `part` changes as what is behind the object does, and not as the object
+    /// next to it; `None` if the curves say nothing.
     pub(crate) fn moves(&self, part: &Bitmap, beside: &Bitmap, ground: &Bitmap) -> Option<bool> {
         let of_part = self.residual_of(part)?;
         let of_object = self.residual_of(beside)?;

@@ -17,7 +17,7 @@ const DIFFERS: f32 = 0.02;
 const STRUCTURE: f32 = 4.0;
 /// And light below this, as a mean square, is noise.
 const NOISE: f32 = 1e-5;
-/// A part shows what is beside it if this share of its pixels does.
+/// A part shows what is next to it if this share of its pixels does.
 const MOSTLY: f64 = 0.35;
 
 /// The thin parts of `object` that are at least `least` pixels long and show what lies on both sides of them.

@@ -18,7 +18,7 @@ use rustix::fs::{Access, OFlags, access};
 pub const SHARED_FOLDER: &str = "/run/relit";
 /// Name of the lock in a folder of sessions.
 const ROOT_LOCK: &str = ".relit-capture.lock";
-/// Where each account has a folder of its own; the second where there is no first.
+/// Where each account has its own folder; the second if the first does not exist.
 const PRIVATE_BASES: [&str; 2] = ["/run/lock", "/tmp"];
 /// Longest content that is read, bytes.
 const MAX_LENGTH: u64 = 20;

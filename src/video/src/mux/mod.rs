@@ -33,7 +33,7 @@ const BUFFER: usize = 1 << 15;
 pub enum Written {
     /// It is in the file, or on its way there.
     Kept,
-    /// It was left out: it depends on frames before the recording, and there was no key frame yet.
+    /// It was left out: it depends on frames before the recording's first key frame.
     BeforeKeyFrame,
 }
 

@@ -61,7 +61,7 @@ impl fmt::Display for Recovered {
 }
 
 /// Looks for interrupted sessions in a folder of sessions and closes them. Those that a living
-/// process is recording are left alone.
+/// process is recording are not changed.
 ///
 /// # Errors
 /// [`RecordingError::System`] where the folder cannot be listed. What goes wrong with one session
@@ -126,7 +126,7 @@ pub fn recover_session(folder: &Path) -> Result<Saved, RecordingError> {
     Ok(saved)
 }
 
-/// How many frames from the first on are readable; 0 where there is no video yet.
+/// How many frames from the first on are readable; 0 before the video exists.
 pub(super) fn whole_frames(path: &Path) -> usize {
     let Ok(video) = Video::open(path) else {
         return 0;

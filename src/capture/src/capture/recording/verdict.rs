@@ -229,7 +229,7 @@ impl Recorded {
         )
     }
 
-    /// Frames before the turn, which are no fault.
+    /// Frames before the turn, which are not a fault.
     fn lead_note(&self) -> Option<Fault> {
         let first = self.writer.session.index().entries().first()?;
         let lead = lead_of(&self.writer.delivered);

@@ -8,7 +8,7 @@ const BLOCK: usize = 64;
 /// Pictures have no more components, and no more scans.
 const MAX_COMPONENTS: u8 = 4;
 const MAX_SCANS: usize = 100;
-/// Blocks of which it is remembered where they are not zero.
+/// The most blocks whose non-zero places are remembered.
 const MAX_BLOCKS: usize = 1 << 24;
 const DHT: u8 = 0xc4;
 const DRI: u8 = 0xdd;
