@@ -114,7 +114,7 @@ fn parse(text: &str) -> Result<CameraAddress, String> {
         "nokhwa" => rest
             .parse()
             .map(CameraAddress::Nokhwa)
-            .map_err(|_| "nokhwa: is followed by a number from 0".to_owned()),
+            .map_err(|_| "give a number from 0 after nokhwa:".to_owned()),
         "replay" => parse_replay(rest).map(CameraAddress::Replay),
         _ => Err(NO_SCHEME.to_owned()),
     }

@@ -68,7 +68,7 @@ pub enum CameraError {
     },
     /// The bus has no bandwidth left for the stream.
     #[error(
-        "the USB bus of {device} is full: no bandwidth is left for this mode; ask for a smaller size, a lower rate or MJPG, or plug it in at another controller"
+        "the USB bus of {device} is full: ask for a smaller size, a lower rate or MJPG, or plug it in at another controller"
     )]
     BusFull {
         /// The device.
@@ -113,7 +113,7 @@ pub enum CameraError {
     },
     /// The device refused a request.
     #[error(
-        "{device} refused when {doing}: close other programs that use it; unplug it and plug it in again if this stays"
+        "{device} refused when {doing}: close other programs that use it; if this persists, unplug it and plug it in again"
     )]
     Refused {
         /// The device.

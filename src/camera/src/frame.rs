@@ -67,7 +67,7 @@ pub enum FrameFault {
     #[error("it is a JPEG without an end")]
     NoEnd,
     /// A JPEG of another size than was agreed.
-    #[error("it is {width} x {height} pixels, which was not agreed")]
+    #[error("it is {width} x {height} pixels, which is not the agreed size")]
     OtherSize {
         /// Its width, pixels.
         width: u32,
@@ -75,7 +75,7 @@ pub enum FrameFault {
         height: u32,
     },
     /// A raw frame with the wrong number of bytes.
-    #[error("it has {found} bytes where its size needs {expected}")]
+    #[error("it has {found} bytes, but its size needs {expected}")]
     Bytes {
         /// Bytes it needs.
         expected: usize,

@@ -28,7 +28,7 @@ pub fn is_session_name(name: &str) -> bool {
 #[cfg(feature = "files")]
 pub(crate) fn not_a_name(name: &str) -> String {
     format!(
-        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most {MAX_LENGTH} bytes, neither starting nor ending with '.', and no device's name of Windows such as con"
+        "{name:?} cannot be a session's name: use at most {MAX_LENGTH} bytes of letters, digits, '-', '_' or inner '.', and no Windows device such as con"
     )
 }
 

@@ -65,7 +65,7 @@ impl MaskReport {
             Some(faults) if faults.is_empty() => (MaskVerdict::Fits, faults),
             Some(faults) => (MaskVerdict::Wrong, faults),
             None => {
-                let why = "hardly anything moves in the video, so that it does not show what the object is: look at mask-preview.png";
+                let why = "hardly anything moves in the video, so that it does not show the object: check mask-preview.png";
                 (MaskVerdict::Unknown, vec![why.to_owned()])
             }
         };

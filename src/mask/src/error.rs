@@ -27,7 +27,7 @@ pub enum MaskingError {
     OutputName(PathBuf),
     /// A mask that differs from its record, or has none.
     #[error(
-        "{0} was not made by this program, or was changed since: it may have been painted by hand and is kept; give --force to replace it, or another name with -o"
+        "{0} was not made by this program, or was changed since: give --force to replace it, or another name with -o"
     )]
     Handmade(PathBuf),
     /// The mask that is there is that of another recording.

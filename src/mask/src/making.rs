@@ -175,7 +175,7 @@ fn record_of(
     {
         if !request.force {
             return Err(MaskingError::Refused(format!(
-                "the mask made with {} differs from the recorded one, although the frame is the same (made by {}, now {software}): nothing was written; give --force to accept the new mask",
+                "the mask made with {} differs from the recorded one ({}, now {software}): nothing was written; give --force to accept the new mask",
                 path.display(),
                 record.software
             )));

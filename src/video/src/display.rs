@@ -38,7 +38,7 @@ impl Display {
             None => match display_matrix(stream, picture) {
                 None => Orientation::default(),
                 Some(matrix) => Orientation::from_display_matrix(&matrix).unwrap_or_else(|| {
-                    let note = "the file asks for a rotation that is not a multiple of 90 degrees, which is left out";
+                    let note = "the file asks for a rotation that is not a multiple of 90 degrees, which is ignored";
                     notes.push(note.to_owned());
                     Orientation::default()
                 }),
@@ -53,7 +53,7 @@ impl Display {
         let pixel = pixel_shape(ratio);
         if pixel.is_none() && ratio.numerator() > 0 && ratio.numerator() != ratio.denominator() {
             notes.push(format!(
-                "the file says that its pixels are {} x {} units in size; they are taken as square",
+                "the file says that its pixels are {} x {} units in size; they are treated as square",
                 ratio.numerator(),
                 ratio.denominator()
             ));

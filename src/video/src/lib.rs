@@ -202,7 +202,7 @@ pub enum DecodeFault {
 impl DecodeFault {
     /// The decoder concealed missing parts.
     fn concealed() -> Self {
-        Self::Unusable("parts of it are missing and were covered up by the decoder".to_owned())
+        Self::Unusable("parts of it are missing and were concealed by the decoder".to_owned())
     }
 
     fn no_picture() -> Self {
@@ -225,7 +225,7 @@ fn open_input(path: &Path) -> Result<Input, VideoError> {
     let still = format_of(path);
     let failed = |why| {
         let why = match still.and_then(Format::unread) {
-            Some((name, advice)) => format!("is {name}, which is not read: {advice}"),
+            Some((name, advice)) => format!("is {name}, which is not supported: {advice}"),
             None => format!(
                 "cannot be opened as a video ({why}): is it complete, and is it a video? `ffprobe` shows more"
             ),

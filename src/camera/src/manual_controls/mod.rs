@@ -150,7 +150,7 @@ pub struct ManualPlan {
 
 /// A control whose value is not what it should be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{name} is {} where {should} was set", value_words(*.is))]
+#[error("{name} is {}, but {should} was set", value_words(*.is))]
 pub struct ControlDrift {
     /// The control's name.
     pub name: String,

@@ -107,7 +107,7 @@ impl Camera for ReplayCamera {
     fn set_control(&mut self, _: u32, _: i64) -> Result<i64, CameraError> {
         Err(CameraError::Unsupported {
             device: self.info.address.to_string(),
-            what: "a recording's controls stand as they were recorded".to_owned(),
+            what: "a recording's controls cannot be changed".to_owned(),
         })
     }
 

@@ -118,7 +118,7 @@ impl Device {
                 why: "it does not answer as a camera".to_owned(),
                 source: Some(error),
             },
-            _ => self.error("it was asked what it is", error),
+            _ => self.error("its capabilities were read", error),
         }
     }
 

@@ -13,7 +13,7 @@ use relit_turntable::simulator;
 #[non_exhaustive]
 pub enum CaptureError {
     /// Something was not as it has to be before the table turns.
-    #[error("the capture was not begun: {0}")]
+    #[error("the capture did not start: {0}")]
     Refused(String),
     /// The camera.
     #[error(transparent)]

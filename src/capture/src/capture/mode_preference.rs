@@ -66,7 +66,7 @@ impl FromStr for ModePreference {
                 preference.fourcc = Some(fourcc_of(format_and_size)?);
             }
             None if text.is_empty() => {
-                let empty = "a mode is written MJPG:1920x1080@30, or as a part of that";
+                let empty = "write a mode as MJPG:1920x1080@30, or a part of that";
                 return Err(CaptureError::Refused(empty.to_owned()));
             }
             None => {}

@@ -103,7 +103,7 @@ impl Worker {
         let from = written.saturating_sub(COMPLAINT);
         match self.errors.read_exact_at(&mut end, from) {
             Ok(()) => String::from_utf8_lossy(&end).into_owned(),
-            Err(error) => format!("what the program said could not be read: {error}"),
+            Err(error) => format!("the program's output could not be read: {error}"),
         }
     }
 

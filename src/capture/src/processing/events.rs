@@ -48,7 +48,7 @@ impl SkippedSession {
         } else if self.broken {
             Some("it is broken")
         } else if self.lossy {
-            Some("something of it is lost")
+            Some("parts of it are lost")
         } else {
             None
         }
@@ -128,8 +128,8 @@ impl ProgramEvent {
             Some(last.strip_prefix("error: ").unwrap_or(last).to_owned())
         };
         said.or_else(last).unwrap_or_else(|| match exit_code {
-            Some(code) => format!("the program ended with exit code {code} and said nothing"),
-            None => "the program was ended by a signal: look at the machine's memory".to_owned(),
+            Some(code) => format!("the program ended with exit code {code}, without a message"),
+            None => "the program was ended by a signal: check the machine's memory".to_owned(),
         })
     }
 

@@ -80,7 +80,7 @@ impl Processing {
             .map_err(ProcessingError::from_io(missing))?;
         let settings =
             ProcessingSettings::read(&root).map_err(ProcessingError::from_io(format!(
-                "{} could not be read: mend it, or remove it and set again what it held",
+                "{} could not be read: repair it, or remove it and set its choices again",
                 store::path(&root).display()
             )))?;
         let beside = || root.parent().unwrap_or(&root).to_owned();

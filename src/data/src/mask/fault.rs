@@ -17,7 +17,7 @@ pub enum MaskFault {
     Labels(String),
     /// It marks nothing.
     #[error(
-        "is empty: its brightest pixel has {brightest} of {white}, and the object has to be at least half as bright as white; make it again with relit-mask, or paint the object white"
+        "is empty: its brightest pixel is {brightest} of {white}, less than half; make it again with relit-mask, or paint the object white"
     )]
     Empty {
         /// The largest value.

@@ -242,7 +242,7 @@ pub fn beside_recordings(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
 
 fn not_there(path: &Path) -> SessionError {
     SessionError::Unusable(format!(
-        "there is no {}: give a session folder, a folder of sessions, or a video file",
+        "{} does not exist: give a session folder, a folder of sessions, or a video file",
         path.display()
     ))
 }

@@ -75,7 +75,7 @@ pub enum ShardError {
     /// A path in `dataset.json`, or one given by the caller, that is not a plain path inside the data
     /// set.
     #[error(
-        "{0:?} cannot be a file of a data set: use a relative path with `/`, without `..`, `\\` and `:`; do not trust a dataset.json that names it"
+        "{0:?} cannot be a file of a data set: it must be relative, without `..`, `\\` and `:`; do not trust its dataset.json"
     )]
     UnsafePath(String),
     /// A session, sample or description that its writer does not take.

@@ -285,7 +285,7 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
                         problems.push(format!("session {session} is there twice"));
                     }
                     (Some(other), _) => problems.push(format!(
-                        "the sessions {} and {session} are one where a file system ignores case: rename one and extract it again",
+                        "the sessions {} and {session} differ only in case, which some file systems ignore: rename one and extract it again",
                         other.id
                     )),
                     (None, Some(entry)) => dataset.replace(
@@ -330,7 +330,9 @@ fn not_of_a_task(out: &Path, dataset: &Dataset) -> Result<Vec<String>, ShardErro
         .iter()
         .filter(|session| dataset.session(&session.id).is_none());
     let problem = |id: &str| {
-        format!("dataset.json also has session {id}, which belongs to no task: use a separate folder")
+        format!(
+            "dataset.json also has session {id}, which belongs to no task: use a separate folder"
+        )
     };
     Ok(others.map(|session| problem(&session.id)).collect())
 }

@@ -21,7 +21,7 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     }
     if let Some((name, advice)) = format.and_then(Format::unread) {
         return Err(StillError::NotRead(format!(
-            "is {name}, which is not read: {advice}"
+            "is {name}, which is not supported: {advice}"
         )));
     }
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();

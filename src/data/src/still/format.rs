@@ -104,7 +104,7 @@ impl Format {
             Self::Avif => Some(("an AVIF image", SAVE)),
             Self::Heic => Some((
                 "a HEIC image",
-                "save it as JPEG or PNG, or let the telephone write JPEG",
+                "save it as JPEG or PNG, or set the phone to JPEG",
             )),
             Self::Other(name, advice) => Some((name, advice)),
             _ => None,

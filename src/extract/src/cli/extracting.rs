@@ -119,7 +119,7 @@ impl Reporter<'_> {
         } else if entry.is_broken() {
             "; it is broken, see its report"
         } else if entry.lossy {
-            "; something of it is lost, see its report"
+            "; parts of it are lost, see its report"
         } else {
             ""
         };

@@ -254,7 +254,7 @@ impl Target {
         }
         if mask.as_raw().iter().all(|&m| m == 0) {
             return Err(ExtractError::Refused(format!(
-                "the object is too small: at {side} pixels it covers half of no pixel of the output; give a larger --size or a smaller --margin"
+                "the object is too small: at {side} pixels it half covers no pixel; give a larger --size or a smaller --margin"
             )));
         }
         Ok(Self {

@@ -72,7 +72,7 @@ fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
         (&shape.missing, "object outside the mask", "mark it white"),
         (
             &shape.holes,
-            "holes in the mask where there is object",
+            "holes of the mask in the object",
             "mark them white",
         ),
     ];

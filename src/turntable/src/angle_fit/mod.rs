@@ -41,7 +41,7 @@ const WRAP_US: f64 = 4_294_967_296.0;
 
 fn uneven(outliers: usize, polls: usize) -> String {
     let found = if outliers * 2 > polls {
-        format!("the {polls} reports lie on no straight line")
+        format!("the {polls} reports do not lie on a straight line")
     } else {
         format!("{outliers} of {polls} reports lie off the line of the others")
     };

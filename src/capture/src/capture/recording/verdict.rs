@@ -206,7 +206,7 @@ impl Recorded {
             found += &format!("{and}{} damaged", frames(damaged));
         }
         let most = self.max_dropped;
-        (lost + damaged > most).then(|| format!("{found}, where {most} are allowed"))
+        (lost + damaged > most).then(|| format!("{found}, but only {most} are allowed"))
     }
 
     /// Why the disk took no more, and how much more the turn would have needed.
@@ -236,7 +236,9 @@ impl Recorded {
         let frames = frames(lead);
         (lead > 0).then(|| Fault {
             t_us: first.t_us,
-            what: format!("{frames} before the turn are in the video, as its frames build on them"),
+            what: format!(
+                "{frames} before the turn are in the video, because later frames depend on them"
+            ),
         })
     }
 
