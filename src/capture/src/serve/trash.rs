@@ -43,7 +43,7 @@ impl Library {
     pub(super) fn restore(&self, id: &str) -> Result<(), Failure> {
         let folder = self.root.join(TRASH).join(id);
         if !is_session_name(id) || !folder.is_dir() {
-            let error = "no deleted session has that name";
+            let error = "no session of that name is in the trash";
             return Err(Failure::not_found(error));
         }
         move_folder(id, &folder, &self.root.join(id))
