@@ -158,9 +158,6 @@ pub enum Event {
     },
     Session(Value),
     Stats(Value),
-    Described {
-        output: String,
-    },
 }
 
 /// Something was checked.
@@ -242,6 +239,6 @@ mod tests {
             assert_eq!(json_of(&event), line);
             count += 1;
         }
-        assert_eq!(count, 36);
+        assert_eq!(count, 35);
     }
 }

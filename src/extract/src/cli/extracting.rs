@@ -81,7 +81,7 @@ fn summary(tally: &Tally) -> String {
     let troubles = [
         (tally.failed, "failed"),
         (tally.left_out, "left out"),
-        (tally.lossy, "with something lost"),
+        (tally.lossy, "with losses"),
         (tally.misfits, "with a mask that does not fit"),
         (tally.broken, "broken: do not train on it"),
     ];
