@@ -10,17 +10,17 @@ use crate::settings::Key;
 /// A `$` command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Dollar {
-    /// `$$`: tell the settings.
+    /// `$$`: print the settings.
     Settings,
     /// `$n=v`: change a setting.
     Set(Key, Decimal),
-    /// `$I`: tell version and options.
+    /// `$I`: print version and options.
     Version,
     /// `$H`: look for the index.
     Home,
     /// `$X`: unlock after an alarm.
     Unlock,
-    /// `$G`: tell the modal state.
+    /// `$G`: print the modal state.
     Modal,
     /// `$J=`: jog.
     Jog(Jog),

@@ -96,7 +96,7 @@ enum Driver {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Planned {
     steps: i32,
-    /// Thousandths of a degree, as asked for: what relative moves count from.
+    /// Thousandths of a degree, as requested: what relative moves count from.
     angle: i32,
 }
 

@@ -16,7 +16,7 @@ pub struct Frame {
     pub height: u32,
     /// The bytes that the driver reports as used; raw rows without padding.
     pub data: Vec<u8>,
-    /// The driver's counter without its wraps at 2^32; `None` where the camera has none.
+    /// The driver's counter without its wraps at 2^32; `None` if the camera has none.
     pub sequence: Option<u64>,
     /// When the frame was taken, microseconds of the monotonic clock (for a replay, of the
     /// given clock).
@@ -120,7 +120,7 @@ fn jpeg_fault(data: &[u8], width: u32, height: u32) -> Option<FrameFault> {
     }
 }
 
-/// Width and height that a JPEG's frame header states (ITU-T T.81, B.2.2); `None` where there is
+/// Width and height that a JPEG's frame header states (ITU-T T.81, B.2.2); `None` if there is
 /// no frame header before the first scan.
 fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
     let mut at = 2;

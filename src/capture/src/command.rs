@@ -82,10 +82,10 @@ impl Command {
 
 /// A rig that takes commands and shows its state.
 pub trait Rig: Send + Sync {
-    /// Takes a command; what comes of it shows in the monitor.
+    /// Takes a command; the result shows in the monitor.
     ///
     /// # Errors
-    /// [`Refused`] where it cannot be begun.
+    /// [`Refused`] if it cannot be begun.
     fn command(&self, command: Command) -> Result<(), Refused>;
 
     /// The state and the newest picture.

@@ -184,7 +184,7 @@ pub enum Check {
     },
 }
 
-/// A program has come to its end.
+/// A program has ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 #[allow(

@@ -12,7 +12,7 @@ const MIN_SAMPLES: usize = 8;
 const DARK: f64 = 1e-5;
 
 /// The effective value of the first two harmonics of some light over the table's angle, over its mean. `light`:
-/// the part of the turn, 0 to 1, and the linear light there; the parts have to be about evenly spread. None where they are too
+/// the part of the turn, 0 to 1, and the linear light there; the parts have to be about evenly spread. `None` if they are too
 /// few, or dark.
 ///
 /// ```

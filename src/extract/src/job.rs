@@ -269,7 +269,7 @@ impl Job {
         manifest.is_some_and(|manifest| matches!(manifest.status, Status::Aborted(_)))
     }
 
-    /// That the recording is a whole turn, or part of one where that is asked for.
+    /// That the recording is a whole turn, or part of one where that is requested.
     fn check_turn(&self, plan: &Plan, partial: bool) -> Result<(), ExtractError> {
         if let Some(covered_deg) = part_of_turn(plan).filter(|_| !partial) {
             return Err(ExtractError::TooLittle(format!(
@@ -284,7 +284,7 @@ impl Job {
                 let covered_deg = plan.seconds() * table.degrees_per_second;
                 if covered_deg < TURN_DEG - TURN_TOLERANCE_DEG {
                     Err(ExtractError::TooLittle(format!(
-                        "the frames cover about {covered_deg:.0} of 360 degrees, at unknown angles: record it again, or give the video file itself to ignore angles"
+                        "the frames cover about {covered_deg:.0} of 360 degrees, at unknown angles: record it again, or give the video file itself to spread frames over time"
                     )))
                 } else {
                     Ok(())

@@ -69,7 +69,7 @@ struct MaskLook<'a> {
 }
 
 impl MaskLook<'_> {
-    /// The mask's shape against that which frames of these numbers show; none where they say nothing about it.
+    /// The mask's shape against that which frames of these numbers show; `None` if they say nothing about it.
     fn shape(&self, numbers: &[u64], effort: Effort) -> Result<Option<ShapeCheck>, ExtractError> {
         let small = halved(self.mask, self.halvings);
         let mut turn = TurnFrames::new(small.width(), small.height());

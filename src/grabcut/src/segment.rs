@@ -81,7 +81,7 @@ pub fn segment(
     segment_with(frame, None, hints, settings, Effort::Fine)
 }
 
-/// Finds the object in `frame` by what a turn shows, where there is one, with or without hints. `turn` was made from
+/// Finds the object in `frame` by what a turn shows, if there is one, with or without hints. `turn` was made from
 /// frames of the same recording. The same input gives the same mask.
 ///
 /// With a rectangle there is a guard against a turn that misleads: if its mask has an outline along which less
@@ -106,7 +106,7 @@ pub fn segment_with(
     Ok(mask)
 }
 
-/// What a mask lacks that the marks closed. It is found by a cut without the marks of the object; none where there is
+/// What a mask lacks that the marks closed. It is found by a cut without the marks of the object; `None` if there is
 /// no cut without them.
 fn closed_opening(
     frame: &RgbImage,

@@ -16,7 +16,7 @@ use super::{MaskFiles, MaskRecord, MaskRequest, MaskingError};
 /// over unless the request has its own, is a recipe, or is forced.
 ///
 /// # Errors
-/// [`MaskingError::Refused`] where they were painted on another recording; [`MaskingError::Unusable`] where they cannot
+/// [`MaskingError::Refused`] if they were painted on another recording; [`MaskingError::Unusable`] if they cannot
 /// be read.
 pub(super) fn with_strokes<'a>(
     request: &'a MaskRequest,

@@ -144,7 +144,7 @@ pub(super) fn write_files(
     Ok(record)
 }
 
-/// The files of a recording's mask: those that are asked for, or `mask.png` in the session folder or, for
+/// The files of a recording's mask: those that are requested, or `mask.png` in the session folder or, for
 /// a bare video, in the working directory.
 pub(super) fn files_of(
     recording: &Recording,

@@ -17,7 +17,7 @@ pub(super) struct SampledTurn {
     pub(super) statistics: TurnStatistics,
 }
 
-/// Reads the frames of a turn that are asked for; none if one frame is enough, and none for a photograph.
+/// Reads the frames of a turn that are requested; none if one frame is enough, and none for a photograph.
 pub(super) fn read_turn(
     video: &Video,
     size: (u32, u32),

@@ -20,12 +20,12 @@ const MAX_STRETCH: f64 = 8.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Display {
     orientation: Orientation,
-    /// Width and height of a pixel, in lowest terms; `None` where it is square.
+    /// Width and height of a pixel, in lowest terms; `None` if it is square.
     pixel: Option<(u32, u32)>,
 }
 
 impl Display {
-    /// What a stream says of its pictures, or the first of them, which counts more; and remarks about it.
+    /// What a stream says about its pictures, or the first of them, which counts more; and remarks about it.
     pub(super) fn from_frame(
         input: &Input,
         stream: &Stream<'_>,

@@ -110,7 +110,7 @@ pub enum VideoError {
     NoSuchFrame {
         /// The file.
         path: PathBuf,
-        /// The frame that was asked for.
+        /// The frame that was requested.
         number: u64,
         /// The last one.
         last: u64,

@@ -30,7 +30,7 @@ pub(super) struct Stamp {
     damaged: bool,
     /// True if decoding can begin with it.
     key: bool,
-    /// For FFV1: whether its checksums are right; `None` where it has none.
+    /// For FFV1: whether its checksums are right; `None` if it has none.
     checked: Option<bool>,
     contents: Contents,
     /// False if it is only decoded because others depend on it: the frames before the start of a

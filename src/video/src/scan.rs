@@ -148,7 +148,7 @@ impl Video {
     }
 
     /// Numbers of the frames that can be decoded without any other, sorted: all of Motion JPEG, the key frames of
-    /// H.264; none where only a decoder tells which frames there are. A [`Reader`] that is asked for none but these decodes
+    /// H.264; `None` if only a decoder tells which frames there are. A [`Reader`] that is asked for none but these decodes
     /// no other.
     #[must_use]
     pub fn key_frames(&self) -> &[u64] {

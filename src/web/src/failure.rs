@@ -1,4 +1,4 @@
-//! Answers that are not what was asked for: a status and a sentence.
+//! Answers that are not what was requested: a status and a sentence.
 
 use axum::Json;
 use axum::extract::rejection::QueryRejection;

@@ -28,7 +28,7 @@ impl Token {
     /// 128 random bits as 32 hexadecimal digits.
     ///
     /// # Errors
-    /// Where the system has no random numbers.
+    /// If the system has no random numbers.
     pub fn random() -> io::Result<Self> {
         let mut bytes = [0_u8; BYTES];
         getrandom::fill(&mut bytes)?;
@@ -39,7 +39,7 @@ impl Token {
     /// around it, such as the end of the line, is not part of it.
     ///
     /// # Errors
-    /// Where it cannot be read, is open to other accounts, or holds no token.
+    /// If it cannot be read, is open to other accounts, or holds no token.
     pub fn from_file(path: &Path) -> io::Result<Self> {
         let failed =
             |error: io::Error| of_file(path, error.kind(), &format!("could not be read: {error}"));

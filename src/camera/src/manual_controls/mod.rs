@@ -156,7 +156,7 @@ pub struct ControlDrift {
     pub name: String,
     /// What was set, or read before.
     pub should: i64,
-    /// What was read; `None` where it can no longer be read.
+    /// What was read; `None` if it can no longer be read.
     pub is: Option<i64>,
 }
 

@@ -49,7 +49,7 @@ struct Playing {
     source: Source,
     /// What the clock showed at the start, microseconds.
     start_us: i64,
-    /// How often the recording has come to its end.
+    /// How often the recording has ended.
     round: u64,
     /// Frames handed out.
     delivered: u64,
@@ -182,7 +182,7 @@ impl ReplayCamera {
         }
     }
 
-    /// The next frame of the source; the first again after the last, where that is asked for.
+    /// The next frame of the source; the first again after the last, where that is requested.
     fn take(&self, playing: &mut Playing) -> Result<CodedFrame, CameraError> {
         let mut taken = playing.source.next();
         if taken.is_none() && self.address.repeat {

@@ -35,7 +35,7 @@ const AGREED: f64 = 0.8;
 /// What is known of the rig whose sessions lie in `root`; `None` before the first measurement.
 ///
 /// # Errors
-/// Where the file cannot be read: sessions would lack what a person has measured.
+/// If the file cannot be read: sessions would lack what a person has measured.
 pub fn read_facts(root: &Path) -> Result<Option<RigFacts>, CaptureError> {
     let path = path(root);
     let bytes = match fs::read(&path) {
@@ -161,7 +161,7 @@ impl Background {
 }
 
 /// The least-squares shift between two pictures by their gradients (B. D. Lucas and T. Kanade, 1981), pixels to
-/// the right; `None` where there is nothing to see.
+/// the right; `None` if there is nothing to see.
 fn shift(before: &image::GrayImage, after: &image::GrayImage) -> Option<f64> {
     let (mut product, mut square) = (0.0, 0.0);
     let at = |picture: &image::GrayImage, x, y| f64::from(picture.get_pixel(x, y).0[0]);

@@ -14,9 +14,9 @@ const PREFERRED: [Fourcc; 5] = [
     Fourcc::NV12,
     Fourcc::RGB3,
 ];
-/// Rates that differ by less count as the same, frames a second: 29.97 is asked for as 30.
+/// Rates that differ by less count as the same, frames a second: 29.97 is requested as 30.
 const SAME_RATE: f64 = 0.05;
-/// Frames a second that can be asked for.
+/// Frames a second that can be requested.
 const MIN_FPS: f64 = 1.0;
 const MAX_FPS: f64 = 1000.0;
 

@@ -94,7 +94,7 @@ impl Settings {
     /// by real time.
     ///
     /// # Errors
-    /// [`CaptureError::Refused`] where one side is real and the other is to run faster.
+    /// [`CaptureError::Refused`] if one side is real and the other is to run faster.
     pub fn speed(&self) -> Result<f64, CaptureError> {
         let replayed = match &self.camera {
             CameraAddress::Replay(replay) => Some(replay.speed),

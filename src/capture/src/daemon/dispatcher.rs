@@ -38,7 +38,7 @@ pub(super) enum Job {
 pub(super) enum Next {
     /// Nothing is to be done.
     Idle,
-    /// This job, until its stop is asked for.
+    /// This job, until its stop is requested.
     Job(Job, StopRequest),
     /// No more jobs come.
     End,

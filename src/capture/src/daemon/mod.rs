@@ -42,7 +42,7 @@ impl Daemon {
     /// the worker, which opens camera and table, and keeps trying while they are not there.
     ///
     /// # Errors
-    /// [`CaptureError::Lock`] where another daemon has them, [`CaptureError::Refused`] for speeds that do not fit, or what
+    /// [`CaptureError::Lock`] if another daemon has them, [`CaptureError::Refused`] for speeds that do not fit, or what
     /// the system answers.
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
         // The lock of the folder is a file in it: nothing is left there where the camera is another's.

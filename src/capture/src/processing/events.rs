@@ -109,7 +109,7 @@ impl ProgramEvent {
         }
     }
 
-    /// The newest word on how far the work has come, once.
+    /// The newest word on the progress, once.
     pub(super) fn take_progress(&mut self) -> Option<(u64, u64)> {
         self.progress.take()
     }
@@ -133,7 +133,7 @@ impl ProgramEvent {
         })
     }
 
-    /// How a step ended whose program had this exit code; none where a signal ended it.
+    /// How a step ended whose program had this exit code; `None` if a signal ended it.
     pub(super) fn end(
         mut self,
         step: ProcessingStep,

@@ -138,7 +138,7 @@ impl Library {
         Ok(names)
     }
 
-    /// The summary of a session, without what was made of it. `None` where it has gone meanwhile.
+    /// The summary of a session, without what was made of it. `None` if it has gone meanwhile.
     pub(super) fn summary(&self, root: &Path, name: &str) -> Option<SessionSummary> {
         let folder = root.join(name);
         let version = FileVersion::read(&folder.join(MANIFEST_FILE))?;

@@ -98,7 +98,7 @@ pub(super) type Entry = (ExtractionState, String);
 /// The entries of a data set's sessions by their names.
 pub(super) type DatasetEntries = BTreeMap<String, Entry>;
 
-/// What a data set says of its sessions. A description that cannot be read tells of none; `relit-extract` says what
+/// What a data set says about its sessions. A description that cannot be read tells of none; `relit-extract` says what
 /// is wrong with it.
 pub(super) fn entries_in(dataset: &Path) -> DatasetEntries {
     let sessions = Dataset::read(dataset).map(|dataset| dataset.sessions);

@@ -18,7 +18,7 @@ use relit_web::{Failure, JsonBody, QueryParams};
 /// Sessions in one answer, unless asked otherwise, and at most.
 const SESSIONS: usize = 100;
 const MAX_SESSIONS: usize = 1000;
-/// Width of a frame in the player, unless asked otherwise, and what can be asked for; pixels.
+/// Width of a frame in the player, unless asked otherwise, and what can be requested; pixels.
 const WIDTH: u32 = 960;
 const WIDTHS: std::ops::RangeInclusive<u32> = 64..=1920;
 /// Recorded pictures do not change.
@@ -100,7 +100,7 @@ pub(super) async fn trash(
     Ok(Json(list.await?))
 }
 
-/// What a person says of a take; a field that is left out or `null` is removed.
+/// What a person says about a take; a field that is left out or `null` is removed.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Annotations {

@@ -91,7 +91,7 @@ pub enum AdvisedAction {
 pub struct AdvisedButton {
     /// What stands on it.
     pub text: String,
-    /// What it does; `null` where nothing can be done by a button.
+    /// What it does; `null` if nothing can be done by a button.
     pub action: Option<AdvisedAction>,
     /// The object that it captures, where that is settled.
     pub object: Option<String>,

@@ -104,7 +104,7 @@ impl Primaries {
     }
 }
 
-/// A matrix to Rec. 709; none where it changes nothing.
+/// A matrix to Rec. 709; `None` if it changes nothing.
 pub(crate) fn significant(matrix: Exact) -> Option<Matrix> {
     let changes = (0..3).any(|row| {
         (0..3).any(|column| {

@@ -150,7 +150,7 @@ fn saturated(page: &Page<'_>, turn: &Turn) -> String {
     figure(plot, turn, &caption)
 }
 
-/// A plot of its own: on a coloured object this fraction is ten times the gated one, and on a common
+/// Its own plot: on a coloured object this fraction is ten times the gated one, and on a common
 /// axis the gate would be unreadable.
 fn saturated_any(page: &Page<'_>, turn: &Turn) -> String {
     let extremes = Extremes::new(page.records, turn, any_channel);

@@ -44,7 +44,7 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     Ok(image)
 }
 
-/// Width and height that a file says it has, before it is turned; none where they cannot be read.
+/// Width and height that a file says it has, before it is turned; `None` if they cannot be read.
 #[must_use]
 pub fn stored_size(bytes: &[u8]) -> Option<(u32, u32)> {
     match Format::sniff(bytes)? {

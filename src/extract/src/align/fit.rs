@@ -254,7 +254,7 @@ impl Sums {
         }
     }
 
-    /// The normal matrix and its determinant; `None` where the object does not say a shift in both directions.
+    /// The normal matrix and its determinant; `None` if the object does not say a shift in both directions.
     fn normal(&self) -> Option<([f64; 3], f64)> {
         let [xx, xy, yy, ..] = self.terms;
         let determinant = xx * yy - xy * xy;

@@ -94,7 +94,7 @@ fn halvings((width, height): (u32, u32)) -> u32 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
     /// To the right and down of its place in the mask, pixels: what is most likely, given what the frame shows and
-    /// how far the object moves in its turn. `None` where the frame cannot be registered.
+    /// how far the object moves in its turn. `None` if the frame cannot be registered.
     pub shift: Option<[f64; 2]>,
     /// Standard deviation of what the frame shows, pixels: by how much parts of
     /// the object and neighbouring scales disagree; moving light shifts the coarser scales more.
@@ -103,7 +103,7 @@ pub struct Alignment {
     /// Correlation of the frame's structure with the object's lasting one, 0..=1.
     pub confidence: f64,
     /// How far a rotation and a growth move the object's pixels in the mean, beyond the shift: degrees
-    /// clockwise, and the factor of size minus 1. `None` where it is not significant.
+    /// clockwise, and the factor of size minus 1. `None` if it is not significant.
     pub turned: Option<(f64, f64)>,
 }
 

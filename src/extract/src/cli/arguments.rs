@@ -147,7 +147,7 @@ pub(crate) struct ExtractArguments {
     threads: Option<usize>,
 }
 
-/// The task that is asked for on the command line, else by the scheduler that started the program.
+/// The task that is requested on the command line, else by the scheduler that started the program.
 fn task(
     line: &ExtractArguments,
     variable: &dyn Fn(&str) -> Option<String>,

@@ -28,7 +28,7 @@ const MIN_OBJECT: u64 = 10;
 /// The marks of object and background.
 ///
 /// # Errors
-/// [`MaskError::NotPlain`] where hardly anything is surely object.
+/// [`MaskError::NotPlain`] if hardly anything is surely object.
 pub(super) fn seeds(frame: &RgbImage, regions: &Regions) -> Result<Seeds, MaskError> {
     let object = sure_object(regions)?;
     let background = eroded(&regions.background);

@@ -35,7 +35,7 @@ pub(crate) fn along_courses(courses: &Courses, object: &Bitmap) -> Bitmap {
     })
 }
 
-/// Whether most of what a pixel shows is the one and not the other; none where they hardly differ.
+/// Whether most of what a pixel shows is the one and not the other; `None` if they hardly differ.
 fn share(courses: &Courses, at: usize, inside: &[f32], outside: &[f32]) -> Option<bool> {
     let apart: Vec<f32> = inside.iter().zip(outside).map(|(i, o)| i - o).collect();
     let length = dot(&apart, &apart);

@@ -1,4 +1,4 @@
-//! What the curves of brightness over a turn say of a part of the image: is it the object or what is behind it?
+//! What the curves of brightness over a turn say about a part of the image: is it the object or what is behind it?
 //!
 //! The light turns about the object, so the brightness of each of its pixels follows the first harmonics of the
 //! table's angle: a diffuse surface's irradiance has few others (Ramamoorthi and Hanrahan, "An efficient
@@ -115,7 +115,7 @@ impl TemporalEvidence {
         still || lengths > 0.0 && dot(&one, &other) > TOGETHER * lengths
     }
 
-    /// Whether the curve of a part is nearer to that of one other than to that of another; none where one of them is
+    /// Whether the curve of a part is nearer to that of one other than to that of another; `None` if one of them is
     /// empty, or the frames are few.
     pub(crate) fn nearer(&self, part: &Bitmap, one: &Bitmap, another: &Bitmap) -> Option<bool> {
         let (part, one, another) = (self.course(part)?, self.course(one)?, self.course(another)?);

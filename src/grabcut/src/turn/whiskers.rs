@@ -1,7 +1,7 @@
 //! Thin parts of a mask that show no object but what lies on both sides of them: mostly pieces of the table's rim.
 //!
 //! A pixel of the rim shows some of the table and some of the room, so that its course over the turn is a mixture of
-//! those below and above it. A stick or a wire of the object has a course of its own.
+//! those below and above it. A stick or a wire of the object has its own course.
 
 use crate::bitmap::{Bitmap, Component, Connectivity};
 

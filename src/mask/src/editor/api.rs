@@ -48,7 +48,7 @@ pub(super) const BODY: BodyLimit = BodyLimit {
     bytes: 4 << 20,
     time: Duration::from_secs(20),
 };
-/// Widest picture of a frame that can be asked for, pixels.
+/// Widest picture of a frame that can be requested, pixels.
 const MAX_WIDTH: u32 = 8192;
 
 /// The record of the mask that was written.

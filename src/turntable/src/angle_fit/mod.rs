@@ -109,7 +109,7 @@ pub(crate) fn timed(report: &PositionReport, turn: &JournaledTurn) -> Option<Jou
 }
 
 impl AngleFit {
-    /// The track of an interrupted turn by what was reported of it; `None` where that does not determine it.
+    /// The track of an interrupted turn by what was reported of it; `None` if that does not determine it.
     #[must_use]
     pub fn from_reports(turn: &JournaledTurn, reports: &[JournaledReport]) -> Option<Self> {
         Self::from_part(reports, turn).ok()

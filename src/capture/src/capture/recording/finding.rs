@@ -24,7 +24,7 @@ pub(super) enum Finding {
     Damaged(usize, FrameFault),
     /// Counter and time stamps do not fit.
     Anomaly(TimingAnomaly),
-    /// The camera's settings are no longer as they were set.
+    /// The camera's settings have changed.
     Settings(String),
 }
 

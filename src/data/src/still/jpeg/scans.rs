@@ -16,7 +16,7 @@ const DRI: u8 = 0xdd;
 const SEQUENTIAL: [u8; 2] = [0xc0, 0xc1];
 const PROGRESSIVE: u8 = 0xc2;
 
-/// The place behind the last scan; none where a scan is not whole, or scans are missing.
+/// The place behind the last scan; `None` if a scan is not whole, or scans are missing.
 pub(super) fn end(bytes: &[u8]) -> Option<usize> {
     let mut tables = Tables::default();
     let mut frame = None;

@@ -43,7 +43,7 @@ pub(crate) enum TimingAnomaly {
 }
 
 impl TimingAnomaly {
-    /// The same with frames counted from frame `first` on; `None` where it is about a frame before
+    /// The same with frames counted from frame `first` on; `None` if it is about a frame before
     /// that one, or about one of `frames` frames later or more.
     pub(crate) fn counted_from(mut self, first: usize, frames: usize) -> Option<Self> {
         match &mut self {
