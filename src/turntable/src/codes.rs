@@ -64,7 +64,7 @@ impl Alarm {
             (20, Family::Rig) => {
                 "the host was silent longer than its lease, the position is kept: unlock it"
             }
-            _ => "an alarm of its own, its position counts as lost: see the firmware's manual",
+            _ => "an alarm of its firmware, its position counts as lost: see the firmware's manual",
         }
     }
 }

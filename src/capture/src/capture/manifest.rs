@@ -77,7 +77,7 @@ fn not_held(locked: &LockedCamera) -> Vec<Fault> {
     missing
         .map(|missing| Fault {
             t_us: 0,
-            what: format!("not held during the turn: {missing}"),
+            what: format!("not locked during the turn: {missing}"),
         })
         .collect()
 }

@@ -141,7 +141,7 @@ impl CameraThread {
                     delivered.map(Finding::QueueFull)
                 }
                 Err(SendTimeoutError::Disconnected(_)) => {
-                    return Err(End::Failed("the disk took no more".to_owned()));
+                    return Err(End::Failed("the disk accepted no more data".to_owned()));
                 }
             }
         };
