@@ -153,7 +153,7 @@ impl Background {
         let all = right.len() + left.len();
         let most = right.len().max(left.len());
         if all < MIN_PICTURES || (most as f64) < AGREED * all as f64 {
-            let unseen = "the camera does not see which way the table turns: put something lit behind the object";
+            let unseen = "the camera does not see which way the table turns: make a lit background visible behind the object";
             return Err(CaptureError::Refused(unseen.to_owned()));
         }
         Ok(right.len() > left.len())
