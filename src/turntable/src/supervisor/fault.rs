@@ -32,7 +32,7 @@ pub enum MotionFault {
     },
     /// The table stands in another place than its target, or does something else.
     #[error(
-        "the table was sent to {target_deg:.3} degrees and is in state {state} at {machine_deg:.3} (from machine zero); check the cable and other senders, then home it"
+        "the table was sent to {target_deg:.3} degrees and is in state {state} at {machine_deg:.3} (from machine zero); check cable and other senders, then home it"
     )]
     Astray {
         /// Its state.
