@@ -10,7 +10,7 @@ TARGET := $(or $(CARGO_TARGET_DIR),target)
 # The programs from the rig to the shards.
 PROGRAMS := -p relit-capture -p relit-mask -p relit-extract
 
-# Parts of the programs that nobody needs to make shards; lint and tests look at them too.
+# Features that making shards does not need; lint and tests cover them too.
 EXTRAS := --features relit-capture/nokhwa,relit-mask/opencv
 
 # The recorded session of a whole turn, which the demonstration replays as a camera.
@@ -53,7 +53,7 @@ setup-app:
 setup-train: ## Install libtorch, which relight's training is built with (544 MB, once)
 	@.ci/setup-train
 
-# Folders of one's own, beside what is downloaded: MESHES and PANORAMAS. What is left out (exit code 3) is named.
+# MESHES and PANORAMAS are your own folders, in addition to the downloads. Files that are left out are listed (exit code 3).
 LIBRARY ?= $(TARGET)/training-data/library.relib
 
 training-data: ## Download objects and panoramas (210 MB) and pack them into LIBRARY, for relight train and relight synth
@@ -64,11 +64,11 @@ training-data: ## Download objects and panoramas (210 MB) and pack them into LIB
 	    --panoramas $(TARGET)/training-data/panoramas $(PANORAMAS) \
 	    || [[ $$? == 3 ]]
 
-# DATA holds the folders meshes, panoramas and held of what relight/cli/weights/README.md names; a run that was stopped goes on.
+# DATA has the folders meshes, panoramas and held, with the files that relight/cli/weights/README.md names. It continues a stopped run.
 RUNS ?= $(CURDIR)/$(TARGET)/train-turn
 
 train-turn: setup-train ## Train the network of relight turn from the folder DATA into RUNS
-	@[[ -d "$(DATA)/panoramas" ]] || { echo "say where the data is: make train-turn DATA=FOLDER"; exit 1; }
+	@[[ -d "$(DATA)/panoramas" ]] || { echo "name the folder of the data: make train-turn DATA=FOLDER"; exit 1; }
 	cargo build --locked --release -p relight --features train
 	@program="$$(realpath $(TARGET)/release/relight)"; mkdir -p "$(RUNS)"; runs="$$(realpath "$(RUNS)")"; cd "$(DATA)"; \
 	"$$program" train turn --settings "$(CURDIR)/relight/cli/weights/turn.toml" --resume -o "$$runs"
@@ -78,7 +78,7 @@ test: setup ## Run all tests; those of training where libtorch is installed
 	@if rig-firmware/build --can && [[ -e /usr/include/simavr/sim_avr.h ]]; then \
 	    $(MAKE) --no-print-directory firmware emulator; \
 	else \
-	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' printed why"; \
+	    echo "the firmware's tests on the emulated chip are skipped: 'make setup' printed the reason"; \
 	fi
 	cargo test --locked --workspace $(EXTRAS) $$(.ci/setup-train --features)
 
@@ -88,7 +88,7 @@ test-rig: setup ## Capture with the kernel's camera drivers and a real tty, in a
 # Pictures of each step are left in PICTURES.
 PICTURES ?= $(TARGET)/day
 
-test-day: setup ## Go through a day at the rig by taps in a browser, with whole turns; pictures in PICTURES
+test-day: setup ## Go through a day at the rig in a browser, with whole turns; pictures in PICTURES
 	cargo build --locked --release $(PROGRAMS) --bins
 	RELIT_PICTURES="$(abspath $(PICTURES))" cargo test --locked --release -p relit-tests --test day -- \
 	    --include-ignored --test-threads 1
@@ -103,7 +103,7 @@ test-objects: setup $(OBJECTS_VENV)/ready ## Extract from and to object stores, 
 	cargo build --locked -p relit-extract --features object-store
 	tests/objects/s3 $(TARGET)/debug/relit-extract $(abspath $(OBJECTS_VENV))/bin/python
 
-test-field: setup $(FIELD_VENV)/ready ## Run the programs on files as the world makes them; prints case, seen, verdict
+test-field: setup $(FIELD_VENV)/ready ## Run the programs on files of cameras, phones and other programs
 	cargo build --locked --release $(PROGRAMS) -p relight --bins
 	$(FIELD_VENV)/bin/python tests/field/run --programs $(TARGET)/release
 
@@ -137,7 +137,7 @@ image: packages ## Make a container image of relit-extract, relit-mask and relig
 static: ## Make relight as one file that needs no library
 	@.ci/static
 
-release: packages wheel image static ## Make all that a release has: packages, wheel, image, static file, checksums, list of crates
+release: packages wheel image static ## Make a release: packages, wheel, image, static file, checksums, list of crates
 	@.ci/release
 
 lint: setup ## Check formatting, lints and documentation
@@ -166,11 +166,11 @@ lint: setup ## Check formatting, lints and documentation
 app: setup-app ## Build the app's page into target/page: its engine for WebAssembly, its weights and its files
 	@.ci/app
 
-test-app: app ## Test the page in headless Chromium, and hold it against the programs
+test-app: app ## Test the page in headless Chromium, and compare it with the programs
 	cargo build --locked --release -p relight -p relit-mask
 	relight/app/tests/run $(TARGET)/page $(TARGET)/release/relight $(TARGET)/release/relit-mask
 
-wasm: ## Build for WebAssembly the crates that a page in a browser is made of
+wasm: ## Build for WebAssembly the crates of the app's page
 	@.ci/wasm
 
 firmware: ## Build the turntable's firmware for Arduino Uno and Nano
@@ -214,7 +214,8 @@ bench-network: setup-train $(BENCH_VENV)/torch-ready ## Measure relight's traini
 	$(BENCH_VENV)/bin/python tests/bench/network.py --program $(TARGET)/release/examples/network_speed \
 	    --runs $(BENCH_RUNS)
 
-docs: setup ## Build the libraries' reference
+docs: setup ## Write the options of all programs into docs/reference, and build the libraries' reference
+	RELIT_WRITE_HELP=1 cargo test --quiet --locked $(PROGRAMS) -p relight --test help
 	cargo doc --locked --no-deps
 	@echo "$(TARGET)/doc/relit_data/index.html"
 

@@ -94,7 +94,7 @@ impl Events {
         self.0 & other.0 != 0
     }
 
-    /// Takes the events of `other` out, and tells whether any was there.
+    /// Takes the events of `other` out, and returns whether any was there.
     pub fn remove(&mut self, other: Events) -> bool {
         let there = self.contains(other);
         self.0 &= !other.0;

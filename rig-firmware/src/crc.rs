@@ -1,6 +1,6 @@
 //! CRC-16/CCITT-FALSE: polynomial 0x1021, start 0xFFFF, nothing reflected, nothing inverted.
 //!
-//! Guards checked lines and the settings in the EEPROM. Knows nobody.
+//! Guards checked lines and the settings in the EEPROM. Knows no other module.
 
 /// A sum that grows byte by byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,17 +10,17 @@ use crate::settings::Key;
 /// A `$` command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Dollar {
-    /// `$$`: tell the settings.
+    /// `$$`: print the settings.
     Settings,
     /// `$n=v`: change a setting.
     Set(Key, Decimal),
-    /// `$I`: tell version and options.
+    /// `$I`: print version and options.
     Version,
     /// `$H`: look for the index.
     Home,
     /// `$X`: unlock after an alarm.
     Unlock,
-    /// `$G`: tell the modal state.
+    /// `$G`: print the modal state.
     Modal,
     /// `$J=`: jog.
     Jog(Jog),
@@ -29,8 +29,8 @@ pub(crate) enum Dollar {
 /// Reads what stands behind the `$`.
 ///
 /// # Errors
-/// [`Error::InvalidStatement`] for what is no command of this table, [`Error::InvalidJog`] for `$J`
-/// without `=`, [`Error::BadNumber`] for a value that is none, and what a jog gives.
+/// [`Error::InvalidStatement`] for an unknown command, [`Error::InvalidJog`] for `$J`
+/// without `=`, [`Error::BadNumber`] for a value that is not a number, and the errors of a jog.
 pub(crate) fn parse(text: &[u8], modal: &Modal) -> Result<Dollar, Error> {
     match text {
         [b'J'] => Err(Error::InvalidJog),

@@ -1,7 +1,7 @@
 //! Decimal numbers in fixed point: text to whole and fraction, and division with rounding.
 //!
 //! Floating point would cost the chip kilobytes, and numbers of 64 bits more than half as much.
-//! Knows nobody.
+//! Knows no other module.
 
 /// A decimal number of up to nine digits before the point and six behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,7 +48,7 @@ impl Decimal {
     }
 }
 
-/// Reads a number such as `-12.5` from the start of `text`, and tells the rest of the text. Digits
+/// Reads a number such as `-12.5` from the start of `text`, and returns the rest of the text. Digits
 /// after the sixth decimal are dropped.
 ///
 /// `None` where no digit stands, or with more than nine digits before the point.
@@ -89,7 +89,7 @@ pub(crate) fn parse(text: &[u8]) -> Option<(Decimal, &[u8])> {
     any.then_some((number, rest))
 }
 
-/// Reads a number of at most `most` digits (nine at most) and nothing else, and tells the rest.
+/// Reads a number of at most `most` digits (nine at most) and nothing else, and returns the rest.
 ///
 /// `None` where no digit stands, or more.
 pub(crate) fn digits(text: &[u8], most: u8) -> Option<(u32, &[u8])> {

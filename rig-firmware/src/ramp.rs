@@ -9,7 +9,7 @@
 //! c(0) = 0.676 f sqrt(2 / a),    c(n) = c(n-1) - 2 c(n-1) / (4 n + 1)
 //! ```
 //!
-//! Intervals are in 256ths of a timer tick; a tick is half a microsecond. Knows nobody.
+//! Intervals are in 256ths of a timer tick; a tick is half a microsecond. Knows no other module.
 
 /// Timer ticks a second.
 pub(crate) const TICKS_PER_SECOND: u32 = 2_000_000;

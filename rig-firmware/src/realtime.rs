@@ -1,7 +1,7 @@
 //! Real-time bytes: commands of one byte that are never part of a line.
 //!
 //! They are picked out in the receive interrupt, so that a full line buffer delays none of them.
-//! Knows nobody.
+//! Knows no other module.
 
 /// What one received byte is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub enum Realtime {
     Hold,
     /// `~`: go on.
     Resume,
-    /// 0x18: stop at once and start anew.
+    /// 0x18: stop at once and start again.
     Reset,
     /// 0x85: ramp to a stop and drop the jog.
     JogCancel,

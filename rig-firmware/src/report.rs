@@ -70,7 +70,7 @@ impl<'a, B: Board> Reply<'a, B> {
         self
     }
 
-    /// Sends a position on three axes, of which the table has one; thousandths of a degree.
+    /// Sends a position, thousandths of a degree, as three axes; the table has only the first.
     pub(crate) fn position(&mut self, position: i32) -> &mut Self {
         self.decimal(position, 3).text(",0.000,0.000")
     }

@@ -183,7 +183,7 @@ impl GrblSettings {
         }
     }
 
-    /// From stored values; `None` where one is not allowed.
+    /// From stored values; `None` if one is not allowed.
     pub(crate) fn from_values(values: [i32; COUNT]) -> Option<GrblSettings> {
         let settings = GrblSettings { values };
         let allowed = Key::ALL.into_iter().all(|key| {
@@ -218,7 +218,7 @@ impl GrblSettings {
     /// # Errors
     /// [`Error::Negative`]; [`Error::StepPulse`] for pulses shorter than 3 us; [`Error::BadNumber`]
     /// for any other value out of bounds or a fraction where a whole number belongs;
-    /// [`Error::StepRate`] where the highest speed would be more than 10 000 steps/s. Nothing
+    /// [`Error::StepRate`] if the highest speed would be more than 10 000 steps/s. Nothing
     /// changes then.
     pub(crate) fn set(&mut self, key: Key, value: Decimal) -> Result<(), Error> {
         let spec = key.spec();

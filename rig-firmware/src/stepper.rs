@@ -124,7 +124,7 @@ impl Stepper {
         }
     }
 
-    /// Takes over settings; at rest only, for the ramp starts anew.
+    /// Takes over settings. Only at rest: the ramp starts again.
     pub(crate) fn configure(&mut self, settings: StepperSettings) {
         self.settings = settings;
         self.ramp = Ramp::at_rest(settings.first_interval);
@@ -157,7 +157,7 @@ impl Stepper {
         }
     }
 
-    /// Chooses the interval of the next step; `None` where none is to come.
+    /// Chooses the interval of the next step; `None` if none is to come.
     fn plan_step(&mut self) -> Option<u32> {
         if self.halted || (self.held && self.ramp.index() == 0) {
             return None;
@@ -199,7 +199,7 @@ impl Stepper {
         (place < self.length).then(|| self.queue.get(at)).flatten()
     }
 
-    /// Adds a move to the queue and plans anew.
+    /// Adds a move to the queue and plans again.
     ///
     /// # Errors
     /// [`Full`] where the queue has no place, or after a halt that nobody cleared yet.
@@ -291,7 +291,7 @@ impl Stepper {
         self.drop_plan();
     }
 
-    /// Lets moves in again after a halt, and tells whether steps were under way when it came: then
+    /// Lets moves in again after a halt, and returns whether steps were under way when it came: then
     /// the motor may have gone on by itself.
     pub fn clear_halt(&mut self) -> bool {
         self.halted = false;

@@ -153,7 +153,7 @@ fn examine(board: &mut impl Board, second: bool) -> Slot {
     }
 }
 
-/// The values of a slot; `None` where they are not allowed.
+/// The values of a slot; `None` if they are not allowed.
 fn read(board: &mut impl Board, second: bool) -> Option<GrblSettings> {
     let mut at = start(second) + 2;
     let mut word = || {

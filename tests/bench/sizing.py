@@ -1,4 +1,4 @@
-"""What one session of 1500 samples costs relit-extract, by the size of its frames: for the table in docs/cluster.md.
+"""What one session of 1500 samples costs relit-extract, by the size of its frames: for the table in docs/guide/cluster.md.
 
     python tests/bench/sizing.py target/release/relit-extract [--threads 2] [--folder FOLDER]
 

@@ -269,7 +269,7 @@ impl<'a> Day<'a> {
         phone.wait_for("document.getElementById('when-done').checked");
     }
 
-    /// While it is recorded nothing else begins: what is asked for waits, and can be cancelled.
+    /// While it is recorded nothing else begins: what is requested waits, and can be cancelled.
     fn record_the_next(&mut self, before: &str) -> String {
         let longest = self.rig.turn.longest;
         let phone = &mut self.phone;

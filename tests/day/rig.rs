@@ -89,7 +89,7 @@ impl Rig {
         Self::serve(command, turn, folder)
     }
 
-    /// In a folder of its own, by relative paths: the page shows them, and its pictures no path of this machine.
+    /// In its own folder, by relative paths: the page shows them, and its pictures no path of this machine.
     fn serve(mut command: Command, turn: &'static Turn, folder: tempfile::TempDir) -> Self {
         symlink(fixtures(), folder.path().join("fixtures")).unwrap();
         command

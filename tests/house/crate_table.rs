@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the table and the manifests both say of a crate.
+/// What the table and the manifests both say about a crate.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct CrateFacts {
     /// Its name.

@@ -114,7 +114,7 @@ impl Source {
         folder.unwrap_or_default().to_vec()
     }
 
-    /// The module that a path in another one leads to; none where it leads out of the crate.
+    /// The module that a path in another one leads to; `None` if it leads out of the crate.
     fn resolved(&self, from: &[String], path: &[String], depth: usize) -> Option<Vec<String>> {
         let (mut at, mut rest) = (from.to_vec(), path);
         loop {

@@ -97,7 +97,7 @@ fn packages_of(manifest: &Path) -> Result<Vec<Value>, String> {
     Ok(list(&answer["packages"]).to_vec())
 }
 
-/// What the manifests say of the crates.
+/// What the manifests say about the crates.
 fn facts(root: &Path, packages: &[Value]) -> Vec<CrateFacts> {
     let is_own = |name: &str| packages.iter().any(|package| package["name"] == name);
     let facts = |package: &Value| {

@@ -22,7 +22,7 @@ pub(crate) fn fixture(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// A rig on virtual time, whose sessions go into a folder of its own. The test's thread takes part.
+/// A rig on virtual time, whose sessions go into its own folder. The test's thread takes part.
 pub(crate) struct Rehearsal {
     pub(crate) root: tempfile::TempDir,
     pub(crate) equipment: Equipment,

@@ -99,7 +99,7 @@ fn even_room(folder: &Path) -> PathBuf {
     path
 }
 
-/// What a take says of the room: whether it is good, and a sentence.
+/// What a take says about the room: whether it is good, and a sentence.
 fn room_check(rig: &mut Rehearsal) -> (bool, String) {
     let take = rig.capture().unwrap();
     assert_eq!(take.verdict, Verdict::Clean, "{take:?}");

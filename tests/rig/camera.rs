@@ -1,4 +1,4 @@
-//! The driver behind the camera: its faults, and what the kernel says of each frame.
+//! The driver behind the camera: its faults, and what the kernel says about each frame.
 
 use std::fs;
 use std::path::Path;

@@ -18,7 +18,7 @@ const MAX_WAIT: Duration = Duration::from_secs(240);
 const STDERR: &str = "stderr.txt";
 /// More lines than a capture prints.
 const MAX_LINES: usize = 4096;
-/// What any capture here is asked for.
+/// The settings of any capture here.
 const ALWAYS: [&str; 7] = [
     "record",
     "--object",

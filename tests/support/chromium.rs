@@ -42,7 +42,7 @@ struct Screen {
     is_phone: bool,
 }
 
-/// What the browser says of a page that gives way to another while it is asked.
+/// What the browser says about a page that gives way to another while it is asked.
 const PAGE_IS_GOING: [&str; 2] = ["context", "navigated or closed"];
 
 /// A browser with one page, and perhaps another that this one opened. Ends with its test, which fails by a panic

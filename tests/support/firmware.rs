@@ -46,7 +46,7 @@ pub fn extremes(edges: &[Edge]) -> (f64, f64) {
     (fastest, hardest)
 }
 
-/// A board whose time goes on only as the test lets it.
+/// A board whose time continues only as the test lets it.
 pub struct FakeBoard {
     /// The firmware's stepper.
     pub stepper: Stepper,
@@ -82,7 +82,7 @@ pub struct FakeBoard {
     pub outputs: Option<Outputs>,
     /// Why the chip was reset.
     pub cause: ResetCause,
-    /// Bytes from the host that come one after the other as time goes on.
+    /// Bytes from the host that come one after the other as time continues.
     wire: VecDeque<u8>,
     wire_at: u64,
 }

@@ -1,7 +1,8 @@
-//! `--help` of a program and of all its verbs, compared with a file in its crate, so that each change of the command line
-//! shows in a review.
+//! `--help` of a program and of all its verbs, compared with a file of the manual in `docs/reference`, so that each
+//! change of the command line shows in a review.
 //!
-//! After a change: `RELIT_WRITE_HELP=1 cargo test -p relit-mask --test help` writes the file anew.
+//! After a change: `make docs` writes these files; `RELIT_WRITE_HELP=1 cargo test -p relit-mask --test help` writes that of
+//! one program.
 
 use std::fmt::Write;
 use std::path::Path;

@@ -9,6 +9,15 @@
 #![cfg_attr(feature = "server", doc = "| [`server`] | the page handed out |")]
 //!
 //! It knows the libraries of photographs, light and masks, and no terminal.
+//!
+//! ```
+//! use relight_app::{Studio, pack, unpack};
+//!
+//! let mut studio = Studio::new();
+//! let reply = studio.answer(&pack(&[br#"{"op": "backgrounds"}"#]));
+//! let parts = unpack(&reply).unwrap();
+//! assert!(std::str::from_utf8(parts[0]).unwrap().contains("panoramas"));
+//! ```
 
 #[cfg(target_arch = "wasm32")]
 mod browser;
@@ -20,8 +29,3 @@ mod studio;
 
 pub use message::{MessageFault, pack, unpack};
 pub use studio::Studio;
-
-/// The example of the README compiles.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

@@ -7,7 +7,7 @@ use relit_test_support::help::assert_help;
 
 #[test]
 fn the_help_is_what_the_file_holds() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/help.txt");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/relight.txt");
     // `train` has the verbs and options of training where the program was built with it.
     assert_help(env!("CARGO_BIN_EXE_relight"), &file, &["train"]);
 }

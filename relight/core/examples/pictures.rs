@@ -1,4 +1,4 @@
-//! Makes the pictures of docs/relight.md: the conventions, the specular layers beside the ground truth, a mug
+//! Makes the pictures of the manual: the conventions, the specular layers beside the ground truth, a mug
 //! under turning light, and the mug in many materials. All that they show is made here.
 //!
 //!     cargo run --release -p relight --example pictures -- docs/images

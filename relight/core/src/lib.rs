@@ -20,6 +20,19 @@
 //!
 //! Without features it takes bytes and gives bytes, on one thread. The feature `files` reads and writes files, and
 //! `threads` works on rayon's threads; results are the same bits with and without.
+//!
+//! ```
+//! use relight_core::light::{Normals, Order, ShLight};
+//! use relight_core::render::{DiffuseForm, DiffuseLayer};
+//!
+//! // A white ball in even light of radiance 1: its irradiance is π everywhere.
+//! let ball = Normals::sphere(65);
+//! let light = ShLight::even(Order::TWO, [1.0; 3]);
+//! let shading = DiffuseLayer::new(&light, DiffuseForm::Irradiance).shading(&ball);
+//! let middle = shading.planes().pixel(32, 32)[0];
+//! assert!((middle - std::f32::consts::PI).abs() < 1e-4);
+//! ```
+
 pub mod captured_object;
 #[cfg(feature = "files")]
 pub mod files;
@@ -31,8 +44,3 @@ pub mod parallel;
 pub mod reader;
 pub mod render;
 pub mod statistics;
-
-/// The example of the README compiles.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

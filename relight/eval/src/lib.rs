@@ -12,6 +12,22 @@
 //! Each line of a [`ScoreTable`] says what was compared and how: numbers under one name differ by a
 //! factor of two and more between conventions, and published tables rarely say which is theirs. What
 //! cannot be read or measured is an error that names the image; no image is left out.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use relight_core::light::NormalsFrame;
+//! use relight_eval::{IntrinsicInput, Predictions, evaluate_intrinsic};
+//! use relight_core::reader::{TruthLayout, TruthSet};
+//!
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let set = TruthSet::open(Path::new("mit-intrinsic"), TruthLayout::Mit)?;
+//!     let found = [Predictions::new("out/net".into(), NormalsFrame::YUp)];
+//!     let table = evaluate_intrinsic(&set, "all", IntrinsicInput::Diffuse, &found, &|_| {})?;
+//!     println!("{table}");
+//!     Ok(())
+//! }
+//! ```
 
 mod error;
 mod highlights;
@@ -36,8 +52,3 @@ pub use relighting::{
 pub use run::EvalProgress;
 pub use scores::{ImageScores, MaskRule, Measured, ScoreLine, ScoreTable};
 pub use turns::{TurnScores, evaluate_turns};
-
-/// The examples of the README, so that they are built.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

@@ -61,8 +61,3 @@ pub use transfer::{
     PhotoViewRecipe, Rooms, TransferCache, TransferRecipe, ViewLamp,
 };
 pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};
-
-/// The examples of the README, so that they are built.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

@@ -1,8 +1,8 @@
 // The one way to c10d, libtorch's library of collective operations, from Rust: tch does not bind it.
 //
 // A group is a TCPStore, through which its processes find each other, and Gloo, which sums tensors of
-// the main memory over them. Called by src/train/process_group.rs and by nothing else; compiled by
-// build.rs with the feature `train`.
+// the main memory over them. Called by src/distributed/process_group.rs and by nothing else; compiled by
+// build.rs with the feature `libtorch`.
 //
 // Each function that can fail answers 0, or 1 with the reason in `fault` (`room` bytes, ended by a 0).
 // No exception leaves this file. A group is used by one thread at a time.

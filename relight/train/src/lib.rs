@@ -7,6 +7,36 @@
 //! | `data` | `photographs` lit on the device, `turn_samples` |
 //! | `distributed` | several processes: their ranks, sums over them |
 //! | `settings` | [`RunSettings`] and others, in TOML |
+//!
+//! ```no_run
+//! use std::collections::BTreeMap;
+//! use std::path::Path;
+//! use std::sync::Arc;
+//!
+//! use relight_train::{DecomposeSettings, DecomposeTask, Resources, Run, TrainError, TrainObserver, read_settings};
+//! use tch::Device;
+//!
+//! /// Ignores everything.
+//! struct Quiet;
+//!
+//! impl TrainObserver for Quiet {
+//!     fn step(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
+//!     fn damaged(&mut self, _: u64, _: &str) {}
+//!     fn validated(&mut self, _: u64, _: &BTreeMap<String, f64>) {}
+//!     fn saved(&mut self, _: u64, _: &Path) {}
+//! }
+//!
+//! fn main() -> Result<(), TrainError> {
+//!     let settings = read_settings::<DecomposeSettings>(Path::new("settings.toml"))?;
+//!     let run = settings.run.clone();
+//!     let resources = Resources { device: Device::Cpu, workers: 2, stop: Arc::default() };
+//!     let stop = Arc::clone(&resources.stop);
+//!     let mut task = DecomposeTask::new(settings, resources, None)?;
+//!     let outcome = Run::open(&mut task, &run, Path::new("run"), true, None)?.finish(&stop, &mut Quiet)?;
+//!     println!("{} steps: {:?}", outcome.steps, outcome.weights);
+//!     Ok(())
+//! }
+//! ```
 
 #![cfg(feature = "libtorch")]
 
@@ -42,8 +72,3 @@ pub use tasks::decompose_task::DecomposeTask;
 pub use tasks::paper_networks::PaperInputs;
 pub use tasks::paper_task::PaperTask;
 pub use tasks::turn_task::TurnNetworkTask;
-
-/// The examples of the README, so that they are built.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

@@ -1,10 +1,10 @@
 //! A whole turn into normals, albedo and the environment light.
 //!
 //! Camera and object ride on one table, so for the object the environment light rotates about the table's axis by an
-//! angle that is known. [`read_curves`] brings a turn to one curve over that angle a pixel and channel. In a light that is not
-//! known the network of turns answers normals and albedo, and one linear fit finds the light. In a light that was measured
-//! photometric stereo finds normals and albedo without training. [`solve_turn`] does either, from a shard, and [`TurnFiles`]
-//! writes what was found.
+//! angle that is known. [`read_curves`] reduces a turn to one curve over that angle for each pixel and channel. In unknown
+//! light the network of turns estimates normals and albedo, and one linear fit finds the light. In measured light
+//! photometric stereo solves for normals and albedo; the network of turns then only checks the rotation direction.
+//! [`solve_turn`] does either, from a shard, and [`TurnFiles`] writes the results.
 //!
 //! | module | concern |
 //! | --- | --- |

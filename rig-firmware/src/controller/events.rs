@@ -122,7 +122,7 @@ impl Controller {
         self.finish(board, Err(Error::Locked));
     }
 
-    /// 0x18: starts anew. The interrupt has stopped the steps already.
+    /// 0x18: starts again. The interrupt has stopped the steps already.
     fn reset<B: Board>(&mut self, board: &mut B, pressed: bool) {
         let in_motion = board.with_stepper(|stepper, _| {
             stepper.halt();

@@ -96,7 +96,7 @@ enum Driver {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Planned {
     steps: i32,
-    /// Thousandths of a degree, as asked for: what relative moves count from.
+    /// Thousandths of a degree, as requested: what relative moves count from.
     angle: i32,
 }
 
@@ -123,7 +123,7 @@ pub struct Controller {
     session: Session,
     /// The sequence number of the line that is under way.
     sequence: Option<u32>,
-    /// When the host was heard last, or the table began to move.
+    /// When the host last sent something, or the table began to move.
     heard: u32,
     store: Store,
     profile: Profile,

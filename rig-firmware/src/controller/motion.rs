@@ -29,7 +29,7 @@ impl Controller {
         }
     }
 
-    /// Tells the stepper once a jog has come to its end.
+    /// Tells the stepper once a jog has ended.
     fn end_jog<B: Board>(&mut self, board: &mut B) {
         if self.jogging {
             self.jogging = board.with_stepper(|stepper, _| {

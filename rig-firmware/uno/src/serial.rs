@@ -39,7 +39,7 @@ impl<const N: usize> Ring<N> {
         N as u8 - self.length
     }
 
-    /// Appends a byte; false if there is no room.
+    /// Appends a byte; false if the queue is full.
     fn push(&mut self, byte: u8) -> bool {
         if self.room() == 0 {
             return false;
@@ -79,7 +79,7 @@ pub(crate) fn receive_room(masked: &mut Masked) -> u8 {
     RECEIVED.lend(masked).room()
 }
 
-/// Queues a byte to be sent; false if there is no room yet.
+/// Queues a byte to be sent; false if the queue is full.
 pub(crate) fn send(byte: u8, masked: &mut Masked) -> bool {
     let queued = TO_SEND.lend(masked).push(byte);
     if queued {

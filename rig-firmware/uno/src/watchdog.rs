@@ -7,7 +7,7 @@
 //! to leave, so that a host that opens the port shows as external *and* watchdog.
 //!
 //! Before `main`, in section `.init3`, the flags are kept and cleared and the watchdog is turned
-//! off: after a reset of its own it goes on with its shortest time, 16 ms.
+//! off: after its own reset it continues with its shortest time, 16 ms.
 
 use core::arch::{asm, global_asm};
 use core::{hint, ptr};

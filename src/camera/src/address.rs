@@ -65,7 +65,7 @@ pub struct ReplayFaults {
     pub damage: BTreeSet<u64>,
     /// Frames that the driver marks as damaged.
     pub flag: BTreeSet<u64>,
-    /// The frame instead of which the camera is unplugged.
+    /// The camera is unplugged instead of delivering this frame.
     pub unplug: Option<u64>,
     /// The frame from which on none is delivered.
     pub stall: Option<u64>,
@@ -114,7 +114,7 @@ fn parse(text: &str) -> Result<CameraAddress, String> {
         "nokhwa" => rest
             .parse()
             .map(CameraAddress::Nokhwa)
-            .map_err(|_| "nokhwa: is followed by a number from 0".to_owned()),
+            .map_err(|_| "give a number from 0 after nokhwa:".to_owned()),
         "replay" => parse_replay(rest).map(CameraAddress::Replay),
         _ => Err(NO_SCHEME.to_owned()),
     }

@@ -45,7 +45,7 @@ pub trait Camera: Send {
     /// clock.
     ///
     /// # Errors
-    /// [`CameraError::Timeout`] (the stream goes on), [`CameraError::Unplugged`],
+    /// [`CameraError::Timeout`] (the stream continues), [`CameraError::Unplugged`],
     /// [`CameraError::Stream`], [`CameraError::NotStarted`] or [`CameraError::EndOfRecording`].
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, CameraError>;
 

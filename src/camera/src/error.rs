@@ -30,12 +30,12 @@ pub enum CameraError {
     },
     /// No such device.
     #[error(
-        "there is no camera at {device}: plug it in, or give another one; `relit-capture devices` lists those that are there"
+        "no camera at {device}: plug it in, or give another; `relit-capture devices` lists them"
     )]
     NotThere {
         /// The device.
         device: String,
-        /// The system's answer, where there is one.
+        /// The system's answer, if there is one.
         source: Option<io::Error>,
     },
     /// The device may not be opened.
@@ -43,7 +43,7 @@ pub enum CameraError {
     NotPermitted {
         /// The device.
         device: String,
-        /// The system's answer, where there is one.
+        /// The system's answer, if there is one.
         source: Option<io::Error>,
     },
     /// A device that delivers no frames, or not in a supported way.
@@ -53,7 +53,7 @@ pub enum CameraError {
         device: String,
         /// What keeps it from being one.
         why: String,
-        /// The system's answer, where there is one.
+        /// The system's answer, if there is one.
         source: Option<io::Error>,
     },
     /// Another program has the stream of the device.
@@ -68,7 +68,7 @@ pub enum CameraError {
     },
     /// The bus has no bandwidth left for the stream.
     #[error(
-        "the USB bus of {device} is full: no bandwidth is left for this mode; ask for a smaller size, a lower rate or MJPG, or plug it in at another controller"
+        "the USB bus of {device} is full: ask for a smaller size, a lower rate or MJPG, or plug it in at another controller"
     )]
     BusFull {
         /// The device.
@@ -81,7 +81,7 @@ pub enum CameraError {
     Unplugged {
         /// The device.
         device: String,
-        /// The system's answer, where there is one.
+        /// The system's answer, if there is one.
         source: Option<io::Error>,
     },
     /// No frame came in time.
@@ -105,7 +105,7 @@ pub enum CameraError {
         /// The system's answer.
         source: io::Error,
     },
-    /// A frame was asked for before the start.
+    /// A frame was requested before the start.
     #[error("{device} is not started: start it before asking for frames")]
     NotStarted {
         /// The device.
@@ -113,7 +113,7 @@ pub enum CameraError {
     },
     /// The device refused a request.
     #[error(
-        "{device} refused when {doing}: close other programs that use it; unplug it and plug it in again if this stays"
+        "{device} refused when {doing}: close other programs that use it; if this persists, unplug it and plug it in again"
     )]
     Refused {
         /// The device.
@@ -134,7 +134,7 @@ pub enum CameraError {
         doing: String,
         /// Why not.
         fault: String,
-        /// The system's answer, where there is one.
+        /// The system's answer, if there is one.
         source: Option<io::Error>,
     },
     /// Something that this kind of camera does not have.
@@ -145,7 +145,7 @@ pub enum CameraError {
         /// What it cannot do, and what can.
         what: String,
     },
-    /// A replay has come to its end.
+    /// A replay has ended.
     #[error(
         "the recording {path} ends after {frames} frames: add `loop=1` to play it again and again"
     )]

@@ -50,7 +50,7 @@ impl Fourcc {
         }
     }
 
-    /// How frames of this code are coded; `None` where they cannot be recorded.
+    /// How frames of this code are coded; `None` if they cannot be recorded.
     pub fn pixel_format(self) -> Option<PixelFormat> {
         let usual = if self == Self(*b"JPEG") {
             Self::MJPG

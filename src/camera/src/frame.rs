@@ -16,7 +16,7 @@ pub struct Frame {
     pub height: u32,
     /// The bytes that the driver reports as used; raw rows without padding.
     pub data: Vec<u8>,
-    /// The driver's counter without its wraps at 2^32; `None` where the camera has none.
+    /// The driver's counter without its wraps at 2^32; `None` if the camera has none.
     pub sequence: Option<u64>,
     /// When the frame was taken, microseconds of the monotonic clock (for a replay, of the
     /// given clock).
@@ -67,7 +67,7 @@ pub enum FrameFault {
     #[error("it is a JPEG without an end")]
     NoEnd,
     /// A JPEG of another size than was agreed.
-    #[error("it is {width} x {height} pixels, which was not agreed")]
+    #[error("it is {width} x {height} pixels, which is not the agreed size")]
     OtherSize {
         /// Its width, pixels.
         width: u32,
@@ -75,7 +75,7 @@ pub enum FrameFault {
         height: u32,
     },
     /// A raw frame with the wrong number of bytes.
-    #[error("it has {found} bytes where its size needs {expected}")]
+    #[error("it has {found} bytes, but its size needs {expected}")]
     Bytes {
         /// Bytes it needs.
         expected: usize,
@@ -120,7 +120,7 @@ fn jpeg_fault(data: &[u8], width: u32, height: u32) -> Option<FrameFault> {
     }
 }
 
-/// Width and height that a JPEG's frame header states (ITU-T T.81, B.2.2); `None` where there is
+/// Width and height that a JPEG's frame header states (ITU-T T.81, B.2.2); `None` if there is
 /// no frame header before the first scan.
 fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
     let mut at = 2;
@@ -151,7 +151,7 @@ fn jpeg_size(data: &[u8]) -> Option<(u32, u32)> {
 }
 
 /// Removes the padding of a raw frame's rows, which are `stride` bytes apart and have `row` bytes
-/// each. The data stay as they are if there is no padding, or if they do not have all rows.
+/// each. Data without padding, or without all rows, stay as they are.
 #[cfg(any(target_os = "linux", test))]
 pub(super) fn without_padding(data: Vec<u8>, stride: usize, row: usize, rows: usize) -> Vec<u8> {
     let needed = rows

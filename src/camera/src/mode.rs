@@ -1,11 +1,11 @@
-//! The mode that a camera is asked for, or has granted.
+//! The mode that is requested of a camera, or that it granted.
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::{CameraError, Fourcc, Rate};
 
-/// The mode that a camera is asked for, or has granted: drivers take the nearest that they have. Written
+/// The mode that is requested of a camera, or that it granted: drivers take the nearest that they have. Written
 /// `MJPG:1920x1080@30`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CameraMode {

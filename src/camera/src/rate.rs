@@ -10,7 +10,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// `numerator / denominator` frames a second; `None` where either is 0.
+    /// `numerator / denominator` frames a second; `None` if either is 0.
     pub fn new(numerator: u32, denominator: u32) -> Option<Self> {
         (numerator > 0 && denominator > 0).then_some(Self {
             numerator,

@@ -66,7 +66,7 @@ impl Command {
     pub fn check(&self, state: &RigState) -> Result<(), Refused> {
         let moves = matches!(self, Self::Home | Self::Jog { .. } | Self::Reset);
         if moves && !state.has_table() {
-            let none = "there is no turntable: give --turntable".to_owned();
+            let none = "no turntable is known: give --turntable".to_owned();
             return Err(Refused::Unavailable(none));
         }
         let obstacle = match self {
@@ -82,10 +82,10 @@ impl Command {
 
 /// A rig that takes commands and shows its state.
 pub trait Rig: Send + Sync {
-    /// Takes a command; what comes of it shows in the monitor.
+    /// Takes a command; the result shows in the monitor.
     ///
     /// # Errors
-    /// [`Refused`] where it cannot be begun.
+    /// [`Refused`] if it cannot be begun.
     fn command(&self, command: Command) -> Result<(), Refused>;
 
     /// The state and the newest picture.

@@ -1,5 +1,5 @@
 //! The JSON lines of the toolkit's programs, each an object with the name of its event. The same type is
-//! printed by the programs and read by the rig, which runs some of them; `docs/json-lines.md` has an example
+//! printed by the programs and read by the rig, which runs some of them; `docs/reference/json-lines.md` has an example
 //! of each line.
 
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,10 @@ use serde_json::Value;
 /// A line for a machine. Values that only their program knows the type of are left as JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
-#[allow(missing_docs, reason = "docs/json-lines.md explains the fields")]
+#[allow(
+    missing_docs,
+    reason = "docs/reference/json-lines.md explains the fields"
+)]
 pub enum Event {
     // Every program. `session` is missing where an event concerns none.
     Warning {
@@ -155,15 +158,15 @@ pub enum Event {
     },
     Session(Value),
     Stats(Value),
-    Described {
-        output: String,
-    },
 }
 
 /// Something was checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-#[allow(missing_docs, reason = "docs/json-lines.md explains the fields")]
+#[allow(
+    missing_docs,
+    reason = "docs/reference/json-lines.md explains the fields"
+)]
 pub enum Check {
     /// A mask, by `relit-mask check`.
     Mask {
@@ -181,10 +184,13 @@ pub enum Check {
     },
 }
 
-/// A program has come to its end.
+/// A program has ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-#[allow(missing_docs, reason = "docs/json-lines.md explains the fields")]
+#[allow(
+    missing_docs,
+    reason = "docs/reference/json-lines.md explains the fields"
+)]
 pub enum Done {
     /// `relit-capture record`.
     Capture { session: String, take: Value },
@@ -225,7 +231,7 @@ mod tests {
 
     #[test]
     fn the_manuals_lines_are_read_and_printed_as_they_stand_there() {
-        let manual = include_str!("../../../docs/json-lines.md");
+        let manual = include_str!("../../../docs/reference/json-lines.md");
         let lines = manual.lines().filter_map(|line| line.strip_prefix("    {"));
         let mut count = 0;
         for line in lines.map(|rest| format!("{{{rest}")) {
@@ -233,6 +239,6 @@ mod tests {
             assert_eq!(json_of(&event), line);
             count += 1;
         }
-        assert_eq!(count, 36);
+        assert_eq!(count, 35);
     }
 }

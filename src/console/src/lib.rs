@@ -81,7 +81,7 @@ impl Console {
         }
     }
 
-    /// The same, which with `wanted` tells a machine also how far the work has come, twice a second at most:
+    /// The same, which with `wanted` tells a machine also the progress, twice a second at most:
     /// `{"event": "progress", "what": ..., "done": ..., "of": ...}`, where 0 of 0 steps are not counted yet.
     #[must_use]
     pub fn with_progress(self, wanted: bool) -> Self {
@@ -151,7 +151,7 @@ impl Console {
         self.warn_with(&format!("{session}: {text}"), &event);
     }
 
-    /// A warning that is an event of its own for a machine.
+    /// A warning that is its own event for a machine.
     pub fn warn_with(self, text: &str, event: &impl Serialize) {
         if self.json {
             print_line(&json_of(event));
@@ -235,7 +235,7 @@ fn lost_line() -> Option<&'static io::Error> {
     LOST_LINE.get()
 }
 
-/// Prints a line. If the output is closed, the work goes on without it.
+/// Prints a line. If the output is closed, the work continues without it.
 pub(crate) fn print_line(text: &str) {
     if let Err(fault) = writeln!(io::stdout(), "{text}")
         && fault.kind() != io::ErrorKind::BrokenPipe

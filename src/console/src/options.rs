@@ -8,10 +8,10 @@ use super::Console;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 #[group(skip)]
 pub struct ConsoleOptions {
-    /// Print one JSON line per event on standard output, for machines.
+    /// Print one JSON line per event on standard output.
     #[arg(long, global = true)]
     pub json: bool,
-    /// With --json, print also how far the work has come.
+    /// With --json, also print progress.
     #[arg(long, global = true, requires = "json")]
     pub progress: bool,
 }

@@ -10,7 +10,7 @@ use super::{Event, json_of, print_line};
 /// Shortest time between two lines.
 const BETWEEN_LINES: Duration = Duration::from_millis(500);
 
-/// Shows how far some work has come; may be told from several threads.
+/// Shows the progress of some work; several threads may report to it.
 #[derive(Debug)]
 pub struct ProgressBar {
     bar: indicatif::ProgressBar,
@@ -124,7 +124,7 @@ impl ProgressBar {
         self.bar.suspend(work)
     }
 
-    /// Begins anew to guess when the work ends: what was done until now went at another pace.
+    /// Restarts the estimate of when the work ends: the work until now had another speed.
     pub fn reset_eta(&self) {
         self.bar.reset_eta();
     }

@@ -49,7 +49,7 @@ impl RunTotals {
         mean.checked_mul(waiting)
     }
 
-    /// Says how far all have come, where there are several.
+    /// Says the progress of all, where there are several.
     pub fn say(&self, console: Console) {
         let Self { of, done, .. } = *self;
         if of < 2 {

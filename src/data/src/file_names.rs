@@ -80,7 +80,7 @@ pub(crate) fn composed(name: &str) -> String {
 /// Another file or folder beside `path` that would be the same one on a file system that ignores case.
 ///
 /// # Errors
-/// Where the folder is there and cannot be listed.
+/// If the folder is there and cannot be listed.
 #[cfg(feature = "files")]
 pub fn alike_beside(path: &Path) -> io::Result<Option<OsString>> {
     let (Some(name), Some(folder)) = (path.file_name(), path.parent()) else {

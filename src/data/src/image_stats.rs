@@ -47,7 +47,7 @@ pub struct Measures {
     pub mean_rgb: [f64; 3],
     /// Population variance of the Laplacian (4 neighbours) of luma, over the pixels that are under
     /// the mask together with their four neighbours; luma = 0.299 R + 0.587 G + 0.114 B, 0..=255.
-    /// 0 if there is no such pixel.
+    /// 0 without such pixels.
     pub sharpness: f64,
 }
 
@@ -126,7 +126,7 @@ impl MaskSpans {
         }
     }
 
-    /// The same mask over an image of which only these columns and rows show what was seen.
+    /// The same mask, limited to the columns and rows of the image that show what was seen.
     ///
     /// ```
     /// use image::{GrayImage, Luma, RgbImage};
@@ -297,7 +297,7 @@ pub struct Measuring<'a> {
 }
 
 impl Measuring<'_> {
-    /// Adds the next row: `BYTES` bytes a pixel, at least three, of which the first are red, green and blue.
+    /// Adds the next row: `BYTES` bytes a pixel, first red, green and blue.
     /// What lies beyond the mask's size does not count.
     // Compiled into the caller, which knows the processor's vector instructions.
     #[inline(always)]

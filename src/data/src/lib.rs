@@ -23,7 +23,7 @@
 //! | [`file_names`] | the names of files: videos, hidden ones, and those that are one file where case is ignored |
 //! | [`mask`] | which pixels a picture of a mask marks |
 //! | [`durable`] | files that appear whole or not at all |
-//! | [`disk`] | a full disk, and what is said of it |
+//! | [`disk`] | the error of a full disk |
 //! | [`causes`] | errors as text, with their causes |
 //! | [`counts`] | numbers of things in sentences |
 //!
@@ -31,8 +31,8 @@
 //! modules but `session`, `shard`, `report` and `durable`.
 //!
 //! `shard` knows `geometry`, `image_stats`, `naming` and `durable`; `report` knows the records of `shard`
-//! and `image_stats`; both know `rig`; `session` and `shard` do not know each other. `docs/formats.md` describes every
-//! file and field.
+//! and `image_stats`; both know `rig`; `session` and `shard` do not know each other. `docs/reference/formats.md`
+//! describes every file and field.
 //!
 //! The folder `examples/` has programs: `session_angles` prints the angle of each frame of a session, `shard_arrays`
 //! reads a shard as arrays, `write_shard` writes a small data set, and `verify_dataset` checks one.

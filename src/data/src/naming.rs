@@ -6,7 +6,7 @@ const MAX_LENGTH: usize = 120;
 
 /// Names that Windows keeps for devices, whatever extension follows.
 const DEVICES: [&str; 4] = ["aux", "con", "nul", "prn"];
-/// Devices of which Windows has several, each with a digit.
+/// Windows devices with a number.
 const NUMBERED_DEVICES: [&str; 2] = ["com", "lpt"];
 
 /// Whether `name` can be a session's name, which becomes a folder's name, a file's stem and part of
@@ -28,11 +28,11 @@ pub fn is_session_name(name: &str) -> bool {
 #[cfg(feature = "files")]
 pub(crate) fn not_a_name(name: &str) -> String {
     format!(
-        "{name:?} cannot be a session's name: use letters, digits, '-', '_' and '.', at most {MAX_LENGTH} bytes, neither starting nor ending with '.', and no device's name of Windows such as con"
+        "{name:?} cannot be a session's name: use at most {MAX_LENGTH} bytes of letters, digits, '-', '_' or inner '.', and no Windows device such as con"
     )
 }
 
-/// Whether Windows takes a file of this name for a device.
+/// Whether the name is that of a device in Windows.
 fn is_device(name: &str) -> bool {
     let stem = name.split('.').next().unwrap_or_default();
     let is = |device: &&str| stem.eq_ignore_ascii_case(device);

@@ -10,7 +10,7 @@ const UTF16_MARKS: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 /// The text of a file, without its byte order mark.
 ///
 /// # Errors
-/// Where the file cannot be read; with the kind `InvalidData` where it is no text.
+/// If the file cannot be read; with the kind `InvalidData` if it is not UTF-8.
 pub fn read(path: &Path) -> io::Result<String> {
     let text = decode(fs::read(path)?);
     text.map_err(|fault| io::Error::new(io::ErrorKind::InvalidData, fault))
@@ -19,7 +19,7 @@ pub fn read(path: &Path) -> io::Result<String> {
 /// The text of a file's content, without its byte order mark.
 ///
 /// # Errors
-/// Where it is no UTF-8: what to do.
+/// What to do if it is not UTF-8.
 pub fn decode(mut bytes: Vec<u8>) -> Result<String, String> {
     if UTF16_MARKS.iter().any(|mark| bytes.starts_with(mark)) {
         return Err("it is UTF-16: save it as UTF-8".to_owned());

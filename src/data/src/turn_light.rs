@@ -8,11 +8,11 @@ use std::f64::consts::TAU;
 pub const MIN_MODULATION: f64 = 0.08;
 /// Fewest angles that tell two harmonics.
 const MIN_SAMPLES: usize = 8;
-/// Light of which nothing can be said, 0 to 1.
+/// Light too dark to judge, 0 to 1.
 const DARK: f64 = 1e-5;
 
 /// The effective value of the first two harmonics of some light over the table's angle, over its mean. `light`:
-/// the part of the turn, 0 to 1, and the linear light there; the parts have to be about evenly spread. None where they are too
+/// the part of the turn, 0 to 1, and the linear light there; the parts have to be about evenly spread. `None` if they are too
 /// few, or dark.
 ///
 /// ```

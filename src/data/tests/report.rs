@@ -290,7 +290,7 @@ fn axis_title(html: &str) -> &str {
     last.split(['<', '>']).nth(1).unwrap()
 }
 
-/// What is said of the angles above the plots.
+/// What is said about the angles above the plots.
 fn note(html: &str) -> &str {
     let last = html.rsplit("<p class=\"note\">").next().unwrap();
     last.split('<').next().unwrap()

@@ -234,6 +234,6 @@ impl Run<'_> {
 /// That two recordings have names that are one on some file systems.
 fn name_alike(id: &str, other: &str) -> ExtractError {
     ExtractError::Refused(format!(
-        "the name {id} is that of {other} where a file system ignores case, and their files would replace each other: rename one, or extract it into another folder"
+        "{id} and {other} differ only in case, which some file systems ignore: rename one, or extract it into another folder"
     ))
 }

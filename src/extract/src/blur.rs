@@ -77,7 +77,7 @@ impl Level {
     }
 }
 
-/// Each frame's drop against the sharp frames before it; `None` where there are too few of them, and where the
+/// Each frame's drop against the sharp frames before it; `None` if there are too few of them, and if the
 /// drop lasts for more than `longest` frames.
 fn drops<'a>(
     levels: impl Iterator<Item = &'a Level>,

@@ -26,7 +26,7 @@ impl<'a> CropView<'a> {
         }
     }
 
-    /// The picture without `by` pixels on each side; empty where there are no more.
+    /// The picture without `by` pixels on each side; empty if nothing remains.
     #[must_use]
     pub fn within(picture: &'a RgbaImage, by: u32) -> Self {
         let (width, height) = picture.dimensions();

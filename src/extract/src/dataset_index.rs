@@ -19,8 +19,8 @@ pub(super) enum Catalog {
 }
 
 impl Catalog {
-    /// That in the folder, or a new one. A task's piece of an earlier run over other recordings is begun
-    /// anew, with the sessions that it holds.
+    /// That in the folder, or a new one. A task's piece of an earlier run over other recordings is started
+    /// again, with the sessions that it holds.
     pub(super) fn open(
         folder: &OutputFolder,
         found: &[PathBuf],

@@ -10,7 +10,7 @@ use relit_video as video;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExtractError {
-    /// It cannot be done as it is asked for: what is wrong, with what, and the way out.
+    /// It cannot be done as it is requested: what is wrong, with what, and the way out.
     #[error("{0}")]
     Refused(String),
     /// The recording holds too little of a turn.

@@ -269,11 +269,11 @@ impl Job {
         manifest.is_some_and(|manifest| matches!(manifest.status, Status::Aborted(_)))
     }
 
-    /// That the recording is a whole turn, or part of one where that is asked for.
+    /// That the recording is a whole turn, or part of one where that is requested.
     fn check_turn(&self, plan: &Plan, partial: bool) -> Result<(), ExtractError> {
         if let Some(covered_deg) = part_of_turn(plan).filter(|_| !partial) {
             return Err(ExtractError::TooLittle(format!(
-                "the frames cover {covered_deg:.1} of 360 degrees: --partial makes the samples that are there, or record it again"
+                "the frames cover {covered_deg:.1} of 360 degrees: give --partial to extract what they show, or record it again"
             )));
         }
         let Some(manifest) = self.recording.manifest.as_ref() else {
@@ -284,7 +284,7 @@ impl Job {
                 let covered_deg = plan.seconds() * table.degrees_per_second;
                 if covered_deg < TURN_DEG - TURN_TOLERANCE_DEG {
                     Err(ExtractError::TooLittle(format!(
-                        "the frames cover about {covered_deg:.0} of 360 degrees, and their angles are not known: record it again, or give the video file itself to spread the frames over time"
+                        "the frames cover about {covered_deg:.0} of 360 degrees, at unknown angles: record it again, or give the video file itself to spread frames over time"
                     )))
                 } else {
                     Ok(())
@@ -496,7 +496,7 @@ fn thousandths(value: f64) -> f64 {
     (1000.0 * value).round() / 1000.0
 }
 
-/// The degrees that are there, where they are no whole turn.
+/// The degrees of a part of a turn; `None` for a whole one.
 fn part_of_turn(plan: &Plan) -> Option<f64> {
     let partial = plan.selection.is_partial();
     plan.selection.covered_deg().filter(|_| partial)

@@ -30,7 +30,7 @@ type MaskDoubts = (Vec<String>, Option<MaskMisfit>);
 /// What is worth a warning about a mask; nothing if the video says nothing about it. `frame` is the one on which the
 /// mask was made, if that is known: in others the object may lie elsewhere.
 ///
-/// The first look takes a few frames. What it finds may be a shadow, so that all the frames decide of which the check
+/// The first look takes a few frames. What it finds may be a shadow: then all the frames decide with which the check
 /// of relit-mask decides.
 ///
 /// # Errors
@@ -69,7 +69,7 @@ struct MaskLook<'a> {
 }
 
 impl MaskLook<'_> {
-    /// The mask's shape against that which frames of these numbers show; none where they say nothing about it.
+    /// The mask's shape against that which frames of these numbers show; `None` if they say nothing about it.
     fn shape(&self, numbers: &[u64], effort: Effort) -> Result<Option<ShapeCheck>, ExtractError> {
         let small = halved(self.mask, self.halvings);
         let mut turn = TurnFrames::new(small.width(), small.height());

@@ -26,7 +26,7 @@ pub(super) struct ObjectMask {
     pub(super) bounding_box: Rect,
     /// BLAKE3 of the mask's file.
     pub(super) blake3: Digest,
-    /// The frame on which it was made, if the record beside it says so.
+    /// The frame on which it was made, if its record says so.
     pub(super) frame: Option<u64>,
     /// What its file was taken for, where that is not plain.
     note: Option<String>,
@@ -51,7 +51,7 @@ impl ObjectMask {
             (Some(named), _) => {
                 let named = named.display();
                 return refused(format!(
-                    "there is no mask {named}: make one with relit-mask, or correct the name given to --mask"
+                    "the mask {named} does not exist: make one with relit-mask, or correct --mask"
                 ));
             }
             (None, Some(folder)) if folder.join(MASK_FILE).is_file() => folder.join(MASK_FILE),
@@ -130,7 +130,7 @@ fn no_mask_in(masks: &Path, recording: &Recording) -> ExtractError {
     ))
 }
 
-/// The frame on which a mask was made, by the record beside it (`mask.json` of `mask.png`). A record that is
+/// The frame on which a mask was made, by its record (`mask.json` of `mask.png`). A record that is
 /// damaged, or that of another mask, says nothing.
 fn frame_of(mask: &Path, blake3: &Digest) -> Option<u64> {
     let record = std::fs::read(mask.with_extension("json")).ok()?;

@@ -39,7 +39,7 @@ pub enum RecordingOutcome {
 }
 
 impl RecordingOutcome {
-    /// The outcome, of which some errors are no failures.
+    /// The outcome; some errors are not failures.
     pub(super) fn from_result(result: Result<Self, ExtractError>) -> Self {
         result.unwrap_or_else(|error| {
             if error.leaves_out() {
@@ -57,7 +57,7 @@ impl RecordingOutcome {
 pub struct Tally {
     /// Recordings that were extracted.
     pub extracted: usize,
-    /// Extracted or skipped recordings of which something is lost.
+    /// Extracted or skipped recordings with losses.
     pub lossy: usize,
     /// Extracted or skipped recordings whose mask does not fit.
     pub misfits: usize,

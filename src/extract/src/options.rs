@@ -42,7 +42,7 @@ pub struct ExtractOptions {
     /// The mask for all recordings, or a folder of masks with the names of clips or sessions; `None` uses the
     /// `mask.png` in each session folder.
     pub mask: Option<PathBuf>,
-    /// Extract the part of a turn where a recording is no whole one; otherwise it is left out.
+    /// Extract recordings of a part of a turn too; otherwise they are left out.
     pub partial: bool,
     /// Skip sessions that the data set already holds, intact and made from the same input.
     pub resume: bool,

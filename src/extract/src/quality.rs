@@ -28,7 +28,7 @@ pub(super) struct TurnFinding {
     pub(super) blur: Option<f64>,
 }
 
-/// The samples of which there is something to say; `samples` are sorted by index, each with the digest of its
+/// The samples with something to report; `samples` are sorted by index, each with the digest of its
 /// image. A whole turn would have `whole_turn` of them.
 pub(super) fn findings(samples: &[(&FrameRecord, Digest)], whole_turn: u32) -> Vec<TurnFinding> {
     // Several samples of one source frame are one picture, in which nothing changes.
@@ -80,7 +80,7 @@ pub(super) fn notices(findings: &[TurnFinding]) -> Vec<Notice> {
     if let Some((index, step)) = steps().next() {
         let count = steps().count();
         notices.push(Notice::Warning(format!(
-            "the exposure changes in steps that light cannot explain, at {}, the first is sample {index} ({step:+.2} stops): switch the camera's automatic exposure and gain off",
+            "the exposure jumps at {}, the first is sample {index} ({step:+.2} stops): switch the camera's automatic exposure and gain off",
             count_of(count as u64, "sample"),
         )));
     }
@@ -88,7 +88,7 @@ pub(super) fn notices(findings: &[TurnFinding]) -> Vec<Notice> {
     if let Some((index, _)) = blurred().next() {
         let count = blurred().count();
         notices.push(Notice::Warning(format!(
-            "{} {} blurred in a way that light cannot explain, the first is sample {index}: does something shake camera or table?",
+            "{} {} blurred, the first is sample {index}: check that nothing shakes camera or table",
             count_of(count as u64, "sample"),
             if count == 1 { "is" } else { "are" },
         )));

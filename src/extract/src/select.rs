@@ -39,7 +39,7 @@ impl TurnSpan {
     /// The span of these candidates, which are in order of time.
     ///
     /// If every candidate has an angle: a full turn from the first frame's angle in the direction in
-    /// which the table turns, of which the candidates may cover a part. Otherwise: the time from the
+    /// which the table turns; the candidates may cover only a part. Otherwise: the time from the
     /// first frame to the end of the last.
     ///
     /// # Errors

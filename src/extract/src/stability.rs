@@ -62,7 +62,7 @@ impl Stability {
         match self.beyond {
             None => Ok(()),
             Some((frame, shift)) => Err(ExtractError::Refused(format!(
-                "from frame {frame} on the object lies {shift:.1} pixels away from its place in the mask, more than {}: was it or the camera pushed? Record it again, make the mask on another frame, or give a larger --max-shift",
+                "from frame {frame} on the object lies {shift:.1} pixels off its mask, more than {}: record it again, mask another frame, or give a larger --max-shift",
                 self.max_shift
             ))),
         }
@@ -75,24 +75,24 @@ impl Stability {
             let all = count_of(self.frames, "frame");
             notices.push(Notice::Warning(match self.unregistered.len() {
                 1 => format!(
-                    "1 of {all} could not be registered (its align_confidence is below {least_confidence:.2}) and is as it was taken: frame {first}"
+                    "1 of {all} could not be aligned (its align_confidence is below {least_confidence:.2}) and stays as recorded: frame {first}"
                 ),
                 count => format!(
-                    "{count} of {all} could not be registered (their align_confidence is below {least_confidence:.2}) and are as they were taken, the first is frame {first}"
+                    "{count} of {all} could not be aligned (their align_confidence is below {least_confidence:.2}) and stay as recorded, the first is frame {first}"
                 ),
             }));
         }
         if let (count @ 1.., most) = self.interpolated {
             let all = count_of(self.frames, "frame");
             notices.push(Notice::Warning(format!(
-                "{count} of {all} could not be registered and {} placed by the frames around, uncertain by at most {most:.2} pixels (shift_interpolated_sd_px says of each)",
-                if count == 1 { "was" } else { "were" },
+                "{count} of {all} could not be aligned; {} placed by the frames around, uncertain by at most {most:.2} pixels (see shift_interpolated_sd_px)",
+                if count == 1 { "it was" } else { "they were" },
             )));
         }
         if let Some((frame, (degrees, growth))) = self.turned {
             let (count, percent) = (count_of(self.turned_frames, "frame"), 100.0 * growth);
             notices.push(Notice::Warning(format!(
-                "in {count} the object is also turned or scaled against the mask, most in frame {frame}: by {degrees:.2} degrees and {percent:+.2} %; only its shift is corrected"
+                "in {count} the object is turned or scaled against the mask, at most by {degrees:.2} degrees and {percent:+.2} % (frame {frame}); only shifts are corrected"
             )));
         }
         notices

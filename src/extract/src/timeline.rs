@@ -30,7 +30,7 @@ pub(super) fn timeline(
     } else {
         let mismatch = || {
             ExtractError::Refused(format!(
-                "frames.jsonl has {} lines and the video has {} frames, and their time stamps do not match: give the video file itself to go on without angles",
+                "{} lines of frames.jsonl do not match the video's {} frames by time: give the video file itself to continue without angles",
                 entries.len(),
                 frames.len()
             ))

@@ -140,7 +140,7 @@ impl Bitmap {
         self.inverted().dilated(radius).inverted()
     }
 
-    /// The set pixels of which another one is set as well.
+    /// The pixels that are set in both.
     pub(super) fn and(&self, other: &Self) -> Self {
         self.map(|at, bit| bit && other.bits[at])
     }
@@ -155,7 +155,7 @@ impl Bitmap {
         self.map(|at, bit| bit && !other.bits[at])
     }
 
-    /// The share of the set pixels of which another one is set as well, 0..=1.
+    /// The share of the set pixels that are set in the other bitmap too, 0..=1.
     pub(super) fn share_in(&self, other: &Self) -> f64 {
         self.and(other).count() as f64 / self.count().max(1) as f64
     }

@@ -7,7 +7,7 @@ use super::settings::{MAX_PIXELS, MIN_SIDE};
 pub enum MaskError {
     /// A side of the frame is shorter than [`MIN_SIDE`], or it has more than [`MAX_PIXELS`].
     #[error(
-        "a frame of {width} x {height} pixels cannot be segmented: it needs at least {MIN_SIDE} a side and at most {MAX_PIXELS} in all"
+        "a frame of {width} x {height} pixels cannot be segmented: it needs at least {MIN_SIDE} a side and at most {MAX_PIXELS} in total"
     )]
     FrameSize {
         /// The frame's width, pixels.
@@ -36,7 +36,7 @@ pub enum MaskError {
     },
     /// GrabCut classified every pixel as background.
     #[error(
-        "no object was found: it does not differ enough from its background for this hint; draw the rectangle closer, or mark the object white in seeds"
+        "no object was found: it differs too little from its background; draw the rectangle closer, or mark the object white in seeds"
     )]
     Empty,
     /// GrabCut classified every pixel as object.

@@ -81,7 +81,7 @@ pub fn segment(
     segment_with(frame, None, hints, settings, Effort::Fine)
 }
 
-/// Finds the object in `frame` by what a turn shows, where there is one, with or without hints. `turn` was made from
+/// Finds the object in `frame` by what a turn shows, if there is one, with or without hints. `turn` was made from
 /// frames of the same recording. The same input gives the same mask.
 ///
 /// With a rectangle there is a guard against a turn that misleads: if its mask has an outline along which less
@@ -106,7 +106,7 @@ pub fn segment_with(
     Ok(mask)
 }
 
-/// What a mask lacks that the marks closed. It is found by a cut without the marks of the object; none where there is
+/// What a mask lacks that the marks closed. It is found by a cut without the marks of the object; `None` if there is
 /// no cut without them.
 fn closed_opening(
     frame: &RgbImage,
@@ -235,7 +235,7 @@ fn initial(hints: &Hints, size: (u32, u32)) -> Result<Trimap, MaskError> {
 /// The share is right for a rectangle with much background in it, and cuts a part off an object that fills its
 /// rectangle and is in places like what is around it. So the cut of the lower energy counts. Where that of GrabCut's
 /// own start reaches all four sides of its rectangle, as the object of a tight one does, the other has to be better by
-/// a margin. A cut that is no object by its size or its pieces has a low energy too, because it says little: then
+/// a margin. A cut whose size or pieces are not those of an object has a low energy too, because it says little: then
 /// others count, and a warning says so.
 fn by_hints(
     frame: &RgbImage,

@@ -20,8 +20,8 @@ const NEARLY_RECT: f64 = 0.97;
 /// Hardly anything changes over the video.
 pub(super) const NOTHING_MOVES: &str = "hardly anything changes over the video: without a moving background the mask rests on the average colours alone; check it, or give a rectangle";
 
-/// A cut was no object by its size or its pieces.
-pub(super) const IMPLAUSIBLE: &str = "object and background look alike: the first cut covered little of the rectangle or was in pieces, so that others were tried; check the mask, and mark object and background in seeds";
+/// The size or the pieces of a cut were not those of an object.
+pub(super) const IMPLAUSIBLE: &str = "object and background look alike, so that several cuts were tried: check the mask, and mark object and background in seeds";
 
 /// What the turn shows was not used; the hints alone decided.
 pub(super) fn turn_dropped(why: &str) -> String {
@@ -31,7 +31,7 @@ pub(super) fn turn_dropped(why: &str) -> String {
 /// A hole, which may be an opening of the object, was filled: a large one, or one that marks closed.
 pub(super) fn hole_filled(&Component { area, bounds }: &Component) -> String {
     format!(
-        "a hole of {area} pixels at {bounds} was filled: if one looks through the object there, mark the opening black in seeds"
+        "a hole of {area} pixels at {bounds} was filled: if it is an opening, mark it black in seeds"
     )
 }
 
@@ -61,7 +61,7 @@ pub(super) fn warnings(
         }),
         dropped(&cleaned.dropped, area),
         (marks > 0).then(|| {
-            format!("{marks} pixels that the seeds mark as object are not in the mask, because they are connected to a smaller part only: mark what connects the parts, or give --keep-all")
+            format!("{marks} pixels marked as object were dropped with a smaller part: mark what connects the parts, or give --keep-all")
         }),
         filled(cleaned, area).map(hole_filled),
         used.and_then(|rect| nearly_rect(rect, &cleaned.mask)),

@@ -43,7 +43,7 @@ impl MaskVerdict {
         match self {
             Self::Fits => ("fits", "the mask fits"),
             Self::Wrong => ("wrong", "the mask is not that of the object"),
-            Self::Unknown => ("unknown", "nothing can be said about the mask"),
+            Self::Unknown => ("unknown", "the mask could not be judged"),
         }
     }
 }
@@ -65,7 +65,7 @@ impl MaskReport {
             Some(faults) if faults.is_empty() => (MaskVerdict::Fits, faults),
             Some(faults) => (MaskVerdict::Wrong, faults),
             None => {
-                let why = "hardly anything moves in the video, so that it does not show what the object is: look at mask-preview.png";
+                let why = "hardly anything moves in the video, so that it does not show the object: check mask-preview.png";
                 (MaskVerdict::Unknown, vec![why.to_owned()])
             }
         };
@@ -103,7 +103,7 @@ pub struct CheckOutput {
 /// writes a page and a record about it.
 ///
 /// # Errors
-/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Recording`] around the cause.
+/// [`MaskingError::Session`] without a recording; otherwise [`MaskingError::Recording`] around the cause.
 pub fn check_mask(input: &Path, mask: Option<&Path>) -> Result<CheckOutput, MaskingError> {
     let recording = Recording::open(input)?;
     let checked = check_recording(&recording, mask);

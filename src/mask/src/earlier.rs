@@ -16,7 +16,7 @@ use super::{MaskFiles, MaskRecord, MaskRequest, MaskingError};
 /// over unless the request has its own, is a recipe, or is forced.
 ///
 /// # Errors
-/// [`MaskingError::Refused`] where they were painted on another recording; [`MaskingError::Unusable`] where they cannot
+/// [`MaskingError::Refused`] if they were painted on another recording; [`MaskingError::Unusable`] if they cannot
 /// be read.
 pub(super) fn with_strokes<'a>(
     request: &'a MaskRequest,
@@ -31,7 +31,7 @@ pub(super) fn with_strokes<'a>(
     if has_own || request.force {
         let is_lost = record.hints.strokes != request.hints.strokes;
         let notice = Notice::Warning(format!(
-            "left out {strokes} of the mask that was there: its recipe is kept as {}",
+            "left out {strokes} of the earlier mask: its recipe is kept as {}",
             files.previous.display()
         ));
         return Ok((Cow::Borrowed(request), is_lost.then_some(notice)));
@@ -43,7 +43,7 @@ pub(super) fn with_strokes<'a>(
         )));
     }
     let notice = Notice::Warning(format!(
-        "applied again {strokes} of the mask that was there: --force leaves out what was painted"
+        "applied {strokes} of the earlier mask again: --force leaves them out"
     ));
     let mut request = request.clone();
     if request.hints.is_empty() && request.turn == TurnRequest::None {

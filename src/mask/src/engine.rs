@@ -20,11 +20,10 @@ const WITHOUT_OPENCV: &str = "OpenCV is not built into this relit-mask: build it
 #[serde(rename_all = "lowercase")]
 #[value(rename_all = "lower")]
 pub enum MaskEngine {
-    /// relit's GrabCut, by hints, by a turn, or by both.
+    /// relit's GrabCut, with hints, a turn, or both.
     #[default]
     Relit,
-    /// OpenCV's GrabCut on one frame by a rectangle or seeds, and then relit's clean-up: a reference. In this
-    /// program only with the feature `opencv`.
+    /// OpenCV's GrabCut, for comparison; needs the feature `opencv`.
     OpenCv,
 }
 

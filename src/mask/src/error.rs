@@ -27,7 +27,7 @@ pub enum MaskingError {
     OutputName(PathBuf),
     /// A mask that differs from its record, or has none.
     #[error(
-        "{0} was not made by this program, or was changed since: it may have been painted by hand and is kept; give --force to replace it, or another name with -o"
+        "{0} was not made by this program, or was changed since: give --force to replace it, or another name with -o"
     )]
     Handmade(PathBuf),
     /// The mask that is there is that of another recording.
@@ -56,7 +56,7 @@ pub enum MaskingError {
     /// OpenCV's GrabCut reported an error.
     #[error("OpenCV's GrabCut failed")]
     OpenCv(#[source] Box<dyn std::error::Error + Send + Sync>),
-    /// The editor cannot be served: the address is taken or not this machine's, or there are no threads or no
+    /// The editor cannot be served: the address is taken or not this machine's, or the system has no threads or no
     /// random numbers.
     #[error(
         "the editor cannot be served at {address}: {source}; give another address or port with --listen"

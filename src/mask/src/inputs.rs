@@ -44,7 +44,7 @@ impl MaskTarget {
     }
 }
 
-/// The recordings of which masks are made, and what lies beside them.
+/// The recordings to mask, and the other files next to them.
 #[derive(Debug, Default)]
 pub struct MaskInputs {
     /// Session folders, videos and photographs.
@@ -131,7 +131,7 @@ impl MaskInputs {
     }
 }
 
-/// The photographs in a folder that is not a session, sorted by name, and what lies beside them. Masks that were made
+/// The photographs in a folder that is not a session, sorted by name, and the other files next to them. Masks that were made
 /// of them are neither.
 fn photographs(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), SessionError> {
     if !folder.is_dir() || folder.join(MANIFEST_FILE).exists() {
@@ -144,7 +144,7 @@ fn photographs(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), SessionErr
     Ok((photographs.collect(), others))
 }
 
-/// Whether a file is a mask that this program made, or goes with one: the record beside it says so.
+/// Whether a file is a mask that this program made, or goes with one, by its record.
 fn is_of_mask(path: &Path) -> bool {
     let stem = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
     let stems = COMPANIONS

@@ -6,7 +6,7 @@
 //! painted for it are applied again, and `NAME-previous.json` keeps its record.
 //!
 //! [`make_mask`] makes a mask from hints that are known; [`edit`] lets a person draw them in a browser;
-//! [`check_mask`] holds a mask against what the turn shows.
+//! [`check_mask`] compares a mask with what the turn shows.
 //!
 //! This crate brings frames and folders to [`relit_grabcut`], and is the program `relit-mask` (in `cli/`).
 //! It knows nothing of data sets and the rig.

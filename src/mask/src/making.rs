@@ -37,7 +37,7 @@ pub struct MaskOutput {
 /// anything before fails.
 ///
 /// # Errors
-/// [`MaskingError::Session`] if there is no recording; otherwise [`MaskingError::Recording`] around the cause.
+/// [`MaskingError::Session`] without a recording; otherwise [`MaskingError::Recording`] around the cause.
 pub fn make_mask(
     input: &Path,
     output: Option<MaskFiles>,
@@ -144,7 +144,7 @@ pub(super) fn write_files(
     Ok(record)
 }
 
-/// The files of a recording's mask: those that are asked for, or `mask.png` in the session folder or, for
+/// The files of a recording's mask: those that are requested, or `mask.png` in the session folder or, for
 /// a bare video, in the working directory.
 pub(super) fn files_of(
     recording: &Recording,
@@ -175,7 +175,7 @@ fn record_of(
     {
         if !request.force {
             return Err(MaskingError::Refused(format!(
-                "the mask made with {} differs from the recorded one, although the frame is the same (made by {}, now {software}): nothing was written; give --force to accept the new mask",
+                "the mask made with {} differs from the recorded one ({}, now {software}): nothing was written; give --force to accept the new mask",
                 path.display(),
                 record.software
             )));

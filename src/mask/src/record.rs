@@ -63,7 +63,7 @@ pub struct SourceFrame {
     /// Exif's number, 2 to 8, by which a photograph was turned for display before; width, height and mask are those after.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exif_orientation: Option<u8>,
-    /// How the video's colours were converted to sRGB, in words; none where they were taken as sRGB.
+    /// How the video's colours were converted to sRGB, in words; `None` if they were taken as sRGB.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colour_conversion: Option<String>,
     /// BLAKE3 of its 8-bit RGB values, row by row, in hexadecimal.
@@ -103,7 +103,7 @@ impl MaskRecord {
     /// Reads the content of a `mask.json`.
     ///
     /// # Errors
-    /// Where it is not JSON, has another schema, or is not a record.
+    /// If it is not JSON, has another schema, or is not a record.
     pub fn from_json(bytes: &[u8]) -> Result<Self, String> {
         let value = serde_json::from_slice(relit_data::text::unmarked(bytes));
         let value: Value = value.map_err(|error: serde_json::Error| error.to_string())?;
@@ -170,7 +170,7 @@ impl RecordedHints {
     /// The hints that were recorded; empty where the video alone was enough.
     ///
     /// # Errors
-    /// Where there are none, or the seeds are damaged.
+    /// If there are none, or the seeds are damaged.
     pub fn hints(&self) -> Result<Hints, String> {
         let wrong = |why: &dyn std::fmt::Display| format!("its seeds are not valid: {why}");
         let seeds = match &self.seeds {

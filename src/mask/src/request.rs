@@ -108,7 +108,7 @@ impl MaskRequest {
     /// Lets this engine cut the object out. [`edit`](super::edit) cuts by relit's nevertheless.
     ///
     /// # Errors
-    /// [`MaskingError::Refused`] where it is not built in, or knows no turn.
+    /// [`MaskingError::Refused`] if it is not built in, or knows no turn.
     pub fn with_engine(self, engine: MaskEngine) -> Result<Self, MaskingError> {
         engine.check(self.turn != TurnRequest::None)?;
         Ok(Self { engine, ..self })

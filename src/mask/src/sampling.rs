@@ -17,7 +17,7 @@ pub(super) struct SampledTurn {
     pub(super) statistics: TurnStatistics,
 }
 
-/// Reads the frames of a turn that are asked for; none where one frame is enough, and of a photograph, which is no turn.
+/// Reads the frames of a turn that are requested; none if one frame is enough, and none for a photograph.
 pub(super) fn read_turn(
     video: &Video,
     size: (u32, u32),
@@ -52,7 +52,7 @@ pub(super) fn sampled(
     Ok(SampledTurn { frames, statistics })
 }
 
-/// Reads a frame, and says of which recording it is.
+/// Reads a frame, and reports its recording.
 pub(super) fn read_frame(
     video: &Video,
     number: u64,

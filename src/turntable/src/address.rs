@@ -71,7 +71,7 @@ impl FromStr for TurntableAddress {
             "sim" => simulated(rest)
                 .map(TurntableAddress::Simulated)
                 .map_err(wrong),
-            other => Err(wrong(format!("{other:?} is no kind of turntable"))),
+            other => Err(wrong(format!("{other:?} is not a kind of turntable"))),
         }
     }
 }
@@ -93,7 +93,7 @@ fn simulated(rest: &str) -> Result<SimulatedAddress, String> {
             Some(("fault", fault)) if !fault.is_empty() => address.fault = Some(fault.to_owned()),
             _ => {
                 return Err(format!(
-                    "{option:?} is no option: there are speed= and fault="
+                    "unknown option {option:?}: the options are speed= and fault="
                 ));
             }
         }

@@ -55,7 +55,7 @@ impl Alarm {
                 "a target was beyond the soft limit, the position is kept: unlock it and go the other way"
             }
             (3, _) => "it was reset in motion, its position is lost: unlock and home it",
-            (4 | 5, _) => "a probe failed, which tables have none of: unlock it",
+            (4 | 5, _) => "a probe failed, which a table does not have: unlock it",
             (6, _) => "it was reset while it looked for the index: home it again",
             (7, _) => "a door opened while it looked for the index: close it and home again",
             (8, _) => "the index sensor stayed active after it was left: check sensor and $27",
@@ -64,7 +64,7 @@ impl Alarm {
             (20, Family::Rig) => {
                 "the host was silent longer than its lease, the position is kept: unlock it"
             }
-            _ => "an alarm of its own, its position counts as lost: see the firmware's manual",
+            _ => "an alarm of its firmware, its position counts as lost: see the firmware's manual",
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::lockfile::LockError;
 pub enum TurntableError {
     /// The text is not an address.
     #[error(
-        "{text:?} is no turntable's address: {why}; use serial:/dev/ttyUSB0, serial: (looks for one), sim:, or none"
+        "{text:?} is not a turntable's address: {why}; use serial:/dev/ttyUSB0, serial: (looks for one), sim:, or none"
     )]
     Address {
         /// The text.
@@ -35,7 +35,7 @@ pub enum TurntableError {
     ),
     /// Another process owns the port.
     #[error(
-        "process {pid} has {path}: look at the table there, or end that process, which stops the table (`relit-capture turntable stop` does)"
+        "process {pid} uses {path}: look at the table there, or end that process, which stops the table (`relit-capture turntable stop` does)"
     )]
     Owned {
         /// The port.
@@ -45,7 +45,7 @@ pub enum TurntableError {
     },
     /// The port could not be opened.
     #[error(
-        "{path} could not be opened: {source}; check that the controller is plugged in, that no other program has the port, and that you may use it (group dialout)"
+        "{path} could not be opened: {source}; check that the controller is plugged in, not used by another program, and open to you (group dialout)"
     )]
     Open {
         /// The port.
@@ -58,7 +58,7 @@ pub enum TurntableError {
     Lock(#[from] LockError),
     /// There is no Grbl controller at the port.
     #[error(
-        "{port} does not answer as a Grbl 1.1 controller ({heard}): check port, cable and power, and that its firmware is the rig's, Grbl 1.1, grblHAL or FluidNC"
+        "{port} does not answer as a Grbl 1.1 controller ({heard}): check port, cable, power and firmware: the rig's, Grbl 1.1, grblHAL or FluidNC"
     )]
     NoController {
         /// The port.
@@ -87,7 +87,7 @@ pub enum TurntableError {
     },
     /// A line got no answer.
     #[error(
-        "{block:?} may or may not have reached the controller: {fault}; the table was stopped, look at its position before you go on"
+        "{block:?} may or may not have reached the controller: {fault}; the table was stopped; check its position before you continue"
     )]
     Lost {
         /// The line.
@@ -174,9 +174,7 @@ pub enum TurntableError {
     #[error("the motion failed: {0}")]
     Motion(#[from] MotionFault),
     /// The table was not reported at rest after a stop.
-    #[error(
-        "the table was told to stop and could not be seen at rest: cut its power, then check the cable"
-    )]
+    #[error("the table did not report that it stopped: cut its power, then check the cable")]
     NotStopped,
     /// The reports of a turn do not determine its angles; why.
     #[error("the turn's angles cannot be determined: {0}")]

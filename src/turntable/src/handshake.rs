@@ -141,10 +141,10 @@ fn no_controller(link: &Link) -> TurntableError {
     let counts = supervisor.counts();
     let heard = match (supervisor.closed(), counts.noise) {
         (Some(why), _) => format!("the port is gone: {why}"),
-        (None, 0) => "nothing was heard".to_owned(),
-        (None, lines) => format!(
-            "{lines} lines were heard that are none of Grbl's, or have no machine position ($10=1)"
-        ),
+        (None, 0) => "no answer came".to_owned(),
+        (None, lines) => {
+            format!("{lines} lines came that are not Grbl's, or lack the machine position ($10=1)")
+        }
     };
     TurntableError::NoController {
         port: link.port_name().to_owned(),
@@ -173,7 +173,7 @@ fn about(link: &Link) -> Result<Vec<Message>, TurntableError> {
         }
         last = messages;
     }
-    let lacks = lacks(&last).unwrap_or("its version and options (`$I`) twice the same");
+    let lacks = lacks(&last).unwrap_or("the same version and options (`$I`) twice");
     Err(TurntableError::NotReported(lacks.to_owned()))
 }
 
@@ -217,7 +217,7 @@ fn settings(link: &Link, extras: bool) -> Result<GrblSettings, TurntableError> {
         last = Some(settings);
     }
     Err(TurntableError::NotReported(if missing.is_empty() {
-        "its settings (`$$`) twice the same".to_owned()
+        "the same settings (`$$`) twice".to_owned()
     } else {
         let missing: Vec<_> = missing.iter().map(|n| format!("${n}")).collect();
         let missing = missing.join(", ");

@@ -17,7 +17,7 @@ const HOMING_OFF: u8 = 5;
 pub enum Homed {
     /// The index was found; the angle 0 is there.
     Index,
-    /// There is no index sensor; the angle 0 is where the table stood.
+    /// Without an index sensor: the angle 0 is where the table stood.
     WhereItStands,
 }
 

@@ -6,7 +6,7 @@ use super::error::TurntableError;
 use super::family::Family;
 use super::protocol::Message;
 
-/// How far a table without a limit of its own may turn in either direction before its cable is wound up, degrees.
+/// How far a table without its own limit may turn in either direction before its cable is wound up, degrees.
 const TRAVEL_DEG: f64 = 400.0;
 
 /// The letters in `[OPT:..]` of the rig's own firmware, Grbl's own being capitals: its reports carry the chip's time

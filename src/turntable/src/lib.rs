@@ -1,8 +1,8 @@
 //! The turntable: a client of Grbl 1.1's serial interface that verifies everything.
 //!
 //! ```text
-//! bytes <- port <- link (a thread) -> wire (lines, answers) -> supervisor (state, stops)
-//!                                                  table, turn, plan, sync -> angles over time
+//! bytes <- port <- io_thread -> protocol (lines, answers) -> supervisor (state, stops)
+//!                                        grbl_client, turn, plan, angle_fit -> angles over time
 //! ```
 //!
 //! It works with a stock Grbl 1.1 board on which one millimetre of X is one degree, with Grbl's
@@ -42,7 +42,7 @@
 //! # }
 //! ```
 //!
-//! A [`simulator`] stands for the table where there is none. This crate knows nothing of cameras and sessions. Its client
+//! A [`simulator`] replaces the table. This crate knows nothing of cameras and sessions. Its client
 //! shares no code with the firmware, which the simulator runs: both sides implement the published interface.
 
 mod address;

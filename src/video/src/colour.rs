@@ -154,7 +154,7 @@ impl Colour {
         notes
     }
 
-    /// sRGB of `rect`, which lies inside a YUV frame whose RGB is not sRGB, with all bits that it has. `None` where its
+    /// sRGB of `rect`, which lies inside a YUV frame whose RGB is not sRGB, with all bits that it has. `None` if its
     /// pixel format cannot be converted.
     pub(super) fn wide_rgb(&self, frame: &frame::Video, rect: Rect) -> Option<RgbImage> {
         let to_srgb = self.to_srgb.as_ref()?;

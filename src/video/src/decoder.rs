@@ -16,7 +16,7 @@ pub(super) fn frames_stand_alone(codec: codec::Id) -> bool {
     matches!(codec, codec::Id::MJPEG | codec::Id::RAWVIDEO)
 }
 
-/// Opens a decoder with this many threads of its own (1: none).
+/// Opens a decoder with this many threads (1: none).
 pub(super) fn open(
     parameters: Parameters,
     threads: usize,

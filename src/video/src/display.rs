@@ -1,5 +1,5 @@
 //! How coded pixels become a picture as it is displayed: pixels that are not square are stretched, then the picture is turned.
-//! This is the one place that knows it, for all that decode.
+//! All decoders use this module.
 
 use ffmpeg_next::codec::packet;
 use ffmpeg_next::format::context::Input;
@@ -20,12 +20,12 @@ const MAX_STRETCH: f64 = 8.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Display {
     orientation: Orientation,
-    /// Width and height of a pixel, in lowest terms; `None` where it is square.
+    /// Width and height of a pixel, in lowest terms; `None` if it is square.
     pixel: Option<(u32, u32)>,
 }
 
 impl Display {
-    /// What a stream says of its pictures, or the first of them, which counts more; and remarks about it.
+    /// What a stream says about its pictures, or the first of them, which counts more; and remarks about it.
     pub(super) fn from_frame(
         input: &Input,
         stream: &Stream<'_>,
@@ -38,7 +38,7 @@ impl Display {
             None => match display_matrix(stream, picture) {
                 None => Orientation::default(),
                 Some(matrix) => Orientation::from_display_matrix(&matrix).unwrap_or_else(|| {
-                    let note = "the file asks for a rotation that is not a multiple of 90 degrees, which is left out";
+                    let note = "the file asks for a rotation that is not a multiple of 90 degrees, which is ignored";
                     notes.push(note.to_owned());
                     Orientation::default()
                 }),
@@ -53,7 +53,7 @@ impl Display {
         let pixel = pixel_shape(ratio);
         if pixel.is_none() && ratio.numerator() > 0 && ratio.numerator() != ratio.denominator() {
             notes.push(format!(
-                "the file says that its pixels are {} x {} units in size; they are taken as square",
+                "the file says that its pixels are {} x {} units in size; they are treated as square",
                 ratio.numerator(),
                 ratio.denominator()
             ));

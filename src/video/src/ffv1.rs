@@ -9,7 +9,7 @@ use crc::{Algorithm, Crc};
 /// Size, status and CRC.
 const FOOTER: usize = 8;
 
-/// Whether the checksums of all slices of a packet are right; `None` where the
+/// Whether the checksums of all slices of a packet are right; `None` if the
 /// packet is not a row of slices with checksums.
 pub(super) fn slices_are_whole(packet: &[u8]) -> Option<bool> {
     let mut rest = packet;

@@ -110,7 +110,7 @@ pub enum VideoError {
     NoSuchFrame {
         /// The file.
         path: PathBuf,
-        /// The frame that was asked for.
+        /// The frame that was requested.
         number: u64,
         /// The last one.
         last: u64,
@@ -191,7 +191,7 @@ pub enum DecodeFault {
     /// The decoder refused its data.
     #[error("its data are damaged ({0})")]
     Damaged(ffmpeg_next::Error),
-    /// There is no picture of it that can be trusted, or none of the right kind: why.
+    /// A picture cannot be trusted or is of the wrong kind: why.
     #[error("{0}")]
     Unusable(String),
     /// The pixel format cannot be converted to RGB.
@@ -202,7 +202,7 @@ pub enum DecodeFault {
 impl DecodeFault {
     /// The decoder concealed missing parts.
     fn concealed() -> Self {
-        Self::Unusable("parts of it are missing and were covered up by the decoder".to_owned())
+        Self::Unusable("parts of it are missing and were concealed by the decoder".to_owned())
     }
 
     fn no_picture() -> Self {
@@ -215,8 +215,8 @@ impl DecodeFault {
     }
 }
 
-/// Opens a file, and only this file: FFmpeg takes a name with a colon for a URL, and that of a picture with a per cent sign
-/// for those of many.
+/// Opens a file, and only this file: FFmpeg treats a name with a colon as a URL, and a picture's name with a per cent sign
+/// as a pattern of many.
 fn open_input(path: &Path) -> Result<Input, VideoError> {
     initialise();
     let name = path.to_str().filter(|name| !name.contains('\0'));
@@ -225,7 +225,7 @@ fn open_input(path: &Path) -> Result<Input, VideoError> {
     let still = format_of(path);
     let failed = |why| {
         let why = match still.and_then(Format::unread) {
-            Some((name, advice)) => format!("is {name}, which is not read: {advice}"),
+            Some((name, advice)) => format!("is {name}, which is not supported: {advice}"),
             None => format!(
                 "cannot be opened as a video ({why}): is it complete, and is it a video? `ffprobe` shows more"
             ),

@@ -50,7 +50,7 @@ impl LiveDecoder {
         })
     }
 
-    /// Decodes the next frame. `None` if there is no picture yet: H.264 begins with a key frame.
+    /// Decodes the next frame. `None` before the first picture: H.264 begins with a key frame.
     ///
     /// # Errors
     /// [`DecodeFault`] if the data are damaged; the next frame may be fine.

@@ -30,7 +30,7 @@ pub(super) struct Stamp {
     damaged: bool,
     /// True if decoding can begin with it.
     key: bool,
-    /// For FFV1: whether its checksums are right; `None` where it has none.
+    /// For FFV1: whether its checksums are right; `None` if it has none.
     checked: Option<bool>,
     contents: Contents,
     /// False if it is only decoded because others depend on it: the frames before the start of a
@@ -87,7 +87,7 @@ pub(super) fn needs_decoding(stamps: &[Stamp]) -> bool {
 /// By how many frames the time of decoding must go back for a new recording to begin; less is jitter.
 const MAX_JITTER: i64 = 4;
 
-/// The recordings of which a file was joined, one after the other: where the time of decoding begins again.
+/// The recordings that were joined into a file, one after the other: where the time of decoding begins again.
 fn recordings(stamps: &[Stamp]) -> Vec<Range<usize>> {
     let timed = (0..)
         .zip(stamps)
@@ -127,7 +127,7 @@ pub(super) fn mark_wrong_checksums(stamps: &mut [Stamp]) {
     }
 }
 
-/// All flags, of which the crate's own type keeps only two.
+/// All flags; the crate's own type keeps only two.
 #[allow(unsafe_code)]
 fn raw_flags(packet: &Packet) -> i32 {
     // SAFETY: the pointer is that of a live packet, and `flags` is a plain number in it.
@@ -272,7 +272,7 @@ fn frame_times(
     }
 }
 
-/// Time stamps of which the last are missing, as a decoder leaves them that has no packet left; `None` if others are.
+/// Fills in missing time stamps at the end, where the decoder had no packet left; `None` if others are missing.
 fn filled_at_the_end(stamps: &[Option<i64>]) -> Option<Vec<i64>> {
     let mut filled: Vec<i64> = stamps.iter().map_while(|&stamp| stamp).collect();
     let missing = stamps.get(filled.len()..).unwrap_or_default();

@@ -18,7 +18,7 @@ pub(super) struct Orientation {
 }
 
 impl Orientation {
-    /// Reads FFmpeg's display matrix: nine 32-bit integers in the machine's byte order, of which
+    /// Reads FFmpeg's display matrix: nine 32-bit integers in the machine's byte order;
     /// the four of the 2 x 2 part are 16.16 fixed point; (x', y') = (a x + c y, b x + d y).
     /// `None` where it is not a turn by a multiple of 90 degrees.
     pub(super) fn from_display_matrix(bytes: &[u8]) -> Option<Self> {

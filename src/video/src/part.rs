@@ -13,7 +13,7 @@ use super::track::Track;
 use super::{DecodeFault, Picture};
 use relit_data::geometry::Rect;
 
-/// Rows that are told together: few enough to be in the processor's cache still.
+/// Rows that are reported together: few enough to be in the processor's cache still.
 const BAND: u32 = 16;
 
 impl Video {
@@ -37,9 +37,9 @@ impl Video {
         self.part_by_bands(pending, region, region, part, |_, _| {})
     }
 
-    /// As [`Self::part`], but no more than what `needed` covers has to be decoded: other pixels hold anything. Meanwhile `seen` is told which rows of the part have come, from the top to the bottom, a few
-    /// at a time: soon enough that their pixels are still in the processor's cache. They come from the top once more
-    /// if the frame turns out to need another decoder.
+    /// As [`Self::part`], but only what `needed` covers has to be decoded: other pixels hold anything. Meanwhile `seen`
+    /// is called with the rows of the part that have come, from top to bottom, a few at a time: soon enough that their
+    /// pixels are still in the processor's cache. They come from the top again if the frame needs another decoder.
     ///
     /// # Errors
     /// As [`Self::part`].
@@ -90,7 +90,7 @@ struct Rows<'a, F> {
     inside: Rect,
     /// The first byte of the next row.
     next: usize,
-    /// The rows of the part that have come, and those of them that were told.
+    /// The rows of the part that have come, and those of them that were reported.
     come: u32,
     told: u32,
     seen: &'a mut F,
@@ -148,7 +148,7 @@ impl Track {
     }
 }
 
-/// The part of both; `None` where they have none.
+/// The part of both; `None` if they have none.
 fn common(a: Rect, b: Rect) -> Option<Rect> {
     let (x, y) = (a.x.max(b.x), a.y.max(b.y));
     let extent = |from: i32, end: i64| u32::try_from(end - i64::from(from)).ok();

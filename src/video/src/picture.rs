@@ -80,7 +80,7 @@ impl Picture {
     /// pixels; 0 where the region reaches beyond the picture.
     ///
     /// # Errors
-    /// [`DecodeFault::PixelFormat`] where the format cannot be converted.
+    /// [`DecodeFault::PixelFormat`] if the format cannot be converted.
     pub fn rgb(&self, region: Rect) -> Result<RgbImage, DecodeFault> {
         let (width, height) = self.size();
         let Some(inside) = region.clipped_to(width, height) else {
@@ -294,7 +294,7 @@ pub(super) fn plane(
     Some((samples, u32::try_from(stride).ok()?))
 }
 
-/// RGB of `rect`, which lies inside the frame. `None` where the frame's planes are not what the
+/// RGB of `rect`, which lies inside the frame. `None` if the frame's planes are not what the
 /// format says.
 fn planes_to_rgb(
     frame: &frame::Video,

@@ -11,7 +11,7 @@ impl Picture {
     /// picture is rotated or stretched, its YUV is full-range or not SDR, as RGB. Its size is [`Self::size`].
     ///
     /// # Errors
-    /// [`DecodeFault::PixelFormat`] where the format cannot be converted.
+    /// [`DecodeFault::PixelFormat`] if the format cannot be converted.
     pub fn raw(&self) -> Result<(PixelFormat, Vec<u8>), DecodeFault> {
         if self.display.is_plain()
             && self.colour.is_srgb()

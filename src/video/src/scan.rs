@@ -148,7 +148,7 @@ impl Video {
     }
 
     /// Numbers of the frames that can be decoded without any other, sorted: all of Motion JPEG, the key frames of
-    /// H.264; none where only a decoder tells which frames there are. A [`Reader`] that is asked for none but these decodes
+    /// H.264; `None` if only a decoder tells which frames there are. A [`Reader`] that is asked for none but these decodes
     /// no other.
     #[must_use]
     pub fn key_frames(&self) -> &[u64] {
@@ -361,7 +361,7 @@ fn find_damage(
     damage
 }
 
-/// Whether the file is shorter than it promises. A slow last frame is no damage; a tenth of the length is.
+/// Whether the file is shorter than it promises. A slow last frame is not damage; a tenth of the length is.
 fn shorter(frames: &[FrameInfo], end_us: i64, promised_us: i64) -> Option<String> {
     let [first, .., last] = frames else {
         return None;

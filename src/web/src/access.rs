@@ -101,7 +101,7 @@ impl AccessPolicy {
         Err(Failure::new(StatusCode::MISDIRECTED_REQUEST, error))
     }
 
-    /// True where no token is asked for, or the right one came.
+    /// True where no token is requested, or the right one came.
     #[must_use]
     pub fn lets_in(&self, headers: &HeaderMap) -> bool {
         let Some(token) = &self.token else {
@@ -111,7 +111,7 @@ impl AccessPolicy {
             || cookies(headers).any(|(name, value)| name == self.cookie && token.is(value))
     }
 
-    /// True where no token is asked for.
+    /// True where no token is requested.
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.token.is_none()

@@ -14,7 +14,7 @@ pub struct Announcement {
     pub address: SocketAddr,
     /// What to open in a browser; holds the token where there is one.
     pub url: String,
-    /// The URL as a QR code for a dark terminal, lines of half blocks. `None` where it does not fit into
+    /// The URL as a QR code for a dark terminal, lines of half blocks. `None` if it does not fit into
     /// one.
     pub qr: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! Answers that are not what was asked for: a status and a sentence.
+//! Answers that are not what was requested: a status and a sentence.
 
 use axum::Json;
 use axum::extract::rejection::QueryRejection;
@@ -34,7 +34,7 @@ impl Failure {
         Self::new(StatusCode::BAD_REQUEST, error)
     }
 
-    /// 404: there is no such thing.
+    /// 404: not found.
     pub fn not_found(error: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, error)
     }

@@ -9,10 +9,10 @@ use hyper::client::conn::http1;
 use hyper_util::rt::TokioIo;
 use tokio::net::TcpStream;
 
-/// Asks the server at `address`, on a connection of its own, and gives back its answer.
+/// Asks the server at `address`, on its own connection, and gives back its answer.
 ///
 /// # Errors
-/// Where it cannot be reached or does not speak HTTP.
+/// If it cannot be reached or does not speak HTTP.
 pub async fn forward(address: SocketAddr, request: Request<Body>) -> io::Result<Response<Body>> {
     let stream = TcpStream::connect(address).await?;
     let (mut sender, connection) = http1::handshake(TokioIo::new(stream))

@@ -77,12 +77,12 @@ pub async fn run(
     let _ = timeout(GRACE, connections.acquire_many(all)).await;
 }
 
-/// Serves a page from threads of its own until `shutdown` is cancelled, with the usual limits. The address's port may be 0 for any
-/// free one. Where there is no token, and others than this machine can reach the address, it is random. `names` are those
+/// Serves a page from its own threads until `shutdown` is cancelled, with the usual limits. The address's port may be 0 for any
+/// free one. Without a token, a random one is made if other machines can reach the address. `names` are those
 /// by which the machine is known, `open_paths` need no token, `announce` is called once, when a browser can connect.
 ///
 /// # Errors
-/// Where the address cannot be listened on, or the system has no randomness or no threads.
+/// If the address cannot be listened on, or the system has no randomness or no threads.
 pub fn serve_page(
     address: SocketAddr,
     token: Option<Token>,

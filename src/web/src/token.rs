@@ -20,7 +20,7 @@ pub struct Token(String);
 const MAX_FILE_LENGTH: u64 = 256;
 /// Permissions that a token's file must not give: to others any, to its group writing.
 const FORBIDDEN: u32 = 0o027;
-/// What is wrong with a text that is no token.
+/// What is wrong with a text that is not a token.
 const NO_TOKEN: &str =
     "a token has 16 to 128 letters a-z, digits, '-' and '_': leave it out to get a random one";
 
@@ -28,7 +28,7 @@ impl Token {
     /// 128 random bits as 32 hexadecimal digits.
     ///
     /// # Errors
-    /// Where the system has no random numbers.
+    /// If the system has no random numbers.
     pub fn random() -> io::Result<Self> {
         let mut bytes = [0_u8; BYTES];
         getrandom::fill(&mut bytes)?;
@@ -36,10 +36,10 @@ impl Token {
     }
 
     /// The token that a file holds, which nobody but its owner and group can read. White space
-    /// around it, such as the end of the line, is no part of it.
+    /// around it, such as the end of the line, is not part of it.
     ///
     /// # Errors
-    /// Where it cannot be read, is open to other accounts, or holds no token.
+    /// If it cannot be read, is open to other accounts, or holds no token.
     pub fn from_file(path: &Path) -> io::Result<Self> {
         let failed =
             |error: io::Error| of_file(path, error.kind(), &format!("could not be read: {error}"));
@@ -62,7 +62,7 @@ impl Token {
             .map_err(|wrong| invalid(format!("holds no token: {wrong}")))
     }
 
-    /// The token that a file holds. Where there is no such file, it is made with a random token, for its
+    /// The token that a file holds. If the file does not exist, it is made with a random token, for its
     /// owner alone.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Still images: any bytes are decoded or refused, and what they say of their colours gives numbers.
+//! Still images: any bytes are decoded or refused, and what they say about their colours gives numbers.
 
 #![no_main]
 

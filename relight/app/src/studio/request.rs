@@ -1,4 +1,21 @@
-//! What the page asks, as JSON: docs/relight-serve.md has the whole of it.
+//! What the page asks of its engine, in a worker of the browser.
+//!
+//! A message is the number of its parts and the length of each as little-endian 32-bit integers, then the parts. The first
+//! part is JSON, the others are pictures (RGBA, 8 bits, sRGB) and files. An answer `{"error": "..."}` is a sentence for
+//! people, and has changed nothing.
+//!
+//! | `op` | with | answers |
+//! | --- | --- | --- |
+//! | `load` | the weights | |
+//! | `open_photo`, `open_pixels` | `object`, `name`, a file; or `width`, `height` and pixels | size, whether it has a mask, the picture |
+//! | `mask` | `object`, `rect`, `strokes`, `auto` (without `rect`: by the plain background) | the mask, its area, warnings |
+//! | `decompose` | `object` | albedo, shading, normals, highlight |
+//! | `backgrounds`, `background` | `kind`, `id` or `name`, a file | names and thumbnails; the size of a scene's picture |
+//! | `render` | `scene`, `longest`, `before` | a picture, where each object is, notes |
+//! | `layers` | `scene`, `longest` | background, objects and shadows apart: of objects light times alpha, encoded as sRGB, and alpha; of shadows what the light is multiplied with |
+//! | `save` | `scene`, `format` | a PNG or JPEG in full size |
+//! | `export`, `import` | `scene`; an archive | an archive; the scene and all its pictures |
+//! | `close` | `object` | |
 
 use relit_grabcut::Stroke;
 use serde::Deserialize;

@@ -8,7 +8,7 @@
 //! | the order in which samples are drawn: batches of neighbours, shuffled, restartable | [`DrawPlan`] |
 //! | batches decoded by threads ahead of their consumer | [`Stream`] |
 //!
-//! A sample that is damaged is never left out in silence: [`DamagedBatch`].
+//! A sample that is damaged is never left out in silence: [`DamagedBatch`]. [`Stream`] has an example.
 
 mod error;
 mod listing;

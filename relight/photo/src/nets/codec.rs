@@ -25,7 +25,7 @@ impl Weights {
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         if bytes.starts_with(b"PK") {
             return Err(
-                "PyTorch saved it: make a safetensors file of it (docs/relight-decompose.md)"
+                "PyTorch saved it: make a safetensors file of it (docs/guide/photograph.md)"
                     .to_owned(),
             );
         }

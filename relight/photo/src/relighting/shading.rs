@@ -16,7 +16,7 @@ const RELIEF: f64 = 0.04;
 const MEAN_PIXELS: usize = 4096;
 
 /// The part of the mean change of a photographed object's brightness, as a logarithm, that is kept. This and the next ones were
-/// chosen on synthetic objects (docs/results/insertion.md).
+/// chosen on synthetic objects (docs/results/relighting.md).
 const KEPT_OF_MEAN: f32 = 0.6;
 /// The part of what is beside the mean where the shading is dark, which may be paint, and where it is bright.
 const KEPT_BESIDE: (f32, f32) = (0.2, 0.8);

@@ -150,13 +150,13 @@ pub struct ManualPlan {
 
 /// A control whose value is not what it should be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{name} is {} where {should} was set", value_words(*.is))]
+#[error("{name} is {}, but {should} was set", value_words(*.is))]
 pub struct ControlDrift {
     /// The control's name.
     pub name: String,
     /// What was set, or read before.
     pub should: i64,
-    /// What was read; `None` where it can no longer be read.
+    /// What was read; `None` if it can no longer be read.
     pub is: Option<i64>,
 }
 

@@ -259,7 +259,7 @@ fn a_reading_that_nobody_can_set_may_move() {
     assert_eq!(drift_between(&before, &after).len(), 1);
 }
 
-/// A camera of which only the controls are asked.
+/// A camera that answers only about its controls.
 struct Answers(Vec<Control>, bool);
 
 impl Camera for Answers {

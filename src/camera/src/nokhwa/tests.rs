@@ -25,7 +25,7 @@ use relit_data::session::FrameClock;
 const TIMEOUT: Duration = Duration::from_secs(20);
 const MAX_DELAY: Duration = Duration::from_millis(50);
 
-/// What the library does when a frame is asked for.
+/// What the library does when a frame is requested.
 enum Step {
     Frame(Vec<u8>),
     Fail,

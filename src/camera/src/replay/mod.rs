@@ -49,7 +49,7 @@ struct Playing {
     source: Source,
     /// What the clock showed at the start, microseconds.
     start_us: i64,
-    /// How often the recording has come to its end.
+    /// How often the recording has ended.
     round: u64,
     /// Frames handed out.
     delivered: u64,
@@ -107,7 +107,7 @@ impl Camera for ReplayCamera {
     fn set_control(&mut self, _: u32, _: i64) -> Result<i64, CameraError> {
         Err(CameraError::Unsupported {
             device: self.info.address.to_string(),
-            what: "a recording's controls stand as they were recorded".to_owned(),
+            what: "a recording's controls cannot be changed".to_owned(),
         })
     }
 
@@ -182,7 +182,7 @@ impl ReplayCamera {
         }
     }
 
-    /// The next frame of the source; the first again after the last, where that is asked for.
+    /// The next frame of the source; the first again after the last, where that is requested.
     fn take(&self, playing: &mut Playing) -> Result<CodedFrame, CameraError> {
         let mut taken = playing.source.next();
         if taken.is_none() && self.address.repeat {

@@ -130,6 +130,6 @@ fn first_format(video: &Video) -> Result<PixelFormat, CameraError> {
         .map(|(format, _)| format)
         .ok_or_else(|| CameraError::Replay {
             path: video.path().to_owned(),
-            why: "not one of its frames can be decoded; give another recording".to_owned(),
+            why: "none of its frames can be decoded; give another recording".to_owned(),
         })
 }

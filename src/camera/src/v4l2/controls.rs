@@ -152,10 +152,10 @@ impl Device {
         let fault = match (Errno::from_io_error(&error), taken) {
             (Some(Errno::NODEV), _) => return unplugged(device, error),
             (Some(Errno::ACCESS | Errno::PERM), _) => {
-                "it is read-only, or an automatic controls it: switch that off first".to_owned()
+                "it is read-only, or set automatically: switch that off first".to_owned()
             }
             (Some(Errno::BUSY), _) => {
-                "it is held while the camera streams, or by another program: stop that first"
+                "it is locked while the camera streams, or by another program: stop that first"
                     .to_owned()
             }
             // A value that does not fit into 32 bits never reaches the driver.

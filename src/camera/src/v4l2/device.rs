@@ -118,7 +118,7 @@ impl Device {
                 why: "it does not answer as a camera".to_owned(),
                 source: Some(error),
             },
-            _ => self.error("it was asked what it is", error),
+            _ => self.error("its capabilities were read", error),
         }
     }
 
@@ -174,7 +174,7 @@ mod tests {
         }
     }
 
-    /// A node that is no camera: every call is refused.
+    /// A node that is not a camera: every call is refused.
     fn null() -> Device {
         device(Node::open(Path::new("/dev/null")).unwrap())
     }

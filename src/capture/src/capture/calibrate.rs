@@ -19,7 +19,7 @@ use crate::preview::whole;
 use relit_camera::Frame;
 use relit_turntable::TurntableError;
 
-/// The file's name. It begins with a dot: nobody takes it for a recording.
+/// The file's name. Its leading dot keeps it apart from recordings.
 const FILE: &str = ".rig.json";
 /// How far the table turns for a measurement, degrees, and how fast, degrees/s.
 const JOG_DEG: f64 = 10.0;
@@ -32,10 +32,10 @@ const MIN_SHIFT: f64 = 0.02;
 const MIN_PICTURES: usize = 8;
 const AGREED: f64 = 0.8;
 
-/// What is known of the rig whose sessions lie in `root`; `None` where nothing was measured.
+/// What is known of the rig whose sessions lie in `root`; `None` before the first measurement.
 ///
 /// # Errors
-/// Where the file cannot be read: sessions would lack what a person has measured.
+/// If the file cannot be read: sessions would lack what a person has measured.
 pub fn read_facts(root: &Path) -> Result<Option<RigFacts>, CaptureError> {
     let path = path(root);
     let bytes = match fs::read(&path) {
@@ -153,7 +153,7 @@ impl Background {
         let all = right.len() + left.len();
         let most = right.len().max(left.len());
         if all < MIN_PICTURES || (most as f64) < AGREED * all as f64 {
-            let unseen = "the camera does not see which way the table turns: leave something to see behind the object, and light on it";
+            let unseen = "the camera does not see which way the table turns: make a lit background visible behind the object";
             return Err(CaptureError::Refused(unseen.to_owned()));
         }
         Ok(right.len() > left.len())
@@ -161,7 +161,7 @@ impl Background {
 }
 
 /// The least-squares shift between two pictures by their gradients (B. D. Lucas and T. Kanade, 1981), pixels to
-/// the right; `None` where there is nothing to see.
+/// the right; `None` if there is nothing to see.
 fn shift(before: &image::GrayImage, after: &image::GrayImage) -> Option<f64> {
     let (mut product, mut square) = (0.0, 0.0);
     let at = |picture: &image::GrayImage, x, y| f64::from(picture.get_pixel(x, y).0[0]);

@@ -11,7 +11,7 @@ pub struct CaptureContext<'a> {
     pub monitor: &'a Monitor,
     /// Gets the frames.
     pub preview: Option<&'a Preview>,
-    /// May be asked for at any time.
+    /// May be requested at any time.
     pub stop: &'a StopRequest,
 }
 

@@ -21,7 +21,7 @@ pub struct Equipment {
     // Dropped in this order: the table is stopped before its simulator is switched off.
     /// The camera; `None` while it is gone, and before it is opened.
     pub camera: Option<Box<dyn Camera>>,
-    /// The table; `None` while it is gone, before it is opened, and where there is none.
+    /// The table; `None` while it is gone, before it is opened, and on a rig without a table.
     pub table: Option<Table>,
     simulator: Option<SimulatedTable>,
     settings: Settings,

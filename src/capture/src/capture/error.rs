@@ -8,12 +8,12 @@ use relit_turntable::TurntableError;
 use relit_turntable::lockfile::LockError;
 use relit_turntable::simulator;
 
-/// Why there is no capture.
+/// Why a capture failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CaptureError {
     /// Something was not as it has to be before the table turns.
-    #[error("the capture was not begun: {0}")]
+    #[error("the capture did not start: {0}")]
     Refused(String),
     /// The camera.
     #[error(transparent)]
@@ -63,7 +63,7 @@ impl CaptureError {
     }
 
     pub(crate) fn no_camera() -> Self {
-        Self::Missing("there is no camera at the moment: plug it in".to_owned())
+        Self::Missing("no camera is connected: plug it in".to_owned())
     }
 }
 

@@ -67,7 +67,7 @@ pub(super) fn manifest(
     }
 }
 
-/// What a camera changes as it likes where it is not the driver that is asked: nobody can see that in
+/// What a camera may change by itself when its driver is not asked: this cannot be seen in
 /// the recording afterwards.
 fn not_held(locked: &LockedCamera) -> Vec<Fault> {
     if locked.clock == FrameClock::Driver {
@@ -77,7 +77,7 @@ fn not_held(locked: &LockedCamera) -> Vec<Fault> {
     missing
         .map(|missing| Fault {
             t_us: 0,
-            what: format!("not held during the turn: {missing}"),
+            what: format!("not locked during the turn: {missing}"),
         })
         .collect()
 }

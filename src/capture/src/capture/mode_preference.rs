@@ -14,9 +14,9 @@ const PREFERRED: [Fourcc; 5] = [
     Fourcc::NV12,
     Fourcc::RGB3,
 ];
-/// Rates that differ by less count as the same, frames a second: 29.97 is asked for as 30.
+/// Rates that differ by less count as the same, frames a second: 29.97 is requested as 30.
 const SAME_RATE: f64 = 0.05;
-/// Frames a second that can be asked for.
+/// Frames a second that can be requested.
 const MIN_FPS: f64 = 1.0;
 const MAX_FPS: f64 = 1000.0;
 
@@ -41,7 +41,7 @@ impl Default for ModePreference {
     }
 }
 
-/// Read as a camera's mode is written, `MJPG:1920x1080@30`, of which each part may be left out.
+/// Parses a camera's mode, such as `MJPG:1920x1080@30`; each part may be left out.
 impl FromStr for ModePreference {
     type Err = CaptureError;
 
@@ -66,7 +66,7 @@ impl FromStr for ModePreference {
                 preference.fourcc = Some(fourcc_of(format_and_size)?);
             }
             None if text.is_empty() => {
-                let empty = "a mode is written MJPG:1920x1080@30, or as a part of that";
+                let empty = "write a mode as MJPG:1920x1080@30, or a part of that";
                 return Err(CaptureError::Refused(empty.to_owned()));
             }
             None => {}

@@ -94,7 +94,7 @@ impl Settings {
     /// by real time.
     ///
     /// # Errors
-    /// [`CaptureError::Refused`] where one side is real and the other is to run faster.
+    /// [`CaptureError::Refused`] if one side is real and the other is to run faster.
     pub fn speed(&self) -> Result<f64, CaptureError> {
         let replayed = match &self.camera {
             CameraAddress::Replay(replay) => Some(replay.speed),
@@ -109,7 +109,7 @@ impl Settings {
             (Some(camera), None, TurntableAddress::None) => Ok(camera),
             (Some(1.0), None, _) | (None, Some(1.0), _) | (None, None, _) => Ok(1.0),
             _ => Err(CaptureError::Refused(
-                "a real camera or turntable goes by real time: leave speed= out of the other one's address"
+                "a real camera or turntable runs in real time: remove speed= from the other address"
                     .to_owned(),
             )),
         }

@@ -6,7 +6,7 @@ use super::error::{CaptureError, Stopped};
 use relit_clock::{Clock, Waitable};
 use relit_turntable::{Table, TurntableError};
 
-/// A stop that may be asked for at any time, from any thread; clones are the same request.
+/// A stop that may be requested at any time, from any thread; clones are the same request.
 #[derive(Debug, Clone)]
 pub struct StopRequest {
     state: Arc<Waitable<State>>,
@@ -48,7 +48,7 @@ impl StopRequest {
         self.asked().map_or(Ok(()), Err)
     }
 
-    /// The result of something that may have been stopped: that a stop was asked for explains an
+    /// The result of something that may have been stopped: that a stop was requested explains an
     /// error better than its consequences do, unless the table did not obey.
     ///
     /// # Errors

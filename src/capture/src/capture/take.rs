@@ -135,8 +135,8 @@ fn check_room(modulation: f64) -> Check {
     let percent = 100.0 * modulation;
     if modulation < MIN_MODULATION {
         let found = format!(
-            "the room is too even: the object's light changes by {percent:.0} % over the turn, \
-             where {:.0} % are needed to learn from it; turn on one lamp at the side, and capture the turn again",
+            "the light is too even: it changes by {percent:.0} % over the turn, but {:.0} % are needed; \
+             turn on one lamp at the side, and capture the turn again",
             100.0 * MIN_MODULATION
         );
         return Check::noted("light", found);

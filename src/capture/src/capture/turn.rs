@@ -136,7 +136,7 @@ pub(super) fn unwind(
     let unwound = stop.explain(stop.over(table, || finished.unwind()));
     if let Err(error) = &unwound {
         let why = with_causes(error);
-        let what = format!("the table did not turn back after the take, look at its cable: {why}");
+        let what = format!("the table did not turn back after the take: {why}; check its cable");
         if matches!(error, CaptureError::Stopped(_)) {
             context.monitor.update(|state| state.note(what));
         } else {

@@ -25,7 +25,7 @@ Examples:
   relit-capture serve --camera v4l2:/dev/video0 --turntable serial:
       the rig as a page for a browser
   relit-capture turntable status
-      what the table at the only controller plugged in is doing
+      the state of the table at the only controller plugged in
 
 Addresses: --camera v4l2:/dev/video0 | nokhwa:0 | replay:PATH, --turntable serial:/dev/ttyUSB0 | serial: | sim: | none.
 
@@ -51,7 +51,7 @@ pub(crate) enum Verb {
         after_help = "Example:\n  relit-capture record --object mug --turntable serial: --exposure 100"
     )]
     Record(Box<RecordArguments>),
-    /// Measure once which way the table turns, and note how high the camera looks down; sessions carry both.
+    /// Measure the table's rotation direction, and note the camera's elevation, for later sessions.
     #[command(
         after_help = "Example:\n  relit-capture calibrate --turntable serial: --elevation 18"
     )]
@@ -71,7 +71,7 @@ pub(crate) enum Verb {
 
 #[derive(Args)]
 pub(crate) struct RecordArguments {
-    /// The object's name, as it goes into the session's: letters, digits, '-', '_', '.'.
+    /// The object's name: letters, digits, '-', '_' and '.'.
     #[arg(long, value_name = "NAME")]
     pub(crate) object: String,
     #[command(flatten)]
@@ -80,7 +80,7 @@ pub(crate) struct RecordArguments {
 
 #[derive(Args)]
 pub(crate) struct CalibrateArguments {
-    /// How high the camera looks down on the table, degrees: 0 from the side [default: as noted before].
+    /// How steeply the camera looks down on the table, degrees [default: as noted before].
     #[arg(long, value_name = "DEGREES", value_parser = elevation)]
     pub(crate) elevation: Option<f64>,
     #[command(flatten)]
@@ -99,19 +99,17 @@ pub(crate) struct TurnArguments {
 
 #[derive(Args)]
 pub(crate) struct ServeArguments {
-    /// Address and port to listen on; a port alone is this machine's own, which no other reaches.
+    /// Address and port; a port alone serves this machine only.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8420")]
     pub(crate) listen: ListenAddress,
-    /// A file that holds the token, which only its owner and its group can read. Where there is none,
-    /// it is made with a random token [default: a new one at each start, where other machines can reach the
-    /// address].
+    /// The token's file, for its owner and group only; made if missing [default: a new token each start, if other
+    /// machines can reach the address].
     #[arg(long, value_name = "FILE")]
     pub(crate) token_file: Option<PathBuf>,
-    /// A name under which clients reach this machine, such as rig.local; may be given several times.
+    /// A name of this machine, such as rig.local; may be repeated.
     #[arg(long = "name", value_name = "NAME")]
     pub(crate) names: Vec<String>,
-    /// The folder in which data sets are made, where relit-mask and relit-extract are installed [default: the
-    /// one that holds --root].
+    /// The folder for data sets [default: the one that holds --root].
     #[arg(long, value_name = "DIR")]
     pub(crate) datasets: Option<PathBuf>,
     #[command(flatten)]
@@ -120,7 +118,7 @@ pub(crate) struct ServeArguments {
 
 #[derive(Args)]
 pub(crate) struct RigArguments {
-    /// The folder in which session folders are made.
+    /// The folder for session folders.
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     root: PathBuf,
     /// The camera's address.
@@ -132,8 +130,8 @@ pub(crate) struct RigArguments {
     /// Speed of the turn, degrees a second.
     #[arg(long, value_name = "SPEED", default_value_t = 7.2, value_parser = speed)]
     degrees_per_second: f64,
-    /// Pixel format, frame size and frames a second: each part may be left out. Formats are MJPG, H264, YUYV,
-    /// NV12, RGB3, GREY and 8-bit Bayer [default: compressed before raw, the largest frames at 30 a second].
+    /// Pixel format, frame size and rate, or a part of that [default: compressed before raw, the largest frames, 30 a
+    /// second].
     #[arg(long, value_name = "MJPG:1920x1080@30")]
     mode: Option<ModePreference>,
     /// Exposure to hold, in the camera's own units [default: as it is].
@@ -151,7 +149,7 @@ pub(crate) struct RigArguments {
     /// Frames that may be missing or damaged in a take.
     #[arg(long, value_name = "N", default_value_t = 0)]
     max_dropped: u64,
-    /// How often a take that came out bad is repeated; the bad ones are kept.
+    /// Retakes after a bad take; the bad ones are kept.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=100))]
     retries: u32,
 }

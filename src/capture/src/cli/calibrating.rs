@@ -35,10 +35,8 @@ pub(crate) fn run(console: Console, asked: CalibrateArguments) -> Result<Outcome
     console.say(
         &format!(
             "the table turns {}; the camera looks down by {}",
-            rotation
-                .as_deref()
-                .unwrap_or("in a direction that is not measured"),
-            elevation.map_or("an angle that is not given".to_owned(), |degrees| format!(
+            rotation.as_deref().unwrap_or("in an unknown direction"),
+            elevation.map_or("an unknown angle".to_owned(), |degrees| format!(
                 "{degrees} degrees"
             ))
         ),

@@ -13,9 +13,7 @@ use relit_console::{Console, Event, Outcome};
 pub(crate) fn run(console: Console) -> ExitCode {
     let cameras = camera::list();
     if cameras.is_empty() {
-        console.warn(
-            "no camera was found: plug one in; a recording can stand in for it (replay:PATH)",
-        );
+        console.warn("no camera was found: plug one in, or replay a recording (replay:PATH)");
     }
     for camera in &cameras {
         report_camera(console, camera);
@@ -81,7 +79,7 @@ fn described(control: &Control) -> String {
         ),
     };
     let note = if control.flags.inactive {
-        ", an automatic controls it"
+        ", set automatically"
     } else {
         ""
     };
@@ -109,7 +107,7 @@ fn report_turntable(console: Console) {
     };
     let addresses: Vec<String> = ports.iter().map(|port| format!("serial:{port}")).collect();
     let text = match addresses.as_slice() {
-        [address] => format!("{address}: a port that a turntable's controller may be at"),
+        [address] => format!("{address}: possibly a turntable's controller"),
         several => several.join("\n"),
     };
     console.say(&text, &Event::Turntable { addresses });

@@ -54,22 +54,21 @@ pub(crate) fn make_root(settings: &Settings) -> Result<MadeFolder, CaptureError>
     MadeFolder::make(&settings.root).map_err(CaptureError::system(root, "made"))
 }
 
-/// Asks the person at the terminal whether a real table may turn; where there is none, nobody agrees.
+/// Asks the person at the terminal whether a real table may turn; without a terminal the answer is no.
 pub(crate) fn agreed(console: Console, settings: &Settings) -> Result<bool, CaptureError> {
     if !matches!(settings.turntable, TurntableAddress::Serial(_)) {
         return Ok(true);
     }
     let mut answer = String::new();
     if io::stdin().is_terminal() {
-        console.ask(
-            "The table will look for its zero and turn. Is its way and its cable free? [y/N] ",
-        );
+        console
+            .ask("The table will find its zero and turn. Can it and its cable move freely? [y/N] ");
         let read = io::stdin().read_line(&mut answer);
         read.map_err(CaptureError::system("the answer", "read"))?;
     }
     let agreed = matches!(answer.trim(), "y" | "Y" | "yes");
     if !agreed {
-        console.warn("the table was not turned: nobody agreed; --yes agrees beforehand");
+        console.warn("the table was not turned: nobody confirmed; --yes confirms beforehand");
     }
     Ok(agreed)
 }
@@ -190,9 +189,9 @@ fn report(console: Console, captured: &Captured, folder: &str) -> Outcome {
 fn judgement(captured: &Captured) -> (&'static str, Outcome) {
     match captured.take.verdict {
         Verdict::Clean if captured.repeated == 0 => ("clean", Outcome::Success),
-        Verdict::Clean => ("clean, after a take that is not usable", Outcome::Partial),
+        Verdict::Clean => ("clean, after an unusable take", Outcome::Partial),
         Verdict::Tolerated => ("whole, with remarks", Outcome::Partial),
-        Verdict::Aborted => ("not usable, kept as aborted", Outcome::Failure),
+        Verdict::Aborted => ("unusable, kept as aborted", Outcome::Failure),
     }
 }
 

@@ -57,7 +57,7 @@ pub(crate) fn run(console: Console, asked: &TurntableArguments) -> Result<Outcom
 fn open(console: Console, port: &Path, options: &TableOptions) -> Result<Table, TurntableError> {
     let table = Table::open_serial(port, options)?;
     if table.was_stopped() {
-        console.warn("the table was moving and no program had it: it was stopped");
+        console.warn("the table was moving without a program: it was stopped");
     }
     Ok(table)
 }
@@ -99,8 +99,8 @@ fn home(console: Console, table: &Table) -> Result<Outcome, TurntableError> {
     let status = table.status()?;
     if homed == Homed::WhereItStands {
         console.warn(
-            "the controller looks for no index (homing is off, $22=0): zero is where the table \
-             stands, for as long as it is not switched off or reset",
+            "homing is off ($22=0): zero is where the table stands, until the controller is switched \
+             off or reset",
         );
     }
     report(console, Event::Homed, &status);

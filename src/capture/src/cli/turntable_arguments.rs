@@ -8,28 +8,28 @@ use relit_turntable::TurntableAddress;
 pub(crate) const TURNTABLE_EXAMPLES: &str = "\
 Examples:
   relit-capture turntable status
-      what the table at the only controller plugged in is doing
+      the state of the table at the only controller plugged in
   relit-capture turntable --turntable serial:/dev/ttyUSB0 home
-      find the index, or make zero of where the table stands
+      find the index, or take the present angle as zero
   relit-capture turntable jog -90
       turn by 90 degrees, back
   relit-capture turntable jog --home 45
       find zero, then turn to 45 degrees
   relit-capture turntable stop
-      stop it; a capture that has the table is ended
+      stop it, and end a capture that uses it
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost.";
 
 pub(crate) const SIMULATE_EXAMPLES: &str = "\
 Examples:
   relit-capture simulate --link /tmp/table
-      then, beside it: relit-capture turntable --turntable serial:/tmp/table status
+      then, in another terminal: relit-capture turntable --turntable serial:/tmp/table status
   relit-capture simulate --fault drop=0.01,flip=0.005 --fault reset@12.5s
       a bad line, and a controller that restarts
 
 Faults: drop=SHARE flip=SHARE duplicate=SHARE merge=SHARE delay=SHARE:TIME of bytes or lines, with
 `to.` or `from.` before them for one direction; reset@TIME and stall@TIME; estop@TIME
-or estop@TIME:TIME presses the emergency stop, for good or for so long.";
+or estop@TIME:TIME presses the emergency stop, for good or for a time.";
 
 #[derive(Args)]
 pub(crate) struct TurntableArguments {
@@ -46,20 +46,19 @@ pub(crate) enum Action {
     Status,
     /// Find the index; without an index sensor, count from where the table stands.
     Home,
-    /// Turn by so many degrees, negative for back, and wait until it is done.
+    /// Turn the table by an angle, negative for back, and wait for the end.
     Jog {
         /// Degrees from here.
         #[arg(value_name = "DEGREES", allow_negative_numbers = true, value_parser = degrees)]
         degrees: f64,
-        /// Degrees a second; by default as fast as is gentle.
+        /// Speed, degrees a second [default: 30, or the highest of a slower table].
         #[arg(long, value_name = "DEGREES_PER_SECOND", value_parser = degrees)]
         speed: Option<f64>,
-        /// Home the table first: where opening the port resets the controller, a table with an index
-        /// (`$22=1`) is locked each time.
+        /// Home the table first; needed if opening the port resets the controller and `$22=1`.
         #[arg(long)]
         home: bool,
     },
-    /// Slow the table down to a stop and drop what it had to do; a program of the toolkit that has it is ended.
+    /// Stop the table smoothly, drop its queue, and end the relit program that uses it.
     Stop,
     /// Release the lock after an alarm.
     Unlock,
@@ -67,13 +66,13 @@ pub(crate) enum Action {
 
 #[derive(Args)]
 pub(crate) struct SimulateArguments {
-    /// Make PATH a second name of the port.
+    /// Link PATH to the simulated port.
     #[arg(long, value_name = "PATH")]
     pub(crate) link: Option<PathBuf>,
-    /// How many times faster than real time it runs.
+    /// Speed, as a multiple of real time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     pub(crate) speed: f64,
-    /// What goes wrong, such as drop=0.01 or reset@12.5s; may be given again.
+    /// A fault, such as drop=0.01 or reset@12.5s; may be repeated.
     #[arg(long, value_name = "FAULT")]
     pub(crate) fault: Vec<String>,
 }

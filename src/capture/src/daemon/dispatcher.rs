@@ -38,7 +38,7 @@ pub(super) enum Job {
 pub(super) enum Next {
     /// Nothing is to be done.
     Idle,
-    /// This job, until its stop is asked for.
+    /// This job, until its stop is requested.
     Job(Job, StopRequest),
     /// No more jobs come.
     End,
@@ -80,11 +80,11 @@ impl Dispatcher {
         &self.monitor
     }
 
-    /// Makes this the job, where there is none.
+    /// Makes this the job, unless one is running.
     pub(super) fn submit(&self, job: Job) -> Result<(), Refused> {
         let mut plan = self.lock();
         if plan.is_ending {
-            let ending = "the rig is about to end: start the program again";
+            let ending = "the program is ending: start it again";
             return Err(Refused::Unavailable(ending.to_owned()));
         }
         if let Some(current) = &plan.current {
@@ -118,7 +118,7 @@ impl Dispatcher {
         self.end();
         self.monitor.fault(
             self.clock.now_us(),
-            "what drives camera and table failed, which is an error in this program: start it again",
+            "the control of camera and table failed, which is an error in this program: start it again",
         );
     }
 

@@ -18,7 +18,7 @@ use relit_clock::Clock;
 
 /// Longest wait for a frame in one go: how late a command is noticed.
 const FRAME_WAIT: Duration = Duration::from_millis(50);
-/// Without a frame for so long the camera is opened anew.
+/// After this long without a frame the camera is opened again.
 const SILENCE: Duration = Duration::from_secs(2);
 /// Time between two requests for the table's status.
 const TABLE_PERIOD: Duration = Duration::from_millis(250);
@@ -57,7 +57,7 @@ impl Idle {
         }
     }
 
-    /// Checks everything anew, after something else used camera and table.
+    /// Checks everything again, after something else used camera and table.
     pub(super) fn restart(&mut self) {
         let now_us = self.clock.now_us();
         (self.last_frame_us, self.counted) = (now_us, None);
@@ -138,7 +138,7 @@ impl Idle {
         }
     }
 
-    /// Shows the free space of the folder of sessions, or that there is no folder any more.
+    /// Shows the free space of the folder of sessions, or that the folder is gone.
     fn look_at_folder(&self, root: &Path) {
         let fault = match free_bytes(root) {
             Ok(free) => {

@@ -42,7 +42,7 @@ impl Daemon {
     /// the worker, which opens camera and table, and keeps trying while they are not there.
     ///
     /// # Errors
-    /// [`CaptureError::Lock`] where another daemon has them, [`CaptureError::Refused`] for speeds that do not fit, or what
+    /// [`CaptureError::Lock`] if another daemon has them, [`CaptureError::Refused`] for speeds that do not fit, or what
     /// the system answers.
     pub fn start(settings: Settings) -> Result<Self, CaptureError> {
         // The lock of the folder is a file in it: nothing is left there where the camera is another's.
@@ -175,7 +175,7 @@ fn check_object(object: &str) -> Result<(), Refused> {
     preflight::check_object(object).map_err(Refused::Invalid)
 }
 
-/// Recovers what an earlier run left, and shows what came of it.
+/// Recovers what an earlier run left, and reports the result.
 fn report_recovered(root: &Path, clock: &Clock, monitor: &Monitor) -> Result<(), CaptureError> {
     for found in recover(root)? {
         monitor.fault(clock.now_us(), found.to_string());

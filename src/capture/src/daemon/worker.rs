@@ -111,7 +111,7 @@ impl Worker {
         motion: impl FnOnce(&Table) -> Result<T, TurntableError> + Send,
     ) -> Result<T, CaptureError> {
         let Some(table) = self.equipment.table.as_ref() else {
-            let none = "there is no turntable at the moment: plug it in, or look at its fault";
+            let none = "no turntable is connected: plug it in, or look at its fault";
             return Err(CaptureError::Missing(none.to_owned()));
         };
         let clock = self.equipment.clock();

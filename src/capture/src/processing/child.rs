@@ -1,4 +1,4 @@
-//! A program that works on a session: it can be held and ended, and is heard line by line.
+//! A program that works on a session: it can be paused and ended, and its output is read line by line.
 
 use std::fs::File;
 use std::io;
@@ -50,7 +50,7 @@ impl Worker {
         })
     }
 
-    /// Hands on what was said since.
+    /// Passes on what the program printed since.
     pub(super) fn hear(&mut self, heard: &mut ProgramEvent) {
         let mut piece = [0; 4096];
         while let Ok(count @ 1..) = self.output.read_at(&mut piece, self.read) {
@@ -87,7 +87,7 @@ impl Worker {
         }
     }
 
-    /// How the program ended, once it has, and everything that it said was heard.
+    /// How the program ended, once it has and all its output is read.
     pub(super) fn ended(&mut self, heard: &mut ProgramEvent) -> io::Result<Option<ExitStatus>> {
         let status = self.child.try_wait()?;
         if status.is_some() {
@@ -103,7 +103,7 @@ impl Worker {
         let from = written.saturating_sub(COMPLAINT);
         match self.errors.read_exact_at(&mut end, from) {
             Ok(()) => String::from_utf8_lossy(&end).into_owned(),
-            Err(error) => format!("what the program said could not be read: {error}"),
+            Err(error) => format!("the program's output could not be read: {error}"),
         }
     }
 

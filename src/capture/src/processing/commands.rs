@@ -27,7 +27,7 @@ pub(super) struct StepPlaces {
 }
 
 impl ProcessingPrograms {
-    /// The command of a step; `None` where its program is not installed.
+    /// The command of a step; `None` if its program is not installed.
     pub(super) fn command(&self, step: ProcessingStep, places: &StepPlaces) -> Option<Command> {
         let (session, dataset) = (places.session.as_os_str(), places.dataset.as_os_str());
         let (program, mut arguments): (_, Vec<OsString>) = match step {
@@ -51,7 +51,7 @@ impl ProcessingPrograms {
         Some(self.launch(program.as_deref()?, arguments))
     }
 
-    /// The editor of a session's mask, on this machine alone. It goes on with a `recipe` where there is one.
+    /// The editor of a session's mask, on this machine alone. It continues with a `recipe` where there is one.
     pub(super) fn editor(&self, session: &Path, recipe: Option<&Path>) -> Option<Command> {
         let mut arguments: Vec<OsString> = vec![session.into(), "--edit".into(), "--json".into()];
         match recipe {

@@ -91,7 +91,7 @@ impl OpenEditor {
         self.used.elapsed() < IN_USE
     }
 
-    /// Holds it while the rig is busy. False once it is over: accepted, discarded, or left alone.
+    /// Holds it while the rig is busy. False once it is over: accepted, discarded, or abandoned.
     pub(super) fn look_after(&mut self, held: bool) -> bool {
         self.worker.hear(&mut self.heard);
         self.worker.hold(held);

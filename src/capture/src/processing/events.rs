@@ -48,7 +48,7 @@ impl SkippedSession {
         } else if self.broken {
             Some("it is broken")
         } else if self.lossy {
-            Some("something of it is lost")
+            Some("parts of it are lost")
         } else {
             None
         }
@@ -62,7 +62,7 @@ pub(super) struct EditorPlace {
     pub(super) url: String,
 }
 
-/// All that was heard of a program.
+/// All that a program reported.
 #[derive(Debug, Default)]
 pub(super) struct ProgramEvent {
     progress: Option<(u64, u64)>,
@@ -109,7 +109,7 @@ impl ProgramEvent {
         }
     }
 
-    /// The newest word on how far the work has come, once.
+    /// The newest word on the progress, once.
     pub(super) fn take_progress(&mut self) -> Option<(u64, u64)> {
         self.progress.take()
     }
@@ -128,12 +128,12 @@ impl ProgramEvent {
             Some(last.strip_prefix("error: ").unwrap_or(last).to_owned())
         };
         said.or_else(last).unwrap_or_else(|| match exit_code {
-            Some(code) => format!("the program ended with exit code {code} and said nothing"),
-            None => "the program was ended by a signal: look at the machine's memory".to_owned(),
+            Some(code) => format!("the program ended with exit code {code}, without a message"),
+            None => "the program was ended by a signal: check the machine's memory".to_owned(),
         })
     }
 
-    /// How a step ended whose program had this exit code; none where a signal ended it.
+    /// How a step ended whose program had this exit code; `None` if a signal ended it.
     pub(super) fn end(
         mut self,
         step: ProcessingStep,
@@ -153,7 +153,7 @@ impl ProgramEvent {
         })
     }
 
-    /// The check looks at a mask of which its maker is unsure.
+    /// Doubts of relit-mask about its own mask count too.
     fn masked(&self) -> StepEnd {
         match self.warnings.first() {
             None => good("the mask is made"),

@@ -1,7 +1,7 @@
 //! What is made of recorded sessions: masks, their check, the extraction, by the programs relit-mask and
 //! relit-extract where they are installed.
 //!
-//! The `queue` decides what is done when, `heard` what a program's words mean; both are without I/O. One thread
+//! The `queue` decides what is done when, `events` what a program's words mean; both are without I/O. One thread
 //! starts the programs as `child` processes. While the rig captures or moves nothing begins,
 //! and what runs is stopped (`SIGSTOP`) until the rig rests. Results lie where the programs leave them, in the session
 //! and the data set; only the settings are kept (`store`) here.
@@ -80,7 +80,7 @@ impl Processing {
             .map_err(ProcessingError::from_io(missing))?;
         let settings =
             ProcessingSettings::read(&root).map_err(ProcessingError::from_io(format!(
-                "{} could not be read: mend it, or remove it and set again what it held",
+                "{} could not be read: repair it, or remove it and set its choices again",
                 store::path(&root).display()
             )))?;
         let beside = || root.parent().unwrap_or(&root).to_owned();
@@ -120,7 +120,7 @@ impl Processing {
     /// Queues steps for a session; returns the job's number.
     ///
     /// # Errors
-    /// [`Refused`] where a program is missing, or the session is being worked on.
+    /// [`Refused`] if a program is missing, or the session is being worked on.
     pub fn submit(&self, session: &str, steps: Vec<ProcessingStep>) -> Result<u64, Refused> {
         if self.shared.editor().as_ref().is_some_and(|open| {
             open.session == session && open.is_in_use() && steps.contains(&ProcessingStep::Mask)
@@ -135,7 +135,7 @@ impl Processing {
         })
     }
 
-    /// Cancels a job; its program is ended. False where there is none of that number.
+    /// Cancels a job; its program is ended. False if no job has that number.
     pub fn cancel(&self, number: u64) -> bool {
         self.shared.change(|plan| plan.queue.cancel(number))
     }
@@ -149,7 +149,7 @@ impl Processing {
     /// Ends all work on a session, so that its folder can be moved.
     ///
     /// # Errors
-    /// [`Refused::Busy`] where a program does not end.
+    /// [`Refused::Busy`] if a program does not end.
     pub fn release(&self, session: &str) -> Result<(), Refused> {
         self.shared.close_editor_of(session);
         self.shared
@@ -165,10 +165,10 @@ impl Processing {
         Ok(())
     }
 
-    /// Opens the editor of a session's mask, or goes on with the one that is open.
+    /// Opens the editor of a session's mask, or continues with the one that is open.
     ///
     /// # Errors
-    /// [`Refused`] where the program is missing or fails, the rig is busy, or somebody edits another session.
+    /// [`Refused`] if the program is missing or fails, the rig is busy, or somebody edits another session.
     pub fn edit(&self, session: &str) -> Result<(), Refused> {
         if is_busy(&self.shared.monitor) {
             return Err(Refused::Busy(HELD.to_owned()));
@@ -193,7 +193,7 @@ impl Processing {
     /// Where requests for the editor go.
     ///
     /// # Errors
-    /// [`Refused`] where none is open, or it is held while the rig is busy.
+    /// [`Refused`] if none is open, or it is held while the rig is busy.
     pub(crate) fn editor(&self) -> Result<EditorTarget, Refused> {
         if is_busy(&self.shared.monitor) {
             return Err(Refused::Unavailable(HELD.to_owned()));

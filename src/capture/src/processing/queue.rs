@@ -101,7 +101,7 @@ impl ProcessingQueue {
         all.any(|entry| entry.work.session == session)
     }
 
-    /// Takes a job out, or has its program ended. False where there is none of that number.
+    /// Takes a job out, or has its program ended. False if no job has that number.
     pub(super) fn cancel(&mut self, number: u64) -> bool {
         if let Some(current) = &mut self.current
             && current.entry.number == number

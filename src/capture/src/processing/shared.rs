@@ -56,8 +56,8 @@ pub(super) struct Plan {
     pub(super) programs: ProcessingPrograms,
 }
 
-/// What is said of the editor while the rig is busy.
-pub(super) const HELD: &str = "the rig is capturing: the editor goes on when it rests";
+/// The editor's message while the rig is busy.
+pub(super) const HELD: &str = "the rig is capturing: the editor continues afterwards";
 
 /// Whether the rig captures or moves, so that nothing may take its processor or disk.
 pub(super) fn is_busy(monitor: &Monitor) -> bool {
@@ -86,7 +86,8 @@ impl Shared {
             Some(open) if open.session == session => open.touch(),
             Some(open) if open.is_in_use() => {
                 let other = &open.session;
-                let error = format!("somebody edits the mask of {other}: finish or close it there");
+                let error =
+                    format!("the mask of {other} is being edited: finish or close it there");
                 return Err(Refused::Busy(error));
             }
             _ => {
@@ -115,7 +116,7 @@ impl Shared {
         })
     }
 
-    /// Changes the plan, keeps on disk what is to outlast the program, and shows what came of it.
+    /// Changes the plan, saves what is to outlast the program, and shows the result.
     pub(super) fn change<T>(&self, change: impl FnOnce(&mut Plan) -> T) -> T {
         let mut plan = self.plan();
         let before = plan.settings;
@@ -128,7 +129,7 @@ impl Shared {
             let path = store::path(&self.root);
             self.monitor.update(|state| {
                 state.note(format!(
-                    "{} could not be written, what is set is forgotten at the next start: {error}",
+                    "{} could not be written: {error}; the next start forgets what was set",
                     path.display()
                 ));
             });

@@ -7,7 +7,7 @@ use std::{fs, io};
 use relit_data::durable;
 use serde::{Deserialize, Serialize};
 
-/// The file's name, in the folder of sessions. It begins with a dot: nobody takes it for a recording.
+/// The file's name, in the folder of sessions. Its leading dot keeps it apart from recordings.
 const FILE: &str = ".processing.json";
 
 /// What a person decides about processing.
@@ -19,7 +19,7 @@ pub(crate) struct ProcessingSettings {
 }
 
 impl ProcessingSettings {
-    /// What is kept in a folder of sessions; the usual where there is no such file.
+    /// What is kept in a folder of sessions; the defaults if the file does not exist.
     pub(super) fn read(root: &Path) -> io::Result<Self> {
         match fs::read(path(root)) {
             Ok(bytes) => Ok(serde_json::from_slice(&bytes)?),

@@ -54,7 +54,7 @@ pub(super) async fn events(
 
 /// Give the rig a command
 ///
-/// Answers once the rig has taken or refused it; what comes of it shows in the state. Of several starts at
+/// Answers once the rig has taken or refused it; the result shows in the state. Of several starts at
 /// once, one is taken.
 pub(super) async fn command(
     State(rig): State<Arc<dyn Rig>>,

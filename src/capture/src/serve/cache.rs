@@ -46,7 +46,7 @@ pub(super) struct FileVersion {
 }
 
 impl FileVersion {
-    /// `None` where there is no such file.
+    /// `None` if the file does not exist.
     pub(super) fn read(path: &Path) -> Option<Self> {
         let data = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
         Some(Self {

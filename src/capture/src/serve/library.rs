@@ -73,7 +73,7 @@ pub(super) struct SessionDetail {
     pub(super) has_mask: bool,
     /// Each frame's time, seconds after the first.
     pub(super) times_s: Vec<f64>,
-    /// Each frame's angle, degrees; `null` where there was no table.
+    /// Each frame's angle, degrees; `null` without a table.
     pub(super) angles_deg: Vec<Option<f64>>,
 }
 
@@ -138,7 +138,7 @@ impl Library {
         Ok(names)
     }
 
-    /// The summary of a session, without what was made of it. `None` where it has gone meanwhile.
+    /// The summary of a session, without what was made of it. `None` if it has gone meanwhile.
     pub(super) fn summary(&self, root: &Path, name: &str) -> Option<SessionSummary> {
         let folder = root.join(name);
         let version = FileVersion::read(&folder.join(MANIFEST_FILE))?;
@@ -265,7 +265,7 @@ impl Library {
         if is_session_name(id) && folder.join(MANIFEST_FILE).is_file() {
             Ok(folder)
         } else {
-            Err(Failure::not_found("there is no session of that name"))
+            Err(Failure::not_found("no session has that name"))
         }
     }
 }

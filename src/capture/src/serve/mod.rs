@@ -143,7 +143,7 @@ pub fn serve(
     served
 }
 
-/// Beats for as long as server and rig run: that this goes on means that threads run and the monitor's
+/// Beats for as long as server and rig run: that this continues means that threads run and the monitor's
 /// locks come free.
 async fn beat(heartbeat: Heartbeat, rig: Arc<dyn Rig>) {
     let mut ticks = interval(heartbeat.period);

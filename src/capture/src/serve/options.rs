@@ -64,7 +64,7 @@ impl fmt::Debug for Heartbeat {
 /// What all clients together may take up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClientLimits {
-    /// Their connections, whatever is asked for on them.
+    /// Their connections, whatever is requested on them.
     pub connections: ConnectionLimits,
     /// Requests for the preview at once.
     pub viewers: usize,

@@ -72,7 +72,7 @@ impl Permits {
             job()
         });
         done.await
-            .unwrap_or_else(|_| Err(Failure::broken("the request could not be worked on")))
+            .unwrap_or_else(|_| Err(Failure::broken("the request could not be processed")))
     }
 }
 

@@ -38,7 +38,7 @@ pub(super) async fn picture(
     QueryParams(After { after }): QueryParams<After>,
 ) -> Result<Response, Failure> {
     let Some(after) = after else {
-        let none = || Failure::busy("there is no picture yet: the camera has not delivered one");
+        let none = || Failure::busy("no picture yet: the camera has not delivered one");
         return Ok(jpeg(monitor.preview().ok_or_else(none)?));
     };
     let _permit = permit(&permits.viewers, "viewers of the preview")?;

@@ -82,7 +82,7 @@ pub(super) struct ExtractionState {
 pub(super) struct SessionResults {
     /// How far it has come.
     pub(super) stage: SessionStage,
-    /// True where a person has to look; false where all that was made is good; `null` where nothing was.
+    /// True if a person has to look; false if all results are good; `null` without results.
     pub(super) is_doubtful: Option<bool>,
     /// Its mask.
     pub(super) mask: Option<MaskState>,
@@ -98,7 +98,7 @@ pub(super) type Entry = (ExtractionState, String);
 /// The entries of a data set's sessions by their names.
 pub(super) type DatasetEntries = BTreeMap<String, Entry>;
 
-/// What a data set says of its sessions. A description that cannot be read tells of none; `relit-extract` says what
+/// What a data set says about its sessions. A description that cannot be read tells of none; `relit-extract` says what
 /// is wrong with it.
 pub(super) fn entries_in(dataset: &Path) -> DatasetEntries {
     let sessions = Dataset::read(dataset).map(|dataset| dataset.sessions);
@@ -196,7 +196,7 @@ fn judged(results: &SessionResults) -> (SessionStage, Option<bool>) {
     }
 }
 
-/// The content of a JSON file; `None` where there is none, or it is something else.
+/// The content of a JSON file; `None` if it does not exist, or is not JSON.
 fn json(path: &Path) -> Option<Value> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }

@@ -129,13 +129,11 @@ fn of_a_session() -> Router<App> {
 
 async fn no_such_path(request: Request) -> Failure {
     let path = request.uri().path();
-    Failure::not_found(format!(
-        "there is nothing at {path}: the manual lists what there is"
-    ))
+    Failure::not_found(format!("{path} does not exist: the manual lists all paths"))
 }
 
 async fn no_such_method(request: Request) -> Failure {
     let (method, path) = (request.method(), request.uri().path());
-    let error = format!("{path} cannot be asked with {method}: the manual lists with what it can");
+    let error = format!("{path} does not take {method}: the manual lists all methods");
     Failure::new(StatusCode::METHOD_NOT_ALLOWED, error)
 }

@@ -18,7 +18,7 @@ use relit_web::{Failure, JsonBody, QueryParams};
 /// Sessions in one answer, unless asked otherwise, and at most.
 const SESSIONS: usize = 100;
 const MAX_SESSIONS: usize = 1000;
-/// Width of a frame in the player, unless asked otherwise, and what can be asked for; pixels.
+/// Width of a frame in the player, unless asked otherwise, and what can be requested; pixels.
 const WIDTH: u32 = 960;
 const WIDTHS: std::ops::RangeInclusive<u32> = 64..=1920;
 /// Recorded pictures do not change.
@@ -100,7 +100,7 @@ pub(super) async fn trash(
     Ok(Json(list.await?))
 }
 
-/// What a person says of a take; a field that is left out or `null` is removed.
+/// What a person says about a take; a field that is left out or `null` is removed.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Annotations {
@@ -153,7 +153,7 @@ pub(super) async fn frame(
     QueryParams(Size { width }): QueryParams<Size>,
 ) -> Result<Response, Failure> {
     let number = frame.strip_suffix(".jpg").and_then(|n| n.parse().ok());
-    let unknown = || Failure::not_found("there is no such frame: ask for a number and \".jpg\"");
+    let unknown = || Failure::not_found("no such frame: ask for a number and \".jpg\"");
     let number: u64 = number.ok_or_else(unknown)?;
     let width = width.unwrap_or(WIDTH).clamp(*WIDTHS.start(), *WIDTHS.end());
     let jpeg = permits.run(Work::Decoding, move || {

@@ -10,7 +10,7 @@ use relit_web::Failure;
 
 use super::library::{Library, SessionSummary, read_names};
 
-/// Where sessions go that were put away. It begins with a dot: nobody takes it for a session.
+/// Where deleted sessions go. Its leading dot keeps it apart from sessions.
 const TRASH: &str = ".trash";
 
 impl Library {
@@ -43,7 +43,7 @@ impl Library {
     pub(super) fn restore(&self, id: &str) -> Result<(), Failure> {
         let folder = self.root.join(TRASH).join(id);
         if !is_session_name(id) || !folder.is_dir() {
-            let error = "no session of that name was put away";
+            let error = "no session of that name is in the trash";
             return Err(Failure::not_found(error));
         }
         move_folder(id, &folder, &self.root.join(id))

@@ -91,13 +91,13 @@ pub enum AdvisedAction {
 pub struct AdvisedButton {
     /// What stands on it.
     pub text: String,
-    /// What it does; `null` where nothing can be done by a button.
+    /// What it does; `null` if nothing can be done by a button.
     pub action: Option<AdvisedAction>,
     /// The object that it captures, where that is settled.
     pub object: Option<String>,
 }
 
-/// What a person at the rig is told, and the one thing to do next.
+/// The message for the person at the rig, and the one thing to do next.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Advice {
     /// How the rig stands, in a few words.
@@ -108,7 +108,7 @@ pub struct Advice {
     pub button: AdvisedButton,
 }
 
-/// The advice of a rig of which nothing is known yet.
+/// The advice before anything is known of the rig.
 impl Default for Advice {
     fn default() -> Self {
         Self::against(&Obstacle::no_camera(None))

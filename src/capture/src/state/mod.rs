@@ -1,4 +1,4 @@
-//! What the rig is doing, as everybody beside it sees it: terminal, page, metrics.
+//! What the rig is doing, for terminal, page and metrics.
 //!
 //! One [`Monitor`] a rig. The capture writes into it, any number of viewers read or subscribe; none of
 //! them can hold the capture up. What follows from it for the person at the rig is [`Advice`]. This module
@@ -46,7 +46,7 @@ pub struct RigState {
     pub session: Option<String>,
     /// Frames written of the present take.
     pub frames: u64,
-    /// Frames the present take shall have.
+    /// Frames that the present take is to have.
     pub frames_wanted: u64,
     /// Frames found missing so far.
     pub dropped: u64,

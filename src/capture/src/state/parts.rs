@@ -62,7 +62,7 @@ pub struct TakeSummary {
     pub frames: u64,
     /// Frames missing of the turn.
     pub dropped: u64,
-    /// Whether it ended early because somebody stopped it: that is no fault.
+    /// Whether it ended early because somebody stopped it, which is not a fault.
     pub is_stopped: bool,
     /// Why, in a sentence, where the verdict is not clean.
     pub reason: Option<String>,
@@ -92,7 +92,7 @@ pub struct TableState {
     pub low_deg: Option<f64>,
     /// How far it may turn on, degrees from the angle 0.
     pub high_deg: Option<f64>,
-    /// Why a take's turn has no room in the cable from where it stands, in a sentence; `None` where it has, or zero is not
+    /// Why a take's turn has no room in the cable from where it stands, in a sentence; `None` if it has, or zero is not
     /// known.
     pub no_room: Option<String>,
     /// Volts of its battery, where it is measured.
@@ -152,7 +152,7 @@ pub struct CaptureSettings {
     pub camera: String,
     /// The turntable's address.
     pub turntable: String,
-    /// Frame width and height that are asked for, pixels; `null` for the largest.
+    /// Frame width and height that are requested, pixels; `null` for the largest.
     pub size: Option<(u32, u32)>,
     /// Frames a second.
     pub fps: f64,
@@ -169,7 +169,7 @@ pub struct CaptureSettings {
 pub struct Check {
     /// What was checked.
     pub what: String,
-    /// False where it is not as it should be, and the capture goes on all the same.
+    /// False where it is not as it should be, and the capture continues all the same.
     pub good: bool,
     /// What was found.
     pub found: String,

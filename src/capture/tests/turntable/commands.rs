@@ -42,7 +42,7 @@ impl Simulated {
         ask(&self.port(), words)
     }
 
-    /// Starts a jog in a process of its own, and waits until the table moves.
+    /// Starts a jog in its own process, and waits until the table moves.
     fn jog(&self, words: &[&str]) -> Child {
         let mut jog = Command::new(PROGRAM)
             .args(["turntable", "--turntable"])
@@ -74,7 +74,7 @@ fn ask(port: &Path, words: &[&str]) -> Output {
         .unwrap()
 }
 
-/// A simulator in a process of its own, until it is dropped.
+/// A simulator in its own process, until it is dropped.
 struct Program(Child);
 
 impl Drop for Program {

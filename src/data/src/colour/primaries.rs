@@ -104,7 +104,7 @@ impl Primaries {
     }
 }
 
-/// A matrix to Rec. 709; none where it changes nothing.
+/// A matrix to Rec. 709; `None` if it changes nothing.
 pub(crate) fn significant(matrix: Exact) -> Option<Matrix> {
     let changes = (0..3).any(|row| {
         (0..3).any(|column| {
@@ -139,7 +139,7 @@ pub(crate) fn multiply(a: &Exact, b: &Exact) -> Exact {
     a.map(|row| std::array::from_fn(|column| (0..3).map(|k| row[k] * b[k][column]).sum()))
 }
 
-/// None where there is no inverse, or a number is none.
+/// None if the matrix is singular, or a number is not finite.
 pub(crate) fn inverse(m: &Exact) -> Option<Exact> {
     let minor = |row: usize, column: usize| {
         let (r, c) = (

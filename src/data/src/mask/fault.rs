@@ -3,7 +3,7 @@
 /// How many labels a message lists.
 const LISTED: usize = 6;
 
-/// Why a picture is no mask of an object. Each begins with a verb, after "the mask PATH".
+/// Why a picture is not a mask of an object. Each begins with a verb, after "the mask PATH".
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MaskFault {
@@ -17,7 +17,7 @@ pub enum MaskFault {
     Labels(String),
     /// It marks nothing.
     #[error(
-        "is empty: its brightest pixel has {brightest} of {white}, and the object has to be at least half as bright as white; make it again with relit-mask, or paint the object white"
+        "is empty: its brightest pixel is {brightest} of {white}, less than half; make it again with relit-mask, or paint the object white"
     )]
     Empty {
         /// The largest value.

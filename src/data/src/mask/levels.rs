@@ -12,7 +12,7 @@ const LABEL_AREA: f64 = 0.02;
 const BLURRED: f64 = 8.0;
 /// Tones between these are neither black nor white, of 255.
 const TONES: (f64, f64) = (32.0, 224.0);
-/// The fraction of what is not black, or of what is not white, that is tones in a picture that is no mask.
+/// The share of tones, among what is not black or what is not white, from which a picture is not a mask.
 const TONES_THERE: f64 = 1.0 / 3.0;
 /// Fraction of its half of the levels that is nearly black or nearly white in a mask with soft edges.
 const PLATEAU: f64 = 0.2;

@@ -99,7 +99,7 @@ impl MaskPicture {
     /// Which pixels are the object's.
     ///
     /// # Errors
-    /// [`MaskFault`] where it marks nothing, several things, or is no mask.
+    /// [`MaskFault`] if it marks nothing, marks several things, or is not a mask.
     pub fn object(&self) -> Result<ObjectPixels, MaskFault> {
         match &self.alpha {
             Some(alpha) if alpha.iter().any(|&a| !self.is_bright(a)) => self.by_alpha(alpha),

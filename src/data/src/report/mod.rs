@@ -1,7 +1,7 @@
 //! The HTML page that shows one extracted session: the result, its warnings, and how the light moved around the object.
 //!
 //! One file that a browser opens from disk without a network: the frames are `data:` URIs, the plots
-//! are inline SVG, and there is no script. The same input gives the same bytes.
+//! are inline SVG, and it has no script. The same input gives the same bytes.
 //!
 //! This module knows the frame's record ([`crate::shard::record`]) and small RGB images. It knows nothing of videos,
 //! masks, shards or files: [`render`] returns text.

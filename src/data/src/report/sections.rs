@@ -49,7 +49,7 @@ fn header(page: &Page<'_>) -> String {
 /// The verdict on the session, with its reasons.
 fn quality(quality: &SessionQuality) -> String {
     let reasons = match quality.reasons.as_slice() {
-        [] => "nothing was found that speaks against its use".to_owned(),
+        [] => "no fault was found".to_owned(),
         reasons => escape(&reasons.join("; ")),
     };
     format!("<p>{}: {reasons}.</p>\n", badge(quality.verdict))
@@ -61,7 +61,7 @@ fn verdict(page: &Page<'_>) -> String {
     let on = page.records.iter().filter(|r| r.spec_net).count();
     let gate = percent(page.gate);
     let spec_net = if on == 0 {
-        format!("Spec-Net is on in none: nowhere is more than {gate} of the object saturated")
+        format!("Spec-Net is off in all: at most {gate} of the object is saturated")
     } else {
         let share = percent(share(on, total));
         format!(
@@ -150,7 +150,7 @@ fn saturated(page: &Page<'_>, turn: &Turn) -> String {
     figure(plot, turn, &caption)
 }
 
-/// A plot of its own: on a coloured object this fraction is ten times the gated one, and on a common
+/// Its own plot: on a coloured object this fraction is ten times the gated one, and on a common
 /// axis the gate would be unreadable.
 fn saturated_any(page: &Page<'_>, turn: &Turn) -> String {
     let extremes = Extremes::new(page.records, turn, any_channel);

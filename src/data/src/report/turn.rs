@@ -62,8 +62,7 @@ impl Turn {
         if self.measured {
             "Angles are the table\u{2019}s, as recorded."
         } else {
-            "The session has no table angles for all samples: angles are the sample\u{2019}s index \
-             as a part of the whole turn."
+            "Some samples have no table angle: angles follow from the samples\u{2019} indices."
         }
     }
 

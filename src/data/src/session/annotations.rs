@@ -1,4 +1,4 @@
-//! What a person says of a take, in its manifest.
+//! What a person says about a take, in its manifest.
 
 use std::fs;
 use std::path::Path;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SessionError {
-    /// There is no session that can be used, or none that can be written: what is wrong, and what to do.
+    /// A session cannot be used or written: what is wrong, and what to do.
     #[error("{0}")]
     Unusable(String),
     /// The capture ended before its first frame.

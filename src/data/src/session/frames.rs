@@ -41,7 +41,7 @@ impl FrameIndex {
     /// parsed was cut off by a power failure: it is skipped, and [`Self::is_torn`] is true.
     ///
     /// # Errors
-    /// The first line that is no frame's, or does not continue those before it, and what is wrong with it.
+    /// The first line that is not a frame's, or does not continue those before it, and what is wrong with it.
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
         let bytes = unmarked(bytes);
         let (index, fault) = Self::parse_until_fault(bytes);

@@ -27,7 +27,7 @@ pub struct TurnJournal {
 }
 
 impl TurnJournal {
-    /// Reads a journal up to its first line that is none: after a power cut the end of the file can
+    /// Reads a journal up to its first invalid line: after a power cut the end of the file can
     /// hold anything. `None` if not even the turn can be read.
     #[must_use]
     pub fn parse(bytes: &[u8]) -> Option<Self> {

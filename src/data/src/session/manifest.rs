@@ -29,7 +29,7 @@ pub struct Manifest {
     pub camera: CameraFacts,
     /// The turntable; `None` if the camera recorded without one.
     pub turntable: Option<TurntableFacts>,
-    /// What is known of the rig; `None` where it was not measured.
+    /// What is known of the rig; `None` if it was not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig: Option<RigFacts>,
     /// The video file.

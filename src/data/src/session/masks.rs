@@ -26,7 +26,7 @@ pub fn mask_stem(path: &Path) -> OsString {
 }
 
 /// The mask of a recording in the folder `masks`: `NAME.png` or `NAME-mask.png`, where NAME is that of its clip, of its
-/// session's folder, or its id. None where there is no such file.
+/// session's folder, or its id. `None` if neither exists.
 #[must_use]
 pub fn mask_in(masks: &Path, recording: &Recording) -> Option<PathBuf> {
     let mut stems = Vec::new();
@@ -50,7 +50,7 @@ pub fn mask_in(masks: &Path, recording: &Recording) -> Option<PathBuf> {
     exact.next().or_else(|| alike_in(masks, &names))
 }
 
-/// A file with one of these names, of which the case may differ.
+/// A file with one of these names, whatever its case.
 fn alike_in(folder: &Path, names: &[OsString]) -> Option<PathBuf> {
     let mut found: Vec<PathBuf> = fs::read_dir(folder)
         .ok()?

@@ -64,7 +64,7 @@ impl Recording {
     /// Opens a session folder or a bare video file. Of the video only the size is checked.
     ///
     /// # Errors
-    /// [`SessionError`] if manifest or index are not usable, the session has not ended, or there is no video.
+    /// [`SessionError`] if manifest or index are not usable, the session has not ended, or it has no video.
     /// What is incomplete but usable becomes a [`Notice`].
     pub fn open(path: &Path) -> Result<Self, SessionError> {
         if path.is_dir() {
@@ -242,7 +242,7 @@ pub fn beside_recordings(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
 
 fn not_there(path: &Path) -> SessionError {
     SessionError::Unusable(format!(
-        "there is no {}: give a session folder, a folder of sessions, or a video file",
+        "{} does not exist: give a session folder, a folder of sessions, or a video file",
         path.display()
     ))
 }

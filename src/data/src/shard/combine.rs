@@ -92,7 +92,7 @@ fn problems(datasets: &[(&Path, Dataset)]) -> Vec<String> {
         let differences = first.settings.differences(&dataset.settings);
         if !differences.is_empty() {
             problems.push(format!(
-                "{} and {} have other settings ({})",
+                "{} and {} have different settings ({})",
                 place.display(),
                 other.display(),
                 differences.join("; ")
@@ -113,7 +113,7 @@ fn problems(datasets: &[(&Path, Dataset)]) -> Vec<String> {
                     place.display()
                 )),
                 Some((other, known)) => problems.push(format!(
-                    "the sessions {known} in {} and {id} in {} are one where a file system ignores case",
+                    "the sessions {known} in {} and {id} in {} differ only in case, which some file systems ignore",
                     other.display(),
                     place.display()
                 )),

@@ -98,7 +98,10 @@ impl<'a> SessionConversion<'a> {
     ) -> Result<Self, ShardError> {
         let mut shards = dataset.shards_of(&session.id);
         let (Some(shard), None) = (shards.next(), shards.next()) else {
-            return Err(changed(&session.id, "it has not one shard".to_owned()));
+            return Err(changed(
+                &session.id,
+                "it does not have exactly one shard".to_owned(),
+            ));
         };
         let rows = read_table(input, &session.table)?;
         let is_whole = rows.len() == session.samples as usize && shard.samples == session.samples;

@@ -63,7 +63,7 @@ pub struct SourceVideo {
     pub bytes: u64,
     /// BLAKE3 of the file.
     pub blake3: Digest,
-    /// How the video's colours were converted to sRGB, in words; `None` where they were taken as sRGB.
+    /// How the video's colours were converted to sRGB, in words; `None` if they were taken as sRGB.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colour_conversion: Option<String>,
     /// BLAKE3 of the session's `frames.jsonl`; `None` without one.

@@ -75,7 +75,7 @@ pub enum ShardError {
     /// A path in `dataset.json`, or one given by the caller, that is not a plain path inside the data
     /// set.
     #[error(
-        "{0:?} cannot be a file of a data set: use a relative path with `/`, without `..`, `\\` and `:`; do not trust a dataset.json that names it"
+        "{0:?} cannot be a file of a data set: it must be relative, without `..`, `\\` and `:`; do not trust its dataset.json"
     )]
     UnsafePath(String),
     /// A session, sample or description that its writer does not take.
@@ -104,7 +104,7 @@ pub enum ShardError {
     },
     /// A folder without `dataset.json`.
     #[error(
-        "{} holds no data set: there is no dataset.json; give the folder that relit-extract wrote", .0.display()
+        "{} holds no dataset.json: give the folder that relit-extract wrote", .0.display()
     )]
     NoDataset(PathBuf),
     /// A file of the data set is not the one that was written.
@@ -145,7 +145,7 @@ fn in_megabytes(bytes: u64) -> String {
 
 impl ShardError {
     /// The same error, or if it says that no more can be written, that `what` needs so many bytes in the
-    /// folder, of which so many were written.
+    /// folder, after so many were written.
     pub(super) fn with_needs(self, what: &str, folder: &Path, needed: u64, written: u64) -> Self {
         let source = match self {
             Self::Io { source, .. } if is_full(&source) => source,

@@ -23,7 +23,7 @@ pub struct SampleSpan {
 /// An iterator over the places of a shard's samples. It reads headers and jumps over data, so that
 /// a shard of 1500 samples costs a few thousand small reads.
 ///
-/// Unlike [`ShardReader`](super::ShardReader) it goes on behind damage: an error stands for what
+/// Unlike [`ShardReader`](super::ShardReader) it continues behind damage: an error stands for what
 /// was lost there, and the samples on both sides of it may lack members. Data are not looked at:
 /// whoever reads a sample finds out whether they are whole.
 ///
@@ -60,7 +60,7 @@ impl<R: Read + Seek> SampleSpans<R> {
     /// Looks through the tar in `source`, from its start; best buffered with a few hundred bytes.
     ///
     /// # Errors
-    /// [`ShardError::ShardRead`] where the source cannot be measured.
+    /// [`ShardError::ShardRead`] if the source cannot be measured.
     pub fn new(mut source: R) -> Result<Self, ShardError> {
         let unread = |source| ShardError::ShardRead { offset: 0, source };
         let length = source.seek(std::io::SeekFrom::End(0)).map_err(unread)?;
@@ -98,7 +98,7 @@ impl<R: Read + Seek> SampleSpans<R> {
         })
     }
 
-    /// Goes on behind damage, or ends where nothing follows.
+    /// Goes on behind damage, or ends if it was the last.
     fn pass_over(&mut self, error: ShardError) {
         self.ended = error.ends_the_shard() || !self.tar.resume().unwrap_or(false);
         self.failed = Some(error);

@@ -2,7 +2,7 @@
 //!
 //! A data set is a folder. `dataset.json` describes it and lists every other file with length and
 //! BLAKE3. Each session has a shard (a tar, or in the layout `paper` a folder of images), a table of
-//! its records, and usually a report. `docs/formats.md` describes every file and field.
+//! its records, and usually a report. `docs/reference/formats.md` describes every file and field.
 //!
 //! | item | purpose |
 //! | --- | --- |

@@ -89,7 +89,7 @@ impl NewDataset {
         ))
     }
 
-    /// Copies the files of a session of the data set in `from`, and compares each with what `dataset` says of it.
+    /// Copies the files of a session of the data set in `from`, and compares each with what `dataset` says about it.
     pub(super) fn copy_session(
         &self,
         from: &Path,

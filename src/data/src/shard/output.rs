@@ -109,7 +109,7 @@ impl OutputFolder {
 /// Keeps writers out of the data set in a folder while the handle is open; several may read.
 ///
 /// # Errors
-/// [`ShardError::Locked`] if it is being written; [`ShardError::NoDataset`] if there is no such folder.
+/// [`ShardError::Locked`] if it is being written; [`ShardError::NoDataset`] if the folder does not exist.
 pub(super) fn lock_for_reading(out: &Path) -> Result<File, ShardError> {
     let handle = File::open(out).map_err(|_| ShardError::NoDataset(out.to_owned()))?;
     locked(handle.try_lock_shared(), out)?;
@@ -275,7 +275,7 @@ pub(super) fn remove_folder(path: &Path) -> Result<(), ShardError> {
     }
 }
 
-/// The names in a folder, sorted; none if there is no such folder. In a name that is not UTF-8,
+/// The names in a folder, sorted; none if the folder does not exist. In a name that is not UTF-8,
 /// invalid bytes are replaced: the writer uses no such names.
 pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, ShardError> {
     let entries = match fs::read_dir(folder) {

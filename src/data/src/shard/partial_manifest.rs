@@ -154,7 +154,7 @@ pub struct Merged {
 
 /// Joins the pieces in the data set `out` and writes its `dataset.json`: the same bytes as one run over all
 /// recordings writes, also where some of them fail. It can be repeated, and changes nothing else. `length` is that of a file of the data set, or of
-/// anything for a folder of images, or an error where there is none.
+/// anything for a folder of images, or an error if the file does not exist.
 ///
 /// # Errors
 /// [`ShardError::PartialManifests`] if a task or a recording is missing or is there twice, if all failed, if tasks saw
@@ -285,7 +285,7 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
                         problems.push(format!("session {session} is there twice"));
                     }
                     (Some(other), _) => problems.push(format!(
-                        "the sessions {} and {session} are one where a file system ignores case: rename one and extract it again",
+                        "the sessions {} and {session} differ only in case, which some file systems ignore: rename one and extract it again",
                         other.id
                     )),
                     (None, Some(entry)) => dataset.replace(
@@ -330,7 +330,9 @@ fn not_of_a_task(out: &Path, dataset: &Dataset) -> Result<Vec<String>, ShardErro
         .iter()
         .filter(|session| dataset.session(&session.id).is_none());
     let problem = |id: &str| {
-        format!("dataset.json also has session {id}, which is no task's: use a folder of its own")
+        format!(
+            "dataset.json also has session {id}, which belongs to no task: use a separate folder"
+        )
     };
     Ok(others.map(|session| problem(&session.id)).collect())
 }

@@ -97,7 +97,7 @@ pub struct SessionQuality {
 }
 
 impl SessionQuality {
-    /// The figures of a session with these records, of which something was lost (`lossy`), or which covers
+    /// The figures of a session with these records. `lossy`: something was lost. It may cover
     /// only a part of the turn (`covered_deg`).
     #[must_use]
     pub fn from_records(records: &[FrameRecord], lossy: bool, covered_deg: Option<f64>) -> Self {

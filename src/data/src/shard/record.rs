@@ -125,7 +125,7 @@ mod tests {
     use super::*;
     use crate::spec_net_gate::SPEC_NET_GATE;
 
-    /// A record of which nothing is to say.
+    /// A record without anything remarkable.
     pub(in crate::shard) fn record(index: u32) -> FrameRecord {
         let measures = Measures {
             mask_px: 40,

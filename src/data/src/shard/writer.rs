@@ -123,7 +123,7 @@ impl ShardWriter {
     /// Adds a sample. Each index must be given exactly once, in any order.
     ///
     /// # Errors
-    /// [`ShardError::Refused`] if it is another session's, there is no such sample or it was given already, a number
+    /// [`ShardError::Refused`] if it is another session's, its index is too large or was given already, a number
     /// is not finite, or image, record and mask differ in size; [`ShardError::DiskFull`], [`ShardError::Io`]. The
     /// sample is then not added.
     pub fn push(&mut self, sample: Sample) -> Result<(), ShardError> {

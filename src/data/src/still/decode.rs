@@ -11,7 +11,7 @@ use crate::still::{Format, StillError, exr, jpeg, radiance};
 /// says [`crate::still::Colour::from_file`].
 ///
 /// # Errors
-/// Where it is no picture of a format that is read, too large, or cut off.
+/// If the format is not supported, or the picture is too large or cut off.
 pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     let format = Format::sniff(bytes);
     match format {
@@ -21,7 +21,7 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     }
     if let Some((name, advice)) = format.and_then(Format::unread) {
         return Err(StillError::NotRead(format!(
-            "is {name}, which is not read: {advice}"
+            "is {name}, which is not supported: {advice}"
         )));
     }
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
@@ -44,7 +44,7 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
     Ok(image)
 }
 
-/// Width and height that a file says it has, before it is turned; none where they cannot be read.
+/// Width and height that a file says it has, before it is turned; `None` if they cannot be read.
 #[must_use]
 pub fn stored_size(bytes: &[u8]) -> Option<(u32, u32)> {
     match Format::sniff(bytes)? {

@@ -11,7 +11,7 @@ pub enum Format {
     Jpeg,
     /// WebP.
     WebP,
-    /// TIFF that is no camera's raw file.
+    /// TIFF, unless it is a camera's raw file.
     Tiff,
     /// Windows bitmap.
     Bmp,
@@ -104,7 +104,7 @@ impl Format {
             Self::Avif => Some(("an AVIF image", SAVE)),
             Self::Heic => Some((
                 "a HEIC image",
-                "save it as JPEG or PNG, or let the telephone write JPEG",
+                "save it as JPEG or PNG, or set the phone to JPEG",
             )),
             Self::Other(name, advice) => Some((name, advice)),
             _ => None,
@@ -112,7 +112,7 @@ impl Format {
     }
 }
 
-/// The formats of the ISO base media file format, by its brands. What has none of these is no still image.
+/// The formats of the ISO base media file format, by its brands. A file without one of these is not a still image.
 fn of_brands(bytes: &[u8]) -> Option<Format> {
     let length = u32::from_be_bytes(bytes.get(..4)?.try_into().ok()?) as usize;
     let end = length.clamp(12, 256).min(bytes.len());

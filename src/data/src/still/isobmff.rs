@@ -3,10 +3,10 @@
 use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage};
 
-/// Boxes of one file are no more.
+/// The most boxes of one file.
 const MAX_BOXES: usize = 4096;
 
-/// The orientation for display; none where the picture stands as it is stored, or the file cannot be read.
+/// The orientation for display; `None` if the picture stands as it is stored, or the file cannot be read.
 pub(crate) fn orientation(bytes: &[u8]) -> Option<Orientation> {
     // `meta` and `pitm` begin with a version and flags.
     let meta = find(bytes, b"meta")?.get(4..)?;

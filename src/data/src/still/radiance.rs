@@ -9,7 +9,7 @@ use crate::still::colour::{Matrix, Primaries, to_rec709 as matrix_of};
 use crate::still::decode::reserve;
 use crate::still::{ColourError, StillError};
 
-/// Headers are no longer.
+/// The longest header, bytes.
 const MAX_HEADER_LENGTH: usize = 65_536;
 
 /// What a header says.

@@ -1,4 +1,4 @@
-//! The directories of a TIFF, of which Exif's data consists too.
+//! The directories of a TIFF; Exif data are such directories too.
 
 pub(super) const NEW_SUBFILE_TYPE: u16 = 254;
 pub(super) const PHOTOMETRIC: u16 = 262;

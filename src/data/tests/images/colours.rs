@@ -1,4 +1,4 @@
-//! What files say of their colours, and what becomes of them in sRGB.
+//! What files say about their colours, and what becomes of them in sRGB.
 
 use image::{DynamicImage, ImageFormat, RgbImage};
 use moxcms::{ColorProfile, DataColorSpace, ToneReprCurve, curve_from_gamma};

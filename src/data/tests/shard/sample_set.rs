@@ -147,7 +147,7 @@ pub(crate) fn write(out: &Path, layout: Layout) {
     write_with(out, layout, SESSION, &indices, |_| {});
 }
 
-/// A data set of one session in a folder of its own.
+/// A data set of one session in its own folder.
 pub(crate) fn dataset(layout: Layout) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     write(dir.path(), layout);

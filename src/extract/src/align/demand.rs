@@ -77,7 +77,7 @@ impl Demand {
         }
     }
 
-    /// The brightness at each template's scale, from the finest on, of a crop of which all rows were taken.
+    /// The brightness at each template's scale, from the finest on, once all rows of a crop were taken.
     pub(super) fn lumas_of_rows<'b>(&self, levels: &'b mut Vec<GrayImage>) -> &'b [GrayImage] {
         levels.resize_with(self.lumas.len(), GrayImage::default);
         self.halved(levels, 0)

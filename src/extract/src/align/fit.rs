@@ -2,7 +2,7 @@
 //!
 //! With a shift s, r(x) = G(x + s) - T(x) is, to the first order, T's change times the error of s. Each
 //! pixel counts by its trust, and the less the more its r exceeds its usual deviation (Geman and
-//! McClure's weights): a highlight that passes is no movement.
+//! McClure's weights): a passing highlight is not mistaken for movement.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -66,7 +66,7 @@ struct Sums {
 }
 
 impl Template {
-    /// The fit nearest to `start`, up to a last step of less than `still`; `None` where there is none within
+    /// The fit nearest to `start`, up to a last step of less than `still`; `None` if no fit lies within
     /// `reach` pixels.
     pub(super) fn fit(
         &self,
@@ -254,7 +254,7 @@ impl Sums {
         }
     }
 
-    /// The normal matrix and its determinant; `None` where the object does not say a shift in both directions.
+    /// The normal matrix and its determinant; `None` if the object does not say a shift in both directions.
     fn normal(&self) -> Option<([f64; 3], f64)> {
         let [xx, xy, yy, ..] = self.terms;
         let determinant = xx * yy - xy * xy;

@@ -45,9 +45,9 @@ const OUTLINE: [usize; 2] = [2, 1];
 /// Source pixels by which the mask's frame may lie beside the turn's middle and still be taken to lie there: as exactly as one
 /// frame can be measured.
 const SAME_PLACE: f64 = 0.1;
-/// Times that the template is made anew at the coarsest, the finest, and the scales between.
+/// Times that the template is computed again at the coarsest, the finest, and the scales between.
 const ROUNDS: [usize; 3] = [3, 2, 1];
-/// Shifts up to this many times the largest are looked for, so that a larger one is told from none.
+/// The search goes up to this many times the largest shift, so that a larger shift is noticed.
 const LOOK_BEYOND: f64 = 1.5;
 /// A shift that a scale finds from nothing, pixels.
 const LITTLE: f64 = 0.75;
@@ -94,16 +94,16 @@ fn halvings((width, height): (u32, u32)) -> u32 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
     /// To the right and down of its place in the mask, pixels: what is most likely, given what the frame shows and
-    /// how far the object moves in its turn. `None` where the frame cannot be registered.
+    /// how far the object moves in its turn. `None` if the frame cannot be registered.
     pub shift: Option<[f64; 2]>,
-    /// Standard deviation of what the frame shows, pixels: by how differently parts of
-    /// the object and neighbouring scales say it, of which light that moves pulls more at the coarser.
-    /// Infinite where there is no shift.
+    /// Standard deviation of what the frame shows, pixels: by how much parts of
+    /// the object and neighbouring scales disagree; moving light shifts the coarser scales more.
+    /// Infinite without a shift.
     pub uncertainty: f64,
     /// Correlation of the frame's structure with the object's lasting one, 0..=1.
     pub confidence: f64,
     /// How far a rotation and a growth move the object's pixels in the mean, beyond the shift: degrees
-    /// clockwise, and the factor of size minus 1. `None` where it is not significant.
+    /// clockwise, and the factor of size minus 1. `None` if it is not significant.
     pub turned: Option<(f64, f64)>,
 }
 
@@ -243,7 +243,7 @@ impl Aligner {
         self.located(lumas, &mut buffers.gradients)
     }
 
-    /// The same from the frame's crop, of which no more is looked at than is needed. It has the size of the mask.
+    /// The same from the frame's crop; only what is needed of it is read. It has the size of the mask.
     #[must_use]
     pub fn measure_crop(&self, crop: CropView<'_>, buffers: &mut AlignBuffers) -> Alignment {
         let (_, height) = crop.dimensions();

@@ -65,7 +65,7 @@ impl Region {
         }
     }
 
-    /// The pixels, of a picture of twice this size or one more, of which these are the half.
+    /// The pixels of a picture of twice this size, or one more, that halving turns into these.
     pub(super) fn doubled(&self, (width, height): (u32, u32)) -> Self {
         let row = |y: usize| {
             let row = self.row(y / 2);

@@ -33,7 +33,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// Row `y`; the nearest one where there is none.
+    /// Row `y`; beyond the picture its nearest row.
     pub(super) fn row(&self, y: isize) -> &[f32] {
         let last = self.height.saturating_sub(1);
         let y = usize::try_from(y).unwrap_or(0).min(last);
@@ -82,7 +82,7 @@ impl Needs {
     }
 }
 
-/// Rows of a picture, of which each takes the place of an earlier one that is needed no more.
+/// Rows of a picture; each replaces an earlier one that is no longer needed.
 #[derive(Debug, Default)]
 struct Rows(Vec<Vec<f32>>);
 
@@ -106,7 +106,7 @@ impl Rows {
         &mut self.0[y % count]
     }
 
-    /// The rows around `y`; the picture's first or last one where there is none.
+    /// The rows around `y`; beyond the picture its first or last row.
     #[inline(always)]
     fn around<const TAPS: usize>(&self, y: usize, height: usize) -> [&[f32]; TAPS] {
         std::array::from_fn(|at| {

@@ -29,7 +29,7 @@ Examples:
       the fourth of ten parts; afterwards: relit-extract merge dataset
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost, \
-or a mask is not that of its object.";
+or a mask does not fit its object.";
 
 /// Turn recorded turns into masked frames with saturation statistics, in training shards.
 #[derive(Parser)]
@@ -56,7 +56,7 @@ pub(crate) enum Verb {
         /// The data set's folder.
         out: PathBuf,
     },
-    /// Join what several tasks wrote into one data set, or finished data sets to a new one.
+    /// Join what several tasks wrote into one data set, or finished data sets into a new one.
     #[command(
         after_help = "Examples:\n  relit-extract merge dataset\n      what several tasks wrote there\n  relit-extract merge monday tuesday -o week\n      finished data sets, whose files are copied"
     )]
@@ -82,7 +82,7 @@ pub(crate) enum Verb {
         #[arg(long, value_parser = named::<Layout>(["webdataset", "paper"]))]
         layout: Layout,
     },
-    /// Show a data set at a glance: sessions with verdicts, saturation, shifts and what else was found.
+    /// Summarise a data set: each session's verdict, saturation, shifts and reasons.
     #[command(
         after_help = "Example:\n  relit-extract stats dataset\n\nIt reads dataset.json alone."
     )]
@@ -106,7 +106,7 @@ pub(crate) struct ExtractArguments {
     /// Samples per session, evenly spread over one turn.
     #[arg(long, value_name = "N", default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     frames: u32,
-    /// Side of images and masks in pixels, or "native" for the source's own pixels.
+    /// Side of the output in pixels, or "native" for the source's.
     #[arg(long, value_name = "PIXELS", default_value = "256", value_parser = size)]
     size: ImageSize,
     /// Margin around the object, as a fraction of its longer side.
@@ -118,12 +118,10 @@ pub(crate) struct ExtractArguments {
     /// Spec-Net should run above this fraction of saturated pixels.
     #[arg(long, value_name = "FRACTION", default_value_t = SPEC_NET_GATE, value_parser = within(0.0, 1.0))]
     spec_net_above: f64,
-    /// How samples are stored: one tar per session, as WebDataset reads it, or folders of images, as in the released
-    /// data set.
+    /// One WebDataset tar per session, or folders of images as in the released data set.
     #[arg(long, default_value = "webdataset", value_parser = named::<Layout>(["webdataset", "paper"]))]
     layout: Layout,
-    /// What to do about shifts of the object against its mask, from vibration or drift: measure and correct them above
-    /// the tolerance, only measure them, or neither.
+    /// Measure how far the object shifts against its mask, and correct shifts above the tolerance.
     #[arg(long, default_value = "correct", value_parser = named::<Align>(["correct", "measure", "off"]))]
     align: Align,
     /// Shifts up to this many source pixels are not corrected.
@@ -132,7 +130,7 @@ pub(crate) struct ExtractArguments {
     /// Refuse a turn in which the object moves by more source pixels than this.
     #[arg(long, value_name = "PIXELS", default_value_t = 8.0, value_parser = within(1.0, MAX_SHIFT))]
     max_shift: f64,
-    /// Extract also recordings that cover part of a turn: the samples that are there, and no others.
+    /// Also extract recordings of part of a turn, with fewer samples.
     #[arg(long)]
     partial: bool,
     /// Skip sessions that the data set already holds, intact and from the same video and mask.
@@ -141,8 +139,7 @@ pub(crate) struct ExtractArguments {
     /// Replace sessions of the same name that were made from another video.
     #[arg(long)]
     replace: bool,
-    /// Extract one part of the recordings: task I of N that share them, from 0/N on [default: that of a Slurm
-    /// array job, where this is one].
+    /// Extract the part of task I of N, counted from 0 [default: from a Slurm array job, if any].
     #[arg(long, value_name = "I/N", value_parser = array_task)]
     task: Option<ArrayTask>,
     /// Number of worker threads [default: one per core].
@@ -150,7 +147,7 @@ pub(crate) struct ExtractArguments {
     threads: Option<usize>,
 }
 
-/// The task that is asked for on the command line, else by the scheduler that started the program.
+/// The task that is requested on the command line, else by the scheduler that started the program.
 fn task(
     line: &ExtractArguments,
     variable: &dyn Fn(&str) -> Option<String>,
@@ -192,7 +189,7 @@ fn array_task(text: &str) -> Result<ArrayTask, String> {
 
 fn new_task(index: u32, count: u32) -> Result<ArrayTask, String> {
     ArrayTask::new(index, count).ok_or_else(|| {
-        format!("there is no task {index} of {count}: they count from 0, and at most {MAX_TASKS}")
+        format!("task {index} of {count} does not exist: tasks count from 0, and are at most {MAX_TASKS}")
     })
 }
 

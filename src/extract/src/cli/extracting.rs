@@ -40,7 +40,7 @@ pub(crate) fn run(
         && tally == Tally::default()
     {
         console.warn(&format!(
-            "task {task} has none of the recordings: name all of them to each task, or give --task 0/1 for all that are named"
+            "task {task} has no recording: give all recordings to each task, or --task 0/1 to extract all that are given"
         ));
     }
     let summary = summary(&tally);
@@ -81,7 +81,7 @@ fn summary(tally: &Tally) -> String {
     let troubles = [
         (tally.failed, "failed"),
         (tally.left_out, "left out"),
-        (tally.lossy, "with something lost"),
+        (tally.lossy, "with losses"),
         (tally.misfits, "with a mask that does not fit"),
         (tally.broken, "broken: do not train on it"),
     ];
@@ -119,7 +119,7 @@ impl Reporter<'_> {
         } else if entry.is_broken() {
             "; it is broken, see its report"
         } else if entry.lossy {
-            "; something of it is lost, see its report"
+            "; parts of it are lost, see its report"
         } else {
             ""
         };

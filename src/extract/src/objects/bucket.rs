@@ -50,7 +50,7 @@ impl Bucket {
         let shown = without_credentials(&text);
         let wrong = |why: &str| {
             ExtractError::Refused(format!(
-                "{shown} is no object store: {why}; give s3://BUCKET/PATH, gs://BUCKET/PATH, az://CONTAINER/PATH or file:///PATH"
+                "{shown} is not an object store: {why}; give s3://BUCKET/PATH, gs://BUCKET/PATH, az://CONTAINER/PATH or file:///PATH"
             ))
         };
         let parsed = Url::parse(&text).map_err(|error| wrong(&error.to_string()))?;
@@ -220,7 +220,7 @@ pub(super) fn not_there(url: &str) -> ExtractError {
     ))
 }
 
-/// The store of a URL; `None` for a kind that is none of ours.
+/// The store of a URL; `None` for an unsupported kind.
 fn store_of(
     scheme: &ObjectStoreScheme,
     url: &Url,

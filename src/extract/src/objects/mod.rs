@@ -57,7 +57,7 @@ fn not_built(path: &Path) -> ExtractError {
 /// The description of the data set in `out`, a folder or a URL: see [`described_so_far`](shard::described_so_far).
 ///
 /// # Errors
-/// As there; [`ExtractError::Refused`] where an object store cannot be used.
+/// As there; [`ExtractError::Refused`] if an object store cannot be used.
 pub fn described(out: &Path) -> Result<(Dataset, Option<String>), ExtractError> {
     match is_url(out) {
         false => Ok(shard::described_so_far(out)?),
@@ -71,7 +71,7 @@ pub fn described(out: &Path) -> Result<(Dataset, Option<String>), ExtractError> 
 /// Joins the pieces of several tasks in `out`, a folder or a URL: see [`merge`](shard::merge()).
 ///
 /// # Errors
-/// As [`merge`](shard::merge()); [`ExtractError::Refused`] where an object store cannot be used.
+/// As [`merge`](shard::merge()); [`ExtractError::Refused`] if an object store cannot be used.
 pub fn merge(out: &Path) -> Result<Merged, ExtractError> {
     match is_url(out) {
         false => {

@@ -238,7 +238,7 @@ struct Target {
 }
 
 impl Target {
-    /// The data set at `url`, of which the description is brought to the local disk.
+    /// The data set at `url`; its description is downloaded.
     fn open(url: &Path, folder: &Path, task: Option<ArrayTask>) -> Result<Self, ExtractError> {
         let bucket = Bucket::open(url)?;
         // A bucket that does not exist is noticed before anything is extracted.

@@ -23,7 +23,7 @@ pub(super) fn check(url: &Path) -> Result<(), ExtractError> {
     let host = rest.split('/').next().unwrap_or_default();
     if host.contains('@') || rest.contains('?') {
         Err(ExtractError::Refused(format!(
-            "{} is given with credentials or a query: they belong into the environment",
+            "{} has credentials or a query: put them into the environment",
             without_credentials(&text)
         )))
     } else {

@@ -106,7 +106,7 @@ impl Scaler {
         Ok(scaling.into_image())
     }
 
-    /// Begins to mask and scale a crop, which has the size of the mask, and of which rows come by and by.
+    /// Begins to mask and scale a crop, which has the size of the mask and arrives row by row.
     ///
     /// # Errors
     /// [`ExtractError::Refused`] if the crop has another size.
@@ -254,7 +254,7 @@ impl Target {
         }
         if mask.as_raw().iter().all(|&m| m == 0) {
             return Err(ExtractError::Refused(format!(
-                "the object is too small: at {side} pixels it covers half of no pixel of the output; give a larger --size or a smaller --margin"
+                "the object is too small: at {side} pixels it half covers no pixel; give a larger --size or a smaller --margin"
             )));
         }
         Ok(Self {

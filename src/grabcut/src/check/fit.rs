@@ -15,7 +15,7 @@ use crate::{Effort, Hints, MaskError, SegmentSettings, TurnStatistics, segment_w
 const NARROW: usize = 2;
 /// Smaller differences of the shape, as a share of the mask's area, are not regions.
 const SMALL: f64 = 0.001;
-/// A part of the mask of which more than this share is table is no object that the frame's border cuts off.
+/// A part of the mask with more than this share of table is not an object that the frame's border cuts off.
 const ON_TABLE: f64 = 0.5;
 
 /// A part of the image in which mask and turn differ.
@@ -36,7 +36,7 @@ pub struct ShapeCheck {
     pub outline: f32,
     /// The same of the turn's own outline.
     pub outline_of_turn: f32,
-    /// Whether the turn shows the mask to be right wherever its own differs: its outline is no measure then.
+    /// Whether the turn confirms the mask wherever its own differs: then its outline is not a measure.
     pub contradicted: bool,
     /// Parts of the mask that show the background, largest first.
     pub leaks: Vec<DoubtfulRegion>,
@@ -90,8 +90,8 @@ impl<'a> MaskCheck<'a> {
     }
 
     /// Compares the mask's shape with that which the turn shows on `frame`, the one on which the mask was
-    /// made, with this effort. None where the turn says nothing: hardly anything moves, or what it shows
-    /// alone is no object.
+    /// made, with this effort. `None` if the turn says nothing: hardly anything moves, or what it shows
+    /// alone is not an object.
     ///
     /// # Errors
     /// As [`segment_with`] a turn and no hints.
@@ -136,8 +136,8 @@ impl<'a> MaskCheck<'a> {
         }))
     }
 
-    /// Of parts in which the mask may be wrong, those of which the turn shows that they are background, or object. The
-    /// turn's own mask has no say.
+    /// Of parts in which the mask may be wrong, those that the turn shows to be background, or object. The
+    /// turn's own mask does not count.
     fn shown(&self, parts: &Bitmap, says: impl Fn(&TurnField, &Bitmap, &Bitmap) -> bool) -> Bitmap {
         let object = self.turn.reduced(&self.mask);
         let least = self.mask.count() as f64 * SMALL;

@@ -11,7 +11,7 @@ const MAX_REGION_OF_A_LOOK: f64 = 0.03;
 const MIN_OUTLINE: f32 = 0.85;
 /// Where it follows it better than the turn's own, differences are the turn's mistakes.
 const BETTER_OUTLINE: f32 = 1.05;
-/// A mask of which more is wrong, as a share of its area, is that of something else.
+/// A mask with more of its area wrong than this share is that of something else.
 const SOMETHING_ELSE: f64 = 0.2;
 /// Where its outline is that of what stands still, so much of it has to be background: what changes by itself, such as a
 /// display on the object, looks so too.
@@ -27,7 +27,7 @@ impl ShapeCheck {
         faults(self, MAX_REGION)
     }
 
-    /// [`Self::faults`] of a turn of which only a few frames were looked at.
+    /// [`Self::faults`] after a look at only a few frames of the turn.
     #[must_use]
     pub fn faults_at_a_look(&self) -> Vec<String> {
         faults(self, MAX_REGION_OF_A_LOOK)
@@ -72,7 +72,7 @@ fn faults(shape: &ShapeCheck, most_region: f64) -> Vec<String> {
         (&shape.missing, "object outside the mask", "mark it white"),
         (
             &shape.holes,
-            "holes in the mask where there is object",
+            "holes of the mask in the object",
             "mark them white",
         ),
     ];

@@ -139,7 +139,7 @@ impl<const D: usize> Moments<D> {
         self.sum.map(|sum| sum / self.count.max(1.0))
     }
 
-    /// The covariance, of which the lower triangle is filled.
+    /// The covariance; only its lower triangle is filled.
     fn covariance(&self, floor: f64) -> [[f64; D]; D] {
         let mean = self.mean();
         std::array::from_fn(|row| {

@@ -59,7 +59,7 @@ pub(crate) struct PixelGraph {
 impl PixelGraph {
     /// Adds a node. `terminal` is what it costs to put it on the sink's side, minus what it costs to
     /// put it on the source's. `capacity[d]` is the cost of separating it from `neighbours[d]`, which
-    /// has to state the same capacity in the opposite direction; 0 where there is none ([`NONE`]).
+    /// has to state the same capacity in the opposite direction; 0 without a neighbour ([`NONE`]).
     pub(crate) fn add(&mut self, terminal: i32, neighbours: [u32; 8], capacity: [i32; 8]) {
         self.nodes.push(Node {
             neighbours,
@@ -106,7 +106,7 @@ impl PixelGraph {
         &mut self.nodes[at as usize]
     }
 
-    /// Both trees anew: their first nodes are those with residual capacity to a terminal.
+    /// Starts both trees again: their first nodes are those with residual capacity to a terminal.
     fn plant(&mut self) {
         self.time = 0;
         for at in 0..self.nodes.len() as u32 {
@@ -341,7 +341,7 @@ mod tests {
     use super::*;
 
     /// A graph of `width` columns with the given terminals and one capacity for each node and
-    /// direction, of which the smaller of the two sides counts.
+    /// direction; the smaller one of the two sides counts.
     struct Grid {
         width: usize,
         terminals: Vec<i32>,

@@ -65,7 +65,7 @@ pub(crate) fn levels(image: &RgbImage, known: Vec<Label>, coarsest: usize) -> Ve
     levels
 }
 
-/// Cuts the object out of `image`, of which this is known.
+/// Cuts the object out of `image`, with what is known of it.
 pub(crate) fn segment(
     image: &RgbImage,
     known: Vec<Label>,
@@ -91,7 +91,7 @@ pub(crate) fn segment(
     ))
 }
 
-/// Takes a result of this size up to the finest of the levels, whose order is from fine to coarse. `field` is told how
+/// Takes a result of this size up to the finest of the levels, whose order is from fine to coarse. `field` is given how
 /// many steps there were before.
 pub(crate) fn ascend<'a, const D: usize, F: Field<D>>(
     finer: &'a [Level<'_>],
@@ -261,7 +261,7 @@ pub(crate) struct RgbField<'a> {
 }
 
 impl<'a> RgbField<'a> {
-    /// A large image, of which few pixels are needed.
+    /// A large image; few of its pixels are needed.
     pub(crate) fn new(image: &'a RgbImage, table: &'a LabTable) -> Self {
         let lab = Vec::new();
         Self { image, table, lab }

@@ -83,7 +83,7 @@ impl Regions {
     /// Finds the regions of a frame.
     ///
     /// # Errors
-    /// [`MaskError::NotPlain`] where the background is not plain, or what differs from it is not clearly one object.
+    /// [`MaskError::NotPlain`] if the background is not plain, or what differs from it is not clearly one object.
     pub(super) fn find(frame: &RgbImage) -> Result<Self, MaskError> {
         let small = reduced(frame);
         let (width, height) = small.dimensions();

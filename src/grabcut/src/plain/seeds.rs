@@ -20,7 +20,7 @@ const MIXTURE: f32 = 0.25;
 const NOISE: f32 = 3.0;
 /// Where shadow-like pixels are a smaller share of the object, they may be a shadow at its foot, and are left to the cut.
 const SHADOW_AT_FOOT: f64 = 0.6;
-/// Where they are a larger share, the object has the background's colour, and its shadow cannot be told from it.
+/// Where they are a larger share, the object has the background's colour, and its shadow cannot be distinguished from it.
 const MAX_SHADOW_LIKE: f64 = 0.8;
 /// Fewer marked pixels of the object do not show its colours.
 const MIN_OBJECT: u64 = 10;
@@ -28,7 +28,7 @@ const MIN_OBJECT: u64 = 10;
 /// The marks of object and background.
 ///
 /// # Errors
-/// [`MaskError::NotPlain`] where hardly anything is surely object.
+/// [`MaskError::NotPlain`] if hardly anything is surely object.
 pub(super) fn seeds(frame: &RgbImage, regions: &Regions) -> Result<Seeds, MaskError> {
     let object = sure_object(regions)?;
     let background = eroded(&regions.background);

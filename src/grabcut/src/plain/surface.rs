@@ -13,7 +13,7 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// Fits the surface to the chosen pixels of an image by least squares; none where they do not determine it.
+    /// Fits the surface to the chosen pixels of an image by least squares; `None` if they do not determine it.
     pub(super) fn fit(
         colours: &[Colour],
         chosen: &Bitmap,
@@ -86,7 +86,7 @@ fn basis(at: usize, (width, height): (usize, usize), degree: usize) -> Vec<f64> 
     basis
 }
 
-/// Solves linear equations by Gaussian elimination; none where they are singular.
+/// Solves linear equations by Gaussian elimination; `None` if they are singular.
 fn solve(mut matrix: Vec<Vec<f64>>, mut right: Vec<[f64; 3]>) -> Option<Vec<[f64; 3]>> {
     let size = right.len();
     for column in 0..size {

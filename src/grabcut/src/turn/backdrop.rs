@@ -74,7 +74,7 @@ fn with_rim(room: &Bitmap, table: &Bitmap, width: usize) -> Bitmap {
     both.or(&both.closed(radius).and(&near_both))
 }
 
-/// The average features at the ends of each row; none where they show the table.
+/// The average features at the ends of each row; `None` if they show the table.
 struct Ends {
     left: Vec<Option<[f32; 5]>>,
     right: Vec<Option<[f32; 5]>>,

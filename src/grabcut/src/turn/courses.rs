@@ -100,7 +100,7 @@ impl Courses {
     }
 }
 
-/// A position of a side and those beside it.
+/// A position of a side and its neighbours.
 fn near(at: usize, side: usize) -> std::ops::Range<usize> {
     at.saturating_sub(1)..(at + 2).min(side)
 }

@@ -21,7 +21,7 @@ pub(crate) struct Disc {
 }
 
 impl Disc {
-    /// From the pixels of the table, and those that are far from the object; none where the rim is not seen well.
+    /// From the pixels of the table, and those that are far from the object; `None` if the rim is not seen well.
     pub(crate) fn fit(
         table: &Bitmap,
         far: &Bitmap,

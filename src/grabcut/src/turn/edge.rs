@@ -1,8 +1,8 @@
 //! Where an object's edge runs, to the pixel.
 //!
 //! A pixel at the edge shows a mixture of object and background. Over a turn the background, the light, or both change,
-//! so that the mixture can be told: its course lies between that of the object beside it and that of the background
-//! beside it. The pixel belongs to what it shows more of.
+//! which makes the mixture measurable: its course lies between those of the neighbouring object and background.
+//! The pixel belongs to the one that it shows more of.
 
 use crate::bitmap::Bitmap;
 
@@ -35,7 +35,7 @@ pub(crate) fn along_courses(courses: &Courses, object: &Bitmap) -> Bitmap {
     })
 }
 
-/// Whether most of what a pixel shows is the one and not the other; none where they hardly differ.
+/// Whether most of what a pixel shows is the one and not the other; `None` if they hardly differ.
 fn share(courses: &Courses, at: usize, inside: &[f32], outside: &[f32]) -> Option<bool> {
     let apart: Vec<f32> = inside.iter().zip(outside).map(|(i, o)| i - o).collect();
     let length = dot(&apart, &apart);
@@ -47,7 +47,7 @@ fn share(courses: &Courses, at: usize, inside: &[f32], outside: &[f32]) -> Optio
     Some(dot(&beyond, &apart) > 0.5 * length)
 }
 
-/// The mean course of what is near a pixel of the first of some parts of which there is enough.
+/// The mean course near a pixel of the first of some parts with enough pixels there.
 fn near(parts: &[Bitmap], at: usize, courses: &Courses) -> Option<Vec<f32>> {
     let (width, height) = courses.size();
     let (x, y) = (at % width, at / width);

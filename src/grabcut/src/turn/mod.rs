@@ -1,4 +1,4 @@
-//! What a whole turn says of each pixel: the object stands still, the room passes by, the table lies below.
+//! What a whole turn says about each pixel: the object stands still, the room passes by, the table lies below.
 
 pub(crate) mod backdrop;
 pub(crate) mod courses;

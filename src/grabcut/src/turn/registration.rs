@@ -29,8 +29,8 @@ pub(crate) fn shift(
     }
 }
 
-/// The shift (right, down) at which it fits best, to a fraction of a pixel, and how well it fits there, where `fit` is
-/// told the step in row order; none where that is at the limit of what is looked for, or nothing fits.
+/// The shift (right, down) at which it fits best, to a fraction of a pixel, and how well it fits there; `fit` gets
+/// the step in row order. `None` if that is at the limit of what is looked for, or nothing fits.
 fn best_shift(width: usize, fit: impl Fn(isize) -> f32) -> Option<([f32; 2], f32)> {
     let side = (2 * REACH + 1) as usize;
     let fit = |at: usize| {

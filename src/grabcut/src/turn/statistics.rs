@@ -109,7 +109,7 @@ pub struct TurnStatistics {
     /// The frames' width and height.
     pub(crate) full: (u32, u32),
     pub(crate) fine: TurnField,
-    /// At half the size; none where the fine one is small enough for the first cut.
+    /// At half the size; `None` if the fine one is small enough for the first cut.
     coarse: Option<TurnField>,
     pub(crate) courses: Courses,
 }
@@ -347,7 +347,7 @@ impl TurnField {
         boundary.unwrap_or(0.0)
     }
 
-    /// How strong the contrast is along the boundary between two parts, which have its size; `None` where they do not
+    /// How strong the contrast is along the boundary between two parts, which have its size; `None` if they do not
     /// touch.
     pub(crate) fn boundary(&self, one: &Bitmap, other: &Bitmap) -> Option<f32> {
         let (columns, rows) = self.size;

@@ -32,7 +32,7 @@ const SHADOW_REACH: f64 = 0.08;
 pub(crate) struct Turntable {
     /// Its plain surface.
     pub(crate) surface: Bitmap,
-    /// Darker pixels of the same colour beside it: where the object shadows it all the time.
+    /// Darker pixels of the same colour next to it: where the object shadows it all the time.
     pub(crate) shadow: Bitmap,
     /// All that is as dark, still and plain as a table, connected with its surface or not.
     pub(crate) plain: Bitmap,

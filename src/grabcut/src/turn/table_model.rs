@@ -79,7 +79,7 @@ pub(crate) struct TableModel {
 }
 
 impl TableModel {
-    /// Learns the table's space; none where no table is seen.
+    /// Learns the table's space; `None` if no table is seen.
     pub(crate) fn learn(courses: &Courses, seen: &Seen<'_>) -> Option<Self> {
         let Candidates { far, surely, table } = candidates(seen, courses.size())?;
         let taken = learned_from(courses, &surely, &table);

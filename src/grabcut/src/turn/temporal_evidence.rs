@@ -1,4 +1,4 @@
-//! What the curves of brightness over a turn say of a part of the image: is it the object or what is behind it?
+//! What the curves of brightness over a turn say about a part of the image: is it the object or what is behind it?
 //!
 //! The light turns about the object, so the brightness of each of its pixels follows the first harmonics of the
 //! table's angle: a diffuse surface's irradiance has few others (Ramamoorthi and Hanrahan, "An efficient
@@ -15,7 +15,7 @@ const ORDER: usize = 2;
 const WAVES: usize = 2 * ORDER;
 /// With fewer frames a curve has no residual.
 const MIN_FRAMES: usize = 2 * (WAVES + 1);
-/// Added to a luminance, 0..=1, of which the logarithm is taken: noise counts little below.
+/// Added to a luminance, 0..=1, before its logarithm: noise counts little below.
 const DARK: f32 = 0.01;
 /// Residual variance by noise.
 const NOISE: f32 = 1e-4;
@@ -92,8 +92,8 @@ impl Curves {
 }
 
 impl TemporalEvidence {
-    /// Where the brightness of the pixels of `part` changes as what is behind the object does, and not as the object
-    /// beside it; none where the curves say nothing.
+    /// Whether the brightness of the pixels of `part` changes as what is behind the object does, and not as the object
+    /// next to it; `None` if the curves say nothing.
     pub(crate) fn moves(&self, part: &Bitmap, beside: &Bitmap, ground: &Bitmap) -> Option<bool> {
         let of_part = self.residual_of(part)?;
         let of_object = self.residual_of(beside)?;
@@ -115,7 +115,7 @@ impl TemporalEvidence {
         still || lengths > 0.0 && dot(&one, &other) > TOGETHER * lengths
     }
 
-    /// Whether the curve of a part is nearer to that of one other than to that of another; none where one of them is
+    /// Whether the curve of a part is nearer to that of one other than to that of another; `None` if one of them is
     /// empty, or the frames are few.
     pub(crate) fn nearer(&self, part: &Bitmap, one: &Bitmap, another: &Bitmap) -> Option<bool> {
         let (part, one, another) = (self.course(part)?, self.course(one)?, self.course(another)?);

@@ -1,7 +1,7 @@
 //! Thin parts of a mask that show no object but what lies on both sides of them: mostly pieces of the table's rim.
 //!
 //! A pixel of the rim shows some of the table and some of the room, so that its course over the turn is a mixture of
-//! those below and above it. A stick or a wire of the object has a course of its own.
+//! those below and above it. A stick or a wire of the object has its own course.
 
 use crate::bitmap::{Bitmap, Component, Connectivity};
 
@@ -17,7 +17,7 @@ const DIFFERS: f32 = 0.02;
 const STRUCTURE: f32 = 4.0;
 /// And light below this, as a mean square, is noise.
 const NOISE: f32 = 1e-5;
-/// A part shows what is beside it if this share of its pixels does.
+/// A part shows what is next to it if this share of its pixels does.
 const MOSTLY: f64 = 0.35;
 
 /// The thin parts of `object` that are at least `least` pixels long and show what lies on both sides of them.

@@ -144,7 +144,7 @@ fn a_stroke_over_the_opening_of_a_handle_is_told() {
     assert!(plain.warnings.is_empty(), "{:?}", plain.warnings);
 }
 
-/// A disc with a pattern of its own that stands still before stripes that move.
+/// A disc with its own pattern that stands still before stripes that move.
 fn still_disc() -> Vec<RgbImage> {
     let level = |x: u32, y: u32, at: u32| {
         let (u, v) = (f64::from(x), f64::from(y));

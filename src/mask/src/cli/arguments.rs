@@ -47,7 +47,7 @@ pub(crate) struct CommandLine {
 /// What is done other than making masks.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Verb {
-    /// Hold the mask of a recording against what its turn shows; writes NAME-check.html
+    /// Compare a recording's mask with what its turn shows; writes NAME-check.html
     #[command(
         after_help = "Example:\n  relit-mask check 20261120T093015Z-mug\n\nExit codes: 0 the mask fits, 1 it could not be checked, 2 wrong usage, 3 it does not fit."
     )]
@@ -65,7 +65,7 @@ pub(crate) enum Verb {
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("hint").args(["rect", "seeds", "auto", "edit", "recipe"]).required(true).multiple(true))]
 pub(crate) struct MaskArguments {
-    /// A session folder, a video, a photograph, or a folder of them: each gets a mask with the same hints
+    /// Session folders, videos, photographs, or folders of them; all use the same hints
     #[arg(value_name = "INPUT", required = true)]
     pub(crate) inputs: Vec<PathBuf>,
 
@@ -77,16 +77,16 @@ pub(crate) struct MaskArguments {
     #[arg(long, value_name = "PNG")]
     seeds: Option<PathBuf>,
 
-    /// Find the object without a hint: in a video by what stands still while the turntable turns, also with --rect or
-    /// --seeds; in a photograph by its plain background
+    /// Find the object without hints: in a video by what stands still during the turn (--rect and --seeds may be
+    /// added), in a photograph by its plain background
     #[arg(long)]
     auto: bool,
 
-    /// Draw the hints on a page in the browser, which begins with the other hints
+    /// Draw hints in the browser, starting from the other hints
     #[arg(long)]
     pub(crate) edit: bool,
 
-    /// Address and port at which the page is served; a port alone is this machine's own, and port 0 any free one
+    /// The page's address and port; a port alone serves this machine only, 0 is any free port
     #[arg(
         long,
         value_name = "ADDRESS:PORT",
@@ -95,11 +95,11 @@ pub(crate) struct MaskArguments {
     )]
     pub(crate) listen: ListenAddress,
 
-    /// The number of the frame to make the mask on, from 0
+    /// The frame to mask, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u64,
 
-    /// What cuts the object out; opencv knows --rect and --seeds, and has to be built in
+    /// The segmentation engine; opencv takes only --rect and --seeds
     #[arg(
         long,
         value_name = "NAME",
@@ -112,17 +112,16 @@ pub(crate) struct MaskArguments {
     #[arg(long)]
     keep_all: bool,
 
-    /// The mask's file name, ending in .png, or a folder for masks with the names of their inputs [default: mask.png in
-    /// the session folder, or here; of several clips or photographs NAME-mask.png]
+    /// The mask's file, NAME.png, or a folder for masks named after their inputs [default: mask.png in the session
+    /// folder, or here; NAME-mask.png for several clips or photographs]
     #[arg(short, long, value_name = "PNG|DIR", value_parser = output)]
     pub(crate) output: Option<MaskTarget>,
 
-    /// Replace a mask that was painted or changed by hand, or that of another input; strokes of the mask that is there
-    /// are left out
+    /// Replace a mask that was changed by hand or is another input's; drop the old mask's strokes
     #[arg(long)]
     force: bool,
 
-    /// Make the mask again that this mask.json describes, to the same bytes
+    /// Make the mask that this mask.json describes again, byte for byte
     #[arg(long, value_name = "JSON", conflicts_with_all =
         ["rect", "seeds", "auto", "frame", "engine", "keep_all"])]
     recipe: Option<PathBuf>,

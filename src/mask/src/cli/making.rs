@@ -52,7 +52,7 @@ fn draw(
             Ok(Outcome::Success)
         }
         None => {
-            console.warn("the editor was left without a mask: nothing was written");
+            console.warn("the editor was closed without a mask: nothing was written");
             Ok(Outcome::Failure)
         }
     }

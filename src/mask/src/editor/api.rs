@@ -48,7 +48,7 @@ pub(super) const BODY: BodyLimit = BodyLimit {
     bytes: 4 << 20,
     time: Duration::from_secs(20),
 };
-/// Widest picture of a frame that can be asked for, pixels.
+/// Widest picture of a frame that can be requested, pixels.
 const MAX_WIDTH: u32 = 8192;
 
 /// The record of the mask that was written.
@@ -72,7 +72,7 @@ impl App {
         &self,
         job: impl FnOnce(&EditorSession) -> Result<T, MaskingError> + Send + 'static,
     ) -> Result<T, Failure> {
-        let broken = || Failure::broken("the request could not be worked on");
+        let broken = || Failure::broken("the request could not be processed");
         let permit = self.permits.clone().acquire_owned().await;
         let permit = permit.map_err(|_| broken())?;
         let session = self.session.clone();

@@ -3,7 +3,7 @@
 //!
 //! The page keeps what was drawn, with its history, and sends all of it with every request: the server
 //! has no state but caches. It serves one person on one recording, and ends when the mask is accepted
-//! or the page is told to discard it. Without the random token of its URL nothing is shown or done.
+//! or discarded. Without the random token of its URL nothing is shown or done.
 
 mod api;
 mod session;
@@ -33,7 +33,7 @@ const AT_ONCE: usize = 2;
 /// written before the mask is accepted; the result is `None` if it was discarded.
 ///
 /// # Errors
-/// [`MaskingError::Session`] if there is no recording, [`MaskingError::Serve`], or [`MaskingError::Recording`]
+/// [`MaskingError::Session`] without a recording, [`MaskingError::Serve`], or [`MaskingError::Recording`]
 /// around the cause.
 pub fn edit(
     input: &Path,

@@ -14,7 +14,7 @@ use super::support::{clip, code, read, relit_mask, said};
 const READY: &str = "document.getElementById('state')?.dataset.state === 'ready'";
 const NONE: &str = "document.getElementById('state')?.dataset.state === 'none'";
 
-/// The browser, where there is one.
+/// The browser, if there is one.
 fn browser() -> Option<PathBuf> {
     chromium::find()
         .inspect_err(|reason| say_skipped(reason))

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::support::{code, relit_mask, said};
 use relit_test_support::disc::{HEIGHT, WIDTH};
 
-/// A turn of 24 frames: a disc with a pattern of its own at (48, 32) before stripes that move.
+/// A turn of 24 frames: a disc with its own pattern at (48, 32) before stripes that move.
 fn turn(folder: &Path) {
     let mut bytes = format!("YUV4MPEG2 W{WIDTH} H{HEIGHT} F30:1 Ip A1:1 C444\n").into_bytes();
     for at in 0..24 {

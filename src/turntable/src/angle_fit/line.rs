@@ -47,7 +47,7 @@ pub(super) struct Fit {
     pub(super) kept: Vec<bool>,
 }
 
-/// Fits a line to `points`, which are sorted by x and most of which are right. Points with a residual
+/// Fits a line to `points`, which are sorted by x and mostly right. Points with a residual
 /// below `floor` are never outliers.
 pub(super) fn robust(points: &[(f64, f64)], floor: f64) -> Fit {
     let mut line = guess(points);
@@ -98,7 +98,7 @@ fn least_squares(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Lin
     slope.is_finite().then_some(Line { x0, y0, slope })
 }
 
-/// 0 if there are no values.
+/// 0 without values.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = (0.5 * values.len().saturating_sub(1) as f64).round() as usize;

@@ -41,7 +41,7 @@ const WRAP_US: f64 = 4_294_967_296.0;
 
 fn uneven(outliers: usize, polls: usize) -> String {
     let found = if outliers * 2 > polls {
-        format!("the {polls} reports lie on no straight line")
+        format!("the {polls} reports do not lie on a straight line")
     } else {
         format!("{outliers} of {polls} reports lie off the line of the others")
     };
@@ -109,7 +109,7 @@ pub(crate) fn timed(report: &PositionReport, turn: &JournaledTurn) -> Option<Jou
 }
 
 impl AngleFit {
-    /// The track of an interrupted turn by what was reported of it; `None` where that does not determine it.
+    /// The track of an interrupted turn by what was reported of it; `None` if that does not determine it.
     #[must_use]
     pub fn from_reports(turn: &JournaledTurn, reports: &[JournaledReport]) -> Option<Self> {
         Self::from_part(reports, turn).ok()

@@ -3,7 +3,7 @@
 //! The lock is the kernel's (`flock`), which frees it when its holder dies. The file's content is the
 //! holder's process number, for those who are refused. The files lie in a folder that the accounts of
 //! a machine share through a group, [`SHARED_FOLDER`], so that a service and a person who logs in find
-//! each other. Where nobody set that up, each account has a folder of its own. Links are never followed.
+//! each other. Where nobody set that up, each account has its own folder. Links are never followed.
 //!
 //! Knows nothing of devices.
 
@@ -18,7 +18,7 @@ use rustix::fs::{Access, OFlags, access};
 pub const SHARED_FOLDER: &str = "/run/relit";
 /// Name of the lock in a folder of sessions.
 const ROOT_LOCK: &str = ".relit-capture.lock";
-/// Where each account has a folder of its own; the second where there is no first.
+/// Where each account has its own folder; the second if the first does not exist.
 const PRIVATE_BASES: [&str; 2] = ["/run/lock", "/tmp"];
 /// Longest content that is read, bytes.
 const MAX_LENGTH: u64 = 20;
@@ -79,7 +79,7 @@ pub fn standard_folder() -> PathBuf {
 /// this account alone, where it does not exist.
 ///
 /// # Errors
-/// [`LockError::System`] where it is a link, is not this account's or root's, can be written by
+/// [`LockError::System`] if it is a link, is not this account's or root's, can be written by
 /// everybody, or is closed to this account.
 pub fn use_folder(folder: &Path) -> Result<(), LockError> {
     match DirBuilder::new().mode(0o700).create(folder) {

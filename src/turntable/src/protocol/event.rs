@@ -64,7 +64,7 @@ pub enum SendError {
     #[error("answers are outstanding that cannot be distinguished: stop the table first")]
     Unsure,
     /// The text cannot be sent as one line.
-    #[error("it is longer than 60 bytes or holds bytes that are no part of a line")]
+    #[error("it is longer than 60 bytes or holds bytes that a line cannot have")]
     Unsendable,
 }
 

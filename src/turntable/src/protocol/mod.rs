@@ -1,5 +1,5 @@
 //! The serial protocol: bytes in, events out. A state machine without I/O, without threads and
-//! without a clock of its own; calls for which time matters take the time as an argument.
+//! without its own clock; calls for which time matters take the time as an argument.
 //!
 //! It assembles lines, parses the messages of a Grbl 1.1 controller and of its relatives, keeps one line in flight and
 //! matches its answer to it, requests status reports and brackets each with the times of request and

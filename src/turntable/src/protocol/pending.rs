@@ -40,7 +40,7 @@ pub(super) struct Pending {
     /// The checked line's number; `None` for a plain line.
     pub(super) seq: Option<u32>,
     pub(super) tries: u32,
-    /// Messages since it was sent that are no answers.
+    /// Messages since it was sent that are not answers.
     pub(super) info: Vec<Message>,
     timeout: ReplyTimeout,
     first_us: i64,

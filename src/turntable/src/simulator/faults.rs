@@ -70,7 +70,7 @@ impl TableFaults {
                 "reset" => self.resets.push(duration(at)?),
                 "stall" => self.stall = Some(duration(at)?),
                 "estop" => self.emergency_stops.push(emergency_stop(at)?),
-                _ => return Err("only reset, stall and estop happen at a time"),
+                _ => return Err("only reset, stall and estop take a time"),
             }
             return Ok(());
         }
@@ -103,7 +103,7 @@ impl WireFaults {
             }
             _ => {
                 return Err(
-                    "there are drop, flip, duplicate, merge, delay, reset, stall and estop",
+                    "the faults are drop, flip, duplicate, merge, delay, reset, stall and estop",
                 );
             }
         };

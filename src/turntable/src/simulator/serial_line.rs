@@ -20,7 +20,7 @@ pub(super) type Timed = (u64, u8);
 pub(super) struct Wire {
     faults: WireFaults,
     random: Random,
-    /// The direction to the chip, in which real-time commands are no part of a line.
+    /// The direction to the chip, in which real-time commands are not part of a line.
     to_chip: bool,
     /// The line so far, in case it is repeated.
     line: Vec<u8>,

@@ -26,7 +26,7 @@ impl Terminal {
         let failed = |step| {
             move |errno: Errno| {
                 SimulatorError(format!(
-                    "could not {step} a pseudoterminal: {errno}; see that /dev/pts is mounted and not full"
+                    "could not {step} a pseudoterminal: {errno}; check that /dev/pts is mounted and not full"
                 ))
             }
         };

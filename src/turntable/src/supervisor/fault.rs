@@ -15,7 +15,7 @@ pub enum MotionFault {
     Alarm(Alarm),
     /// The table was put on hold, but not by this program.
     #[error(
-        "the table was put on hold, and not by this program; look for a button or another sender, and start again"
+        "something else put the table on hold; look for a button or another sender, and start again"
     )]
     Held,
     /// The controller fell silent.
@@ -32,7 +32,7 @@ pub enum MotionFault {
     },
     /// The table stands in another place than its target, or does something else.
     #[error(
-        "the table was sent to {target_deg:.3} degrees and is in state {state} at {machine_deg:.3} (from machine zero); the line to it was damaged, it restarted, or something else drives it; look at the cable, then home it"
+        "the table was sent to {target_deg:.3} degrees and is in state {state} at {machine_deg:.3} (from machine zero); check cable and other senders, then home it"
     )]
     Astray {
         /// Its state.
@@ -46,12 +46,12 @@ pub enum MotionFault {
     #[error("the table did not arrive in time; compare its speed with the settings $110 and $120")]
     Late,
     /// The line that moves the table got no answer.
-    #[error("the line that moves it may or may not have been taken: {0}")]
+    #[error("the line that moves it may or may not have arrived: {0}")]
     Line(LineFault),
     /// The port is gone.
     #[error("the port is gone ({0}); check that the controller is plugged in")]
     PortLost(String),
     /// A stop was requested.
-    #[error("a stop was asked for")]
+    #[error("a stop was requested")]
     Stopped,
 }

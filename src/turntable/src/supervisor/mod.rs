@@ -407,7 +407,7 @@ impl Supervisor {
         }
     }
 
-    /// Notes what a report says of an alarm.
+    /// Notes what a report says about an alarm.
     fn note_alarm(&mut self, report: &PositionReport) {
         if report.state != ControllerState::Alarm {
             self.alarm = None;

@@ -1,4 +1,4 @@
-//! Monitoring a motion: whether it goes on, and where it ends.
+//! Monitoring a motion: whether it continues, and where it ends.
 
 use super::{ControllerTraits, MotionFault, PositionReport};
 use crate::codes::Alarm;

@@ -1,4 +1,4 @@
-//! libjpeg-turbo's decoder, of which the crate `mozjpeg-sys` has a copy.
+//! libjpeg-turbo's decoder, from the copy in the crate `mozjpeg-sys`.
 //!
 //! The library reports errors by a function that must not return: it unwinds through the library, which is
 //! compiled for that, and is caught here.

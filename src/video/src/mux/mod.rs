@@ -33,7 +33,7 @@ const BUFFER: usize = 1 << 15;
 pub enum Written {
     /// It is in the file, or on its way there.
     Kept,
-    /// It was left out: it depends on frames before the recording, and there was no key frame yet.
+    /// It was left out: it depends on frames before the recording's first key frame.
     BeforeKeyFrame,
 }
 
@@ -132,8 +132,8 @@ impl Muxer {
     /// Adds a frame that was taken at `t_us` microseconds of the camera's clock.
     ///
     /// # Errors
-    /// [`VideoError::DiskFull`] where the disk is full, [`VideoError::Write`] where it fails otherwise,
-    /// [`VideoError::Refused`] where an uncompressed picture has not the bytes of one (nothing was
+    /// [`VideoError::DiskFull`] if the disk is full, [`VideoError::Write`] if it fails otherwise,
+    /// [`VideoError::Refused`] if an uncompressed picture has not the bytes of one (nothing was
     /// written then, and the next may follow), H.264 has no start codes, or FFmpeg cannot code it.
     pub fn write(&mut self, data: &[u8], t_us: i64) -> Result<Written, VideoError> {
         let chained = self.stream.format == PixelFormat::H264;

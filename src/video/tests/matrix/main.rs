@@ -282,7 +282,7 @@ fn with_repeated_pictures(mut stream: Vec<u8>) -> Vec<u8> {
 struct Reference {
     numbers: Vec<u64>,
     luma: Vec<Vec<u8>>,
-    /// Seconds; none where the program knows none.
+    /// Seconds; `None` if the program knows none.
     times: Vec<Option<f64>>,
 }
 

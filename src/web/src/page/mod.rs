@@ -68,7 +68,7 @@ impl Entry {
 #[derive(Debug, Clone, Copy)]
 pub struct Index(pub &'static str);
 
-/// The page at `/`. With a token in the URL, the browser gets it as a cookie and goes on to the URL
+/// The page at `/`. With a token in the URL, the browser gets it as a cookie and continues to the URL
 /// without it, so that it stays out of history and bookmarks.
 pub async fn index(
     State(policy): State<Arc<AccessPolicy>>,

@@ -24,7 +24,7 @@ Examples:
   relight insert mug --into room.hdr -o out.png
       an object that relight turn has captured: its folder, or mug/object.relit
   relight insert --scene scene.toml -o out.png
-      all of it from a file (docs/relight-insert.md)";
+      all of it from a file (docs/guide/photograph.md)";
 
 #[derive(Args)]
 pub(crate) struct Arguments {

@@ -32,7 +32,7 @@ impl Node {
         Ok(listed(self.call(&QUERY_EXT_CTRL, &mut found))?.map(|()| found))
     }
 
-    /// The text of a menu's item, or the number of an integer menu's; `None` if there is no such
+    /// The text of a menu's item, or the number of an integer menu's; `None` if it has no such
     /// item.
     pub(in crate::v4l2) fn menu_item(
         &self,

@@ -126,7 +126,7 @@ impl Node {
     /// A call whose structure can hold pointers; repeated if a signal interrupts it.
     ///
     /// # Safety
-    /// Where the kernel follows a pointer of `argument` in this call, it must be valid for all that
+    /// Where the kernel follows a pointer of `argument` in this call, it must be valid for everything
     /// the call reads and writes there.
     unsafe fn call_with_pointers<T>(
         &self,

@@ -79,9 +79,9 @@ impl CameraThread {
                     Ok(())
                 }
             }
-            Err(CameraError::EndOfRecording { .. }) => Err(End::Failed(
-                "the recording that plays the camera is over".to_owned(),
-            )),
+            Err(CameraError::EndOfRecording { .. }) => {
+                Err(End::Failed("the replayed recording has ended".to_owned()))
+            }
             Err(error) => Err(End::Failed(with_causes(&error))),
         }
     }
@@ -141,7 +141,7 @@ impl CameraThread {
                     delivered.map(Finding::QueueFull)
                 }
                 Err(SendTimeoutError::Disconnected(_)) => {
-                    return Err(End::Failed("the disk took no more".to_owned()));
+                    return Err(End::Failed("the disk accepted no more data".to_owned()));
                 }
             }
         };

@@ -24,7 +24,7 @@ pub(super) enum Finding {
     Damaged(usize, FrameFault),
     /// Counter and time stamps do not fit.
     Anomaly(TimingAnomaly),
-    /// The camera's settings are no longer as they were set.
+    /// The camera's settings have changed.
     Settings(String),
 }
 
@@ -66,7 +66,7 @@ impl Finding {
                 "a frame before frame {n} could not be recorded: it was empty, or no key frame came before it"
             ),
             Self::Unwritten { count, .. } => format!(
-                "the disk took no more: {} from frame {n} on did not reach it",
+                "the disk accepted no more data: {} from frame {n} on are missing",
                 frames(*count)
             ),
             Self::Damaged(_, fault) => format!("frame {n} is damaged: {fault}"),

@@ -1,6 +1,6 @@
 //! Recording one turn of a started camera into a session folder.
 //!
-//! A [`Recorder`] reads the camera in a thread of its own, so that nothing that happens elsewhere
+//! A [`Recorder`] reads the camera in its own thread, so that nothing that happens elsewhere
 //! costs a frame: the disk has a queue and a thread before it, and the preview never
 //! holds it up. The time of the turn may be announced after it began ([`Window`]). What is on the
 //! disk is never older than a second, and [`recovery`] closes a session whose recorder died.

@@ -42,7 +42,7 @@ pub(super) struct WriterOutcome {
     pub(super) delivered: Vec<Option<usize>>,
     /// What is wrong with delivered frames.
     pub(super) findings: Vec<Finding>,
-    /// What a sample of the turn's frames says of the environment light.
+    /// What a sample of the turn's frames says about the environment light.
     pub(super) light: EnvironmentLight,
     /// Bytes of video.
     pub(super) bytes: u64,

@@ -61,10 +61,10 @@ impl fmt::Display for Recovered {
 }
 
 /// Looks for interrupted sessions in a folder of sessions and closes them. Those that a living
-/// process is recording are left alone.
+/// process is recording are not changed.
 ///
 /// # Errors
-/// [`RecordingError::System`] where the folder cannot be listed. What goes wrong with one session
+/// [`RecordingError::System`] if the folder cannot be listed. What goes wrong with one session
 /// is in its [`Recovered`].
 pub fn recover(root: &Path) -> Result<Vec<Recovered>, RecordingError> {
     let failed = |source| RecordingError::System {
@@ -97,7 +97,7 @@ pub fn recover(root: &Path) -> Result<Vec<Recovered>, RecordingError> {
 /// Closes one interrupted session.
 ///
 /// # Errors
-/// [`SessionError::InUse`] where its recorder lives, [`SessionError::Ended`] where there is nothing
+/// [`SessionError::InUse`] if its recorder lives, [`SessionError::Ended`] if there is nothing
 /// to do, [`RecordingError::NotMended`], or what the file system answers; its status stays
 /// "recording" then, except for [`RecordingError::NotMended`].
 pub fn recover_session(folder: &Path) -> Result<Saved, RecordingError> {
@@ -126,7 +126,7 @@ pub fn recover_session(folder: &Path) -> Result<Saved, RecordingError> {
     Ok(saved)
 }
 
-/// How many frames from the first on are readable; 0 where there is no video yet.
+/// How many frames from the first on are readable; 0 before the video exists.
 pub(super) fn whole_frames(path: &Path) -> usize {
     let Ok(video) = Video::open(path) else {
         return 0;

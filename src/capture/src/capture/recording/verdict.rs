@@ -39,7 +39,7 @@ impl Recorded {
     }
 
     /// How much the light on what stands in the middle of the picture changes over the turn, as
-    /// [`relit_data::turn_light`] measures it; `None` where too few frames could be looked at.
+    /// [`relit_data::turn_light`] measures it; `None` if too few frames could be looked at.
     #[must_use]
     pub fn modulation(&self) -> Option<f64> {
         let frames = usize::try_from(self.camera.count.expected).unwrap_or(usize::MAX);
@@ -53,8 +53,8 @@ impl Recorded {
     }
 
     /// Judges the take and closes its session. Each frame gets the angle (degrees) that `angle`
-    /// returns for its time stamp (microseconds). `control_faults`: what is no longer as it was set
-    /// on the camera, a sentence each.
+    /// returns for its time stamp (microseconds). `control_faults`: the settings of the camera that
+    /// changed, a sentence each.
     ///
     /// # Errors
     /// What closing the session answers; its status stays "recording" then, and it can be recovered.
@@ -162,7 +162,7 @@ impl Recorded {
         self.writer.failure.is_none() && matches!(self.camera.end, End::OnPurpose(_))
     }
 
-    /// Why the take cannot be used; `None` where it can.
+    /// Why the take cannot be used; `None` if it can.
     fn rejection(&self, findings: &[Finding]) -> Option<String> {
         if let Some(failure) = &self.writer.failure {
             return Some(self.disk_failure(failure));
@@ -206,7 +206,7 @@ impl Recorded {
             found += &format!("{and}{} damaged", frames(damaged));
         }
         let most = self.max_dropped;
-        (lost + damaged > most).then(|| format!("{found}, where {most} are allowed"))
+        (lost + damaged > most).then(|| format!("{found}, but only {most} are allowed"))
     }
 
     /// Why the disk took no more, and how much more the turn would have needed.
@@ -229,14 +229,16 @@ impl Recorded {
         )
     }
 
-    /// Frames before the turn, which are no fault.
+    /// Frames before the turn, which are not a fault.
     fn lead_note(&self) -> Option<Fault> {
         let first = self.writer.session.index().entries().first()?;
         let lead = lead_of(&self.writer.delivered);
         let frames = frames(lead);
         (lead > 0).then(|| Fault {
             t_us: first.t_us,
-            what: format!("{frames} before the turn are in the video, as its frames build on them"),
+            what: format!(
+                "{frames} before the turn are in the video, because later frames depend on them"
+            ),
         })
     }
 

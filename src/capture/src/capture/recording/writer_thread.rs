@@ -116,7 +116,7 @@ impl WriterThread {
         Ok(())
     }
 
-    /// Part of a raw picture, filled up with zeros: what came of it is kept.
+    /// Part of a raw picture, filled up with zeros, so that what arrived is kept.
     fn padded(&self, data: &[u8]) -> Option<Vec<u8>> {
         let stream = &self.stream;
         let whole = stream.format.frame_bytes(stream.width, stream.height)?;

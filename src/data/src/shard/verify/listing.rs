@@ -63,7 +63,7 @@ fn entries(dataset: &Dataset) -> Vec<VerifyProblem> {
         let other = *folded_names.entry(folded(id)).or_insert(id);
         if other != id {
             wrong(format!(
-                "the sessions {other:?} and {id:?} are one where a file system ignores case"
+                "the sessions {other:?} and {id:?} differ only in case, which some file systems ignore"
             ));
         }
     }

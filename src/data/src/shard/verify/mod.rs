@@ -25,7 +25,7 @@ pub struct VerifyReport {
     pub sessions: u64,
     /// Shards that were read.
     pub shards: u64,
-    /// Samples of which every part was found.
+    /// Samples with all their parts.
     pub samples: u64,
     /// What is wrong; empty if the data set is intact.
     pub problems: Vec<VerifyProblem>,
@@ -64,7 +64,7 @@ impl fmt::Display for VerifyProblem {
 /// rayon's threads, in batches of bounded size.
 ///
 /// # Errors
-/// Only if there is no data set to check: [`ShardError::NoDataset`], [`ShardError::Description`],
+/// Only without a data set to check: [`ShardError::NoDataset`], [`ShardError::Description`],
 /// [`ShardError::UnsafePath`], [`ShardError::SessionName`], or [`ShardError::Io`] on the folder. Everything else is a
 /// [`VerifyProblem`].
 pub fn verify(

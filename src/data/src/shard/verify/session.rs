@@ -48,7 +48,7 @@ pub(super) struct SessionCheck<'a> {
 
 /// What was found in a shard.
 pub(super) struct Found {
-    /// Samples of which every part was there.
+    /// Samples with all their parts.
     pub(super) samples: u64,
     /// The records that could be read, by index; empty in a layout without records.
     pub(super) records: Vec<Option<FrameRecord>>,

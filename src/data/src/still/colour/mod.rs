@@ -163,7 +163,7 @@ impl Colour {
     }
 }
 
-/// The matrix to Rec. 709, whose white that of these primaries becomes; none where nothing would change.
+/// The matrix to Rec. 709, whose white that of these primaries becomes; `None` if nothing would change.
 pub(super) fn to_rec709(primaries: Primaries) -> Result<Option<Matrix>, ColourError> {
     let impossible = || {
         let pairs = [

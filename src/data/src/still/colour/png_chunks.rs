@@ -1,4 +1,4 @@
-//! How a PNG says what its numbers stand for: by the chunks cICP, iCCP, sRGB, gAMA and cHRM, the first of which counts.
+//! How a PNG says what its numbers mean: in the first of the chunks cICP, iCCP, sRGB, gAMA and cHRM.
 
 use png::Info;
 
@@ -13,7 +13,7 @@ const SAME_GAMMA: f32 = 0.02;
 /// The gammas of gAMA that are possible.
 const GAMMAS: std::ops::RangeInclusive<f32> = 0.1..=10.0;
 
-/// What the chunks say; none where there are none.
+/// What the chunks say; `None` without chunks.
 pub(super) fn stated(info: &Info<'_>, is_grey: bool) -> Result<Option<Colour>, ColourError> {
     if let Some(points) = info.coding_independent_code_points {
         if !points.is_video_full_range_image {

@@ -1,4 +1,4 @@
-//! What a file says of its colours.
+//! What a file says about its colours.
 
 use std::io::Cursor;
 
@@ -19,7 +19,7 @@ impl Colour {
     /// What the content of a file says; sRGB where it says nothing, and light of Rec. 709 in EXR and HDR.
     ///
     /// # Errors
-    /// Where it says what is not converted.
+    /// If it says what is not converted.
     pub fn from_file(bytes: &[u8]) -> Result<Self, ColourError> {
         match Format::sniff(bytes) {
             Some(Format::Exr) => Ok(Self::light(exr::to_rec709(bytes)?)),

@@ -1,6 +1,6 @@
 //! The bits of a scan, and Huffman's codes in them (ITU-T T.81, annex F).
 
-/// Codes of 1 to 16 bits, of which only what they mean is kept.
+/// Codes of 1 to 16 bits; only their meaning is kept.
 #[derive(Clone)]
 pub(super) struct Codes {
     /// Of each length the first code, and how many there are.
@@ -74,7 +74,7 @@ impl<'a> Bits<'a> {
         Some(value)
     }
 
-    /// What the next code means; none where there is no such code.
+    /// What the next code means; `None` for an unknown code.
     pub(super) fn symbol(&mut self, codes: &Codes) -> Option<u8> {
         let (mut code, mut index) = (0, 0);
         for (first, count) in codes.lengths {

@@ -11,7 +11,7 @@ const EOI: u8 = 0xd9;
 const SOS: u8 = 0xda;
 const APP2: u8 = 0xe2;
 
-/// The file, which ends with the marker EOI; where only the marker is missing it is put behind the last scan. None where a
+/// The file, which ends with the marker EOI; where only the marker is missing it is put behind the last scan. `None` if a
 /// part of the picture is missing.
 pub(crate) fn whole(bytes: &[u8]) -> Option<Cow<'_, [u8]>> {
     if has_end(bytes) {

@@ -8,7 +8,7 @@ const BLOCK: usize = 64;
 /// Pictures have no more components, and no more scans.
 const MAX_COMPONENTS: u8 = 4;
 const MAX_SCANS: usize = 100;
-/// Blocks of which it is remembered where they are not zero.
+/// The most blocks whose non-zero places are remembered.
 const MAX_BLOCKS: usize = 1 << 24;
 const DHT: u8 = 0xc4;
 const DRI: u8 = 0xdd;
@@ -16,7 +16,7 @@ const DRI: u8 = 0xdd;
 const SEQUENTIAL: [u8; 2] = [0xc0, 0xc1];
 const PROGRESSIVE: u8 = 0xc2;
 
-/// The place behind the last scan; none where a scan is not whole, or scans are missing.
+/// The place behind the last scan; `None` if a scan is not whole, or scans are missing.
 pub(super) fn end(bytes: &[u8]) -> Option<usize> {
     let mut tables = Tables::default();
     let mut frame = None;

@@ -5,7 +5,7 @@
 pub(crate) enum TimingAnomaly {
     /// Counter and time stamps disagree on what lies between two frames.
     #[error(
-        "before frame {before} the driver's counter grows by {counted} and the time stamps by {timed} frames"
+        "before frame {before} the driver's counter grows by {counted} frames, but the time stamps by {timed}"
     )]
     Contradiction {
         /// The frame after the place.
@@ -33,7 +33,7 @@ pub(crate) enum TimingAnomaly {
     #[error("the time stamps are too irregular to count frames by")]
     Irregular,
     /// The camera does not keep the agreed rate.
-    #[error("the camera delivers {measured:.2} frames/s where {agreed:.2} were agreed")]
+    #[error("the camera delivers {measured:.2} frames/s, but {agreed:.2} were agreed")]
     Rate {
         /// Frames a second as measured.
         measured: f64,
@@ -43,7 +43,7 @@ pub(crate) enum TimingAnomaly {
 }
 
 impl TimingAnomaly {
-    /// The same with frames counted from frame `first` on; `None` where it is about a frame before
+    /// The same with frames counted from frame `first` on; `None` if it is about a frame before
     /// that one, or about one of `frames` frames later or more.
     pub(crate) fn counted_from(mut self, first: usize, frames: usize) -> Option<Self> {
         match &mut self {

@@ -11,7 +11,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// The least-squares line; `None` where all numbers are equal, or the line falls.
+    /// The least-squares line; `None` if all numbers are equal, or the line falls.
     pub(super) fn through(numbers: &[i64], times: &[f64]) -> Option<Self> {
         let count = numbers.len() as f64;
         let mean = |sum: f64| sum / count;

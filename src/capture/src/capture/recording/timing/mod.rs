@@ -26,7 +26,7 @@ const RATE_TOLERANCE: f64 = 0.02;
 /// Counter and time stamp of one delivered frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FrameStamp {
-    /// The driver's counter without its wraps; `None` where the camera has none. It may stand still
+    /// The driver's counter without its wraps; `None` if the camera has none. It may stand still
     /// or go back.
     pub sequence: Option<u64>,
     /// The time stamp, microseconds.

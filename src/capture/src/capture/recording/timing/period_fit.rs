@@ -30,7 +30,7 @@ pub(super) struct PeriodFit {
 }
 
 impl PeriodFit {
-    /// Fits a period near `expected`; `None` where the stamps are too irregular.
+    /// Fits a period near `expected`; `None` if the stamps are too irregular.
     pub(super) fn find(times: &[f64], expected: f64) -> Option<Self> {
         let (frequency, vector) = strongest(times, 1.0 / expected);
         let length = vector.0.hypot(vector.1) / times.len() as f64;

@@ -38,7 +38,7 @@ struct Row {
     button: String,
     /// `null`: the button is disabled.
     action: Option<String>,
-    /// Words of the refusal of each command, or `null` where it is taken.
+    /// Words of the refusal of each command, or `null` if it is taken.
     commands: BTreeMap<String, Option<String>>,
 }
 
