@@ -27,7 +27,7 @@ pub(super) fn make_empty_folder(path: &Path) -> Result<(), String> {
     match entries.next() {
         None => Ok(()),
         Some(_) => Err(format!(
-            "{} is not empty: give a folder that is empty or not there",
+            "{} is not empty: give a new or empty folder",
             path.display()
         )),
     }

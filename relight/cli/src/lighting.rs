@@ -66,7 +66,7 @@ impl LightArguments {
         self.light_angle.to_radians()
     }
 
-    /// The file of coefficients and that of a panorama, of which at most one is given.
+    /// The file of coefficients and the file of a panorama; at most one is given.
     pub(crate) fn files(&self) -> (Option<&Path>, Option<&Path>) {
         match self.light.as_deref() {
             Some(path) if LightSource::is_text(path) => (Some(path), None),

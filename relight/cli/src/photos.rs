@@ -146,7 +146,7 @@ pub(crate) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<(), Stri
     let is_same = |input: &&PathBuf| input.canonicalize().is_ok_and(|input| input == place);
     inputs.iter().find(is_same).map_or(Ok(()), |_| {
         Err(format!(
-            "{} is read as well: give the result another name",
+            "{} is also an input: give the result another name",
             output.display()
         ))
     })

@@ -62,7 +62,7 @@ pub(crate) fn one_of<T: Copy + Send + Sync>(
         let found = choices.iter().find(|(name, ..)| *name == given);
         found
             .map(|&(.., value)| value)
-            .ok_or("it is none of the possible values")
+            .ok_or("it is not a possible value")
     })
 }
 

@@ -72,7 +72,7 @@ impl Baseline {
     }
 }
 
-/// An image as albedo times shading, of which the latter may not be known.
+/// An image as albedo times shading; the shading may be unknown.
 struct IntrinsicImages {
     albedo: Rgb<Linear>,
     shading: Option<Rgb<Linear>>,
@@ -130,7 +130,7 @@ pub fn evaluate_intrinsic(
     let has_oracle = first.is_none_or(|one| one.shading.is_some() && one.normals.is_some());
     let mut baselines = Baseline::ALL.to_vec();
     if !has_oracle {
-        let note = "the oracle is left out: the set does not know both normals and shading";
+        let note = "the oracle is left out: the set does not have both normals and shading";
         table.notes.push(note.to_owned());
         baselines.retain(|(baseline, _)| *baseline != Baseline::Oracle);
     }

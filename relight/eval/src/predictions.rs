@@ -112,7 +112,7 @@ impl Predictions {
         };
         found.ok_or_else(|| {
             EvalError::Unfit(format!(
-                "there is no prediction {part}.exr or {part}.png in {}: all images of the ground truth are compared, or none",
+                "{part}.exr or {part}.png is missing in {}: give a prediction for every image of the ground truth",
                 self.root.join(name).display()
             ))
         })

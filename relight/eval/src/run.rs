@@ -8,10 +8,10 @@ use relight_core::metrics::MetricError;
 use relight_core::parallel;
 use relight_core::reader::{TruthSample, TruthSet};
 
-/// Told after each image, from many threads, how many there are in all.
+/// Called after each image, from many threads, with the number of all images.
 pub type EvalProgress<'a> = &'a (dyn Fn(usize) + Sync);
 
-/// What is wrong with a sample of which a measure cannot be taken.
+/// The fault of a sample that cannot be measured.
 pub(super) const NOT_MEASURED: &str = "cannot be measured";
 /// The same where no light can be fitted.
 pub(super) const UNLIT: &str = "cannot be lit: no light can be fitted to it";
@@ -134,7 +134,7 @@ pub(super) fn need<'a, T>(
     found.as_ref().ok_or_else(|| {
         let name = &sample.name;
         EvalError::Unfit(format!(
-            "the ground truth has no {part} of {name}: this protocol cannot be run on it"
+            "the ground truth has no {part} of {name}, which this protocol needs"
         ))
     })
 }
@@ -160,7 +160,7 @@ pub(super) fn grey(image: &Rgb<Linear>) -> Vec<f32> {
     channels.map(|((r, g), b)| (r + g + b) / 3.0).collect()
 }
 
-/// An image of which all channels are this plane.
+/// An image with this plane in all channels.
 pub(super) fn of_grey(extent: Extent, plane: Vec<f32>) -> Result<Rgb<Linear>, EvalError> {
     let planes = Planes::from_planes(extent, [plane.clone(), plane.clone(), plane])?;
     Ok(Rgb::new(planes))

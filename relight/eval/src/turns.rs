@@ -118,7 +118,7 @@ impl TurnSet {
 }
 
 /// Solves every turn of a data set of `relight synth turns` by every method; `split` is what the table calls them. `progress`
-/// is told each turn and method.
+/// is called for each turn and method.
 ///
 /// # Errors
 /// Where a turn or its ground truth cannot be read, or cannot be solved.
@@ -293,9 +293,9 @@ impl fmt::Display for TurnScores {
         writeln!(f, "turns, {turns} of {}", self.split)?;
         writeln!(
             f,
-            "  angles between found and true normals, degrees: mean over the turns and its standard error, of their means and \
-             medians; by how much answers are turned about the table's axis (mean of the amounts), and the mean error without \
-             it; what is expected; albedo: squared error over energy; of the pixels expected within 10, 20, 30 degrees how many are"
+            "  errors of normals in degrees, averaged over the turns ± standard error: mean, median; azimuth: mean rotation \
+             of the answers about the table's axis; unturned: mean error without it; expected: the predicted error; albedo: \
+             squared error over energy; 10, 20, 30: how many pixels expected within so many degrees are"
         )?;
         writeln!(
             f,

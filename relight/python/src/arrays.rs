@@ -26,7 +26,7 @@ pub(crate) enum GivenPicture<'py> {
     Light(PyReadonlyArray3<'py, f32>),
 }
 
-/// The same, of which Python may change its own.
+/// The same, copied: Python may change its array meanwhile.
 pub(crate) enum Picture {
     File(PathBuf),
     Memory(DynamicImage),
@@ -125,7 +125,7 @@ pub(crate) struct Array<T> {
 }
 
 impl Array<f32> {
-    /// Rows, columns and channels; one channel alone is no dimension.
+    /// Rows, columns and channels; a single channel has no dimension of its own.
     pub(crate) fn from_planes<const C: usize>(planes: &Planes<C>) -> Self {
         let Extent { width, height } = planes.extent();
         let mut values = vec![0.0; C * width * height];

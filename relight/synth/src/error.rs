@@ -36,7 +36,7 @@ pub enum SynthError {
     /// A texture or an image cannot be read.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// Numbers are no light.
+    /// The numbers are not a light.
     #[error(transparent)]
     Light(#[from] LightError),
     /// A picture could not be encoded.
@@ -82,7 +82,7 @@ impl SynthError {
     pub(super) fn mesh(path: &Path) -> impl FnOnce(String) -> Self {
         move |reason| {
             let fault = format!(
-                "is a mesh that cannot be used: {reason}; mend it, or take it out of the folder"
+                "is a mesh that cannot be used: {reason}; repair it, or remove it from the folder"
             );
             Self::unusable(path, fault)
         }

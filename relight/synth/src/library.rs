@@ -24,7 +24,7 @@ use relit_data::shard::Digest;
 pub(crate) const PANORAMA_EXTENT: Extent = Extent::new(256, 128);
 /// Size of panoramas as pictures.
 const PICTURE_EXTENT: Extent = Extent::new(256, 128);
-/// Seeds of which panoramas are made.
+/// Seeds from which panoramas are made.
 const VARIANTS: u64 = 4;
 
 /// Meshes, pictures and panoramas to draw from.

@@ -103,7 +103,7 @@ impl TextureImage {
     /// Reads a picture, whose values are sRGB where it says nothing else.
     ///
     /// # Errors
-    /// [`SynthError::Image`] where it cannot be read or is no picture.
+    /// [`SynthError::Image`] if it cannot be read or is not a picture.
     pub(crate) fn read(path: &Path) -> Result<Self, SynthError> {
         let image = ColourImage::read(path, None)?.into_light();
         let planes = image.planes();
@@ -125,7 +125,7 @@ impl TextureImage {
         })
     }
 
-    /// The same of a packed library's JPEG, of which no side is longer than `longest`.
+    /// The same of a packed library's JPEG, with sides of at most `longest`.
     pub(crate) fn unpacked(
         bytes: &[u8],
         kind: PictureKind,
@@ -140,7 +140,7 @@ impl TextureImage {
         Ok(Self::reduced(&image, kind, MAX_SIDE))
     }
 
-    /// The picture as a JPEG of which no side is longer than `longest`.
+    /// The picture as a JPEG with sides of at most `longest`.
     ///
     /// # Errors
     /// Where it has no pixels.
@@ -227,7 +227,7 @@ impl TextureImage {
     }
 }
 
-/// Part of an image's pixels of which less than half is opaque.
+/// The part of an image's pixels that are less than half opaque.
 fn see_through(image: &DynamicImage) -> f32 {
     if !image.color().has_alpha() {
         return 0.0;
@@ -244,7 +244,7 @@ struct Means {
 }
 
 impl Means {
-    /// The smallest squares of which there are at most `longest` side by side.
+    /// The smallest squares with at most `longest` in a row or column.
     fn new(sides: [usize; 2], longest: usize) -> Self {
         let square = sides[0].max(sides[1]).div_ceil(longest).max(1);
         Self { sides, square }

@@ -40,7 +40,7 @@ pub enum TrainError {
     #[error("the run was asked to stop while its first samples were being composed")]
     Stopped,
     /// Another process of the run has ended, or cannot be reached.
-    #[error("another process of this run has ended or cannot be reached any more ({0})")]
+    #[error("another process of this run has ended or can no longer be reached ({0})")]
     ProcessLost(String),
     /// A fault of the program.
     #[error("{0}: this is a fault of the program")]
@@ -65,9 +65,9 @@ impl TrainError {
         ))
     }
 
-    /// That a file is no checkpoint of this run.
+    /// A file is not a checkpoint of this run.
     pub(super) fn checkpoint(path: &Path, fault: &str) -> Self {
         let path = path.display();
-        Self::Refused(format!("{path} is no checkpoint of this run: {fault}"))
+        Self::Refused(format!("{path} is not a checkpoint of this run: {fault}"))
     }
 }

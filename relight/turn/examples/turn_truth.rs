@@ -27,7 +27,7 @@ fn weights(name: &str) -> Result<Weights, NetError> {
     Weights::read(&folder.join(name))
 }
 
-/// Confidences above which the error is told.
+/// Confidences above which the error is printed.
 const LEVELS: [f32; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.9];
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -80,8 +80,8 @@ pub struct SolvedTurn {
     pub reading: Duration,
 }
 
-/// Solves the turn of a shard, or of what else [`read_curves`] takes. `progress` is told how many frames of the
-/// shard, and then of the video, are done, and how many there are.
+/// Solves the turn of a shard, or of what else [`read_curves`] takes. `progress` is called with the number of frames
+/// done and of all frames: first those of the shard, then those of the video.
 ///
 /// # Errors
 /// Where the shard or the video cannot be read, a network fails, or no light fits the turn.

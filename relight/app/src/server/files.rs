@@ -46,7 +46,8 @@ pub(super) struct Encoding {
 pub enum PageFault {
     /// There is none where one would be.
     #[error(
-        "there is no page of relight in {}: build it by 'make app', install the Debian package relight, or give its folder by --page",
+        "{} does not contain the app's page: build it with 'make app', install the Debian package relight, or give its folder \
+         with --page",
         either(places)
     )]
     NoPage {
@@ -54,7 +55,7 @@ pub enum PageFault {
         places: Vec<PathBuf>,
     },
     /// Its list or a file of that is missing, damaged or not whole.
-    #[error("the page is incomplete, {} {why}: build the page again by 'make app'", path.display())]
+    #[error("the page is incomplete, {} {why}: build it again with 'make app'", path.display())]
     Incomplete {
         /// The file.
         path: PathBuf,

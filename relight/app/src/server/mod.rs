@@ -1,4 +1,4 @@
-//! The page's server: it hands out the files of a folder, and takes nothing. Who gets in is decided by `relit-web`: on
+//! The page's server: it serves the files of a folder and accepts no uploads. `relit-web` decides who gets in: on
 //! loopback everybody, elsewhere whoever has the token.
 //!
 //! | file | concern |
@@ -18,7 +18,7 @@ pub use files::{PageFault, PageFiles};
 
 /// The address is refused, or the system has no randomness or no threads.
 #[derive(Debug, thiserror::Error)]
-#[error("the page cannot be served at {address}: give another address by --listen")]
+#[error("the page cannot be served at {address}: give another address with --listen")]
 pub struct PageServerError {
     /// The address.
     pub address: SocketAddr,

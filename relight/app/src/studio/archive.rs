@@ -103,7 +103,7 @@ impl SceneFiles {
     /// The scene and the files of an archive.
     ///
     /// # Errors
-    /// Where it is no archive, too large, or its scene names a file that it has not.
+    /// If it is not an archive, is too large, or its scene names a file that it does not contain.
     pub(super) fn unpacked(archive: &[u8]) -> Result<(SceneDescription, Self), Refusal> {
         let mut archive = ZipArchive::new(Cursor::new(archive)).map_err(|fault| damaged(&fault))?;
         let text = text::decode(entry(&mut archive, SCENE)?);
@@ -157,13 +157,13 @@ fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>,
 
 fn missing(name: &str) -> Refusal {
     Refusal(format!(
-        "{name} is not in the archive, and its scene.toml names it"
+        "the archive lacks {name}, which its scene.toml names"
     ))
 }
 
 fn damaged(fault: &(dyn std::error::Error + 'static)) -> Refusal {
     Refusal::because(
-        "the file is no scene that was kept: it is no ZIP archive, or damaged",
+        "this file is not a saved scene: it is not a ZIP archive, or is damaged",
         fault,
     )
 }

@@ -1,4 +1,4 @@
-//! What the objects are put into: a photograph, or a panorama of which a part is seen.
+//! The background of a scene: a photograph, or part of a panorama.
 
 use std::path::Path;
 
@@ -55,12 +55,12 @@ impl StudioBackground {
     /// The background that the page asks for, whose file or pixels are these.
     ///
     /// # Errors
-    /// Where it cannot be read, or is no panorama.
+    /// If it cannot be read, or is not a panorama.
     pub(super) fn open(asked: &BackgroundRequest, bytes: &[u8]) -> Result<Self, Refusal> {
         match asked {
             BackgroundRequest::Panorama { id } => {
                 let scenery = Scenery::from_id(id);
-                let none = || Refusal(format!("there is no panorama {id}"));
+                let none = || Refusal(format!("unknown panorama {id}"));
                 Ok(Self::made(scenery.ok_or_else(none)?)?)
             }
             BackgroundRequest::Photo { name } => Self::photo(name, bytes.to_vec()),
@@ -91,7 +91,7 @@ impl StudioBackground {
     /// A photograph.
     ///
     /// # Errors
-    /// Where it cannot be read, or has values that are no light.
+    /// If it cannot be read, or has a value that is negative or not finite.
     pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         let opened = OpenedFile::read(name, bytes, None)?;
         let (name, file) = (opened.name, opened.bytes);
@@ -237,7 +237,7 @@ impl StudioBackground {
         }
     }
 
-    /// What a scene is told of it, after [`StudioBackground::prepare`].
+    /// The background as a scene takes it, after [`StudioBackground::prepare`].
     pub(super) fn for_scene(&self) -> SceneBackground<'_> {
         match &self.content {
             Content::Photo(photo) => SceneBackground::Picture(photo.shown()),

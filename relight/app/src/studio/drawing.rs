@@ -13,7 +13,7 @@ use super::pixels::{covering, rgba, shown};
 
 /// How much of a pixel an object covers at least where it counts as seen.
 const SEEN: f32 = 0.5;
-/// A larger part of a picture that is clipped is told.
+/// A clipped part of the background larger than this is reported.
 const MUCH_CLIPPED: f32 = 0.25;
 
 /// The setting that was made last, with all that it depends on: a background, the scene without objects and without the
@@ -25,7 +25,7 @@ impl KeptEnvironment {
     /// The setting of a scene, `longest` pixels at most; the background is made ready for it.
     ///
     /// # Errors
-    /// Where there is no light.
+    /// If the light is dark.
     pub(super) fn of(
         &mut self,
         scene: &SceneDescription,
@@ -140,16 +140,14 @@ impl<'a> Drawing<'a> {
         if let Some(sun) = &self.setting.sun {
             let sure = 100.0 * sun.confidence;
             notes.push(format!(
-                "light comes from the sun in the picture ({sure:.0} % sure)"
+                "lit by the sun in the picture ({sure:.0} % confidence)"
             ));
         }
         if let Some(exposure) = &self.setting.exposure
             && exposure.clipped > MUCH_CLIPPED
         {
             let part = 100.0 * exposure.clipped;
-            notes.push(format!(
-                "{part:.0} % of the background is too bright to be shown"
-            ));
+            notes.push(format!("{part:.0} % of the background is clipped to white"));
         }
         notes
     }

@@ -41,7 +41,7 @@ use request::{FileFormat, Request};
 
 /// The most objects of a scene.
 const MAX_OBJECTS: usize = 12;
-/// The size of a panorama's picture where nothing is said.
+/// The default size of a panorama's picture.
 const PANORAMA_PICTURE: [u32; 2] = [1280, 960];
 
 /// The engine of the page: it answers messages, one after the other.
@@ -73,7 +73,7 @@ impl Objects {
     }
 }
 
-/// What is said, and the pictures and files with it.
+/// The fields of an answer, and the pictures and files with it.
 type Answer = (Value, Vec<Vec<u8>>);
 
 impl Studio {
@@ -164,7 +164,7 @@ impl Studio {
         let others = self.objects.0.keys().filter(|&&key| key != number).count();
         if others >= MAX_OBJECTS {
             return refused(format!(
-                "there are {others} objects already, and a scene has at most that many: remove one first"
+                "the scene already has {others} objects, the maximum: remove one first"
             ));
         }
         let answer = told(&object);
@@ -283,7 +283,9 @@ impl Studio {
     fn import(&mut self, archive: &[u8]) -> Result<Answer, Refusal> {
         let (described, files) = SceneFiles::unpacked(archive)?;
         if described.objects.len() > MAX_OBJECTS {
-            return refused(format!("a scene has at most {MAX_OBJECTS} objects"));
+            return refused(format!(
+                "the scene has too many objects: the maximum is {MAX_OBJECTS}"
+            ));
         }
         let background_name = described.background.to_string_lossy();
         let content = files.content(&described.background)?.clone();
@@ -332,7 +334,7 @@ fn no_background() -> Refusal {
 
 fn no_object(number: u32) -> Refusal {
     Refusal(format!(
-        "there is no object {number}: open its photograph again"
+        "unknown object {number}: open its photograph again"
     ))
 }
 

@@ -25,7 +25,7 @@ pub(super) const MAX_PIXELS: usize = 2_000_000;
 const MAX_READ: usize = 100_000_000;
 /// How errors name the mask of a photograph.
 const MASK: &str = "mask.png";
-/// The height of an object of which the scene is shown while it is worked on, pixels.
+/// The height of an object in the preview, while the scene is edited, pixels.
 const PREVIEW_ROWS: usize = 320;
 /// The most that the longest side of its photograph has then.
 const PREVIEW_SIDE: usize = 1024;
@@ -64,7 +64,7 @@ impl StudioObject {
     /// Opens a file.
     ///
     /// # Errors
-    /// Where it is no photograph and no captured object, or too large.
+    /// If it is neither a photograph nor a captured object, or is too large.
     pub(super) fn open(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         if is_captured(name) {
             let captured = CapturedObject::from_bytes(&bytes)?;
@@ -84,7 +84,7 @@ impl StudioObject {
     /// Opens a photograph with the mask that was kept with it.
     ///
     /// # Errors
-    /// Where it is no photograph, or the mask is none.
+    /// If the photograph or the mask cannot be read.
     pub(super) fn open_masked(
         name: &str,
         bytes: Vec<u8>,
@@ -309,7 +309,7 @@ impl OpenedFile {
     /// file is not to be asked.
     ///
     /// # Errors
-    /// Where it is no picture that can be read.
+    /// If it cannot be read as a picture.
     pub(super) fn read(
         name: &str,
         bytes: Vec<u8>,
@@ -324,7 +324,7 @@ impl OpenedFile {
             && !has_at_most(MAX_READ)
         {
             return refused(format!(
-                "{name} has {width} x {height} pixels: at most {} million are read",
+                "{name} has {width} x {height} pixels: the limit is {} million",
                 MAX_READ / 1_000_000
             ));
         }

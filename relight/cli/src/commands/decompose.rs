@@ -66,7 +66,7 @@ impl Arguments {
 
     fn normals_fault(&self) -> Option<String> {
         let is_lone = self.normals.is_none() && self.normals_frame.normals_y.is_some();
-        is_lone.then(|| "--normals-y is for --normals, and that is not given".to_owned())
+        is_lone.then(|| "--normals-y needs --normals".to_owned())
     }
 
     fn frames_fault(&self) -> Option<String> {
@@ -77,7 +77,7 @@ impl Arguments {
             .find(|path| PhotoInput::has_frames(path))
         else {
             let given = self.count.is_some();
-            return given.then(|| "--count is for shards, and there is none".to_owned());
+            return given.then(|| "--count needs a shard (.tar)".to_owned());
         };
         let given = [
             ("--mask", self.photos.mask.is_some()),
@@ -87,7 +87,7 @@ impl Arguments {
         let (option, _) = given.into_iter().find(|(_, is_given)| *is_given)?;
         let frames = frames.display();
         Some(format!(
-            "{option} is for photographs: the frames of {frames} have masks of their own and are sRGB"
+            "{option} is for photographs: the frames of {frames} have their own masks and are sRGB"
         ))
     }
 
@@ -96,7 +96,7 @@ impl Arguments {
         let is_one = matches!(self.photos.photos.as_slice(), [photo] if !photo.is_dir());
         (!is_one).then(|| {
             let mask = mask.display();
-            format!("--mask {mask}: one mask belongs to one photograph; give a folder of masks")
+            format!("--mask {mask} is one mask for several photographs: give a folder of masks")
         })
     }
 
@@ -156,7 +156,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     outcome(&found, lost, "decomposed")
 }
 
-/// What is said of a photograph.
+/// What is reported about a photograph.
 struct Decomposed {
     text: String,
     event: Value,

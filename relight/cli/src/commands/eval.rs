@@ -178,9 +178,8 @@ impl Arguments {
             Protocol::Mit { set, .. }
             | Protocol::Normals { set }
             | Protocol::Light { set, .. }
-            | Protocol::Highlight { set } => {
-                (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
-            }
+            | Protocol::Highlight { set } => (set.count == Some(0))
+                .then(|| "--count 0 compares nothing: give 1 or more".to_owned()),
             Protocol::Relighting { .. } | Protocol::Turn(_) => None,
         }
     }
@@ -253,7 +252,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             estimates,
             weights,
         } => {
-            let table = table.as_ref().ok_or("--data is missing")?;
+            let table = table.as_ref().ok_or("give the ground truth with --data")?;
             relighting(table, estimates, weights, console)
         }
         Protocol::Turn(arguments) => turns(arguments, console),

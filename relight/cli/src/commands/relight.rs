@@ -35,7 +35,7 @@ Examples:
   relight relight photos --mask masks --lamp -45,40 -o relit
       many photographs: relit/<name>.png";
 
-/// The longest side of a video's frames where nothing is said.
+/// The default for the longest side of a video's frames.
 const MOVIE_SIDE: usize = 1080;
 /// What `--light` takes for the light that the photograph was taken in.
 const OWN: &str = "own";
@@ -101,14 +101,12 @@ impl Arguments {
     pub(crate) fn fault(&self) -> Option<String> {
         if self.light.is_empty() {
             return Some(
-                "give the new light by --light FILE or --lamp AZIMUTH,ELEVATION".to_owned(),
+                "give the new light with --light FILE or --lamp AZIMUTH,ELEVATION".to_owned(),
             );
         }
         let has_file = self.light.light.is_some() && !self.is_own_light();
         if self.background == Some(BackgroundName::Light) && !has_file {
-            return Some(
-                "--background light: there is no panorama; give one by --light".to_owned(),
-            );
+            return Some("--background light needs a panorama: give one with --light".to_owned());
         }
         if self.is_set() {
             return None;
@@ -248,7 +246,7 @@ impl Run<'_> {
         let note = photo.mask_note.as_ref();
         let note = note.map_or_else(String::new, |note| format!("; the mask {note}"));
         let text = format!(
-            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposing{note}",
+            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposition{note}",
             output.display(),
         );
         let event = json!({

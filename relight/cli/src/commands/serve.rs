@@ -53,7 +53,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         let url = &announcement.url;
         let mut text = format!("open {url} (end with Ctrl+C)");
         if !announcement.address.ip().is_loopback() {
-            text += "\nbrowsers keep the page for work without a network only from https or from this machine itself";
+            text += "\nbrowsers store the page for offline use only over https or on this machine";
             if let Some(code) = &announcement.qr {
                 text = format!("{text}\n{code}");
             }

@@ -144,7 +144,10 @@ fn library(arguments: &LibraryArguments, console: Console) -> CommandResult {
         .extension()
         .is_none_or(|found| found != LIBRARY_EXTENSION)
     {
-        let fault = format!("{} does not end in .{LIBRARY_EXTENSION}", out.display());
+        let fault = format!(
+            "--output {}: give a name that ends in .{LIBRARY_EXTENSION}",
+            out.display()
+        );
         return Err(fault.into());
     }
     let sources = LibrarySources {
@@ -164,7 +167,7 @@ fn library(arguments: &LibraryArguments, console: Console) -> CommandResult {
     }
     for origin in summary.without_licence() {
         let text = format!(
-            "{origin}: no licence is known, so nobody can tell what may be learned from it: write an origin.toml there"
+            "{origin}: the licence is unknown, so it is not certain that training on it is allowed: write an origin.toml there"
         );
         let event = json!({ "event": "no_licence", "origin": origin });
         console.warn_with(&text, &event);
@@ -205,7 +208,7 @@ fn report_library(out: &Path, summary: &LibrarySummary, console: Console) {
     console.say(&text, &event);
 }
 
-/// Warns of meshes whose files do not say how they look.
+/// Warns of meshes whose files have no materials.
 fn tell_of_plain_meshes(library: &Library, console: Console) -> Result<(), &'static str> {
     let plain = library
         .meshes
@@ -214,12 +217,12 @@ fn tell_of_plain_meshes(library: &Library, console: Console) -> Result<(), &'sta
     let plain: Vec<&str> = plain.map(|(name, _)| name.as_str()).collect();
     if plain.len() == library.meshes.len() {
         return Err(
-            "--own-albedo: no mesh says how it looks: give a folder with some whose files have materials, by --meshes",
+            "--own-albedo: no mesh has materials: give meshes with materials with --meshes",
         );
     }
     if !plain.is_empty() {
         let text = format!(
-            "{} of {} meshes do not say how they look, and are painted: {}",
+            "{} of {} meshes have no materials and are painted: {}",
             plain.len(),
             library.meshes.len(),
             plain.join(", ")
@@ -261,7 +264,7 @@ impl PictureArguments {
         let SynthSummary { new, kept, .. } = written;
         let out = &self.folder.output;
         console.say(
-            &format!("{}: {new} {what} written, {kept} were there", out.display()),
+            &format!("{}: {new} {what} written, {kept} kept", out.display()),
             &json!({ "event": what, "out": out, "new": new, "kept": kept }),
         );
     }

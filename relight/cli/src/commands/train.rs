@@ -238,7 +238,7 @@ impl RunArguments {
     fn folder(&self) -> Result<&Path, &'static str> {
         self.output
             .as_deref()
-            .ok_or("--output RUN is missing: where the run is kept")
+            .ok_or("give the folder of the run with --output")
     }
 
     /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads. What
@@ -352,7 +352,7 @@ fn report(outcome: &RunOutcome, console: Console) {
         .map(|path| path.display().to_string())
         .collect();
     let end = if outcome.stopped {
-        "stopped; go on with --resume"
+        "stopped; continue with --resume"
     } else {
         "done"
     };

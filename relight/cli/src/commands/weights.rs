@@ -148,7 +148,7 @@ impl Arguments {
     pub(crate) fn fault(&self) -> Option<String> {
         let Verb::Export(export) = &self.verb;
         if export.input.is_none() && export.net.shipped().is_none() {
-            return Some("give the weights: none of this network come with the program".to_owned());
+            return Some("give the weights: the program contains none for this network".to_owned());
         }
         let output = export.output.display();
         let is_known = export.ending().is_some();

@@ -36,6 +36,6 @@ pub(super) fn check_size(extent: Extent) -> Result<(), CapturedObjectError> {
         return Ok(());
     }
     Err(CapturedObjectError::Content(format!(
-        "{width} x {height} pixels are not from 1 x 1 to {MAX_SIDE} a side and {MAX_PIXELS} in all"
+        "{width} x {height} pixels: the limits are 1 to {MAX_SIDE} a side and {MAX_PIXELS} in total"
     )))
 }

@@ -10,7 +10,7 @@
 //! | --- | --- |
 //! | `asset.json` | schema `relight.asset/1`, name, width and height, and the value `white` that the largest number of a map stands for |
 //! | `alpha.png` | 16-bit grey: the part of the pixel that the object covers |
-//! | `normal.png` | 16 bits, (n + 1) / 2, x to the right, y up, z to the viewer; black where there is none |
+//! | `normal.png` | 16 bits, (n + 1) / 2, x to the right, y up, z to the viewer; black outside the object |
 //! | `albedo.png` | 16 bits, linear, over `white.albedo`: the object's own colour, also in pixels that it covers in part |
 //! | `specular.png`, `smoothness.png` | s_p, 16 bits, linear, over `white.specular`; α, 16-bit grey, over `white.smoothness`. Both are there or none |
 //! | `confidence.png` | 16-bit grey: 0 to 1 |

@@ -55,7 +55,7 @@ pub fn write_exr(path: &Path, planes: &Planes<3>) -> Result<(), ImageError> {
 /// Reads the colours of an image as [`StoredImage::read`], and says what its numbers were.
 ///
 /// # Errors
-/// Where the file cannot be read or is no image of a known format.
+/// If the file cannot be read or is not an image of a known format.
 pub fn read_planes(path: &Path) -> Result<(Planes<3>, Samples), ImageError> {
     let image = StoredImage::read(path)?;
     Ok((image.planes, image.samples))
@@ -74,7 +74,7 @@ impl StoredImage {
     /// Reads an image; see [`StoredImage::from_bytes`].
     ///
     /// # Errors
-    /// Where the file cannot be read or is no image of a known format.
+    /// If the file cannot be read or is not an image of a known format.
     pub fn read(path: &Path) -> Result<Self, ImageError> {
         let bytes = fs::read(path).map_err(ImageError::open(path))?;
         Self::from_bytes(path, &bytes)
@@ -85,7 +85,7 @@ impl ColourImage {
     /// Reads a picture; see [`ColourImage::from_bytes`].
     ///
     /// # Errors
-    /// Where the file cannot be read or is no image of a known format, or its colours cannot be converted.
+    /// If the file cannot be read or is not an image of a known format, or its colours cannot be converted.
     pub fn read(path: &Path, transfer: Option<Transfer>) -> Result<Self, ImageError> {
         let bytes = fs::read(path).map_err(ImageError::open(path))?;
         Self::from_bytes(path, &bytes, transfer)
@@ -97,7 +97,7 @@ impl Rgb<Linear> {
     /// [`ColourImage::from_bytes`]. Alpha is left out; grey becomes three equal channels.
     ///
     /// # Errors
-    /// Where the file cannot be read or is no image of these formats.
+    /// If the file cannot be read or is not an image of these formats.
     pub fn read(path: &Path, transfer: Transfer) -> Result<Self, ImageError> {
         Ok(ColourImage::read(path, Some(transfer))?.into_light())
     }
@@ -137,7 +137,7 @@ impl<Y: YAxis> Normals<Y> {
     /// file says which way y points: the caller does, by `Y`.
     ///
     /// # Errors
-    /// Where the file cannot be read or is no image.
+    /// If the file cannot be read or is not an image.
     pub fn read(path: &Path) -> Result<Self, ImageError> {
         let (planes, samples) = read_planes(path)?;
         Ok(match samples {
@@ -195,14 +195,18 @@ impl CapturedObject {
     /// Reads a file, or that in a folder of `relight turn`.
     ///
     /// # Errors
-    /// Where it cannot be read or is no captured object that this program knows.
+    /// If it cannot be read or is not a captured object that this version can read.
     pub fn read(path: &Path) -> Result<Self, CapturedObjectError> {
         let path = &file_of(path);
         let read = CapturedObjectError::file(path, "cannot be read");
         let mut content = Vec::new();
         let mut file = File::open(path).map_err(&read)?.take(Self::MAX_BYTES + 1);
         file.read_to_end(&mut content).map_err(&read)?;
-        let is_none = CapturedObjectError::file(path, "is no object that relight can light");
+        let is_none = CapturedObjectError::file(
+            path,
+            "is not a captured object: give object.relit, or the folder of relight \
+             turn",
+        );
         Self::from_bytes(&content).map_err(is_none)
     }
 

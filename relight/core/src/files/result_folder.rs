@@ -17,7 +17,7 @@ use relit_data::durable::{Partial, publish, sync_folder};
 pub enum FolderFault {
     /// It holds something else: its name.
     Foreign(PathBuf, String),
-    /// There is something that is no folder.
+    /// The path exists and is not a folder.
     NoFolder(PathBuf),
     /// It cannot be read.
     Read(PathBuf, io::Error),

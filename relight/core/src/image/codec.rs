@@ -90,7 +90,7 @@ impl StoredImage {
     /// format holds multiplied with it, are divided by it. Errors name it as `path`.
     ///
     /// # Errors
-    /// Where it is no image of a known format, too large, or cut off.
+    /// If it is not an image of a known format, is too large, or is cut off.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ImageError> {
         let mut image = decode(path, bytes)?;
         if let DynamicImage::ImageRgba32F(pixels) = &mut image {

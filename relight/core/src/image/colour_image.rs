@@ -30,7 +30,7 @@ impl ColourImage {
     /// file states. Errors name it as `path`.
     ///
     /// # Errors
-    /// Where it is no image of a known format, too large or cut off, or its colours cannot be converted.
+    /// If it is not an image of a known format, is too large or cut off, or its colours cannot be converted.
     pub fn from_bytes(
         path: &Path,
         bytes: &[u8],

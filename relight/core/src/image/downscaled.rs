@@ -27,7 +27,7 @@ impl DownscaledFile {
     /// what they stand for says `transfer`, or else the file. Errors name it as `path`.
     ///
     /// # Errors
-    /// Where it is no image of a known format, too large or cut off, or its colours cannot be converted.
+    /// If it is not an image of a known format, is too large or cut off, or its colours cannot be converted.
     pub fn new(
         path: &Path,
         bytes: &[u8],

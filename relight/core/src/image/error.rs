@@ -18,7 +18,7 @@ pub enum ImageError {
     /// Images that belong together, or the planes of one, differ in size.
     #[error("{0}")]
     Size(String),
-    /// A file is no mask of an object.
+    /// A file is not a mask of an object.
     #[error("the mask {} {fault}", path.display())]
     NotAMask {
         /// The file.

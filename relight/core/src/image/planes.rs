@@ -5,8 +5,8 @@ use std::array;
 use super::{Extent, ImageError, check_extent};
 use crate::parallel;
 
-/// `C` planes of one size, each row by row from the top. What the values mean is said by the types
-/// that hold planes, such as [`Rgb`](super::Rgb).
+/// `C` planes of one size, each row by row from the top. The types that hold planes, such as
+/// [`Rgb`](super::Rgb), state what the values mean.
 ///
 /// ```
 /// use relight_core::image::{Extent, Planes};

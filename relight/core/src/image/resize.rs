@@ -37,8 +37,8 @@ impl<const C: usize> Planes<C> {
         self.resized_part(&Part::all(self.extent()), &Part::all(extent))
     }
 
-    /// A part, `target`, of an image in another size, of which this is the part `source`. The image is 0 beside that
-    /// part, and ends where it ends even where the part goes on.
+    /// Resamples this image, which is the part `source` of a larger one, to the part `target` of that image in another size.
+    /// Outside `source` the larger image is 0.
     ///
     /// # Panics
     /// Where this has another size than `source`, or `target` reaches beyond its image.

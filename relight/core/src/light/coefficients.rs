@@ -142,7 +142,7 @@ impl FromStr for ShLight {
             .map(|(at, line)| {
                 three_numbers(line).ok_or_else(|| {
                 LightError::Coefficients(format!(
-                    "line {} of the coefficients has not three finite numbers (red, green, blue)",
+                    "line {} of the coefficients is not three finite numbers (red, green, blue)",
                     at + 1
                 ))
             })

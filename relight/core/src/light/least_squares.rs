@@ -32,7 +32,7 @@ impl NormalEquations {
         }
     }
 
-    /// Adds equations of which the sums of products are known: of factors `i` and `j <= i`, and of factor `i`
+    /// Adds equations by their sums of products: of factors `i` and `j <= i`, and of factor `i`
     /// and the value.
     pub fn add_sums(
         &mut self,

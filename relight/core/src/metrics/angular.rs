@@ -19,7 +19,7 @@ impl AngularError {
     pub const LIMITS: [f64; 3] = [11.25, 22.5, 30.0];
 }
 
-/// The angles between two normal maps, of which the planes are x, y and z in the same axes. The
+/// The angles between two normal maps, whose planes are x, y and z in the same axes. The
 /// vectors need not be of length 1.
 ///
 /// # Errors

@@ -84,7 +84,7 @@ pub(super) fn check_length(
         return Ok(());
     }
     Err(MetricError::Incomparable(format!(
-        "{what} has {found} values where {expected} pixels are compared: the images are not of one size"
+        "{what} has {found} values instead of {expected}: the images differ in size"
     )))
 }
 

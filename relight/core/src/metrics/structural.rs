@@ -46,7 +46,7 @@ impl Comparison<'_> {
         let middles = self.middles(window);
         if middles.is_empty() {
             return Err(MetricError::Incomparable(format!(
-                "no window of {window}x{window} pixels has its middle under the mask"
+                "no window of {window}x{window} pixels has its centre in the mask"
             )));
         }
         let similarity = |channel: &Channel<'_>| {

@@ -29,7 +29,7 @@ pub enum OpenError {
         /// What is wrong.
         source: relit_data::shard::ShardError,
     },
-    /// There are no samples in it, or its files do not belong together.
+    /// It contains no samples, or its files do not belong together.
     #[error("{} {fault}", path.display())]
     Content {
         /// The file or folder.
@@ -43,11 +43,11 @@ pub enum OpenError {
 }
 
 impl OpenError {
-    /// That a folder has none of what is `expected` in it.
+    /// A folder contains none of what is `expected`.
     pub(super) fn empty(path: &Path, expected: &str) -> Self {
         Self::Content {
             path: path.to_owned(),
-            fault: format!("holds no samples: {expected} were expected in it"),
+            fault: format!("holds no samples: expected {expected}"),
         }
     }
 }
@@ -109,8 +109,8 @@ pub struct DamagedSample {
     pub fault: SampleFault,
 }
 
-/// A batch of which samples are damaged. What is whole of it is there as well: who wants to go on
-/// without the rest takes it, and has seen that something is missing.
+/// A batch with damaged samples. Its intact samples are included: a caller that accepts the loss
+/// can go on with them.
 #[derive(Debug, thiserror::Error)]
 #[error("{} samples of a batch are damaged: {}", damage.len(), listed(damage))]
 pub struct DamagedBatch<B> {

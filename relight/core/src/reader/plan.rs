@@ -18,9 +18,9 @@ pub struct SampleId {
 /// Which samples make a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Draw {
-    /// Neighbours of one turn: in a shard of `relit-extract` any 12 cover the whole turn. Where a run
-    /// begins is drawn anew for each epoch; the last run of a turn goes on at the turn's start. It
-    /// is shorter where the turn is no multiple of the batch.
+    /// Neighbours of one turn: in a shard of `relit-extract` any 12 cover the whole turn. The start
+    /// of a run is drawn again for each epoch; the last run of a turn goes on at the turn's start. It
+    /// is shorter if the turn is not a multiple of the batch.
     Neighbours,
     /// Samples from anywhere.
     Mixed,
@@ -55,7 +55,7 @@ impl Rank {
         world_size: 1,
     };
 
-    /// The process `index` of `world_size`; none where there is no such process.
+    /// The process `index` of `world_size`; `None` if `index` is out of range.
     #[must_use]
     pub const fn new(index: u32, world_size: u32) -> Option<Self> {
         if index < world_size {
@@ -163,7 +163,7 @@ impl DrawPlan {
 enum Groups {
     /// Neighbours: where each begins, how many samples it has, and how many its turn has.
     Runs(Vec<Run>),
-    /// All samples, of which each batch takes the next.
+    /// All samples; each batch takes the next ones.
     Mixed { samples: Vec<SampleId>, batch: u32 },
 }
 

@@ -204,7 +204,7 @@ mod tests {
     use super::*;
     use crate::reader::{Draw, Rank, SampleFault};
 
-    /// Turns of which the samples are their own numbers; one of them is damaged.
+    /// Turns whose samples are their own numbers; one of them is damaged.
     struct Numbers;
 
     impl Source for Numbers {

@@ -105,7 +105,7 @@ impl DiffuseLayer {
         }
     }
 
-    /// The shading S, 0 where there is no surface.
+    /// The shading S, 0 outside the object.
     #[must_use]
     pub fn shading(&self, normals: &Normals<YUp>) -> Rgb<Linear> {
         let mut shading = Planes::zeros(normals.extent());

@@ -62,7 +62,7 @@ impl LobeLayer {
         }
     }
 
-    /// The highlight H, 0 where there is no surface.
+    /// The highlight H, 0 outside the object.
     ///
     /// # Errors
     /// Where the maps differ in size.

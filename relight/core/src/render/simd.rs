@@ -108,7 +108,7 @@ impl Lanes {
         self.map(|v| v.max(0.0))
     }
 
-    /// 1 where a unit normal stands, 0 where there is no surface.
+    /// 1 where a unit normal stands, 0 outside the object.
     #[inline(always)]
     pub(super) fn surface([x, y, z]: [Self; 3]) -> Self {
         (x * x + y * y + z * z).map(|square| if square > 0.25 { 1.0 } else { 0.0 })

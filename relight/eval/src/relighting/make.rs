@@ -150,8 +150,8 @@ impl Origin {
     }
 }
 
-/// Writes an evaluation set into the folder `out`, objects side by side on rayon's threads;
-/// `progress` is told each object. Objects that are there are kept: a call that was interrupted can be
+/// Writes an evaluation set into the folder `out`, objects in parallel on rayon's threads;
+/// `progress` is called for each object. Existing objects are kept: an interrupted call can be
 /// repeated, also for more objects. `relighting.json` is written last.
 ///
 /// # Errors

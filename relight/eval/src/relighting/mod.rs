@@ -28,7 +28,7 @@ pub fn evaluate_relighting(
 ) -> Result<ScoreTable, EvalError> {
     let notes = vec![
         set.about(),
-        "one image in; out the images under all other lights; images: how many were compared"
+        "input: one image; output: the images under all other lights; images: how many were compared"
             .to_owned(),
         format!("SSIM by {}", SSIM_WINDOW),
     ];

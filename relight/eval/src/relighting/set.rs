@@ -167,7 +167,7 @@ impl Object {
     }
 }
 
-/// The values of an image file, of which the size must be this.
+/// The values of an image file, which must have this size.
 pub(super) fn read_image(path: PathBuf, expected: Extent) -> Result<Planes<3>, EvalError> {
     let (planes, _) = read_planes(&path)?;
     if planes.extent() == expected {

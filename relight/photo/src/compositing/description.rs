@@ -15,7 +15,7 @@ use crate::relighting::{
 const SIDES: RangeInclusive<f64> = 16.0..=16_384.0;
 /// Brightness, stops.
 const STOPS: RangeInclusive<f64> = -20.0..=20.0;
-/// Angles of which more than one turn is of use, degrees.
+/// The range of angles that may exceed one turn, degrees.
 const TURNS: RangeInclusive<f64> = -3600.0..=3600.0;
 /// What a channel is multiplied with.
 const TINTS: RangeInclusive<f64> = 0.0..=1000.0;
@@ -154,7 +154,10 @@ impl SceneDescription {
     /// Where the text is no TOML, or says what a scene cannot be.
     pub fn parse(text: &str) -> Result<Self, InsertError> {
         let scene: Self = toml::from_str(text).map_err(|fault| {
-            InsertError::Input(format!("it is no scene: {}", fault.to_string().trim_end()))
+            InsertError::Input(format!(
+                "it is not a scene: {}",
+                fault.to_string().trim_end()
+            ))
         })?;
         scene.check()?;
         Ok(scene)
@@ -188,7 +191,7 @@ impl SceneDescription {
         Extent::new(width, height)
     }
 
-    /// Whether all that is said can be.
+    /// Checks that all values are in range.
     ///
     /// # Errors
     /// [`InsertError`] names the first number that is out of its range; the number of objects comes last.
@@ -322,14 +325,14 @@ impl ObjectDescription {
     }
 }
 
-/// Whether each number, with its name, lies in its range, which is told in words too. One that is none lies in no range.
+/// Checks that each number, with its name, lies in its range, also given in words. NaN lies in no range.
 fn check_all<const N: usize>(
     numbers: [(&str, f64, RangeInclusive<f64>, &str); N],
 ) -> Result<(), InsertError> {
     for (what, value, range, allowed) in numbers {
         if !range.contains(&value) {
             return Err(InsertError::Input(format!(
-                "{what} is {value}, it has to be {allowed}"
+                "{what} is {value}: it has to be {allowed}"
             )));
         }
     }

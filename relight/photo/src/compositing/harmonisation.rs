@@ -20,7 +20,7 @@ const SMOOTHEST_PART: f64 = 0.1;
 /// Grain is as fine as the pixels: in half the size it has half the deviation. A square that keeps more than this part of it there
 /// shows gravel, cloth or leaves.
 const FINE: f32 = 0.75;
-/// Deviations below this are those of rounding to 8 bits: nothing is to be told of how fine they are.
+/// Deviations below this come from rounding to 8 bits: they say nothing about the grain.
 const ROUNDING: f32 = 2e-3;
 /// The part of the squares that have to show nothing but grain, so that it is known.
 const MIN_PART: f64 = 0.02;
@@ -119,7 +119,7 @@ pub(crate) fn grain(picture: &Planes<3>, alpha: Option<&Planes<1>>) -> f32 {
         .min(MAX_GRAIN)
 }
 
-/// The deviation in a square of so many pixels a side, of which the first has this column and row; the pixels about it are read too.
+/// The deviation in a square of so many pixels a side, whose first has this column and row; the pixels around it are read too.
 fn deviation(values: &[f32], width: usize, [left, top]: [usize; 2], side: usize) -> f32 {
     let mut sum = 0.0;
     for y in top + 1..=top + side {

@@ -80,7 +80,7 @@ impl SceneLayer {
     }
 }
 
-/// Changes the pixels of a picture that lie under an image of which the first pixel is at `place`; `change` is given the pixel of the
+/// Changes the pixels of a picture that lie under an image whose first pixel is at `place`; `change` takes the pixel of the
 /// image, the value and the channel.
 fn over(
     picture: &mut Planes<3>,

@@ -34,7 +34,7 @@ const TILTS: (f64, f64) = (5.0, 89.0);
 pub enum SceneBackground<'a> {
     /// A photograph, or the first frame of a video.
     Picture(&'a Rgb<Linear>),
-    /// A panorama, of which a part is seen.
+    /// A panorama; the background shows part of it.
     Panorama(&'a Panorama),
 }
 
@@ -65,7 +65,7 @@ impl SceneEnvironment {
     /// The setting of a scene before a background. Light that is not `given` is taken from the background.
     ///
     /// # Errors
-    /// [`InsertError::Dark`] where there is no light.
+    /// [`InsertError::Dark`] if the light is dark.
     pub fn new(
         scene: &SceneDescription,
         background: SceneBackground<'_>,

@@ -46,7 +46,7 @@ impl<'a> SceneObject<'a> {
         let alpha = &self.subject.matte.alpha;
         if !self.placement.is_seen(alpha, extent) {
             return Err(wrong(format!(
-                "would lie wholly outside the picture: its place is {},{}, in parts of the picture's sides",
+                "would lie completely outside the picture: its place is {},{} in parts of width and height",
                 at[0], at[1]
             )));
         }

@@ -18,7 +18,7 @@ const HALF_PATTERN: i64 = PATTERN as i64 / 2;
 const RAYS: usize = 12;
 /// How many times its width the object's shadow is looked for to both sides, and its height above and below.
 const REACH: f64 = 1.5;
-/// The part of the object's height over which a shadow that goes on ends where it is no longer looked for.
+/// The part of the object's height over which a shadow fades out at the end of the computed area.
 const FADE: f32 = 0.125;
 /// The part of the object's lowest points that may lie below the ground: normals at the rim are rough.
 const BELOW_GROUND: f64 = 0.03;
@@ -254,7 +254,7 @@ impl HeightField {
         ]
     }
 
-    /// Whether the shape is in the way from a point in a direction, `inside` of which rows and depths of the box are passed. Its cells
+    /// Whether the shape blocks a ray from a point; `inside` is the part of the ray within the rows and depths of the box. Cells
     /// are 1 wide; rows lie below y = 0.
     fn blocks(&self, from: [f32; 3], ray: &Ray, inside: &Range<f32>) -> bool {
         let mut walk = Walk::through(ray, from, inside);
@@ -461,7 +461,7 @@ mod tests {
         lamp.panorama(Extent::new(128, 64))
     }
 
-    /// What arrives at a cell of the relief's columns and rows, or beside them.
+    /// The light that arrives at a cell of the relief's columns and rows, or outside them.
     fn arriving(shadow: &Shadow, x: i64, y: i64) -> f32 {
         let Extent { width, height } = shadow.arriving.extent();
         let [x, y] = [x - shadow.from[0], y - shadow.from[1]];

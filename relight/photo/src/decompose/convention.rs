@@ -76,7 +76,7 @@ impl Values {
 }
 
 impl Axes {
-    /// The way in which y points where nobody says it.
+    /// The direction of y, if the caller gives none.
     pub(super) fn frame(self) -> NormalsFrame {
         match self {
             Self::Viewer => NormalsFrame::YUp,
@@ -86,7 +86,7 @@ impl Axes {
 }
 
 impl Convention {
-    /// How the network of this signature is used for pictures of `side` x `side` pixels, or why it cannot be.
+    /// How a network of this signature is used on pictures of `side` x `side` pixels, or why it cannot be used.
     pub(super) fn from_signature(signature: &OnnxSignature, side: usize) -> Result<Self, String> {
         if let Some(tokens) = signature.input("num_tokens") {
             return Self::moge(signature, tokens, side);
@@ -105,7 +105,7 @@ impl Convention {
                 axes: Axes::Viewer,
             }),
             inputs => Err(format!(
-                "its inputs are {}: neither one picture, nor those of MoGe-2 (image, num_tokens)",
+                "its inputs are {}: give a network of one picture, or MoGe-2 (image, num_tokens)",
                 named(inputs)
             )),
         }
@@ -114,12 +114,12 @@ impl Convention {
     fn moge(signature: &OnnxSignature, tokens: &OnnxValue, side: usize) -> Result<Self, String> {
         let output = signature.output("normal").ok_or_else(|| {
             format!(
-                "it looks like MoGe-2 without normals: its outputs are {}; take a model whose name ends in -normal",
+                "it looks like MoGe-2 without normals (outputs {}): give a model whose name ends in -normal",
                 named(&signature.outputs)
             )
         })?;
         if tokens.element != DataType::Int64 {
-            return Err("its input num_tokens is no whole number".to_owned());
+            return Err("its input num_tokens is not a 64-bit integer".to_owned());
         }
         let picture = picture_of(signature, &tokens.name)?;
         Ok(Self {

@@ -20,7 +20,7 @@ pub struct CropSquare {
 
 impl CropSquare {
     /// The square around the pixels where the mask is at least one half, with 4 % more than their longer
-    /// side; none where there are none.
+    /// side; `None` without such pixels.
     #[must_use]
     pub fn around(mask: &Planes<1>) -> Option<Self> {
         let sides = bounds(mask)?;

@@ -206,7 +206,7 @@ impl Decomposer {
         Ok(())
     }
 
-    /// What the other network for normals was taken for, in words; none where there is none.
+    /// The kind of network that [`Self::read_normals`] recognised, in words; `None` if none was read.
     #[must_use]
     pub fn normals_network(&self) -> Option<&'static str> {
         self.normals.as_ref().map(OtherNormals::name)
@@ -356,7 +356,7 @@ impl CutObject {
         })
     }
 
-    /// The part of the pixels under the mask of which all channels have at least so much light.
+    /// The part of the pixels under the mask whose channels all have at least so much light.
     fn saturated(&self, from: f32) -> f64 {
         let [red, green, blue] = self.picture.planes();
         let (mut all, mut full) = (0_u64, 0_u64);
@@ -372,7 +372,7 @@ impl CutObject {
 pub(super) fn check_size(extent: Extent) -> Result<(), DecomposeError> {
     if extent.width.saturating_mul(extent.height) > MAX_PIXELS {
         return Err(DecomposeError::Photo(format!(
-            "the photograph has {} x {} pixels, and at most {MAX_PIXELS} are decomposed: make the photograph smaller",
+            "the photograph has {} x {} pixels; the limit is {MAX_PIXELS}: make it smaller",
             extent.width, extent.height
         )));
     }

@@ -43,8 +43,8 @@ pub struct AnsweredMaps {
 }
 
 impl EncodedPicture {
-    /// Encodes a linear picture under a mask (0..=1, in the object from one half). Values that are no numbers
-    /// count as black.
+    /// Encodes a linear picture under a mask (0..=1, in the object from one half). NaN
+    /// counts as black.
     ///
     /// # Panics
     /// Where the mask has another size.

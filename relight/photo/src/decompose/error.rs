@@ -29,21 +29,21 @@ pub enum DecomposeError {
     #[error("{0}")]
     Photo(String),
     /// There is nothing under the mask.
-    #[error("the mask is empty: it is nowhere at least one half")]
+    #[error("the mask is empty: no pixel is at least one half")]
     EmptyMask,
-    /// There is no light on the object.
-    #[error("the picture is black all over the object: nothing is lit")]
+    /// The object is black.
+    #[error("the object is black: give a brighter photograph, or another mask")]
     Unlit,
     /// A photograph without light.
-    #[error("{} is black all over: there is no object to be seen", path.display())]
+    #[error("{} is completely black: give a brighter photograph", path.display())]
     Black {
         /// The photograph.
         path: PathBuf,
     },
     /// Nothing says where the object is.
     #[error(
-        "{} does not say where the object is: it has no alpha, and its background is not black. \
-         Make a mask with `relit-mask` and give it by --mask, or the rectangle around the object by --rect",
+        "{} does not say where the object is: give a mask with --mask (`relit-mask` makes one), or a rectangle around the \
+         object with --rect",
         path.display()
     )]
     NoMask {
@@ -51,7 +51,7 @@ pub enum DecomposeError {
         path: PathBuf,
     },
     /// A file says of its colours what is not converted.
-    #[error("{} {fault}: convert it to sRGB or EXR, or say by --transfer how to read it", path.display())]
+    #[error("{} {fault}: convert it to sRGB or EXR, or give its encoding with --transfer", path.display())]
     Colour {
         /// The photograph.
         path: PathBuf,
@@ -111,8 +111,8 @@ impl From<FolderFault> for DecomposeError {
             FolderFault::Foreign(path, name) => Self::file(
                 &path,
                 format!(
-                    "holds {name}, which is no file of a decomposition: give a folder that is new, empty, or holds an \
-                     earlier decomposition and nothing else"
+                    "holds {name}, which is not part of a decomposition: give a folder that is new, empty, or holds only an \
+                     earlier decomposition"
                 ),
             ),
             FolderFault::NoFolder(path) => Self::file(

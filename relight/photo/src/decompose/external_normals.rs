@@ -56,8 +56,8 @@ impl OtherNormals {
         self.convention.name
     }
 
-    /// The normals of a linear picture of the network's size, none outside the mask; `None` where the
-    /// answer is no map of normals.
+    /// The normals of a linear picture of the network's size, none outside the mask; `None` if the
+    /// answer is not a map of normals.
     pub(super) fn run(
         &self,
         picture: &Planes<3>,

@@ -22,7 +22,7 @@ pub struct FittedGloss {
 }
 
 /// The gloss whose highlight in this light is nearest to the one that is given: the best of a few
-/// smoothnesses, each with its s_p by least squares. None where there is no highlight, or none that
+/// smoothnesses, each with its s_p by least squares. `None` without a highlight that
 /// the light explains.
 pub fn fit_gloss(
     light: &ShLight,

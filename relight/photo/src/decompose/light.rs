@@ -18,13 +18,13 @@ const STIFFER_FITS: usize = 8;
 /// The coefficients that change sign in the mirror image, left and right: those that are odd in x.
 const ODD_IN_X: [usize; 3] = [3, 4, 7];
 
-/// The coefficients of order 2 of grey irradiance, where nothing is in the light's way, in units of the mean shading of an
-/// object: what the network's head for light answers.
+/// The output of the network's head for light: coefficients of order 2 of the unblocked grey irradiance, in units of the mean
+/// shading of the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedLight([f64; LIGHT_OUTPUTS]);
 
 impl PredictedLight {
-    /// What the network answers; none where these are not so many numbers.
+    /// From the network's output; `None` if it has another length.
     pub(super) fn from_output(answer: &[f32]) -> Option<Self> {
         let numbers: [f32; LIGHT_OUTPUTS] = answer.try_into().ok()?;
         let is_light = numbers.iter().all(|value| value.is_finite());
@@ -70,8 +70,8 @@ impl PredictedLight {
     }
 }
 
-/// The light of a shading, grey and of mean 1: the nearest one by least squares, drawn to what the network says where it says
-/// something, as stiff as it has to be to be one that there can be.
+/// The light of a shading, grey and of mean 1: the nearest one by least squares, regularised towards the network's
+/// prediction, if it gives one. The stiffness grows while the light is too one-sided to exist.
 pub(super) fn light_of_shading(
     normals: &Normals<YUp>,
     shading: &Rgb<Linear>,

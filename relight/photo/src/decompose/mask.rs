@@ -70,8 +70,8 @@ fn binary(mask: Planes<1>) -> Planes<1> {
     mask.map(|value| f32::from(u8::from(value >= 0.5)))
 }
 
-/// The largest part of the photograph that is not black, with the dark places in it. Values that are no numbers
-/// are black.
+/// The largest part of the photograph that is not black, with the dark places in it. NaN
+/// is black.
 fn before_black(encoded: &Planes<3>) -> Result<Planes<1>, NoObject> {
     let extent = encoded.extent();
     let [red, green, blue] = encoded.planes();

@@ -83,7 +83,7 @@ const SHAPE_OF_LAYERS: f32 = 0.8;
 /// Keeps logarithms of dark values finite.
 const DARKEST: f32 = 1e-4;
 
-/// What is said of a picture of the network's size; with `mirror`, the mean of that and of what is said of its mirror image.
+/// The answer for a picture of the network's size; with `mirror`, averaged with the answer for its mirror image.
 pub(super) fn look(
     net: &dyn MapsNet,
     picture: &Planes<3>,
@@ -206,7 +206,7 @@ pub(super) struct Whole {
     pub(super) picture: Planes<3>,
     pub(super) mask: Planes<1>,
     pub(super) fields: Fields,
-    /// As it was said at the coarse scale, which is that of the training.
+    /// The prediction at the coarse scale, the scale of the training.
     pub(super) light: Option<PredictedLight>,
 }
 

@@ -46,7 +46,7 @@ impl Photo {
     /// black background, or the rectangle. Errors name it as `path`, and its stem is the photograph's name.
     ///
     /// # Errors
-    /// Where it is no picture, too large or encoded in an unknown way, or nothing says where the object is.
+    /// If it is not a picture, is too large or encoded in an unknown way, or does not show where the object is.
     pub fn from_bytes(
         path: &Path,
         bytes: &[u8],
@@ -171,8 +171,8 @@ pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
     Some(Extent::new(width as usize, height as usize))
 }
 
-/// That a mask has the photograph's size. One of a photograph that was not turned as its Exif orientation says is told from
-/// any other.
+/// Checks that a mask has the photograph's size. A mask of the photograph before its Exif orientation was applied gets its own
+/// message.
 fn check_extent(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), DecomposeError> {
     let is_turned = found == Extent::new(expected.height, expected.width) && found != expected;
     // Exif's orientations from 5 on swap the sides.
@@ -180,8 +180,8 @@ fn check_extent(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), Dec
         relit_data::still::orientation(bytes).map(relit_data::still::Orientation::to_exif);
     if is_turned && orientation.is_some_and(|number| number >= 5) {
         return Err(DecomposeError::Photo(format!(
-            "the mask has {} x {} pixels as the photograph is stored, which is displayed turned to {} x {}: make the mask again \
-             with this version's relit-mask, or turn it",
+            "the mask has {} x {} pixels, as stored; the photograph is displayed rotated, {} x {}: rotate the mask, or make \
+             it again with relit-mask",
             found.width, found.height, expected.width, expected.height
         )));
     }
@@ -199,8 +199,8 @@ fn check_mask(mask: &Planes<1>, rectangle: Option<Rect>) -> Result<(), Decompose
     Err(DecomposeError::Photo(
         if rectangle.clipped_to(width, height).is_some() {
             format!(
-                "in the rectangle {rectangle} there is nothing of the object: by the photograph's alpha or black \
-             background it lies elsewhere"
+                "the rectangle {rectangle} contains nothing of the object: the photograph's alpha or black background places \
+                 it elsewhere"
             )
         } else {
             format!(

@@ -70,7 +70,7 @@ fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ExportError
         serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
     let white = figures.white.albedo;
     if !(white.is_finite() && white >= 0.0) {
-        return Err(wrong("white.albedo is no number from 0 up".to_owned()));
+        return Err(wrong("white.albedo is not a number from 0 up".to_owned()));
     }
     let (mask, _) = read_planes(&folder.join("mask.png"))?;
     let alpha = Planes::from_planes(mask.extent(), [mask.plane(0).to_vec()])?;

@@ -60,7 +60,7 @@ pub struct FoundPhotos {
     pub unused: Vec<UnusedFile>,
 }
 
-/// A file of a folder of photographs that is none of those that are read.
+/// A file in a folder of photographs that is not read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnusedFile {
     /// The file.
@@ -122,7 +122,7 @@ impl PhotoInput {
         match alike_beside(path).map_err(DecomposeError::read(path))? {
             None => Ok(()),
             Some(other) => Err(DecomposeError::Names(format!(
-                "{} would replace {} where a file system ignores case: rename the photograph, or give another folder by \
+                "{} would replace {} where a file system ignores case: rename the photograph, or give another folder with \
                  --output",
                 path.display(),
                 path.with_file_name(other).display()
@@ -176,7 +176,7 @@ fn add_folder(
         if path.is_file() {
             files.push(path);
         } else if !has_frames && holds_pictures(&path) {
-            let what = "is not used: it is a folder within; give it by its name";
+            let what = "is not used: it is a subfolder; name it as a photograph folder of its own";
             unused.push(UnusedFile::new(path, what));
         }
     }
@@ -261,8 +261,8 @@ fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
         let Some(name) = name else { continue };
         if let Some(first) = names.insert(folded(&name), path) {
             return Err(DecomposeError::Names(format!(
-                "{} and {} would both be written to {name}, at least where a file system ignores case: rename one, or give \
-                 them different folders by --output, one after the other",
+                "{} and {} would both be written to {name} (case is ignored): rename one, or decompose them in two runs with \
+                 different --output",
                 first.display(),
                 path.display()
             )));
@@ -306,7 +306,7 @@ fn mask_file(given: &Path, name: &str) -> Result<PathBuf, DecomposeError> {
         Ok(path)
     } else {
         Err(DecomposeError::Photo(format!(
-            "there is no mask {}, which belongs to the photograph",
+            "the photograph's mask {} is missing",
             path.display()
         )))
     }

@@ -61,7 +61,7 @@ impl InsertSource {
         if CapturedObject::is_named(&path) {
             if object.mask.is_some() {
                 return Err(InsertError::Input(format!(
-                    "{}: it has its own mask, give none",
+                    "{} has its own mask: do not give one",
                     path.display()
                 )));
             }
@@ -81,7 +81,7 @@ impl<'a> Insertion<'a> {
     /// Everything but the objects: the first frame of a video is read, and the light, where the scene names one in files.
     ///
     /// # Errors
-    /// Where a file cannot be read, or there is no light.
+    /// If a file cannot be read, or the light is dark.
     pub fn new(
         scene: &SceneDescription,
         mut background: BackgroundFile,
@@ -98,7 +98,7 @@ impl<'a> Insertion<'a> {
     /// The same in a light that is given, whatever the scene names, or else in the background's.
     ///
     /// # Errors
-    /// Where the first frame of a video cannot be read, or there is no light.
+    /// If the first frame of a video cannot be read, or the light is dark.
     pub fn in_light(
         scene: &SceneDescription,
         mut background: BackgroundFile,
@@ -307,7 +307,7 @@ fn given_light(
     };
     let SceneBackground::Picture(picture) = background else {
         return Err(InsertError::Input(
-            "light.object: a panorama shows its light itself; give a photograph or a video"
+            "light.object needs a photograph or a video as the background, not a panorama"
                 .to_owned(),
         ));
     };

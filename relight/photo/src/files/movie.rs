@@ -35,7 +35,7 @@ pub enum MovieFormat {
 #[non_exhaustive]
 pub enum MovieError {
     /// The program is not there.
-    #[error("a video needs the program ffmpeg, which cannot be started: install it")]
+    #[error("ffmpeg, which videos need, cannot be started: install it")]
     NoProgram(#[source] io::Error),
     /// A video cannot be written or read.
     #[error("{} {fault}", path.display())]
@@ -148,7 +148,7 @@ impl MovieWriter {
     }
 
     /// Starts `ffmpeg` for frames of one size. The last line of an odd width or height is shown twice, since
-    /// both formats halve the resolution of colours. The folder is made where there is none.
+    /// both formats halve the resolution of colours. A missing folder is made.
     ///
     /// # Errors
     /// Where the program cannot be started, or the folder not be made.
@@ -194,7 +194,7 @@ impl MovieWriter {
     /// called after each.
     ///
     /// # Errors
-    /// Where a frame cannot be computed, or the video not be written. There is no video of no frames.
+    /// If a frame cannot be computed, the video cannot be written, or there are no frames.
     pub fn write_frames<E: From<MovieError> + Send>(
         path: &Path,
         (format, frames_per_second): (MovieFormat, u32),
@@ -337,8 +337,8 @@ fn partial_name(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// What is said of a program that said nothing.
-pub(super) const SILENT: &str = "it ended without a word";
+/// The reason for a program that printed none.
+pub(super) const SILENT: &str = "it ended without a message";
 
 /// Reads all that a program writes, and keeps its last line.
 pub(super) fn last_line(mut pipe: ChildStderr) -> Option<String> {

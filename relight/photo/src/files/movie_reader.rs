@@ -46,7 +46,7 @@ impl MovieReader {
     /// Starts `ffmpeg` for a file.
     ///
     /// # Errors
-    /// Where a program cannot be started, the file is no video, or its colours cannot be converted.
+    /// If a program cannot be started, the file is not a video, or its colours cannot be converted.
     pub fn open(path: &Path, timing: FrameTiming) -> Result<Self, MovieError> {
         let facts = Facts::probe(path)?;
         let frame_rate = facts

@@ -46,8 +46,8 @@ impl OutputKind {
     }
 }
 
-/// Writes a picture: linear into an EXR, encoded into a JPEG, and with 8 bits into any other file, a PNG. The folder is made
-/// where there is none.
+/// Writes a picture: linear into an EXR, encoded into a JPEG, and with 8 bits into any other file, a PNG. A missing folder
+/// is made.
 ///
 /// # Errors
 /// Where the file cannot be written.

@@ -126,7 +126,7 @@ impl DecompositionFiles<'_> {
     /// earlier decomposition and nothing else.
     ///
     /// # Errors
-    /// Where it holds something else or is no folder, or cannot be read.
+    /// If it holds something else, is not a folder, or cannot be read.
     pub fn check(out: &Path) -> Result<(), DecomposeError> {
         Ok(RESULTS.check(out)?)
     }

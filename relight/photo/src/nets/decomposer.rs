@@ -11,7 +11,7 @@
 //! highlight (1, before softplus), and log shading as two: an offset, and the share of the picture's
 //! own log luminance (logit). With [`decomposer_with_heads`] there are two more. `paint`: how much of a pixel's
 //! darkness is paint rather than shadow (1, logit). `light`, a vector of [`LIGHT_OUTPUTS`] numbers: the coefficients of order 2
-//! of the grey irradiance that arrives from all around where nothing is in its way, in units of the mean shading.
+//! of the unblocked grey irradiance from all around, in units of the mean shading.
 
 use super::graph::{Graph, GroupedLayers, Value};
 use super::weights::Weights;

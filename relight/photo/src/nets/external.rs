@@ -93,11 +93,11 @@ fn part_of(tensor: &TensorProto) -> Result<ExternalPart, String> {
         && expected != given
     {
         return Err(wrong(&format!(
-            "has {given} bytes where its shape has {expected}"
+            "has {given} bytes; its shape needs {expected}"
         )));
     }
     let length = given.or(expected);
-    let length = length.ok_or_else(|| wrong("has a shape or type that is not known"))?;
+    let length = length.ok_or_else(|| wrong("has an unknown shape or type"))?;
     Ok(ExternalPart {
         location: location.value.clone(),
         offset: number("offset")?.unwrap_or(0),

@@ -109,7 +109,7 @@ fn near(half: &[f32], extent: Extent) -> Vec<f32> {
 /// A cell with its neighbours inside.
 struct Cell {
     at: u32,
-    /// The four neighbours, left, right, above and below; itself where there is none.
+    /// The four neighbours, left, right, above and below; the cell itself in place of a missing one.
     around: [u32; 4],
     /// How many there are not.
     missing: f32,
@@ -185,7 +185,7 @@ impl HeightSolver {
     }
 }
 
-/// The mean height of the cells that have one outside beside them.
+/// The mean height of the cells with a neighbour outside.
 fn rim_height(heights: &[f32], inside: &[bool], extent: Extent) -> f32 {
     let is_rim = |at: usize| {
         inside[at]

@@ -69,8 +69,8 @@ impl RelightableObject {
     /// picture, `alpha` is what its file says; else alpha and the colours of its edge are estimated.
     ///
     /// # Errors
-    /// Where the photograph has values that are no light, mask or alpha have another size, the mask is empty, or the network
-    /// fails.
+    /// If the photograph has a value that is negative or not finite, mask or alpha have another size, the mask is empty, or the
+    /// network fails.
     pub fn new(
         photo: &Rgb<Linear>,
         mask: &Planes<1>,
@@ -229,11 +229,11 @@ impl RelightableObject {
     /// H' = lobe(E') + w (H - lobe(E))
     /// ```
     ///
-    /// where t and u say how far the decomposition is believed. Of a photograph's t is 0.6. u is 0.2 where it is dark (S up to
-    /// 0.15) to 0.8 where it is bright (from 0.5 on), 0.25 more where the network is certain what of the darkness is paint, and
-    /// as much less where it cannot tell. Of a captured object's both are 1. So relief and fine texture stay, shadows stay as
-    /// far as the light comes from where it came from, no brightness changes by more than can be believed, and the photograph's
-    /// own light gives the photograph.
+    /// where t and u are the confidence in the decomposition. For a photograph t is 0.6. u is 0.2 where it is dark (S up to
+    /// 0.15) to 0.8 where it is bright (from 0.5 on), 0.25 more where the network is certain how much of the dark is paint, and
+    /// as much less where it is uncertain. For a captured object both are 1. So relief and fine texture stay, shadows stay as
+    /// far as the light comes from the same directions, brightness changes only as far as the confidence allows, and the
+    /// photograph's own light gives the photograph.
     ///
     /// # Errors
     /// None for a subject, whose maps have one size; those of the render layers in general.
@@ -308,7 +308,7 @@ fn smoothed(normals: &Normals<YUp>, wanted: &[bool], side: usize) -> Normals<YUp
     }
 }
 
-/// Light from everywhere, of which a white diffuse surface is 1.
+/// Light from everywhere, in which a white diffuse surface is 1.
 fn even_light() -> ShLight {
     let light = ShLight::even(Order::TWO, [1.0; 3]);
     let exposure = f64::from(exposure_for(&light));

@@ -54,7 +54,7 @@ impl LightSource {
     }
 }
 
-/// Adds a sun that is seen in a picture of which half the angles are these.
+/// Adds a sun that is seen in a picture; `angles` are half its angles of view.
 fn add_sun(made: &mut Planes<3>, sun: SeenSun, angles: [f64; 2]) {
     let pixel = |place: f64, side: usize| {
         ((place + 0.5) * side as f64).clamp(0.0, side as f64 - 1.0) as usize

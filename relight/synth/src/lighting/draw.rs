@@ -130,8 +130,8 @@ impl SyntheticLamp {
 }
 
 impl Environment {
-    /// At a random rotation: about the vertical mostly, with a little tilt, else any. None where there
-    /// are no panoramas.
+    /// At a random rotation: about the vertical mostly, with a little tilt, else any. `None` without
+    /// panoramas.
     fn draw(
         random: &mut Random,
         panoramas: &Panoramas,

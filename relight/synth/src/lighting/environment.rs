@@ -88,7 +88,7 @@ impl Panoramas {
         }
     }
 
-    /// Keeps those of which the name is wanted.
+    /// Keeps those whose name is wanted.
     pub(crate) fn retain(&mut self, wanted: impl Fn(&str) -> bool) {
         self.entries.retain(|entry| wanted(&entry.name));
     }
@@ -176,7 +176,7 @@ struct SkyRay {
 }
 
 impl<'a> Sky<'a> {
-    /// None where there is no such panorama.
+    /// `None` if this panorama does not exist.
     pub(super) fn new(
         environment: &Environment,
         panoramas: &'a Panoramas,

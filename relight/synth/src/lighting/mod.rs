@@ -67,7 +67,7 @@ impl Lighting {
         }
     }
 
-    /// All light but what bounces, as coefficients of an order: where nothing is in the way, their
+    /// All light except what bounces, as coefficients of an order: without shadows, their
     /// diffuse layer is the shading, smoothed where lamps are.
     #[must_use]
     pub fn coefficients(&self, order: Order, panoramas: &Panoramas) -> ShLight {

@@ -35,7 +35,7 @@ pub(crate) struct PlacedPicture {
 }
 
 impl PlacedPicture {
-    /// The value at texture coordinates, the mean of all where there are none.
+    /// The value at texture coordinates; without them the mean of all.
     fn at(&self, coordinates: Option<Vec2>) -> Vec3 {
         let place = |at: Vec2| self.placed.map_or(at, |placed| placed.transform_point2(at));
         match coordinates.map(place).filter(|place| place.is_finite()) {
@@ -77,7 +77,7 @@ impl Default for MeshMaterial {
 }
 
 impl MeshMaterial {
-    /// The look at a place of the pictures, under a colour that multiplies them; where there are no texture coordinates, that
+    /// The look at a place of the pictures, under a colour that multiplies them; without texture coordinates,
     /// of the pictures' means.
     fn at(&self, place: Option<Vec2>, paint: Vec3) -> OwnSurface {
         let looked_up = |picture: &PlacedPicture| picture.at(place);

@@ -47,16 +47,16 @@ pub struct Mesh {
     pub left_out: Vec<String>,
 }
 
-/// Why a file is no mesh that is read.
+/// The fault of a file in an unknown format.
 pub(super) const NOT_READ: &str =
     "is not a mesh of a kind that can be read: give .obj, .gltf or .glb";
-/// Why triangles are no surface.
+/// The fault of triangles without an area.
 const EMPTY: &str = "it has no triangle with an area";
 
 impl Mesh {
     /// Reads a mesh: Wavefront (`.obj`) or glTF 2.0 (`.gltf`, `.glb`). All its parts become one
     /// surface; its own normals are not used, those of faces within 50 degrees are blended. Materials with pictures or of several
-    /// colours are read, from the files beside it that it names, and colours of vertices; one colour for all is not taken for
+    /// colours are read, from the files that it names, and colours of vertices; one colour for all is not used as
     /// the object's. What of that cannot be used is left out: see [`Self::left_out`].
     ///
     /// # Errors
@@ -158,10 +158,14 @@ fn check(raw: &RawMesh) -> Result<(), String> {
         for &vertex in corners {
             match raw.positions.get(vertex as usize) {
                 Some(position) if position.is_finite() => {}
-                Some(_) => return Err(format!("vertex {vertex} is not at a finite place")),
+                Some(_) => {
+                    return Err(format!(
+                        "vertex {vertex} has a coordinate that is not finite"
+                    ));
+                }
                 None => {
                     return Err(format!(
-                        "triangle {triangle} names vertex {vertex} of {count}"
+                        "triangle {triangle} names vertex {vertex}; there are {count}"
                     ));
                 }
             }
@@ -318,7 +322,7 @@ impl Face {
     }
 }
 
-/// Which corners of which faces meet at each vertex.
+/// The corners of faces that meet at each vertex.
 struct CornersAround {
     starts: Vec<u32>,
     /// Three times the face, plus the corner.

@@ -21,7 +21,7 @@ impl Triangulator {
     }
 
     /// The triangles of a polygon by its corners' numbers, all turning as the polygon does: a fan about the first corner
-    /// where that covers it, as for all that are convex; ears that are clipped on the polygon's plane where not.
+    /// if that covers it, as for every convex one; else ears clipped on the polygon's plane.
     pub(super) fn triangles(&mut self, corners: &[Vec3]) -> Vec<[usize; 3]> {
         let fan = (2..corners.len()).map(|k| [0, k - 1, k]);
         let normal = normal(corners);

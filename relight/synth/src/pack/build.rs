@@ -54,7 +54,7 @@ pub struct LibrarySummary {
 }
 
 impl LibrarySummary {
-    /// The origins of which no licence is known.
+    /// The origins whose licence is unknown.
     #[must_use]
     pub fn without_licence(&self) -> Vec<&str> {
         let entries = self.objects.iter().chain(&self.panoramas);
@@ -66,8 +66,8 @@ impl LibrarySummary {
     }
 }
 
-/// Builds a library and writes it to `out`, with its table beside it as `.csv` and `.md`. What cannot be read is left
-/// out. `progress` is called with how many files there are, and then once a file.
+/// Builds a library and writes it to `out`, with its table as `.csv` and `.md` in the same folder. What cannot be read is left
+/// out. `progress` is called with the number of files, and then once a file.
 ///
 /// # Errors
 /// Where a folder is not there or holds nothing, where no object or no panorama is left of those that were asked for, or
@@ -203,7 +203,7 @@ impl Building {
         }
     }
 
-    /// Numbers the pictures, of which each is there once.
+    /// Numbers the pictures. Each is kept once.
     fn finish(mut self) -> (Parts, LibrarySummary, Vec<Row>) {
         let mut parts = Parts {
             objects: Vec::new(),

@@ -392,7 +392,7 @@ pub(super) fn decode_mesh(
             None => Ok(Vec2::NAN),
             Some(number) => {
                 let place = places.get(number as usize);
-                let place = place.ok_or("it names texture coordinates that are not there")?;
+                let place = place.ok_or("it names texture coordinates that are missing")?;
                 Ok::<Vec2, String>(grid.value(*place).into())
             }
         };
@@ -411,7 +411,7 @@ pub(super) fn decode_mesh(
         raw.colours = colours.as_chunks::<3>().0.to_vec();
     }
     if !rest.0.is_empty() {
-        return Err("it is longer than its catalogue says".to_owned());
+        return Err("it is longer than its catalogue states".to_owned());
     }
     decode_materials(packed, &mut raw, picture)?;
     Ok(raw)
@@ -424,7 +424,7 @@ fn decode_materials(
 ) -> Result<(), String> {
     for &(material, count) in &packed.runs {
         if material.is_some_and(|number| number >= packed.materials.len()) {
-            return Err("it names a material that is not there".to_owned());
+            return Err("it names a material that is missing".to_owned());
         }
         if count > packed.triangles - raw.materials.of_triangle.len() {
             return Err("its materials have too many triangles".to_owned());

@@ -134,7 +134,7 @@ impl Wanted {
 pub(crate) fn read(path: &Path, bytes: &[u8], wanted: Wanted) -> Result<Contents, SynthError> {
     contents(bytes, wanted).map_err(|why| {
         let fault = format!(
-            "is not a library that can be read: {why}; build it again by relight synth library"
+            "is not a library that can be read: {why}; build it again with relight synth library"
         );
         SynthError::unusable(path, fault)
     })
@@ -146,7 +146,7 @@ fn contents(bytes: &[u8], wanted: Wanted) -> Result<Contents, String> {
         .map_err(|fault| format!("its catalogue is damaged: {fault}"))?;
     if catalogue.format != FORMAT {
         return Err(format!(
-            "its format is {:?}, and {FORMAT:?} is read",
+            "its format is {:?}; this version reads {FORMAT:?}",
             catalogue.format
         ));
     }
@@ -197,7 +197,7 @@ fn meshes(archive: &Archive<'_>, catalogue: &Catalogue) -> Result<Vec<(String, M
         .collect::<Result<_, String>>()?;
     let picture = |number: usize, kind: PictureKind| {
         let found = pictures.get(number).filter(|(_, own)| *own == kind);
-        let found = found.ok_or_else(|| format!("it names picture {number}, which is not there"));
+        let found = found.ok_or_else(|| format!("it names picture {number}, which is missing"));
         found.map(|(image, _)| Arc::clone(image))
     };
     let numbered = catalogue.objects.par_iter().enumerate();

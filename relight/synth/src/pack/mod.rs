@@ -10,7 +10,7 @@
 //! | `orient` | triangles that face one way |
 //! | `codec` | meshes and panoramas as bytes |
 //! | `file` | the file: a zip archive with a catalogue |
-//! | `table` | the table beside it |
+//! | `table` | the table of contents, as `.csv` and `.md` |
 
 mod build;
 mod candidates;
@@ -57,7 +57,7 @@ pub struct LibraryEntry {
     pub is_for_validation: bool,
 }
 
-/// What is said where nothing is known of an author or a licence.
+/// Stands for an unknown author or licence.
 const UNKNOWN: &str = "unknown";
 
 /// Whether what has this name is for validation only: one of ten, by a hash of the name alone, so that it stays so in

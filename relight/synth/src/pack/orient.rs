@@ -179,7 +179,7 @@ mod tests {
     use super::*;
     use crate::shape::ShapeKind;
 
-    /// A ball, of which every third triangle faces inwards where `is_mixed`, else all of them.
+    /// A ball. If `is_mixed`, every third triangle faces inwards, else all of them.
     fn ball(is_mixed: bool) -> RawMesh {
         let ball = ShapeKind::Sphere.build(0);
         let mut raw = RawMesh {

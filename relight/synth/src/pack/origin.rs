@@ -35,7 +35,7 @@ pub(super) struct Origins {
 }
 
 impl Origins {
-    /// What is said of a file below `root`: the nearest [`ORIGIN`] counts.
+    /// The origin of a file below `root`: the nearest [`ORIGIN`] counts.
     ///
     /// # Errors
     /// Where that file is damaged.

@@ -17,7 +17,7 @@ use crate::texture::{PictureKind, TextureImage};
 const MAX_TRIANGLES: usize = 30_000;
 /// Thinner than this part of its size, an object is flat.
 const FLAT: f32 = 0.02;
-/// A picture of which more is see-through is cut out, as those of leaves,
+/// A picture with a larger see-through part is cut out, as those of leaves,
 const CUT_OUT: f32 = 0.1;
 /// and an object is left out where such pictures cover more of its surface than this.
 const MAX_CUT_OUT: f32 = 0.05;
@@ -203,7 +203,7 @@ fn is_flat(raw: &RawMesh) -> bool {
         .any(|thickness| thickness < FLAT * largest)
 }
 
-/// Whether much of the surface is pictures of which much is see-through.
+/// Whether much of the surface is covered by see-through pictures.
 fn is_cut_out(raw: &RawMesh) -> bool {
     let is_cut_out = |number: &u32| {
         let material = raw.materials.all.get(*number as usize);

@@ -11,7 +11,7 @@ use crate::SynthError;
 
 const COLUMNS: &str = "kind,name,title,category,author,licence,origin,part,triangles,note\n";
 
-/// An object or a panorama, and what came of it.
+/// An object or a panorama, and whether it was packed.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
     pub(super) kind: &'static str,

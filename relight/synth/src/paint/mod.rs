@@ -81,7 +81,7 @@ impl Paint {
         }
     }
 
-    /// The mesh's own albedo, of which `mean` is the mean.
+    /// The mesh's own albedo; `mean` is its mean.
     pub(super) fn own(mean: Vec3) -> Self {
         Self {
             kind: AlbedoKind::Own,

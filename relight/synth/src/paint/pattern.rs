@@ -66,7 +66,7 @@ pub(super) struct Canvas<'a> {
 }
 
 impl Canvas<'_> {
-    /// One of the points, or any where there are none.
+    /// One of the points; any point without them.
     fn point(&self, random: &mut Random) -> Vec3 {
         match self.points.get(random.index(self.points.len())) {
             Some(&point) => point,

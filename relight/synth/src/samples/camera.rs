@@ -21,7 +21,7 @@ pub(crate) struct CameraModel {
     pub read_noise: f32,
     /// That of the noise of light itself, at the clipping level; it falls with the light's root.
     pub shot_noise: f32,
-    /// Quality of the JPEG compression, 1..=100; none where there is none.
+    /// Quality of the JPEG compression, 1..=100; `None` without compression.
     pub jpeg: Option<u8>,
 }
 

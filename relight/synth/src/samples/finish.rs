@@ -17,9 +17,9 @@ const OWN: f32 = 0.5;
 /// Exponents of highlights.
 const BROADEST: f32 = 4.0;
 const SHARPEST: f32 = 150.0;
-/// What a surface that is no metal reflects at its highlight.
+/// The part that a non-metal reflects at its highlight.
 const DIELECTRIC: f32 = 0.04;
-/// Rougher than this, a surface has no highlight that could be told from its diffuse light.
+/// Rougher than this, a surface's highlight cannot be separated from its diffuse light.
 const ROUGHEST: f32 = 0.9;
 
 /// Paint, relief and gloss.

@@ -59,8 +59,8 @@ pub struct SynthSummary {
     pub kept: u64,
 }
 
-/// Writes the samples 0 to `count - 1` of a recipe into the folder `out`, side by side on rayon's
-/// threads; `progress` is told each sample that is done. A sample's folder, `<number>` with six digits,
+/// Writes the samples 0 to `count - 1` of a recipe into the folder `out`, in parallel on rayon's
+/// threads; `progress` is called for each finished sample. A sample's folder, `<number>` with six digits,
 /// appears when all its files are in it. A call that was interrupted can be repeated, and goes on.
 ///
 /// # Errors
@@ -105,7 +105,7 @@ impl SampleFolder {
         handle.try_lock().map_err(|reason| match reason {
             TryLockError::WouldBlock => SynthError::unusable(
                 path,
-                "is written by another process: wait until it ends, or give another folder",
+                "is being written by another process: wait until it ends, or give another folder",
             ),
             TryLockError::Error(source) => SynthError::write(path)(source),
         })?;

@@ -32,8 +32,8 @@ pub(crate) struct Description {
     pub finish: Finish,
     /// The name of the panorama that the lighting has.
     pub panorama: Option<String>,
-    /// All light but what bounces, as nine coefficients in the viewer's frame, times the camera's gain:
-    /// their diffuse layer is the shading where nothing is in the way.
+    /// All light except what bounces, as nine coefficients in the viewer's frame, times the camera's gain:
+    /// without shadows, their diffuse layer is the shading.
     pub coefficients: [[f64; 3]; 9],
     /// The light.
     pub lighting: Lighting,

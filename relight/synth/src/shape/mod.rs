@@ -32,7 +32,7 @@ pub enum ShapeKind {
 }
 
 impl ShapeKind {
-    /// The kinds of which a random object is one, each with its weight: what trained best.
+    /// The kinds of random objects, each with its weight: what trained best.
     pub(super) const WEIGHTS: [(Self, f32); 4] = [
         (Self::Blend, 0.62),
         (Self::Lathe, 0.15),

@@ -42,7 +42,7 @@ pub struct DrawnTurn {
     pub pixels: Vec<u32>,
     /// Curves over the table's angle, with noise, clipping and errors of the angle.
     pub curves: Vec<CurveCoefficients>,
-    /// The elevation that is said, radians; the true one is near.
+    /// The stated elevation, radians; the true one is near.
     pub elevation: f32,
     /// Unit normals in the viewer's frame.
     pub normals: Vec<Vec3>,

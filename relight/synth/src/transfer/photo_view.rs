@@ -79,7 +79,7 @@ impl PhotoView {
     pub const POINTS: usize = 1;
     /// Unit vectors to the eye, 3 planes.
     pub const TOWARDS_EYE: usize = 4;
-    /// 1 where nothing stands in the way of what a pixel mirrors.
+    /// 1 where what a pixel mirrors is not blocked.
     pub const MIRRORS: usize = 7;
     /// Where the surface is in the mesh's own frame, within the unit sphere, 3 planes.
     pub const OBJECT_POINTS: usize = 8;
@@ -87,7 +87,7 @@ impl PhotoView {
     pub const BLOCKED: usize = 11;
     /// The irradiance that an object of the albedo 1 throws back onto a pixel, a plane for each of 9 harmonics.
     pub const BOUNCED: usize = Self::BLOCKED + Self::ORDER.coefficients();
-    /// Planes in all.
+    /// The number of planes.
     pub const BASE: usize = Self::BOUNCED + BOUNCE_COEFFICIENTS;
 }
 

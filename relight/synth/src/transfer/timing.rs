@@ -29,7 +29,7 @@ pub(super) struct TableTiming {
     matrix: [[f32; CURVE_COEFFICIENTS]; CURVE_COEFFICIENTS],
 }
 
-/// A frame: where the table is said to be and where it is, radians.
+/// A frame: the stated and the true angle of the table, radians.
 #[derive(Debug, Clone, Copy)]
 struct FrameAngle {
     said: f64,

@@ -41,8 +41,8 @@ pub use description::{FrameTruth, TurnDescription, TurnRecipe};
 const BATCH: u32 = 32;
 
 /// Writes the turns 0 to `count - 1` into the data set in the folder `out`: shards in the format of
-/// `relit-extract`, and beside them `truth/<session>/`. Frames are made side by side on rayon's threads.
-/// Turns that the data set already describes are kept. `progress` is told each frame that is done.
+/// `relit-extract`, and next to them `truth/<session>/`. Frames are made in parallel on rayon's threads.
+/// Turns that the data set already describes are kept. `progress` is called for each finished frame.
 ///
 /// # Errors
 /// Where a setting is out of range, `out` holds another data set, or a file cannot be written: turns
@@ -179,7 +179,7 @@ fn write_turn(
     Ok((entry, files.shards))
 }
 
-/// The smallest rectangle around the object; empty where there is none.
+/// The smallest rectangle around the object; empty without one.
 fn bounding_box(mask: &GrayImage) -> Rect {
     let inside = mask
         .enumerate_pixels()

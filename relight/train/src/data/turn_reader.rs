@@ -23,7 +23,7 @@ pub(crate) struct TurnReader {
     stream: Stream<Turns>,
     plan: DrawPlan,
     cursor: Cursor,
-    /// The epoch of the last group of which frames could be read.
+    /// The epoch of the last group with readable frames.
     readable: u64,
 }
 

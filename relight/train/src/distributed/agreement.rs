@@ -30,8 +30,8 @@ pub(crate) fn agree(group: &ProcessGroup, facts: &[Fact]) -> Result<(), TrainErr
         if let Some(fact) = differs {
             let what = facts[fact].0;
             return Err(TrainError::Refused(format!(
-                "{what} of process {process} are not those of process 0: start all processes with the same program, command \
-                 and files, and a folder for the run that all of them see"
+                "{what} of process {process} are not those of process 0: start all processes with the same program, command, \
+                 files and shared run folder"
             )));
         }
     }

@@ -79,8 +79,8 @@ impl Launch {
 
 fn incomplete(set: &str, missing: &str) -> TrainError {
     TrainError::Refused(format!(
-        "{set} is set and {missing} is not: to train with several processes, set RANK, WORLD_SIZE, MASTER_ADDR and \
-         MASTER_PORT for each of them, as torchrun does; for one process, unset RANK and WORLD_SIZE"
+        "{set} is set and {missing} is not: set RANK, WORLD_SIZE, MASTER_ADDR and MASTER_PORT for each process, as torchrun \
+         does, or unset RANK and WORLD_SIZE"
     ))
 }
 

@@ -97,7 +97,8 @@ impl ProcessGroup {
             }
         })
         .map_err(not_joined)?;
-        let raw = NonNull::new(raw).ok_or_else(|| not_joined("c10d made no group".to_owned()))?;
+        let raw = NonNull::new(raw)
+            .ok_or_else(|| not_joined("c10d did not create a group".to_owned()))?;
         let rank = launch.rank;
         Ok(Self { rank, raw })
     }

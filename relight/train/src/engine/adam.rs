@@ -13,8 +13,8 @@ use crate::error::TrainError;
 use crate::settings::RunSettings;
 use relight_photo::nets::Weights;
 
-/// The number of steps in a saved memory, in thousands and the rest: 32 bits hold both exactly. Steps of which nothing could
-/// be learned do not count, so it is not that of the run.
+/// The number of steps in a saved memory, in thousands and the rest: 32 bits hold both exactly. Skipped steps
+/// do not count, so it differs from the step of the run.
 const STEPS: &str = "steps";
 const STEPS_PART: u64 = 1000;
 

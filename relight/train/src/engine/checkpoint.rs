@@ -59,7 +59,7 @@ impl Checkpoint {
         durable::write_whole(&path, &bytes).map_err(TrainError::io(&path, "written"))
     }
 
-    /// Reads the one in a run's folder; none where there is none.
+    /// Reads the checkpoint in a run's folder; `None` if it has none.
     ///
     /// # Errors
     /// [`TrainError::Io`] or [`TrainError::Refused`].
@@ -86,11 +86,13 @@ impl Checkpoint {
                 .ok_or_else(|| format!("it has no {name}"))
         };
         if fact("schema")? != SCHEMA {
-            return Err(format!("it is no {SCHEMA}"));
+            return Err(format!("it is not a {SCHEMA}"));
         }
         Ok(Self {
             task: fact("task")?,
-            step: fact("step")?.parse().map_err(|_| "its step is no number")?,
+            step: fact("step")?
+                .parse()
+                .map_err(|_| "its step is not a number")?,
             settings: fact("settings")?,
             inputs: fact("inputs")?,
             cursor: fact("place")?,

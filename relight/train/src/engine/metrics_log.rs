@@ -25,7 +25,7 @@ impl MetricsLog {
     pub fn open(folder: &Path, from_step: u64) -> Result<Self, TrainError> {
         let running = || {
             TrainError::Refused(format!(
-                "the run in {} is being made by another program: wait for its end, or give another folder",
+                "another program is writing the run in {}: wait until it ends, or give another folder",
                 folder.display()
             ))
         };

@@ -44,7 +44,7 @@ pub trait TrainObserver {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct RunOutcome {
-    /// Steps made in all.
+    /// Steps made in total.
     pub steps: u64,
     /// Whether it was asked to stop before its last step.
     pub stopped: bool,
@@ -95,7 +95,7 @@ impl<'a> Run<'a> {
             None => 0,
             Some(_) if !resume => {
                 return Err(TrainError::Refused(format!(
-                    "{} holds a run already: go on with --resume, or give another folder",
+                    "{} already holds a run: continue it with --resume, or give another folder",
                     folder.display()
                 )));
             }
@@ -281,7 +281,7 @@ impl<'a> Run<'a> {
         journal.scalars(step, &values)
     }
 
-    /// Ends the run of which another process is lost: the first of those that are left saves it.
+    /// Ends the run after another process was lost: the first of the remaining processes saves it.
     fn end_early(&mut self, lost: TrainError, observer: &mut dyn TrainObserver) -> TrainError {
         let path = Checkpoint::path(self.folder);
         let path = path.display();
@@ -404,11 +404,10 @@ fn recall(
         )));
     }
     if let Some(setting) = task.differing_setting(&checkpoint.settings) {
-        return Err(other(format!("its settings are others: {setting}")));
+        return Err(other(format!("its settings differ: {setting}")));
     }
     if checkpoint.inputs != inputs {
-        let fault =
-            "it was trained on other turns, or with other networks beside the one that learns";
+        let fault = "it was trained on other turns, or with other fixed networks";
         return Err(other(fault.to_owned()));
     }
     task.go_to(&checkpoint.cursor).map_err(other)?;

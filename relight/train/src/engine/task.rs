@@ -69,7 +69,7 @@ pub trait TrainingTask {
     /// Whatever keeps them from being computed.
     fn validate(&mut self) -> Result<Validation, TrainError>;
 
-    /// The cursor in data that are read one after the other, to go on from; empty where there are none.
+    /// The cursor in data that are read in order, to resume from; empty without such data.
     fn cursor(&self) -> String {
         String::new()
     }

@@ -19,7 +19,7 @@ pub struct DataSettings {
     pub size: u32,
     /// Views from which each step draws.
     pub views: u64,
-    /// Views that are cast anew at each step, in place of the oldest.
+    /// New views cast at each step, in place of the oldest.
     pub new_views: u64,
     /// Rays a pixel of a view.
     pub rays: u32,

@@ -23,7 +23,7 @@ pub fn read_settings<S: DeserializeOwned>(path: &Path) -> Result<S, TrainError> 
     let text = text::read(path).map_err(TrainError::io(path, "read"))?;
     toml::from_str(&text).map_err(|fault| {
         TrainError::Refused(format!(
-            "{} is no file of settings: {fault}",
+            "{} is not a settings file: {fault}",
             path.display()
         ))
     })

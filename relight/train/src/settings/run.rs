@@ -16,7 +16,7 @@ const MAX_MINUTES: f64 = 1e6;
 pub struct RunSettings {
     /// Of the initial weights and of all draws.
     pub seed: u64,
-    /// Steps in all, at least 1.
+    /// Steps of the whole run, at least 1.
     pub steps: u64,
     /// Samples of a step, at least 1.
     pub batch: u64,

@@ -15,9 +15,9 @@ const MAX_VIEWS: u64 = 1_000_000;
 pub struct TransferSettings {
     /// Width and height, a multiple of 32.
     pub size: u32,
-    /// Views in all; each is cast once.
+    /// The number of views; each is cast once.
     pub views: u64,
-    /// The folder in which views are kept; runs can share it. `views` in the folder of the run where there is none.
+    /// The folder in which views are kept; runs can share it. Default: `views` in the folder of the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub view_folder: Option<PathBuf>,
     /// Views that are there from the first step on.

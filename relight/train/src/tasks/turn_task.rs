@@ -16,9 +16,9 @@ use relight_core::reader::Rank;
 use relight_photo::nets::{LOG_MEANS, Weights, turn_network};
 use relight_synth::{DrawnTurn, LeftOut, stream};
 
-/// What the expected error counts beside the normals.
+/// The loss coefficient of the expected error; that of the normals is 1.
 const EXPECTED_ERROR: f64 = 0.05;
-/// What the albedo counts beside them.
+/// The loss coefficient of the albedo; that of the normals is 1.
 const ALBEDO: f64 = 0.5;
 /// Range of the logarithm of the expected chord while training.
 const LOG_CHORD: (f64, f64) = (-4.0, 1.0);

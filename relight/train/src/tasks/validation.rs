@@ -31,7 +31,7 @@ pub(crate) type Figures = BTreeMap<String, f64>;
 #[derive(Debug)]
 pub(crate) struct HeldOutTurns {
     batches: Vec<TurnTensors>,
-    /// What of them was damaged, until it was said.
+    /// The damage in them, until it is reported.
     damage: Option<String>,
 }
 

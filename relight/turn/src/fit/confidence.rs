@@ -26,7 +26,7 @@ const RELATIVE_RESIDUAL: f64 = 0.005;
 const COMMON: f64 = 0.08;
 /// Error of normals where the turn does not determine them, radians. By hand.
 pub(crate) const UNOBSERVABLE: f64 = 1.0;
-/// Error of a normal nearly all of whose light is clipped, radians. By hand.
+/// Error of a normal whose light is nearly all clipped, radians. By hand.
 const CLIPPED: f64 = 0.8;
 
 /// The pixels of a turn as they are fitted.

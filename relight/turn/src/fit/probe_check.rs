@@ -1,4 +1,4 @@
-//! Whether a ball is where it is said to be: the light that is fitted to it has to fit it, and no circle beside it
+//! Checks the place given for a ball: the light that is fitted to it has to fit it, and no other circle
 //! has a clearly smaller residual. Knows nothing of what the light is used for.
 
 use crate::error::TurnError;
@@ -22,7 +22,7 @@ const STEPS: [f64; 3] = [-1.0, 0.0, 1.0];
 const REFINED: i32 = 3;
 /// Largest residual of a grey ball by its own light, over that by an even light. By hand.
 const MAX_OF_GREY: f64 = 0.3;
-/// The same of a chrome ball, of whose small windows the panorama keeps less. By hand.
+/// The same of a chrome ball; the panorama resolves its small windows less. By hand.
 const MAX_OF_CHROME: f64 = 0.6;
 /// Largest part of the given circle's residual with which another one is the ball. By hand.
 const CLEARLY: f64 = 0.6;

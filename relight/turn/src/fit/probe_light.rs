@@ -46,7 +46,7 @@ impl ProbeBuilder {
     /// The light.
     ///
     /// # Errors
-    /// Where the frames tell too little, or the ball is not where it is said to be: [`TurnError::Misplaced`] and
+    /// If the frames show too little, or the ball is not at the given place: [`TurnError::Misplaced`] and
     /// [`TurnError::NoBall`].
     pub(crate) fn finish(self) -> Result<ProbeLight, TurnError> {
         let Probe {
@@ -149,7 +149,7 @@ mod tests {
         try_measure(probe(ball), shown).unwrap()
     }
 
-    /// The same for a ball that is said to be elsewhere.
+    /// The same for a ball at another given place.
     fn try_measure(
         probe: Probe,
         shown: impl Fn(&ShLight, &Normals<YUp>) -> Planes<3>,

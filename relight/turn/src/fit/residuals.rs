@@ -1,5 +1,5 @@
-//! The residual of a pixel's curve, and which parts of the turn its fit may believe by it: not those in which it is in
-//! another's shadow or shows a highlight.
+//! The residual of a pixel's curve, and the parts of the turn that its fit may use: not those in which it lies in
+//! shadow or shows a highlight.
 
 use relight_core::statistics::upper_median;
 

@@ -12,7 +12,7 @@ const CANDIDATES: usize = 400;
 const REFINED: usize = 3;
 /// First step of a refinement, radians. By hand: half the distance of candidates.
 const FIRST_STEP: f64 = 0.06;
-/// Step at which it is told which of the candidates is the best, radians. By hand.
+/// Step at which the best candidate is chosen, radians. By hand.
 const ROUGH_STEP: f64 = 0.01;
 /// Step at which a refinement ends, radians. Numerical.
 const LAST_STEP: f64 = 2e-4;

@@ -37,7 +37,7 @@ pub struct Elevation {
 }
 
 impl Elevation {
-    /// What is usual where nothing is known: 18 degrees, and 8 either way.
+    /// The default for an unknown elevation: 18 ± 8 degrees.
     #[must_use]
     pub const fn assumed() -> Self {
         Self {

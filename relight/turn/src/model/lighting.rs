@@ -88,7 +88,7 @@ impl TableLight {
         self.scaled(|l, _| MIRROR * cosine_lobe(l) / PI)
     }
 
-    /// The light of which a white Lambertian surface shows this, as far as it shows it well.
+    /// The light that gives this irradiance on a white Lambertian surface, in the bands that it shows well.
     pub(crate) fn light_of_irradiance(self) -> Self {
         self.scaled(|l, _| {
             if l < LAMBERTIAN_BANDS {

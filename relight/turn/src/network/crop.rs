@@ -59,7 +59,7 @@ impl Crop {
         }
     }
 
-    /// The mirror image, left and right, of which the table turns the other way.
+    /// The left-right mirror image, whose table turns the other way.
     pub(crate) fn mirrored(&self) -> Self {
         let side = GRID as u32;
         let mut cells: Vec<(u32, [[f32; 3]; COEFFICIENTS])> = self

@@ -10,11 +10,11 @@ use num_complex::Complex32;
 use relight_photo::nets::{LOG_MEANS, TURN_INPUTS};
 use serde::Serialize;
 
-/// Harmonics of which the network sees all channels.
+/// Harmonics that the network sees in all channels.
 const COLOURED: usize = 4;
-/// Harmonics that it sees in all.
+/// Harmonics that it sees.
 const HARMONICS: usize = 6;
-/// Harmonics that it also sees undivided, and of which it is told the mean.
+/// Harmonics that it also sees undivided, with their mean.
 const STRONG: usize = 2;
 /// Terms of a curve.
 const TERMS: usize = 2 * HARMONICS + 1;

@@ -99,8 +99,8 @@ impl TurnNetwork {
         Ok(Self { plan })
     }
 
-    /// Normals and what they are expected to be off by. Of the hypotheses of the light's phase that with the least
-    /// expected error is taken, and of it the mean of what is said of the turn and of its mirror image.
+    /// Normals and their expected errors, averaged over the turn and its mirror image. Of the hypotheses of the light's
+    /// phase, the one with the least expected error is taken.
     ///
     /// # Errors
     /// [`NetError`] where the network fails.

@@ -77,8 +77,8 @@ impl ReadTurn {
     }
 }
 
-/// Reads the turn of a shard, or of what else [`Turns::open`] takes, once through. `progress` is told how many
-/// frames are done, and how many there are.
+/// Reads the turn of a shard, or of what else [`Turns::open`] takes, once through. `progress` is called with the
+/// number of frames done, and of all frames.
 ///
 /// # Errors
 /// Where it cannot be opened, holds several turns, or shows too little.
@@ -206,8 +206,8 @@ impl Reader {
         if *self.has_angles.get_or_insert(recorded.is_some()) != recorded.is_some() {
             let key = &frame.key;
             self.damage.push(match recorded {
-                Some(_) => format!("{key} has an angle and others have none: it is left out"),
-                None => format!("{key} has no angle and others do: it is left out"),
+                Some(_) => format!("{key} has an angle, others have none: it is left out"),
+                None => format!("{key} has no angle, others have one: it is left out"),
             });
             return None;
         }
@@ -225,8 +225,8 @@ impl Reader {
         let indices = self.last_index as u64 + 1;
         if !has_angles && indices > self.frames.into() {
             return Err(TurnError::Refused(format!(
-                "the frames have no angles, and only {} of at least {indices} of the turn are there: without angles, a turn \
-                 has to be whole",
+                "the frames have no angles, and only {} of at least {indices} are there: without angles, a turn has to be \
+                 complete",
                 self.frames
             )));
         }

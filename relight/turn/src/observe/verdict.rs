@@ -46,12 +46,12 @@ impl TurnVerdict {
                 "the environment light is too even for normals and albedo: turn on one lamp at the side, and capture the turn again",
             ),
             Self::NotLambertian => Some(
-                "most of what varies over the turn is shadows or highlights, which the normals do not explain: \
-                 do not trust them where the confidence is low",
+                "most of the variation is shadows or highlights, which the normals do not explain: do not trust them where \
+                 the confidence is low",
             ),
             Self::Overexposed => Some(
-                "the object is overexposed: nearly all of it is clipped over half of the turn or more; \
-                 shorten the exposure or lower the gain, and capture the turn again",
+                "the object is overexposed: nearly all of it is clipped for half the turn or more; shorten the exposure or \
+                 lower the gain, and capture again",
             ),
             Self::Underexposed => Some(
                 "the object is underexposed: nearly all of it is black; \
@@ -61,7 +61,7 @@ impl TurnVerdict {
                 "the frames cover only part of a turn: do not trust normals where the confidence is low, or capture a whole turn",
             ),
             Self::Uncertain => Some(
-                "the network of turns is not sure of the normals: do not trust them where the confidence is low, \
+                "the network of turns is uncertain of the normals: do not trust them where the confidence is low, \
                  or measure the light (--light, --light-ball)",
             ),
         }

@@ -57,7 +57,7 @@ pub(crate) struct Arguments {
     pub(super) network: NetworkArguments,
 }
 
-/// What is said of the objects; what is given once holds for all, what is given as often as there are objects for one each.
+/// Options of the objects: given once, an option applies to all; given once for each object, to one each.
 #[derive(Args)]
 struct ObjectArguments {
     /// A mask, white on the object, or a folder of masks, PHOTO.png.
@@ -86,7 +86,7 @@ impl Arguments {
             .find(|&(_, given)| given > 1 && given != count);
         if let Some((name, given)) = odd {
             return Some(format!(
-                "{name} is given {given} times for {count} photographs: give it once, or for each"
+                "{name} is given {given} times for {count} photographs: give it once, or once for each"
             ));
         }
         if let [mask] = object.mask.as_slice()
@@ -177,7 +177,7 @@ impl ObjectArguments {
     }
 }
 
-/// What is said of an object: for it alone, or for all.
+/// The value for an object: its own, or the one for all.
 fn of<T: Clone>(given: &[T], number: usize) -> Option<T> {
     match given {
         [one] => Some(one.clone()),

@@ -128,7 +128,7 @@ fn output_fault(output: &Path, rotates: bool) -> Option<String> {
 impl RenderArguments {
     fn fault(&self) -> Option<String> {
         if self.light.is_empty() {
-            return Some("give the light by --light FILE or --lamp AZIMUTH,ELEVATION".to_owned());
+            return Some("give the light with --light FILE or --lamp AZIMUTH,ELEVATION".to_owned());
         }
         match &self.object.smoothness {
             Map::Even([first, others @ ..]) if others.iter().any(|value| value != first) => {

@@ -54,7 +54,7 @@ impl ObjectArguments {
     ///
     /// # Errors
     /// Where a file cannot be read, the maps differ in size, a map has a value that is negative or not
-    /// finite, or there is no surface.
+    /// finite, or no pixel shows the object.
     pub(super) fn read(&self) -> Result<Surface, Box<dyn Error>> {
         if let Some(path) = &self.object {
             return Ok(CapturedObject::read(path)?.surface().clone());
@@ -92,10 +92,9 @@ impl ObjectArguments {
         };
         if normals.is_empty() {
             let path = path.display();
-            return Err(format!(
-                "{path} shows no surface: it has no normals, or none inside the mask"
-            )
-            .into());
+            return Err(
+                format!("{path} has no normals inside the mask: give another map or mask").into(),
+            );
         }
         Ok(normals)
     }
@@ -143,7 +142,7 @@ fn check_values(path: &Path, what: &'static str, planes: &Planes<3>) -> Result<(
     Err(ImageError::Form {
         path: path.to_owned(),
         fault: format!(
-            "is no map of {what}: it has a value that is negative, infinite or not a number"
+            "is not a map of {what}: it has a value that is negative, infinite or not a number"
         ),
     })
 }
@@ -155,7 +154,7 @@ fn map(text: &str) -> Result<Map, String> {
         Err(_) => Ok(Map::File(text.into())),
         Ok(&[value]) if is_value(value) => Ok(Map::Even([value; 3])),
         Ok(&[r, g, b]) if [r, g, b].into_iter().all(is_value) => Ok(Map::Even([r, g, b])),
-        Ok(_) => Err("give a file, or one or three numbers that are not negative".to_owned()),
+        Ok(_) => Err("give a file, or one or three numbers from 0 up".to_owned()),
     }
 }
 

@@ -67,7 +67,8 @@ fn light_source(arguments: &Arguments, solved: &SolvedTurn) -> Option<String> {
 /// How it came out.
 fn text(arguments: &Arguments, solved: &SolvedTurn, [reading, all]: [f64; 2]) -> String {
     format!(
-        "{}: {} frames over {:.0} degrees in {reading:.1} s, all in {all:.1} s; normals expected within {:.0} degrees (median), \
+        "{}: {} frames over {:.0} degrees in {reading:.1} s, {all:.1} s in total; normals expected within {:.0} degrees \
+         (median), \
          light {}, material {}",
         arguments.folder.output.display(),
         solved.turn.curves.frames(),

@@ -27,7 +27,7 @@ pub(super) struct FolderTurn {
 }
 
 impl FolderTurn {
-    /// Looks for the frames of the video `name`, of which there should be `expected`.
+    /// Looks for the frames of the video `name`; `expected` is their number.
     pub(super) fn open(root: &Path, name: &str, expected: Option<u32>) -> Result<Self, OpenError> {
         let folder = root.join("imgs").join(name);
         let numbered: BTreeMap<u32, String> = listed(&folder, Path::is_file)?

@@ -20,8 +20,8 @@ pub use batch::{Encoding, TurnBatch, TurnFrame};
 /// The turns of a data set. Each is a shard, or a folder of images; its samples are numbered by
 /// their position, in an order in which any 12 neighbours cover the whole turn.
 ///
-/// Opening it finds out where samples stand and reads none of them. What is lost is told then as
-/// [`DamagedSample`] of the batch that it belongs to, in each epoch.
+/// Opening finds the samples' places and reads none of them. A sample that is lost is then reported as
+/// [`DamagedSample`] of its batch, in each epoch.
 pub struct Turns {
     turns: Vec<Turn>,
     encoding: Encoding,

@@ -108,11 +108,11 @@ impl Pictures<'_> {
         let textures = &self.file.document.textures;
         let of = textures
             .get(texture)
-            .ok_or_else(|| format!("its texture {texture} of {} is not there", textures.len()))?;
+            .ok_or_else(|| format!("its texture {texture} of {} is missing", textures.len()))?;
         let webp = of.extensions.webp.as_ref().and_then(|webp| webp.source);
         of.source.or(webp).ok_or_else(|| {
             let why = match of.extensions.others.keys().next() {
-                Some(extension) => format!("is in a format that is not read ({extension})"),
+                Some(extension) => format!("is in an unsupported format ({extension})"),
                 None => "has no picture".to_owned(),
             };
             format!("its texture {texture}, counted from 0, {why}")

@@ -87,7 +87,7 @@ pub fn solve_in_light(
     }
 }
 
-/// An object of a material in a known light, of which the lobe is to be found.
+/// An object of a material in a known light, whose lobe is to be found.
 #[derive(Debug, Clone, Copy)]
 struct Finish {
     frame: TableFrame,

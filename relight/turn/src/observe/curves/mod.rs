@@ -23,7 +23,7 @@ const MIN_PARTS: usize = 8;
 /// Least gap between parts with frames that is not covered, in usual gaps. By hand.
 const HOLE: f64 = 3.0;
 
-/// What is wrong with frames of which nothing is left.
+/// The fault of frames without a usable pixel.
 pub(crate) const NOTHING: &str = "no frame has a pixel under the mask";
 
 /// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Its memory does not grow with the number of frames.
@@ -87,8 +87,8 @@ impl CurveBuilder {
         })
     }
 
-    /// Takes a frame up: its angle, degrees, and its planes of linear red, green and blue. Frames at angles
-    /// that are no number are left out.
+    /// Takes a frame up: its angle, degrees, and its planes of linear red, green and blue. Frames whose angle is
+    /// not a number are left out.
     ///
     /// # Errors
     /// Where it has another size.
@@ -102,7 +102,7 @@ impl CurveBuilder {
             let [found, expected] =
                 [extent, self.extent].map(|size| format!("{} x {}", size.width, size.height));
             return Err(TurnError::Refused(format!(
-                "a frame has {found} pixels where {expected} are needed"
+                "a frame has {found} pixels instead of {expected}"
             )));
         }
         if !angle_deg.is_finite() {
@@ -132,7 +132,7 @@ impl CurveBuilder {
         let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
         if seen.len() < MIN_PARTS {
             return Err(TurnError::Refused(format!(
-                "{} different angles were found: five terms a pixel need at least {MIN_PARTS}, spread over the turn",
+                "{} different angles were found: at least {MIN_PARTS}, spread over the turn, are needed",
                 seen.len()
             )));
         }
