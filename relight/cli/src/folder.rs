@@ -8,7 +8,7 @@ use clap::Args;
 /// The folder that a verb writes its results into.
 #[derive(Args)]
 pub(crate) struct OutputFolder {
-    /// The folder for the results; made where it is missing.
+    /// The folder for the results; created if missing.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
 }

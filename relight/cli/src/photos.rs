@@ -21,11 +21,11 @@ pub(crate) struct PhotoArguments {
     /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
     #[arg(required = true, value_name = "PHOTO")]
     pub(crate) photos: Vec<PathBuf>,
-    /// A grey image as large as the photograph, white on the object; or a folder of such, PHOTO.png [default: the
-    /// photograph's alpha, or what is not black before a black background].
+    /// A grey image of the photograph's size, white on the object; or a folder of them, PHOTO.png [default: the photograph's
+    /// alpha, or all but its black background].
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) mask: Option<PathBuf>,
-    /// A rectangle around the object, pixels. If nothing else says where the object is, the whole rectangle is the object.
+    /// A rectangle around the object, pixels; all of it is the object if neither alpha nor a black background shows which part.
     #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
     pub(crate) rect: Option<Rect>,
     #[command(flatten)]

@@ -38,19 +38,18 @@ pub(crate) struct Arguments {
     photos: PhotoArguments,
     #[command(flatten)]
     folder: OutputFolder,
-    /// Of each shard the first so many samples, which are spread over the turn.
+    /// Decompose only the first N samples of each shard, which are spread over the turn.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     count: Option<u32>,
-    /// How many photographs are decomposed in parallel [default: one a core, at most 4].
+    /// Photographs decomposed in parallel [default: one per core, at most 4].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
     #[command(flatten, next_help_heading = "Network")]
     network: NetworkArguments,
-    /// Leave out the mirror image: faster, and a little worse.
+    /// Do not average with the mirror image: faster, and slightly worse.
     #[arg(long)]
     no_mirror: bool,
-    /// Take the normals of another network: the published file of MoGe-2 or Metric3D, or one of 256 x 256 pixels (see the
-    /// manual).
+    /// Take the normals from MoGe-2 or Metric3D, as published, or a network of 256 x 256 pixels.
     #[arg(long, value_name = "FILE.onnx")]
     normals: Option<PathBuf>,
     #[command(flatten)]

@@ -20,7 +20,7 @@ use crate::shipped;
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight weights export -o relight.onnx
-      the network of relight decompose for any ONNX engine, for pictures of any size
+      the network of relight decompose, for any ONNX engine and pictures of any size
   relight weights export net.safetensors --net normal-net -o normal-net.onnx
       the paper's Normal-Net";
 
@@ -78,31 +78,31 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Check weights against a network, and write them with it as ONNX or alone as safetensors.
+    /// Check weights, and write them as safetensors or, with their network, as ONNX.
     Export(Export),
 }
 
 #[derive(Args)]
 struct Export {
-    /// The weights (.safetensors) [default: those that come with the program].
+    /// The weights (.safetensors) [default: built in].
     #[arg(value_name = "IN")]
     input: Option<PathBuf>,
     /// The file to write: .onnx or .safetensors.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// The network that they are for.
+    /// The network of the weights.
     #[arg(long, value_enum, default_value_t = NetName::Decomposer)]
     net: NetName,
-    /// Write 32 bits a number in place of 16.
+    /// Write 32-bit numbers instead of 16-bit ones.
     #[arg(long)]
     single: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum NetName {
-    /// Ours of photographs, with the heads that the weights have.
+    /// That of relight decompose, with the weights' heads.
     Decomposer,
-    /// Ours of turns.
+    /// That of relight turn.
     TurnNet,
     /// The paper's Spec-Net.
     SpecNet,
@@ -112,7 +112,7 @@ enum NetName {
     LightNet,
     /// The paper's Light-Net as released.
     LightNetReleased,
-    /// The paper's net for specular reflectance and smoothness, with a pooled head.
+    /// The paper's net for reflectance and smoothness, pooled head.
     ReflectanceNet,
     /// The same with the released head.
     ReflectanceNetReleased,

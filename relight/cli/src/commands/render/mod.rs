@@ -43,13 +43,13 @@ pub(crate) struct Arguments {
 enum RenderedResult {
     /// An image, or with --rotate a video in which the light rotates.
     Image(Box<ImageArguments>),
-    /// A sheet of the object in many materials: smoothness 5 to 200 across, from 0 to 40 % of reflected light down.
+    /// The object in many materials: smoothness 5 to 200 across, reflectance 0 to 40 % down.
     Materials(Box<MaterialsArguments>),
 }
 
 #[derive(Args)]
 struct ImageArguments {
-    /// The image (.png, .exr), or for --rotate a video (.mp4, .webm) or a folder for PNG frames.
+    /// The image (.png, .exr), or with --rotate a video (.mp4, .webm) or a folder for PNG frames.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     #[command(flatten)]
@@ -70,8 +70,8 @@ struct MaterialsArguments {
 /// The object, its light, and how it is shown.
 #[derive(Args)]
 struct RenderArguments {
-    /// Brightness in stops beyond a white diffuse surface under even light of radiance 1, or "auto": a white diffuse
-    /// surface that faces the strongest light is white.
+    /// Brightness in stops: 0 shows a white surface in even light of radiance 1 as white; auto, one that faces the strongest
+    /// light.
     #[arg(long, value_name = "STOPS", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     exposure: Exposure,
     #[command(flatten)]
@@ -80,11 +80,11 @@ struct RenderArguments {
     object: ObjectArguments,
     #[command(flatten, next_help_heading = "Light")]
     light: LightArguments,
-    /// The order of spherical harmonics to which the light is brought; the paper's is 2, highlights need more
-    /// [default: that of a file of coefficients, else 48].
+    /// Order of the light's spherical harmonics; the paper's is 2, highlights need more [default: that of the coefficients, else
+    /// 48].
     #[arg(long, value_name = "0-64", value_parser = clap::value_parser!(u8).range(0..=Order::MAX as i64))]
     order: Option<u8>,
-    /// Write the coefficients of the light to this file, too.
+    /// Also write the light's coefficients to this file.
     #[arg(long, value_name = "FILE")]
     save_light: Option<PathBuf>,
 }

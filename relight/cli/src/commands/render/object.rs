@@ -28,18 +28,18 @@ pub(super) struct ObjectArguments {
     /// A captured object in place of maps: object.relit, or the folder of relight turn.
     #[arg(value_name = "OBJECT", help_heading = None::<&'static str>, conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
     object: Option<PathBuf>,
-    /// Normals: PNG of 8 or 16 bits, colours (n + 1) / 2, black outside; or EXR of vectors. x right, z to the viewer.
+    /// Normals, x to the right, z to the viewer: a PNG of (n + 1) / 2, black outside, or an EXR of vectors.
     #[arg(long, value_name = "FILE", required_unless_present = "object")]
     normals: Option<PathBuf>,
     #[command(flatten)]
     normals_frame: NormalsArgument,
-    /// A grey image; the object is where it is at least one half [default: where there are normals].
+    /// A grey image, at least one half on the object [default: where normals are].
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
-    /// Albedo: a file, or a linear value or three (0.8, or 0.8,0.5,0.3).
+    /// Albedo: a file, or one or three linear values (0.8, or 0.8,0.5,0.3).
     #[arg(long, value_name = "FILE|VALUE", default_value = "0.8", value_parser = map)]
     albedo: Map,
-    /// Specular reflectance s_p: a file, or a linear value or three; without it the object is diffuse.
+    /// Specular reflectance s_p: a file, or one or three linear values [default: none, diffuse].
     #[arg(long, value_name = "FILE|VALUE", value_parser = map)]
     reflectance: Option<Map>,
     /// Smoothness α: a value, an EXR, or an 8-bit PNG of values 0 to 255.
