@@ -51,7 +51,7 @@ impl Scenery {
     /// The panorama of another size.
     ///
     /// # Errors
-    /// Where it has no pixels.
+    /// If it has no pixels.
     pub(crate) fn panorama_of(self, extent: Extent) -> Result<Panorama, LightError> {
         let blank = Panorama::new(Rgb::new(Planes::zeros(extent)))?;
         Panorama::new(Rgb::new(Planes::from_fn(extent, |x, y| {

@@ -35,7 +35,7 @@ impl ObjectSources {
     }
 }
 
-/// Reads a library, of packed ones a part, and names what of its folders is not used; then what comes of it is incomplete.
+/// Reads a library (a part of packed ones), and names the unused files of its folders; with any, the outcome is incomplete.
 pub(crate) fn read_library(
     folders: &Folders,
     part: fn(Library) -> Result<Library, SynthError>,

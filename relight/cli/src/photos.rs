@@ -64,7 +64,7 @@ impl PhotoArguments {
     }
 }
 
-/// What comes of a run in which so many photographs were lost.
+/// The outcome of a run with so many lost photographs.
 pub(crate) fn outcome(found: &FoundPhotos, lost: usize, what: &str) -> CommandResult {
     match lost {
         0 if found.unused.is_empty() => Ok(Outcome::Success),

@@ -5,7 +5,7 @@ use relight_photo::nets::{NetError, Weights};
 /// The weights of the decomposing network.
 ///
 /// # Errors
-/// [`NetError::File`] where the program was built with a damaged file.
+/// [`NetError::File`] if the program was built with a damaged file.
 pub(crate) fn weights() -> Result<Weights, NetError> {
     let bytes = include_bytes!("../weights/decompose.safetensors");
     read("relight/cli/weights/decompose.safetensors", bytes)

@@ -3,7 +3,7 @@
 //! All of them are samples themselves, by the nearest rank. Nothing is interpolated. Samples are compared by the total
 //! order of floating-point numbers.
 
-/// The sample that has `rank` others before it, from 0; the largest where there are fewer. None where there are no
+/// The sample that has `rank` others before it, from 0; the largest where there are fewer. `None` if there are no
 /// samples. The samples are left in another order.
 pub fn ranked<T: Copy + Into<f64>>(samples: &mut [T], rank: usize) -> Option<T> {
     let last = samples.len().checked_sub(1)?;

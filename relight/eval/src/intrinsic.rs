@@ -117,7 +117,7 @@ const MIN_SHADING: f64 = 0.2;
 /// `albedo` and `shading`). Of a set that does not know its shading, of albedo alone.
 ///
 /// # Errors
-/// Where the ground truth or a prediction cannot be read or measured.
+/// If the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_intrinsic(
     set: &TruthSet,
     split: &str,

@@ -22,7 +22,7 @@ fn fitted(sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
 /// for each prediction (`light.txt`). `form` says how shading follows from the coefficients.
 ///
 /// # Errors
-/// Where the ground truth or a prediction cannot be read or measured.
+/// If the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_light(
     set: &TruthSet,
     split: &str,

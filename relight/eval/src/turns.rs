@@ -121,7 +121,7 @@ impl TurnSet {
 /// is called for each turn and method.
 ///
 /// # Errors
-/// Where a turn or its ground truth cannot be read, or cannot be solved.
+/// If a turn or its ground truth cannot be read, or cannot be solved.
 pub fn evaluate_turns(
     folder: &Path,
     split: &str,

@@ -88,7 +88,7 @@ impl Library {
     /// [`Self::training`]. Where no folder of panoramas is given, 13 are made. Meshes of other kinds are left out.
     ///
     /// # Errors
-    /// Where a folder holds no file of its kind; whatever is wrong with a file.
+    /// If a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
         let packed = Contents::from_folders(folders)?;
         let (meshes, mut left_out) = match &folders.meshes {
@@ -128,7 +128,7 @@ impl Library {
     /// A packed library from its bytes; errors name it as `path`.
     ///
     /// # Errors
-    /// [`SynthError::Unusable`] where it is damaged.
+    /// [`SynthError::Unusable`] if it is damaged.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, SynthError> {
         let contents = pack::read(path, bytes, Wanted::ALL)?;
         let pictures = contents.panoramas.iter();
@@ -144,7 +144,7 @@ impl Library {
     /// The part of packed libraries that may be learned from. What comes from folders is in both parts.
     ///
     /// # Errors
-    /// Where no panorama is left.
+    /// If no panorama is left.
     pub fn training(self) -> Result<Self, SynthError> {
         self.part(false)
     }
@@ -152,7 +152,7 @@ impl Library {
     /// The part of packed libraries that is for validation only: a tenth of the objects and of the panoramas.
     ///
     /// # Errors
-    /// Where no panorama is left.
+    /// If no panorama is left.
     pub fn validation(self) -> Result<Self, SynthError> {
         self.part(true)
     }

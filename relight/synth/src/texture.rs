@@ -143,7 +143,7 @@ impl TextureImage {
     /// The picture as a JPEG with sides of at most `longest`.
     ///
     /// # Errors
-    /// Where it has no pixels.
+    /// If it has no pixels.
     pub(crate) fn packed(&self, kind: PictureKind, longest: usize) -> Result<Vec<u8>, FileError> {
         let (width, height) = (self.width, self.height);
         let means = Means::new([width, height], longest);

@@ -84,7 +84,7 @@ pub struct SolvedTurn {
 /// done and of all frames: first those of the shard, then those of the video.
 ///
 /// # Errors
-/// Where the shard or the video cannot be read, a network fails, or no light fits the turn.
+/// If the shard or the video cannot be read, a network fails, or no light fits the turn.
 pub fn solve_turn(
     shard: &Path,
     options: &TurnOptions<'_>,

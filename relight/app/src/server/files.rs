@@ -80,7 +80,7 @@ impl PageFiles {
     /// Reads the page of a folder.
     ///
     /// # Errors
-    /// Where there is none, or a file of its list is missing or not whole.
+    /// If the folder has no page, or a file of its list is missing or incomplete.
     pub fn read(folder: &Path) -> Result<Self, PageFault> {
         let path = folder.join(LIST);
         let list = fs::read(&path).map_err(|_| PageFault::NoPage {

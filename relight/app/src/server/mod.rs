@@ -31,7 +31,7 @@ pub struct PageServerError {
 /// the server is known, beside its addresses. `announce` is called once, when a browser can connect.
 ///
 /// # Errors
-/// Where the address cannot be listened on.
+/// If the address cannot be listened on.
 pub fn serve_page(
     files: PageFiles,
     address: SocketAddr,
@@ -57,7 +57,7 @@ pub fn serve_page(
 /// `page` next to the folder of a build.
 ///
 /// # Errors
-/// [`PageFault::NoPage`] where neither is there.
+/// [`PageFault::NoPage`] if neither is there.
 pub fn installed_page(program: &Path) -> Result<PathBuf, PageFault> {
     let above = program.parent().and_then(Path::parent);
     let above = above.unwrap_or_else(|| Path::new("/"));

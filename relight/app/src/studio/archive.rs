@@ -33,7 +33,7 @@ impl SceneFiles {
     /// Adds an object's files; their names.
     ///
     /// # Errors
-    /// Where its mask cannot be encoded.
+    /// If its mask cannot be encoded.
     pub(super) fn add_object(&mut self, object: &StudioObject) -> Result<ObjectFiles, Refusal> {
         let photo = self.add(&object.name, object.file.clone());
         let mask = match object.mask_file() {
@@ -53,7 +53,7 @@ impl SceneFiles {
     /// Adds the background's file; its name.
     ///
     /// # Errors
-    /// Where it cannot be encoded.
+    /// If it cannot be encoded.
     pub(super) fn add_background(
         &mut self,
         background: &StudioBackground,
@@ -87,7 +87,7 @@ impl SceneFiles {
     /// The archive of a scene whose files these are.
     ///
     /// # Errors
-    /// Where the scene cannot be written.
+    /// If the scene cannot be written.
     pub(super) fn packed(&self, scene: &SceneDescription) -> Result<Vec<u8>, Refusal> {
         let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
@@ -129,7 +129,7 @@ impl SceneFiles {
     /// The content of a file.
     ///
     /// # Errors
-    /// Where there is none.
+    /// If the archive lacks it.
     pub(super) fn content(&self, path: &Path) -> Result<&Vec<u8>, Refusal> {
         let name = path.to_string_lossy();
         let content = self.entries.get(name.as_ref());

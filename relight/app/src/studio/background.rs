@@ -41,7 +41,7 @@ struct PhotoBackground {
 }
 
 struct PanoramaBackground {
-    /// None where it is made.
+    /// `None` for a synthetic one.
     file: Option<Vec<u8>>,
     scenery: Option<Scenery>,
     panorama: Panorama,
@@ -115,7 +115,7 @@ impl StudioBackground {
     /// A panorama: linear light in HDR or EXR, or any picture that is twice as wide as high.
     ///
     /// # Errors
-    /// Where it cannot be read or has another shape.
+    /// If it cannot be read or has another shape.
     pub(super) fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         let opened = OpenedFile::read(name, bytes, None)?;
         let Extent { width, height } = opened.image.stored().planes.extent();
@@ -154,7 +154,7 @@ impl StudioBackground {
     /// The panorama of this id that is made, or that of a file of a kept scene: one that is made is known by its name.
     ///
     /// # Errors
-    /// Where it cannot be read.
+    /// If it cannot be read.
     pub(super) fn kept(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         let made = Scenery::ALL
             .into_iter()
@@ -186,7 +186,7 @@ impl StudioBackground {
     /// The file that is kept with a scene.
     ///
     /// # Errors
-    /// Where a panorama that is made cannot be encoded.
+    /// If a panorama that is made cannot be encoded.
     pub(super) fn file(&self) -> Result<Vec<u8>, Refusal> {
         match &self.content {
             Content::Photo(photo) => Ok(photo.file.clone()),

@@ -77,7 +77,7 @@ impl<'a> Drawing<'a> {
     /// Objects as a scene describes them; `before`: as they were photographed, without shadows.
     ///
     /// # Errors
-    /// Where an object cannot stand where it should.
+    /// If an object cannot stand where it should.
     pub(super) fn new(
         scene: &SceneDescription,
         setting: &'a SceneEnvironment,

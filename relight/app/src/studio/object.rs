@@ -120,7 +120,7 @@ impl StudioObject {
     /// A photograph that a browser has decoded.
     ///
     /// # Errors
-    /// Where the pixels are not as many as they should be.
+    /// If the pixels are not as many as they should be.
     pub(super) fn from_pixels(name: &str, size: [u32; 2], rgba: &[u8]) -> Result<Self, Refusal> {
         Self::open(&format!("{}.png", stem(name)), png_of(name, size, rgba)?)
     }
@@ -148,7 +148,7 @@ impl StudioObject {
         }
     }
 
-    /// Its mask for the page; none where nobody and nothing has said where the object is.
+    /// Its mask for the page; `None` until the object is marked or found.
     pub(super) fn mask(&self) -> Option<Vec<u8>> {
         match &self.content {
             Content::Photo(cut) => {
@@ -170,7 +170,7 @@ impl StudioObject {
     /// Cuts the object out by hints; with `auto` and without a rectangle by its plain background.
     ///
     /// # Errors
-    /// Where the hints do not fit, the background is not plain, or nothing is left.
+    /// If the hints do not fit, the background is not plain, or nothing is left.
     pub(super) fn cut_out(
         &mut self,
         rect: Option<[i32; 4]>,
@@ -238,7 +238,7 @@ impl StudioObject {
     /// The photograph decomposed as it is; none of a captured object.
     ///
     /// # Errors
-    /// Where it is not cut out yet, or cannot be decomposed.
+    /// If it is not cut out yet, or cannot be decomposed.
     pub(super) fn decomposed(&mut self, decomposer: &Decomposer) -> Result<Decomposition, Refusal> {
         let photo = self.photo()?.clone().at_most(PREVIEW_SIDE);
         let options = photo.options(&DecomposeOptions::default());
@@ -248,7 +248,7 @@ impl StudioObject {
     /// Makes the object ready to be shown while the scene is worked on.
     ///
     /// # Errors
-    /// Where it is not cut out yet, or cannot be decomposed.
+    /// If it is not cut out yet, or cannot be decomposed.
     pub(super) fn prepare(&mut self, decomposer: &Decomposer) -> Result<(), Refusal> {
         if self.prepared().is_some() {
             return Ok(());
@@ -279,7 +279,7 @@ impl StudioObject {
     /// The object as `relight insert` puts it into a scene.
     ///
     /// # Errors
-    /// Where it is not cut out yet, or cannot be decomposed.
+    /// If it is not cut out yet, or cannot be decomposed.
     pub(super) fn subject(
         &mut self,
         setting: &SceneEnvironment,
@@ -355,7 +355,7 @@ impl OpenedFile {
 /// The pixels that a browser has decoded, in a PNG.
 ///
 /// # Errors
-/// Where they are not as many as they should be.
+/// If they are not as many as they should be.
 pub(super) fn png_of(
     name: &str,
     [width, height]: [u32; 2],

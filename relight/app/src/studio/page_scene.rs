@@ -62,7 +62,7 @@ impl PageScene {
     /// The scene as a file has it, with the files of its background and of each object.
     ///
     /// # Errors
-    /// Where something is missing or unknown, or a number is out of its range.
+    /// If something is missing or unknown, or a number is out of its range.
     pub(super) fn described(
         &self,
         background: PathBuf,
@@ -94,7 +94,7 @@ impl PageScene {
     /// The page's scene of a file's, whose objects have these numbers.
     ///
     /// # Errors
-    /// Where its light is one that the page has not.
+    /// If its light is one that the page has not.
     pub(super) fn new(scene: &SceneDescription, numbers: &[u32]) -> Result<Self, Refusal> {
         let objects = scene.objects.iter().zip(numbers);
         let mut rest = fields(scene)?;

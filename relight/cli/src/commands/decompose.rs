@@ -114,7 +114,7 @@ impl Arguments {
             decomposer.read_normals(path, self.normals_frame.normals_y)?;
             let name = decomposer.normals_network().unwrap_or_default();
             let event = json!({ "event": "normals", "file": path, "network": name });
-            console.say(&format!("{}: taken for {name}", path.display()), &event);
+            console.say(&format!("{}: recognised as {name}", path.display()), &event);
         }
         Ok((decomposer, name))
     }

@@ -91,7 +91,8 @@ enum BackgroundName {
 /// `--light` as this verb takes it.
 pub(crate) fn or_own(light: Arg) -> Arg {
     light.value_name("FILE|own").help(
-        "The light: a panorama (.hdr, .exr; its centre is behind the object), coefficients (.txt), or own: the photograph's estimated light",
+        "The light: a panorama (.hdr, .exr; its centre is behind the object), coefficients (.txt), or own: the \
+         photograph's estimated light",
     )
 }
 

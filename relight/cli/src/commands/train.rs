@@ -282,7 +282,7 @@ fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
     path.map(Weights::read).transpose()
 }
 
-/// Makes the run of a task, and tells how it came out; or prints the settings.
+/// Runs a task and reports the outcome; or prints the settings.
 fn train<S: Serialize, T: TrainingTask>(
     (settings, run): (S, RunSettings),
     arguments: &RunArguments,

@@ -51,7 +51,7 @@ impl ResultFolder {
     /// what it is to lie in can be written.
     ///
     /// # Errors
-    /// [`FolderFault::Foreign`] or [`FolderFault::NoFolder`], or where a folder cannot be read or written.
+    /// [`FolderFault::Foreign`] or [`FolderFault::NoFolder`], or if a folder cannot be read or written.
     pub fn check(self, out: &Path) -> Result<(), FolderFault> {
         let no_folder = |path: &Path| FolderFault::NoFolder(path.to_owned());
         out.file_name().ok_or_else(|| no_folder(out))?;
@@ -94,7 +94,7 @@ impl ResultFolder {
     /// Lets `fill` write files into a hidden folder, which then takes the name `out`, in place of earlier results.
     ///
     /// # Errors
-    /// Those of [`Self::check`], where a file cannot be written, or `fill` fails: then `out` is as it was.
+    /// Those of [`Self::check`], if a file cannot be written, or `fill` fails: then `out` is as it was.
     pub fn write<T, E: From<FolderFault>>(
         self,
         out: &Path,

@@ -33,7 +33,7 @@ pub enum Samples {
 /// Values of 0 to 1 in a JPEG of good quality; others are clipped.
 ///
 /// # Errors
-/// Where the picture, called `path`, cannot be encoded.
+/// If the picture, called `path`, cannot be encoded.
 pub fn encode_jpeg(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageError> {
     let [width, height] = planes.extent().sides();
     let mut bytes = Vec::new();
@@ -51,7 +51,7 @@ pub fn encode_jpeg(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageErro
 /// The values as they are, 32-bit floating point, in an EXR.
 ///
 /// # Errors
-/// Where the picture, called `path`, cannot be encoded.
+/// If the picture, called `path`, cannot be encoded.
 pub fn encode_exr(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageError> {
     let [width, height] = planes.extent().sides();
     let values: Vec<f32> = interleaved(planes, |v| [v]);

@@ -22,7 +22,7 @@ pub struct DownscaledFile {
 }
 
 impl DownscaledFile {
-    /// The picture of a file with at most so many pixels, turned as it is displayed; none where the file has no more, or has
+    /// The picture of a file with at most so many pixels, turned as it is displayed; `None` if the file has no more, or has
     /// floating point values with alpha. Integers are averaged as they are encoded, and become sRGB where they are none;
     /// what they stand for says `transfer`, or else the file. Errors name it as `path`.
     ///

@@ -40,7 +40,7 @@ impl<const C: usize> Planes<C> {
     /// The planes of an image, each of `extent.pixels()` values.
     ///
     /// # Errors
-    /// Where a plane has another length.
+    /// If a plane has another length.
     pub fn from_planes(extent: Extent, planes: [Vec<f32>; C]) -> Result<Self, ImageError> {
         match planes.iter().find(|plane| plane.len() != extent.pixels()) {
             None => Ok(Self { extent, planes }),
@@ -68,7 +68,7 @@ impl<const C: usize> Planes<C> {
     /// Images of one size side by side, `columns` in a row; places beyond the last are 0.
     ///
     /// # Errors
-    /// Where an image has another size than the first.
+    /// If an image has another size than the first.
     pub fn sheet(tiles: &[Self], columns: usize) -> Result<Self, ImageError> {
         let tile = tiles.first().map_or(Extent::new(0, 0), Self::extent);
         let columns = columns.max(1);

@@ -33,7 +33,7 @@ impl ShLight {
     /// The light of these coefficients, (l, m) at index `l (l + 1) + m`.
     ///
     /// # Errors
-    /// Where their number is not that of an order, or one is not finite.
+    /// If their number is not that of an order, or one is not finite.
     pub fn new(coefficients: Vec<[f64; 3]>) -> Result<Self, LightError> {
         let order = Order::from_coefficients(coefficients.len())?;
         if coefficients.iter().flatten().all(|value| value.is_finite()) {

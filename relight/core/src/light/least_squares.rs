@@ -59,7 +59,7 @@ impl NormalEquations {
         }
     }
 
-    /// The solution by Cholesky's decomposition; none where the matrix has no full rank.
+    /// The solution by Cholesky's decomposition; `None` if the matrix has no full rank.
     pub fn solve(mut self) -> Option<Vec<[f64; 3]>> {
         let n = self.unknowns;
         let largest = (0..n).map(|i| self.matrix[i * n + i]).fold(0.0, f64::max);

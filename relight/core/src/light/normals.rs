@@ -121,7 +121,7 @@ impl<Y: YAxis> Normals<Y> {
     /// The same map with no surface where the mask is below one half.
     ///
     /// # Errors
-    /// Where the mask has another size.
+    /// If the mask has another size.
     pub fn masked(mut self, mask: &Planes<1>) -> Result<Self, ImageError> {
         check_extent("mask", mask.extent(), self.extent())?;
         for plane in self.planes.planes_mut() {

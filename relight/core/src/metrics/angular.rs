@@ -23,7 +23,7 @@ impl AngularError {
 /// vectors need not be of length 1.
 ///
 /// # Errors
-/// As [`Comparison::new`]; [`MetricError::Incomparable`] where a vector under the mask has no length.
+/// As [`Comparison::new`]; [`MetricError::Incomparable`] if a vector under the mask has no length.
 pub fn angular_error(
     extent: Extent,
     truth: [&[f32]; 3],

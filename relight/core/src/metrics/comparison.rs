@@ -24,7 +24,7 @@ impl<'a> Comparison<'a> {
     /// size, at the pixels where `mask` is true.
     ///
     /// # Errors
-    /// [`MetricError::EmptyMask`], or [`MetricError::Incomparable`] where sizes or channels differ or a value under the mask
+    /// [`MetricError::EmptyMask`], or [`MetricError::Incomparable`] if sizes or channels differ or a value under the mask
     /// is not finite.
     pub fn new(
         extent: Extent,

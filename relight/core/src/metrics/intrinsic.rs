@@ -41,7 +41,7 @@ pub struct IntrinsicError {
 /// estimate of one plane stands for each channel of the ground truth.
 ///
 /// # Errors
-/// As [`Comparison::new`] and [`Comparison::lmse`]; [`MetricError::DarkGroundTruth`] where the ground truth has
+/// As [`Comparison::new`] and [`Comparison::lmse`]; [`MetricError::DarkGroundTruth`] if the ground truth has
 /// no positive value to be scaled by.
 pub fn intrinsic_error(
     convention: Convention,

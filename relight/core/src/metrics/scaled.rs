@@ -110,7 +110,7 @@ impl Comparison<'_> {
     /// estimate's units.
     ///
     /// # Errors
-    /// [`MetricError::Incomparable`] where no window fits, [`MetricError::DarkGroundTruth`] where the ground truth is 0 in all windows.
+    /// [`MetricError::Incomparable`] if no window fits, [`MetricError::DarkGroundTruth`] if the ground truth is 0 in all windows.
     pub fn lmse(&self, fit: ScaleFit, windows: Windows) -> Result<f64, MetricError> {
         windows.check(self.extent)?;
         let mut totals = vec![Total::default(); self.channels.len()];

@@ -35,7 +35,7 @@ impl Comparison<'_> {
     /// inside the image and have their middle under the mask.
     ///
     /// # Errors
-    /// [`MetricError::Incomparable`] where no window fits, or none has its middle under the mask.
+    /// [`MetricError::Incomparable`] if no window fits, or none has its middle under the mask.
     pub fn ssim(&self) -> Result<f64, MetricError> {
         let weights = weights();
         let window = weights.len();

@@ -168,7 +168,7 @@ impl<S: Source> Drop for Stream<S> {
     }
 }
 
-/// Makes every `threads`-th batch, from `index` on, until nobody wants more.
+/// Makes every `threads`-th batch, from `index` on, until the receiver is gone.
 fn decode<S: Source>(
     source: &S,
     streaming: Streaming,

@@ -158,7 +158,7 @@ pub(super) fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
 }
 
 impl HigherBands {
-    /// Those of a light; none where it has no even band beyond 2.
+    /// Those of a light; `None` if it has no even band beyond 2.
     fn from_light(light: &ShLight) -> Option<Self> {
         if light.order().get() < 4 {
             return None;

@@ -65,7 +65,7 @@ impl LobeLayer {
     /// The highlight H, 0 outside the object.
     ///
     /// # Errors
-    /// Where the maps differ in size.
+    /// If the maps differ in size.
     pub fn highlight(
         &self,
         normals: &Normals<YUp>,

@@ -47,7 +47,7 @@ impl PowerLayer {
     /// The highlight H, 0 outside the object.
     ///
     /// # Errors
-    /// Where the maps differ in size.
+    /// If the maps differ in size.
     pub fn highlight(
         &self,
         normals: &Normals<YUp>,

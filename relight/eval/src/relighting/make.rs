@@ -155,7 +155,7 @@ impl Origin {
 /// repeated, also for more objects. `relighting.json` is written last.
 ///
 /// # Errors
-/// Where the folder holds objects of another recipe, a setting is out of range or a file cannot be written.
+/// If the folder holds objects of another recipe, a setting is out of range or a file cannot be written.
 pub fn make_relighting(
     recipe: &RelightingRecipe,
     library: &Library,

@@ -19,7 +19,7 @@ use set::{Object, Part, object_folder};
 /// MSE and DSSIM of relit images, for each method: the mean over all objects and target lights.
 ///
 /// # Errors
-/// Where the set or a prediction cannot be read or measured.
+/// If the set or a prediction cannot be read or measured.
 pub fn evaluate_relighting(
     set: &RelightingSet,
     split: &str,

@@ -95,7 +95,7 @@ impl RelightingSet {
     /// Opens the set in the folder `root`.
     ///
     /// # Errors
-    /// Where a file of it cannot be read, or is of another version.
+    /// If a file of it cannot be read, or is of another version.
     pub fn open(root: &Path) -> Result<Self, EvalError> {
         let path = root.join(FILE);
         let bytes = fs::read(&path).map_err(EvalError::read(&path))?;

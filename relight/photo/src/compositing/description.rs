@@ -151,7 +151,7 @@ impl SceneDescription {
     /// Reads a description, and checks its numbers.
     ///
     /// # Errors
-    /// Where the text is no TOML, or says what a scene cannot be.
+    /// If the text is not TOML, or a value is not allowed.
     pub fn parse(text: &str) -> Result<Self, InsertError> {
         let scene: Self = toml::from_str(text).map_err(|fault| {
             InsertError::Input(format!(
@@ -166,7 +166,7 @@ impl SceneDescription {
     /// The text of the scene, which [`SceneDescription::parse`] reads back as it was.
     ///
     /// # Errors
-    /// Where a path is no Unicode.
+    /// If a path is not Unicode.
     pub fn to_toml(&self) -> Result<String, InsertError> {
         toml::to_string(self)
             .map_err(|fault| InsertError::Input(format!("it cannot be written: {fault}")))
@@ -224,7 +224,7 @@ impl LightDescription {
     /// The lamp, if the light is one.
     ///
     /// # Errors
-    /// Where its text is none.
+    /// If its text is none.
     pub fn lamp(&self) -> Result<Option<DiscLamp>, InsertError> {
         let Some(text) = &self.lamp else {
             return Ok(None);

@@ -25,7 +25,7 @@ impl<'a> InsertScene<'a> {
     /// degrees (0 to 90), with objects from back to front.
     ///
     /// # Errors
-    /// Where an object would lie outside, or be larger than can be.
+    /// If an object would lie outside, or be larger than can be.
     pub(crate) fn new(
         extent: Extent,
         (light, panorama): (ShLight, Panorama),

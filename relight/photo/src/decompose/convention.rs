@@ -13,7 +13,7 @@ const METRIC3D_SIDE: usize = 518;
 /// How a network for normals is used.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Convention {
-    /// What it was taken for.
+    /// The kind of network, in words.
     pub(super) name: &'static str,
     /// Of its pictures.
     pub(super) extent: Extent,

@@ -80,7 +80,7 @@ impl Window {
     }
 }
 
-/// The columns and rows in which a mask is somewhere at least one half; none where it is empty.
+/// The columns and rows in which a mask is somewhere at least one half; `None` if it is empty.
 fn bounds(mask: &Planes<1>) -> Option<[Range<usize>; 2]> {
     let Extent { width, .. } = mask.extent();
     let mut low = [usize::MAX; 2];

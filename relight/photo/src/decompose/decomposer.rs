@@ -86,7 +86,7 @@ pub struct Decomposition {
     /// The highlight H, grey; 0 where none was separated.
     pub highlight: Planes<1>,
     /// Per pixel, which part of its darkness is expected to be paint, 0..=1: near 1 print, near 0 shadow, in between where
-    /// the network cannot tell. None where it was not asked for, and of weights without that head.
+    /// the network cannot tell. `None` if it was not asked for, and of weights without that head.
     pub paint: Option<Planes<1>>,
     /// The light of order 2 around the object, by its shading and by what the network says of it: grey, as the
     /// shading is. The colour of the light is part of the albedo.
@@ -144,7 +144,7 @@ impl Decomposer {
     /// The network with these weights, for pictures of [`WORKING_SIDE`].
     ///
     /// # Errors
-    /// Where the weights are not this network's.
+    /// If the weights are not this network's.
     pub fn new(weights: &Weights) -> Result<Self, DecomposeError> {
         Self::with_side(weights, WORKING_SIDE)
     }
@@ -152,7 +152,7 @@ impl Decomposer {
     /// The network with these weights, for pictures of `side` x `side` pixels, a multiple of 32.
     ///
     /// # Errors
-    /// Where the weights are not this network's, or it cannot take such pictures.
+    /// If the weights are not this network's, or it cannot take such pictures.
     pub fn with_side(weights: &Weights, side: usize) -> Result<Self, DecomposeError> {
         let graph = decomposer_of(weights);
         let net = |weights: &Weights, side: usize| -> Result<Box<dyn MapsNet>, NetError> {
@@ -194,7 +194,7 @@ impl Decomposer {
     /// `frame` says which way y points; where it is none, y points as a known network has it, and else up.
     ///
     /// # Errors
-    /// Where it cannot be read or run, or answers something else; then all stays as it was.
+    /// If it cannot be read or run, or answers something else; then all stays as it was.
     #[cfg(feature = "files")]
     pub fn read_normals(
         &mut self,
@@ -222,7 +222,7 @@ impl Decomposer {
     /// of the picture that are negative or no numbers count as black.
     ///
     /// # Errors
-    /// Where the mask has another size or is empty, the picture is black under it or has more than [`MAX_PIXELS`], or the
+    /// If the mask has another size or is empty, the picture is black under it or has more than [`MAX_PIXELS`], or the
     /// network fails.
     pub fn decompose(
         &self,

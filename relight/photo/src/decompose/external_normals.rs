@@ -51,7 +51,7 @@ impl OtherNormals {
         }
     }
 
-    /// What the network was taken for, in words.
+    /// The kind of network, in words.
     pub(super) fn name(&self) -> &'static str {
         self.convention.name
     }

@@ -66,7 +66,7 @@ impl Photo {
     /// The same of a picture in memory, called `path`.
     ///
     /// # Errors
-    /// Where it is too large, or nothing says where the object is.
+    /// If it is too large, or nothing says where the object is.
     pub fn from_image(
         path: &Path,
         image: ColourImage,
@@ -111,7 +111,7 @@ impl Photo {
     /// A frame of a data set, which has its mask and what is known of its saturation.
     ///
     /// # Errors
-    /// Where the mask is empty.
+    /// If the mask is empty.
     pub fn from_frame(
         name: String,
         picture: Rgb<Linear>,
@@ -164,7 +164,7 @@ pub(crate) fn stem(path: &Path) -> String {
     stem.to_string_lossy().into_owned()
 }
 
-/// The size that a file says it has; none where it cannot be read.
+/// The size that a file says it has; `None` if it cannot be read.
 #[must_use]
 pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
     let (width, height) = relit_data::still::stored_size(bytes)?;

@@ -37,7 +37,7 @@ const BLEED: usize = 4;
 /// The content of a GLB file: the object on this mesh. The longer side of the picture is a metre long.
 ///
 /// # Errors
-/// Where a map cannot be encoded, or the file would be too large.
+/// If a map cannot be encoded, or the file would be too large.
 pub fn to_glb(object: &CapturedObject, mesh: &ObjectMesh) -> Result<Vec<u8>, ExportError> {
     let mut parts = Parts::default();
     let positions = &mesh.positions;

@@ -40,7 +40,7 @@ struct EvenGloss {
 /// Reads an object: a file `*.relit`, or a folder with `object.relit` or with the maps of a decomposition or a turn.
 ///
 /// # Errors
-/// Where it holds no object, or where a file cannot be read.
+/// If it holds no object, or if a file cannot be read.
 pub fn read_object(path: &Path) -> Result<CapturedObject, ExportError> {
     if !path.exists() {
         return Err(ExportError::Missing(path.to_owned()));

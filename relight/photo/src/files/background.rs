@@ -25,7 +25,7 @@ pub enum BackgroundFile {
 }
 
 impl BackgroundFile {
-    /// How the colours of a video are converted to sRGB, in words; none where they are taken as sRGB.
+    /// How the colours of a video are converted to sRGB, in words; `None` if they are taken as sRGB.
     #[must_use]
     pub fn colour_conversion(&self) -> Option<String> {
         match self {

@@ -81,7 +81,7 @@ impl PhotoInput {
     /// turn the first `most`.
     ///
     /// # Errors
-    /// Where a folder cannot be read or holds none, a shard cannot be opened, or two photographs would
+    /// If a folder cannot be read or holds none, a shard cannot be opened, or two photographs would
     /// be written to one folder.
     pub fn find(paths: &[PathBuf], most: Option<u32>) -> Result<FoundPhotos, DecomposeError> {
         let (mut found, mut unused) = (Vec::new(), Vec::new());
@@ -117,7 +117,7 @@ impl PhotoInput {
     /// are, also where a file system ignores case.
     ///
     /// # Errors
-    /// [`DecomposeError::Names`], or where the folder cannot be listed.
+    /// [`DecomposeError::Names`], or if the folder cannot be listed.
     pub fn check_result(path: &Path) -> Result<(), DecomposeError> {
         match alike_beside(path).map_err(DecomposeError::read(path))? {
             None => Ok(()),
@@ -146,7 +146,7 @@ impl PhotoInput {
     /// black background, or the rectangle. A frame of a shard has its own.
     ///
     /// # Errors
-    /// Where a file cannot be read or does not fit, or nothing says where the object is.
+    /// If a file cannot be read or does not fit, or nothing says where the object is.
     pub fn load(&self, reading: &PhotoReading) -> Result<Photo, DecomposeError> {
         match self {
             Self::File(path) => read_file(path, reading),
@@ -214,7 +214,7 @@ fn holds_pictures(folder: &Path) -> bool {
     !folder.join(FIGURES).exists() && entries.map(|entry| entry.path()).any(is_picture)
 }
 
-/// Why a file of a folder is left out; none where it is taken for a photograph: by its content, or by a name that
+/// Why a file of a folder is left out; `None` if it counts as a photograph: by its content, or by a name that
 /// promises one, so that reading it says what is wrong.
 fn use_of(path: PathBuf) -> Option<UnusedFile> {
     let mut head = Vec::new();

@@ -55,7 +55,7 @@ impl InsertSource {
     /// Reads what a scene says of an object; its paths are relative to `folder`.
     ///
     /// # Errors
-    /// Where a file cannot be read, or a captured object is given a mask.
+    /// If a file cannot be read, or a captured object is given a mask.
     pub fn read(object: &ObjectDescription, folder: &Path) -> Result<Self, InsertError> {
         let path = folder.join(&object.photo);
         if CapturedObject::is_named(&path) {
@@ -138,7 +138,7 @@ impl<'a> Insertion<'a> {
     /// An object, decomposed no larger than it has to be.
     ///
     /// # Errors
-    /// Where it cannot be decomposed.
+    /// If it cannot be decomposed.
     pub fn subject(
         &self,
         object: &ObjectDescription,
@@ -153,7 +153,7 @@ impl<'a> Insertion<'a> {
         })
     }
 
-    /// How many frames are written; none where the background has as many as it has.
+    /// How many frames are written; `None` if the background has as many as it has.
     #[must_use]
     pub fn frames(&self, output: &InsertionOutput<'_>) -> Option<u32> {
         match (OutputKind::from_path(output.path), &self.background) {
@@ -166,7 +166,7 @@ impl<'a> Insertion<'a> {
     /// Writes the picture or the video; how many frames it has. `written` is called after each.
     ///
     /// # Errors
-    /// Where a frame cannot be read, composed or written.
+    /// If a frame cannot be read, composed or written.
     pub fn write(
         &mut self,
         scene: &InsertScene<'_>,

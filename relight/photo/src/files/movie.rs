@@ -135,7 +135,7 @@ impl MovieWriter {
     /// Whether `ffmpeg` can be started.
     ///
     /// # Errors
-    /// [`MovieError::NoProgram`] where it cannot.
+    /// [`MovieError::NoProgram`] if it cannot.
     pub fn check() -> Result<(), MovieError> {
         Command::new("ffmpeg")
             .arg("-version")
@@ -151,7 +151,7 @@ impl MovieWriter {
     /// both formats halve the resolution of colours. A missing folder is made.
     ///
     /// # Errors
-    /// Where the program cannot be started, or the folder not be made.
+    /// If the program cannot be started, or the folder not be made.
     pub fn create(
         path: &Path,
         format: MovieFormat,
@@ -223,7 +223,7 @@ impl MovieWriter {
     /// Adds a frame; values beyond 0 to 1 are clipped.
     ///
     /// # Errors
-    /// Where it has another size, or the program has ended.
+    /// If it has another size, or the program has ended.
     pub fn push(&mut self, frame: &Rgb<Srgb>) -> Result<(), MovieError> {
         let found = frame.planes().extent();
         if found != self.extent {
@@ -245,7 +245,7 @@ impl MovieWriter {
     /// Waits for the program and gives the file its name.
     ///
     /// # Errors
-    /// Where the program failed, or the file cannot be given its name.
+    /// If the program failed, or the file cannot be given its name.
     pub fn finish(mut self) -> Result<(), MovieError> {
         drop(self.program.stdin.take());
         let is_done = self.program.wait().is_ok_and(|status| status.success());

@@ -113,7 +113,7 @@ impl MovieReader {
         self.frame_rate
     }
 
-    /// How its colours are converted to sRGB, in words; none where they are taken as sRGB.
+    /// How its colours are converted to sRGB, in words; `None` if they are taken as sRGB.
     #[must_use]
     pub fn colour_conversion(&self) -> Option<String> {
         self.wide.as_ref().map(|wide| wide.to_srgb.to_string())
@@ -122,7 +122,7 @@ impl MovieReader {
     /// The next frame; none after the last.
     ///
     /// # Errors
-    /// Where the program fails, or the file ends in the middle of a frame.
+    /// If the program fails, or the file ends in the middle of a frame.
     pub fn frame(&mut self) -> Result<Option<Rgb<Srgb>>, MovieError> {
         let Some(pipe) = &mut self.program.stdout else {
             return Ok(None);

@@ -50,7 +50,7 @@ impl OutputKind {
 /// is made.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write_picture(path: &Path, picture: &Rgb<Linear>) -> Result<(), ImageError> {
     match OutputKind::from_path(path) {
         Some(OutputKind::Exr) => picture.write_exr(path),

@@ -117,7 +117,7 @@ impl DecompositionFiles<'_> {
     /// decomposition in it is replaced.
     ///
     /// # Errors
-    /// As [`Self::check`], or where a file cannot be written: then the folder is as it was.
+    /// As [`Self::check`], or if a file cannot be written: then the folder is as it was.
     pub fn write(&self, out: &Path) -> Result<DecompositionFigures, DecomposeError> {
         RESULTS.write(out, |folder| self.write_files(folder))
     }

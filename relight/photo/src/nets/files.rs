@@ -55,7 +55,7 @@ impl Weights {
 /// Reads an ONNX file with all its weights, also those in other files of its folder.
 ///
 /// # Errors
-/// [`NetError::Io`] where it cannot be read, [`NetError::File`] where such a file cannot, or what it says of them is damaged.
+/// [`NetError::Io`] if it cannot be read, [`NetError::File`] if such a file cannot, or what it says of them is damaged.
 pub fn read_onnx(path: &Path) -> Result<Vec<u8>, NetError> {
     let bytes = fs::read(path).map_err(not_read(path))?;
     let merged = with_external_weights(&bytes, |part| read_part(path, part));

@@ -33,7 +33,7 @@ const INFERRED: i64 = -1;
 /// `facts` are what the file says of itself.
 ///
 /// # Errors
-/// What [`Weights::fitted_to`] answers, or [`NetError::Weights`] where half precision cannot hold a weight.
+/// What [`Weights::fitted_to`] answers, or [`NetError::Weights`] if half precision cannot hold a weight.
 pub fn to_onnx(
     graph: &Graph,
     weights: &Weights,

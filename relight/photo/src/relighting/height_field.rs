@@ -36,7 +36,7 @@ pub(crate) struct HeightField {
 }
 
 impl HeightField {
-    /// The shape whose normals these are, where alpha is at least one half; none where that is nowhere.
+    /// The shape whose normals these are, where alpha is at least one half; `None` if it is less everywhere.
     ///
     /// Heights are those whose differences from cell to cell are nearest to the slopes that the normals have, by least squares.
     pub(crate) fn new(normals: &Normals<YUp>, alpha: &Planes<1>) -> Option<Self> {
@@ -120,7 +120,7 @@ struct Cell {
 }
 
 impl Cell {
-    /// None where it has no neighbour.
+    /// `None` if it has no neighbour.
     fn new(at: usize, extent: Extent, inside: &[bool], slopes: &[[f32; 2]]) -> Option<Self> {
         let (mut cell, mut count) = ([at as u32; 4], 0.0);
         let mut sum = 0.0;

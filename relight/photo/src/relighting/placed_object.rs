@@ -29,7 +29,7 @@ impl PlacedObject {
         }
     }
 
-    /// The shape of the object whose own normals these are; none where it covers no pixel by a half.
+    /// The shape of the object whose own normals these are; `None` if it covers no pixel by a half.
     pub(crate) fn relief(&self, normals: &Normals<YUp>) -> Option<&HeightField> {
         if self.relief.get().is_none() {
             // Not within `get_or_init`: while this thread waits for others, it may take over another frame that comes here.

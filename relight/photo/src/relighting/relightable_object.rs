@@ -111,7 +111,7 @@ impl RelightableObject {
     /// its albedo is; its gloss is the mean over what it covers.
     ///
     /// # Errors
-    /// Where it covers no pixel by a half.
+    /// If it covers no pixel by a half.
     pub fn from_captured(asset: &CapturedObject) -> Result<Self, InsertError> {
         let (extent, surface) = (asset.extent(), asset.surface());
         let mask = asset.alpha().clone().map(|a| f32::from(u8::from(a >= 0.5)));

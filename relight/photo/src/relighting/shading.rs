@@ -58,14 +58,14 @@ pub(crate) struct Shading {
     residual: Vec<f32>,
     /// The logarithm of S + d.
     seen: Vec<f32>,
-    /// None where it is taken for the truth.
+    /// `None` if it counts as the ground truth.
     doubt: Option<Doubt>,
     /// E.
     pub(crate) own: Vec<f32>,
 }
 
 impl Shading {
-    /// Of the shading that was found and the irradiance of the light on the normals, where it is `wanted`, taken for the truth.
+    /// From the estimated shading and the irradiance of the light on the normals, where it is `wanted`, as the ground truth.
     pub(crate) fn new(shading: &Planes<1>, own: &Planes<3>, wanted: &[bool]) -> Self {
         let extent = shading.extent();
         // The light is grey: its channels are equal.

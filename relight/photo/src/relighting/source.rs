@@ -23,7 +23,7 @@ impl LightSource {
     /// The light as coefficients: all those that are given, or enough for highlights.
     ///
     /// # Errors
-    /// [`InsertError::Dark`] where no surface receives any of it.
+    /// [`InsertError::Dark`] if no surface receives any of it.
     pub fn light(&self) -> Result<ShLight, InsertError> {
         let light = match self {
             Self::Panorama(panorama) => panorama.project(Order::HIGHLIGHT),

@@ -1,4 +1,4 @@
-//! Light out of a plain picture: what it shows is taken for a part of a panorama, and the rest is made up from it.
+//! Light from a plain picture: it becomes part of a panorama, and the rest is extrapolated from it.
 
 use std::f64::consts::PI;
 

@@ -119,7 +119,7 @@ impl Panoramas {
 }
 
 impl Environment {
-    /// The light as the coefficients whose irradiance the method takes; none where it casts rays.
+    /// The light as the coefficients whose irradiance the method takes; `None` if it casts rays.
     pub(super) fn smooth(&self, panoramas: &Panoramas) -> Option<ShLight> {
         match self.method {
             Method::OrderTwo => Some(self.coefficients(Order::TWO, panoramas)),

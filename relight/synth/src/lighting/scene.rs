@@ -9,7 +9,7 @@ use crate::random::stream;
 /// likes. What is slow is kept: the buffer, the tree for rays, and how open each pixel is.
 pub struct SyntheticScene {
     buffer: GBuffer,
-    /// None where light is never blocked.
+    /// `None` if light is never blocked.
     shade: Option<Shade>,
 }
 

@@ -16,7 +16,7 @@ pub struct Material {
     pub albedo: Vec<Vec3>,
     /// Unit normals, with relief.
     pub normals: Vec<Vec3>,
-    /// Its highlights; none where it is Lambertian.
+    /// Its highlights; `None` if it is Lambertian.
     pub gloss: Option<BlinnPhong>,
 }
 

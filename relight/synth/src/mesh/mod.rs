@@ -60,7 +60,7 @@ impl Mesh {
     /// the object's. What of that cannot be used is left out: see [`Self::left_out`].
     ///
     /// # Errors
-    /// [`SynthError::Unusable`] where the file is damaged, holds no surface or is of another kind, [`SynthError::Io`] where it
+    /// [`SynthError::Unusable`] if the file is damaged, holds no surface or is of another kind, [`SynthError::Io`] if it
     /// cannot be read.
     pub fn read(path: &Path) -> Result<Self, SynthError> {
         let is_known = has_extension(path, &["obj", "gltf", "glb"]);
@@ -199,7 +199,7 @@ impl RawMesh {
     /// triangle uses.
     ///
     /// # Errors
-    /// Where it has no triangles, or their vertices are not there.
+    /// If it has no triangles, or their vertices are not there.
     pub(crate) fn welded(self) -> Result<Self, String> {
         check(&self)?;
         let mut places: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.positions.len());

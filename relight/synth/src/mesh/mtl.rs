@@ -66,7 +66,7 @@ pub(super) fn materials(text: &str) -> Vec<MtlMaterial> {
     all
 }
 
-/// Finite numbers; none where something else stands among them.
+/// Finite numbers; `None` if something else stands among them.
 fn numbers(text: &str) -> Option<Vec<f32>> {
     let words = without_comment(text).split_whitespace();
     let number = |word: &str| word.parse().ok().filter(|number: &f32| number.is_finite());

@@ -70,7 +70,7 @@ impl LibrarySummary {
 /// out. `progress` is called with the number of files, and then once a file.
 ///
 /// # Errors
-/// Where a folder is not there or holds nothing, where no object or no panorama is left of those that were asked for, or
+/// If a folder is not there or holds nothing, if no object or no panorama is left of those that were asked for, or
 /// where a file cannot be written.
 pub fn build_library(
     sources: &LibrarySources,

@@ -37,7 +37,7 @@ impl Candidates {
     /// All objects in folders, in those within them and in archives there; archives may also be named themselves.
     ///
     /// # Errors
-    /// Where there are none, or a folder or an archive cannot be read.
+    /// If none is found, or a folder or an archive cannot be read.
     pub(super) fn objects(folders: &[PathBuf]) -> Result<Self, SynthError> {
         let mut candidates = Self::default();
         let mut origins = Origins::default();
@@ -67,7 +67,7 @@ impl Candidates {
     /// All panoramas in folders and in those within them.
     ///
     /// # Errors
-    /// Where there are none, or a folder cannot be read.
+    /// If none is found, or a folder cannot be read.
     pub(super) fn panoramas(folders: &[PathBuf]) -> Result<Self, SynthError> {
         let mut candidates = Self::default();
         let mut origins = Origins::default();

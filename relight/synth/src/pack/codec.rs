@@ -142,7 +142,7 @@ impl<T: Copy + Eq + Hash> Numbered<T> {
 /// A mesh as bytes. Pictures are numbered in their order in the second list, each with what its values are.
 ///
 /// # Errors
-/// Where a number is not finite.
+/// If a number is not finite.
 pub(super) fn encode_mesh(raw: &RawMesh) -> Result<(PackedMesh, Vec<u8>, Pictures), String> {
     let EncodedMaterials {
         materials,
@@ -364,7 +364,7 @@ impl<'a> Rest<'a> {
 /// The mesh that bytes hold. `picture` gives those of the library by their numbers.
 ///
 /// # Errors
-/// Where the bytes are not what the catalogue says.
+/// If the bytes are not what the catalogue says.
 pub(super) fn decode_mesh(
     packed: &PackedMesh,
     bytes: &[u8],
@@ -485,7 +485,7 @@ pub(super) fn encode_panorama(panorama: &Panorama) -> (PackedPanorama, Vec<u8>) 
 /// The panorama that bytes hold.
 ///
 /// # Errors
-/// Where the bytes are not what the catalogue says.
+/// If the bytes are not what the catalogue says.
 pub(super) fn decode_panorama(packed: PackedPanorama, bytes: &[u8]) -> Result<Panorama, String> {
     let PackedPanorama { width, height } = packed;
     if !(8..=MAX_PANORAMA).contains(&width) || width != 2 * height {

@@ -130,7 +130,7 @@ impl Wanted {
 /// Reads a library from its bytes; errors name it as `path`.
 ///
 /// # Errors
-/// [`SynthError::Unusable`] where it is damaged.
+/// [`SynthError::Unusable`] if it is damaged.
 pub(crate) fn read(path: &Path, bytes: &[u8], wanted: Wanted) -> Result<Contents, SynthError> {
     contents(bytes, wanted).map_err(|why| {
         let fault = format!(

@@ -38,7 +38,7 @@ impl Origins {
     /// The origin of a file below `root`: the nearest [`ORIGIN`] counts.
     ///
     /// # Errors
-    /// Where that file is damaged.
+    /// If that file is damaged.
     pub(super) fn of(&mut self, root: &Path, path: &Path) -> Result<Origin, SynthError> {
         for folder in path.ancestors().skip(1) {
             if let Some(origin) = self.folder(folder)? {

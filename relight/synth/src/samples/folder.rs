@@ -64,7 +64,7 @@ pub struct SynthSummary {
 /// appears when all its files are in it. A call that was interrupted can be repeated, and goes on.
 ///
 /// # Errors
-/// Where a setting is out of range, the folder holds something else or is being written, or a file
+/// If a setting is out of range, the folder holds something else or is being written, or a file
 /// cannot be written: samples that are done stay.
 pub fn write_samples(
     recipe: &Recipe,

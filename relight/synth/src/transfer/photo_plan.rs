@@ -26,7 +26,7 @@ const OTHER_HUES: f32 = 0.2;
 const PRINTED: f32 = 0.3;
 /// Part of the cameras without noise and compression, whose response is sRGB.
 const PLAIN_CAMERA: f32 = 0.5;
-/// Part of the pictures whose values are taken for sRGB, whatever the camera's response: the user of a photograph does not know
+/// Part of the pictures whose values are read as sRGB, whatever the camera's response: the user of a photograph does not know
 /// it either. Hardly more, as albedo times shading is not such a picture.
 const TAKEN_AS_SRGB: f32 = 0.1;
 /// Part of the cameras, but for the plain ones, whose pictures are not quite sharp.
@@ -99,7 +99,7 @@ pub struct PhotoCamera {
     pub level: f32,
     /// Of the response, the power `1 / gamma`; none: sRGB.
     pub gamma: Option<f32>,
-    /// Whether the picture's values are taken for sRGB afterwards.
+    /// Whether the picture's values are read as sRGB afterwards.
     pub taken_as_srgb: bool,
     /// Standard deviation of the noise that does not depend on light.
     pub read_noise: f32,

@@ -37,7 +37,7 @@ struct FrameAngle {
 }
 
 impl TableTiming {
-    /// A turn's timing; none where its equations have no solution.
+    /// A turn's timing; `None` if its equations have no solution.
     pub(super) fn draw(random: &mut Random) -> Option<Self> {
         let angles = frame_angles(random);
         Self::from_angles(&angles)

@@ -45,7 +45,7 @@ const BATCH: u32 = 32;
 /// Turns that the data set already describes are kept. `progress` is called for each finished frame.
 ///
 /// # Errors
-/// Where a setting is out of range, `out` holds another data set, or a file cannot be written: turns
+/// If a setting is out of range, `out` holds another data set, or a file cannot be written: turns
 /// that are whole stay.
 pub fn write_turns(
     turns: &TurnRecipe,

@@ -13,12 +13,12 @@ use relight_synth::SynthSample;
 /// Planes of a sample: the input, the linear picture, shading, albedo, normals, highlight.
 const PLANES: usize = INPUTS + 3 + 1 + 3 + 3 + 1;
 
-/// How the values of a made picture are taken for light.
+/// How the values of a synthetic picture are converted to light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Linearisation {
     /// By the response of the camera that made it: the picture is exactly albedo times shading plus highlight.
     Exact,
-    /// As sRGB, as a photograph is taken whose camera nobody knows.
+    /// As sRGB, like a photograph from an unknown camera.
     AsSrgb,
 }
 

@@ -50,7 +50,7 @@ pub(crate) struct TurnTensors {
 /// What is left of a group of frames.
 #[derive(Debug)]
 pub(crate) struct TurnGroup {
-    /// Its frames; none where fewer than two can be read.
+    /// Its frames; `None` if fewer than two can be read.
     pub frames: Option<TurnTensors>,
     /// What of it was damaged.
     pub damage: Option<String>,
@@ -114,7 +114,7 @@ impl TurnReader {
     /// The next group of this process, in 32 or 64 bits.
     ///
     /// # Errors
-    /// [`TrainError::Torch`]; [`TrainError::Refused`] where a whole epoch has no group with two frames.
+    /// [`TrainError::Torch`]; [`TrainError::Refused`] if a whole epoch has no group with two frames.
     pub(crate) fn next_group(
         &mut self,
         kind: Kind,

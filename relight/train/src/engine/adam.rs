@@ -88,7 +88,7 @@ impl Adam {
     /// Goes on from a memory that was saved.
     ///
     /// # Errors
-    /// [`TrainError::Refused`] where it is another network's.
+    /// [`TrainError::Refused`] if it is another network's.
     pub fn recall(&mut self, memory: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.first, &memory.under("first."))?;
         copy_into(&mut self.second, &memory.under("second."))?;

@@ -11,7 +11,7 @@ use crate::error::TrainError;
 /// The GPU of a number, from 0.
 ///
 /// # Errors
-/// [`TrainError::Refused`] where libtorch has no library for CUDA that can be loaded, or finds fewer GPUs.
+/// [`TrainError::Refused`] if libtorch has no library for CUDA that can be loaded, or finds fewer GPUs.
 pub fn cuda_device(number: usize) -> Result<Device, TrainError> {
     load()?;
     let count = Cuda::device_count();

@@ -21,7 +21,7 @@ impl MetricsLog {
     /// The journal in a run's folder; a resumed run goes on behind the line of its last step.
     ///
     /// # Errors
-    /// [`TrainError::Io`], [`TrainError::Refused`] where another program has it open.
+    /// [`TrainError::Io`], [`TrainError::Refused`] if another program has it open.
     pub fn open(folder: &Path, from_step: u64) -> Result<Self, TrainError> {
         let running = || {
             TrainError::Refused(format!(

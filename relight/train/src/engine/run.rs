@@ -79,7 +79,7 @@ impl<'a> Run<'a> {
     /// which open it with the same arguments.
     ///
     /// # Errors
-    /// [`TrainError::Refused`] where there is one without `resume`, or another one; [`TrainError::Io`],
+    /// [`TrainError::Refused`] if there is one without `resume`, or another one; [`TrainError::Io`],
     /// [`TrainError::ProcessLost`].
     pub fn open(
         task: &'a mut dyn TrainingTask,
@@ -132,7 +132,7 @@ impl<'a> Run<'a> {
     /// weights at the end.
     ///
     /// # Errors
-    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Refused`] where another process is lost:
+    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Refused`] if another process is lost:
     /// the run is
     /// saved.
     pub fn finish(

@@ -45,7 +45,7 @@ pub trait TrainingTask {
     /// Takes this process's part of the work from now on. Called before the first step.
     ///
     /// # Errors
-    /// [`TrainError::Refused`] where the settings leave no equal parts.
+    /// [`TrainError::Refused`] if the settings leave no equal parts.
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
 
     /// What of a user's own files it does not use.

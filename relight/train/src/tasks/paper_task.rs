@@ -37,7 +37,7 @@ impl PaperTask {
     /// Reads what photographs are made of, opens the turns, and makes the networks.
     ///
     /// # Errors
-    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Refused`] where the phase
+    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Refused`] if the phase
     /// needs what is not given.
     pub fn new(
         phase: PaperPhase,

@@ -17,7 +17,7 @@ use relight_synth::{Library, Recipe, stream};
 const TURN_BATCHES: usize = 4;
 /// Samples of a batch of composed samples.
 const SAMPLE_BATCH: usize = 16;
-/// Part of the pictures whose values are taken for sRGB, whatever the camera's response.
+/// Part of the pictures whose values are read as sRGB, whatever the camera's response.
 const TAKEN_AS_SRGB: f64 = 0.10;
 /// Part of the pictures that a plain camera takes (sRGB, no noise, no compression); the others are taken as the recipe says.
 const PLAIN: f64 = 0.5;

@@ -219,7 +219,7 @@ impl CurveStatistics {
     }
 
     /// The albedo that fits the curve best, shrunk toward one from which albedos of an object are `spread` away: as far
-    /// as what is left of the curve, taken for noise of `freedom` degrees of freedom, lets it be any other.
+    /// as the curve's residual, as noise of `freedom` degrees of freedom, leaves it uncertain.
     pub(crate) fn shrunk_albedo(
         &self,
         harmonics: &PixelHarmonics,

@@ -10,7 +10,7 @@ use crate::error::TurnError;
 /// fitted with.
 ///
 /// # Errors
-/// Where the file cannot be read.
+/// If the file cannot be read.
 pub fn read_given_light(path: &Path) -> Result<ShLight, TurnError> {
     let is_panorama = path.extension().is_some_and(|ending| {
         ending.eq_ignore_ascii_case("hdr") || ending.eq_ignore_ascii_case("exr")

@@ -17,7 +17,7 @@ const DARKEST: f32 = 1e-4;
 /// another light. Its unit is not known.
 ///
 /// # Errors
-/// Where the network fails.
+/// If the network fails.
 pub(crate) fn photo_albedo(
     weights: &Weights,
     frames: &[Rgb<Linear>],

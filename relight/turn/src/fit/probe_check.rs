@@ -52,7 +52,7 @@ struct Shown<'a> {
 /// The residual of a ball's own light, over the variation, 0 to 1, at the place that was given for it.
 ///
 /// # Errors
-/// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle has a clearly
+/// [`TurnError::NoBall`] if that is most of it, [`TurnError::Misplaced`] if another circle has a clearly
 /// smaller one.
 pub(crate) fn check(
     curves: &TurnCurves,
@@ -140,7 +140,7 @@ impl Shown<'_> {
         }
     }
 
-    /// The residual of the light fitted to a ball in a circle, over that of an even light; none where the circle is not
+    /// The residual of the light fitted to a ball in a circle, over that of an even light; `None` if the circle is not
     /// in the picture, or nothing varies in it.
     fn residual(&self, circle: Circle) -> Option<f64> {
         let wanted =

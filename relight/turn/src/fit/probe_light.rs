@@ -25,7 +25,7 @@ pub struct ProbeLight {
     pub light: ShLight,
     /// How many frames it was measured in.
     pub frames: u32,
-    /// What the ball was taken for.
+    /// The kind of ball assumed.
     pub ball: ProbeBall,
     /// What it looks like.
     pub looks: ProbeBall,

@@ -27,7 +27,7 @@ fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, model: &ShadingM
 }
 
 /// How much more light than the fit's each part of the turn has, the mean of the channels, over the
-/// [`reference`]; none where all channels are clipped.
+/// [`reference`]; `None` if all channels are clipped.
 pub(crate) fn residuals(
     curves: &TurnCurves,
     pixel: usize,

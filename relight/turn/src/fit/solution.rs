@@ -31,7 +31,7 @@ pub struct TurnSolution {
     /// The light, where it was measured.
     pub(crate) measured: Option<ShLight>,
     pub(crate) conditioning: Conditioning,
-    /// None where the object has none.
+    /// `None` if the object has none.
     pub(crate) gloss: Option<FoundGloss>,
 }
 
@@ -92,7 +92,7 @@ impl TurnSolution {
     /// The light to order 2, in the viewer's frame at the table's angle 0.
     ///
     /// # Errors
-    /// Where a term is not finite.
+    /// If a term is not finite.
     pub fn light(&self) -> Result<ShLight, LightError> {
         let light = match &self.measured {
             Some(measured) => measured.clone(),
@@ -101,7 +101,7 @@ impl TurnSolution {
         Ok(light.with_order(Order::TWO))
     }
 
-    /// What the object is taken for.
+    /// The object's assumed material.
     #[must_use]
     pub const fn material(&self) -> MaterialKind {
         self.model.material

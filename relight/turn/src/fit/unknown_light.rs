@@ -28,7 +28,7 @@ const METAL_SMOOTHNESS: f64 = 60.0;
 /// of what the network of photographs has `seen`.
 ///
 /// # Errors
-/// Where the exposure was wrong, or no light fits the curves.
+/// If the exposure was wrong, or no light fits the curves.
 pub(crate) fn solve_by_network(
     curves: &TurnCurves,
     found: &TurnPrediction,

@@ -63,7 +63,7 @@ impl TableLight {
     /// The same as coefficients in the table's frame.
     ///
     /// # Errors
-    /// Where a term is not finite.
+    /// If a term is not finite.
     pub(crate) fn light(&self) -> Result<ShLight, LightError> {
         let mut coefficients = vec![[0.0; 3]; TERMS];
         for at in 0..TERMS {

@@ -50,7 +50,7 @@ impl ShadingModel {
     /// The light in the viewer's frame, at the table's angle 0, as far as it is seen in the base layer.
     ///
     /// # Errors
-    /// Where a term is not finite.
+    /// If a term is not finite.
     pub(crate) fn light(&self) -> Result<ShLight, LightError> {
         let light = match self.material {
             MaterialKind::Diffuse => self.diffuse.light_of_irradiance(),

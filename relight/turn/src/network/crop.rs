@@ -204,7 +204,7 @@ impl<'a> CoveredPixels<'a> {
         (x < extent.width && y < extent.height).then(|| self.numbers[y * extent.width + x])?
     }
 
-    /// The pixels of a cell and what each counts; none where fewer than half of them are under the mask.
+    /// The pixels of a cell and what each counts; `None` if fewer than half of them are under the mask.
     fn of_cell(&self, cell: u32, corner: [f32; 2], step: f32) -> Option<Vec<(usize, f32)>> {
         let at = [cell as usize % GRID, cell as usize / GRID];
         let range = |axis: usize| {

@@ -93,7 +93,7 @@ impl TurnNetwork {
     /// The network with these weights.
     ///
     /// # Errors
-    /// [`NetError`] where they are another network's.
+    /// [`NetError`] if they are another network's.
     pub fn new(weights: &Weights) -> Result<Self, NetError> {
         let plan = Inference::new(&turn_network(), weights, (GRID, GRID))?;
         Ok(Self { plan })
@@ -103,7 +103,7 @@ impl TurnNetwork {
     /// phase, the one with the least expected error is taken.
     ///
     /// # Errors
-    /// [`NetError`] where the network fails.
+    /// [`NetError`] if the network fails.
     pub(crate) fn predict(
         &self,
         curves: &TurnCurves,

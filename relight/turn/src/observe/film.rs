@@ -25,7 +25,7 @@ const MAX_DIFFERENT: f64 = 0.12;
 /// Reads the ball in the video of a turn. `progress` is called with the number of frames done, and of all frames.
 ///
 /// # Errors
-/// Where the video cannot be read, is not that of the turn, or the ball is not in it or under the object's mask.
+/// If the video cannot be read, is not that of the turn, or the ball is not in it or under the object's mask.
 pub(crate) fn film(
     recording: &Recording,
     turn: &ReadTurn,

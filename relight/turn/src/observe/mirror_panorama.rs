@@ -62,7 +62,7 @@ impl MirrorPanorama {
         self.counts[cell] += 1.0;
     }
 
-    /// What the same direction showed in the mean; none where it was never added.
+    /// What the same direction showed in the mean; `None` if it was never added.
     pub(crate) fn seen(&self, angle: f64, normal: [f64; 3]) -> Option<[f64; 3]> {
         let cell = self.cell(angle, normal);
         mean(&self.sums[cell..=cell], &self.counts[cell..=cell])

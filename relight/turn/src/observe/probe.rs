@@ -54,7 +54,7 @@ impl ProbeBuilder {
     /// Takes up a frame at an angle of the table, degrees.
     ///
     /// # Errors
-    /// [`TurnError::Setting`] where the ball is not in it.
+    /// [`TurnError::Setting`] if the ball is not in it.
     pub(crate) fn push(&mut self, angle_deg: f64, frame: &Rgb<Srgb>) -> Result<(), TurnError> {
         let (picture, place) = (frame.planes(), self.probe.place);
         if !place.is_within(picture.extent()) {
@@ -80,7 +80,7 @@ impl ProbeBuilder {
     /// The curves of the square.
     ///
     /// # Errors
-    /// Where the frames tell too little.
+    /// If the frames tell too little.
     pub(crate) fn curves(self) -> Result<TurnCurves, TurnError> {
         let nothing = || TurnError::Refused(NOTHING.to_owned());
         self.builder.ok_or_else(nothing)?.finish()

@@ -52,11 +52,11 @@ pub struct ReadTurn {
     pub first: Vec<Rgb<Linear>>,
     /// Where the frames stand in the turn's video, from 0, and the table's angle of each, degrees.
     pub(crate) sources: Vec<(u64, f64)>,
-    /// The video itself; none where the frames have no records.
+    /// The video itself; `None` if the frames have no records.
     pub(crate) origin: Option<TurnOrigin>,
     /// 1 on the object, else 0.
     pub mask: Planes<1>,
-    /// Whether frames have their angles; else they are taken for evenly spread over one turn.
+    /// Whether frames have their angles; else they are assumed to be evenly spread over one turn.
     pub has_angles: bool,
     /// What is wrong with frames that are left out.
     pub damage: Vec<String>,
@@ -81,7 +81,7 @@ impl ReadTurn {
 /// number of frames done, and of all frames.
 ///
 /// # Errors
-/// Where it cannot be opened, holds several turns, or shows too little.
+/// If it cannot be opened, holds several turns, or shows too little.
 pub fn read_curves(
     path: &Path,
     rotation: TableRotation,

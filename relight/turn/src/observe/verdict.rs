@@ -37,7 +37,7 @@ impl TurnVerdict {
         }
     }
 
-    /// What to do about it, in one sentence; none where all is well.
+    /// What to do about it, in one sentence; `None` if all is well.
     #[must_use]
     pub const fn advice(self) -> Option<&'static str> {
         match self {

@@ -40,7 +40,7 @@ const SCHEMA: &str = "relight.solved_turn/1";
 pub struct TurnFiles<'a> {
     /// What was read and found.
     pub solved: &'a SolvedTurn,
-    /// Where the light is from: a file's name, or none where it was found.
+    /// The source of the light: a file's name, or `None` if it was estimated.
     pub light_source: Option<&'a str>,
 }
 
@@ -49,7 +49,7 @@ impl TurnFiles<'_> {
     /// nothing else.
     ///
     /// # Errors
-    /// Where it holds something else, or cannot be read or written.
+    /// If it holds something else, or cannot be read or written.
     pub fn check(out: &Path) -> Result<(), TurnError> {
         Ok(RESULTS.check(out)?)
     }
@@ -58,7 +58,7 @@ impl TurnFiles<'_> {
     /// replaced. Gives the figures that `turn.json` holds.
     ///
     /// # Errors
-    /// Where the folder holds something else or a file cannot be written: then the folder is as it was.
+    /// If the folder holds something else or a file cannot be written: then the folder is as it was.
     pub fn write(&self, out: &Path) -> Result<Value, TurnError> {
         RESULTS.write(out, |folder| self.write_files(folder))
     }

@@ -53,7 +53,7 @@ impl ObjectArguments {
     /// Reads the object.
     ///
     /// # Errors
-    /// Where a file cannot be read, the maps differ in size, a map has a value that is negative or not
+    /// If a file cannot be read, the maps differ in size, a map has a value that is negative or not
     /// finite, or no pixel shows the object.
     pub(super) fn read(&self) -> Result<Surface, Box<dyn Error>> {
         if let Some(path) = &self.object {
@@ -147,7 +147,7 @@ fn check_values(path: &Path, what: &'static str, planes: &Planes<3>) -> Result<(
     })
 }
 
-/// One number, three numbers parted by commas, or else a file.
+/// One number, three numbers separated by commas, or else a file.
 fn map(text: &str) -> Result<Map, String> {
     let numbers: Result<Vec<f32>, _> = text.split(',').map(str::parse).collect();
     match numbers.as_deref() {

@@ -56,7 +56,7 @@ fn solve(arguments: &Arguments, console: Console) -> Result<SolvedTurn, Box<dyn 
     Ok(solved)
 }
 
-/// Where the light is from; none where it is to be found.
+/// The source of the light; `None` if it is to be estimated.
 fn light_source(arguments: &Arguments, solved: &SolvedTurn) -> Option<String> {
     let given = arguments.light.as_ref();
     let given = given.map(|path| path.display().to_string());

@@ -38,7 +38,7 @@ impl Panorama {
     /// The panorama that an image of radiance shows.
     ///
     /// # Errors
-    /// Where it has no pixels, or a value is infinite or not a number.
+    /// If it has no pixels, or a value is infinite or not a number.
     pub fn new(image: Rgb<Linear>) -> Result<Self, LightError> {
         if image.planes().extent().pixels() == 0 {
             return Err(LightError::Empty);

@@ -113,7 +113,7 @@ impl Parts<'_> {
         })
     }
 
-    /// What `read` makes of the file of this role; none where the sample may lack it and does.
+    /// The result of `read` on the file of this role; `None` if the file is optional and missing.
     fn read<T>(
         &self,
         role: Role,

@@ -18,7 +18,7 @@ use crate::reader::{DamagedSample, OpenError, SampleFault};
 pub(super) struct FolderTurn {
     name: String,
     folder: PathBuf,
-    /// The file of each frame, in order of time; none where it is missing.
+    /// The file of each frame, in order of time; `None` if it is missing.
     files: Vec<Option<String>>,
     /// The frame at each position.
     order: Vec<u32>,

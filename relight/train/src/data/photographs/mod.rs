@@ -129,7 +129,7 @@ impl Photographs {
     /// The batch of a step; steps are asked for one after the other.
     ///
     /// # Errors
-    /// [`TrainError::Stopped`] where the run is asked to stop before the views are cast, [`TrainError::Fault`],
+    /// [`TrainError::Stopped`] if the run is asked to stop before the views are cast, [`TrainError::Fault`],
     /// [`TrainError::Torch`].
     pub fn batch(&mut self, step: u64) -> Result<TruthBatch, TrainError> {
         let newest = self.data.views_at(step);

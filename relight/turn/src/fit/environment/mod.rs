@@ -23,7 +23,7 @@ const RIDGE: f64 = 1e-5;
 /// beyond the second are those that metal shows.
 ///
 /// # Errors
-/// Where a map has another size, or no light fits the curves.
+/// If a map has another size, or no light fits the curves.
 pub fn fit_turn_light(
     curves: &TurnCurves,
     surface: &Surface,

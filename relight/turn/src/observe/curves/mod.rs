@@ -67,7 +67,7 @@ impl CurveBuilder {
     /// For the pixels under a mask: where it is at least one half.
     ///
     /// # Errors
-    /// Where there are none.
+    /// If no pixel is under it.
     pub(crate) fn new(extent: Extent, mask: &[f32]) -> Result<Self, TurnError> {
         let places: Vec<usize> = (0..extent.pixels().min(mask.len()))
             .filter(|&at| mask[at] >= 0.5)
@@ -91,7 +91,7 @@ impl CurveBuilder {
     /// not a number are left out.
     ///
     /// # Errors
-    /// Where it has another size.
+    /// If it has another size.
     pub(crate) fn push(
         &mut self,
         angle_deg: f64,
@@ -127,7 +127,7 @@ impl CurveBuilder {
     /// The curves of all frames.
     ///
     /// # Errors
-    /// Where the frames do not tell two harmonics.
+    /// If the frames do not tell two harmonics.
     pub(crate) fn finish(self) -> Result<TurnCurves, TurnError> {
         let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
         if seen.len() < MIN_PARTS {

@@ -53,7 +53,7 @@ impl SolvedTurn {
         self.turn.damage.is_empty() && self.solution.verdict().is_fit()
     }
 
-    /// Where nobody said which way the table turns: it was found and is not the usual way, or nothing tells it.
+    /// For a rotation direction that was not given: it was estimated and is not the usual one, or is unknown.
     fn of_rotation(&self) -> Option<String> {
         let rotation = self.turn.rotation;
         let (direction, other) = (rotation.direction, rotation.direction.other());
@@ -71,7 +71,7 @@ impl SolvedTurn {
         }
     }
 
-    /// Where the network of turns speaks against the direction that was taken.
+    /// If the network of turns contradicts the direction that was used.
     fn of_doubted_direction(&self) -> Option<String> {
         let other = self.turn.rotation.direction.other();
         self.network.is_direction_doubted().then(|| {
@@ -84,7 +84,7 @@ impl SolvedTurn {
     }
 }
 
-/// Where a ball does not look like what it was called, or its light fits it badly.
+/// If a ball does not look like its given kind, or its light fits it badly.
 fn of_ball(measured: &ProbeLight) -> Vec<String> {
     let (ball, looks) = (measured.ball, measured.looks);
     let kind =
