@@ -36,8 +36,8 @@ pub fn evaluate_light(
             "MSE and SSIM after both were brought to a maximum of 1; SSIM by {}",
             SSIM_WINDOW
         ),
-        "direction: degrees between the bands 1 of the light and of the true light (where the set has none, of that \
-         fitted to the true shading), 90 where one of them has no direction"
+        "direction: degrees between band 1 of the light and of the true light (or that fitted to the true shading), 90 \
+         if one has no direction"
             .to_owned(),
     ];
     let mut table = ScoreTable::new("light", notes);

@@ -43,15 +43,15 @@ impl TurnVerdict {
         match self {
             Self::Good => None,
             Self::TooEven => Some(
-                "the environment light is too even for normals and albedo: turn on one lamp at the side, and capture the turn again",
+                "the environment light is too even for normals and albedo: turn on one lamp at the side, and capture again",
             ),
             Self::NotLambertian => Some(
                 "most of the variation is shadows or highlights, which the normals do not explain: do not trust them where \
                  the confidence is low",
             ),
             Self::Overexposed => Some(
-                "the object is overexposed: nearly all of it is clipped for half the turn or more; shorten the exposure or \
-                 lower the gain, and capture again",
+                "the object is overexposed: nearly all of it is clipped for half the turn or more; lower exposure or \
+                 gain, and capture again",
             ),
             Self::Underexposed => Some(
                 "the object is underexposed: nearly all of it is black; \
@@ -61,8 +61,8 @@ impl TurnVerdict {
                 "the frames cover only part of a turn: do not trust normals where the confidence is low, or capture a whole turn",
             ),
             Self::Uncertain => Some(
-                "the network of turns is uncertain of the normals: do not trust them where the confidence is low, \
-                 or measure the light (--light, --light-ball)",
+                "the network of turns is uncertain of the normals: do not trust them where the confidence is low; for a black \
+                 or metal object, measure the light (--light-ball)",
             ),
         }
     }
