@@ -63,7 +63,7 @@ enum Verb {
 }
 
 impl Verb {
-    /// What is wrong with the arguments together: wrong usage, exit code 2.
+    /// The fault of a combination of arguments: wrong usage, exit code 2.
     fn fault(&self) -> Option<String> {
         match self {
             Self::Decompose(arguments) => arguments.fault(),
@@ -104,7 +104,7 @@ pub(crate) fn run() -> ExitCode {
     })
 }
 
-/// What is wrong with the arguments of the verb that was given, with the verb's own usage.
+/// The error for a fault in the arguments of the given verb, with the verb's usage.
 fn wrong_usage(matches: &ArgMatches, fault: String) -> Error {
     let mut command = CommandLine::command();
     command.build();

@@ -1,4 +1,4 @@
-//! Options of new light, of videos in which it rotates and of what it makes of surfaces, which several verbs take.
+//! Options that several verbs share: new light, videos in which it rotates, and shading models.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;

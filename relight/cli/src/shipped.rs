@@ -1,4 +1,4 @@
-//! The weights that come with the program.
+//! The built-in weights.
 
 use relight_photo::nets::{NetError, Weights};
 

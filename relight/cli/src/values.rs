@@ -10,7 +10,7 @@ use relight_core::light::NormalsFrame;
 use relight_photo::decompose::SpecularGate;
 use relight_photo::relighting::WhiteBalance;
 
-/// Values of an option: the name on the command line, what the help says of it, and what it stands for.
+/// Values of an option: the name on the command line, its help, and its meaning.
 pub(crate) type Choices<T> = &'static [(&'static str, &'static str, T)];
 
 /// How integers in files of colour are encoded.

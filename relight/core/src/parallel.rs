@@ -1,4 +1,4 @@
-//! Work on many rows, parts or frames side by side. Without the feature `threads`, as in a browser, one comes after
+//! Parallel work on many rows, parts or frames. Without the feature `threads`, as in a browser, one comes after
 //! the other. What is worked on must not depend on the order, so the results are the same.
 
 use std::panic::{self, AssertUnwindSafe};

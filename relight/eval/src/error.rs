@@ -31,7 +31,7 @@ pub enum EvalError {
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: &'static str,
         /// Why.
         source: Cause,

@@ -23,7 +23,7 @@ enum Baseline {
     ConstantAlbedo,
     /// Shading 1; the albedo is the image.
     ConstantShading,
-    /// The shading is the mean of the image's channels, the albedo what is left: its colour.
+    /// The shading is the mean of the image's channels, the albedo the remaining colour.
     LuminanceShading,
     /// The shading is the square root of that mean.
     RootShading,

@@ -19,7 +19,7 @@ fn fitted(sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
 
 /// MSE, SMSE and SSIM of the shading that light makes on the true normals, and the angle between its direction and that
 /// of the true light: for even light, for that which is fitted to the true shading, the best that light of order 2 can do, and
-/// for each prediction (`light.txt`). `form` says how shading follows from the coefficients.
+/// for each prediction (`light.txt`). `form` gives the shading from the coefficients.
 ///
 /// # Errors
 /// If the ground truth or a prediction cannot be read or measured.

@@ -22,13 +22,13 @@ pub struct Predictions {
 
 /// What `relight decompose` writes beside its layers.
 const DESCRIPTION: &str = "decomposition.json";
-/// What that says it is.
+/// Its schema.
 const SCHEMA: &str = "relight.decomposition/1";
 
-/// What is wrong with a description that does not parse.
+/// The fault of a description that does not parse.
 pub(crate) const NO_SET: &str = "does not describe a set";
 
-/// The part of it that says what it is.
+/// The part with its schema.
 #[derive(Deserialize)]
 struct Description {
     schema: String,
@@ -127,7 +127,7 @@ impl Predictions {
     }
 }
 
-/// An estimate at the size of the ground truth: as it is, or the means over blocks where it is so many times larger.
+/// An estimate at the size of the ground truth: as it is, or averaged over blocks if it is larger by an integer factor.
 fn brought_to(path: PathBuf, planes: Planes<3>, extent: Extent) -> Result<Planes<3>, EvalError> {
     let found = planes.extent();
     let times = found.width / extent.width.max(1);

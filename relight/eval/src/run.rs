@@ -1,4 +1,4 @@
-//! What all protocols share: going through the images of a set, and means over them.
+//! Shared by all protocols: a loop over the images of a set, and means over them.
 
 use rayon::prelude::*;
 
@@ -13,7 +13,7 @@ pub type EvalProgress<'a> = &'a (dyn Fn(usize) + Sync);
 
 /// The fault of a sample that cannot be measured.
 pub(super) const NOT_MEASURED: &str = "cannot be measured";
-/// The same where no light can be fitted.
+/// The same if no light can be fitted.
 pub(super) const UNLIT: &str = "cannot be lit: no light can be fitted to it";
 
 /// A measure of one image that becomes part of a line.
@@ -45,7 +45,7 @@ pub(super) fn add_method(
     Ok(())
 }
 
-/// What `work` finds of `count` samples, side by side, with their names. A panic is an error that names the sample.
+/// The results of `work` on `count` samples, in parallel, with their names. A panic is an error that names the sample.
 pub(super) fn each<R: Send>(
     count: usize,
     progress: &(dyn Fn() + Sync),
@@ -139,7 +139,7 @@ pub(super) fn need<'a, T>(
     })
 }
 
-/// What is measured of a sample, with the sample's name in an error.
+/// The measurement of a sample, with the sample's name in an error.
 pub(super) fn measured<T>(
     sample: &TruthSample,
     result: Result<T, MetricError>,

@@ -45,7 +45,7 @@ struct TurnScore {
     /// Mean and median of what is expected of the pixels, degrees.
     expected_mean_deg: f64,
     expected_deg: f64,
-    /// What is to be thought of the turn.
+    /// The verdict on the turn.
     verdict: TurnVerdict,
 }
 

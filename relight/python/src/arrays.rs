@@ -17,7 +17,7 @@ use crate::failure::{Failure, choice};
 /// How errors name a picture that is an array.
 const ARRAY: &str = "array";
 
-/// A picture as the package hands it over: a path, or an array of rows, columns and 3 or 4 channels that lies in one piece.
+/// A picture from the package: a path, or a contiguous array of rows, columns and 3 or 4 channels.
 #[derive(FromPyObject)]
 pub(crate) enum GivenPicture<'py> {
     Path(PathBuf),
@@ -90,7 +90,7 @@ impl Picture {
         })
     }
 
-    /// The colours; `transfer` says how integers are encoded, where the file is not to be asked.
+    /// The colours; `transfer` is the encoding of integers, in place of what the file states.
     pub(crate) fn colours(self, transfer: Option<Transfer>) -> Result<ColourImage, Failure> {
         Ok(match self {
             Self::File(path) => ColourImage::from_bytes(&path, &read(&path)?, transfer)?,

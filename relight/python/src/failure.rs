@@ -1,4 +1,4 @@
-//! Work without Python's lock, and what it fails with as an exception: the program's sentence.
+//! Work without Python's lock, with its errors as exceptions that have the program's sentence.
 
 use std::error::Error;
 use std::io;

@@ -12,7 +12,7 @@ use relight_photo::relighting::{DiscLamp, LightSource};
 use crate::arrays::{GivenPicture, Picture};
 use crate::failure::Failure;
 
-/// Light as the package hands it over.
+/// Light from the package.
 #[derive(FromPyObject)]
 pub(crate) enum GivenLight<'py> {
     /// `AZIMUTH,ELEVATION[,COLOUR][,SIZE]`, and the ambient light.

@@ -24,7 +24,7 @@ use crate::failure::{Failure, choice, unlocked};
 use crate::light::GivenLight;
 use crate::networks::decomposer;
 
-/// A photograph as the package hands it over: the picture, its mask, a rectangle, and how integers are encoded.
+/// A photograph from the package: the picture, its mask, a rectangle, and the encoding of integers.
 #[derive(FromPyObject)]
 pub(crate) struct GivenPhotograph<'py>(
     GivenPicture<'py>,
@@ -158,7 +158,7 @@ impl Layers {
     }
 }
 
-/// What is behind a relit object.
+/// The background of a relit object.
 #[derive(Clone, Copy)]
 enum Behind {
     Photo,

@@ -17,7 +17,7 @@ use relit_data::causes::with_causes;
 const AHEAD: usize = 4;
 
 /// A batch for Python: images, masks, keys, records as JSON (none for folders of images), damaged samples as text, and
-/// the epoch and sample behind it.
+/// the epoch and sample after it.
 type PythonBatch<'py> = (
     Bound<'py, PyArray4<f32>>,
     Bound<'py, PyArray4<f32>>,

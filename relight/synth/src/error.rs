@@ -1,4 +1,4 @@
-//! What can go wrong while data is made.
+//! Errors of making data.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -22,12 +22,12 @@ pub enum SynthError {
         /// The system's answer.
         source: io::Error,
     },
-    /// A file or folder is not what it should be.
+    /// A file or folder is not as required.
     #[error("{path} {fault}")]
     Unusable {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it, and what to do.
+        /// The fault, and what to do.
         fault: String,
     },
     /// What was given cannot be used.
@@ -70,7 +70,7 @@ impl SynthError {
         }
     }
 
-    /// That a file or folder is not what it should be.
+    /// A file or folder is not as required.
     pub(super) fn unusable(path: &Path, fault: impl Into<String>) -> Self {
         Self::Unusable {
             path: path.to_owned(),
@@ -88,7 +88,7 @@ impl SynthError {
         }
     }
 
-    /// That a folder was made otherwise.
+    /// A folder was made with other settings.
     pub(super) fn other_settings(path: &Path) -> Self {
         let fault = "holds samples that were made with other settings: give the same ones, or another folder";
         Self::unusable(path, fault)

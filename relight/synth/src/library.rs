@@ -36,7 +36,7 @@ pub struct Library {
     pub(crate) pictures: Vec<TextureImage>,
     /// The panoramas, never none.
     pub panoramas: Panoramas,
-    /// What of the folders is not used.
+    /// Unused files of the folders.
     pub left_out: Vec<LeftOut>,
     /// Of meshes and panoramas from packed libraries, by name: whether they are for validation only.
     pub(crate) is_for_validation: BTreeMap<String, bool>,
@@ -47,7 +47,7 @@ pub struct Library {
 pub struct LeftOut {
     /// The file.
     pub path: PathBuf,
-    /// What of it, and why.
+    /// The part, and the reason.
     pub what: String,
 }
 
@@ -62,7 +62,7 @@ impl fmt::Display for LeftOut {
 pub struct Folders {
     /// `.obj`, `.gltf` and `.glb`, also in folders within it.
     pub meshes: Option<PathBuf>,
-    /// `.png`, `.jpg`, `.webp`, `.tif` and `.bmp`; sRGB where they say nothing else.
+    /// `.png`, `.jpg`, `.webp`, `.tif` and `.bmp`; sRGB by default.
     pub textures: Option<PathBuf>,
     /// `.hdr` and `.exr`; none: those that are made here.
     pub panoramas: Option<PathBuf>,
@@ -211,7 +211,7 @@ impl Library {
 }
 
 impl Contents {
-    /// What is wanted of packed libraries that stand in place of folders; each is read once.
+    /// The wanted part of packed libraries given in place of folders; each is read once.
     fn from_folders(folders: &Folders) -> Result<Self, SynthError> {
         let packed = |path: &Option<PathBuf>| path.clone().filter(|path| pack::is_packed(path));
         let (meshes, panoramas) = (packed(&folders.meshes), packed(&folders.panoramas));
@@ -236,7 +236,7 @@ impl Contents {
     }
 }
 
-/// The panoramas that are made here, by name: four each of studio, room and sky, and one even light.
+/// The synthetic panoramas, by name: four each of studio, room and sky, and one even light.
 ///
 /// # Errors
 /// None with panoramas of any size; [`SynthError::Light`] is passed on.

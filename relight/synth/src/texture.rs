@@ -100,7 +100,7 @@ impl TextureImage {
         }
     }
 
-    /// Reads a picture, whose values are sRGB where it says nothing else.
+    /// Reads a picture, whose values are sRGB by default.
     ///
     /// # Errors
     /// [`SynthError::Image`] if it cannot be read or is not a picture.
@@ -177,7 +177,7 @@ impl TextureImage {
         })
     }
 
-    /// Part of the picture that its file says is see-through; it is shown as if it were not.
+    /// Part of the picture that is transparent in its file; it is shown as opaque.
     pub(crate) fn see_through(&self) -> f32 {
         self.see_through
     }

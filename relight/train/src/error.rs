@@ -1,4 +1,4 @@
-//! What can go wrong while training.
+//! Errors of training.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -22,8 +22,8 @@ pub enum TrainError {
     /// A sheet of answers could not be encoded.
     #[error(transparent)]
     Encode(#[from] relit_data::shard::ShardError),
-    /// What is wrong, and what to do: with something that was given, as a setting, an option, a checkpoint or a GPU, or
-    /// with the run itself.
+    /// A fault, and what to do: in something given (a setting, an option, a checkpoint or a GPU), or in the
+    /// run itself.
     #[error("{0}")]
     Refused(String),
     /// A file cannot be read or written.
@@ -58,7 +58,7 @@ impl TrainError {
         }
     }
 
-    /// That a saved optimiser lacks a tensor, or has one of another shape.
+    /// A saved optimiser lacks a tensor, or has one of another shape.
     pub(super) fn no_memory(name: &str) -> Self {
         Self::Refused(format!(
             "the saved optimiser has no {name} of the right shape: it is another network's"

@@ -113,7 +113,7 @@ pub enum TurnError {
 }
 
 impl TurnError {
-    /// That a video is not that of the turn, and what tells them apart.
+    /// A video is not that of the turn, with the difference.
     pub(crate) fn other_video(path: &Path, why: &str) -> Self {
         let path = path.display();
         Self::Refused(format!(

@@ -59,7 +59,7 @@ pub enum PageFault {
     Incomplete {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         why: String,
     },
 }

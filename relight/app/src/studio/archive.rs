@@ -61,7 +61,7 @@ impl SceneFiles {
         Ok(self.add(&background.name, background.file()?).into())
     }
 
-    /// Adds a file under a name that no other has; two of the same content are one.
+    /// Adds a file under a unique name; files with the same content become one.
     fn add(&mut self, name: &str, content: Vec<u8>) -> String {
         let plain = plain_name(name);
         let (stem, ending) = plain.rsplit_once('.').unwrap_or((&plain, "bin"));

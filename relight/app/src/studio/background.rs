@@ -45,7 +45,7 @@ struct PanoramaBackground {
     file: Option<Vec<u8>>,
     scenery: Option<Scenery>,
     panorama: Panorama,
-    /// The camera that looked last, and what it depends on.
+    /// The last camera, and what it depends on.
     view: Option<(ViewKey, PanoramaView)>,
 }
 
@@ -245,7 +245,7 @@ impl StudioBackground {
         }
     }
 
-    /// What is seen of it after light has turned by so many radians, after [`StudioBackground::prepare`].
+    /// The visible part after the light has rotated by so many radians, after [`StudioBackground::prepare`].
     pub(super) fn seen(&self, setting: &SceneEnvironment, turn: f64) -> Rgb<Linear> {
         match &self.content {
             Content::Photo(photo) => photo.shown().clone(),

@@ -16,7 +16,7 @@ const SEEN: f32 = 0.5;
 /// A clipped part of the background larger than this is reported.
 const MUCH_CLIPPED: f32 = 0.25;
 
-/// The setting that was made last, with all that it depends on: a background, the scene without objects and without the
+/// The last setting, with its inputs: a background, the scene without objects and without the
 /// light's angle, and its longest side. While only those change it stays.
 #[derive(Default)]
 pub(super) struct KeptEnvironment(Option<((SceneDescription, Option<u32>), SceneEnvironment)>);

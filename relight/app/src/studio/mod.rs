@@ -383,7 +383,7 @@ fn backgrounds() -> Result<Answer, Refusal> {
     Ok((json!({ "panoramas": panoramas }), thumbnails))
 }
 
-/// The brightest shading, but for one pixel in a hundred: what is shown as white.
+/// The 99th percentile of the shading, which is shown as white.
 fn most_shading(shading: &Planes<1>) -> f32 {
     let mut values: Vec<f32> = shading
         .plane(0)

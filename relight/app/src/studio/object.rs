@@ -125,7 +125,7 @@ impl StudioObject {
         Self::open(&format!("{}.png", stem(name)), png_of(name, size, rgba)?)
     }
 
-    /// What it is made of: a photograph, which is decomposed, or maps that were measured.
+    /// Its source: a photograph, which is decomposed, or measured maps.
     pub(super) const fn kind(&self) -> &'static str {
         match self.content {
             Content::Photo(_) => "photo",
@@ -235,7 +235,7 @@ impl StudioObject {
         }
     }
 
-    /// The photograph decomposed as it is; none of a captured object.
+    /// The decomposed photograph; `None` for a captured object.
     ///
     /// # Errors
     /// If it is not cut out yet, or cannot be decomposed.

@@ -100,7 +100,7 @@ enum RelightingStep {
     Make(MakeArguments),
 }
 
-/// The ground truth, and the table of how far it is met.
+/// The ground truth, and the table of scores.
 #[derive(Args)]
 struct TableArguments {
     /// The folder of the ground truth.
@@ -172,7 +172,7 @@ const INPUTS: Choices<IntrinsicInput> = &[
 ];
 
 impl Arguments {
-    /// What is wrong with the arguments together.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         match &self.protocol {
             Protocol::Mit { set, .. }

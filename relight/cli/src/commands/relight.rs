@@ -97,7 +97,7 @@ pub(crate) fn or_own(light: Arg) -> Arg {
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         if self.light.is_empty() {
             return Some(
@@ -170,7 +170,7 @@ impl Arguments {
 /// All that is the same for every photograph.
 struct Run<'a> {
     arguments: &'a Arguments,
-    /// Read when the first photograph is there: it takes its time.
+    /// Read with the first photograph, since reading is slow.
     network: OnceLock<Network>,
     light: Option<LightSource>,
     reading: PhotoReading,

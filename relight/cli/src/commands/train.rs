@@ -264,7 +264,7 @@ impl RunArguments {
     }
 }
 
-/// Process 0 says whom it waits for: a process that was not started would keep it without a word.
+/// Process 0 reports whom it waits for: a process that was not started would block it silently.
 fn tell_of_waiting(launch: &Launch, console: Console) {
     if launch.rank.index() > 0 {
         return;
@@ -365,7 +365,7 @@ fn report(outcome: &RunOutcome, console: Console) {
     );
 }
 
-/// Shows a run on the terminal. Any process but the first has no bar, and says only what it alone knows.
+/// Shows a run on the terminal. Processes other than the first have no bar, and report only what they alone know.
 struct RunProgress {
     console: Console,
     process: u32,

@@ -24,7 +24,7 @@ Examples:
   relight weights export net.safetensors --net normal-net -o normal-net.onnx
       the paper's Normal-Net";
 
-/// What a file of our network of photographs says of itself: the same for all of its weights.
+/// Metadata of an ONNX file of our network of photographs, the same for all weights.
 const DECOMPOSER_FACTS: [(&str, &str); 7] = [
     (
         "input",
@@ -60,7 +60,7 @@ const DECOMPOSER_FACTS: [(&str, &str); 7] = [
     ),
 ];
 
-/// What a file of the weights that come with the program says beside.
+/// Further metadata of an ONNX file of the built-in weights.
 const SHIPPED_FACTS: [(&str, &str); 2] = [
     ("licence", "MIT OR Apache-2.0"),
     (
@@ -119,7 +119,7 @@ enum NetName {
 }
 
 impl NetName {
-    /// What reads the weights that come with the program, if any do.
+    /// The reader of the built-in weights, if there are any.
     fn shipped(self) -> Option<fn() -> Result<Weights, NetError>> {
         match self {
             Self::Decomposer => Some(shipped::weights),
@@ -144,7 +144,7 @@ impl NetName {
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         let Verb::Export(export) = &self.verb;
         if export.input.is_none() && export.net.shipped().is_none() {
@@ -166,7 +166,7 @@ impl Export {
 }
 
 impl Export {
-    /// The weights that are given, or those that come with the program.
+    /// The given weights, or the built-in ones.
     fn weights(&self) -> Result<Weights, Box<dyn Error>> {
         match (&self.input, self.net.shipped()) {
             (Some(path), _) => Ok(Weights::read(path)?),
@@ -175,7 +175,7 @@ impl Export {
         }
     }
 
-    /// What an ONNX file says of itself.
+    /// The metadata of an ONNX file.
     fn facts(&self) -> Vec<(&'static str, &'static str)> {
         let mut facts = Vec::new();
         if matches!(self.net, NetName::Decomposer) {

@@ -20,7 +20,7 @@ pub enum CapturedObjectError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: String,
     },
     /// Its content cannot be used.

@@ -12,7 +12,7 @@
 //! | `alpha.png` | 16-bit grey: the part of the pixel that the object covers |
 //! | `normal.png` | 16 bits, (n + 1) / 2, x to the right, y up, z to the viewer; black outside the object |
 //! | `albedo.png` | 16 bits, linear, over `white.albedo`: the object's own colour, also in pixels that it covers in part |
-//! | `specular.png`, `smoothness.png` | s_p, 16 bits, linear, over `white.specular`; α, 16-bit grey, over `white.smoothness`. Both are there or none |
+//! | `specular.png`, `smoothness.png` | s_p, 16 bits, linear, over `white.specular`; α, 16-bit grey, over `white.smoothness`. Both or neither exist |
 //! | `confidence.png` | 16-bit grey: 0 to 1 |
 //!
 //! Readers ignore entries and fields that they do not know. A change that an older reader would misunderstand raises

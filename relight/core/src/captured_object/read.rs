@@ -70,7 +70,7 @@ struct Schema {
     schema: String,
 }
 
-/// The bytes of an entry that has at most so many.
+/// The bytes of an entry, up to a limit.
 fn entry(
     archive: &mut Archive<'_>,
     name: &'static str,

@@ -52,7 +52,7 @@ pub fn write_exr(path: &Path, planes: &Planes<3>) -> Result<(), ImageError> {
     write(path, &encode_exr(path, planes)?)
 }
 
-/// Reads the colours of an image as [`StoredImage::read`], and says what its numbers were.
+/// Reads the colours of an image as [`StoredImage::read`], and returns the type of its numbers.
 ///
 /// # Errors
 /// If the file cannot be read or is not an image of a known format.
@@ -134,7 +134,7 @@ impl Panorama {
 
 impl<Y: YAxis> Normals<Y> {
     /// Reads a PNG, 8 or 16 bits, of colours `(n + 1) / 2`, or an EXR of the vectors themselves. No
-    /// file says which way y points: the caller does, by `Y`.
+    /// file does not state the direction of y: the caller gives it by `Y`.
     ///
     /// # Errors
     /// If the file cannot be read or is not an image.

@@ -65,7 +65,7 @@ impl<const C: usize> Planes<C> {
         image
     }
 
-    /// Images of one size side by side, `columns` in a row; places beyond the last are 0.
+    /// Images of one size in a grid with `columns` in a row; cells beyond the last are 0.
     ///
     /// # Errors
     /// If an image has another size than the first.
@@ -176,7 +176,7 @@ impl<const C: usize> Planes<C> {
         self
     }
 
-    /// Calls `fill(y, row)` for every row, side by side where there are threads; `row` has one slice a
+    /// Calls `fill(y, row)` for every row, in parallel if there are threads; `row` has one slice a
     /// channel.
     pub fn fill_rows(&mut self, fill: impl Fn(usize, [&mut [f32]; C]) + Sync) {
         let width = self.extent.width.max(1);

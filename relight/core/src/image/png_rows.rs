@@ -6,7 +6,7 @@ use super::codec::to_integer;
 use super::{Depth, Extent, ImageError, Planes};
 use crate::parallel;
 
-/// Rows that are computed side by side.
+/// Rows that are computed in parallel.
 const ROWS: usize = 64;
 
 /// Values of 0 to 1 as integers in a PNG; others are clipped.

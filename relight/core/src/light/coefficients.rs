@@ -130,7 +130,7 @@ impl fmt::Display for ShLight {
 impl FromStr for ShLight {
     type Err = LightError;
 
-    /// Reads one line a coefficient; numbers are parted by blanks or commas, empty lines and those
+    /// Reads one line a coefficient; numbers are separated by blanks or commas, empty lines and those
     /// that begin with # are passed over.
     fn from_str(text: &str) -> Result<Self, LightError> {
         let lines = text.lines().enumerate();

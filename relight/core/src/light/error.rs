@@ -1,6 +1,6 @@
-//! What can be wrong with light.
+//! Errors of light.
 
-/// What is wrong with light.
+/// An error of light.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LightError {

@@ -65,7 +65,7 @@ impl Order {
         (self.get() + 1) * (self.get() + 1)
     }
 
-    /// The order that has so many coefficients.
+    /// The order with so many coefficients.
     pub(super) fn from_coefficients(count: usize) -> Result<Self, LightError> {
         let side = count.isqrt();
         if count == 0 || side * side != count {

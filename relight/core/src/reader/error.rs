@@ -26,7 +26,7 @@ pub enum OpenError {
     Dataset {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         source: relit_data::shard::ShardError,
     },
     /// It contains no samples, or its files do not belong together.
@@ -34,7 +34,7 @@ pub enum OpenError {
     Content {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong, and what should be there.
+        /// The fault, and what is expected.
         fault: String,
     },
     /// A thread cannot be started.

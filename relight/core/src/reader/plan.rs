@@ -78,7 +78,7 @@ impl Rank {
     }
 }
 
-/// A position between two samples of a plan, to go on from. It is the same for all processes.
+/// A position between two samples of a plan, to resume from. It is the same for all processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Cursor {
     /// Which time all samples are drawn, from 0.
@@ -87,7 +87,7 @@ pub struct Cursor {
     pub sample: u64,
 }
 
-/// The samples of a batch, and the cursor behind it.
+/// The samples of a batch, and the cursor after it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Job {
     pub(super) samples: Vec<SampleId>,

@@ -42,7 +42,7 @@ pub struct Streaming {
     pub ahead: usize,
 }
 
-/// A batch, and the cursor from which a stream goes on behind it.
+/// A batch, and the cursor after it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawn<B> {
     /// The samples.

@@ -156,7 +156,7 @@ fn exp2(power: f32) -> f32 {
     scale * (1.0 + rest * (1.0 + rest * (0.5 + rest * (1.0 / 6.0 + rest * high))))
 }
 
-/// What is done to a group of pixels with `I` values each, giving `O` values.
+/// A function from `I` to `O` values for a group of pixels.
 pub(super) trait Kernel<const I: usize, const O: usize>: Sync {
     /// Memory that is used again for every group.
     type Scratch;
@@ -169,7 +169,7 @@ pub(super) trait Kernel<const I: usize, const O: usize>: Sync {
     fn run(&self, scratch: &mut Self::Scratch, inputs: [Lanes; I]) -> [Lanes; O];
 }
 
-/// Runs a kernel over planes of one length, side by side where there are threads.
+/// Runs a kernel over planes of one length, in parallel if there are threads.
 pub(super) fn run<const I: usize, const O: usize>(
     kernel: &impl Kernel<I, O>,
     inputs: [&[f32]; I],

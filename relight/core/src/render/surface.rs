@@ -1,4 +1,4 @@
-//! What is lit: the maps of an object.
+//! A surface to light: the maps of an object.
 
 use crate::image::{Extent, ImageError, Linear, Planes, Rgb, check_extent};
 use crate::light::{Normals, YUp};

@@ -37,7 +37,7 @@ pub struct RelightingRecipe {
     pub lights: usize,
     /// Width and height of the images, 16..=2048 pixels.
     pub size: u32,
-    /// What all is drawn from.
+    /// The seed of all draws.
     pub seed: u64,
     /// Whether objects cast shadows on themselves.
     pub shadows: bool,
@@ -98,7 +98,7 @@ impl RelightingRecipe {
     }
 }
 
-/// What all objects of a folder were made of.
+/// The inputs of all objects of a folder.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Origin {
     lights: usize,
@@ -130,7 +130,7 @@ impl Origin {
         }
     }
 
-    /// Writes itself into the folder, or compares itself with what is there.
+    /// Writes itself into the folder, or compares itself with the existing file.
     fn describe(&self, out: &Path) -> Result<(), EvalError> {
         let path = out.join(Self::FILE);
         match fs::read(&path) {

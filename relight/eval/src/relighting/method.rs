@@ -45,7 +45,7 @@ impl RelightMethod<'_> {
         }
     }
 
-    /// What is the same for all lights.
+    /// What all lights share.
     pub(super) fn prepare<'a>(
         &'a self,
         set: &'a RelightingSet,

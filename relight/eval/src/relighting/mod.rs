@@ -1,5 +1,5 @@
 //! Relighting: one image of an object in, the same object under other lights out. The paper's table
-//! has 100 objects under 30 lights each: from the image under one light to the 29 others, matt and
+//! has 100 objects under 30 lights each: from the image under one light to the 29 others, diffuse and
 //! with highlights.
 
 mod make;

@@ -12,7 +12,7 @@ use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::render::{Gloss, Surface};
 
-/// What the description says it is.
+/// The description's schema.
 pub(super) const SCHEMA: &str = "relight.relighting/2";
 /// The description of a set.
 pub(super) const FILE: &str = "relighting.json";
@@ -20,7 +20,7 @@ pub(super) const FILE: &str = "relighting.json";
 /// The objects of a set and its lights:
 ///
 /// ```text
-/// relighting.json             what there is, and what it was made of; written last
+/// relighting.json             the contents and their inputs; written last
 /// lights/<ll>.txt             the light as coefficients of order 24, in the units of the images
 /// <ooo>/{mask,normal,albedo}.png      the ground truth of an object: 16 bits, linear, y up
 /// <ooo>/<ll>-diffuse.png      the object without highlights under a light, sRGB
@@ -37,7 +37,7 @@ pub struct RelightingSet {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Index {
     pub(super) schema: String,
-    /// What it was made by and of.
+    /// Its program and inputs.
     pub(super) about: String,
     pub(super) lights: Vec<String>,
     pub(super) objects: Vec<ObjectEntry>,
@@ -126,7 +126,7 @@ impl RelightingSet {
         &self.lights
     }
 
-    /// What it was made of, as a sentence.
+    /// Its inputs, as a sentence.
     pub(super) fn about(&self) -> String {
         self.index.about.clone()
     }

@@ -1,4 +1,4 @@
-//! What of a background an inserted object has to follow: brightness, white balance, grain. Knows pictures only.
+//! Properties of a background that an inserted object adopts: brightness, white balance, grain. Knows pictures only.
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::statistics::above_part;
@@ -22,7 +22,7 @@ const SMOOTHEST_PART: f64 = 0.1;
 const FINE: f32 = 0.75;
 /// Deviations below this come from rounding to 8 bits: they say nothing about the grain.
 const ROUNDING: f32 = 2e-3;
-/// The part of the squares that have to show nothing but grain, so that it is known.
+/// The part of the squares that must show only grain for it to be measured.
 const MIN_PART: f64 = 0.02;
 /// The most grain that a camera makes.
 const MAX_GRAIN: f32 = 0.06;

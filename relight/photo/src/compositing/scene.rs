@@ -47,7 +47,7 @@ impl<'a> InsertScene<'a> {
         })
     }
 
-    /// All objects as they are seen after the light has turned about the vertical by so many radians, from back to front.
+    /// All objects after the light has rotated about the vertical by so many radians, from back to front.
     ///
     /// # Errors
     /// Those of the render layers.

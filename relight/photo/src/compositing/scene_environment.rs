@@ -1,4 +1,4 @@
-//! What a background says of the objects that are put before it: their light, how far their ground is looked down on, and
+//! What a background determines for inserted objects: their light, the tilt of their ground, and
 //! how bright they are. Opens no files.
 
 use std::f32::consts::PI;
@@ -163,7 +163,7 @@ impl SceneEnvironment {
         InsertScene::new(self.extent, light, self.tilt, self.matching, objects)
     }
 
-    /// What is seen of a panorama that has turned by so many radians, as bright as it is shown.
+    /// The visible part of a panorama that has rotated by so many radians, at its exposure.
     #[must_use]
     pub fn seen(&self, view: &PanoramaView, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
         shown(view, panorama, turn, self.panorama_scale)

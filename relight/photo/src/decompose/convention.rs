@@ -1,4 +1,4 @@
-//! What the pictures and vectors of other networks for normals mean: told by the names of what goes in and comes out.
+//! Conventions of other networks for normals, recognised by the names of their inputs and outputs.
 
 use crate::nets::{OnnxSignature, OnnxValue};
 use relight_core::image::Extent;
@@ -49,7 +49,7 @@ pub(super) enum Channels {
 /// Axes of vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Axes {
-    /// x right, z to the viewer; the caller says which way y points.
+    /// x right, z to the viewer; the caller gives the direction of y.
     Viewer,
     /// OpenCV's: x right, y down, z away from the viewer.
     Camera,

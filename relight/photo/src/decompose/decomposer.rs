@@ -88,11 +88,11 @@ pub struct Decomposition {
     /// Per pixel, which part of its darkness is expected to be paint, 0..=1: near 1 print, near 0 shadow, in between where
     /// the network cannot tell. `None` if it was not asked for, and of weights without that head.
     pub paint: Option<Planes<1>>,
-    /// The light of order 2 around the object, by its shading and by what the network says of it: grey, as the
+    /// The light of order 2 around the object, from its shading and the network's prediction: grey, as the
     /// shading is. The colour of the light is part of the albedo.
     pub light: ShLight,
-    /// The light of order 2 whose irradiance on the normals is nearest to the shading, whatever the network says. Its side is
-    /// less sure, but it holds what of the light reaches the object: relighting begins with it.
+    /// The light of order 2 whose irradiance on the normals is nearest to the shading, without the network's prediction. Its
+    /// direction is less certain, but it has the light that reaches the object: relighting starts from it.
     pub shading_light: ShLight,
     /// The gloss of the whole object, where a highlight was separated and [`Self::shading_light`] explains it.
     pub gloss: Option<FittedGloss>,
@@ -126,7 +126,7 @@ pub struct Decomposition {
 /// ```
 pub struct Decomposer {
     scales: Scales,
-    /// Whether the network tells paint from shadow.
+    /// Whether the network separates paint from shadow.
     tells_paint: bool,
     normals: Option<OtherNormals>,
 }

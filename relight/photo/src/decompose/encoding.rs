@@ -38,7 +38,7 @@ pub struct AnsweredMaps {
     pub shading: Planes<1>,
     /// Highlight, grey, in the picture's units.
     pub highlight: Planes<1>,
-    /// How much of the darkness is paint rather than shadow, 0..=1; 0 of a network that does not tell it.
+    /// How much of the darkness is paint rather than shadow, 0..=1; 0 from a network without that head.
     pub paint: Planes<1>,
 }
 

@@ -40,7 +40,7 @@ pub enum DecomposeError {
         /// The photograph.
         path: PathBuf,
     },
-    /// Nothing says where the object is.
+    /// The object's place is unknown.
     #[error(
         "{} does not say where the object is: give a mask with --mask (`relit-mask` makes one), or a rectangle around the \
          object with --rect",
@@ -50,7 +50,7 @@ pub enum DecomposeError {
         /// The photograph.
         path: PathBuf,
     },
-    /// A file says of its colours what is not converted.
+    /// A file states colours that cannot be converted.
     #[error("{} {fault}: convert it to sRGB or EXR, or give its encoding with --transfer", path.display())]
     Colour {
         /// The photograph.
@@ -77,7 +77,7 @@ pub enum DecomposeError {
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: String,
     },
 }

@@ -1,4 +1,4 @@
-//! The light of a photograph: what the network says of it, and the fit to the shading that begins there.
+//! The light of a photograph: the network's prediction, and the fit to the shading that starts from it.
 
 use crate::nets::LIGHT_OUTPUTS;
 use relight_core::image::{Linear, Rgb};
@@ -7,7 +7,7 @@ use relight_core::render::{cosine_lobe, fit_light_near};
 
 /// Keeps the light from behind, which normals hardly show, small: see [`fit_light_near`].
 const STIFFNESS: f64 = 1e-3;
-/// The same towards what the network says. Chosen on synthetic objects: a stiffer fit finds the light's side a little better
+/// The same towards the network's prediction. Chosen on synthetic objects: a stiffer fit finds the light's side a little better
 /// and explains the shading less (docs/results/decomposition.md).
 const STIFFNESS_TO_PREDICTION: f64 = 1e-2;
 /// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
@@ -94,7 +94,7 @@ pub(super) fn light_of_shading(
     Ok(light)
 }
 
-/// Whether band 1 is longer than that of any light; it is grey, so that one channel says it.
+/// Whether band 1 is longer than that of any light; it is grey, so one channel suffices.
 fn is_too_one_sided(light: &ShLight) -> bool {
     let [mean, a, b, c] = [0, 1, 2, 3].map(|at: usize| light.coefficients()[at][1]);
     (a * a + b * b + c * c).sqrt() > MAX_ONE_SIDED * mean

@@ -1,4 +1,4 @@
-//! Where the object is: what a photograph, a file or a rectangle says of it.
+//! The object's mask: from a photograph, a file or a rectangle.
 
 use super::crop::inside;
 use relight_core::image::{Extent, Planes, beside};
@@ -9,7 +9,7 @@ pub(super) const NEARLY_BLACK: f32 = 12.5 / 255.0;
 /// The part of the photograph's edge that is black where its background is.
 const BLACK_EDGE: f64 = 0.95;
 
-/// What said where the object is.
+/// The source of the mask.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MaskSource {

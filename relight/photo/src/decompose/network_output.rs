@@ -57,7 +57,7 @@ impl MapsNet for Engine {
 /// log shading, highlight, paint.
 pub(super) type Fields = Planes<9>;
 
-/// What the network says of a picture.
+/// The network's output for a picture.
 pub(super) struct Look {
     pub(super) fields: Fields,
     pub(super) light: Option<PredictedLight>,
@@ -183,7 +183,7 @@ fn without_gaps(normals: Normals<YUp>, mask: &[bool]) -> Normals<YUp> {
     }
 }
 
-/// The fields of a mirror image as those of the picture: a normal's x points the other way.
+/// The fields of a mirror image as those of the picture: a normal's x changes its sign.
 fn turned_back(fields: Fields) -> Fields {
     let mut fields = fields.mirrored();
     for value in &mut *fields.planes_mut()[0] {

@@ -30,7 +30,7 @@ pub struct Photo {
     saturated_fraction: Option<f64>,
 }
 
-/// What is known of a photograph beside its file.
+/// What is known about a photograph besides its file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PhotoHints<'a> {
     /// A picture of the mask, and how errors name it.
@@ -66,7 +66,7 @@ impl Photo {
     /// The same of a picture in memory, called `path`.
     ///
     /// # Errors
-    /// If it is too large, or nothing says where the object is.
+    /// If it is too large, or the object's place is unknown.
     pub fn from_image(
         path: &Path,
         image: ColourImage,
@@ -131,7 +131,7 @@ impl Photo {
         })
     }
 
-    /// The photograph with a longest side of at most so many pixels.
+    /// The photograph, reduced to a longest side.
     #[must_use]
     pub fn at_most(mut self, longest: usize) -> Self {
         let Extent { width, height } = self.picture.planes().extent();
@@ -164,7 +164,7 @@ pub(crate) fn stem(path: &Path) -> String {
     stem.to_string_lossy().into_owned()
 }
 
-/// The size that a file says it has; `None` if it cannot be read.
+/// The size that a file states; `None` if it cannot be read.
 #[must_use]
 pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
     let (width, height) = relit_data::still::stored_size(bytes)?;

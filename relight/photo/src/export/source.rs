@@ -15,7 +15,7 @@ use super::ExportError;
 /// The figures of a decomposition, and those of a turn.
 const FIGURES: [&str; 2] = ["decomposition.json", "turn.json"];
 
-/// What the figures say that the maps do not.
+/// The figures that the maps do not have.
 #[derive(Deserialize)]
 struct MapFigures {
     white: MapWhites,

@@ -146,7 +146,7 @@ impl PhotoInput {
     /// black background, or the rectangle. A frame of a shard has its own.
     ///
     /// # Errors
-    /// If a file cannot be read or does not fit, or nothing says where the object is.
+    /// If a file cannot be read or does not fit, or the object's place is unknown.
     pub fn load(&self, reading: &PhotoReading) -> Result<Photo, DecomposeError> {
         match self {
             Self::File(path) => read_file(path, reading),
@@ -215,7 +215,7 @@ fn holds_pictures(folder: &Path) -> bool {
 }
 
 /// Why a file of a folder is left out; `None` if it counts as a photograph: by its content, or by a name that
-/// promises one, so that reading it says what is wrong.
+/// promises one, so that reading it reports the fault.
 fn use_of(path: PathBuf) -> Option<UnusedFile> {
     let mut head = Vec::new();
     let file = fs::File::open(&path);

@@ -52,7 +52,7 @@ pub struct InsertionOutput<'a> {
 }
 
 impl InsertSource {
-    /// Reads what a scene says of an object; its paths are relative to `folder`.
+    /// Reads an object of a scene; its paths are relative to `folder`.
     ///
     /// # Errors
     /// If a file cannot be read, or a captured object is given a mask.
@@ -269,7 +269,7 @@ fn first_of(background: &mut BackgroundFile) -> Result<Option<Rgb<Linear>>, Inse
     }
 }
 
-/// What of a background stands still.
+/// The still part of a background.
 fn still_of<'a>(
     background: &'a BackgroundFile,
     first: Option<&'a Rgb<Linear>>,

@@ -42,7 +42,7 @@ pub enum MovieError {
     File {
         /// The video.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         fault: String,
     },
 }
@@ -190,7 +190,7 @@ impl MovieWriter {
         })
     }
 
-    /// Writes a video of `count` frames. Some are computed side by side; they are encoded in order, and `written` is
+    /// Writes a video of `count` frames. Some are computed in parallel; they are encoded in order, and `written` is
     /// called after each.
     ///
     /// # Errors

@@ -26,7 +26,7 @@ const MAX_SD_ROWS: usize = 576;
 pub enum FrameTiming {
     /// Each once, whenever it is shown.
     Each,
-    /// What is seen at even intervals, by the video's frame rate.
+    /// Frames at even intervals, by the video's frame rate.
     Even,
 }
 
@@ -240,7 +240,7 @@ fn unread(path: &Path, output: &Output) -> MovieError {
     )
 }
 
-/// What `ffprobe` says of a video and its first frame.
+/// The output of `ffprobe` for a video and its first frame.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct Facts {

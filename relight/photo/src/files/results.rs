@@ -1,4 +1,4 @@
-//! What is written of a decomposition: a folder that appears when it is whole.
+//! The files of a decomposition: a folder that appears when it is complete.
 
 use std::path::Path;
 
@@ -37,7 +37,7 @@ const RESULTS: ResultFolder = ResultFolder {
     marker: FIGURES,
     holds: |name| FILES.contains(&name),
 };
-/// What it says it is.
+/// Its schema.
 const SCHEMA: &str = "relight.decomposition/1";
 /// Width and height of the lit ball, and of the pictures of the sheet, pixels.
 const TILE: usize = 256;
@@ -99,7 +99,7 @@ struct FigureLight {
     residual: f64,
 }
 
-/// A decomposition together with what it was made of, ready to be written.
+/// A decomposition with its inputs, ready to be written.
 #[derive(Debug, Clone, Copy)]
 pub struct DecompositionFiles<'a> {
     /// The photograph.

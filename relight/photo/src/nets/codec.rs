@@ -21,7 +21,7 @@ impl Weights {
     /// are times the scale of their output channel, which the tensor `NAME.scale` has.
     ///
     /// # Errors
-    /// A sentence that says what is wrong.
+    /// A sentence with the reason.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         if bytes.starts_with(b"PK") {
             return Err(

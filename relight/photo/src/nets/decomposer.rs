@@ -60,7 +60,7 @@ pub fn decomposer() -> Graph {
     })
 }
 
-/// The same network with a head that tells paint from shadow, and one that tells the light.
+/// The same network with a head that separates paint from shadow, and one that predicts the light.
 #[must_use]
 pub fn decomposer_with_heads() -> Graph {
     build(Heads {
@@ -115,7 +115,7 @@ fn build(heads: Heads) -> Graph {
     net
 }
 
-/// From the coarsest features to what they say of the light, wherever in the picture they are.
+/// From the coarsest features to the light, independent of their place in the picture.
 fn light(net: &mut Graph, middle: Value) -> Value {
     let named = |layer: usize| format!("{LIGHT_PARAMETERS}{layer}");
     let value = net.pointwise(named(0), middle, LIGHT_HIDDEN);

@@ -1,4 +1,4 @@
-//! What can go wrong with weights and inference.
+//! Errors of weights and inference.
 
 use std::io;
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ pub enum NetError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: String,
     },
     /// A network that cannot be run, or cannot take such a picture.
@@ -34,7 +34,7 @@ pub enum NetError {
 }
 
 impl NetError {
-    /// That weights lack a parameter.
+    /// Weights lack a parameter.
     #[must_use]
     pub fn missing(net: &str, name: &str) -> Self {
         Self::Weights(format!(

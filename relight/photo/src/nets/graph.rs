@@ -22,7 +22,7 @@ pub struct Parameter {
     pub name: String,
     /// Its shape; a weight's first number is the outputs.
     pub shape: Vec<usize>,
-    /// What it is for.
+    /// Its purpose.
     pub role: Role,
 }
 
@@ -148,7 +148,7 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// A network with one input picture of so many channels, and that input.
+    /// A network with one input picture, and that input.
     #[must_use]
     pub fn new(name: &'static str, channels: usize) -> (Self, Value) {
         let input = Node {

@@ -13,7 +13,7 @@ pub struct Tensor {
 }
 
 impl Tensor {
-    /// A tensor of these values; `None` where they are not as many as the shape says.
+    /// A tensor of these values; `None` if their number does not match the shape.
     #[must_use]
     pub fn new(shape: Vec<usize>, values: Vec<f32>) -> Option<Self> {
         let count = shape

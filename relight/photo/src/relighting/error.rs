@@ -50,7 +50,7 @@ pub enum InsertError {
     Object {
         /// Which, from 1.
         number: usize,
-        /// What is wrong.
+        /// The fault.
         fault: String,
     },
 }

@@ -22,7 +22,7 @@ impl ObjectGloss {
     }
 }
 
-/// What is to be another material than it was.
+/// Changes of the material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaterialChange {
     /// What the albedo is multiplied with.

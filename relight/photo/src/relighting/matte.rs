@@ -1,14 +1,14 @@
-//! How much of each pixel the object covers, and its colours freed of what lay behind it. Knows nothing of light.
+//! How much of each pixel the object covers, and its colours without the background's. Knows nothing of light.
 
 use super::smooth::{blurred, weighted_mean};
 use relight_core::image::{Extent, Planes};
 
-/// How far a matte may lie from the mask where colours say otherwise: on the mask's edge, and at the band's ends.
+/// How far a matte may differ from the mask if the colours contradict it: on the mask's edge, and at the band's ends.
 const GEOMETRY_DEVIATIONS: (f32, f32) = (0.25, 0.12);
 /// The deviation of colours that counts where they do not vary at all, as a part of them.
 const MIN_DEVIATION: f32 = 0.08;
-/// The most by which it may, whatever the colours say: a mask is rarely wrong by more than its edge is soft, and a bite out of the
-/// object is seen at once.
+/// The most by which it may differ, whatever the colours are: a mask is rarely wrong by more than the width of its soft edge,
+/// and a bite out of the object is visible at once.
 const MAX_FROM_MASK: f32 = 0.4;
 /// The weight of what lies near the edge, where nothing from further inside or outside is near.
 const EDGE_WEIGHT: f32 = 1e-3;

@@ -1,4 +1,4 @@
-//! An object at the size and the angle at which it stands in a picture: all that neither light nor its place changes.
+//! An object at its size and rotation in a picture: everything that does not depend on light or place.
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
@@ -69,7 +69,7 @@ impl LastPlaced {
         self.lock().clone()
     }
 
-    /// What is kept is always whole, whoever had the lock.
+    /// The kept value is always complete, whoever had the lock.
     fn lock(&self) -> MutexGuard<'_, Option<Arc<PlacedObject>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

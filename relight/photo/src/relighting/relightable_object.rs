@@ -1,4 +1,4 @@
-//! An object out of a photograph, decomposed so that it can be shown in another light.
+//! An object from a photograph, decomposed for relighting.
 
 use std::sync::Arc;
 

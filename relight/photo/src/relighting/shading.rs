@@ -1,4 +1,4 @@
-//! The shading of a photograph beside that of its light: relief, shadows, and what neither says.
+//! The shading of a photograph compared with that of its light: relief, shadows, and the uncertain rest.
 
 use relight_core::image::Planes;
 
@@ -52,7 +52,7 @@ fn kept_beside(seen: f32, paint: Option<f32>) -> f32 {
 pub(crate) struct Shading {
     /// The logarithm of the fine part of D.
     relief: Vec<f32>,
-    /// The logarithm of the coarse part of D: shadows, bounced light, and what order 2 cannot say.
+    /// The logarithm of the coarse part of D: shadows, bounced light, and what order 2 cannot represent.
     shadow: Vec<f32>,
     /// What the bounds of D leave of S.
     residual: Vec<f32>,
@@ -108,7 +108,7 @@ impl Shading {
         result
     }
 
-    /// The same of a photograph, which is believed in part, where it is `wanted`; `paint` is what of its darkness is expected to
+    /// The same for a photograph, with partial confidence, where it is `wanted`; `paint` is the part of its darkness expected to
     /// be paint, 0..=1.
     pub(crate) fn doubted(mut self, paint: Option<&Planes<1>>, wanted: &[bool]) -> Self {
         let kept = |(at, &seen)| kept_beside(seen, paint.map(|paint| paint.plane(0)[at]));

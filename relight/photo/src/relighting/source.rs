@@ -71,7 +71,7 @@ pub fn exposure_between(old: &ShLight, new: &ShLight) -> f32 {
 }
 
 /// How much two lights come from the same side, 0 to 1: 1 for lights of one shape, whatever their strength and
-/// colour, 0 for opposite ones. It says how far shadows that were found in the one are right in the other.
+/// colour, 0 for opposite ones. It is the part of the shadows in the one that hold in the other.
 ///
 /// With a and b the irradiance of bands 1 and 2, each over that of band 0, it is `1 - |a - b| / (|a| + |b|)`.
 #[must_use]

@@ -10,7 +10,7 @@ use relight_core::light::{Panorama, ShLight};
 const MADE: Extent = Extent::new(128, 64);
 /// What lies beside the picture is as coarse as this.
 const COARSE: Extent = Extent::new(12, 8);
-/// Values from which on a picture is clipped: windows, lamps and the sky are brighter than it can say.
+/// Values from which on a picture is clipped: windows, lamps and the sky are brighter than it can show.
 const CLIPPED: f32 = 0.92;
 /// How many times as strong as the mean of all else the sun lights what faces it.
 const SUN: f64 = 4.0;

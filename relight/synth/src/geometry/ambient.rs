@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::{GBuffer, Occluder};
 use crate::random::{mix, stream, unit_of};
 
-/// Farthest thing that counts as in the way; the object is about 2 large.
+/// Farthest distance at which something blocks; the object is about 2 large.
 const REACH: f32 = 4.0;
 
 impl GBuffer {

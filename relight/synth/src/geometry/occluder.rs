@@ -1,4 +1,4 @@
-//! What stands in the way of light.
+//! What blocks light.
 
 use std::time::Duration;
 

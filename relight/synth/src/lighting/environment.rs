@@ -233,7 +233,7 @@ impl<'a> Sky<'a> {
         }
     }
 
-    /// Adds the panorama's light. Without an occluder nothing is in the way but the horizon.
+    /// Adds the panorama's light. Without an occluder only the horizon blocks it.
     pub(super) fn light(
         &self,
         buffer: &GBuffer,

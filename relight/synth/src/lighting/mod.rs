@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | `lamp` | one lamp: its rays, its shadows |
 //! | `environment` | light from all around: by order-2 coefficients, or by rays |
-//! | `shaded` | what light makes of a surface; each kind of light is added by itself |
+//! | `shaded` | shading and highlight of a surface; each kind of light is added separately |
 //! | `scene` | a buffer with what blocks its light; whole lightings |
 //! | `draw` | random lightings |
 

@@ -1,4 +1,4 @@
-//! What light makes of a surface: shading and highlight.
+//! Shading and highlight of a surface in a light.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

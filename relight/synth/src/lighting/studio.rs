@@ -1,4 +1,4 @@
-//! Panoramas out of nothing but a seed: a studio with soft boxes, a room with a window, a sky, even
+//! Panoramas from a seed: a studio with soft boxes, a room with a window, a sky, even
 //! light. Knows directions only.
 
 use glam::Vec3;

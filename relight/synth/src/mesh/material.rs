@@ -1,4 +1,4 @@
-//! What a mesh's own file says of its surface: colours, pictures of them, roughness and metal, as in glTF 2.0. Knows nothing of
+//! The surface from a mesh's own file: colours, pictures of them, roughness and metal, as in glTF 2.0. Knows nothing of
 //! light.
 
 use std::collections::BTreeSet;
@@ -103,7 +103,7 @@ impl MeshMaterials {
         self.of_triangle.iter().map(|&one| one as usize).collect()
     }
 
-    /// Whether they say more than one colour for all, as programs write for an object that has none.
+    /// Whether they have more than one colour for all, which programs write for an object without colours.
     pub(crate) fn tell_anything(&self) -> bool {
         let used = self.used();
         let mut used = used.iter().filter_map(|&one| self.all.get(one));

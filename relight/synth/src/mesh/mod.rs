@@ -1,5 +1,5 @@
 //! Triangle meshes with a normal for each corner. Knows nothing of cameras or light; `obj` and
-//! `gltf` read files, `material` is what they say of the surface, and `mtl` reads it for `obj`.
+//! `gltf` read files, `material` is their surface, and `mtl` reads it for `obj`.
 
 mod beside;
 mod gltf;
@@ -43,7 +43,7 @@ pub struct Mesh {
     /// As in [`RawMesh::colours`].
     colours: Vec<[Vec3; 3]>,
     materials: Option<MeshMaterials>,
-    /// What the mesh's file names and is not used, as its pictures where they are not there: each in words of its own.
+    /// Parts of the mesh's file that are not used, such as missing pictures: each in words.
     pub left_out: Vec<String>,
 }
 
@@ -98,13 +98,13 @@ impl Mesh {
         })
     }
 
-    /// Whether the mesh's file says how it looks.
+    /// Whether the mesh's file has materials.
     #[must_use]
     pub fn has_own_surface(&self) -> bool {
         self.materials.is_some()
     }
 
-    /// The look of a triangle at weights of its corners, where the mesh's file says one.
+    /// The look of a triangle at weights of its corners, if the mesh's file has one.
     pub(super) fn own_surface(&self, triangle: usize, weights: [f32; 3]) -> Option<OwnSurface> {
         let materials = self.materials.as_ref()?;
         let corners = self.texture.get(triangle);
@@ -117,7 +117,7 @@ impl Mesh {
         Some(materials.at(triangle, place, paint))
     }
 
-    /// The digest of all that the mesh's pictures follow from.
+    /// The digest of everything that determines the mesh's pictures.
     pub(super) fn digest(&self) -> Digest {
         let mut bytes = Vec::new();
         let mut add = |values: &[f32]| bytes.extend(values.iter().flat_map(|x| x.to_le_bytes()));
@@ -185,7 +185,7 @@ impl RawMesh {
     /// What the bytes of a file hold, by its extension.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// The fault, in words.
     pub(crate) fn parsed(path: &Path, bytes: &[u8]) -> Result<Self, String> {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         match extension.to_str() {

@@ -124,7 +124,7 @@ fn option(text: &str) -> Option<(&'static str, usize)> {
     options.find(|(name, _)| name.eq_ignore_ascii_case(word))
 }
 
-/// Whether at most so many numbers follow an option; else so many words.
+/// Whether the values of an option are numbers; else they are words.
 fn takes_numbers(option: &str) -> bool {
     ["-bm", "-boost", "-mm", "-o", "-s", "-t", "-texres"].contains(&option)
 }

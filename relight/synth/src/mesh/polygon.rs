@@ -3,7 +3,7 @@
 use earcut::Earcut;
 use glam::{DVec3, Vec3};
 
-/// Part of a polygon's squared area by which a triangle may face the other way and still be flat, as rounding makes it.
+/// Part of a polygon's squared area by which a triangle may face backwards by rounding and still be flat.
 const FLAT: f64 = 1e-9;
 
 /// Cuts polygons into triangles. Kept for many of them, as it keeps its memory.
@@ -69,7 +69,7 @@ fn normal(corners: &[Vec3]) -> DVec3 {
         .sum()
 }
 
-/// The axis along which a direction is longest; none of a direction without a finite length.
+/// The longest axis of a direction; `None` for one without a finite length.
 fn dominant(direction: DVec3) -> Option<usize> {
     let length = direction.length_squared();
     (length.is_finite() && length > 0.0).then(|| direction.abs().max_position())

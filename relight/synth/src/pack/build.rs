@@ -38,7 +38,7 @@ pub struct LibrarySources {
     pub panoramas: Vec<PathBuf>,
 }
 
-/// What a library holds, and what it does not.
+/// The contents of a library, and what was left out.
 #[derive(Debug, Clone, Default)]
 pub struct LibrarySummary {
     /// Its objects.

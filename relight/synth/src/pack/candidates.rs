@@ -19,14 +19,14 @@ const FURNITURE: &str = "sh3f";
 pub(super) struct Candidate {
     pub(super) path: PathBuf,
     pub(super) entry: LibraryEntry,
-    /// Whether its catalogue says that it belongs into a wall.
+    /// Whether its catalogue places it in a wall.
     pub(super) is_door_or_window: bool,
-    /// Why it is not to be learned from, where its folder says so.
+    /// Why it is excluded from training, if its folder says so.
     pub(super) leave_out: Option<String>,
     pub(super) rotation: Mat3,
 }
 
-/// Objects, and the archives from which they were unpacked: files are there as long as these are.
+/// Objects, and the archives from which they were unpacked: the files exist as long as these.
 #[derive(Default)]
 pub(super) struct Candidates {
     pub(super) all: Vec<Candidate>,

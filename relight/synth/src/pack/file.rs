@@ -47,7 +47,7 @@ pub(super) struct PackedEntry<T> {
     pub(super) content: T,
 }
 
-/// What is drawn from of a packed library.
+/// The part of a packed library to draw from.
 #[derive(Debug, Default)]
 pub(crate) struct Contents {
     pub(crate) meshes: Vec<(String, Mesh)>,
@@ -212,7 +212,7 @@ fn meshes(archive: &Archive<'_>, catalogue: &Catalogue) -> Result<Vec<(String, M
         .collect()
 }
 
-/// A zip archive in memory, whose parts are read side by side.
+/// A zip archive in memory, whose parts are read in parallel.
 struct Archive<'a>(ZipArchive<Cursor<&'a [u8]>>);
 
 impl<'a> Archive<'a> {

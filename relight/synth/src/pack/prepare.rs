@@ -24,7 +24,7 @@ const MAX_CUT_OUT: f32 = 0.05;
 /// Directions in which an object's thickness is measured: the normals of its largest triangles.
 const DIRECTIONS: usize = 48;
 
-/// Words at the end of a title that say that an object belongs to a room.
+/// Words at the end of a title of objects that belong to a building.
 const OF_ROOMS: [&str; 10] = [
     "wall", "walls", "window", "windows", "door", "doors", "floor", "ceiling", "roof", "plane",
 ];
@@ -150,7 +150,7 @@ fn is_part_of_room(candidate: &Candidate) -> bool {
         || OF_ROOMS.contains(&last)
 }
 
-/// The mesh with vertices joined, without triangles that have no area, or that are there twice.
+/// The mesh with vertices joined, without triangles of no area and duplicates.
 fn repaired(mut raw: RawMesh) -> Result<RawMesh, String> {
     let is_finite = |place: &Vec3| place.is_finite();
     if raw.positions.iter().all(is_finite) {

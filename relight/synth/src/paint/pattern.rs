@@ -195,7 +195,7 @@ impl Pattern {
         }
     }
 
-    /// Lays the pattern in a colour over what is there.
+    /// Lays the pattern over the paint in a colour.
     pub(super) fn paint(
         &self,
         colour: Vec3,

@@ -19,7 +19,7 @@ pub(crate) struct CameraModel {
     pub response: Response,
     /// Standard deviation of the noise that does not depend on light, as a part of the clipping level.
     pub read_noise: f32,
-    /// That of the noise of light itself, at the clipping level; it falls with the light's root.
+    /// Standard deviation of shot noise at the clipping level; it falls with the light's root.
     pub shot_noise: f32,
     /// Quality of the JPEG compression, 1..=100; `None` without compression.
     pub jpeg: Option<u8>,

@@ -71,7 +71,7 @@ impl Finish {
         }
     }
 
-    /// What the mesh's own file says, one gloss for all of the surface.
+    /// From the mesh's own file, one gloss for the whole surface.
     fn own(surface: &[OwnSurface]) -> Self {
         let albedo: Vec3 = surface.iter().map(own_albedo).sum();
         Self {
@@ -125,7 +125,7 @@ impl BlinnPhong {
         }
     }
 
-    /// The highlights of a surface whose file says how rough it is; none of a dull one. The exponent is 2 / roughness^4 - 2
+    /// The highlights of a surface whose file states its roughness; `None` for a dull one. The exponent is 2 / roughness^4 - 2
     /// (Karis 2013, "Specular BRDF Reference"), and as much brighter as it gathers light, (exponent + 8) / 8 (Hoffman 2013,
     /// "Background: Physics and Math of Shading").
     fn from_surface(surface: &[OwnSurface]) -> Option<Self> {

@@ -16,7 +16,7 @@ use crate::library::Library;
 
 /// The description of a folder of samples.
 const FILE: &str = "synth.json";
-/// What it says it is.
+/// Its schema.
 const SCHEMA: &str = "relight.synth/1";
 
 /// What a folder of samples was made of.
@@ -181,7 +181,7 @@ pub(crate) fn holds_samples(folder: &Path) -> bool {
     folder.join(FILE).exists()
 }
 
-/// Writes the description, or compares it with the one that is there.
+/// Writes the description, or compares it with the existing one.
 fn describe(folder: &Path, origin: &Origin) -> Result<(), SynthError> {
     let path = folder.join(FILE);
     let there = match fs::read(&path) {

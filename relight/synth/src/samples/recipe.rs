@@ -30,7 +30,7 @@ const DRAWS: usize = 4;
 /// How samples are made. The same recipe and library give the same samples.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Recipe {
-    /// What all is drawn from.
+    /// The seed of all draws.
     pub seed: u64,
     /// Width and height of the pictures, 16..=2048 pixels.
     pub size: u32,
@@ -44,7 +44,7 @@ pub struct Recipe {
     pub lightings: u32,
     /// Whether the camera is a random one; else it is the plain one.
     pub random_camera: bool,
-    /// Whether all objects whose file says how they look keep that; else half of them.
+    /// Whether all objects with materials keep them; else half of them.
     pub own_albedo: bool,
 }
 

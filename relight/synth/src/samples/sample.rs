@@ -20,7 +20,7 @@ use relight_core::light::{Order, ShLight};
 pub(crate) struct Description {
     /// The sample's number.
     pub number: u64,
-    /// What it was drawn from.
+    /// The seed of its draws.
     pub seed: u64,
     /// The object.
     pub object: ObjectSource,
@@ -28,7 +28,7 @@ pub(crate) struct Description {
     pub pose: Pose,
     /// How it is seen.
     pub projection: Projection,
-    /// What it is made of.
+    /// The object's finish.
     pub finish: Finish,
     /// The name of the panorama that the lighting has.
     pub panorama: Option<String>,

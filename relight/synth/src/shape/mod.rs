@@ -19,7 +19,7 @@ use super::random::Random;
 pub enum ShapeKind {
     /// One to nine rounded primitives, blended into one another, with bumps, twists, shells, cuts.
     Blend,
-    /// A body of revolution: vases, cups with walls and handles, cylinders.
+    /// A solid of revolution: vases, cups with walls and handles, cylinders.
     Lathe,
     /// Boxes, piled or hollow: flat faces, sharp edges, dark insides.
     Boxes,

@@ -57,7 +57,7 @@ impl TransferCache {
         })
     }
 
-    /// The turn of a seed: the view of a number in a random material and room.
+    /// The turn of a seed: a view in a random material and environment light.
     ///
     /// # Errors
     /// [`SynthError`] if the view cannot be written.

@@ -1,4 +1,4 @@
-//! A view in a random material, room and camera: what a network of turns learns from.
+//! A view in a random material, environment light and camera, for training the network of turns.
 
 use std::f32::consts::TAU;
 
@@ -54,7 +54,7 @@ impl DrawnTurn {
     /// How turns are drawn: another number draws another turn of a seed.
     pub const RECIPE: u32 = 2;
 
-    /// The turn of a seed: the view in a random material and room.
+    /// The turn of a seed: the view in a random material and environment light.
     pub(super) fn draw(view: &RadianceTransfer, rooms: &Rooms, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let finish = finish(view, &mut random);
@@ -126,7 +126,7 @@ impl DrawnTurn {
         }
     }
 
-    /// What is left of the curves where the table's angle is not known well.
+    /// The curves with errors of the table's angle.
     fn mistime(&mut self, random: &mut Random) {
         let Some(timing) = TableTiming::draw(random) else {
             return;
@@ -136,7 +136,7 @@ impl DrawnTurn {
         }
     }
 
-    /// The mirror image, left and right: the table turns the other way then.
+    /// The left-right mirror image, in which the table turns the other way.
     fn mirror(&mut self) {
         let mut order: Vec<usize> = (0..self.pixels.len()).collect();
         let size = self.size;

@@ -45,7 +45,7 @@ pub struct PhotoPlan {
     pub contrast: f32,
     /// The one colour of a surface that has only one; 0 where it has more.
     pub plain: [f32; 3],
-    /// What is printed on it.
+    /// The print on it.
     pub print: Option<PhotoPrint>,
     /// The lamps.
     pub lamps: Vec<PhotoLamp>,
@@ -103,7 +103,7 @@ pub struct PhotoCamera {
     pub taken_as_srgb: bool,
     /// Standard deviation of the noise that does not depend on light.
     pub read_noise: f32,
-    /// That of the noise of light itself, at the clipping level.
+    /// Standard deviation of shot noise at the clipping level.
     pub shot_noise: f32,
     /// Standard deviation of its blur, pixels.
     pub blur: f32,

@@ -31,7 +31,7 @@ const FAR: f32 = 1e3;
 /// How views for photographs are drawn and cast. The same recipe and library give the same views.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PhotoViewRecipe {
-    /// What all is drawn from.
+    /// The seed of all draws.
     pub seed: u64,
     /// Width and height, pixels.
     pub size: u32,
@@ -132,7 +132,7 @@ fn view_lamp(lamp: &SyntheticLamp) -> ViewLamp {
     }
 }
 
-/// What a camera sees of an object, and what stands in the way of light.
+/// What a camera sees of an object, and what blocks light.
 pub(super) struct Seen {
     buffer: GBuffer,
     occluder: Occluder,

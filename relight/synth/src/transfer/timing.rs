@@ -22,7 +22,7 @@ const MAX_GAP: usize = 6;
 /// Ridge on the coefficients, as a part of the mean of the diagonal. Numerical.
 const RIDGE: f64 = 1e-6;
 
-/// What becomes of a curve where its angles are off: its coefficients by least squares over the frames that are there.
+/// A curve with errors of its angles: its coefficients by least squares over the existing frames.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct TableTiming {
     /// Row by row: what each true coefficient adds to each that is found.

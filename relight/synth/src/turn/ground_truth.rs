@@ -42,7 +42,7 @@ impl GroundTruthFolder {
         fs::write(&path, bytes).map_err(SynthError::write(&path))
     }
 
-    /// What all frames share.
+    /// Writes what all frames share.
     pub(super) fn write_object(&self, turn: &SimulatedTurn<'_>) -> Result<(), SynthError> {
         let (buffer, material) = (turn.scene.buffer(), &turn.material);
         self.write("turn.json", &turn.json())?;

@@ -37,7 +37,7 @@ pub(crate) use stand::{Stand, standing_object};
 
 pub use description::{FrameTruth, TurnDescription, TurnRecipe};
 
-/// Frames that are made side by side before they are written.
+/// Frames that are made in parallel before they are written.
 const BATCH: u32 = 32;
 
 /// Writes the turns 0 to `count - 1` into the data set in the folder `out`: shards in the format of

@@ -10,7 +10,7 @@ use crate::error::TrainError;
 pub struct Launch {
     /// Which process this is, and how many there are.
     pub rank: Rank,
-    /// Which process of its machine this is, where the launcher says it: the number of its GPU.
+    /// The process's number on its machine, if the launcher gives it: the number of its GPU.
     pub local: Option<usize>,
     /// The host name or address of process 0.
     pub address: String,

@@ -60,7 +60,7 @@ pub struct ProcessGroup {
 }
 
 impl ProcessGroup {
-    /// Meets the other processes; all of them are there when it returns.
+    /// Waits for the other processes; all have joined when it returns.
     ///
     /// # Errors
     /// [`TrainError::Refused`].
@@ -185,7 +185,7 @@ impl ProcessGroup {
     }
 }
 
-/// That a setting cannot be divided among the processes.
+/// A setting cannot be divided among the processes.
 pub(crate) fn indivisible(name: &str, value: u64, rank: Rank, needed: &str) -> TrainError {
     let of = rank.world_size();
     TrainError::Refused(format!("{name} is {value}: {of} processes need {needed}"))

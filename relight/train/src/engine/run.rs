@@ -28,7 +28,7 @@ use relight_photo::nets::WeightPrecision;
 /// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.
 const SUCCESSION: Duration = Duration::from_secs(3);
 
-/// What a run says while it goes on.
+/// Events of a run.
 pub trait TrainObserver {
     /// A step was made. `losses` have their weights.
     fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>);
@@ -75,7 +75,7 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Begins a run in a folder, or goes on with the one that is there (`resume`); among the processes of a group, all of
+    /// Begins a run in a folder, or resumes the existing one (`resume`); among the processes of a group, all of
     /// which open it with the same arguments.
     ///
     /// # Errors
@@ -372,7 +372,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// What has to be the same in all processes.
+/// Facts that have to be equal in all processes.
 fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
     let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
     let weights = fingerprint(task.learner().model.parameters())?;

@@ -1,4 +1,4 @@
-//! What a run trains, on what, and what it hears of it: the losses of a step, the figures of a validation.
+//! A training task: the networks, the data, the losses of a step, and the figures of a validation.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -28,13 +28,13 @@ pub trait TrainingTask {
     /// Its name, as on the command line.
     fn name(&self) -> &'static str;
 
-    /// The settings that make the run what it is, as TOML.
+    /// The settings that determine the run, as TOML.
     fn settings(&self) -> String;
 
     /// The first setting that another run's settings have otherwise.
     fn differing_setting(&self, other: &str) -> Option<String>;
 
-    /// What it was given beside its settings and what learns, as text that is the same where that is.
+    /// A text that identifies the inputs, apart from the settings and the trained weights.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
@@ -48,7 +48,7 @@ pub trait TrainingTask {
     /// [`TrainError::Refused`] if the settings leave no equal parts.
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
 
-    /// What of a user's own files it does not use.
+    /// Unused files of the user.
     fn left_out(&self) -> &[LeftOut] {
         &[]
     }
@@ -77,7 +77,7 @@ pub trait TrainingTask {
     /// Goes on from such a cursor.
     ///
     /// # Errors
-    /// A sentence that says why it cannot.
+    /// A sentence with the reason.
     fn go_to(&mut self, _place: &str) -> Result<(), String> {
         Ok(())
     }

@@ -74,7 +74,7 @@ impl LossTerms {
         self.0.iter().map(mean).collect()
     }
 
-    /// The weighted sum, in which each loss counts the part that `parts` says: 1 for all of it. `None` if there is
+    /// The weighted sum, with each loss scaled by its entry of `parts`: 1 for all of it. `None` if there is
     /// nothing.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use crate::error::TrainError;
 const MAX_SAMPLES: u64 = 1_000_000;
 const MAX_SIZE: u32 = 1024;
 
-/// Of what photographs are made: the table `[data]`.
+/// The data of photographs: the table `[data]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DataSettings {

@@ -20,7 +20,7 @@ pub struct TransferSettings {
     /// The folder in which views are kept; runs can share it. Default: `views` in the folder of the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub view_folder: Option<PathBuf>,
-    /// Views that are there from the first step on.
+    /// Views that exist from the first step on.
     pub first_views: u64,
     /// Views that join at each step, until all have.
     pub new_views: u64,

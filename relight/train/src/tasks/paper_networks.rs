@@ -1,4 +1,4 @@
-//! The networks of the paper's phases: which one a phase trains, which ones it is given, and what it descends on them.
+//! The networks of the paper's phases: the one that a phase trains, the given ones, and their losses.
 
 use std::iter;
 use std::path::PathBuf;

@@ -197,7 +197,7 @@ pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Trut
     })
 }
 
-/// Scale-invariant error of the shading that Light-Net's light makes of the true normals of composed samples.
+/// Scale-invariant error of the shading by Light-Net's light on the true normals of composed samples.
 ///
 /// # Errors
 /// [`TrainError::Torch`].

@@ -24,7 +24,7 @@ const ALBEDO: f64 = 0.5;
 const LOG_CHORD: (f64, f64) = (-4.0, 1.0);
 /// Turns of a batch of validation.
 const VALIDATION_BATCH: usize = 8;
-/// Expected errors at which validation says how many pixels keep them, degrees.
+/// Expected errors for which validation counts the pixels within them, degrees.
 const WITHIN_DEG: [(f64, &str); 2] = [(10.0, "within_10"), (20.0, "within_20")];
 
 /// Training of the network of whole turns.

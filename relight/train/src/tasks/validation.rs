@@ -1,4 +1,4 @@
-//! What networks are judged by while they train: turns and composed samples on which none of them trains.
+//! Validation during training: on turns and composed samples that no network trains on.
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -19,9 +19,9 @@ const TURN_BATCHES: usize = 4;
 const SAMPLE_BATCH: usize = 16;
 /// Part of the pictures whose values are read as sRGB, whatever the camera's response.
 const TAKEN_AS_SRGB: f64 = 0.10;
-/// Part of the pictures that a plain camera takes (sRGB, no noise, no compression); the others are taken as the recipe says.
+/// Part of the pictures that a plain camera takes (sRGB, no noise, no compression); the others follow the recipe.
 const PLAIN: f64 = 0.5;
-/// A highlight is there from this part of white on.
+/// The least part of white that counts as a highlight.
 const SEEN_HIGHLIGHT: f64 = 0.05;
 
 /// Figures by name, each a mean over what was looked at.

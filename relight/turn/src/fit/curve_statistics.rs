@@ -86,7 +86,7 @@ struct Projection {
 }
 
 impl Projection {
-    /// The albedo that is shrunk toward another one, by this much beside what the curve says.
+    /// The albedo, shrunk toward another one with this weight relative to the curve.
     fn shrunk(self, to: f64, by: f64) -> f64 {
         if self.own + by > 1e-12 {
             ((self.along + by * to) / (self.own + by)).max(0.0)

@@ -131,7 +131,7 @@ mod tests {
         light
     }
 
-    /// What is seen beside the ball: above, an environment that moves past, and below, the table.
+    /// The surroundings of the ball in the picture: above, an environment that moves past; below, the table.
     fn behind(angle_deg: f64, x: usize, y: usize) -> [f32; 3] {
         if y > 50 {
             return [0.5, 0.45, 0.4];

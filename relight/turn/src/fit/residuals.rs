@@ -17,8 +17,8 @@ const WIDTH: f64 = 2.0;
 /// Least standard deviation, in parts of the pixel's mean light. By hand.
 const MIN_DEVIATION: f64 = 0.01;
 
-/// The light by which what is left of a pixel is measured: the model's mean over the turn, or a tenth of what is
-/// seen where that is more.
+/// The unit of a pixel's residual: the model's mean over the turn, or a tenth of what is
+/// seen, if that is more.
 fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, model: &ShadingModel) -> f64 {
     let harmonics = model.harmonics(fit.normal);
     let predicted: f64 = (0..3).map(|c| fit.albedo[c] * harmonics.base[c][0]).sum();

@@ -38,7 +38,7 @@ pub(crate) struct PixelFit {
     /// In the viewer's frame.
     pub(crate) normal: [f64; 3],
     pub(crate) albedo: [f64; 3],
-    /// What is left of the curve, over the energy of its variation.
+    /// The residual of the curve, over the energy of its variation.
     pub(crate) residual: f64,
 }
 

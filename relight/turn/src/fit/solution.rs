@@ -107,7 +107,7 @@ impl TurnSolution {
         self.model.material
     }
 
-    /// What is to be thought of the normals and the albedo.
+    /// The verdict on the normals and the albedo.
     #[must_use]
     pub const fn verdict(&self) -> TurnVerdict {
         self.conditioning.verdict

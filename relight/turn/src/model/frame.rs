@@ -17,14 +17,14 @@ const GIVEN_UNCERTAINTY_DEG: f64 = 1.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FactSource {
-    /// Nobody said: what is usual on this rig.
+    /// Unknown: the usual value of this rig.
     #[default]
     Assumed,
     /// The caller.
     Given,
     /// The session: it is known of the rig.
     Rig,
-    /// The network of turns, which is clearly surer of its normals this way.
+    /// The network of turns, whose expected errors are clearly smaller this way.
     Network,
 }
 

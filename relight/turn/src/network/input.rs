@@ -1,6 +1,6 @@
 //! The harmonics of a turn as the planes that the network of turns is given.
 //!
-//! Normals do not depend on a pixel's albedo, on the light's strength, or on which way the room is turned. So harmonics
+//! Normals do not depend on a pixel's albedo, on the light's strength, or on the rotation of the environment light. So harmonics
 //! are divided by the curve's mean, by their effective value over the object, and turned by the phase of the light, which
 //! is read from the curves themselves.
 
@@ -30,8 +30,8 @@ const DARK: f32 = 0.1;
 /// Largest logarithm of a mean beside that of all. By hand.
 const MAX_LOG: f32 = 3.0;
 
-/// Which way the room is taken to be turned. The phase of the first harmonic says it, where that is strong; in a room
-/// that is bright on two opposite sides that of the second says it, up to half a turn.
+/// The assumed rotation of the environment light. The phase of the first harmonic gives it, if that is strong; in an environment
+/// that is bright on two opposite sides, that of the second gives it, up to half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PhaseHypothesis {
@@ -216,7 +216,7 @@ impl Ratios {
         }
     }
 
-    /// The harmonics as they are where the room is turned back by this phase.
+    /// The harmonics with the environment light rotated back by this phase.
     fn turned(&self, phase: f32) -> Vec<Vec<Harmonic>> {
         let harmonics = self.harmonics.iter().enumerate();
         harmonics

@@ -82,7 +82,7 @@ impl MirrorPanorama {
         row * COLUMNS + column
     }
 
-    /// What it shows, as coefficients; directions that it never shows are as bright as their row, or as all.
+    /// Its coefficients; directions that it never shows are as bright as their row, or as all.
     pub(crate) fn light(&self) -> Result<ShLight, TurnError> {
         let all = self.all().ok_or(TurnError::NoLight)?;
         let order = Order::GLOSS;

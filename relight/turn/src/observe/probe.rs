@@ -28,7 +28,7 @@ pub enum ProbeBall {
 pub(crate) struct Probe {
     /// Where it is.
     pub(crate) place: ProbePlace,
-    /// What it is made of; what it looks like where that is not known.
+    /// Its material; by default as it looks.
     pub(crate) ball: Option<ProbeBall>,
     /// The camera over the table.
     pub(crate) elevation: Elevation,
@@ -80,7 +80,7 @@ impl ProbeBuilder {
     /// The curves of the square.
     ///
     /// # Errors
-    /// If the frames tell too little.
+    /// If the frames show too little.
     pub(crate) fn curves(self) -> Result<TurnCurves, TurnError> {
         let nothing = || TurnError::Refused(NOTHING.to_owned());
         self.builder.ok_or_else(nothing)?.finish()

@@ -21,7 +21,7 @@ use crate::observe::curves::{CurveBuilder, NOTHING, TurnCurves};
 /// Frames that are drawn at a time. By convention of the shards: twelve neighbours cover the whole turn.
 const BATCH: u32 = 12;
 
-/// Which way the table turns, and what says so.
+/// The rotation direction, and its source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct TableRotation {
     /// Seen from above, as the table's angle grows.
@@ -30,7 +30,7 @@ pub struct TableRotation {
     pub source: FactSource,
 }
 
-/// What the records of a shard say of the video that it was made from.
+/// The video that a shard was made from, by its records.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct TurnOrigin {
     /// The session's id.
@@ -58,7 +58,7 @@ pub struct ReadTurn {
     pub mask: Planes<1>,
     /// Whether frames have their angles; else they are assumed to be evenly spread over one turn.
     pub has_angles: bool,
-    /// What is wrong with frames that are left out.
+    /// The faults of frames that are left out.
     pub damage: Vec<String>,
 }
 

@@ -29,7 +29,7 @@ impl TurnVerdict {
         matches!(self, Self::Good | Self::NotLambertian | Self::Uncertain)
     }
 
-    /// What to do where the camera's exposure makes the turn worthless.
+    /// What to do if the camera's exposure makes the turn useless.
     pub(crate) const fn exposure_advice(self) -> Option<&'static str> {
         match self {
             Self::Overexposed | Self::Underexposed => self.advice(),

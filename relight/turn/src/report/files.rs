@@ -1,4 +1,4 @@
-//! What is written of a turn: a folder that appears when it is whole.
+//! The files of a turn: a folder that appears when it is complete.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use crate::solving::SolvedTurn;
 
 /// The file of figures.
 const FIGURES: &str = "turn.json";
-/// What is written beside the figures.
+/// What is written besides the figures.
 const FILES: [&str; 8] = [
     "normal.png",
     "albedo.png",
@@ -32,10 +32,10 @@ const RESULTS: ResultFolder = ResultFolder {
     holds: |name| name == FIGURES || FILES.contains(&name),
 };
 
-/// What it says it is.
+/// Its schema.
 const SCHEMA: &str = "relight.solved_turn/1";
 
-/// A solved turn with all that is written of it.
+/// A solved turn with all its files.
 #[derive(Debug, Clone, Copy)]
 pub struct TurnFiles<'a> {
     /// What was read and found.

@@ -72,7 +72,7 @@ struct ObjectArguments {
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         let count = self.photos.len();
         let object = &self.object;

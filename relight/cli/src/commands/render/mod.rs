@@ -96,7 +96,7 @@ enum Exposure {
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         match &self.result {
             RenderedResult::Image(arguments) => {
@@ -112,7 +112,7 @@ impl Arguments {
     }
 }
 
-/// What is wrong with the name of what is written.
+/// The fault of the output's name, if there is one.
 fn output_fault(output: &Path, rotates: bool) -> Option<String> {
     let is_folder = output.extension().is_none();
     let wanted = match OutputKind::from_path(output) {

@@ -133,7 +133,7 @@ impl ObjectArguments {
     }
 }
 
-/// Whether no value is negative or not finite.
+/// Whether all values are finite and not negative.
 fn check_values(path: &Path, what: &'static str, planes: &Planes<3>) -> Result<(), ImageError> {
     let mut values = planes.planes().into_iter().flatten();
     if values.all(|value| value.is_finite() && *value >= 0.0) {

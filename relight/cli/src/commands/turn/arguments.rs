@@ -75,7 +75,7 @@ struct LightBall {
 }
 
 impl Arguments {
-    /// What is known of the turn beforehand.
+    /// What is known about the turn beforehand.
     pub(super) fn options(&self) -> Result<TurnOptions<'_>, Box<dyn Error>> {
         let light = match (&self.light, self.light_ball) {
             (Some(path), _) => TurnLight::Given(read_given_light(path)?),

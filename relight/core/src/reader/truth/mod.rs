@@ -13,7 +13,7 @@ use layout::Entry;
 pub use layout::TruthLayout;
 
 /// An image and its ground truth. A data set has some of these parts and lacks others;
-/// all that are there have the size of the mask.
+/// all maps have the size of the mask.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruthSample {
     /// Its name within the set; parts of it are separated by `/`.

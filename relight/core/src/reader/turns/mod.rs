@@ -36,7 +36,7 @@ impl Turns {
     /// Opens
     ///
     /// - a shard, `*.tar`, by the rule of WebDataset with members `png`, `mask.png` and `json`;
-    /// - a folder that `relit-extract` has written, in either layout: `dataset.json` tells what
+    /// - a folder that `relit-extract` has written, in either layout: `dataset.json` states what
     ///   should be there;
     /// - a folder of shards;
     /// - a folder in the layout of the paper's released data set: `imgs/<video>/<k>.png` (or `.jpg`)

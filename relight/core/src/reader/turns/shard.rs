@@ -71,7 +71,7 @@ impl ShardTurn {
         u32::try_from(self.slots.len()).unwrap_or(u32::MAX)
     }
 
-    /// Why none of its samples is there, where that is so: it may be no shard at all.
+    /// Why no sample was found, if none was: the file may not be a shard.
     pub(super) fn whole_loss(&self) -> Option<&str> {
         let mut losses = self.slots.iter().map(|slot| match slot {
             Slot::At(_) => None,

@@ -108,7 +108,7 @@ impl<'a> File<'a> {
     }
 }
 
-/// That an extension is needed and not read.
+/// An extension is required and not supported.
 pub(super) fn not_read(extension: &str) -> String {
     format!("it needs the glTF extension {extension}, which is not supported: save it without")
 }

@@ -36,7 +36,7 @@ pub(super) fn read(
 /// The pictures of a file's materials, each read once.
 struct Pictures<'a> {
     file: &'a File<'a>,
-    /// By number and what its values are; none of those that cannot be used.
+    /// By number and type of values; `None` for those that cannot be used.
     read: HashMap<(usize, PictureKind), Option<Arc<TextureImage>>>,
     left_out: &'a mut Vec<String>,
 }

@@ -1,5 +1,5 @@
 //! glTF 2.0 files: JSON with its buffers in files or inside, or one binary file. Positions, texture coordinates and colours
-//! of triangles are read, placed as the scene's nodes say, and their materials with pictures.
+//! of triangles are read, placed by the scene's nodes, and their materials with pictures.
 //!
 //! Read here and not by a library: the one that is maintained refuses valid files for what is not needed of them, and ends the
 //! program at some that are not.
@@ -102,7 +102,7 @@ impl Reader<'_> {
         self.push(primitive, first, &triangles)
     }
 
-    /// Adds triangles of vertices from `first` on, with what the part says of their corners.
+    /// Adds triangles of vertices from `first` on, with the part's attributes of their corners.
     fn push(&mut self, part: &Primitive, first: u32, triangles: &[[u32; 3]]) -> Result<(), String> {
         let count = self.raw.triangles.len() + triangles.len();
         if count > MAX_TRIANGLES {

@@ -18,7 +18,7 @@ use super::raw::{RawMesh, RawTriangle};
 use super::text::{Statements, decoded, keyword, readings, without_comment};
 use crate::texture::{PictureKind, TextureImage};
 
-/// Names of materials by which programs say that there is none.
+/// Names that programs give to a missing material.
 const NO_MATERIAL: [&str; 3] = ["", "none", "(null)"];
 
 /// Most files of materials that one statement may be read as.
@@ -398,7 +398,7 @@ fn split(mesh: &Path, named: &str) -> Vec<Result<PathBuf, String>> {
 /// The pictures of a file's materials, each read once.
 struct Pictures<'a> {
     path: &'a Path,
-    /// By name; none of those that cannot be used.
+    /// By name; `None` for those that cannot be used.
     read: HashMap<String, Option<Arc<TextureImage>>>,
 }
 

@@ -127,7 +127,7 @@ impl CurveBuilder {
     /// The curves of all frames.
     ///
     /// # Errors
-    /// If the frames do not tell two harmonics.
+    /// If the frames do not determine two harmonics.
     pub(crate) fn finish(self) -> Result<TurnCurves, TurnError> {
         let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
         if seen.len() < MIN_PARTS {
