@@ -217,7 +217,7 @@ class TurnBatches(torch.utils.data.IterableDataset):
     def __iter__(self):
         worker = torch.utils.data.get_worker_info()
         count, number = (worker.num_workers, worker.id) if worker else (1, 0)
-        # Opened here, so that each worker has files of its own.
+        # Opened here, so that each worker has its own files.
         batches = _open(self._path, linear=self._linear).batches(
             self._batch,
             rank=self._rank * count + number,
@@ -228,7 +228,7 @@ class TurnBatches(torch.utils.data.IterableDataset):
         )
         state = self._cursor.state_dict()
         for batch in batches:
-            # The cursor is behind the batches of all workers: only the last one's is behind what a loop has had.
+            # The cursor is after the batches of all workers: only the last worker's is after all that the loop has got.
             if number == count - 1:
                 state = batch.cursor.state_dict()
             if batch.damaged:

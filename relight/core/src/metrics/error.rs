@@ -8,7 +8,7 @@ pub enum MetricError {
     #[error("{0}")]
     Incomparable(String),
     /// No pixel counts.
-    #[error("the mask is empty: there are no pixels to compare")]
+    #[error("the mask is empty: nothing to compare")]
     EmptyMask,
     /// The ground truth is zero wherever it counts.
     #[error("the ground truth is zero at every compared pixel: the relative error is undefined")]

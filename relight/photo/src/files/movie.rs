@@ -194,7 +194,7 @@ impl MovieWriter {
     /// called after each.
     ///
     /// # Errors
-    /// If a frame cannot be computed, the video cannot be written, or there are no frames.
+    /// If a frame cannot be computed, the video cannot be written, or `count` is 0.
     pub fn write_frames<E: From<MovieError> + Send>(
         path: &Path,
         (format, frames_per_second): (MovieFormat, u32),

@@ -64,12 +64,11 @@ fn light_source(arguments: &Arguments, solved: &SolvedTurn) -> Option<String> {
     given.or_else(|| measured.map(|measured| format!("probe, {}", measured.ball)))
 }
 
-/// How it came out.
+/// The result, in words.
 fn text(arguments: &Arguments, solved: &SolvedTurn, [reading, all]: [f64; 2]) -> String {
     format!(
         "{}: {} frames over {:.0} degrees in {reading:.1} s, {all:.1} s in total; normals expected within {:.0} degrees \
-         (median), \
-         light {}, material {}",
+         (median), light {}, material {}",
         arguments.folder.output.display(),
         solved.turn.curves.frames(),
         solved.turn.curves.coverage_deg(),
