@@ -4,7 +4,7 @@ import { Held } from "./held.js";
 
 /** The smallest module that needs SIMD. */
 const SIMD = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];
-const NO_WASM = "This browser cannot run relight: it needs WebAssembly with SIMD, which browsers have had since 2023.";
+const NO_WASM = "This browser cannot run relight: it lacks WebAssembly with SIMD. Use a browser from 2023 or later.";
 
 /** The engine, and the weights of its networks. */
 export const MODULE = "relight.wasm";
@@ -118,7 +118,7 @@ export class Engine extends EventTarget {
         const loss = lost.length > 0 ? ` These could not be opened again: ${lost.join(", ")}.` : "";
         this.dispatchEvent(new CustomEvent("restart", { detail: `The engine crashed and was started again (${fault}).${loss}` }));
       })
-      .catch((error) => this.dispatchEvent(new CustomEvent("restart", { detail: `The engine could not be started again: ${error.message}` })))
+      .catch((error) => this.dispatchEvent(new CustomEvent("restart", { detail: `The engine could not be restarted: ${error.message} Reload the page.` })))
       .finally(() => (this.#restarting = null));
   }
 

@@ -47,7 +47,7 @@ export async function copyOf(file) {
   try {
     return new File([await file.arrayBuffer()], file.name || "photo", { type: file.type });
   } catch {
-    throw new Error(`${file.name} cannot be read.`);
+    throw new Error(`${file.name} cannot be read: choose it again.`);
   }
 }
 

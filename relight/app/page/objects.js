@@ -126,7 +126,7 @@ export class Objects {
     if (photo !== this.#photo) return;
     this.#layersOf = layers || null;
     $("layers").replaceChildren(...(layers ? LAYERS.map((name, index) => this.#tile(layers, name, index)) : []));
-    $("layers-note").textContent = layers?.glossy ? "Much of it is overexposed: highlights were separated." : "";
+    $("layers-note").textContent = layers?.glossy ? "It is partly overexposed, so highlights were separated." : "";
   }
 
   #tile({ pictures }, name, index) {
