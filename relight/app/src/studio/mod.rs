@@ -164,7 +164,7 @@ impl Studio {
         let others = self.objects.0.keys().filter(|&&key| key != number).count();
         if others >= MAX_OBJECTS {
             return refused(format!(
-                "the scene already has {others} objects, the maximum: remove one first"
+                "a scene has at most {MAX_OBJECTS} objects: remove one first"
             ));
         }
         let answer = told(&object);
@@ -284,7 +284,7 @@ impl Studio {
         let (described, files) = SceneFiles::unpacked(archive)?;
         if described.objects.len() > MAX_OBJECTS {
             return refused(format!(
-                "the scene has too many objects: the maximum is {MAX_OBJECTS}"
+                "the scene has more objects than are possible: at most {MAX_OBJECTS}"
             ));
         }
         let background_name = described.background.to_string_lossy();
