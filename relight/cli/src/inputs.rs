@@ -1,4 +1,4 @@
-//! Options of how files and networks are to be read, which several verbs take.
+//! Options for reading files and networks, shared by several verbs.
 
 use std::path::PathBuf;
 
@@ -41,7 +41,7 @@ pub(crate) struct WeightsArgument {
 }
 
 impl WeightsArgument {
-    /// The weights, or else the shipped ones, and how they are named.
+    /// The weights, or else the built-in ones, and their name.
     pub(crate) fn read_or(
         &self,
         shipped: fn() -> Result<Weights, NetError>,

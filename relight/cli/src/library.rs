@@ -1,4 +1,4 @@
-//! Options and the library of the verbs that make objects: what a user brings.
+//! Options and the library of the verbs that make objects: the user's own files.
 
 use std::path::PathBuf;
 

@@ -52,7 +52,7 @@ impl LightArguments {
         self.light.is_none() && self.lamp.is_none()
     }
 
-    /// The light that is given, before it is rotated.
+    /// The given light, before its rotation.
     pub(crate) fn read(&self) -> Result<Option<LightSource>, InsertError> {
         match (&self.lamp, &self.light) {
             (Some(lamp), _) => Ok(Some(LightSource::Lamp(lamp.disc))),

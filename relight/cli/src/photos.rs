@@ -1,4 +1,4 @@
-//! Options of photographs that are decomposed, and of the files that they come from, which several verbs take.
+//! Options for photographs and their files, shared by several verbs.
 
 use std::path::{Path, PathBuf};
 

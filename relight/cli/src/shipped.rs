@@ -20,7 +20,7 @@ pub(crate) fn turn_weights() -> Result<Weights, NetError> {
     read("relight/cli/weights/turn.safetensors", bytes)
 }
 
-/// Weights by the place where they stand in the repository.
+/// Weights by their path in the repository.
 fn read(path: &str, bytes: &[u8]) -> Result<Weights, NetError> {
     Weights::from_bytes(bytes).map_err(|fault| NetError::File {
         path: path.into(),

@@ -118,7 +118,7 @@ fn direction_score(
     })
 }
 
-/// Where most of the light comes from: its band 1, the mean of the channels. None of even light.
+/// The main direction of the light: its band 1, averaged over the channels. `None` for even light.
 fn direction(light: &ShLight) -> Option<Direction> {
     let [y, z, x] = [1, 2, 3].map(|at: usize| light.coefficients()[at].iter().sum::<f64>());
     Direction::new(x, y, z)

@@ -10,7 +10,7 @@ use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
 use relight_core::light::{LightError, Normals, NormalsFrame, ShLight, YDown, YUp};
 use relit_data::text;
 
-/// A folder with a folder for each image of the ground truth, of the same name, in which the estimates lie:
+/// A folder with a folder of estimates for each image of the ground truth, of the same name:
 /// `albedo`, `shading`, `highlight` (or `specular`), `normal` as `.exr` (linear, or vectors) or `.png` (8 or 16
 /// bits), `light.txt` as lines of red, green and blue coefficients. Estimates that are a whole number of times larger than
 /// the ground truth are brought to its size, each pixel the mean of those that it covers.
@@ -20,7 +20,7 @@ pub struct Predictions {
     frame: NormalsFrame,
 }
 
-/// What `relight decompose` writes beside its layers.
+/// The file that `relight decompose` writes besides its layers.
 const DESCRIPTION: &str = "decomposition.json";
 /// Its schema.
 const SCHEMA: &str = "relight.decomposition/1";

@@ -18,12 +18,12 @@ use serde::Serialize;
 use super::predictions::{NO_SET, read_light};
 use super::{EvalError, EvalProgress};
 
-/// Errors up to which it is counted how many pixels keep what is expected of them, degrees.
+/// Expected errors for which the pixels within them are counted, degrees.
 const LIMITS_DEG: [f64; 3] = [10.0, 20.0, 30.0];
 /// Azimuths that are tried for the turn about the table's axis, degrees to each side.
 const AZIMUTHS_DEG: i32 = 90;
 
-/// The ways in which turns are solved, as the table names them, and whether the solver is given the true light.
+/// The methods for turns, as named in the table, and whether they get the true light.
 const METHODS: [(&str, bool); 2] = [("light unknown", false), ("light known", true)];
 
 /// The errors of a turn by a method.

@@ -1,4 +1,4 @@
-//! Pictures that Python gives, as paths or arrays, and arrays that it gets.
+//! Pictures from Python, as paths or arrays, and arrays for it.
 
 use std::fs;
 use std::path::{Path, PathBuf};

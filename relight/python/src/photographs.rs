@@ -303,7 +303,7 @@ pub(crate) fn insert<'py>(
     Ok((picture.into_python(py)?, notes))
 }
 
-/// What an object is made of: a photograph, or a captured object's file.
+/// The source of an object: a photograph, or a captured object's file.
 fn inserted(photograph: Photograph) -> Result<InsertSource, Failure> {
     match &photograph.picture {
         Picture::File(path) if CapturedObject::is_named(path) => {

@@ -15,7 +15,7 @@ use crate::arrays::{Array, to_planes};
 use crate::failure::{Failure, choice, unlocked};
 use crate::light::GivenLight;
 
-/// Reflectance and smoothness as Python gives them.
+/// Reflectance and smoothness from Python.
 type GivenGloss<'py> = (PyReadonlyArray3<'py, f32>, PyReadonlyArray2<'py, f32>);
 
 /// An object that is given by its maps under a light: a picture for each angle by which it has turned, degrees. Without an

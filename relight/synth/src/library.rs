@@ -30,7 +30,7 @@ const VARIANTS: u64 = 4;
 /// Meshes, pictures and panoramas to draw from.
 #[derive(Debug, Clone, Default)]
 pub struct Library {
-    /// By file name, with the folders in which it lies; none: all objects are procedural.
+    /// By file name, with its folders; empty: all objects are procedural.
     pub meshes: Vec<(String, Mesh)>,
     /// Textures, and panoramas as textures.
     pub(crate) pictures: Vec<TextureImage>,
@@ -64,7 +64,7 @@ pub struct Folders {
     pub meshes: Option<PathBuf>,
     /// `.png`, `.jpg`, `.webp`, `.tif` and `.bmp`; sRGB by default.
     pub textures: Option<PathBuf>,
-    /// `.hdr` and `.exr`; none: those that are made here.
+    /// `.hdr` and `.exr`; `None`: the synthetic ones.
     pub panoramas: Option<PathBuf>,
 }
 
@@ -141,7 +141,7 @@ impl Library {
         })
     }
 
-    /// The part of packed libraries that may be learned from. What comes from folders is in both parts.
+    /// The training part of packed libraries. Files of folders are in both parts.
     ///
     /// # Errors
     /// If no panorama is left.
@@ -302,7 +302,7 @@ const OTHER_MESHES: [&str; 35] = [
 
 type NamedMeshes = Vec<(String, Mesh)>;
 
-/// All meshes of a folder and those within it, and what of them is not used.
+/// All meshes of a folder and its subfolders, and the unused files.
 fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<LeftOut>), SynthError> {
     let files = files_below(folder)?;
     let (wanted, others): (Vec<PathBuf>, Vec<PathBuf>) =
@@ -360,7 +360,7 @@ pub(crate) fn files_below(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
     Ok(files)
 }
 
-/// What lies in a folder, without what systems hide there.
+/// The entries of a folder, without hidden ones of the system.
 fn members(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(SynthError::read(folder))? {

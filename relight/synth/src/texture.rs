@@ -11,7 +11,7 @@ use image::{DynamicImage, ImageError as FileError, ImageReader, Limits, RgbImage
 use super::SynthError;
 use relight_core::image::{ColourImage, ColourSpace, Extent, Linear, Srgb};
 
-/// Longest side of a mesh's own pictures in memory: larger ones are made smaller.
+/// Longest side of a mesh's own pictures in memory: larger ones are reduced.
 const MAX_SIDE: usize = 1024;
 
 /// Quality of the JPEG of a mesh's picture in a packed library, 1 to 100.
@@ -31,7 +31,7 @@ pub(crate) struct TextureImage {
 #[derive(Debug, Clone)]
 enum Texels {
     Light(Vec<Vec3>),
-    /// As the file has them, in a quarter of the memory, and what each level stands for.
+    /// As in the file, in a quarter of the memory, with the value of each level.
     Levels(Vec<[u8; 3]>, PictureKind),
 }
 

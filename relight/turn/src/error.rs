@@ -38,7 +38,7 @@ pub enum TurnError {
         /// How many it has.
         found: usize,
     },
-    /// The frames do not make a turn, or a folder or a video is another than what is needed: why.
+    /// The frames do not make a turn, or a folder or a video is not the required one.
     #[error("{0}")]
     Refused(String),
     /// A setting is beyond what may be given.
@@ -71,7 +71,7 @@ pub enum TurnError {
     /// The session whose video shows the ball cannot be read.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The session from which a shard was made is not near it.
+    /// The session of a shard is not next to its data set.
     #[error("the session or video from which {} was made is not next to its data set: give it with --session", .0.display())]
     NoSession(PathBuf),
     /// The ball is under the object's mask.

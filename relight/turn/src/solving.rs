@@ -29,7 +29,7 @@ pub struct TurnOptions<'a> {
     /// Which way the table turns as its angle grows. Where it is not given, it is that of the rig in `dataset.json` or
     /// `session.json`, else the one with clearly smaller expected errors of the network, else the usual one.
     pub rotation: Option<RotationDirection>,
-    /// The camera over the table; that of the rig, or what is usual, where it is not given.
+    /// The camera over the table; by default that of the rig, or the usual one.
     pub elevation: Option<Elevation>,
     /// The light.
     pub light: TurnLight<'a>,
@@ -47,7 +47,7 @@ pub enum TurnLight<'a> {
     Given(ShLight),
     /// A ball on the table measures it.
     Ball {
-        /// The session of the turn, or its video; looked for by `dataset.json` where it is not given.
+        /// The session of the turn, or its video; by default as named in `dataset.json`.
         session: Option<&'a Path>,
         /// Where the ball is in the video.
         place: ProbePlace,
@@ -80,7 +80,7 @@ pub struct SolvedTurn {
     pub reading: Duration,
 }
 
-/// Solves the turn of a shard, or of what else [`read_curves`] takes. `progress` is called with the number of frames
+/// Solves the turn of a shard, or of another input of [`read_curves`]. `progress` is called with the number of frames
 /// done and of all frames: first those of the shard, then those of the video.
 ///
 /// # Errors

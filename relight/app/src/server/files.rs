@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-/// The list of the files, by which the page keeps them for work without a network.
+/// The list of the files that the page stores for offline use.
 pub(super) const LIST: &str = "files.json";
-/// What the page may load: only its own files, and nothing runs in it that is not part of them.
+/// What the page may load: only its own files and their scripts.
 pub(super) const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; \
     img-src 'self' blob: data:; media-src 'self' blob:; connect-src 'self' blob:; worker-src 'self'; \
     manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -108,7 +108,7 @@ impl PageFiles {
 }
 
 impl PageFile {
-    /// Reads a file, and what lies next to it compressed.
+    /// Reads a file and its compressed versions.
     fn read(folder: &Path, name: &str, expected: u64) -> Result<Self, PageFault> {
         let path = folder.join(name);
         let content = if is_plain(name) {

@@ -151,7 +151,7 @@ impl StudioBackground {
         })
     }
 
-    /// The panorama of this id that is made, or that of a file of a kept scene: one that is made is known by its name.
+    /// The synthetic panorama of this id, or that of a saved scene's file: a synthetic one is known by its name.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -175,7 +175,7 @@ impl StudioBackground {
         }
     }
 
-    /// Whether it is a panorama, and the id of one that is made.
+    /// Whether it is a panorama, and the id of a synthetic one.
     pub(super) fn panorama_id(&self) -> Option<Option<&'static str>> {
         match &self.content {
             Content::Photo(_) => None,
@@ -200,7 +200,7 @@ impl StudioBackground {
         }
     }
 
-    /// The size of a scene's picture, where that of a panorama's is given.
+    /// The size of a scene's picture, from the given size for a panorama.
     pub(super) fn extent(&self, of_panorama: [u32; 2]) -> Extent {
         match &self.content {
             Content::Photo(photo) => photo.picture.planes().extent(),
@@ -288,7 +288,7 @@ pub(super) fn made_panoramas() -> Result<Vec<(Scenery, Vec<u8>)>, Refusal> {
     Scenery::ALL.into_iter().map(made).collect()
 }
 
-/// A panorama as bright as a screen can show it: by the median, so that a sun does not make all else black.
+/// A panorama exposed for a screen by its median, so that a sun does not make everything else black.
 fn thumbnail(panorama: &Panorama) -> Vec<u8> {
     let planes = panorama.image().planes().resized(THUMBNAIL);
     let mut values: Vec<f32> = planes.plane(1).to_vec();

@@ -114,7 +114,7 @@ impl<'a> Drawing<'a> {
         Ok((picture, boxes.collect()))
     }
 
-    /// The background, then for each object its colours and its shadow; and where each lies.
+    /// The background, then for each object its colours and its shadow, with their places.
     ///
     /// # Errors
     /// Those of the render layers.

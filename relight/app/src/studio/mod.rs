@@ -1,4 +1,4 @@
-//! The engine: it keeps photographs, masks, a background and what was computed of them, and answers messages.
+//! The engine: it keeps photographs, masks, a background and their results, and answers messages.
 //!
 //! | file | concern |
 //! | --- | --- |
@@ -206,7 +206,7 @@ impl Studio {
         Ok((says, Vec::new()))
     }
 
-    /// A scene as it is drawn while it is worked on: smaller, of objects that are ready; in layers or in one picture.
+    /// A scene in the preview: smaller, with the objects that are ready, in layers or as one picture.
     fn draw(
         &mut self,
         scene: &PageScene,

@@ -1,4 +1,4 @@
-//! An object of the page: its file, its mask, and what was computed of it.
+//! An object of the page: its file, its mask, and its results.
 
 use std::path::Path;
 
@@ -52,7 +52,7 @@ enum Content {
 struct Cut {
     /// As a screen shows it, and as GrabCut sees it.
     shown: RgbImage,
-    /// A mask that a person made; without one the file's own counts, if it has any.
+    /// The user's mask; without one, the file's own, if it has one.
     mask: Option<GrayImage>,
     /// The photograph with its mask.
     photo: Option<Photo>,
@@ -200,7 +200,7 @@ impl StudioObject {
         Ok(mask)
     }
 
-    /// Reads the photograph with its mask, where there is one: the same that `relight` reads of its files.
+    /// Reads the photograph with its mask, if it has one, as `relight` reads its files.
     fn read_photo(&mut self) -> Result<(), Refusal> {
         let Content::Photo(cut) = &mut self.content else {
             return Ok(());
@@ -305,8 +305,8 @@ pub(super) struct OpenedFile {
 }
 
 impl OpenedFile {
-    /// Decodes a file, after it was made smaller where it is too large. `transfer` says how integers are encoded, where the
-    /// file is not to be asked.
+    /// Decodes a file, reduced if it is too large. `transfer` is the encoding of integers, in place of
+    /// that of the file.
     ///
     /// # Errors
     /// If it cannot be read as a picture.

@@ -18,7 +18,7 @@ use crate::folder::OutputFolder;
 use crate::inputs::NormalsArgument;
 use crate::photos::{NetworkArguments, PhotoArguments, name_lost, outcome};
 
-/// Each photograph takes its memory, gigabytes where it is large.
+/// Each photograph takes memory, gigabytes if it is large.
 const MAX_SIDE_BY_SIDE: usize = 4;
 
 pub(crate) const EXAMPLES: &str = "\

@@ -37,7 +37,7 @@ Examples:
 
 /// The default for the longest side of a video's frames.
 const MOVIE_SIDE: usize = 1080;
-/// What `--light` takes for the light that the photograph was taken in.
+/// The value of `--light` for the photograph's own light.
 const OWN: &str = "own";
 
 #[derive(Args)]
@@ -262,7 +262,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Nothing that is read may be overwritten, and the folders of what is written are made.
+    /// Refuses to overwrite inputs, and makes the folders of outputs.
     fn check_outputs(&self, output: &Path, name: &str) -> Result<(), Box<dyn Error>> {
         let arguments = self.arguments;
         if arguments.is_set() {

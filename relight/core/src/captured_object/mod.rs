@@ -1,7 +1,7 @@
 //! A captured object in one file, ready to be lit: `object.relit`.
 //!
 //! A [`CapturedObject`] is the maps of an object as it was seen from one side: how far each pixel is covered, normals,
-//! albedo, gloss where it has any, and how confident each normal is. The module knows nothing of where they come
+//! albedo, gloss if it has any, and the confidence in each normal. The module knows nothing of where they come
 //! from, nor of what is done with them.
 //!
 //! The file is a ZIP archive whose entries are stored without compression, so that any program can open it:

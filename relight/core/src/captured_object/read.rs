@@ -14,7 +14,7 @@ use crate::render::{Gloss, Surface};
 
 /// The longest `asset.json`, bytes.
 const MAX_MANIFEST: u64 = 1 << 16;
-/// The most bytes that decoding a map may take beside the map itself.
+/// The most bytes that decoding a map may take besides the map itself.
 const DECODER: u64 = 1 << 20;
 /// Bytes of a map, at most, for each pixel: an incompressible image of four channels of 16 bits.
 const BYTES_A_PIXEL: u64 = 9;

@@ -72,8 +72,8 @@ impl Planes<3> {
     }
 }
 
-/// An image as it is stored, without any conversion of colour: a mask, normals, or what else has no colours. Where it has
-/// some see [`ColourImage`](super::ColourImage).
+/// An image as stored, without colour conversion: a mask, normals, or other data. For
+/// colours see [`ColourImage`](super::ColourImage).
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredImage {
     /// The colours: integers scaled to 0 to 1, floating point values as they are. Grey is three equal

@@ -136,7 +136,7 @@ pub fn beside(extent: Extent, at: usize) -> [Option<usize>; 4] {
     ]
 }
 
-/// For each of `to` pixels of a line: the pixels of a line of `from` that it is made of, with weights.
+/// For each of `to` pixels of a line: the source pixels of a line of `from`, with weights.
 fn taps(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
     if to <= from {
         let single = |(at, share): (usize, f64)| (at, share as f32);

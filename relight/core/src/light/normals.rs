@@ -75,7 +75,7 @@ impl<Y: YAxis> Normals<Y> {
         }
     }
 
-    /// The map whose colours `(n + 1) / 2`, 0 to 1, these are; black stands for no surface.
+    /// The map with these colours `(n + 1) / 2`, 0 to 1; black is outside the object.
     #[must_use]
     pub fn from_colours(mut colours: Planes<3>) -> Self {
         let [red, green, blue] = colours.planes_mut();
@@ -132,7 +132,7 @@ impl<Y: YAxis> Normals<Y> {
         Ok(self)
     }
 
-    /// The same map with the normal of the nearest surface where the mask is true and there is none.
+    /// The same map; pixels of the mask without a normal get the nearest one.
     ///
     /// # Panics
     /// Where the mask is not as long as the map has pixels.

@@ -4,7 +4,7 @@ use super::LightError;
 
 /// The highest band of an expansion in spherical harmonics, 0 to 64.
 ///
-/// The orders that relight uses stand here and nowhere else:
+/// All orders that relight uses:
 ///
 /// | constant | order | for |
 /// | --- | --- | --- |

@@ -4,7 +4,7 @@ use super::comparison::Channel;
 use super::{Comparison, MetricError};
 use crate::image::Extent;
 
-/// Which scales are fitted to the estimate before it is compared, by least squares under the mask.
+/// The scales that are fitted to the estimate before the comparison, by least squares under the mask.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ScaleFit {
     /// None: the values are compared as they are.

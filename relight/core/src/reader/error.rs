@@ -1,4 +1,4 @@
-//! Why a data set, or one sample of it, cannot be given.
+//! Errors of a data set, and of one sample.
 
 use std::fmt::Display;
 use std::io;

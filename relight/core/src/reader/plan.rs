@@ -1,4 +1,4 @@
-//! In which order samples are drawn. Knows how many there are and nothing of what they are.
+//! The order in which samples are drawn. Knows their number and not their content.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-/// Where one sample is: the position in a turn, or in what else holds samples in an order.
+/// The position of one sample in a turn, or in another ordered set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SampleId {
     /// Which turn, from 0.
@@ -33,7 +33,7 @@ pub struct DrawPlan {
     pub batch: u32,
     /// Which of them go together.
     pub draw: Draw,
-    /// The seed of the shuffle; none draws in the order in which the samples stand.
+    /// The seed of the shuffle; `None` draws in stored order.
     pub seed: Option<u64>,
     /// Which process draws: each draws its own batches.
     pub rank: Rank,
@@ -107,7 +107,7 @@ impl DrawPlan {
     }
 
     /// The batches of this rank from a cursor on, up to the end of the epoch before `end`. `turns` are the numbers
-    /// of samples. The cursor behind a batch is behind those that the other ranks take along with it.
+    /// of samples. The cursor after a batch is also after the batches that the other ranks take with it.
     pub(super) fn jobs(
         self,
         turns: &[u32],

@@ -64,7 +64,7 @@ pub struct DiffuseLayer {
     coefficients: [[f64; 3]; 9],
     /// The order of the light that counts.
     order: Order,
-    /// What the bands beyond 2 add, where there are any.
+    /// The contribution of the bands beyond 2, if there are any.
     higher: Option<HigherBands>,
 }
 

@@ -21,7 +21,7 @@ use crate::light::{Normals, Order, Quadrature, ShLight, YUp, polar_functions};
 ///   k_1 = 2π / (α + 2), k_l = k_(l-2) (α - l + 2) / (α + l + 1).
 /// - H(n) = s_p Σ k_l(α) G_lm Y_lm(n) (Funk-Hecke), where negative ringing is cut off.
 ///
-/// What is lost are the bands of the light beyond its order, and those of G beyond the layer's.
+/// The light's bands beyond its order are lost, and those of G beyond the layer's.
 ///
 /// ```
 /// use relight_core::light::{Normals, Order, ShLight};

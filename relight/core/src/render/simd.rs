@@ -22,7 +22,7 @@ const BLOCK: usize = 256 * WIDTH;
 #[repr(align(64))]
 pub(super) struct Lanes([f32; WIDTH]);
 
-/// What formulas are written in: `f64` where they are differentiated, [`Lanes`] where they are fast.
+/// The number type of formulas: `f64` to differentiate, [`Lanes`] for speed.
 pub(super) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {

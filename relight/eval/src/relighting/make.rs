@@ -24,11 +24,11 @@ use relight_synth::{BlinnPhong, GBuffer, Library, Lighting, Material, Recipe, Sh
 
 /// Mean irradiance over all normals under each light: white then has half the value that clips.
 const IRRADIANCE: f32 = 0.5;
-/// What `Recipe` draws, and what is drawn here: numbers of streams that it does not use.
+/// Numbers of random streams that `Recipe` does not use.
 const LIGHT_STREAM: u64 = 101;
 const OBJECT_STREAM: u64 = 102;
 
-/// What an evaluation set consists of. The same recipe and library make the same set.
+/// The settings of an evaluation set. The same recipe and library make the same set.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RelightingRecipe {
     /// How many objects; the paper has 100.

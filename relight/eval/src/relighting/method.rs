@@ -25,10 +25,10 @@ pub enum RelightMethod<'d> {
     Oracle(SpecularForm),
     /// What was predicted: the relit images, under the names that the set has.
     Predictions(Predictions),
-    /// What `relight relight` makes of the image: layers, light and hedge. The mean irradiance of the image's light is
+    /// The result of `relight relight` on the image: layers, light and hedge. The mean irradiance of the image's light is
     /// given, since all lights of a set have the same: an image does not show how bright its light is compared with the new one.
     Photograph(&'d Decomposer),
-    /// What `relight decompose` makes of it, with the same given: its normals, albedo and gloss, rendered as those of the
+    /// The result of `relight decompose` with the same inputs: its normals, albedo and gloss, rendered as those of the
     /// oracle.
     Maps(&'d Decomposer),
 }

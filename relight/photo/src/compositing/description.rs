@@ -55,10 +55,10 @@ pub struct SceneDescription {
     /// How many degrees the camera looks down into a panorama.
     #[serde(default = "default_down")]
     pub down: f64,
-    /// How many degrees the camera looks down on the ground where the objects stand.
+    /// The angle at which the camera looks down on the ground of the objects, degrees.
     #[serde(default)]
     pub tilt: Option<f64>,
-    /// The light; without any it is taken from the background.
+    /// The light; by default that of the background.
     #[serde(default)]
     pub light: LightDescription,
     /// Whether brightness, white balance and grain of the objects follow the background.
@@ -75,7 +75,7 @@ pub struct SceneDescription {
     pub objects: Vec<ObjectDescription>,
 }
 
-/// Where the light comes from, at most one of panorama, lamp, coefficients and object, and how far it is rotated.
+/// The source of the light, at most one of panorama, lamp, coefficients and object, and its rotation.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightDescription {
@@ -113,13 +113,13 @@ pub struct ObjectDescription {
     /// Its height in parts of the picture's.
     #[serde(default = "default_height")]
     pub height: f64,
-    /// Degrees by which it is turned in the plane, counter-clockwise.
+    /// Rotation in the plane, degrees, counter-clockwise.
     #[serde(default)]
     pub rotation: f64,
     /// What its albedo is multiplied with.
     #[serde(default = "default_tint")]
     pub tint: [f32; 3],
-    /// The part of even light that it reflects, and its smoothness, in place of the gloss that was found.
+    /// The part of even light that it reflects, and its smoothness, in place of the estimated gloss.
     #[serde(default)]
     pub gloss: Option<[f32; 2]>,
     /// Its brightness in stops.
@@ -131,7 +131,7 @@ pub struct ObjectDescription {
 }
 
 impl SceneDescription {
-    /// Objects before a background, and all else as a file that does not name it has it.
+    /// Objects before a background, and defaults for everything else.
     #[must_use]
     pub fn new(background: PathBuf, objects: Vec<ObjectDescription>) -> Self {
         Self {

@@ -7,7 +7,7 @@ use relight_core::statistics::above_part;
 const BRIGHT: f32 = 0.8;
 /// The part of the values that is brighter than a picture's bright places.
 const BRIGHTEST_PART: f64 = 0.05;
-/// The least and the most by which an object is made darker or brighter.
+/// The limits of an object's change of brightness.
 const LEVELS: (f32, f32) = (0.05, 1.5);
 /// How far a channel of the light's colour may be from grey.
 const CASTS: (f32, f32) = (0.7, 1.4);

@@ -4,7 +4,7 @@ use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 
 use super::harmonisation::noise;
 
-/// An object as it is seen in a scene, ready to be put on any background.
+/// An object as seen in a scene, ready for any background.
 #[derive(Debug, Clone)]
 pub struct SceneLayer {
     /// Column and row of its first pixel; it may begin outside.

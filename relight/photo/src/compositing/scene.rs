@@ -243,7 +243,7 @@ mod tests {
         (lamp.light().unwrap(), lamp.panorama())
     }
 
-    /// Where the object stands in its own photograph.
+    /// The object's place in its own photograph.
     const OWN_PLACE: Placement = Placement {
         at: [32.0 / 60.0, 40.0 / 50.0],
         height: 30.0 / 50.0,

@@ -18,9 +18,9 @@ use crate::relighting::{
 const WHITE: f32 = 1.4;
 /// The size of a panorama from which shadows are drawn, at most.
 const MAX_AROUND: Extent = Extent::new(512, 256);
-/// The longer side of the picture of a panorama by which it is exposed, pixels.
+/// The longer side of a panorama's picture for its exposure, pixels.
 const LOOK: usize = 160;
-/// Photographs are brought to this much more than the size in which they are shown.
+/// Photographs are resized to this multiple of their displayed size.
 const RESERVE: f64 = 1.25;
 /// The shortest that the longest side of a photograph is made, pixels.
 const MIN_SIDE: usize = 32;
@@ -38,18 +38,18 @@ pub enum SceneBackground<'a> {
     Panorama(&'a Panorama),
 }
 
-/// What follows from a scene's description and its background, before the objects are known.
+/// The setting of a scene: what follows from its description and background, before the objects.
 #[derive(Debug, Clone)]
 pub struct SceneEnvironment {
     /// Width and height of the picture.
     pub extent: Extent,
-    /// The light: the one that is given, or that of the background.
+    /// The light: the given one, or that of the background.
     pub light: LightSource,
     /// How far the camera looks down on the ground of the objects, degrees.
     pub tilt: f64,
     /// What the background asks of the objects.
     pub matching: Harmonisation,
-    /// The sun that is seen in a picture from which the light is taken.
+    /// The sun in a picture that gives the light.
     pub sun: Option<SeenSun>,
     /// How a panorama is exposed.
     pub exposure: Option<PanoramaExposure>,

@@ -5,7 +5,7 @@ use relight_core::image::Extent;
 use relight_core::light::NormalsFrame;
 use tract_onnx::pb::tensor_proto::DataType;
 
-/// Tokens that MoGe-2 divides a picture into: the middle of those that it was trained on.
+/// The number of MoGe-2's tokens: the middle of its training range.
 const TOKENS: i64 = 1800;
 /// Width and height of Metric3D's pictures where the file leaves them open, pixels.
 const METRIC3D_SIDE: usize = 518;
@@ -148,7 +148,7 @@ impl Convention {
     }
 }
 
-/// The one input beside `other`, which has to be a picture.
+/// The one input besides `other`, which has to be a picture.
 fn picture_of<'a>(signature: &'a OnnxSignature, other: &str) -> Result<&'a OnnxValue, String> {
     let mut rest = signature.inputs.iter().filter(|input| input.name != other);
     match (rest.next(), rest.next()) {

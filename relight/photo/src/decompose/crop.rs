@@ -46,7 +46,7 @@ impl CropSquare {
         }
     }
 
-    /// What a photograph shows there, in another size; 0 beyond its edges.
+    /// That part of a photograph in another size; 0 beyond its edges.
     pub fn resized<const C: usize>(&self, image: &Planes<C>, extent: Extent) -> Planes<C> {
         let all = Window {
             at: [0; 2],

@@ -26,7 +26,7 @@ use relit_data::spec_net_gate::{self, SPEC_NET_GATE};
 pub const MAX_PIXELS: usize = 64_000_000;
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;
-/// By how much normals are tilted further before light is fitted to them: the network's are a little flatter than the true ones.
+/// The factor that tilts normals before light is fitted to them: the network's are slightly flatter than the true ones.
 /// Measured on synthetic objects (docs/results/decomposition.md).
 const TILT: f32 = 1.1;
 
@@ -191,10 +191,10 @@ impl Decomposer {
     /// MoGe-2's and Metric3D's published files are known by the names of their inputs and outputs, and used as they are. Any
     /// other takes one picture, 1 x 3 x side x side, (x - 0.5) / 0.5 of the sRGB values x, 0 outside the mask; and answers
     /// with 1 x 3 x side x side, vectors of any length, or with 1 x 2 x side x side, slopes (p, q) of normals (p, q, 1).
-    /// `frame` says which way y points; where it is none, y points as a known network has it, and else up.
+    /// `frame` is the direction of y; by default that of a known network, else up.
     ///
     /// # Errors
-    /// If it cannot be read or run, or answers something else; then all stays as it was.
+    /// If it cannot be read or run, or has other outputs; then nothing changes.
     #[cfg(feature = "files")]
     pub fn read_normals(
         &mut self,
@@ -401,7 +401,7 @@ struct FittedLight {
     gloss: Option<FittedGloss>,
 }
 
-/// A value as light: black where it is negative or no number.
+/// A value as light: black if it is negative or NaN.
 fn usable(value: f32) -> f32 {
     if value.is_finite() {
         value.max(0.0)

@@ -1,4 +1,4 @@
-//! What the decomposing network sees of a picture, and what its answer means: the same for training
+//! The decomposing network's input, and the meaning of its output: the same for training
 //! and for use.
 
 use crate::nets::{INPUTS, OUTPUTS};

@@ -72,7 +72,7 @@ pub enum DecomposeError {
     /// No light can be fitted.
     #[error("no light can be fitted")]
     Light(#[from] LightError),
-    /// A file or folder is not there, or cannot be used for what is asked.
+    /// A file or folder is missing, or cannot be used for its purpose.
     #[error("{} {fault}", path.display())]
     File {
         /// The file or folder.

@@ -113,7 +113,7 @@ impl OtherNormals {
         (square, [(width - square) / 2, (height - square) / 2])
     }
 
-    /// The vectors of an answer, as large as what the network takes.
+    /// The vectors of an answer, in the size of the network's input.
     fn vectors(&self, shape: &[usize], values: &[f32]) -> Option<Planes<3>> {
         let extent = self.convention.extent;
         let Extent { width, height } = extent;

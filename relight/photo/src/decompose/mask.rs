@@ -6,7 +6,7 @@ use relit_data::geometry::Rect;
 
 /// Encoded values up to this count as nearly black: 12 of 255.
 pub(super) const NEARLY_BLACK: f32 = 12.5 / 255.0;
-/// The part of the photograph's edge that is black where its background is.
+/// The least black part of the photograph's edge for a black background.
 const BLACK_EDGE: f64 = 0.95;
 
 /// The source of the mask.

@@ -24,7 +24,7 @@ pub struct Photo {
     pub mask_source: MaskSource,
     /// What a person may want to know of the mask's file, after "the mask".
     pub mask_note: Option<String>,
-    /// The alpha that its file has, 0 to 1, as it stands there.
+    /// The file's alpha, 0 to 1.
     pub alpha: Option<Planes<1>>,
     saturated_from: f32,
     saturated_fraction: Option<f64>,
@@ -108,7 +108,7 @@ impl Photo {
         })
     }
 
-    /// A frame of a data set, which has its mask and what is known of its saturation.
+    /// A frame of a data set, with its mask and its saturation.
     ///
     /// # Errors
     /// If the mask is empty.

@@ -25,7 +25,7 @@ pub enum BackgroundFile {
 }
 
 impl BackgroundFile {
-    /// How the colours of a video are converted to sRGB, in words; `None` if they are taken as sRGB.
+    /// The conversion of a video's colours to sRGB, in words; `None` if they are read as sRGB.
     #[must_use]
     pub fn colour_conversion(&self) -> Option<String> {
         match self {

@@ -31,7 +31,7 @@ pub struct PhotoReading {
 }
 
 impl PhotoReading {
-    /// The mask of a photograph of this name: the file that is given itself, or the photograph's in the folder that is given.
+    /// The mask of a photograph of this name: the given file, or the photograph's in the given folder.
     #[must_use]
     pub fn mask_path(given: &Path, name: &str) -> PathBuf {
         if given.is_dir() {
@@ -155,7 +155,7 @@ impl PhotoInput {
     }
 }
 
-/// Photographs, each with the path under which it was found: its own, or that of its data set.
+/// Photographs, each with its path, or that of its data set.
 type Found = Vec<(PathBuf, PhotoInput)>;
 
 fn add_folder(
@@ -243,7 +243,7 @@ fn add_turns(found: &mut Found, path: &Path, most: Option<u32>) -> Result<(), De
     Ok(())
 }
 
-/// Whether every file and every turn has a folder of its own for its results, also where a file system ignores case.
+/// Checks that every file and every turn has its own folder for results, also if a file system ignores case.
 fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
     let mut names = BTreeMap::new();
     let mut last_turn = None;

@@ -95,7 +95,7 @@ impl<'a> Insertion<'a> {
         Self::before(scene, (background, first), light, decomposer, options)
     }
 
-    /// The same in a light that is given, whatever the scene names, or else in the background's.
+    /// The same in a given light, which replaces that of the scene, or else in the background's.
     ///
     /// # Errors
     /// If the first frame of a video cannot be read, or the light is dark.
@@ -206,7 +206,7 @@ impl<'a> Insertion<'a> {
         }
     }
 
-    /// A video whose frames have the objects before them, which do not move.
+    /// A video with still objects before its frames.
     fn film_over(
         &mut self,
         scene: &InsertScene<'_>,

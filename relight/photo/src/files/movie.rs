@@ -18,7 +18,7 @@ use crate::relighting::InsertError;
 
 /// The colours of what is written, as a filter.
 const COLOURS: &str = "setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1";
-/// How many frames each thread computes before they are encoded.
+/// The number of frames that each thread computes before they are encoded.
 const FRAMES_A_THREAD: u32 = 2;
 
 /// What a video file is encoded as.

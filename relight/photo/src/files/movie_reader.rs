@@ -18,7 +18,7 @@ const MAX_PIXELS: usize = 1 << 26;
 const STREAM: &str = "V:0";
 /// Pixels that are not square are stretched to squares; FFmpeg has turned the frame already.
 const SQUARE_PIXELS: &str = "scale='max(1,round(iw*max(1,sar)))':'max(1,round(ih/min(1,sar)))'";
-/// Videos with more rows have the matrix of BT.709 where they state none, as players take it.
+/// Videos with more rows have the matrix of BT.709 by default, as in players.
 const MAX_SD_ROWS: usize = 576;
 
 /// Which frames of a video are read.
@@ -113,7 +113,7 @@ impl MovieReader {
         self.frame_rate
     }
 
-    /// How its colours are converted to sRGB, in words; `None` if they are taken as sRGB.
+    /// The conversion of its colours to sRGB, in words; `None` if they are read as sRGB.
     #[must_use]
     pub fn colour_conversion(&self) -> Option<String> {
         self.wide.as_ref().map(|wide| wide.to_srgb.to_string())

@@ -113,7 +113,7 @@ pub struct DecompositionFiles<'a> {
 }
 
 impl DecompositionFiles<'_> {
-    /// Writes all files into the folder `out`, which appears when they are there. An earlier
+    /// Writes all files into the folder `out`, which appears when they are complete. An earlier
     /// decomposition in it is replaced.
     ///
     /// # Errors
@@ -122,7 +122,7 @@ impl DecompositionFiles<'_> {
         RESULTS.write(out, |folder| self.write_files(folder))
     }
 
-    /// Whether a decomposition may be written to the folder `out`: it is not there, empty, or holds the files of an
+    /// Whether a decomposition may be written to the folder `out`: it is missing, empty, or holds the files of an
     /// earlier decomposition and nothing else.
     ///
     /// # Errors
@@ -301,7 +301,7 @@ fn write_grey(path: &Path, light: &Planes<1>) -> Result<f32, ImageError> {
     Ok(white)
 }
 
-/// The light that the largest value of a file stands for: 1 where all fits in, so that files can be compared.
+/// The light of the largest value of a file: 1 if everything fits, so that files can be compared.
 fn white_of<const C: usize>(light: &Planes<C>) -> f32 {
     let values = light.planes().into_iter().flatten();
     values.fold(1.0_f32, |a, &b| a.max(b))

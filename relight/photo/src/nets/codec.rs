@@ -54,7 +54,7 @@ impl Weights {
     /// The bytes of a safetensors file, with facts about them in its header.
     ///
     /// # Errors
-    /// A sentence: where a value is too large for the precision, or what the format's writer answers.
+    /// A sentence: a value is too large for the precision, or the error of the format's writer.
     pub fn to_safetensors(
         &self,
         precision: WeightPrecision,

@@ -69,7 +69,7 @@ pub fn decomposer_with_heads() -> Graph {
     })
 }
 
-/// The network that has these weights: with the heads for paint and for light, where they have them.
+/// The network of these weights: with the heads for paint and for light, if they have them.
 #[must_use]
 pub fn decomposer_of(weights: &Weights) -> Graph {
     let have = |prefix: &str| {

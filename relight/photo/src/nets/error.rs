@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NetError {
-    /// Weights that are not the network's, or that it or a file cannot hold.
+    /// Weights of another network, or that do not fit into it or a file.
     #[error("{0}")]
     Weights(String),
     /// A file that cannot be read or written.

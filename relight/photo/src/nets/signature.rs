@@ -1,4 +1,4 @@
-//! What goes into and comes out of a network in an ONNX file, without its weights.
+//! The inputs and outputs of a network in an ONNX file, without its weights.
 
 use prost::Message;
 use tract_onnx::pb::tensor_proto::DataType;

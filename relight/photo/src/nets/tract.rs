@@ -13,7 +13,7 @@ use super::weights::Tensor;
 /// A network in tract.
 pub(super) struct TractPlan {
     shape: [usize; 4],
-    /// What goes into each input; none for the picture.
+    /// The value of each input; `None` for the picture.
     inputs: Vec<Option<TractTensor>>,
     plan: Arc<TypedRunnableModel>,
 }

@@ -154,7 +154,7 @@ impl Weights {
 }
 
 impl Weights {
-    /// The same without those whose names begin so: a network that gets a head less.
+    /// The same without weights whose names begin with this: for a network with a head less.
     #[must_use]
     pub fn without(&self, prefix: &str) -> Self {
         let named = |name: &str| name.trim_start_matches("module.").starts_with(prefix);

@@ -18,7 +18,7 @@ const BLOCK_BITS: u32 = 3;
 /// The side of a block, cells.
 pub(crate) const BLOCK: usize = 1 << BLOCK_BITS;
 
-/// How far an object reaches towards the viewer, cell by cell. What is behind is not seen: it is taken to be the front,
+/// The height of an object towards the viewer, cell by cell. The back is not seen: it is assumed to be the front,
 /// mirrored at the plane of the rim.
 #[derive(Debug, Clone)]
 pub(crate) struct HeightField {
@@ -115,7 +115,7 @@ struct Cell {
     missing: f32,
     /// One over the number of neighbours.
     share: f32,
-    /// How much higher it is than they are in the mean, by the slopes.
+    /// How much higher it is than their mean, by the slopes.
     step: f32,
 }
 

@@ -30,7 +30,7 @@ const EDGE_PART: f64 = 1.0 / 160.0;
 pub(crate) struct Matte {
     /// The part of each pixel that the object covers, 0 to 1.
     pub(crate) alpha: Planes<1>,
-    /// The object's colours, linear, also where it covers little or nothing of a pixel: those of its edge go on there.
+    /// The object's colours, linear, also where it covers little or nothing of a pixel: those of its edge are continued there.
     pub(crate) foreground: Planes<3>,
 }
 
@@ -85,7 +85,7 @@ impl Matte {
         matte.continued(2 * edge + 1)
     }
 
-    /// The matte of a cut-out picture, whose colours are the object's own wherever it covers something.
+    /// The matte of a cut-out picture, whose colours are the object's own.
     ///
     /// # Panics
     /// Where alpha has another size.

@@ -54,19 +54,19 @@ pub struct RelightableObject {
     /// In units in which the mean shading is 1.
     albedo: Planes<3>,
     shading: Shading,
-    /// What the highlight has that gloss in the own light has not.
+    /// The highlight minus the gloss in the photograph's own light.
     highlight: Planes<1>,
     gloss: Option<ObjectGloss>,
     /// Foreground less diffuse part and highlight.
     rest: Planes<3>,
-    /// The light in which the object was, grey, of order 2, in units in which the mean shading is 1.
+    /// The photograph's light, grey, of order 2, in units in which the mean shading is 1.
     pub light: ShLight,
     last_standing: LastPlaced,
 }
 
 impl RelightableObject {
     /// Decomposes the object that a mask (1 on it, else 0) shows in a photograph of linear light. Of a cut-out
-    /// picture, `alpha` is what its file says; else alpha and the colours of its edge are estimated.
+    /// picture, `alpha` is that of its file; else alpha and the colours of its edge are estimated.
     ///
     /// # Errors
     /// If the photograph has a value that is negative or not finite, mask or alpha have another size, the mask is empty, or the

@@ -5,7 +5,7 @@ use relight_core::image::Extent;
 use relight_core::light::{Order, Panorama, ShLight};
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
 
-/// The size of a panorama that stands for a lamp or coefficients, from which shadows are drawn.
+/// The size of the panorama of a lamp or coefficients for casting shadows.
 const DRAWN: Extent = Extent::new(256, 128);
 
 /// New light.
@@ -20,7 +20,7 @@ pub enum LightSource {
 }
 
 impl LightSource {
-    /// The light as coefficients: all those that are given, or enough for highlights.
+    /// The light as coefficients: all given ones, or enough for highlights.
     ///
     /// # Errors
     /// [`InsertError::Dark`] if no surface receives any of it.

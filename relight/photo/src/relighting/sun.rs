@@ -3,7 +3,7 @@
 
 use relight_core::image::{Extent, Planes, beside};
 
-/// The longer side of the picture in which it is looked for, pixels.
+/// The longer side of the picture that is searched, pixels.
 const LOOK: usize = 256;
 /// Values from which on all channels are clipped.
 const CLIPPED: f32 = 0.92;

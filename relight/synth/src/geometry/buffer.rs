@@ -1,4 +1,4 @@
-//! The geometry buffer: what is known of the surface at each pixel before there is light.
+//! The geometry buffer: the surface at each pixel, independent of light.
 
 use glam::{Affine3A, DVec4, Mat3, Vec2, Vec3, Vec4};
 
@@ -202,7 +202,7 @@ impl<'a> Posed<'a> {
         }
     }
 
-    /// Adds what is seen of a triangle at a pixel; false where, by rounding, the pixel is missed.
+    /// Adds the surface of a triangle at a pixel; false if the pixel is missed by rounding.
     fn resolve(&self, number: u32, column: u32, row: u32, surface: &mut GBuffer) -> bool {
         let corners = self.mesh.triangles[number as usize];
         let inside = Triangle::new(corners, &self.projected)

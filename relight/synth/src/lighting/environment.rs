@@ -271,7 +271,7 @@ impl<'a> Sky<'a> {
     }
 }
 
-/// A point of a surface, which knows from where light matters to it.
+/// A point of a surface, with the directions from which light reaches it.
 struct Point<'a> {
     normal: Vec3,
     towards_eye: Vec3,

@@ -43,7 +43,7 @@ pub struct Lighting {
     pub(crate) environment: Option<Environment>,
     /// Irradiance of even light from all around.
     pub(crate) ambient: Vec3,
-    /// Light that comes from the object's own lit parts to its hollows, as a factor of what they send back: 1 where all of
+    /// Light from the object's own lit parts in its hollows, as a factor of what they send back: 1 where all of
     /// it arrives.
     pub(crate) bounce: Vec3,
     /// Whether the object blocks light: without, there are neither cast shadows nor dark hollows.

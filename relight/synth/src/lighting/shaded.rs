@@ -20,7 +20,7 @@ pub struct Material {
     pub gloss: Option<BlinnPhong>,
 }
 
-/// How Blinn and Phong's highlight looks: `reflectance x max(0, n . b)^exponent`, where b lies half way
+/// The Blinn-Phong highlight: `reflectance x max(0, n . b)^exponent`, where b lies half way
 /// between the light and the eye.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BlinnPhong {

@@ -1,4 +1,4 @@
-//! Files that a mesh's file names: they lie in its folder, or below. Names are those of the computer on which it was written,
+//! Files that a mesh's file names, in its folder or below. Names are those of the computer on which it was written,
 //! whose letters may differ in case and whose folders may be others.
 
 use std::fs;

@@ -26,7 +26,7 @@ pub(crate) struct MeshMaterial {
     pub(crate) factors: Option<PlacedPicture>,
 }
 
-/// A picture, and where texture coordinates lie on it.
+/// A picture, and the mapping of texture coordinates onto it.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedPicture {
     pub(crate) image: Arc<TextureImage>,

@@ -182,7 +182,7 @@ fn too_large(triangles: usize) -> String {
 }
 
 impl RawMesh {
-    /// What the bytes of a file hold, by its extension.
+    /// The content of a file's bytes, by its extension.
     ///
     /// # Errors
     /// The fault, in words.

@@ -1,5 +1,5 @@
-//! Materials of Wavefront files: their colour, its picture, and how sharp the highlight is. All else in them is left out, also
-//! where it is damaged: programs write many things there.
+//! Materials of Wavefront files: their colour, its picture, and how sharp the highlight is. Everything else is ignored, also if
+//! it is damaged: programs write many things there.
 
 use glam::{Affine2, Vec2, Vec3};
 

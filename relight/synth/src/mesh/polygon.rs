@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 /// Part of a polygon's squared area by which a triangle may face backwards by rounding and still be flat.
 const FLAT: f64 = 1e-9;
 
-/// Cuts polygons into triangles. Kept for many of them, as it keeps its memory.
+/// Cuts polygons into triangles. Reused for many of them, since it keeps its memory.
 pub(super) struct Triangulator {
     earcut: Earcut<f64>,
     ears: Vec<usize>,

@@ -10,8 +10,8 @@ pub(crate) const NO_TEXTURE: [Vec2; 3] = [Vec2::NAN; 3];
 /// Colours of a triangle that has none.
 const WHITE: [Vec3; 3] = [Vec3::ONE; 3];
 
-/// What a file or a generator gives: positions, triangles by index, and texture coordinates and colours for
-/// each corner and materials where there are any.
+/// The result of a file or a generator: positions, triangles by index, and texture coordinates and colours for
+/// each corner and materials, if there are any.
 #[derive(Debug, Default)]
 pub(crate) struct RawMesh {
     pub(crate) positions: Vec<Vec3>,

@@ -47,7 +47,7 @@ pub struct LibrarySummary {
     pub panoramas: Vec<LibraryEntry>,
     /// How many objects and panoramas are left out, by the reason.
     pub left_out: BTreeMap<String, usize>,
-    /// Files that cannot be read, and what objects are used without, as pictures that are not there.
+    /// Files that cannot be read, and missing parts of used objects, such as pictures.
     pub faults: Vec<LeftOut>,
     /// Of the file.
     pub bytes: usize,

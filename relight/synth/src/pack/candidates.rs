@@ -1,4 +1,4 @@
-//! Which objects and panoramas there are to choose from, and where each comes from.
+//! The objects and panoramas to choose from, and their origins.
 
 use std::path::{Path, PathBuf};
 

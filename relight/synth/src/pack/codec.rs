@@ -268,7 +268,7 @@ fn encode_materials(of: &MeshMaterials) -> Result<EncodedMaterials, String> {
     })
 }
 
-/// Numbers column by column, each as its difference from the one before, the low bytes before the high ones.
+/// Numbers column by column, each as its difference from the previous one, low bytes first.
 fn push_columns<const N: usize>(bytes: &mut Vec<u8>, rows: &[[u16; N]]) {
     for column in 0..N {
         let values = || rows.iter().map(move |row| row[column]);
@@ -361,7 +361,7 @@ impl<'a> Rest<'a> {
     }
 }
 
-/// The mesh that bytes hold. `picture` gives those of the library by their numbers.
+/// The mesh in bytes. `picture` gives the library's pictures by number.
 ///
 /// # Errors
 /// If the bytes are not what the catalogue says.

@@ -35,7 +35,7 @@ pub(super) struct Catalogue {
     pub(super) panoramas: Vec<PackedEntry<PackedPanorama>>,
 }
 
-/// Whether a picture's values are colours; else they are numbers.
+/// Whether a picture's values are colours; else they are data.
 type IsColours = bool;
 pub(super) type PackedObject = PackedEntry<PackedMesh>;
 
@@ -78,7 +78,7 @@ pub(super) struct Parts {
 /// The bytes of a library's file: the same parts give the same bytes.
 ///
 /// # Errors
-/// In words; with parts of any size that fit into memory there is none.
+/// In words; does not occur with parts that fit into memory.
 pub(super) fn encode(parts: Parts) -> Result<Vec<u8>, String> {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
     let small = SimpleFileOptions::default()

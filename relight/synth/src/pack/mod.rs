@@ -1,4 +1,4 @@
-//! Packed libraries: many objects and panoramas in one file, with who made each and under which licence.
+//! Packed libraries: many objects and panoramas in one file, with the author and licence of each.
 //!
 //! | file | concern |
 //! | --- | --- |

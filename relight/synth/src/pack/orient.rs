@@ -1,4 +1,4 @@
-//! Triangles that face one way: neighbours alike, and each part of a mesh outwards.
+//! Consistent orientation of triangles: neighbours alike, and each part of a mesh outwards.
 //!
 //! Which side of a part is outside is voted for by rays, as in Takayama et al. 2014, "A simple method for correcting facet
 //! orientations in polygon meshes based on ray casting": light comes to it from far away.

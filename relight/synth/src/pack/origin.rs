@@ -1,4 +1,4 @@
-//! `origin.toml`: who made the files of a folder, and under which licence.
+//! `origin.toml`: the author and licence of the files of a folder.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,4 @@
-//! The table beside a library: `.csv` with a line for each object and panorama, and `.md` with what weights' cards need.
+//! The table of a library: `.csv` with a line for each object and panorama, and `.md` with the facts for model cards.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;

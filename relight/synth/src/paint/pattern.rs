@@ -11,7 +11,7 @@ use super::mark::Mark;
 use super::palette::Palette;
 use super::writing::Writing;
 
-/// Where a coat of paint lies. Lengths are in the object's own frame, in which it is about 2 large.
+/// The area of a coat of paint. Lengths are in the object's own frame, in which it is about 2 large.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Pattern {

@@ -152,7 +152,7 @@ impl CameraModel {
         image.iter().enumerate().map(value).collect()
     }
 
-    /// The picture after its compression, where there is one.
+    /// The picture after its compression, if it is compressed.
     pub(crate) fn compressed(&self, picture: RgbImage) -> RgbImage {
         let Some(quality) = self.jpeg else {
             return picture;

@@ -1,4 +1,4 @@
-//! What an object is made of: paint, relief and gloss together.
+//! The finish of an object: paint, relief and gloss.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use crate::random::Random;
 
 /// Part of the objects that have relief.
 const RELIEF: f32 = 0.35;
-/// How many of the objects that come with a look of their own keep it.
+/// The part of the objects with materials that keep them.
 const OWN: f32 = 0.5;
 /// Exponents of highlights.
 const BROADEST: f32 = 4.0;
@@ -35,7 +35,7 @@ pub(crate) struct Finish {
 
 impl Finish {
     /// A random finish for what a buffer shows; it is glossy with the probability `glossy`. Half of the objects that come
-    /// with a look of their own keep it, with the gloss of that; with `own` all do.
+    /// with materials keep them, with their gloss; with `own` all do.
     pub(crate) fn draw(
         random: &mut Random,
         buffer: &GBuffer,
@@ -51,7 +51,7 @@ impl Finish {
         Self::painted(random, buffer, library, glossy)
     }
 
-    /// The same for an object whose own look, if it has one, is painted over.
+    /// The same for an object whose materials, if it has any, are painted over.
     pub(crate) fn painted(
         random: &mut Random,
         buffer: &GBuffer,

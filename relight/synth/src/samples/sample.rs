@@ -1,4 +1,4 @@
-//! One sample: a picture, its ground truth, and every number that it was made of.
+//! One sample: a picture, its ground truth, and all its parameters.
 
 use glam::Vec3;
 use image::{GrayImage, RgbImage};
@@ -79,7 +79,7 @@ pub struct SynthSample<'a> {
     pub(crate) description: Description,
 }
 
-/// What the largest value in a file of 16 bits stands for.
+/// The light of the largest value in a 16-bit file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Whites {
     /// In `shading.png`.
@@ -116,7 +116,7 @@ impl<'a> SynthSample<'a> {
         &self.description.coefficients
     }
 
-    /// The light, 0..=1, for a value of the picture, 0..=1: what its camera's response takes back.
+    /// The light, 0..=1, for a value of the picture, 0..=1: the inverse of its camera's response.
     #[must_use]
     pub fn light_of(&self, value: f32) -> f32 {
         self.description.camera.response.decode(value)

@@ -40,7 +40,7 @@ struct Header {
 }
 
 impl TransferCache {
-    /// Views in a folder, which is made where it is missing.
+    /// Views in a folder, created if missing.
     ///
     /// # Errors
     /// [`SynthError`] if the folder cannot be made.

@@ -22,11 +22,11 @@ const HALF_VECTOR: f32 = 0.5;
 const TINTED: f32 = 0.2;
 /// Part of the objects of one colour.
 const PLAIN: f32 = 0.35;
-/// Part of the turns whose angles are off and whose frames are not all there.
+/// Part of the turns with errors of the angle and missing frames.
 const MISTIMED: f32 = 0.4;
 /// Part of the turns whose highlights clip.
 const CLIPPED: f32 = 0.3;
-/// Part of the turns whose elevation is not known well, and how far it is off, degrees.
+/// Part of the turns with an error of the elevation, and its size, degrees.
 const UNSURE: f32 = 0.5;
 const ELEVATION_ERROR_DEG: f32 = 4.0;
 const MAX_ELEVATION_ERROR_DEG: f32 = 8.0;

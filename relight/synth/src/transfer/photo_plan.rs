@@ -1,4 +1,4 @@
-//! The material, light and camera of a photograph of a cast view: every number of it but those of its noise.
+//! The material, light and camera of a photograph of a cast view: all its parameters except the noise.
 //!
 //! The chances of lamps, ambient light, gloss and cameras are those of [`Recipe`](crate::Recipe).
 
@@ -16,7 +16,7 @@ use crate::samples::camera::{CameraModel, Response};
 const BY_LAMP: f32 = 0.8;
 /// Part of the surfaces with gloss.
 const GLOSSY: f32 = 0.35;
-/// Part of these whose highlights have a colour of their own.
+/// Part of these with coloured highlights.
 const COLOURED_GLOSS: f32 = 0.2;
 /// Part of the surfaces of one colour.
 const PLAIN: f32 = 0.2;

@@ -1,4 +1,4 @@
-//! A view for photographs: what a device needs to light it in any way without a ray.
+//! A view for photographs: the data for a device to light it in any way without rays.
 //!
 //! Light from all around goes by the harmonics of the viewer's frame, as in a turn's view. They have no sharp shadows: those
 //! come from a few lamps whose visibility is cast with the view.
@@ -21,7 +21,7 @@ use crate::turn::Stand;
 
 /// Part of the closed objects that stand on a black table.
 const ON_TABLE: f32 = 0.4;
-/// Part of the objects that are meshes, where there are any.
+/// Part of the objects that are meshes, if there are any.
 const MESHES: f32 = 0.6;
 /// The camera over that table, degrees.
 const ELEVATIONS: std::ops::Range<f32> = 0.0..50.0;
@@ -136,7 +136,7 @@ fn view_lamp(lamp: &SyntheticLamp) -> ViewLamp {
 pub(super) struct Seen {
     buffer: GBuffer,
     occluder: Occluder,
-    /// Upwards from the table in the viewer's frame, where it stands on one.
+    /// The table's upward axis in the viewer's frame, if it stands on one.
     table: Option<Vec3>,
 }
 

@@ -60,7 +60,7 @@ pub struct FrameTruth {
     pub index: u32,
     /// The table's angle, degrees.
     pub angle_deg: f64,
-    /// What 65535 stands for in the frame's `shading` and `highlight`.
+    /// The value of 65535 in the frame's `shading` and `highlight`.
     pub(crate) white: Whites,
     /// All light but what bounces, as nine coefficients in the viewer's frame, with the camera's gain.
     pub coefficients: [[f64; 3]; 9],

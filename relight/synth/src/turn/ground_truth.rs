@@ -13,7 +13,7 @@ use crate::samples::png::{Sixteen, encode_sixteen};
 /// The folder of the ground truth of all turns.
 const TRUTH: &str = "truth";
 
-/// Where the ground truth of a session lies in a data set.
+/// The path of a session's ground truth in a data set.
 pub(super) fn ground_truth_of(out: &Path, session: &str) -> PathBuf {
     out.join(TRUTH).join(session)
 }

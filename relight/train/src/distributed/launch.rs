@@ -5,7 +5,7 @@ use relight_core::reader::Rank;
 
 use crate::error::TrainError;
 
-/// The rank of this process among those of a run, and where they meet.
+/// The rank of this process in a run, and the address of its rendezvous.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
     /// Which process this is, and how many there are.

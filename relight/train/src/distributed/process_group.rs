@@ -52,7 +52,7 @@ unsafe extern "C" {
     fn relight_group_leave(group: *mut RawGroup);
 }
 
-/// This process and the others of its run. All of them make the same calls in the same order.
+/// The processes of a run. All of them make the same calls in the same order.
 #[derive(Debug)]
 pub struct ProcessGroup {
     rank: Rank,
@@ -115,7 +115,7 @@ impl ProcessGroup {
         self.rank.index() == 0
     }
 
-    /// Replaces numbers by their sums over all processes, which have the same number of them.
+    /// Replaces numbers by their sums over all processes; each has equally many.
     ///
     /// # Errors
     /// [`TrainError::ProcessLost`].

@@ -1,4 +1,4 @@
-//! A run on disk: one file that is whole or not there, from which the run goes on to the same losses.
+//! A run on disk: one complete file or none, from which the run resumes with the same losses.
 
 use std::collections::HashMap;
 use std::fs;
@@ -23,7 +23,7 @@ pub struct Checkpoint {
     pub step: u64,
     /// The settings, as TOML: another run's are refused.
     pub settings: String,
-    /// What the run was given beside its settings: another run's is refused.
+    /// The inputs of the run besides its settings: those of another run are refused.
     pub inputs: String,
     /// The cursor in the data; the file names it `place`.
     pub cursor: String,

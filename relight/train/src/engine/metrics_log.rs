@@ -18,7 +18,7 @@ pub struct MetricsLog {
 }
 
 impl MetricsLog {
-    /// The journal in a run's folder; a resumed run goes on behind the line of its last step.
+    /// The journal in a run's folder; a resumed run continues after the line of its last step.
     ///
     /// # Errors
     /// [`TrainError::Io`], [`TrainError::Refused`] if another program has it open.
@@ -64,7 +64,7 @@ impl MetricsLog {
     }
 }
 
-/// Opens the table without the lines of steps after `from_step`, which a run that is resumed makes again.
+/// Opens the table without the lines of steps after `from_step`, which a resumed run repeats.
 fn open_table(path: &Path, from_step: u64) -> io::Result<File> {
     let kept = match std::fs::read_to_string(path) {
         Ok(text) => {

@@ -34,7 +34,7 @@ pub struct DataSettings {
     /// A folder of panoramas, or the training part of a packed library, in place of the synthetic ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub panoramas: Option<PathBuf>,
-    /// Samples on which the network is validated, made from seeds that it does not train on.
+    /// Validation samples, from seeds that are not used in training.
     pub validation: u64,
 }
 
@@ -54,7 +54,7 @@ impl Default for DataSettings {
     }
 }
 
-/// What a step takes from turns: the table `[turns]`.
+/// The turns of a step: the table `[turns]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TurnSettings {

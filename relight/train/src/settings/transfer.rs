@@ -40,7 +40,7 @@ pub struct TransferSettings {
     /// none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation_panoramas: Option<PathBuf>,
-    /// Turns on which the network is validated, of procedural shapes that it does not train on.
+    /// Validation turns, of procedural shapes that are not used in training.
     pub validation: u64,
 }
 

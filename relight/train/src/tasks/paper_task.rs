@@ -34,7 +34,7 @@ pub struct PaperTask {
 }
 
 impl PaperTask {
-    /// Reads what photographs are made of, opens the turns, and makes the networks.
+    /// Reads the data of photographs, opens the turns, and makes the networks.
     ///
     /// # Errors
     /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Refused`] if the phase

@@ -81,7 +81,7 @@ impl TurnNetworkTask {
     }
 }
 
-/// Unit normals, and the logarithm of the chord by which they are expected to be off.
+/// Unit normals, and the logarithm of their expected chord error.
 fn answered(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
     let normals = answer.f_narrow(1, 0, 3)?;
     let length = normals
@@ -96,7 +96,7 @@ fn answered(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
 }
 
 /// How far the logarithm of the albedo is off at each pixel and channel, 0 outside the masks. Each channel of a turn is in a
-/// unit of its own: that in which it is off by 0 in the mean.
+/// unit of its own, in which its mean error is 0.
 fn albedo_errors(answer: &Tensor, batch: &TurnBatch) -> Result<Tensor, TrainError> {
     let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
     let errors = answer

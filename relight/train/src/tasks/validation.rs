@@ -74,13 +74,13 @@ impl HeldOutTurns {
     }
 }
 
-/// Ray-cast samples of objects that are never trained on: their shapes are made, none of them is a mesh.
+/// Ray-cast samples of objects that are never trained on, all procedural.
 #[derive(Debug)]
 pub(crate) struct HeldOutSamples {
     recipe: Recipe,
     library: Library,
     count: u64,
-    /// Made when they are needed first: only one process of several looks at them.
+    /// Made at their first use, in one process only.
     samples: OnceCell<Vec<TruthArrays>>,
 }
 

@@ -6,7 +6,7 @@ use relight_core::light::{Order, Panorama, ShLight};
 
 use crate::error::TurnError;
 
-/// The light of a file: the coefficients that it holds, or a panorama (.hdr, .exr) projected to the order that gloss is
+/// The light of a file: its coefficients, or a panorama (.hdr, .exr) projected to the order that gloss is
 /// fitted with.
 ///
 /// # Errors

@@ -49,7 +49,7 @@ struct Shown<'a> {
     ball: ProbeBall,
 }
 
-/// The residual of a ball's own light, over the variation, 0 to 1, at the place that was given for it.
+/// The residual of a ball's own light, over the variation, 0 to 1, at its given place.
 ///
 /// # Errors
 /// [`TurnError::NoBall`] if that is most of it, [`TurnError::Misplaced`] if another circle has a clearly

@@ -9,7 +9,7 @@ use crate::model::harmonics::COEFFICIENTS;
 use crate::model::shading::{PixelHarmonics, ShadingModel};
 use crate::observe::curves::TurnCurves;
 
-/// Least share of what is seen that the model is taken to fit, 0 to 1. By hand.
+/// Least share of the observed light that the model is assumed to fit, 0 to 1. By hand.
 const MIN_MODEL: f64 = 0.1;
 
 /// Residual whose weight is one quarter, in standard deviations. By hand.

@@ -1,4 +1,4 @@
-//! The normal of one pixel: the one whose curve is nearest to what was seen.
+//! The normal of one pixel: the one whose curve is nearest to the observed one.
 
 use rayon::prelude::*;
 

@@ -77,7 +77,7 @@ impl TurnSolution {
         }))
     }
 
-    /// How far each normal is to be trusted, 0 to 1: one half where it is expected to be off by 11.5 degrees.
+    /// The confidence in each normal, 0 to 1: one half at an expected error of 11.5 degrees.
     #[must_use]
     pub fn confidence(&self, curves: &TurnCurves) -> Planes<1> {
         curves.map(|pixel| [confidence(self.expected_errors[pixel]) as f32])

@@ -13,7 +13,7 @@ const USUAL_UNCERTAINTY_DEG: f64 = 8.0;
 /// Uncertainty of one that was measured, degrees. By hand.
 const GIVEN_UNCERTAINTY_DEG: f64 = 1.0;
 
-/// Where an elevation or a rotation direction comes from.
+/// The source of an elevation or a rotation direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FactSource {

@@ -11,7 +11,7 @@ use crate::model::harmonics::{COEFFICIENTS, GLOSS_ORDER, HarmonicTerm};
 /// Terms of a channel's light.
 pub(crate) const TERMS: usize = (GLOSS_ORDER + 1) * (GLOSS_ORDER + 1);
 
-/// The first of them: those that a Lambertian surface shows but for little.
+/// The first of them, which nearly determine a Lambertian surface.
 pub(crate) const LAMBERTIAN_TERMS: usize = LAMBERTIAN_BANDS * LAMBERTIAN_BANDS;
 
 const LAMBERTIAN_BANDS: usize = 3;

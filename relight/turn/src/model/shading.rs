@@ -14,7 +14,7 @@ pub(crate) struct ShadingModel {
     pub(crate) frame: TableFrame,
     /// What a white diffuse surface shows along its normal; metal does not show it.
     pub(crate) diffuse: TableLight,
-    /// What gloss shows beside the diffuse part; of metal, what a white one shows.
+    /// The glossy part besides the diffuse one; for metal, that of a white one.
     pub(crate) gloss: TableLight,
     pub(crate) material: MaterialKind,
 }

@@ -11,7 +11,7 @@ use crate::observe::curves::TurnCurves;
 const SIDE: usize = 128;
 /// Part of the grid's side that the object takes. By convention: as of the objects that it was trained on.
 const FILL: f32 = 0.9;
-/// What a pixel at the mask's edge counts beside one inside. By hand: it shows some of the background.
+/// The weight of a pixel at the mask's edge relative to one inside. By hand: it shows some of the background.
 const EDGE: f32 = 0.02;
 /// Ridge on the harmonics, as a part of the mean of the diagonal. Numerical.
 const RIDGE: f64 = 1e-6;

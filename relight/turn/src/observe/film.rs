@@ -1,4 +1,4 @@
-//! What the video of a turn shows beside the object: a ball that measures its light.
+//! The ball in the video of a turn that measures its light.
 
 use std::collections::HashMap;
 

@@ -33,7 +33,7 @@ impl MirrorPanorama {
         }
     }
 
-    /// What a ball of these normals shows. What is clipped in it counts as white.
+    /// The picture of a ball with these normals. Clipped pixels count as white.
     pub(crate) fn from_curves(curves: &TurnCurves, normals: &Planes<3>, frame: TableFrame) -> Self {
         let white = curves.clipped_value();
         let mut panorama = Self::new(frame);

@@ -1,4 +1,4 @@
-//! What a shard was made from: its entry in `dataset.json`, and the session or video that lies near.
+//! The origin of a shard: its entry in `dataset.json`, and the session or video nearby.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! A ball on the table, diffuse grey or chrome, which measures the light, and what the picture shows at and around it.
+//! A ball on the table, diffuse grey or chrome, that measures the light, and the picture at and around it.
 
 use std::fmt;
 

@@ -77,7 +77,7 @@ impl ReadTurn {
     }
 }
 
-/// Reads the turn of a shard, or of what else [`Turns::open`] takes, once through. `progress` is called with the
+/// Reads the turn of a shard, or of another input of [`Turns::open`], once. `progress` is called with the
 /// number of frames done, and of all frames.
 ///
 /// # Errors

@@ -45,8 +45,8 @@ pub struct TurnFiles<'a> {
 }
 
 impl TurnFiles<'_> {
-    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and
-    /// nothing else.
+    /// Whether results may be written to the folder `out`: it is missing, empty, or holds only earlier
+    /// results.
     ///
     /// # Errors
     /// If it holds something else, or cannot be read or written.
@@ -54,7 +54,7 @@ impl TurnFiles<'_> {
         Ok(RESULTS.check(out)?)
     }
 
-    /// Writes all files into the folder `out`, which appears when they are there; an earlier result in it is
+    /// Writes all files into the folder `out`, which appears when they are complete; an earlier result in it is
     /// replaced. Gives the figures that `turn.json` holds.
     ///
     /// # Errors

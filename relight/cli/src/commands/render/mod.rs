@@ -138,7 +138,7 @@ impl RenderArguments {
         }
     }
 
-    /// The light, rotated; it is written where that is asked for.
+    /// The light, rotated; written to a file on request.
     fn read_light(&self) -> Result<ShLight, Box<dyn Error>> {
         let order = self.order.map(|order| Order::new(order.into()));
         let order = order.transpose()?;

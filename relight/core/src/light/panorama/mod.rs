@@ -14,7 +14,7 @@ use crate::image::{ColourImage, Extent, ImageError, Linear, Planes, Rgb, Samples
 
 /// Linear radiance from all around, as an equirectangular image whose every pixel has one radiance.
 ///
-/// The middle column is what the viewer sees behind the object (-z), right of it is to the right (+x),
+/// The middle column is behind the object (-z), right of it is to the right (+x),
 /// the left and right edge meet at the viewer's back (+z); rows go down from the zenith (+y).
 ///
 /// ```
@@ -126,7 +126,7 @@ impl Panorama {
         (nearest(across, width), nearest(down, height))
     }
 
-    /// The radiance from a direction: that of the pixel that lies there.
+    /// The radiance from a direction: that of its pixel.
     #[must_use]
     pub fn radiance(&self, from: Direction) -> [f32; 3] {
         let (x, y) = self.pixel_towards(from);

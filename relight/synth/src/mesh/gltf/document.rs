@@ -192,7 +192,7 @@ pub(super) struct TextureTransform {
 }
 
 impl TextureInfo {
-    /// The number of the texture coordinates on which the picture lies.
+    /// The number of the picture's texture coordinates.
     pub(super) fn coordinates(&self) -> usize {
         let transform = self.extensions.transform.as_ref();
         let other = transform.and_then(|transform| transform.tex_coord);

@@ -163,7 +163,7 @@ fn check(document: &Document) -> Result<(), String> {
     }
 }
 
-/// What an address stands for: data within it, or a file in the folder of the mesh.
+/// The target of an address: data within it, or a file in the folder of the mesh.
 fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (kind, text) = data.split_once(',').ok_or("holds no data")?;

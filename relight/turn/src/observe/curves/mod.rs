@@ -234,7 +234,7 @@ impl TurnCurves {
         1.0 - weights.iter().map(|&weight| f64::from(weight)).sum::<f64>() / weights.len() as f64
     }
 
-    /// Where the pixels under the mask stand in the frame, row by row.
+    /// The places of the pixels under the mask in the frame, row by row.
     pub(crate) fn places(&self) -> &[usize] {
         &self.places
     }
@@ -261,7 +261,7 @@ impl TurnCurves {
         &self.values[pixel * self.parts()..][..self.parts()]
     }
 
-    /// How much each of them counts, 0 or 1: nothing where it is clipped.
+    /// The weight of each, 0 or 1: 0 if it is clipped.
     pub(crate) fn weights(&self, pixel: usize) -> &[[f32; 3]] {
         &self.weights[pixel * self.parts()..][..self.parts()]
     }
@@ -289,7 +289,7 @@ impl TurnCurves {
         places.map(move |&at| map.pixel(at % width, at / width).map(f64::from))
     }
 
-    /// How many degrees of the turn the frames cover: all but gaps that are much larger than what is usual between them.
+    /// The degrees of the turn that the frames cover: all except gaps much larger than the usual distance.
     #[must_use]
     pub fn coverage_deg(&self) -> f64 {
         let mut angles: Vec<f64> = self.angles.iter().map(|angle| angle.to_degrees()).collect();

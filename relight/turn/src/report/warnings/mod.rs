@@ -1,4 +1,4 @@
-//! What a user should know of a result, and which option changes it.
+//! Warnings about a result, and the option that changes it.
 
 use relit_data::rig::RotationDirection;
 
@@ -10,7 +10,7 @@ use crate::solving::SolvedTurn;
 const MAX_RESIDUAL: f64 = 0.4;
 
 impl SolvedTurn {
-    /// What a user should know of it.
+    /// Its warnings.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = self.ball.iter().flat_map(of_ball).collect();
