@@ -22,9 +22,9 @@ import { bindTabs } from "./tabs.js";
 import { Video } from "./video.js";
 import { Work } from "./work.js";
 
-/** Longer questions are shown as going on, milliseconds. */
+/** Requests that take longer show activity, milliseconds. */
 const LONG = 300;
-/** The background to begin with. */
+/** The first background. */
 const FIRST = "room";
 
 notices.listen();
@@ -63,14 +63,14 @@ async function begin() {
   await keepOffline();
 }
 
-/** The networks can wait until there is something to be seen. */
+/** The networks load after the first picture. */
 function firstPicture(rendering) {
   return new Promise((resolve) => {
     for (const event of ["picture", "problem"]) rendering.addEventListener(event, resolve, { once: true });
   });
 }
 
-/** Undo and redo: of the sketch while an object is cut out, else of the scene. */
+/** Undo and redo: in the sketch while an object is being cut out, else in the scene. */
 function bindSteps(work, cutter) {
   const step = (by) => (by < 0 ? work.undo() : work.redo());
   $("undo").addEventListener("click", () => step(-1));
@@ -91,7 +91,7 @@ function bindSteps(work, cutter) {
   });
 }
 
-/** As long as it is pressed; by keys, pressed and pressed again. */
+/** Held with a pointer; toggled with the keyboard. */
 function bindBefore(rendering) {
   const button = $("before");
   const show = (before) => {
@@ -109,13 +109,13 @@ function bindBefore(rendering) {
   });
 }
 
-/** A file may be a photograph, a captured object or a kept scene. */
+/** A file may be a photograph, a captured object or a saved scene. */
 function takeObjects(objects, saving) {
   const take = async (file) => ((await isZip(file)) ? saving.reopen(file) : objects.add(file));
   for (const field of ["photo-file", "camera-file"]) fields.takeFiles(field, take);
 }
 
-/** What the engine does, and what it says of the picture. */
+/** The engine's activity, and its notes on the picture. */
 function showState(engine, rendering) {
   let timer = 0;
   engine.addEventListener("busy", ({ detail }) => {

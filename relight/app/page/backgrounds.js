@@ -1,4 +1,4 @@
-// The background of the scene: one of the bundled panoramas, a panorama or a photograph of one's own.
+// The background of the scene: a bundled panorama, or the user's own panorama or photograph.
 
 import { $, make } from "./dom.js";
 import { copyOf } from "./files.js";
@@ -19,7 +19,7 @@ export class Backgrounds {
     this.#show();
   }
 
-  /** Puts a file of one's own behind the objects. */
+  /** Sets the user's own file as the background. */
   async open(file, kind) {
     calm();
     say(`Opening ${file.name} …`);

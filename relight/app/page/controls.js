@@ -8,7 +8,7 @@ const percent = (value) => `${Math.round(100 * value)} %`;
 const stops = (value) => `${value > 0 ? "+" : ""}${value.toFixed(1)}`;
 const NO_GLOSS = [0.3, 60];
 
-/** Controls by their id: whose value it is, how it is read and what a new one changes, and how it is told. */
+/** Controls by id: the owner of the value, how to read it, what a new value changes, and how to display it. */
 const CONTROLS = {
   "height": { of: "object", read: ({ height }) => height, write: (height) => ({ height }), text: percent },
   "rotation": { of: "object", read: ({ rotation }) => rotation, write: (rotation) => ({ rotation }), text: degrees },

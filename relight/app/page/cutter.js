@@ -1,4 +1,4 @@
-// An object is cut out of its photograph by a sketch; the mask follows.
+// Cuts an object out of its photograph by a sketch; the mask follows.
 
 import { $, make, pixels } from "./dom.js";
 import { attempt } from "./notices.js";
@@ -21,7 +21,7 @@ export class Cutter {
   #sketcher = new Sketcher($("cut-canvas"));
   #photo = null;
   #done = null;
-  /** The sketch that the mask shows, and whether one is being made. */
+  /** The sketch of the current mask, and whether one is being made. */
   #cutOf = null;
   #cutting = false;
 
@@ -44,7 +44,7 @@ export class Cutter {
     return this.#draw(photo, photo.sketch ?? found ?? EMPTY);
   }
 
-  /** The sketch of a photograph that needs none; null where a person has to say where the object is. */
+  /** The sketch of a photograph that needs no strokes; null if the user has to mark the object. */
   async #find(photo) {
     try {
       await this.#library.cut(photo, BY_BACKGROUND);
@@ -67,7 +67,7 @@ export class Cutter {
     return new Promise((resolve) => (this.#done = resolve));
   }
 
-  /** Takes the last step back, or again. */
+  /** Undoes or redoes the last step. */
   step(by) {
     this.#sketcher.step(by);
   }
@@ -84,7 +84,7 @@ export class Cutter {
     this.#close(true);
   }
 
-  /** Back to the mask as it was, where there was one. */
+  /** Restores the earlier mask, if there was one. */
   async #cancel() {
     const { sketch } = this.#photo;
     if (sketch && (this.#cutting || this.#cutOf !== sketch)) await attempt(() => this.#library.cut(this.#photo, sketch));

@@ -1,4 +1,4 @@
-// Elements of the page: found by their id, made of text and never of markup.
+// Elements of the page: found by id, built from text and never from markup.
 
 export const $ = (id) => document.getElementById(id);
 

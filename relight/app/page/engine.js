@@ -1,29 +1,29 @@
-// The engine as the page sees it: questions and answers. After a fault it is started anew and given again what it held.
+// The engine as the page sees it: requests and answers. After a crash it is restarted and gets its contents again.
 
 import { Held } from "./held.js";
 
 /** The smallest module that needs SIMD. */
 const SIMD = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];
-const NO_WASM = "This browser cannot run relight: it needs WebAssembly with SIMD, which browsers have had since 2023.";
+const NO_WASM = "This browser cannot run relight: it lacks WebAssembly with SIMD. Use a browser from 2023 or later.";
 
 /** The engine, and the weights of its networks. */
 export const MODULE = "relight.wasm";
 export const NETWORKS = "weights.safetensors";
 
-/** Questions after which the networks will be needed. */
+/** Requests after which the networks will be needed. */
 const NEED_NETWORKS = new Set(["open_photo", "open_pixels", "import"]);
 
-/** The engine ended while it answered. */
+/** The engine crashed during a request. */
 export class Fault extends Error {}
 
-/** Events: "restart" (detail: a sentence), "busy" (detail: how many questions are open). */
+/** Events: "restart" (detail: a sentence), "busy" (detail: the number of open requests). */
 export class Engine extends EventTarget {
-  /** Bytes of the engine's memory after its last answer. */
+  /** The engine's memory after its last answer, bytes. */
   memory = 0;
 
   #module;
   #loading;
-  /** The file of the networks, from when the engine has it, and its way into the engine from when they are first wanted. */
+  /** The file of the networks, once loaded, and its transfer into the engine, once they are needed. */
   #networks = null;
   #prepared = null;
   #worker;
@@ -53,7 +53,7 @@ export class Engine extends EventTarget {
     return this.#prepared;
   }
 
-  /** Asks the engine. Its answer's parts are in `parts`, and `seconds` is how long it took; refusals and faults are thrown as sentences. */
+  /** Sends a request. The answer has its `parts` and the `seconds` it took; refusals and crashes are thrown as errors with a sentence. */
   async ask(op, fields = {}, parts = []) {
     if (this.#restarting) await this.#restarting;
     if (NEED_NETWORKS.has(op)) await this.prepare();
@@ -102,7 +102,7 @@ export class Engine extends EventTarget {
     resolve({ ...reply, parts, seconds: (end - began) / 1000 });
   }
 
-  /** The worker itself broke: nothing that is open will be answered. */
+  /** The worker itself failed: open requests get no answer. */
   #failed(event) {
     event.preventDefault();
     const open = [...this.#open.values()];
@@ -118,11 +118,11 @@ export class Engine extends EventTarget {
         const loss = lost.length > 0 ? ` These could not be opened again: ${lost.join(", ")}.` : "";
         this.dispatchEvent(new CustomEvent("restart", { detail: `The engine crashed and was started again (${fault}).${loss}` }));
       })
-      .catch((error) => this.dispatchEvent(new CustomEvent("restart", { detail: `The engine could not be started again: ${error.message}` })))
+      .catch((error) => this.dispatchEvent(new CustomEvent("restart", { detail: `The engine could not be restarted: ${error.message} Reload the page.` })))
       .finally(() => (this.#restarting = null));
   }
 
-  /** A new worker that holds what the old one held; the names of what it would not take. */
+  /** Starts a new worker with the contents of the old one; returns the names of what it refused. */
   async #rebuild() {
     const waiting = [...this.#open.values()];
     const lost = [];
@@ -139,7 +139,7 @@ export class Engine extends EventTarget {
     return lost;
   }
 
-  /** The first request that fails again, if any. */
+  /** Repeats the requests; returns the first that fails again, if any. */
   async #giveAgain() {
     for (const request of this.#held.requests()) {
       try {

@@ -1,18 +1,18 @@
-// Files that somebody brings: by a field behind a button, dropped or pasted. What comes before the engine is there is kept.
+// Files from the user: chosen with a button, dropped or pasted. Files that come before the engine is ready are kept.
 
 import { $ } from "./dom.js";
 import { copyOf } from "./files.js";
 import { attempt, say } from "./notices.js";
 
-/** The field of what is dropped or pasted. */
+/** The field for dropped or pasted files. */
 const ANY = "photo-file";
 
 /** What to do with a file, by field. */
 const takers = new Map();
-/** Files that came before they could be taken: { field, name, copy }. Null from when they are taken at once. */
+/** Files that came too early: { field, name, copy }. Null once files are handled at once. */
 let waiting = [];
 
-/** Listens to all fields, to the buttons before them, and to what is dropped or pasted. */
+/** Listens to all fields and their buttons, and to dropped and pasted files. */
 export function listen() {
   for (const button of document.querySelectorAll("[data-opens]")) button.addEventListener("click", () => $(button.dataset.opens).click());
   for (const field of fields()) {
@@ -34,19 +34,19 @@ export function listen() {
   });
 }
 
-/** Says what to do with the files of a field. */
+/** Sets the handler for the files of a field. */
 export function takeFiles(field, take) {
   takers.set(field, take);
 }
 
-/** Takes the files that came before, one after the other, and from now on each as it comes. */
+/** Handles the early files in order, and from now on each as it comes. */
 export async function takeWaiting() {
   const files = waiting;
   waiting = null;
   for (const { field, copy } of files) await attempt(async () => takers.get(field)(await copy));
 }
 
-/** Takes no file, ever: says why. */
+/** Refuses all files from now on, with the reason. */
 export function refuseFiles(why) {
   const refuse = () => {
     throw new Error(why);
@@ -59,7 +59,7 @@ const fields = () => document.querySelectorAll("input[type=file]");
 
 function arrived(field, file) {
   if (!waiting) return attempt(() => takers.get(field)(file));
-  // Read at once: until its turn comes the file may change or go.
+  // Read at once: the file may change or disappear before its turn.
   const copy = copyOf(file);
   copy.catch(() => {});
   waiting.push({ field, name: file.name, copy });

@@ -1,18 +1,18 @@
-// Files that somebody chose: what the engine reads itself, what only the browser reads, and what nobody should.
+// Files from the user: those that the engine reads, those that only the browser reads, and those to refuse.
 
-/** More is not read, bytes. */
+/** The largest file, bytes. */
 const MOST_BYTES = 100e6;
-/** More is not decoded, pixels. */
+/** The largest picture, pixels. */
 const MOST_PIXELS = 100e6;
-/** To so many pixels a picture is reduced that the browser decodes. */
+/** Pictures that the browser decodes are reduced to this many pixels. */
 const KEPT_PIXELS = 2 ** 21;
-/** As much of a file says what it is. */
+/** The bytes that identify a file's type. */
 const HEAD = 65536;
 
-/** How files begin that the engine reads: [offset, text]. */
+/** Signatures of files that the engine reads: [offset, text]. */
 const READ_BY_ENGINE = [[0, "\xff\xd8\xff"], [0, "\x89PNG"], [8, "WEBP"], [0, "\x76\x2f\x31\x01"], [0, "#?"]];
 
-/** Whether the engine reads a file itself. Refuses what is too much or nothing. */
+/** Whether the engine reads a file itself. Refuses empty and too large files. */
 export async function openable(file) {
   if (file.size === 0) throw new Error(`${file.name} is empty.`);
   if (file.size > MOST_BYTES) throw new Error(`${file.name} is too large: ${(file.size / 1e6).toFixed(0)} MB; the limit is ${MOST_BYTES / 1e6} MB.`);
@@ -22,12 +22,12 @@ export async function openable(file) {
   return READ_BY_ENGINE.some(([at, text]) => head.startsWith(text, at));
 }
 
-/** Whether a file is a zip that may be a kept scene: a captured object is a zip of another kind. */
+/** Whether a file is a zip that may be a saved scene: a captured object is a zip of another kind. */
 export async function isZip(file) {
   return !isCaptured(file) && (await headOf(file)).startsWith("PK\x03\x04");
 }
 
-/** A picture that the browser decodes, as it is to be looked at and not too large: { fields: { name, width, height }, rgba }. */
+/** A picture decoded by the browser, upright and not too large: { fields: { name, width, height }, rgba }. */
 export async function asPixels(file) {
   const [wide, high] = declaredSize(await headOf(file)) ?? [0, 0];
   if (wide * high > MOST_PIXELS) throw new Error(`${file.name} is too large: ${wide} × ${high} pixels; the limit is ${MOST_PIXELS / 1e6} million.`);
@@ -42,12 +42,12 @@ export async function asPixels(file) {
   return { fields: { name: file.name, width, height }, rgba: new Uint8Array(context.getImageData(0, 0, width, height).data.buffer) };
 }
 
-/** A copy that stays readable when the file changes or goes. */
+/** A copy that stays readable if the file changes or disappears. */
 export async function copyOf(file) {
   try {
     return new File([await file.arrayBuffer()], file.name || "photo", { type: file.type });
   } catch {
-    throw new Error(`${file.name} cannot be read.`);
+    throw new Error(`${file.name} cannot be read: choose it again.`);
   }
 }
 
@@ -69,8 +69,8 @@ function declaredSize(head) {
   return sizes.sort((a, b) => b[0] * b[1] - a[0] * a[1])[0] ?? null;
 }
 
-/** An integer of so many bytes, the lowest first. */
+/** A little-endian integer of so many bytes. */
 const little = (text, at, bytes) => [...text.slice(at, at + bytes)].reduceRight((sum, letter) => 256 * sum + letter.charCodeAt(0), 0);
 
-/** An integer, the highest byte first. */
+/** A big-endian integer. */
 const big = (text) => [...text].reduce((sum, letter) => 256 * sum + letter.charCodeAt(0), 0);

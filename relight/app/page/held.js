@@ -1,6 +1,6 @@
-// What the engine holds, as the requests that gave it: files, strokes, the background. A new engine is given them again.
+// The engine's contents, as the requests that made them: files, strokes, the background. A new engine gets them again.
 
-/** The key under which a request is kept, for those that leave something in the engine. */
+/** The key of a request, if it changes the engine's contents. */
 const KEYS = {
   open_photo: ({ object }) => `object ${object}`,
   open_pixels: ({ object }) => `object ${object}`,
@@ -12,7 +12,7 @@ const KEYS = {
 export class Held {
   #requests = new Map();
 
-  /** Keeps a request that was answered, as far as it changed what the engine holds. */
+  /** Keeps an answered request, if it changed the engine's contents. */
   note(request) {
     const { op, object } = request.fields;
     if (op === "import") this.#requests.clear();
@@ -24,12 +24,12 @@ export class Held {
     if (key) this.#requests.set(key, request);
   }
 
-  /** All requests, in the order in which they were first made. */
+  /** All requests, in their first order. */
   requests() {
     return [...this.#requests.values()];
   }
 
-  /** Gives a request up; the name of what is lost. */
+  /** Drops a request; returns the name of what is lost. */
   drop({ fields }) {
     this.#requests.delete(KEYS[fields.op](fields));
     if (fields.object !== undefined) this.#requests.delete(`mask ${fields.object}`);

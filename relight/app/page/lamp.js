@@ -1,4 +1,4 @@
-// The lamp: dragged on a dial of the sky, which is seen from above, and on the picture, around the selected object.
+// The lamp: dragged on a dial of the sky, seen from above, and on the picture, around the selected object.
 
 import { $, clamp } from "./dom.js";
 import { lampAt, lampAzimuth } from "./scene.js";
@@ -21,7 +21,7 @@ export class Lamp {
     rendering.addEventListener("picture", () => this.#show());
   }
 
-  /** The middle of the dial is above, its edge the horizon, its lower end the viewer's side. */
+  /** The centre of the dial is the zenith, its edge the horizon, its lower end the viewer's side. */
   #onDial(event) {
     const box = $("dial").getBoundingClientRect();
     const [x, y] = [(2 * (event.clientX - box.left)) / box.width - 1, (2 * (event.clientY - box.top)) / box.height - 1];
@@ -29,7 +29,7 @@ export class Lamp {
     this.#turn(Math.atan2(x, y) / RADIANS, elevation);
   }
 
-  /** The lamp stays before the object, or behind it, as it was. */
+  /** The lamp stays on its side of the object, in front or behind. */
   #onPicture(event) {
     const [x, y] = this.#aroundObject(event);
     const far = Math.hypot(x, y);
@@ -46,7 +46,7 @@ export class Lamp {
     return Math.cos(lampAzimuth(this.#work.scene.light) * RADIANS) < -1e-6;
   }
 
-  /** Where a pointer is, from the object's middle: to the right and up, 1 at the lamp's distance. */
+  /** The pointer's position from the object's centre: to the right and up, 1 at the lamp's distance. */
   #aroundObject(event) {
     const box = $("picture").getBoundingClientRect();
     const scale = this.#rendering.width / box.width;
@@ -59,7 +59,7 @@ export class Lamp {
     return REACH * Math.min(this.#rendering.width, this.#rendering.height);
   }
 
-  /** The middle of the selected object, or of the picture, pixels of the picture; inside, so that the lamp can be reached. */
+  /** The centre of the selected object, or of the picture, in pixels; inside the picture, so that the lamp can be reached. */
   #middle() {
     const { width, height, boxes } = this.#rendering;
     const [x, y, w, h] = boxes.find(({ key }) => key === this.#work.selected)?.box ?? [0, 0, width, height];

@@ -1,14 +1,14 @@
-// What the page knows of the photographs and backgrounds that the engine holds: their names, pictures, masks and strokes.
+// The page's record of the engine's photographs and backgrounds: names, pictures, masks and strokes.
 
 import { canvasOf } from "./dom.js";
 import { openable, asPixels } from "./files.js";
 
 /** The longer side of a small picture in a list, pixels. */
 const SMALL = 112;
-/** A new object's height, and the most of the picture's width that it takes. */
+/** A new object's height, and its largest part of the picture's width. */
 const TALL = 0.5;
 const WIDE = 0.6;
-/** A new object is enlarged so many times at most. */
+/** The largest enlargement of a new object. */
 const ENLARGED = 16;
 
 export class Library {
@@ -21,7 +21,7 @@ export class Library {
   #number = 0;
   /** The engine's background. */
   #background = null;
-  /** Ends with the last question that goes by the engine's background. */
+  /** Resolves with the last request that uses the engine's background. */
   #asked = Promise.resolve();
 
   constructor(engine) {
@@ -45,7 +45,7 @@ export class Library {
     return answer;
   }
 
-  /** Takes a photograph apart, where that is not yet done. */
+  /** Decomposes a photograph, if that is not yet done. */
   async decompose(photo) {
     if (photo.layers) return photo.layers;
     const { parts, width, height, ...answer } = await this.#engine.ask("decompose", { object: photo.object });
@@ -54,12 +54,12 @@ export class Library {
     return photo.layers;
   }
 
-  /** What was made of an older mask is gone; the new one is shown in lists. */
+  /** Drops results of an older mask; lists show the new one. */
   cutAnew(photo, sketch) {
     Object.assign(photo, { sketch, layers: null, masked: true, small: smallOf(photo) });
   }
 
-  /** Gives photographs back to the engine that no scene has any more. */
+  /** Frees photographs that no scene uses any more. */
   async closeAllBut(reachable) {
     for (const object of [...this.photos.keys()]) {
       if (reachable.has(object)) continue;
@@ -68,7 +68,7 @@ export class Library {
     }
   }
 
-  /** The backgrounds that the engine makes. */
+  /** The engine's own backgrounds. */
   async bundled() {
     const { panoramas, parts } = await this.#engine.ask("backgrounds");
     panoramas.forEach(({ id, name }, index) => {
@@ -94,7 +94,7 @@ export class Library {
     return background;
   }
 
-  /** Asks the engine for something of a scene, before the background of that scene and nobody else's. */
+  /** Sends a request for a scene, with that scene's background in the engine. */
   askBefore(key, op, fields) {
     return this.#inTurn(async () => {
       if (this.#background !== key) {
@@ -106,14 +106,14 @@ export class Library {
     });
   }
 
-  /** Does something after all that was to be done so before it. */
+  /** Runs an action after all earlier ones. */
   #inTurn(work) {
     const done = this.#asked.then(work);
     this.#asked = done.catch(() => {});
     return done;
   }
 
-  /** Opens a kept scene's file in place of everything: its scene, and the key of its background. */
+  /** Opens a saved scene in place of everything: its scene, and the key of its background. */
   reopen(file) {
     return this.#inTurn(async () => {
       const answer = await this.#engine.ask("import", {}, [file]);
@@ -132,7 +132,7 @@ export class Library {
     return this.#takeBackground(background, rest[0]);
   }
 
-  /** The background of a kept scene: one of the engine's, or the kept file's, which only the engine has. */
+  /** The background of a saved scene: one of the engine's own, or that of the file, which only the engine has. */
   #takeBackground({ kind, name, id, width, height }, thumbnail) {
     const known = id !== undefined && this.backgrounds.get(id);
     const key = known ? id : `own ${++this.#number}`;
@@ -152,7 +152,7 @@ export class Library {
     this.photos.set(photo.object, photo);
   }
 
-  /** Gives a file to the engine as it is; where it is of a kind that only the browser knows, as pixels. */
+  /** Gives a file to the engine as it is; as pixels, if only the browser can read it. */
   async #ask(file, asFile, asRead) {
     const known = await openable(file);
     if (known) return asFile(file.name, [file]);
@@ -161,7 +161,7 @@ export class Library {
   }
 }
 
-/** Where a new object comes to stand: high, but not too wide, and beside what is there. */
+/** The place of a new object: high, but not too wide, and next to the others. */
 export function placeFor(photo, scene) {
   const [, , w, h] = boundsOf(photo);
   const [width, height] = scene.size;
@@ -169,7 +169,7 @@ export function placeFor(photo, scene) {
   return { at: [beside, 0.9], height: Math.min(TALL, (WIDE * width * h) / (w * height), (ENLARGED * h) / height) };
 }
 
-/** The rectangle that a photograph's mask takes. */
+/** The bounding box of a photograph's mask. */
 export function boundsOf({ mask, width, height }) {
   if (!mask) return [0, 0, width, height];
   let [left, top, right, bottom] = [width, height, -1, -1];
@@ -216,7 +216,7 @@ function maskCanvas({ mask, width, height }) {
   return canvas;
 }
 
-/** A small picture of a background's file; a grey one of what the browser cannot read. */
+/** A small picture of a background's file; a grey one if the browser cannot read it. */
 async function smallOfFile(file) {
   const small = new OffscreenCanvas(96, 48);
   const context = small.getContext("2d");
@@ -227,7 +227,7 @@ async function smallOfFile(file) {
   return small;
 }
 
-/** The sides of a thumbnail of which only the number of pixels is known. */
+/** The sides of a thumbnail from its number of pixels. */
 function sidesOf(rgba, width, height) {
   const pixels = rgba.length / 4;
   if (pixels === 96 * 48) return [96, 48];

@@ -1,4 +1,4 @@
-// What the page loads before it can work, as a bar in bytes. What fails is said, and loaded again when somebody asks for it.
+// Loads what the page needs before it works, with a progress bar in bytes. Failures are shown, and "Try again" repeats them.
 
 import { $ } from "./dom.js";
 
@@ -7,7 +7,7 @@ const LIST = "files.json";
 
 export class Loading {
   #names;
-  /** Bytes of each file, and how many of them are here. */
+  /** Bytes of each file, and how many have arrived. */
   #sizes = null;
   #here = new Map();
   /** The files that are in use. */
@@ -18,7 +18,7 @@ export class Loading {
     this.#names = names;
   }
 
-  /** Loads a file and hands it to `use`, again and again until that succeeds. `what` names it to people. */
+  /** Loads a file and passes it to `use`, until that succeeds. `what` is its name in messages. */
   async file(what, name, use) {
     for (let cache = "default"; ; cache = "reload") {
       try {
@@ -71,7 +71,7 @@ export class Loading {
   }
 }
 
-/** Says what failed; goes on when somebody asks for it. */
+/** Shows what failed; resolves on "Try again". */
 async function askAgain(fault) {
   sayFault(fault);
   $("loading-again").hidden = false;
@@ -80,7 +80,7 @@ async function askAgain(fault) {
   sayFault("");
 }
 
-/** Says why the page does not start. */
+/** Shows why the page does not start. */
 export function sayFault(fault) {
   $("loading").hidden = false;
   $("loading-fault").textContent = fault;

@@ -1,13 +1,13 @@
-// What the page says: a quiet line for what goes on, an alert for what failed. One sentence each.
+// Messages: a quiet line for progress, an alert for failures. One sentence each.
 
 import { $ } from "./dom.js";
 
-/** Says what goes on or was done. */
+/** Shows what is going on or was done. */
 export function say(text) {
   $("status").textContent = text;
 }
 
-/** Says what failed, until it is read. */
+/** Shows what failed, until it is closed. */
 export function alert(text) {
   $("alert-text").textContent = sentence(text);
   $("alert").hidden = false;
@@ -17,13 +17,13 @@ export function alert(text) {
 /** The engine's messages end without a full stop, as they do in a terminal. */
 const sentence = (text) => (/[.!?]$/.test(text) ? text : `${text}.`);
 
-/** Takes the alert away. */
+/** Closes the alert. */
 export function calm() {
   $("alert").hidden = true;
   $("alert-text").textContent = "";
 }
 
-/** Does something that may fail; what went wrong is said. */
+/** Runs an action that may fail, and shows its error. */
 export async function attempt(doing) {
   try {
     return await doing();
@@ -33,7 +33,7 @@ export async function attempt(doing) {
   }
 }
 
-/** Sentences for what nobody foresaw, so that the page stays in use. */
+/** Alerts for unexpected errors, so that the page stays usable. */
 export function listen() {
   $("alert-close").addEventListener("click", calm);
   window.addEventListener("error", (event) => {

@@ -1,4 +1,4 @@
-// The objects of the scene: added from files, listed, ordered, copied, removed; and what a photograph was decomposed into.
+// The objects of the scene: added from files, listed, ordered, copied, removed; and the layers of a decomposed photograph.
 
 import { $, make } from "./dom.js";
 import { copyOf } from "./files.js";
@@ -28,7 +28,7 @@ export class Objects {
     this.#show();
   }
 
-  /** Puts the object of a file into the scene, after it is cut out. */
+  /** Adds the object of a file to the scene, after it is cut out. */
   async add(file) {
     if (this.#opening || this.#cutter.isOpen) throw new Error("Finish the object that is being cut out first.");
     calm();
@@ -126,7 +126,7 @@ export class Objects {
     if (photo !== this.#photo) return;
     this.#layersOf = layers || null;
     $("layers").replaceChildren(...(layers ? LAYERS.map((name, index) => this.#tile(layers, name, index)) : []));
-    $("layers-note").textContent = layers?.glossy ? "Much of it is overexposed: highlights were separated." : "";
+    $("layers-note").textContent = layers?.glossy ? "It is partly overexposed, so highlights were separated." : "";
   }
 
   #tile({ pictures }, name, index) {

@@ -1,8 +1,8 @@
-// The page stays in the browser, so that it opens without a network.
+// Stores the page in the browser, so that it opens offline.
 
 import { $ } from "./dom.js";
 
-/** Keeps the page's files; says when they are all here. Where the browser does not keep pages, says that. */
+/** Stores the page's files and shows when all are stored, or that the browser does not store pages. */
 export async function keepOffline() {
   if (!("serviceWorker" in navigator)) return show("online", "Online only: browsers store pages only if they are opened over https");
   try {

@@ -1,5 +1,5 @@
-// The picture of the scene, made of the engine's layers by the graphics card: shadows are multiplied into the background, then
-// objects are laid over it, all in linear light. Layers can stand elsewhere than they were made, until new ones are there.
+// Composes the picture of the scene from the engine's layers on the graphics card: shadows are multiplied into the background, then
+// objects are laid over it, all in linear light. Layers can be moved from where they were made, until new ones arrive.
 
 const VERTEX = `#version 300 es
 uniform mat3 place;
@@ -43,7 +43,7 @@ void main() {
   colour = vec4(mix(light * 12.92, 1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, light)), 1);
 }`;
 
-/** A painter on a canvas: by WebGL2, or plainly where there is none. */
+/** A painter on a canvas: with WebGL2, else without. */
 export function painterOn(canvas) {
   const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
   return gl ? new LayerPainter(canvas, gl) : new PlainPainter(canvas);
@@ -206,7 +206,7 @@ function program(gl, fragment) {
     gl.attachShader(program, shader);
   }
   gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) throw new Error(`The graphics card refuses the page's program: ${gl.getProgramInfoLog(program)}`);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) throw new Error(`The graphics card cannot run the page's shaders: ${gl.getProgramInfoLog(program)}`);
   const uniforms = Object.fromEntries(["place", "picture", "shadow"].map((name) => [name, gl.getUniformLocation(program, name)]));
   return { program, uniforms };
 }

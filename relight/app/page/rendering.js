@@ -1,5 +1,5 @@
-// The picture of the stage: asks the engine for layers, one question at a time and always for the newest scene. While something
-// changes the picture is small; when it rests, sharp. Where only placements change, the layers that are here are moved.
+// The picture of the stage: requests layers from the engine, one request at a time and always for the newest scene. While something
+// changes, the picture is small; at rest it is sharp. If only placements change, the current layers are moved.
 
 import { clamp } from "./dom.js";
 import { forEngine, lookOf } from "./scene.js";
@@ -7,18 +7,18 @@ import { forEngine, lookOf } from "./scene.js";
 /** The longer side of a picture while something changes, pixels. */
 const DRAFT = 512;
 const LEAST_DRAFT = 256;
-/** A draft may take so long before smaller ones are made, milliseconds. */
+/** Drafts that take longer are made smaller, milliseconds. */
 const PATIENCE = 60;
 /** Rest before new layers are made for new placements, and before a picture is made sharp, milliseconds. */
 const PLACED = 150;
 const STILL = 300;
 const SHARPEST = 1280;
 
-/** Events: "picture" (a new one is shown), "state" (it rests or does not), "problem" (detail: a sentence). */
+/** Events: "picture" (a new one is shown), "state" (at rest or not), "problem" (detail: a sentence). */
 export class Rendering extends EventTarget {
   /** Where the objects stand in the picture that is shown: [{ key, box }], from back to front. */
   boxes = [];
-  /** What the engine says of the picture. */
+  /** The engine's notes on the picture. */
   notes = [];
   width = 4;
   height = 3;
@@ -44,7 +44,7 @@ export class Rendering extends EventTarget {
     canvas.addEventListener("empty", () => this.refresh());
   }
 
-  /** Makes the picture anew, although the scene is the same. */
+  /** Makes the picture again, although the scene is the same. */
   refresh() {
     this.#shown = this.#before = null;
     this.#sceneChanged();
@@ -63,7 +63,7 @@ export class Rendering extends EventTarget {
     this.#plan();
   }
 
-  /** Whether the picture is the scene's, and as sharp as it becomes. */
+  /** Whether the picture is that of the scene, in full sharpness. */
   get rests() {
     return !this.#running && this.#next() === null;
   }
@@ -76,7 +76,7 @@ export class Rendering extends EventTarget {
     if (next) this.#timer = setTimeout(() => this.#make(next.sharp), Math.max(0, next.at - performance.now()));
   }
 
-  /** What is to be made next, and when. */
+  /** What to make next, and when. */
   #next() {
     const { scene } = this.#work;
     if (this.#wantsBefore) return this.#before?.scene === scene ? null : { sharp: true, at: 0 };
@@ -117,7 +117,7 @@ export class Rendering extends EventTarget {
     if (!this.#wantsBefore) this.#show();
   }
 
-  /** Shows what is here: the layers, or the picture of before where it is the scene's. */
+  /** Shows the current layers, or the picture from before, if it is the scene's. */
   #show() {
     const { scene, picture } = this.#wantsBefore ? this.#before ?? {} : { scene: this.#shown?.scene, picture: this.#shown?.layers };
     if (!picture || (this.#wantsBefore && scene !== this.#work.scene)) return;
@@ -127,7 +127,7 @@ export class Rendering extends EventTarget {
     if (!this.#wantsBefore) this.#paint();
   }
 
-  /** Smaller drafts where they take long, larger ones where they do not. */
+  /** Smaller drafts if they take long, larger ones if not. */
   #learn(took) {
     const factor = clamp(Math.sqrt(PATIENCE / took), 0.8, 1.1);
     this.#draft = Math.round(clamp(this.#draft * factor, LEAST_DRAFT, DRAFT));
@@ -144,7 +144,7 @@ export class Rendering extends EventTarget {
     this.dispatchEvent(new Event("picture"));
   }
 
-  /** Paints the layers that are here as the scene wants them to stand. */
+  /** Paints the current layers in the scene's placement. */
   #paint() {
     if (!this.#painter.layered || !this.#shown?.layers) return;
     const { scene, layers } = this.#shown;
@@ -165,7 +165,7 @@ export class Rendering extends EventTarget {
 
 const boxOf = ({ box, place, width, height }) => box ?? [...place, width, height];
 
-/** How an object's layer gets from where it was made to where it is to stand, pixels. */
+/** The transformation of an object's layer from where it was made to its new place, pixels. */
 function moveOf(from, to, width, height) {
   const foot = [from.at[0] * width, from.at[1] * height];
   const [dx, dy] = [to.at[0] * width - foot[0], to.at[1] * height - foot[1]];

@@ -1,4 +1,4 @@
-// What leaves the page, by the browser's own ways: pictures and kept scenes as downloads or through its share sheet.
+// Saves pictures and scenes as downloads or through the browser's share sheet.
 
 import { $ } from "./dom.js";
 import { takeFiles } from "./fields.js";
@@ -29,7 +29,7 @@ export class Saving {
     say("The picture is saved.");
   }
 
-  /** Through the share sheet where the browser has one for files, else as a download. */
+  /** Through the share sheet, if the browser has one for files, else as a download. */
   async #share() {
     const file = await this.#picture("jpeg");
     if (!navigator.canShare?.({ files: [file] })) {
@@ -47,7 +47,7 @@ export class Saving {
 
   async #picture(format) {
     const scene = this.#ready();
-    say("Making the picture in full size …");
+    say("Rendering the picture in full size …");
     const { parts } = await this.#library.askBefore(scene.background, "save", { scene: forEngine(scene), format });
     return new File(parts, `relight.${ENDS[format]}`, { type: TYPES[format] });
   }
@@ -61,7 +61,7 @@ export class Saving {
     say("The scene is saved, with its photographs.");
   }
 
-  /** Opens a kept scene in place of this one. */
+  /** Opens a saved scene in place of this one. */
   async reopen(file) {
     calm();
     if (!(await isZip(file))) throw new Error(`${file.name} is not a saved scene: choose a zip file that this page saved.`);
@@ -81,7 +81,7 @@ export class Saving {
   }
 }
 
-/** Hands a file to the browser's downloads. */
+/** Saves a file as a download. */
 export function download(file) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(file);

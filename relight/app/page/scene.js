@@ -1,11 +1,11 @@
-// The scene: what stands where, in which light. Plain values; every change makes a new scene.
+// The scene: objects, their places and the light. Plain values; every change makes a new scene.
 
 export const MOST_OBJECTS = 12;
-/** A scene's fields that the engine knows, besides its objects'. */
+/** The engine's fields of a scene, without those of its objects. */
 const FIELDS = ["size", "fov", "down", "tilt", "match", "white_balance", "exposure", "light"];
 const OBJECT_FIELDS = ["object", "at", "height", "rotation", "tint", "gloss", "exposure", "shadow"];
 const LIGHT = { kind: "background", azimuth: 45, elevation: 45, colour: "#ffffff", size: 30, ambient: 0.15, angle: 0 };
-/** Of a copy, beside that of which it was made, in parts of the picture. */
+/** The offset of a copy from its original, in parts of the picture. */
 const BESIDE = 0.08;
 
 let keys = 0;
@@ -14,7 +14,7 @@ export const emptyScene = (background) => ({
   background, size: [1280, 960], fov: 60, down: 10, match: true, white_balance: "light", exposure: 0, light: LIGHT, objects: [],
 });
 
-/** An object as it comes into a scene. `key` names it in the page for as long as it stays. */
+/** A new object of a scene. `key` is its name in the page as long as it exists. */
 export function newObject(object, place) {
   return { key: ++keys, object, at: [0.5, 0.9], height: 0.4, rotation: 0, tint: [1, 1, 1], gloss: null, exposure: 0, shadow: 1, ...place };
 }
@@ -49,7 +49,7 @@ export function duplicated(scene, key) {
   return added(scene, newObject(object.object, { ...object, at: [x, object.at[1]] }));
 }
 
-/** The object a step nearer to the viewer, or farther by -1. */
+/** Moves the object a step nearer to the viewer, or farther by -1. */
 export function reordered(scene, key, step) {
   const objects = [...scene.objects];
   const from = objects.findIndex((object) => object.key === key);
@@ -59,17 +59,17 @@ export function reordered(scene, key, step) {
   return { ...scene, objects };
 }
 
-/** Where the lamp is seen: all light is turned, and it with all. */
+/** The azimuth at which the lamp appears, with the rotation of the light. */
 export const lampAzimuth = ({ azimuth, angle }) => around(azimuth + angle);
 
-/** A lamp that is seen at an azimuth. */
+/** A lamp that appears at an azimuth. */
 export const lampAt = (azimuth, { angle }) => ({ azimuth: around(azimuth - angle) });
 
 const around = (degrees) => Math.round(((degrees % 360) + 360) % 360) % 360;
 
 export const find = (scene, key) => scene.objects.find((object) => object.key === key);
 
-/** The scene as text, without where its objects stand: two scenes with the same text differ in placement only. */
+/** The scene as text, without placements: two scenes with the same text differ in placement only. */
 export function lookOf(scene) {
   const objects = scene.objects.map(({ at, height, rotation, ...look }) => look);
   return JSON.stringify({ ...scene, objects });

@@ -1,11 +1,11 @@
-// The stage: objects are selected and dragged by one pointer, sized and turned by two, by the wheel or by keys. Where there is no
+// The stage: objects are selected and dragged by one pointer, sized and turned by two, by the wheel or by keys. Without an
 // object, a panorama is turned.
 
 import { $, clamp } from "./dom.js";
 import { attempt } from "./notices.js";
 import { duplicated, removed, reordered } from "./scene.js";
 
-/** So far beside an object's box it is still meant, pixels of the page. */
+/** A pointer this near to an object's box still selects it, pixels of the page. */
 const SLACK = { mouse: 4, pen: 12, touch: 24 };
 const LEAST_HEIGHT = 0.02;
 const MOST_HEIGHT = 2;
@@ -36,7 +36,7 @@ export class Stage {
     work.addEventListener("selection", () => this.#mark());
   }
 
-  /** One name for all changes of a gesture: they are one step of the history. */
+  /** One name for all changes of a gesture: they are one step in the history. */
   get #join() {
     return `gesture ${this.#gesture}`;
   }
@@ -69,7 +69,7 @@ export class Stage {
 
   #up(event) {
     this.#pointers.delete(event.pointerId);
-    // The finger that stays after a pinch shall not push the object.
+    // The finger that stays after a pinch must not move the object.
     this.#doing = null;
   }
 
@@ -90,7 +90,7 @@ export class Stage {
     if (object) this.#work.changeObject(this.#placed(object, dx, dy), this.#join);
   }
 
-  /** A panorama is looked around in, and its light turns with it. */
+  /** Looks around in a panorama; its light turns with it. */
   #turn(dx) {
     const { light, fov, size } = this.#work.scene;
     if (!this.#rendering.turns) return;

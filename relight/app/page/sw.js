@@ -1,4 +1,4 @@
-// Keeps all files of one version of the page, and hands them out: the page opens without a network.
+// Stores all files of one version of the page and serves them: the page opens offline.
 
 const CACHE = `relight ${new URL(self.location).searchParams.get("version")}`;
 
@@ -21,7 +21,7 @@ async function takeOver() {
   await self.clients.claim();
 }
 
-/** Which version there is, the network knows better where somebody asks for news; all else is handed out as it was kept. */
+/** A check for a new version asks the network first; everything else is served from the store. */
 async function answer(request, url) {
   const cache = await caches.open(CACHE);
   if (url.pathname.endsWith("/files.json") && request.cache === "no-cache") return fetch(request).catch(() => cache.match("files.json"));

@@ -1,4 +1,4 @@
-// A short film in which the light goes once around: all pictures are made first, then played into the browser's recorder.
+// A short video in which the light rotates once: all pictures are rendered first, then played into the browser's recorder.
 
 import { $, make, pixels } from "./dom.js";
 import { attempt, calm, say } from "./notices.js";
@@ -8,7 +8,7 @@ import { forEngine } from "./scene.js";
 const RATE = 24;
 const LONGEST = 640;
 const KINDS = ["video/mp4;codecs=avc1.42E01F", "video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
-/** A recorder that has not ended so long after it was stopped never does, milliseconds. */
+/** A recorder that has not ended this long after its stop has failed, milliseconds. */
 const LONGEST_END = 20_000;
 const NO_RECORDER = "This browser cannot make videos: save a picture instead.";
 
@@ -40,9 +40,9 @@ export class Video {
     }
   }
 
-  /** All pictures of the turn, compressed: as many as a phone can hold. */
+  /** All pictures of the video, compressed so that they fit into a phone's memory. */
   async #render(scene, count) {
-    say("Making the pictures of the video …");
+    say("Rendering the pictures of the video …");
     Object.assign($("video-progress"), { hidden: false, max: count, value: 0 });
     const frames = [];
     for (let index = 0; index < count && this.#making; index++) {
@@ -59,7 +59,7 @@ export class Video {
   async #record(frames, type) {
     say("Recording the video …");
     const file = await recorded(frames, type);
-    // A browser may name a kind that it has no encoder for, and record nothing.
+    // A browser may claim a format without an encoder, and record nothing.
     if (file.size === 0) throw new Error(NO_RECORDER);
     download(file);
     say("The video is saved.");
@@ -73,14 +73,14 @@ function kindOfVideo() {
   return type;
 }
 
-/** A picture of even sides, which every encoder of videos takes. */
+/** A picture with even sides, as video encoders require. */
 async function compressed(rgba, width, height) {
   const canvas = new OffscreenCanvas(width - (width % 2), height - (height % 2));
   canvas.getContext("2d").putImageData(pixels(rgba, width, height), 0, 0);
   return canvas.convertToBlob({ type: "image/jpeg", quality: 0.95 });
 }
 
-/** Plays pictures into a recorder, each for as long as it is to be seen. */
+/** Plays pictures into a recorder, each for its duration. */
 async function recorded(frames, type) {
   const first = await createImageBitmap(frames[0]);
   const canvas = make("canvas", { width: first.width, height: first.height });

@@ -1,9 +1,9 @@
-// The work: the scene with its history, and which of its objects is selected. Everybody who shows it listens to it.
+// The work: the scene with its history, and which of its objects is selected. All views listen to it.
 
 import { History } from "./history.js";
 import { changed, find } from "./scene.js";
 
-/** Events: "scene" (the scene is another), "selection". */
+/** Events: "scene" (the scene changed), "selection". */
 export class Work extends EventTarget {
   selected = null;
 
@@ -15,7 +15,7 @@ export class Work extends EventTarget {
     this.begin(scene);
   }
 
-  /** Begins anew with a scene, without a way back. */
+  /** Starts over with a scene, without a history. */
   begin(scene) {
     this.#history = new History(scene);
     this.#kept = scene;
@@ -39,17 +39,17 @@ export class Work extends EventTarget {
     return this.#history.canRedo;
   }
 
-  /** Whether there is anything that was not kept in a file. */
+  /** Whether there are unsaved changes. */
   get unsaved() {
     return this.scene !== this.#kept && this.scene.objects.length > 0;
   }
 
-  /** Notes that the scene is kept in a file. */
+  /** Marks the scene as saved. */
   kept(scene) {
     this.#kept = scene;
   }
 
-  /** The engine's numbers of all objects that can be come back to. */
+  /** The engine's numbers of all objects in the history. */
   get reachable() {
     return new Set(this.#history.states.flatMap((scene) => scene.objects.map(({ object }) => object)));
   }
@@ -60,7 +60,7 @@ export class Work extends EventTarget {
     this.#tell();
   }
 
-  /** Goes on to a scene that has a new object, which is selected. */
+  /** Changes to a scene with a new object, which is selected. */
   add(scene) {
     this.change(scene);
     this.select(scene.objects.at(-1).key);

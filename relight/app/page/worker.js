@@ -19,7 +19,7 @@ async function begin(module) {
   }
 }
 
-/** For every import of the module, which nothing calls, a function that says so if it is called. */
+/** A function for every import of the module; none should be called, and each throws. */
 function importsOf(module) {
   const imports = {};
   for (const { module: from, name } of WebAssembly.Module.imports(module)) {
@@ -48,7 +48,7 @@ async function answer({ id, fields, parts }) {
   }
 }
 
-/** Files come as blobs, so that they are read where they are needed. */
+/** Files come as blobs, and are read here, where they are needed. */
 async function bytesOf(part) {
   return part instanceof Blob ? new Uint8Array(await part.arrayBuffer()) : part;
 }
@@ -60,7 +60,7 @@ function ask(parts) {
   return take(exports.relight_answer(request, length) >>> 0);
 }
 
-/** The parts of a reply, which is given back. */
+/** The parts of a reply, whose memory is freed. */
 function take(address) {
   const bytes = replyAt(address);
   const parts = unpack(bytes);
@@ -73,7 +73,7 @@ function replyAt(address) {
   return new Uint8Array(buffer, address + WORD, new DataView(buffer).getUint32(address, true));
 }
 
-/** What the engine says of its end, or else what the browser says. */
+/** The engine's own message on its crash, else the browser's. */
 function faultOr(text) {
   try {
     return new TextDecoder().decode(replyAt(exports.relight_fault() >>> 0).slice()) || text;

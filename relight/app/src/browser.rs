@@ -1,8 +1,8 @@
 //! The engine as the page's worker calls it: four functions over the module's memory.
 //!
-//! A request is written into bytes of `relight_alloc` and given to `relight_answer`, which takes them over. A reply begins with
+//! A request is written into bytes of `relight_alloc` and passed to `relight_answer`, which owns them then. A reply begins with
 //! its length as a little-endian 32-bit integer and is given back by `relight_free`. After a panic, which is a trap to the
-//! worker, `relight_fault` tells its text; the engine is not to be asked anything else then.
+//! worker, `relight_fault` returns its text; the engine must not be called again.
 #![allow(
     unsafe_code,
     reason = "functions that JavaScript calls have their own names, and pass addresses"

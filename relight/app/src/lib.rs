@@ -6,7 +6,7 @@
 //! | `studio` | the engine: photographs, masks, scenes and what is asked of them |
 //! | `scenery` | panoramas that are made, so that a scene needs no file |
 //! | `browser` | the engine's functions that the page's worker calls |
-#![cfg_attr(feature = "server", doc = "| [`server`] | the page handed out |")]
+#![cfg_attr(feature = "server", doc = "| [`server`] | serves the page |")]
 //!
 //! It knows the libraries of photographs, light and masks, and no terminal.
 //!

@@ -6,11 +6,9 @@ const MAX_PARTS: usize = 256;
 /// Bytes of an integer.
 const WORD: usize = 4;
 
-/// Bytes are no message: they end before it does or go on behind it, or it has no parts or very many.
+/// The bytes are not a message: they are too few or too many, or the number of parts is 0 or above the limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "the message is damaged: its bytes are not 1 to {MAX_PARTS} parts of the lengths that it states"
-)]
+#[error("the message is damaged: it does not contain 1 to {MAX_PARTS} parts of the stated lengths")]
 pub struct MessageFault;
 
 /// The parts as one message.
@@ -38,7 +36,7 @@ pub fn pack(parts: &[&[u8]]) -> Vec<u8> {
 /// The parts of a message.
 ///
 /// # Errors
-/// Where the bytes are no message.
+/// If the bytes are not a message.
 pub fn unpack(message: &[u8]) -> Result<Vec<&[u8]>, MessageFault> {
     let (count, mut rest) = word(message)?;
     if !(1..=MAX_PARTS).contains(&count) {

@@ -1,4 +1,4 @@
-//! Panoramas that are made by formulas, so that a scene needs no file and no licence: what is all around, as linear radiance.
+//! Panoramas made by formulas, so that a scene needs no file and no licence, in linear radiance.
 
 use relight_core::image::{Extent, Planes, Rgb};
 use relight_core::light::{Direction, LightError, Panorama};
@@ -51,7 +51,7 @@ impl Scenery {
     /// The panorama of another size.
     ///
     /// # Errors
-    /// Where it has no pixels.
+    /// If it has no pixels.
     pub(crate) fn panorama_of(self, extent: Extent) -> Result<Panorama, LightError> {
         let blank = Panorama::new(Rgb::new(Planes::zeros(extent)))?;
         Panorama::new(Rgb::new(Planes::from_fn(extent, |x, y| {
@@ -114,7 +114,7 @@ fn inside(at: [f64; 2], middle: [f64; 2], half: [f64; 2], soft: f64) -> f64 {
     line(0) * line(1)
 }
 
-/// How many degrees a direction is from that of a lamp or sun, whose azimuth and elevation are given as of lamps.
+/// The angle between a direction and that of a lamp or sun, degrees; azimuth and elevation as for lamps.
 fn degrees_from(towards: Direction, [azimuth, elevation]: [f64; 2]) -> f64 {
     let lamp = DiscLamp {
         azimuth,

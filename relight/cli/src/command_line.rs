@@ -10,7 +10,7 @@ use crate::commands::{
     decompose, eval, export, insert, relight, render, serve, synth, train, turn, weights,
 };
 
-/// Single-view relighting: photographs decomposed and relit, rendering, synthetic data with ground truth, measures of the results.
+/// Single-view relighting: decompose, relight and insert photographed objects; render, train, score.
 #[derive(Parser)]
 #[command(
     name = "relight",
@@ -20,7 +20,7 @@ use crate::commands::{
 struct CommandLine {
     #[command(subcommand)]
     verb: Verb,
-    /// Print one JSON line an event on standard output.
+    /// Print one JSON line per event on standard output.
     #[arg(long, global = true)]
     json: bool,
 }
@@ -30,16 +30,16 @@ enum Verb {
     /// Decompose photographs: normals, albedo, shading, highlight and light.
     #[command(after_help = decompose::EXAMPLES)]
     Decompose(decompose::Arguments),
-    /// Show the objects of photographs in another light: a picture, or a video in which the light rotates.
+    /// Relight the objects of photographs: a picture, or a video in which the light rotates.
     #[command(after_help = relight::EXAMPLES, mut_arg("light", relight::or_own))]
     Relight(Box<relight::Arguments>),
-    /// Put the objects of photographs into another picture, a panorama or a video.
+    /// Insert the objects of photographs into another picture, a panorama or a video.
     #[command(after_help = insert::EXAMPLES)]
     Insert(Box<insert::Arguments>),
-    /// Light an object that is given by its maps: an image, a video, or a sheet of materials.
+    /// Render an object from its maps: an image, a video, or a sheet of materials.
     #[command(after_help = render::EXAMPLES)]
     Render(render::Arguments),
-    /// Measure estimates and baselines by the protocols of the paper's tables.
+    /// Score estimates and baselines by the protocols of the paper's tables.
     #[command(after_help = eval::EXAMPLES)]
     Eval(eval::Arguments),
     /// Render synthetic objects with their ground truth: samples, whole turns, panoramas.
@@ -51,19 +51,19 @@ enum Verb {
     /// Decompose a whole turn of the table: normals, albedo and light.
     #[command(after_help = turn::EXAMPLES)]
     Turn(turn::Arguments),
-    /// Write objects for other programs: GLB, layered EXR, a Blender script.
+    /// Export objects for other programs, as GLB or layered EXR.
     #[command(after_help = export::EXAMPLES)]
     Export(export::Arguments),
-    /// Serve the app: a page that cuts objects out of photographs, relights them and puts them into scenes.
+    /// Serve the web app: cut objects out of photographs, relight them, compose scenes.
     #[command(after_help = serve::EXAMPLES)]
     Serve(serve::Arguments),
-    /// Convert weights of networks.
+    /// Convert network weights.
     #[command(after_help = weights::EXAMPLES)]
     Weights(weights::Arguments),
 }
 
 impl Verb {
-    /// What is wrong with the arguments together: wrong usage, exit code 2.
+    /// The fault of a combination of arguments: wrong usage, exit code 2.
     fn fault(&self) -> Option<String> {
         match self {
             Self::Decompose(arguments) => arguments.fault(),
@@ -104,7 +104,7 @@ pub(crate) fn run() -> ExitCode {
     })
 }
 
-/// What is wrong with the arguments of the verb that was given, with the verb's own usage.
+/// The error for a fault in the arguments of the given verb, with the verb's usage.
 fn wrong_usage(matches: &ArgMatches, fault: String) -> Error {
     let mut command = CommandLine::command();
     command.build();

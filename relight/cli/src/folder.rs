@@ -8,7 +8,7 @@ use clap::Args;
 /// The folder that a verb writes its results into.
 #[derive(Args)]
 pub(crate) struct OutputFolder {
-    /// The folder for the results; made where it is missing.
+    /// The folder for the results; created if missing.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
 }
@@ -27,7 +27,7 @@ pub(super) fn make_empty_folder(path: &Path) -> Result<(), String> {
     match entries.next() {
         None => Ok(()),
         Some(_) => Err(format!(
-            "{} is not empty: give a folder that is empty or not there",
+            "{} is not empty: give a new or empty folder",
             path.display()
         )),
     }

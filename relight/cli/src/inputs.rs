@@ -1,4 +1,4 @@
-//! Options of how files and networks are to be read, which several verbs take.
+//! Options for reading files and networks, shared by several verbs.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use crate::values::{NORMALS_Y, TRANSFERS, one_of};
 /// How files of colour are encoded.
 #[derive(Args)]
 pub(crate) struct TransferArgument {
-    /// How integers in files of colour are encoded; EXR and HDR are linear [default: what a photograph says, or sRGB].
+    /// Encoding of integer colours; EXR and HDR are linear [default: from the file, else sRGB].
     #[arg(long, value_parser = one_of(TRANSFERS))]
     pub(crate) transfer: Option<Transfer>,
 }
@@ -20,13 +20,13 @@ pub(crate) struct TransferArgument {
 /// Which way maps of normals have y.
 #[derive(Args)]
 pub(crate) struct NormalsArgument {
-    /// Which way y points in the normals that are read [default: as the network is known to have it, else up].
+    /// Direction of y in the normals that are read [default: that of a known network, else up].
     #[arg(long, value_name = "WAY", value_parser = one_of(NORMALS_Y))]
     pub(crate) normals_y: Option<NormalsFrame>,
 }
 
 impl NormalsArgument {
-    /// The frame of normals that nobody knows by their file.
+    /// The frame of normals whose file does not state it.
     pub(crate) fn or_up(&self) -> NormalsFrame {
         self.normals_y.unwrap_or(NormalsFrame::YUp)
     }
@@ -35,13 +35,13 @@ impl NormalsArgument {
 /// The weights of the network that a verb runs.
 #[derive(Args)]
 pub(crate) struct WeightsArgument {
-    /// The network's weights (.safetensors) [default: those that come with the program].
+    /// The network's weights (.safetensors) [default: built in].
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
 }
 
 impl WeightsArgument {
-    /// The weights, or else the shipped ones, and how they are named.
+    /// The weights, or else the built-in ones, and their name.
     pub(crate) fn read_or(
         &self,
         shipped: fn() -> Result<Weights, NetError>,

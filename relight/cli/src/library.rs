@@ -1,4 +1,4 @@
-//! Options and the library of the verbs that make objects: what a user brings.
+//! Options and the library of the verbs that make objects: the user's own files.
 
 use std::path::PathBuf;
 
@@ -13,13 +13,13 @@ pub(crate) struct ObjectSources {
     /// The same seed gives the same bytes.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Let light pass through objects: neither cast shadows nor dark hollows.
+    /// Let light pass through objects: no cast shadows, no dark hollows.
     #[arg(long)]
     pub(crate) no_shadows: bool,
-    /// Objects of one's own besides procedural shapes: .obj, .gltf, .glb, also in folders within; or a packed library, .relib.
+    /// Your own objects besides procedural shapes: a folder of .obj, .gltf, .glb, or a packed library, .relib.
     #[arg(long, value_name = "FOLDER")]
     pub(crate) meshes: Option<PathBuf>,
-    /// Light: .hdr, .exr; or a packed library, .relib [default: synthetic panoramas].
+    /// Panoramas for the light: a folder of .hdr, .exr, or a packed library, .relib [default: synthetic].
     #[arg(long, value_name = "FOLDER")]
     pub(crate) panoramas: Option<PathBuf>,
 }
@@ -35,7 +35,7 @@ impl ObjectSources {
     }
 }
 
-/// Reads a library, of packed ones a part, and names what of its folders is not used; then what comes of it is incomplete.
+/// Reads a library (a part of packed ones), and names the unused files of its folders; with any, the outcome is incomplete.
 pub(crate) fn read_library(
     folders: &Folders,
     part: fn(Library) -> Result<Library, SynthError>,

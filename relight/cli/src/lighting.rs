@@ -1,4 +1,4 @@
-//! Options of new light, of videos in which it rotates and of what it makes of surfaces, which several verbs take.
+//! Options that several verbs share: new light, videos in which it rotates, and shading models.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -12,18 +12,18 @@ use crate::values::{Choices, degrees, one_of, within};
 /// New light.
 #[derive(Args)]
 pub(crate) struct LightArguments {
-    /// The light: a panorama (.hdr, .exr) with what is behind the object in its middle, or coefficients (.txt).
+    /// The light: a panorama (.hdr, .exr; its centre is behind the object) or coefficients (.txt).
     #[arg(long, value_name = "FILE", conflicts_with = "lamp")]
     pub(crate) light: Option<PathBuf>,
-    /// The light: a lamp at degrees about the vertical (0 at the viewer's side, 90 on the right) and above the horizon; its
-    /// colour, such as #ffd9b0 or 3200K; its size in degrees [default: white, 30].
+    /// A lamp: degrees about the vertical (0 at the viewer, 90 on the right) and above the horizon, colour (#ffd9b0 or 3200K),
+    /// size in degrees [default: white, 30].
     #[arg(
         long,
         value_name = "AZIMUTH,ELEVATION[,COLOUR][,SIZE]",
         allow_hyphen_values = true
     )]
     pub(crate) lamp: Option<Lamp>,
-    /// Rotate the light about the vertical first, from the viewer to the right.
+    /// Initial rotation of the light about the vertical, from the viewer to the right.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = degrees(), allow_hyphen_values = true)]
     pub(crate) light_angle: f64,
 }
@@ -52,7 +52,7 @@ impl LightArguments {
         self.light.is_none() && self.lamp.is_none()
     }
 
-    /// The light that is given, before it is rotated.
+    /// The given light, before its rotation.
     pub(crate) fn read(&self) -> Result<Option<LightSource>, InsertError> {
         match (&self.lamp, &self.light) {
             (Some(lamp), _) => Ok(Some(LightSource::Lamp(lamp.disc))),
@@ -66,7 +66,7 @@ impl LightArguments {
         self.light_angle.to_radians()
     }
 
-    /// The file of coefficients and that of a panorama, of which at most one is given.
+    /// The file of coefficients and the file of a panorama; at most one is given.
     pub(crate) fn files(&self) -> (Option<&Path>, Option<&Path>) {
         match self.light.as_deref() {
             Some(path) if LightSource::is_text(path) => (Some(path), None),
@@ -78,13 +78,13 @@ impl LightArguments {
 /// A video in which light rotates.
 #[derive(Args)]
 pub(crate) struct RotationArguments {
-    /// Rotate the light by so many degrees about the vertical, in a video.
+    /// Make a video in which the light rotates by so many degrees about the vertical.
     #[arg(long, value_name = "DEGREES", value_parser = degrees(), allow_hyphen_values = true)]
     pub(crate) rotate: Option<f64>,
-    /// How long that takes.
+    /// Length of the video, seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = within(0.01..=3600.0, "seconds"), requires = "rotate")]
     pub(crate) seconds: f64,
-    /// Frames a second.
+    /// Frames per second.
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=240), requires = "rotate")]
     pub(crate) fps: u32,
 }
@@ -125,7 +125,7 @@ const SHADING_MODELS: Choices<ShadingModel> = &[
     ),
     (
         "paper",
-        "The paper's formulas, as its released code has them, from the first nine coefficients",
+        "The paper's formulas as in its released code, from nine coefficients",
         ShadingModel::Paper,
     ),
 ];

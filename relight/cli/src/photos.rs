@@ -1,4 +1,4 @@
-//! Options of photographs that are decomposed, and of the files that they come from, which several verbs take.
+//! Options for photographs and their files, shared by several verbs.
 
 use std::path::{Path, PathBuf};
 
@@ -21,11 +21,11 @@ pub(crate) struct PhotoArguments {
     /// Photographs (PNG, JPEG, WebP, TIFF, BMP, GIF, EXR, HDR), folders of them, or shards (.tar).
     #[arg(required = true, value_name = "PHOTO")]
     pub(crate) photos: Vec<PathBuf>,
-    /// A grey image as large as the photograph, white on the object; or a folder of such, PHOTO.png [default: the
-    /// photograph's alpha, or what is not black before a black background].
+    /// A grey image of the photograph's size, white on the object; or a folder of them, PHOTO.png [default: the photograph's
+    /// alpha, or all but its black background].
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) mask: Option<PathBuf>,
-    /// A rectangle around the object, pixels. If nothing else says where the object is, the whole rectangle is the object.
+    /// A rectangle around the object, pixels; all of it is the object if neither alpha nor a black background shows which part.
     #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
     pub(crate) rect: Option<Rect>,
     #[command(flatten)]
@@ -64,7 +64,7 @@ impl PhotoArguments {
     }
 }
 
-/// What comes of a run in which so many photographs were lost.
+/// The outcome of a run with so many lost photographs.
 pub(crate) fn outcome(found: &FoundPhotos, lost: usize, what: &str) -> CommandResult {
     match lost {
         0 if found.unused.is_empty() => Ok(Outcome::Success),
@@ -146,7 +146,7 @@ pub(crate) fn not_an_input(output: &Path, inputs: &[PathBuf]) -> Result<(), Stri
     let is_same = |input: &&PathBuf| input.canonicalize().is_ok_and(|input| input == place);
     inputs.iter().find(is_same).map_or(Ok(()), |_| {
         Err(format!(
-            "{} is read as well: give the result another name",
+            "{} is also an input: give the result another name",
             output.display()
         ))
     })

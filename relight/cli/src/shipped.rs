@@ -1,11 +1,11 @@
-//! The weights that come with the program.
+//! The built-in weights.
 
 use relight_photo::nets::{NetError, Weights};
 
 /// The weights of the decomposing network.
 ///
 /// # Errors
-/// [`NetError::File`] where the program was built with a damaged file.
+/// [`NetError::File`] if the program was built with a damaged file.
 pub(crate) fn weights() -> Result<Weights, NetError> {
     let bytes = include_bytes!("../weights/decompose.safetensors");
     read("relight/cli/weights/decompose.safetensors", bytes)
@@ -20,7 +20,7 @@ pub(crate) fn turn_weights() -> Result<Weights, NetError> {
     read("relight/cli/weights/turn.safetensors", bytes)
 }
 
-/// Weights by the place where they stand in the repository.
+/// Weights by their path in the repository.
 fn read(path: &str, bytes: &[u8]) -> Result<Weights, NetError> {
     Weights::from_bytes(bytes).map_err(|fault| NetError::File {
         path: path.into(),

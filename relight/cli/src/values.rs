@@ -10,14 +10,14 @@ use relight_core::light::NormalsFrame;
 use relight_photo::decompose::SpecularGate;
 use relight_photo::relighting::WhiteBalance;
 
-/// Values of an option: the name on the command line, what the help says of it, and what it stands for.
+/// Values of an option: the name on the command line, its help, and its meaning.
 pub(crate) type Choices<T> = &'static [(&'static str, &'static str, T)];
 
 /// How integers in files of colour are encoded.
 pub(crate) const TRANSFERS: Choices<Transfer> = &[
-    ("srgb", "The transfer function of sRGB", Transfer::Srgb),
-    ("gamma22", "The power 1 / 2.2", Transfer::Gamma22),
-    ("linear", "In proportion to light", Transfer::Linear),
+    ("srgb", "sRGB transfer function", Transfer::Srgb),
+    ("gamma22", "Power 1 / 2.2", Transfer::Gamma22),
+    ("linear", "Linear light", Transfer::Linear),
 ];
 
 /// Which way y points in maps of normals.
@@ -25,17 +25,17 @@ pub(crate) const NORMALS_Y: Choices<NormalsFrame> = &[
     ("up", "As relight writes them", NormalsFrame::YUp),
     (
         "down",
-        "As in the paper's figures and released code and data",
+        "As in the paper's figures, code and data",
         NormalsFrame::YDown,
     ),
 ];
 
 /// How the colour of new light is shown.
 pub(crate) const WHITE_BALANCES: Choices<WhiteBalance> = &[
-    ("light", "As the light has it", WhiteBalance::Light),
+    ("light", "The light keeps its colour", WhiteBalance::Light),
     (
         "auto",
-        "As by a camera that is balanced for it: white is as grey as in the picture around",
+        "As by a camera balanced for the light: white is as neutral as in the background",
         WhiteBalance::Auto,
     ),
 ];
@@ -44,7 +44,7 @@ pub(crate) const WHITE_BALANCES: Choices<WhiteBalance> = &[
 pub(crate) const GATES: Choices<SpecularGate> = &[
     (
         "auto",
-        "Where more than 5 % of the object's pixels are saturated",
+        "If more than 5 % of the object's pixels are saturated",
         SpecularGate::Auto,
     ),
     ("on", "Always", SpecularGate::On),
@@ -62,7 +62,7 @@ pub(crate) fn one_of<T: Copy + Send + Sync>(
         let found = choices.iter().find(|(name, ..)| *name == given);
         found
             .map(|&(.., value)| value)
-            .ok_or("it is none of the possible values")
+            .ok_or("it is not a possible value")
     })
 }
 

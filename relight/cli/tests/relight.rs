@@ -225,7 +225,7 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
         (
             format!("{one} --light own --background light -o o.png"),
             2,
-            "there is no panorama",
+            "needs a panorama",
         ),
         (
             format!("{one} --light own --lamp 30,40 -o o.png"),

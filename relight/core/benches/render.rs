@@ -1,4 +1,4 @@
-//! Rendering one image of 256 x 256 on one thread, in processor time: the layers, and beside them the same formulas in plain
+//! Rendering one image of 256 x 256 on one thread, in processor time: the layers, compared with the same formulas in plain
 //! loops over pixels.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 #![allow(

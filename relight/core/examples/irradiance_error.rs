@@ -16,7 +16,7 @@ const ORDERS: [usize; 7] = [2, 4, 8, 12, 24, 48, 64];
 
 /// Pixels of the sphere's picture, across.
 const SIDE: usize = 48;
-/// Pixels of the picture whose cost is told, across.
+/// The width of the picture that is timed, pixels.
 const TIMED_SIDE: usize = 512;
 
 fn main() -> Result<(), Box<dyn Error>> {

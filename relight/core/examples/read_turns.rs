@@ -1,4 +1,4 @@
-//! Reads each sample of a data set once and says how fast: `read_turns DATA [THREADS [ROUNDS]]`.
+//! Reads each sample of a data set once and prints the speed: `read_turns DATA [THREADS [ROUNDS]]`.
 //!
 //! DATA is a shard, a folder of shards, or what else [`Turns::open`] takes.
 #![allow(clippy::print_stdout, reason = "the example is a program of its own")]

@@ -1,4 +1,4 @@
-//! What all of relight rests on: light, render layers, measures, and the captured object's file. It knows nothing of
+//! The basis of relight: light, render layers, measures, and the captured object's file. It knows nothing of
 //! networks and terminals, and builds for a browser (`wasm32-unknown-unknown`).
 //!
 //! One frame holds for directions, light and normals everywhere: x to the right, y **up**, z out of
@@ -12,7 +12,7 @@
 //! | [`metrics`] | how far an estimate is from the ground truth |
 //! | [`captured_object`] | a captured object in one file, ready to be lit |
 //! | [`statistics`] | median and quantiles of samples |
-//! | [`parallel`] | rows and parts side by side, where there are threads |
+//! | [`parallel`] | parallel work on rows and parts, if there are threads |
 #![cfg_attr(
     feature = "files",
     doc = "| [`files`] | pictures, light, maps and results in files |\n| [`reader`] | shards and the folders of other data sets as streams of arrays |"

@@ -1,4 +1,4 @@
-//! Work on many rows, parts or frames side by side. Without the feature `threads`, as in a browser, one comes after
+//! Parallel work on many rows, parts or frames. Without the feature `threads`, as in a browser, one comes after
 //! the other. What is worked on must not depend on the order, so the results are the same.
 
 use std::panic::{self, AssertUnwindSafe};
@@ -92,7 +92,7 @@ pub fn join<A: Send, B: Send>(
 #[error("a fault of the program, described above: please report it")]
 pub struct JobPanic;
 
-/// What `job` returns, so that a panic ends nothing but this job. What it changed must not be used after a panic.
+/// The result of `job`; a panic ends only this job. Data that it changed must not be used after a panic.
 ///
 /// # Errors
 /// [`JobPanic`], whose reason the panic hook has printed.

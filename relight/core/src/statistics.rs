@@ -3,7 +3,7 @@
 //! All of them are samples themselves, by the nearest rank. Nothing is interpolated. Samples are compared by the total
 //! order of floating-point numbers.
 
-/// The sample that has `rank` others before it, from 0; the largest where there are fewer. None where there are no
+/// The sample that has `rank` others before it, from 0; the largest where there are fewer. `None` if there are no
 /// samples. The samples are left in another order.
 pub fn ranked<T: Copy + Into<f64>>(samples: &mut [T], rank: usize) -> Option<T> {
     let last = samples.len().checked_sub(1)?;
@@ -12,7 +12,7 @@ pub fn ranked<T: Copy + Into<f64>>(samples: &mut [T], rank: usize) -> Option<T> 
     Some(*found)
 }
 
-/// The sample that this part of all, 0 to 1, lies below. None where there are no samples.
+/// The sample that this part of all, 0 to 1, lies below; `None` without samples.
 pub fn above_part<T: Copy + Into<f64>>(
     samples: impl IntoIterator<Item = T>,
     part: f64,
@@ -22,19 +22,19 @@ pub fn above_part<T: Copy + Into<f64>>(
     ranked(&mut samples, rank)
 }
 
-/// The quantile of a part, 0 to 1: the sample of rank `part (n - 1)`, rounded down. None where there are no samples.
+/// The quantile of a part, 0 to 1: the sample of rank `part (n - 1)`, rounded down; `None` without samples.
 pub fn quantile<T: Copy + Into<f64>>(samples: impl IntoIterator<Item = T>, part: f64) -> Option<T> {
     let mut samples: Vec<T> = samples.into_iter().collect();
     let rank = (samples.len().saturating_sub(1) as f64 * part) as usize;
     ranked(&mut samples, rank)
 }
 
-/// The sample in the middle, the lower of two; none where there are no samples.
+/// The sample in the middle, the lower of two; `None` without samples.
 pub fn median<T: Copy + Into<f64>>(samples: impl IntoIterator<Item = T>) -> Option<T> {
     quantile(samples, 0.5)
 }
 
-/// The sample in the middle, the upper of two; none where there are no samples.
+/// The sample in the middle, the upper of two; `None` without samples.
 pub fn upper_median<T: Copy + Into<f64>>(samples: impl IntoIterator<Item = T>) -> Option<T> {
     let mut samples: Vec<T> = samples.into_iter().collect();
     let rank = samples.len() / 2;

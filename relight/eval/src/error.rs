@@ -20,7 +20,7 @@ pub enum EvalError {
     /// A sample of the ground truth cannot be read.
     #[error("the ground truth is damaged")]
     Damage(#[from] DamagedSample),
-    /// Ground truth and predictions do not have what the protocol needs: what is wrong.
+    /// Ground truth and predictions do not have what the protocol needs.
     #[error("{0}")]
     Unfit(String),
     /// A prediction cannot be read.
@@ -31,7 +31,7 @@ pub enum EvalError {
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: &'static str,
         /// Why.
         source: Cause,

@@ -10,7 +10,7 @@ use relight_core::reader::{TruthSample, TruthSet};
 /// the image's units). Images are brought to a maximum of 1 and encoded as sRGB, in which highlights are seen.
 ///
 /// # Errors
-/// Where the ground truth or a prediction cannot be read or measured.
+/// If the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_highlights(
     set: &TruthSet,
     split: &str,

@@ -23,7 +23,7 @@ enum Baseline {
     ConstantAlbedo,
     /// Shading 1; the albedo is the image.
     ConstantShading,
-    /// The shading is the mean of the image's channels, the albedo what is left: its colour.
+    /// The shading is the mean of the image's channels, the albedo the remaining colour.
     LuminanceShading,
     /// The shading is the square root of that mean.
     RootShading,
@@ -72,7 +72,7 @@ impl Baseline {
     }
 }
 
-/// An image as albedo times shading, of which the latter may not be known.
+/// An image as albedo times shading; the shading may be unknown.
 struct IntrinsicImages {
     albedo: Rgb<Linear>,
     shading: Option<Rgb<Linear>>,
@@ -117,7 +117,7 @@ const MIN_SHADING: f64 = 0.2;
 /// `albedo` and `shading`). Of a set that does not know its shading, of albedo alone.
 ///
 /// # Errors
-/// Where the ground truth or a prediction cannot be read or measured.
+/// If the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_intrinsic(
     set: &TruthSet,
     split: &str,
@@ -130,7 +130,7 @@ pub fn evaluate_intrinsic(
     let has_oracle = first.is_none_or(|one| one.shading.is_some() && one.normals.is_some());
     let mut baselines = Baseline::ALL.to_vec();
     if !has_oracle {
-        let note = "the oracle is left out: the set does not know both normals and shading";
+        let note = "the oracle is left out: the set does not have both normals and shading";
         table.notes.push(note.to_owned());
         baselines.retain(|(baseline, _)| *baseline != Baseline::Oracle);
     }

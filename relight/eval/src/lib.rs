@@ -5,12 +5,12 @@
 //! | [`evaluate_intrinsic`] | albedo and shading | both | SMSE, LMSE by each [`Convention`](relight_core::metrics::Convention) |
 //! | [`evaluate_normals`] | normals | normals | MSE, DSSIM, angles |
 //! | [`evaluate_light`] | normals and shading | light as coefficients | MSE, SMSE, SSIM of the shading that it makes |
-//! | [`evaluate_highlights`] | image, highlight | highlight | MSE, DSSIM of the highlight and of what it leaves |
+//! | [`evaluate_highlights`] | image, highlight | highlight | MSE, DSSIM of the highlight and of the rest |
 //! | [`evaluate_turns`] | turns with normals, albedo, light | nothing: it runs `turn` | angles, albedo, what is expected beside what is |
 //! | [`evaluate_relighting`] | an object's maps, images under many lights | maps, or images | MSE, DSSIM |
 //!
-//! Each line of a [`ScoreTable`] says what was compared and how: numbers under one name differ by a
-//! factor of two and more between conventions, and published tables rarely say which is theirs. What
+//! Each line of a [`ScoreTable`] states what was compared and how: numbers under one name differ by a
+//! factor of two and more between conventions, and published tables rarely state theirs. What
 //! cannot be read or measured is an error that names the image; no image is left out.
 //!
 //! ```no_run

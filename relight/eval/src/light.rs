@@ -19,10 +19,10 @@ fn fitted(sample: &TruthSample, known: &[bool]) -> Result<ShLight, EvalError> {
 
 /// MSE, SMSE and SSIM of the shading that light makes on the true normals, and the angle between its direction and that
 /// of the true light: for even light, for that which is fitted to the true shading, the best that light of order 2 can do, and
-/// for each prediction (`light.txt`). `form` says how shading follows from the coefficients.
+/// for each prediction (`light.txt`). `form` gives the shading from the coefficients.
 ///
 /// # Errors
-/// Where the ground truth or a prediction cannot be read or measured.
+/// If the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_light(
     set: &TruthSet,
     split: &str,
@@ -36,8 +36,8 @@ pub fn evaluate_light(
             "MSE and SSIM after both were brought to a maximum of 1; SSIM by {}",
             SSIM_WINDOW
         ),
-        "direction: degrees between the bands 1 of the light and of the true light (where the set has none, of that \
-         fitted to the true shading), 90 where one of them has no direction"
+        "direction: degrees between band 1 of the light and of the true light (or that fitted to the true shading), 90 \
+         if one has no direction"
             .to_owned(),
     ];
     let mut table = ScoreTable::new("light", notes);
@@ -118,7 +118,7 @@ fn direction_score(
     })
 }
 
-/// Where most of the light comes from: its band 1, the mean of the channels. None of even light.
+/// The main direction of the light: its band 1, averaged over the channels. `None` for even light.
 fn direction(light: &ShLight) -> Option<Direction> {
     let [y, z, x] = [1, 2, 3].map(|at: usize| light.coefficients()[at].iter().sum::<f64>());
     Direction::new(x, y, z)

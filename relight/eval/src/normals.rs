@@ -13,7 +13,7 @@ use relight_core::reader::{TruthSample, TruthSet};
 /// prediction (part `normal`).
 ///
 /// # Errors
-/// Where the ground truth or a prediction cannot be read or measured.
+/// If the ground truth or a prediction cannot be read or measured.
 pub fn evaluate_normals(
     set: &TruthSet,
     split: &str,

@@ -10,7 +10,7 @@ use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
 use relight_core::light::{LightError, Normals, NormalsFrame, ShLight, YDown, YUp};
 use relit_data::text;
 
-/// A folder with a folder for each image of the ground truth, of the same name, in which the estimates lie:
+/// A folder with a folder of estimates for each image of the ground truth, of the same name:
 /// `albedo`, `shading`, `highlight` (or `specular`), `normal` as `.exr` (linear, or vectors) or `.png` (8 or 16
 /// bits), `light.txt` as lines of red, green and blue coefficients. Estimates that are a whole number of times larger than
 /// the ground truth are brought to its size, each pixel the mean of those that it covers.
@@ -20,15 +20,15 @@ pub struct Predictions {
     frame: NormalsFrame,
 }
 
-/// What `relight decompose` writes beside its layers.
+/// The file that `relight decompose` writes besides its layers.
 const DESCRIPTION: &str = "decomposition.json";
-/// What that says it is.
+/// Its schema.
 const SCHEMA: &str = "relight.decomposition/1";
 
-/// What is wrong with a description that does not parse.
+/// The fault of a description that does not parse.
 pub(crate) const NO_SET: &str = "does not describe a set";
 
-/// The part of it that says what it is.
+/// The part with its schema.
 #[derive(Deserialize)]
 struct Description {
     schema: String,
@@ -112,7 +112,7 @@ impl Predictions {
         };
         found.ok_or_else(|| {
             EvalError::Unfit(format!(
-                "there is no prediction {part}.exr or {part}.png in {}: all images of the ground truth are compared, or none",
+                "{part}.exr or {part}.png is missing in {}: give a prediction for every image of the ground truth",
                 self.root.join(name).display()
             ))
         })
@@ -127,7 +127,7 @@ impl Predictions {
     }
 }
 
-/// An estimate at the size of the ground truth: as it is, or the means over blocks where it is so many times larger.
+/// An estimate at the size of the ground truth: as it is, or averaged over blocks if it is larger by an integer factor.
 fn brought_to(path: PathBuf, planes: Planes<3>, extent: Extent) -> Result<Planes<3>, EvalError> {
     let found = planes.extent();
     let times = found.width / extent.width.max(1);

@@ -1,4 +1,4 @@
-//! What all protocols share: going through the images of a set, and means over them.
+//! Shared by all protocols: a loop over the images of a set, and means over them.
 
 use rayon::prelude::*;
 
@@ -8,12 +8,12 @@ use relight_core::metrics::MetricError;
 use relight_core::parallel;
 use relight_core::reader::{TruthSample, TruthSet};
 
-/// Told after each image, from many threads, how many there are in all.
+/// Called after each image, from many threads, with the number of all images.
 pub type EvalProgress<'a> = &'a (dyn Fn(usize) + Sync);
 
-/// What is wrong with a sample of which a measure cannot be taken.
+/// The fault of a sample that cannot be measured.
 pub(super) const NOT_MEASURED: &str = "cannot be measured";
-/// The same where no light can be fitted.
+/// The same if no light can be fitted.
 pub(super) const UNLIT: &str = "cannot be lit: no light can be fitted to it";
 
 /// A measure of one image that becomes part of a line.
@@ -45,7 +45,7 @@ pub(super) fn add_method(
     Ok(())
 }
 
-/// What `work` finds of `count` samples, side by side, with their names. A panic is an error that names the sample.
+/// The results of `work` on `count` samples, in parallel, with their names. A panic is an error that names the sample.
 pub(super) fn each<R: Send>(
     count: usize,
     progress: &(dyn Fn() + Sync),
@@ -134,12 +134,12 @@ pub(super) fn need<'a, T>(
     found.as_ref().ok_or_else(|| {
         let name = &sample.name;
         EvalError::Unfit(format!(
-            "the ground truth has no {part} of {name}: this protocol cannot be run on it"
+            "the ground truth has no {part} of {name}, which this protocol needs"
         ))
     })
 }
 
-/// What is measured of a sample, with the sample's name in an error.
+/// The measurement of a sample, with the sample's name in an error.
 pub(super) fn measured<T>(
     sample: &TruthSample,
     result: Result<T, MetricError>,
@@ -160,7 +160,7 @@ pub(super) fn grey(image: &Rgb<Linear>) -> Vec<f32> {
     channels.map(|((r, g), b)| (r + g + b) / 3.0).collect()
 }
 
-/// An image of which all channels are this plane.
+/// An image with this plane in all channels.
 pub(super) fn of_grey(extent: Extent, plane: Vec<f32>) -> Result<Rgb<Linear>, EvalError> {
     let planes = Planes::from_planes(extent, [plane.clone(), plane.clone(), plane])?;
     Ok(Rgb::new(planes))

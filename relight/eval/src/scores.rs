@@ -54,7 +54,7 @@ pub struct ScoreLine {
     pub mask: MaskRule,
     /// How many images there were.
     pub images: usize,
-    /// Which part of which data they are.
+    /// The data set, and its part.
     pub split: String,
 }
 

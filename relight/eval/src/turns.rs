@@ -18,12 +18,12 @@ use serde::Serialize;
 use super::predictions::{NO_SET, read_light};
 use super::{EvalError, EvalProgress};
 
-/// Errors up to which it is counted how many pixels keep what is expected of them, degrees.
+/// Expected errors for which the pixels within them are counted, degrees.
 const LIMITS_DEG: [f64; 3] = [10.0, 20.0, 30.0];
 /// Azimuths that are tried for the turn about the table's axis, degrees to each side.
 const AZIMUTHS_DEG: i32 = 90;
 
-/// The ways in which turns are solved, as the table names them, and whether the solver is given the true light.
+/// The methods for turns, as named in the table, and whether they get the true light.
 const METHODS: [(&str, bool); 2] = [("light unknown", false), ("light known", true)];
 
 /// The errors of a turn by a method.
@@ -45,7 +45,7 @@ struct TurnScore {
     /// Mean and median of what is expected of the pixels, degrees.
     expected_mean_deg: f64,
     expected_deg: f64,
-    /// What is to be thought of the turn.
+    /// The verdict on the turn.
     verdict: TurnVerdict,
 }
 
@@ -118,10 +118,10 @@ impl TurnSet {
 }
 
 /// Solves every turn of a data set of `relight synth turns` by every method; `split` is what the table calls them. `progress`
-/// is told each turn and method.
+/// is called for each turn and method.
 ///
 /// # Errors
-/// Where a turn or its ground truth cannot be read, or cannot be solved.
+/// If a turn or its ground truth cannot be read, or cannot be solved.
 pub fn evaluate_turns(
     folder: &Path,
     split: &str,
@@ -293,9 +293,9 @@ impl fmt::Display for TurnScores {
         writeln!(f, "turns, {turns} of {}", self.split)?;
         writeln!(
             f,
-            "  angles between found and true normals, degrees: mean over the turns and its standard error, of their means and \
-             medians; by how much answers are turned about the table's axis (mean of the amounts), and the mean error without \
-             it; what is expected; albedo: squared error over energy; of the pixels expected within 10, 20, 30 degrees how many are"
+            "  errors of normals in degrees, averaged over the turns ± standard error: mean, median; azimuth: mean rotation \
+             of the answers about the table's axis; unturned: mean error without it; expected: the predicted error; albedo: \
+             squared error over energy; 10, 20, 30: how many pixels expected within so many degrees are"
         )?;
         writeln!(
             f,

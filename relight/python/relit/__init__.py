@@ -1,25 +1,24 @@
-"""Photographs and whole turns decomposed, relit and rendered, and the data sets of relit read.
+"""Decompose, relight and render photographs and whole turns, and read relit's data sets.
 
     d = relit.decompose("mug.jpg", "mug-mask.png")        # normals, albedo, shading, highlight, light
     picture = relit.relight("mug.jpg", "mug-mask.png", lamp=(60, 30))
-    turn = relit.solve_turn("dataset/mug.tar")            # of a whole turn
+    turn = relit.solve_turn("dataset/mug.tar")            # a whole turn
     image = relit.render(turn.normals, turn.albedo, turn.light, specular=turn.specular)
     matplotlib.pyplot.imshow(relit.to_srgb(image))
 
     for batch in relit.open("dataset").batches(seed=1):
         train(batch.images, batch.masks)
 
-Images that are given: a path; or an array of rows x columns x 3 (or 4, with alpha, which the colours are not multiplied
-with), red, green, blue: uint8 or uint16 in sRGB, or float32 in proportion to light (linear). Masks that are given: a
-path, or rows x columns: bool, or white on the object. Images that come back are float32 and linear, rows x columns x 3;
-`to_srgb` makes them ready for a screen or a file.
+Input images: a path, or an array of rows x columns x 3 (red, green, blue) or 4 (with straight alpha): uint8 or uint16 in
+sRGB, or float32 in linear light. Input masks: a path, or an array of rows x columns: bool, or white on the object.
+Results are float32 and linear, rows x columns x 3; `to_srgb` converts them for a screen or a file.
 
 Directions: x to the right, y up, z to the viewer. Light: float64, coefficients of spherical harmonics x 3 (red, green,
 blue), nine for order 2, (l, m) at l (l + 1) + m, without the Condon-Shortley phase; or a panorama, rows x columns x 3,
-twice as wide as high, whose middle is what the viewer sees behind the object.
+twice as wide as high, whose centre is behind the object.
 
-Work runs on all cores without Python's lock. What fails raises ValueError, or OSError for files, with a sentence that
-says what to do; what is only doubtful warns (RelitWarning).
+Work runs on all cores without Python's lock. Errors raise ValueError, or OSError for files, and say what to do; doubtful
+results warn (RelitWarning).
 """
 
 from ._photographs import (

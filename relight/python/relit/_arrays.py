@@ -1,4 +1,4 @@
-"""What a user gives, as `_relit` takes it."""
+"""Arguments of the user, converted to those of `_relit`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy
 
 
 class RelitWarning(UserWarning):
-    """A result that its user should look at."""
+    """A result that should be checked."""
 
 
 def warn(sentences):
@@ -22,7 +22,7 @@ def is_path(given):
 
 
 def picture(given, what="image"):
-    """A path, or an array in one piece of rows, columns and 3 or 4 channels: uint8, uint16 or float32."""
+    """A path, or a contiguous array of rows, columns and 3 or 4 channels: uint8, uint16 or float32."""
     if is_path(given):
         return os.fspath(given)
     array = numpy.asarray(given)
@@ -33,7 +33,7 @@ def picture(given, what="image"):
     if array.dtype.kind == "f":
         array = array.astype(numpy.float32, copy=False)
     if array.dtype not in (numpy.uint8, numpy.uint16, numpy.float32):
-        raise ValueError(f"the {what} is of {array.dtype}: give uint8 or uint16 (sRGB), or float32 (linear)")
+        raise ValueError(f"the {what} has the type {array.dtype}: give uint8 or uint16 (sRGB), or float32 (linear)")
     return numpy.ascontiguousarray(array)
 
 
@@ -66,10 +66,10 @@ def photograph(image, mask=None, box=None, transfer=None):
 
 
 def light_source(light, lamp=None, ambient=0.15):
-    """A lamp, coefficients, a panorama or a path; None where nothing is given."""
+    """A lamp, coefficients, a panorama or a path; None if neither light nor lamp is given."""
     if lamp is not None:
         if light is not None:
-            raise ValueError("light and lamp are given: give one")
+            raise ValueError("light and lamp exclude each other: give one")
         text = lamp if isinstance(lamp, str) else ",".join(str(part) for part in lamp)
         return text, within("ambient", ambient, 0.0, 10.0)
     if light is None or is_path(light):
@@ -88,7 +88,7 @@ def within(what, value, least, most):
 
 
 def angles(light_angle):
-    """Angles in a list, and whether one alone was given."""
+    """A list of angles, and whether a single one was given."""
     is_one = numpy.ndim(light_angle) == 0
     listed = [light_angle] if is_one else list(light_angle)
     return [within("light_angle", angle, -36000.0, 36000.0) for angle in listed], is_one

@@ -1,4 +1,4 @@
-"""Photographs: decomposed, relit, put into other pictures; their masks."""
+"""Decompose, relight, insert and mask photographs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ._arrays import (
     within,
 )
 
-#: Each photograph takes its memory, gigabytes where it is large.
+#: Each photograph takes memory, gigabytes if it is large.
 _MAX_SIDE_BY_SIDE = 4
 
 
@@ -40,34 +40,34 @@ class Decomposition:
     albedo: numpy.ndarray
     #: rows x columns, float32, linear, from 0: mean 1 under the mask.
     shading: numpy.ndarray
-    #: rows x columns, float32, linear, from 0, in the photograph's units; 0 where none was separated.
+    #: rows x columns, float32, linear, from 0, in the photograph's units; 0 where no highlight was separated.
     highlight: numpy.ndarray
-    #: rows x columns, float32, 0 to 1: how sure the network is what of a pixel's darkness is paint and what is shadow.
+    #: rows x columns, float32, 0 to 1: the network's certainty whether a dark pixel is paint or shadow.
     #: Where it is low, albedo and shading may be wrong by the same factor.
     confidence: numpy.ndarray
     #: rows x columns, bool: the object.
     mask: numpy.ndarray
     #: 9 x 3, float64: the light around the object, grey, in units in which the mean shading is 1.
     light: numpy.ndarray
-    #: Reflectance and smoothness of the whole object for `render`; None where no highlight tells them.
+    #: Reflectance and smoothness of the whole object for `render`; None without a highlight that shows them.
     specular: tuple | None
     #: The part of the object's pixels that are saturated, 0 to 1.
     saturated_fraction: float
-    #: How far the layers together are from the photograph, root mean square over that of the photograph.
+    #: The difference of the recomposed layers from the photograph: root mean square, over that of the photograph.
     residual: float
 
 
 def decompose(image, mask=None, *, box=None, transfer=None, highlights="auto", mirror=True):
-    """A photograph of an object into normals, albedo, shading, highlight and light: a `Decomposition`.
+    """Decompose a photograph of an object into normals, albedo, shading, highlight and light: a `Decomposition`.
 
     image: a path, or rows x columns x 3 or 4: uint8 or uint16 (sRGB), float32 (linear).
-    mask: a path, or rows x columns. Without one the image's alpha counts, or what is not black before black.
+    mask: a path, or rows x columns. Default: the image's alpha, or all but a black background.
     box: x, y, width and height of a rectangle around the object, pixels.
-    transfer: "srgb", "gamma22" or "linear": how integers are encoded, where the file is not to be asked.
+    transfer: "srgb", "gamma22" or "linear": the encoding of integers; by default as the file states.
     highlights: "auto" separates them where more than 5 % of the object is saturated; "on", "off".
-    mirror: False leaves out the look at the mirror image: faster, and a little worse.
+    mirror: False does not average with the mirror image: faster, and slightly worse.
 
-    The same as `relight decompose`, number by number.
+    Gives the same numbers as `relight decompose`.
     """
     found, note = _relit.decompose(photograph(image, mask, box, transfer), highlights, mirror)
     if note:
@@ -76,11 +76,11 @@ def decompose(image, mask=None, *, box=None, transfer=None, highlights="auto", m
 
 
 def decompose_many(photographs, *, threads=None, return_exceptions=False, **options):
-    """Decompositions of many photographs, in their order, while further ones are under way.
+    """Decompose many photographs in parallel; yields the decompositions in order.
 
-    photographs: any iterable of images, or of pairs of image and mask. It is read as far ahead as there are threads.
-    threads: how many photographs are decomposed side by side; as many as there are cores, at most 4.
-    return_exceptions: gives the exception in place of a decomposition, and goes on; else it is raised.
+    photographs: any iterable of images, or of pairs of image and mask. It is read ahead by up to two photographs per thread.
+    threads: photographs decomposed in parallel; by default one per core, at most 4.
+    return_exceptions: yield an exception in place of a decomposition and continue, instead of raising it.
     options: those of `decompose`.
     """
     threads = threads or min(_cores(), _MAX_SIDE_BY_SIDE)
@@ -127,21 +127,21 @@ def relight(
     transfer=None,
     highlights="auto",
 ):
-    """The object of a photograph in another light: rows x columns x 3, float32, linear.
+    """Relight the object of a photograph: rows x columns x 3, float32, linear.
 
     image, mask, box, transfer, highlights: see `decompose`.
     light: a panorama (rows x columns x 3, or a path to .hdr or .exr), coefficients (n x 3, or a path to .txt), or "own",
-        the photograph's own light as it was estimated.
-    lamp: (azimuth, elevation[, colour][, size]), or "60,30,3200K,10": degrees about the vertical (0 at the viewer's side,
-        90 on the right, 180 behind) and above the horizon; "#ffd9b0" or "3200K"; degrees across.
-    ambient: even light beside a lamp, as a part of it, 0 to 10.
+        the photograph's estimated light.
+    lamp: (azimuth, elevation[, colour][, size]), or "60,30,3200K,10": degrees about the vertical (0 at the viewer,
+        90 on the right, 180 behind) and above the horizon; colour "#ffd9b0" or "3200K"; size in degrees.
+    ambient: ambient light, as a part of the lamp's, 0 to 10.
     light_angle: degrees by which the light is rotated about the vertical, from the viewer to the right; or several, for
         frames x rows x columns x 3.
-    background: "photo", "light" (the panorama), "grey", "black" or "white"; by default the panorama that lights the
-        object, the photograph for its own light, or grey.
-    fov: degrees of a panorama that the picture's longer side shows, 1 to 150.
-    white_balance: "light", or "auto" as by a camera that is balanced for it.
-    exposure: stops. With 0 the strongest light is as strong as in the photograph.
+    background: "photo", "light" (the panorama), "grey", "black" or "white"; by default the light's panorama,
+        the photograph for its own light, or grey.
+    fov: angle of view into a panorama along the picture's longer side, degrees, 1 to 150.
+    white_balance: "light" keeps the light's colour, "auto" is as by a camera balanced for it.
+    exposure: stops; at 0 the strongest light is as strong as in the photograph.
     size: the longest side of the result, pixels; by default the photograph's.
 
     The same as `relight relight`.
@@ -196,29 +196,29 @@ def insert(
     transfer=None,
     highlights="auto",
 ):
-    """Objects of photographs in another picture, with their shadows: rows x columns x 3, float32, linear.
+    """Insert objects of photographs into another picture, with their shadows: rows x columns x 3, float32, linear.
 
     objects: from back to front: images, pairs of image and mask, or paths of captured objects (.relit).
     into: a photograph, or a panorama: a file of it, or a float32 array twice as wide as high.
 
     For all objects, or a list with one for each:
-    at: the middle of an object's lower edge, (x, y) in parts of the picture's sides from the upper left corner; by default
-        beside each other at 0.9.
+    at: the centre of an object's lower edge, (x, y) in parts of the picture's sides from the upper left corner; by default
+        next to each other at 0.9.
     height: in parts of the picture's, 0.4 by default.
     rotation: degrees in the plane, counter-clockwise.
     tint: (red, green, blue) that its albedo is multiplied with.
-    gloss: (part of even light that it reflects, smoothness), in place of what was found.
-    shadow: how much of its shadow is seen, 0 to 1.
+    gloss: (reflected part of even light, smoothness), in place of the estimated gloss.
+    shadow: strength of its shadow, 0 to 1.
     brightness: stops.
 
     For the picture:
-    light, lamp, ambient: see `relight`; by default the light is taken from `into`.
+    light, lamp, ambient: see `relight`; by default the light of `into`.
     light_angle: degrees by which the light, and a panorama behind the objects with it, is rotated.
-    size, fov, down: width and height of the picture of a panorama in pixels, the degrees that its longer side shows,
+    size, fov, down: for a panorama, width and height of the picture in pixels, its angle of view along the longer side,
         and how many degrees the camera looks down.
-    tilt: degrees that the camera looks down on the ground; by default by the panorama and `at`, or 20.
+    tilt: degrees that the camera looks down on the ground; by default from the panorama and `at`, or 20.
     match: whether brightness, white balance and grain of the objects follow the picture.
-    white_balance, exposure: of the light, and of a panorama in stops from the one that is found.
+    white_balance: see `relight`. exposure: of a panorama, stops from the automatic one.
     transfer, highlights: of the objects' photographs, see `decompose`.
 
     The same as `relight insert`.
@@ -261,7 +261,7 @@ def insert(
 
 
 def _one_each(name, values, parts, count):
-    """A value for each object; none where none is given."""
+    """A value for each object; empty if none is given."""
     if values is None or count == 0:
         return []
     array = numpy.asarray(values, dtype=numpy.float64)
@@ -269,7 +269,7 @@ def _one_each(name, values, parts, count):
     if array.shape == shape[1:]:
         array = numpy.broadcast_to(array, shape)
     if array.shape != shape:
-        raise ValueError(f"{name} is given for {len(array)} objects, and there are {count}: give one, or one for each")
+        raise ValueError(f"{name} has values for {len(array)} of {count} objects: give one, or one for each")
     return array.tolist()
 
 
@@ -278,11 +278,11 @@ def mask(image, box=None, *, seeds=None, keep_all=False):
 
     image: see `decompose`.
     box: x, y, width and height of a rectangle around the object, pixels.
-    seeds: a painted image of the same size, or a path to a PNG: white is object, black background, all else is open.
-        Or rows x columns: 255, 0, and 128 for open.
-    keep_all: keeps every part, not only the largest.
+    seeds: a painted image of the same size, or a path to a PNG: white is object, black is background, all else is unknown.
+        Or rows x columns: 255, 0, and 128 for unknown.
+    keep_all: keep every part, not only the largest.
 
-    The same as `relit-mask` makes of one frame.
+    The same as `relit-mask` on one frame.
     """
     if seeds is not None:
         painted = is_path(seeds) or numpy.ndim(seeds) == 3
@@ -293,16 +293,16 @@ def mask(image, box=None, *, seeds=None, keep_all=False):
 
 
 def read_image(path, *, transfer=None):
-    """The light of the picture at `path`, as the programs read it: rows x columns x 3 (or 4, with alpha), float32, linear.
+    """Read the picture at `path` as linear light, as the programs do: rows x columns x 3 (or 4, with alpha), float32, linear.
 
     PNG, JPEG, WebP, TIFF, BMP, GIF, OpenEXR and Radiance HDR, turned as they are displayed, in the primaries of sRGB.
-    transfer: "srgb", "gamma22" or "linear": how integers are encoded, where the file is not to be asked.
+    transfer: "srgb", "gamma22" or "linear": the encoding of integers; by default as the file states.
     """
     return _relit.read_image(os.fspath(path), transfer)
 
 
 def to_srgb(image, dtype=numpy.uint8):
-    """image: linear light of any shape. What a screen takes: sRGB of `dtype` uint8 or uint16, cut off beyond 0 to 1."""
+    """Convert linear light of any shape to sRGB of `dtype` uint8 or uint16, clipped to 0 to 1."""
     image = numpy.ascontiguousarray(image, dtype=numpy.float32)
     if numpy.dtype(dtype) == numpy.uint8:
         return _relit.to_srgb8(image)

@@ -1,4 +1,4 @@
-"""Data sets of relit, in order, shuffled, and from any place on."""
+"""Read relit's data sets: in order, shuffled, and from any position."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NEVER = 2**64 - 1
 
 @dataclasses.dataclass(frozen=True)
 class Cursor:
-    """A place between two batches. It is the same for all ranks."""
+    """A position between two batches, the same for all ranks."""
 
     epoch: int = 0
     sample: int = 0
@@ -26,13 +26,13 @@ class Cursor:
 
     @classmethod
     def of(cls, state):
-        """A cursor out of a cursor or of what `state_dict` gave."""
+        """A cursor from a cursor or from the result of `state_dict`."""
         return state if isinstance(state, cls) else cls(**state)
 
 
 @dataclasses.dataclass(frozen=True)
 class Batch:
-    """Frames as arrays, and what is known of them."""
+    """Frames as arrays, with their records."""
 
     images: numpy.ndarray
     masks: numpy.ndarray
@@ -52,7 +52,7 @@ class Batch:
 
 
 class Batches:
-    """An iterator over batches. `cursor` is the place behind the last one that it gave."""
+    """An iterator over batches. `cursor` is the position after the last batch."""
 
     def __init__(self, stream, cursor):
         self._stream = stream
@@ -75,21 +75,21 @@ class Batches:
 
 
 class Dataset:
-    """A data set that is opened: a shard, a folder of shards, or what relit-extract has written."""
+    """An open data set: a shard, a folder of shards, or what relit-extract has written."""
 
     def __init__(self, path, linear=False):
         self._data = _Data(os.fspath(path), linear)
         self.turns = dict(zip(self._data.names(), self._data.samples()))
 
     def __len__(self):
-        """How many samples there are, damaged ones included."""
+        """The number of samples, with damaged ones."""
         return sum(self._data.samples())
 
     def batches(self, batch=12, *, draw="neighbours", seed=None, rank=0, world_size=1, cursor=None, epochs=1, threads=1):
-        """Batches from `cursor` on, up to the end of `epochs` epochs in all; None goes on for ever.
+        """Batches from `cursor` on, up to `epochs` epochs in total; None never ends.
 
         `draw`: "neighbours" (frames that follow each other in a shard: any 12 cover the whole turn) or "mixed". Without
-        a seed they come as they stand. The same arguments always give the same batches.
+        a seed they come in stored order. The same arguments always give the same batches.
         """
         if draw not in ("neighbours", "mixed"):
             raise ValueError(f"draw is {draw!r}: give 'neighbours' or 'mixed'")
@@ -101,12 +101,12 @@ class Dataset:
         return Batches(stream, cursor)
 
     def __iter__(self):
-        """One frame after the other, as they stand: image, mask, record."""
+        """The frames in stored order: image, mask, record."""
         for batch in self.batches():
             yield from zip(batch.images, batch.masks, batch.records)
 
 
 def open(path, *, linear=False):
-    """Opens a data set: the `path` of a shard, of a folder of shards, or of what relit-extract has written. `linear` gives values
-    in proportion to light in place of sRGB."""
+    """Open a data set: a shard, a folder of shards, or a folder that relit-extract has written. `linear` gives linear values
+    in place of sRGB."""
     return Dataset(path, linear)

@@ -1,4 +1,4 @@
-"""Whole turns solved, and the render layers."""
+"""Solve whole turns, and render."""
 
 from __future__ import annotations
 
@@ -13,44 +13,44 @@ from ._arrays import angles, frames, light_source, warn, within
 
 @dataclasses.dataclass(frozen=True)
 class Turn:
-    """What a whole turn shows of its object. Everything is as large as the shard's frames, and 0 outside the mask."""
+    """The object of a whole turn. Everything is as large as the shard's frames, and 0 outside the mask."""
 
     #: The session.
     name: str
     #: rows x columns x 3, float32: unit vectors, x right, y up, z to the viewer.
     normals: numpy.ndarray
-    #: rows x columns x 3, float32, linear, from 0: in the units of a light that was given, else such that the mean shading
-    #: is 1 in each channel. Of metal it is the colour of its reflection: render it with an albedo of 0.
+    #: rows x columns x 3, float32, linear, from 0: in the units of a given light, else such that the mean shading
+    #: is 1 in each channel. For metal it is the colour of its reflection: render it with an albedo of 0.
     albedo: numpy.ndarray
     #: rows x columns x 3, float32, linear: the mean over the turn.
     shading: numpy.ndarray
-    #: rows x columns, float32, 0 to 1: how far each normal is to be trusted; one half where it is expected to be off by
+    #: rows x columns, float32, 0 to 1: the confidence in each normal; one half at an expected error of
     #: 11.5 degrees.
     confidence: numpy.ndarray
-    #: rows x columns, float32, degrees: how far each normal is expected to be off.
+    #: rows x columns, float32, degrees: the expected error of each normal.
     expected_error: numpy.ndarray
     #: rows x columns, bool: the object.
     mask: numpy.ndarray
     #: 9 x 3, float64: the light of order 2 in the viewer's frame at the table's angle 0.
     light: numpy.ndarray
-    #: Degrees: the median over the object of how far normals are expected to be off.
+    #: Degrees: the median over the object of the expected error of normals.
     expected_error_deg: float
-    #: Reflectance, rows x columns x 3, and smoothness, rows x columns, for `render`; None of a diffuse object.
+    #: Reflectance, rows x columns x 3, and smoothness, rows x columns, for `render`; None for a diffuse object.
     specular: tuple | None
 
 
 def solve_turn(shard, *, rotation=None, elevation=None, light=None, material="diffuse"):
-    """Normals, albedo and light of a whole turn: a `Turn`.
+    """Estimate normals, albedo and light of a whole turn: a `Turn`.
 
     shard: the path of a shard (.tar) of relit-extract, or of a folder with one turn.
-    rotation: "counter-clockwise" or "clockwise", seen from above; by default what the data set says of the rig, or what
-        the frames show.
-    elevation: degrees that the camera looks down on the table; by default what the data set says, or 18.
-    light: the light, where it was measured, in the viewer's frame at the table's angle 0: coefficients (n x 3, or a path
+    rotation: "counter-clockwise" or "clockwise", seen from above; by default that of the data set, or as estimated from
+        the frames.
+    elevation: degrees that the camera looks down on the table; by default that of the data set, or 18.
+    light: the measured light, in the viewer's frame at table angle 0: coefficients (n x 3, or a path
         to .txt), or a panorama (rows x columns x 3, or a path).
     material: "diffuse" (with gloss or without) or "metal".
 
-    The same as `relight turn`. What its user should know is said as warnings.
+    The same as `relight turn`. Doubts about the result come as warnings.
     """
     found, sentences = _relit.solve_turn(os.fspath(shard), rotation, elevation, light_source(light), material)
     warn(sentences)
@@ -69,23 +69,23 @@ def render(
     diffuse_form="irradiance",
     specular_form="lobe",
 ):
-    """An object that is given by its maps, under a light: rows x columns x 3, float32, linear.
+    """Render an object from its maps in a light: rows x columns x 3, float32, linear.
 
     image = exposure x (albedo x irradiance + reflectance x integral of radiance times the lobe).
 
-    normals: rows x columns x 3, x right, y up, z to the viewer, of any length; 0 where there is no surface.
-    albedo: linear: one value, red, green and blue, or rows x columns x 3; not negative.
+    normals: rows x columns x 3, x right, y up, z to the viewer, of any length; 0 outside the object.
+    albedo: linear, from 0: one value, red, green and blue, or rows x columns x 3.
     light: coefficients (n x 3), a panorama (rows x columns x 3), or a path to either.
-    specular: reflectance (as albedo) and smoothness (a value, or rows x columns), the exponent of Blinn and Phong.
+    specular: reflectance (as albedo) and smoothness (a value, or rows x columns), the Blinn-Phong exponent.
     light_angle: degrees by which the light is rotated about the vertical, from the viewer to the right; or several, for
         frames x rows x columns x 3.
-    exposure: stops beyond a white diffuse surface under even light of radiance 1; or "auto": a white diffuse surface that
-        faces the strongest light is white.
-    order: of spherical harmonics to which a panorama is brought, 0 to 64.
-    diffuse_form: "irradiance", or "released" as the paper's released code has it.
+    exposure: stops; 0 shows a white surface in even light of radiance 1 as white; "auto", one that faces the strongest
+        light.
+    order: of the spherical harmonics of a panorama, 0 to 64.
+    diffuse_form: "irradiance", or "released" as in the paper's released code.
     specular_form: "lobe", close to the ground truth, or "power", the paper's formula.
 
-    The same as `relight render`. `relit.torch.render` does it on tensors, with gradients.
+    The same as `relight render`. `relit.torch.render` does the same on tensors, with gradients.
     """
     normals = numpy.ascontiguousarray(normals, dtype=numpy.float32)
     if normals.ndim != 3 or normals.shape[2] != 3:

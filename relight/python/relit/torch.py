@@ -1,5 +1,5 @@
-"""For people who train networks of their own in PyTorch: the render layers and the low-rank loss as plain tensor code, with
-gradients, and data sets for torch.utils.data.
+"""For your own networks in PyTorch: the render layers and the low-rank loss as plain tensor code with gradients, and data
+sets for torch.utils.data.
 
     image = relit.torch.render(normals, albedo, light, specular=(reflectance, smoothness))
     loss = relit.torch.low_rank_loss(reflectances.flatten(1))
@@ -73,7 +73,7 @@ def _surface(normals):
 
 
 def shading(normals, light, form="irradiance"):
-    """The irradiance of unit normals (0 where there is no surface), from 0: the diffuse layer. `form` "released" is that of
+    """The irradiance of unit normals (0 outside the object), from 0: the diffuse layer. `form` "released" is that of
     the paper's released code: the first nine coefficients, |L00|, and 0.1 more."""
     order = _order(light)
     if form == "released":
@@ -100,7 +100,7 @@ def _cosine_lobe(l):
 
 def highlight(normals, reflectance, smoothness, light, form="lobe"):
     """The specular layer: reflectance (... x 3 x rows x columns, or what broadcasts) times the integral of radiance times the
-    lobe of Blinn and Phong; smoothness (... x 1 x rows x columns, or a number) is its exponent. `form` "power" is the formula of
+    Blinn-Phong lobe; smoothness (... x 1 x rows x columns, or a number) is its exponent. `form` "power" is the formula of
     the paper, for the first nine coefficients."""
     smoothness = torch.as_tensor(smoothness, dtype=normals.dtype, device=normals.device).clamp_min(0.01)
     smoothness = smoothness.expand(*normals.shape[:-3], 1, *normals.shape[-2:])
@@ -177,8 +177,8 @@ def render(normals, albedo, light, specular=None, diffuse_form="irradiance", spe
 
 
 def low_rank_loss(rows):
-    """How far N reflectances of one object (N x d, or groups x N x d) are from being multiples of one: the paper's low-rank
-    loss, the squared distance to the best approximation of rank one, which counts as a constant; the mean over groups."""
+    """The paper's low-rank loss of N reflectances of one object (N x d, or groups x N x d): the squared distance to the best
+    approximation of rank one, which counts as a constant; the mean over groups."""
     rows = rows if rows.dim() == 3 else rows[None]
     with torch.no_grad():
         vector = _first_singular_vector(rows)
@@ -201,9 +201,9 @@ def _first_singular_vector(rows):
 
 
 class TurnBatches(torch.utils.data.IterableDataset):
-    """Images, masks and the state behind them, batch by batch. Each worker of a loader draws its own batches, as if it
-    were a rank of its own. With `n` workers the state moves on behind every `n`-th batch: who goes on from it may read
-    up to `n - 1` batches again, and misses none."""
+    """Images, masks and the state behind them, batch by batch. Each worker of a loader draws its own batches, like a
+    rank of its own. With `n` workers the state advances after every `n`-th batch: resuming from it may read up to `n - 1`
+    batches again, and misses none."""
 
     def __init__(self, path, batch=12, *, linear=False, rank=0, world_size=1, epochs=1, **options):
         self._path, self._linear = path, linear
@@ -217,7 +217,7 @@ class TurnBatches(torch.utils.data.IterableDataset):
     def __iter__(self):
         worker = torch.utils.data.get_worker_info()
         count, number = (worker.num_workers, worker.id) if worker else (1, 0)
-        # Opened here, so that each worker has files of its own.
+        # Opened here, so that each worker has its own files.
         batches = _open(self._path, linear=self._linear).batches(
             self._batch,
             rank=self._rank * count + number,
@@ -228,7 +228,7 @@ class TurnBatches(torch.utils.data.IterableDataset):
         )
         state = self._cursor.state_dict()
         for batch in batches:
-            # The cursor is behind the batches of all workers: only the last one's is behind what a loop has had.
+            # The cursor is after the batches of all workers: only the last worker's is after all that the loop has got.
             if number == count - 1:
                 state = batch.cursor.state_dict()
             if batch.damaged:

@@ -1,4 +1,4 @@
-//! Pictures that Python gives, as paths or arrays, and arrays that it gets.
+//! Pictures from Python, as paths or arrays, and arrays for it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::failure::{Failure, choice};
 /// How errors name a picture that is an array.
 const ARRAY: &str = "array";
 
-/// A picture as the package hands it over: a path, or an array of rows, columns and 3 or 4 channels that lies in one piece.
+/// A picture from the package: a path, or a contiguous array of rows, columns and 3 or 4 channels.
 #[derive(FromPyObject)]
 pub(crate) enum GivenPicture<'py> {
     Path(PathBuf),
@@ -26,7 +26,7 @@ pub(crate) enum GivenPicture<'py> {
     Light(PyReadonlyArray3<'py, f32>),
 }
 
-/// The same, of which Python may change its own.
+/// The same, copied: Python may change its array meanwhile.
 pub(crate) enum Picture {
     File(PathBuf),
     Memory(DynamicImage),
@@ -90,7 +90,7 @@ impl Picture {
         })
     }
 
-    /// The colours; `transfer` says how integers are encoded, where the file is not to be asked.
+    /// The colours; `transfer` is the encoding of integers, in place of what the file states.
     pub(crate) fn colours(self, transfer: Option<Transfer>) -> Result<ColourImage, Failure> {
         Ok(match self {
             Self::File(path) => ColourImage::from_bytes(&path, &read(&path)?, transfer)?,
@@ -125,7 +125,7 @@ pub(crate) struct Array<T> {
 }
 
 impl Array<f32> {
-    /// Rows, columns and channels; one channel alone is no dimension.
+    /// Rows, columns and channels; a single channel has no dimension of its own.
     pub(crate) fn from_planes<const C: usize>(planes: &Planes<C>) -> Self {
         let Extent { width, height } = planes.extent();
         let mut values = vec![0.0; C * width * height];

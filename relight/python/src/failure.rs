@@ -1,4 +1,4 @@
-//! Work without Python's lock, and what it fails with as an exception: the program's sentence.
+//! Work without Python's lock, with its errors as exceptions that have the program's sentence.
 
 use std::error::Error;
 use std::io;
@@ -64,7 +64,7 @@ pub(crate) fn unlocked<R: Send>(
     static PROCESS: OnceLock<u32> = OnceLock::new();
     if *PROCESS.get_or_init(process::id) != process::id() {
         return Err(PyRuntimeError::new_err(
-            "relit was used before this process was forked, and its threads are gone: start worker processes by \"spawn\" \
+            "relit was used before this process was forked, and its threads are gone: start workers with \"spawn\" \
              (multiprocessing.get_context), or use relit only in them",
         ));
     }

@@ -12,17 +12,17 @@ use relight_photo::relighting::{DiscLamp, LightSource};
 use crate::arrays::{GivenPicture, Picture};
 use crate::failure::Failure;
 
-/// Light as the package hands it over.
+/// Light from the package.
 #[derive(FromPyObject)]
 pub(crate) enum GivenLight<'py> {
-    /// `AZIMUTH,ELEVATION[,COLOUR][,SIZE]`, and the even light beside it.
+    /// `AZIMUTH,ELEVATION[,COLOUR][,SIZE]`, and the ambient light.
     Lamp(String, f64),
     Coefficients(PyReadonlyArray2<'py, f64>),
     /// A panorama, or a file of light.
     Picture(GivenPicture<'py>),
 }
 
-/// The same, of which Python may change its own.
+/// The same, copied: Python may change its array meanwhile.
 pub(crate) enum Light {
     Source(LightSource),
     File(PathBuf),

@@ -24,7 +24,7 @@ use crate::failure::{Failure, choice, unlocked};
 use crate::light::GivenLight;
 use crate::networks::decomposer;
 
-/// A photograph as the package hands it over: the picture, its mask, a rectangle, and how integers are encoded.
+/// A photograph from the package: the picture, its mask, a rectangle, and the encoding of integers.
 #[derive(FromPyObject)]
 pub(crate) struct GivenPhotograph<'py>(
     GivenPicture<'py>,
@@ -33,7 +33,7 @@ pub(crate) struct GivenPhotograph<'py>(
     Option<String>,
 );
 
-/// The same, of which Python may change its own.
+/// The same, copied: Python may change its array meanwhile.
 pub(crate) struct Photograph {
     picture: Picture,
     mask: Option<Picture>,
@@ -73,8 +73,7 @@ impl Photograph {
         };
         photo.map_err(|error| match error {
             DecomposeError::NoMask { path } => Failure::value(format!(
-                "{} does not say where the object is: it has no alpha, and its background is not black. Give a mask, such as \
-                 that of relit.mask(image, box=(x, y, width, height))",
+                "{} does not say where the object is: give a mask, such as relit.mask(image, box=(x, y, width, height))",
                 path.display()
             )),
             error => error.into(),
@@ -159,7 +158,7 @@ impl Layers {
     }
 }
 
-/// What is behind a relit object.
+/// The background of a relit object.
 #[derive(Clone, Copy)]
 enum Behind {
     Photo,
@@ -228,7 +227,7 @@ pub(crate) fn relight<'py>(
     Ok((pictures.collect::<PyResult<_>>()?, note))
 }
 
-/// Where nothing is said, the panorama that lights the object, its photograph in its own light, or grey.
+/// By default the panorama that lights the object, its photograph in its own light, or grey.
 fn backdrop(
     background: Option<Behind>,
     light: Option<&LightSource>,
@@ -252,7 +251,7 @@ fn backdrop(
             Ok(Backdrop::Panorama(view, panorama.clone()))
         }
         (Behind::Light, None) => Err(Failure::value(
-            "background is \"light\": there is no panorama; give one as light",
+            "background=\"light\" needs a panorama: give one as light",
         )),
     }
 }
@@ -304,13 +303,13 @@ pub(crate) fn insert<'py>(
     Ok((picture.into_python(py)?, notes))
 }
 
-/// What an object is made of: a photograph, or a captured object's file.
+/// The source of an object: a photograph, or a captured object's file.
 fn inserted(photograph: Photograph) -> Result<InsertSource, Failure> {
     match &photograph.picture {
         Picture::File(path) if CapturedObject::is_named(path) => {
             if photograph.mask.is_some() {
                 return Err(Failure::value(format!(
-                    "{}: it has its own mask, give none",
+                    "{} has its own mask: do not give one",
                     path.display()
                 )));
             }

@@ -17,7 +17,7 @@ use relit_data::causes::with_causes;
 const AHEAD: usize = 4;
 
 /// A batch for Python: images, masks, keys, records as JSON (none for folders of images), damaged samples as text, and
-/// the epoch and sample behind it.
+/// the epoch and sample after it.
 type PythonBatch<'py> = (
     Bound<'py, PyArray4<f32>>,
     Bound<'py, PyArray4<f32>>,
@@ -80,7 +80,7 @@ impl Data {
                 draw: if mixed { Draw::Mixed } else { Draw::Neighbours },
                 seed,
                 rank: Rank::new(rank.0, rank.1)
-                    .ok_or_else(|| value("the rank is not below the world size"))?,
+                    .ok_or_else(|| value("rank has to be below world_size"))?,
             },
             from: Cursor {
                 epoch: from.0,
@@ -110,7 +110,7 @@ impl BatchStream {
     fn next<'py>(&self, py: Python<'py>) -> PyResult<Option<PythonBatch<'py>>> {
         // A lock is poisoned where a thread of Rust broke off.
         let drawn = py.detach(|| self.stream.lock().ok().map(|mut stream| stream.next()));
-        let drawn = drawn.ok_or_else(|| PyRuntimeError::new_err("reading broke off"))?;
+        let drawn = drawn.ok_or_else(|| PyRuntimeError::new_err("reading failed"))?;
         let (drawn, damage) = match drawn {
             None => return Ok(None),
             Some(Ok(drawn)) => (drawn, Vec::new()),

@@ -15,7 +15,7 @@ use crate::arrays::{Array, to_planes};
 use crate::failure::{Failure, choice, unlocked};
 use crate::light::GivenLight;
 
-/// Reflectance and smoothness as Python gives them.
+/// Reflectance and smoothness from Python.
 type GivenGloss<'py> = (PyReadonlyArray3<'py, f32>, PyReadonlyArray2<'py, f32>);
 
 /// An object that is given by its maps under a light: a picture for each angle by which it has turned, degrees. Without an
@@ -95,7 +95,7 @@ fn planes(array: &PyReadonlyArray3<'_, f32>) -> PyResult<Planes<3>> {
     planes.map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
-/// That no value is negative or not finite.
+/// Checks that no value is negative or not finite.
 fn check<const C: usize>(what: &str, map: &Planes<C>) -> Result<(), Failure> {
     let mut values = map.planes().into_iter().flatten();
     if values.all(|value| value.is_finite() && *value >= 0.0) {

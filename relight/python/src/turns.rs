@@ -15,7 +15,7 @@ use crate::failure::{choice, unlocked};
 use crate::light::{GivenLight, Light};
 use crate::networks::turn_networks;
 
-/// What is found of a turn, by name, and what its user should know.
+/// The results of a turn by name, and its warnings.
 #[pyfunction]
 pub(crate) fn solve_turn<'py>(
     py: Python<'py>,

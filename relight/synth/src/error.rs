@@ -1,4 +1,4 @@
-//! What can go wrong while data is made.
+//! Errors of making data.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -22,12 +22,12 @@ pub enum SynthError {
         /// The system's answer.
         source: io::Error,
     },
-    /// A file or folder is not what it should be.
+    /// A file or folder is not as required.
     #[error("{path} {fault}")]
     Unusable {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it, and what to do.
+        /// The fault, and what to do.
         fault: String,
     },
     /// What was given cannot be used.
@@ -36,7 +36,7 @@ pub enum SynthError {
     /// A texture or an image cannot be read.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// Numbers are no light.
+    /// The numbers are not a light.
     #[error(transparent)]
     Light(#[from] LightError),
     /// A picture could not be encoded.
@@ -70,7 +70,7 @@ impl SynthError {
         }
     }
 
-    /// That a file or folder is not what it should be.
+    /// A file or folder is not as required.
     pub(super) fn unusable(path: &Path, fault: impl Into<String>) -> Self {
         Self::Unusable {
             path: path.to_owned(),
@@ -82,13 +82,13 @@ impl SynthError {
     pub(super) fn mesh(path: &Path) -> impl FnOnce(String) -> Self {
         move |reason| {
             let fault = format!(
-                "is a mesh that cannot be used: {reason}; mend it, or take it out of the folder"
+                "is a mesh that cannot be used: {reason}; repair it, or remove it from the folder"
             );
             Self::unusable(path, fault)
         }
     }
 
-    /// That a folder was made otherwise.
+    /// A folder was made with other settings.
     pub(super) fn other_settings(path: &Path) -> Self {
         let fault = "holds samples that were made with other settings: give the same ones, or another folder";
         Self::unusable(path, fault)

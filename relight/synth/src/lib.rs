@@ -9,7 +9,7 @@
 //! | `samples` | `recipe` draws objects, `view`s, `finish`es and lights; `camera` makes 8-bit values of light; `folder` writes |
 //! | `library`, `pack` | what there is to draw from; many objects and panoramas in one file |
 //! | `turn` | whole turns as shards |
-//! | `transfer` | views that any room lights without a ray: of photographs and of whole turns |
+//! | `transfer` | views for any environment light without rays: of photographs and of whole turns |
 //!
 //! All of it follows from a seed: the same seed gives the same bytes on any number of threads. What is
 //! slow is kept apart from what is cheap: a [`SyntheticScene`] is made once for an object in a pose, and then

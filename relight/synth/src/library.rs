@@ -24,19 +24,19 @@ use relit_data::shard::Digest;
 pub(crate) const PANORAMA_EXTENT: Extent = Extent::new(256, 128);
 /// Size of panoramas as pictures.
 const PICTURE_EXTENT: Extent = Extent::new(256, 128);
-/// Seeds of which panoramas are made.
+/// Seeds from which panoramas are made.
 const VARIANTS: u64 = 4;
 
 /// Meshes, pictures and panoramas to draw from.
 #[derive(Debug, Clone, Default)]
 pub struct Library {
-    /// By file name, with the folders in which it lies; none: all objects are procedural.
+    /// By file name, with its folders; empty: all objects are procedural.
     pub meshes: Vec<(String, Mesh)>,
     /// Textures, and panoramas as textures.
     pub(crate) pictures: Vec<TextureImage>,
     /// The panoramas, never none.
     pub panoramas: Panoramas,
-    /// What of the folders is not used.
+    /// Unused files of the folders.
     pub left_out: Vec<LeftOut>,
     /// Of meshes and panoramas from packed libraries, by name: whether they are for validation only.
     pub(crate) is_for_validation: BTreeMap<String, bool>,
@@ -47,7 +47,7 @@ pub struct Library {
 pub struct LeftOut {
     /// The file.
     pub path: PathBuf,
-    /// What of it, and why.
+    /// The part, and the reason.
     pub what: String,
 }
 
@@ -62,9 +62,9 @@ impl fmt::Display for LeftOut {
 pub struct Folders {
     /// `.obj`, `.gltf` and `.glb`, also in folders within it.
     pub meshes: Option<PathBuf>,
-    /// `.png`, `.jpg`, `.webp`, `.tif` and `.bmp`; sRGB where they say nothing else.
+    /// `.png`, `.jpg`, `.webp`, `.tif` and `.bmp`; sRGB by default.
     pub textures: Option<PathBuf>,
-    /// `.hdr` and `.exr`; none: those that are made here.
+    /// `.hdr` and `.exr`; `None`: the synthetic ones.
     pub panoramas: Option<PathBuf>,
 }
 
@@ -88,7 +88,7 @@ impl Library {
     /// [`Self::training`]. Where no folder of panoramas is given, 13 are made. Meshes of other kinds are left out.
     ///
     /// # Errors
-    /// Where a folder holds no file of its kind; whatever is wrong with a file.
+    /// If a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
         let packed = Contents::from_folders(folders)?;
         let (meshes, mut left_out) = match &folders.meshes {
@@ -128,7 +128,7 @@ impl Library {
     /// A packed library from its bytes; errors name it as `path`.
     ///
     /// # Errors
-    /// [`SynthError::Unusable`] where it is damaged.
+    /// [`SynthError::Unusable`] if it is damaged.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, SynthError> {
         let contents = pack::read(path, bytes, Wanted::ALL)?;
         let pictures = contents.panoramas.iter();
@@ -141,10 +141,10 @@ impl Library {
         })
     }
 
-    /// The part of packed libraries that may be learned from. What comes from folders is in both parts.
+    /// The training part of packed libraries. Files of folders are in both parts.
     ///
     /// # Errors
-    /// Where no panorama is left.
+    /// If no panorama is left.
     pub fn training(self) -> Result<Self, SynthError> {
         self.part(false)
     }
@@ -152,7 +152,7 @@ impl Library {
     /// The part of packed libraries that is for validation only: a tenth of the objects and of the panoramas.
     ///
     /// # Errors
-    /// Where no panorama is left.
+    /// If no panorama is left.
     pub fn validation(self) -> Result<Self, SynthError> {
         self.part(true)
     }
@@ -211,7 +211,7 @@ impl Library {
 }
 
 impl Contents {
-    /// What is wanted of packed libraries that stand in place of folders; each is read once.
+    /// The wanted part of packed libraries given in place of folders; each is read once.
     fn from_folders(folders: &Folders) -> Result<Self, SynthError> {
         let packed = |path: &Option<PathBuf>| path.clone().filter(|path| pack::is_packed(path));
         let (meshes, panoramas) = (packed(&folders.meshes), packed(&folders.panoramas));
@@ -236,7 +236,7 @@ impl Contents {
     }
 }
 
-/// The panoramas that are made here, by name: four each of studio, room and sky, and one even light.
+/// The synthetic panoramas, by name: four each of studio, room and sky, and one even light.
 ///
 /// # Errors
 /// None with panoramas of any size; [`SynthError::Light`] is passed on.
@@ -302,7 +302,7 @@ const OTHER_MESHES: [&str; 35] = [
 
 type NamedMeshes = Vec<(String, Mesh)>;
 
-/// All meshes of a folder and those within it, and what of them is not used.
+/// All meshes of a folder and its subfolders, and the unused files.
 fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<LeftOut>), SynthError> {
     let files = files_below(folder)?;
     let (wanted, others): (Vec<PathBuf>, Vec<PathBuf>) =
@@ -360,7 +360,7 @@ pub(crate) fn files_below(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
     Ok(files)
 }
 
-/// What lies in a folder, without what systems hide there.
+/// The entries of a folder, without hidden ones of the system.
 fn members(folder: &Path) -> Result<Vec<PathBuf>, SynthError> {
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(SynthError::read(folder))? {

@@ -42,7 +42,7 @@ impl Random {
         Self(Pcg64Mcg::seed_from_u64(seed))
     }
 
-    /// A seed for something that draws by itself.
+    /// A seed for an independent stream of draws.
     pub(super) fn seed(&mut self) -> u64 {
         self.0.next_u64()
     }

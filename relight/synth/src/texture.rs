@@ -11,7 +11,7 @@ use image::{DynamicImage, ImageError as FileError, ImageReader, Limits, RgbImage
 use super::SynthError;
 use relight_core::image::{ColourImage, ColourSpace, Extent, Linear, Srgb};
 
-/// Longest side of a mesh's own pictures in memory: larger ones are made smaller.
+/// Longest side of a mesh's own pictures in memory: larger ones are reduced.
 const MAX_SIDE: usize = 1024;
 
 /// Quality of the JPEG of a mesh's picture in a packed library, 1 to 100.
@@ -31,7 +31,7 @@ pub(crate) struct TextureImage {
 #[derive(Debug, Clone)]
 enum Texels {
     Light(Vec<Vec3>),
-    /// As the file has them, in a quarter of the memory, and what each level stands for.
+    /// As in the file, in a quarter of the memory, with the value of each level.
     Levels(Vec<[u8; 3]>, PictureKind),
 }
 
@@ -100,10 +100,10 @@ impl TextureImage {
         }
     }
 
-    /// Reads a picture, whose values are sRGB where it says nothing else.
+    /// Reads a picture, whose values are sRGB by default.
     ///
     /// # Errors
-    /// [`SynthError::Image`] where it cannot be read or is no picture.
+    /// [`SynthError::Image`] if it cannot be read or is not a picture.
     pub(crate) fn read(path: &Path) -> Result<Self, SynthError> {
         let image = ColourImage::read(path, None)?.into_light();
         let planes = image.planes();
@@ -125,7 +125,7 @@ impl TextureImage {
         })
     }
 
-    /// The same of a packed library's JPEG, of which no side is longer than `longest`.
+    /// The same of a packed library's JPEG, with sides of at most `longest`.
     pub(crate) fn unpacked(
         bytes: &[u8],
         kind: PictureKind,
@@ -140,10 +140,10 @@ impl TextureImage {
         Ok(Self::reduced(&image, kind, MAX_SIDE))
     }
 
-    /// The picture as a JPEG of which no side is longer than `longest`.
+    /// The picture as a JPEG with sides of at most `longest`.
     ///
     /// # Errors
-    /// Where it has no pixels.
+    /// If it has no pixels.
     pub(crate) fn packed(&self, kind: PictureKind, longest: usize) -> Result<Vec<u8>, FileError> {
         let (width, height) = (self.width, self.height);
         let means = Means::new([width, height], longest);
@@ -177,7 +177,7 @@ impl TextureImage {
         })
     }
 
-    /// Part of the picture that its file says is see-through; it is shown as if it were not.
+    /// Part of the picture that is transparent in its file; it is shown as opaque.
     pub(crate) fn see_through(&self) -> f32 {
         self.see_through
     }
@@ -227,7 +227,7 @@ impl TextureImage {
     }
 }
 
-/// Part of an image's pixels of which less than half is opaque.
+/// The part of an image's pixels that are less than half opaque.
 fn see_through(image: &DynamicImage) -> f32 {
     if !image.color().has_alpha() {
         return 0.0;
@@ -244,7 +244,7 @@ struct Means {
 }
 
 impl Means {
-    /// The smallest squares of which there are at most `longest` side by side.
+    /// The smallest squares with at most `longest` in a row or column.
     fn new(sides: [usize; 2], longest: usize) -> Self {
         let square = sides[0].max(sides[1]).div_ceil(longest).max(1);
         Self { sides, square }

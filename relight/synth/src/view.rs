@@ -1,4 +1,4 @@
-//! Where an object stands and how the camera looks at it. The frame is the viewer's: x to the right,
+//! The place of an object and of the camera. The frame is the viewer's: x to the right,
 //! y up, z to the viewer; the picture's edges lie at -1 and 1 in the plane z = 0.
 
 use glam::{Affine3A, Mat3, Vec2, Vec3};

@@ -1,4 +1,4 @@
-//! What can go wrong while training.
+//! Errors of training.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -22,8 +22,8 @@ pub enum TrainError {
     /// A sheet of answers could not be encoded.
     #[error(transparent)]
     Encode(#[from] relit_data::shard::ShardError),
-    /// What is wrong, and what to do: with something that was given, as a setting, an option, a checkpoint or a GPU, or
-    /// with the run itself.
+    /// A fault, and what to do: in something given (a setting, an option, a checkpoint or a GPU), or in the
+    /// run itself.
     #[error("{0}")]
     Refused(String),
     /// A file cannot be read or written.
@@ -40,7 +40,7 @@ pub enum TrainError {
     #[error("the run was asked to stop while its first samples were being composed")]
     Stopped,
     /// Another process of the run has ended, or cannot be reached.
-    #[error("another process of this run has ended or cannot be reached any more ({0})")]
+    #[error("another process of this run has ended or can no longer be reached ({0})")]
     ProcessLost(String),
     /// A fault of the program.
     #[error("{0}: this is a fault of the program")]
@@ -58,16 +58,16 @@ impl TrainError {
         }
     }
 
-    /// That a saved optimiser lacks a tensor, or has one of another shape.
+    /// A saved optimiser lacks a tensor, or has one of another shape.
     pub(super) fn no_memory(name: &str) -> Self {
         Self::Refused(format!(
             "the saved optimiser has no {name} of the right shape: it is another network's"
         ))
     }
 
-    /// That a file is no checkpoint of this run.
+    /// A file is not a checkpoint of this run.
     pub(super) fn checkpoint(path: &Path, fault: &str) -> Self {
         let path = path.display();
-        Self::Refused(format!("{path} is no checkpoint of this run: {fault}"))
+        Self::Refused(format!("{path} is not a checkpoint of this run: {fault}"))
     }
 }

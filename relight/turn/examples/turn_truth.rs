@@ -1,7 +1,7 @@
 //! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [metal]`.
 //!
 //! TRUTH is a rendered session (`normal_gt.png`, `albedo_gt.png`, `truth.json`) or a folder that `relight synth turns`
-//! wrote (`normal.png`, `albedo.png`, `turn.json`). `metal` says what the object is of.
+//! wrote (`normal.png`, `albedo.png`, `turn.json`). `metal` gives the material.
 #![allow(clippy::print_stdout, reason = "the example is a program of its own")]
 
 use std::error::Error;
@@ -27,7 +27,7 @@ fn weights(name: &str) -> Result<Weights, NetError> {
     Weights::read(&folder.join(name))
 }
 
-/// Confidences above which the error is told.
+/// Confidences above which the error is printed.
 const LEVELS: [f32; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.9];
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -20,14 +20,14 @@ pub enum TurnError {
     /// The shard cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The shard is damaged, and what is left of it does not do.
-    #[error("{} is damaged ({damage}), and what is left of it does not do", path.display())]
+    /// The shard is damaged, and the rest of it cannot be solved.
+    #[error("{} is damaged ({damage}), and the rest of it cannot be solved", path.display())]
     Damaged {
         /// The shard.
         path: PathBuf,
         /// The first damage.
         damage: String,
-        /// Why the rest does not do.
+        /// Why the rest cannot be solved.
         source: Box<TurnError>,
     },
     /// There is more than one turn.
@@ -38,7 +38,7 @@ pub enum TurnError {
         /// How many it has.
         found: usize,
     },
-    /// The frames do not make a turn, or a folder or a video is another than what is needed: why.
+    /// The frames do not make a turn, or a folder or a video is not the required one.
     #[error("{0}")]
     Refused(String),
     /// A setting is beyond what may be given.
@@ -52,52 +52,55 @@ pub enum TurnError {
         allowed: &'static str,
     },
     /// No light fits the curves.
-    #[error("no light explains the turn: all of it is dark, or all of it is clipped")]
+    #[error(
+        "no light fits the turn: it is all dark or all clipped; change the exposure and capture it again"
+    )]
     NoLight,
     /// The network of turns fails.
     #[error(transparent)]
     Network(#[from] NetError),
     /// The network of photographs fails.
-    #[error("the network of photographs cannot tell the albedo")]
+    #[error("the network of photographs cannot estimate the albedo")]
     Decompose(#[from] DecomposeError),
     /// An image or a light cannot be read or written.
     #[error(transparent)]
     Image(#[from] ImageError),
     /// The object cannot be made a file.
-    #[error("the object cannot be written as a file that can be lit")]
+    #[error("the captured object cannot be written")]
     Asset(#[source] Box<CapturedObjectError>),
     /// The session whose video shows the ball cannot be read.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The session from which a shard was made is not near it.
-    #[error("no session or video of which {} was made lies beside its data set: give it with --session", .0.display())]
+    /// The session of a shard is not next to its data set.
+    #[error("the session or video from which {} was made is not next to its data set: give it with --session", .0.display())]
     NoSession(PathBuf),
     /// The ball is under the object's mask.
     #[error(
-        "the object's mask covers {percent:.0} % of the ball at {given}: measure the ball's place in the video again, or take the ball out of the mask"
+        "the object's mask covers {percent:.0} % of the ball at {given}: measure the ball's place again, or remove the ball \
+         from the mask"
     )]
     BallInMask {
-        /// Where it is said to be.
+        /// The place that was given.
         given: String,
         /// The part of the ball that is covered.
         percent: f64,
     },
-    /// There is no ball.
+    /// The circle shows no ball.
     #[error(
-        "the circle at {given} shows no ball: the light by it explains {explained:.0} % of what varies in it; measure the ball's middle and radius in the video again, \
-         check that nothing covers it, and say what the ball is made of"
+        "the circle at {given} shows no ball: its light explains {explained:.0} % of the variation; measure it again, uncover \
+         the ball, and check its material"
     )]
     NoBall {
-        /// Where it is said to be.
+        /// The place that was given.
         given: String,
         /// The part that is explained, percent.
         explained: f64,
     },
     /// The ball is elsewhere.
-    #[error("the ball is not at {given}, where the light by it explains {:.0} % of what varies, but at about {},{},{}, where it explains {:.0} %: \
-         measure its middle and radius in the video again", explained[0], better[0], better[1], better[2], explained[1])]
+    #[error("the ball is not at {given} ({:.0} % explained) but near {},{},{} ({:.0} % explained): measure its centre and \
+         radius in the video again", explained[0], better[0], better[1], better[2], explained[1])]
     Misplaced {
-        /// Where it is said to be.
+        /// The place that was given.
         given: String,
         /// Middle and radius of a circle that fits clearly better, pixels.
         better: [f64; 3],
@@ -110,7 +113,7 @@ pub enum TurnError {
 }
 
 impl TurnError {
-    /// That a video is not that of the turn, and what tells them apart.
+    /// A video is not that of the turn, with the difference.
     pub(crate) fn other_video(path: &Path, why: &str) -> Self {
         let path = path.display();
         Self::Refused(format!(
@@ -131,7 +134,7 @@ impl From<CapturedObjectError> for TurnError {
     }
 }
 
-/// A light of which a coefficient is not finite is none.
+/// A coefficient of the light is not finite.
 impl From<LightError> for TurnError {
     fn from(_: LightError) -> Self {
         Self::NoLight
@@ -142,7 +145,7 @@ impl From<FolderFault> for TurnError {
     fn from(fault: FolderFault) -> Self {
         Self::Refused(match fault {
             FolderFault::Foreign(path, name) => format!(
-                "{} holds {name}, which is no result of a turn: give a folder that is new, empty, or holds an earlier result",
+                "{} holds {name}, which is not a result of a turn: give a folder that is new, empty, or holds an earlier result",
                 path.display()
             ),
             FolderFault::NoFolder(path) => format!(

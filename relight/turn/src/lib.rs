@@ -15,8 +15,8 @@
 //! | `report` | `files`, `sheet`, `movie`, `object`: what is written; `warnings`: what a user should know |
 //!
 //! `solving` puts them together. A folder knows those above it in this table. Each module has its parameters as constants, with
-//! unit and source: *derived*, *measured*, *by convention*, *numerical* (a guard on which results hardly depend), or *by hand*,
-//! of which no sweep is recorded.
+//! unit and source: *derived*, *measured*, *by convention*, *numerical* (a guard on which results hardly depend), or *by hand*
+//! (no sweep is recorded).
 
 mod error;
 mod fit;

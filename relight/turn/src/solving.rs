@@ -23,13 +23,13 @@ use crate::observe::probe::{Probe, ProbeBall};
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::reading::{ReadTurn, TableRotation, read_curves};
 
-/// What is known of a turn beforehand.
+/// What is known about a turn beforehand.
 #[derive(Debug, Clone, Default)]
 pub struct TurnOptions<'a> {
     /// Which way the table turns as its angle grows. Where it is not given, it is that of the rig in `dataset.json` or
-    /// `session.json`, else the one in which the network of turns is clearly surer, else the usual one.
+    /// `session.json`, else the one with clearly smaller expected errors of the network, else the usual one.
     pub rotation: Option<RotationDirection>,
-    /// The camera over the table; that of the rig, or what is usual, where it is not given.
+    /// The camera over the table; by default that of the rig, or the usual one.
     pub elevation: Option<Elevation>,
     /// The light.
     pub light: TurnLight<'a>,
@@ -37,7 +37,7 @@ pub struct TurnOptions<'a> {
     pub material: MaterialKind,
 }
 
-/// What is known of the light of a turn.
+/// What is known about the light of a turn.
 #[derive(Debug, Clone, Default)]
 pub enum TurnLight<'a> {
     /// Nothing.
@@ -47,11 +47,11 @@ pub enum TurnLight<'a> {
     Given(ShLight),
     /// A ball on the table measures it.
     Ball {
-        /// The session of the turn, or its video; looked for by `dataset.json` where it is not given.
+        /// The session of the turn, or its video; by default as named in `dataset.json`.
         session: Option<&'a Path>,
         /// Where the ball is in the video.
         place: ProbePlace,
-        /// What it is made of; what it looks like where that is not known.
+        /// Its material; by default as it looks.
         ball: Option<ProbeBall>,
     },
 }
@@ -59,7 +59,7 @@ pub enum TurnLight<'a> {
 /// The networks that turns are solved with.
 #[derive(Debug)]
 pub struct TurnNetworks {
-    /// That which sees the whole turn.
+    /// The network of turns.
     pub turn: TurnNetwork,
     /// The weights of that which sees single frames.
     pub photo: Weights,
@@ -80,11 +80,11 @@ pub struct SolvedTurn {
     pub reading: Duration,
 }
 
-/// Solves the turn of a shard, or of what else [`read_curves`] takes. `progress` is told how many frames of the
-/// shard, and then of the video, are done, and how many there are.
+/// Solves the turn of a shard, or of another input of [`read_curves`]. `progress` is called with the number of frames
+/// done and of all frames: first those of the shard, then those of the video.
 ///
 /// # Errors
-/// Where the shard or the video cannot be read, a network fails, or no light fits the turn.
+/// If the shard or the video cannot be read, a network fails, or no light fits the turn.
 pub fn solve_turn(
     shard: &Path,
     options: &TurnOptions<'_>,
@@ -146,7 +146,7 @@ pub fn solve_turn(
     })
 }
 
-/// What is known of the rig: by the data set of the shard, else by the session.
+/// The rig's properties: from the data set of the shard, else from the session.
 fn rig_of(shard: &Path, recording: Option<&Recording>) -> RigFacts {
     let of_session = || recording?.manifest.as_ref()?.rig;
     rig_of_dataset(shard)
@@ -168,8 +168,8 @@ fn rotation(options: &TurnOptions<'_>, rig: RigFacts) -> TableRotation {
     }
 }
 
-/// What the network of turns says of a turn, in the other rotation direction where nobody knows it and the network is clearly
-/// surer of that one.
+/// The network's answer for a turn, in the other rotation direction if that is unknown and the network is clearly
+/// more certain there.
 fn predict(
     mut turn: ReadTurn,
     elevation: Elevation,

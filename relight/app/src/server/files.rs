@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-/// The list of the files, by which the page keeps them for work without a network.
+/// The list of the files that the page stores for offline use.
 pub(super) const LIST: &str = "files.json";
-/// What the page may load: only its own files, and nothing runs in it that is not part of them.
+/// What the page may load: only its own files and their scripts.
 pub(super) const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; \
     img-src 'self' blob: data:; media-src 'self' blob:; connect-src 'self' blob:; worker-src 'self'; \
     manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -46,7 +46,8 @@ pub(super) struct Encoding {
 pub enum PageFault {
     /// There is none where one would be.
     #[error(
-        "there is no page of relight in {}: build it by 'make app', install the Debian package relight, or give its folder by --page",
+        "{} does not contain the app's page: build it with 'make app', install the Debian package relight, or give its folder \
+         with --page",
         either(places)
     )]
     NoPage {
@@ -54,11 +55,11 @@ pub enum PageFault {
         places: Vec<PathBuf>,
     },
     /// Its list or a file of that is missing, damaged or not whole.
-    #[error("the page is incomplete, {} {why}: build the page again by 'make app'", path.display())]
+    #[error("the page is incomplete, {} {why}: build it again with 'make app'", path.display())]
     Incomplete {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         why: String,
     },
 }
@@ -79,7 +80,7 @@ impl PageFiles {
     /// Reads the page of a folder.
     ///
     /// # Errors
-    /// Where there is none, or a file of its list is missing or not whole.
+    /// If the folder has no page, or a file of its list is missing or incomplete.
     pub fn read(folder: &Path) -> Result<Self, PageFault> {
         let path = folder.join(LIST);
         let list = fs::read(&path).map_err(|_| PageFault::NoPage {
@@ -107,7 +108,7 @@ impl PageFiles {
 }
 
 impl PageFile {
-    /// Reads a file, and what lies next to it compressed.
+    /// Reads a file and its compressed versions.
     fn read(folder: &Path, name: &str, expected: u64) -> Result<Self, PageFault> {
         let path = folder.join(name);
         let content = if is_plain(name) {

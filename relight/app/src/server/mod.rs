@@ -1,4 +1,4 @@
-//! The page's server: it hands out the files of a folder, and takes nothing. Who gets in is decided by `relit-web`: on
+//! The page's server: it serves the files of a folder and accepts no uploads. `relit-web` decides who gets in: on
 //! loopback everybody, elsewhere whoever has the token.
 //!
 //! | file | concern |
@@ -18,7 +18,7 @@ pub use files::{PageFault, PageFiles};
 
 /// The address is refused, or the system has no randomness or no threads.
 #[derive(Debug, thiserror::Error)]
-#[error("the page cannot be served at {address}: give another address by --listen")]
+#[error("the page cannot be served at {address}: give another address with --listen")]
 pub struct PageServerError {
     /// The address.
     pub address: SocketAddr,
@@ -31,7 +31,7 @@ pub struct PageServerError {
 /// the server is known, beside its addresses. `announce` is called once, when a browser can connect.
 ///
 /// # Errors
-/// Where the address cannot be listened on.
+/// If the address cannot be listened on.
 pub fn serve_page(
     files: PageFiles,
     address: SocketAddr,
@@ -57,7 +57,7 @@ pub fn serve_page(
 /// `page` next to the folder of a build.
 ///
 /// # Errors
-/// [`PageFault::NoPage`] where neither is there.
+/// [`PageFault::NoPage`] if neither is there.
 pub fn installed_page(program: &Path) -> Result<PathBuf, PageFault> {
     let above = program.parent().and_then(Path::parent);
     let above = above.unwrap_or_else(|| Path::new("/"));

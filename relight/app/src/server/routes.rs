@@ -33,7 +33,7 @@ pub(super) fn router(files: PageFiles, policy: Arc<AccessPolicy>) -> Router {
     Router::new()
         .route("/", get(index))
         .route("/{name}", get(file))
-        .fallback(|| async { Failure::not_found("there is no such file") })
+        .fallback(|| async { Failure::not_found("file not found") })
         .layer(from_fn_with_state(policy, guard))
         .with_state(served)
 }
@@ -87,7 +87,7 @@ fn answer(files: &PageFiles, name: &str, headers: &HeaderMap) -> Response {
         },
     )) = found
     else {
-        return Failure::not_found("there is no such file").into_response();
+        return Failure::not_found("file not found").into_response();
     };
     let about = [
         (header::CONTENT_SECURITY_POLICY, POLICY),

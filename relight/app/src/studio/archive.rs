@@ -33,7 +33,7 @@ impl SceneFiles {
     /// Adds an object's files; their names.
     ///
     /// # Errors
-    /// Where its mask cannot be encoded.
+    /// If its mask cannot be encoded.
     pub(super) fn add_object(&mut self, object: &StudioObject) -> Result<ObjectFiles, Refusal> {
         let photo = self.add(&object.name, object.file.clone());
         let mask = match object.mask_file() {
@@ -53,7 +53,7 @@ impl SceneFiles {
     /// Adds the background's file; its name.
     ///
     /// # Errors
-    /// Where it cannot be encoded.
+    /// If it cannot be encoded.
     pub(super) fn add_background(
         &mut self,
         background: &StudioBackground,
@@ -61,7 +61,7 @@ impl SceneFiles {
         Ok(self.add(&background.name, background.file()?).into())
     }
 
-    /// Adds a file under a name that no other has; two of the same content are one.
+    /// Adds a file under a unique name; files with the same content become one.
     fn add(&mut self, name: &str, content: Vec<u8>) -> String {
         let plain = plain_name(name);
         let (stem, ending) = plain.rsplit_once('.').unwrap_or((&plain, "bin"));
@@ -87,7 +87,7 @@ impl SceneFiles {
     /// The archive of a scene whose files these are.
     ///
     /// # Errors
-    /// Where the scene cannot be written.
+    /// If the scene cannot be written.
     pub(super) fn packed(&self, scene: &SceneDescription) -> Result<Vec<u8>, Refusal> {
         let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
@@ -103,7 +103,7 @@ impl SceneFiles {
     /// The scene and the files of an archive.
     ///
     /// # Errors
-    /// Where it is no archive, too large, or its scene names a file that it has not.
+    /// If it is not an archive, is too large, or its scene names a file that it does not contain.
     pub(super) fn unpacked(archive: &[u8]) -> Result<(SceneDescription, Self), Refusal> {
         let mut archive = ZipArchive::new(Cursor::new(archive)).map_err(|fault| damaged(&fault))?;
         let text = text::decode(entry(&mut archive, SCENE)?);
@@ -129,7 +129,7 @@ impl SceneFiles {
     /// The content of a file.
     ///
     /// # Errors
-    /// Where there is none.
+    /// If the archive lacks it.
     pub(super) fn content(&self, path: &Path) -> Result<&Vec<u8>, Refusal> {
         let name = path.to_string_lossy();
         let content = self.entries.get(name.as_ref());
@@ -157,13 +157,13 @@ fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>,
 
 fn missing(name: &str) -> Refusal {
     Refusal(format!(
-        "{name} is not in the archive, and its scene.toml names it"
+        "the archive lacks {name}, which its scene.toml names"
     ))
 }
 
 fn damaged(fault: &(dyn std::error::Error + 'static)) -> Refusal {
     Refusal::because(
-        "the file is no scene that was kept: it is no ZIP archive, or damaged",
+        "this file is not a saved scene: it is not a ZIP archive, or is damaged",
         fault,
     )
 }

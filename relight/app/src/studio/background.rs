@@ -1,4 +1,4 @@
-//! What the objects are put into: a photograph, or a panorama of which a part is seen.
+//! The background of a scene: a photograph, or part of a panorama.
 
 use std::path::Path;
 
@@ -41,11 +41,11 @@ struct PhotoBackground {
 }
 
 struct PanoramaBackground {
-    /// None where it is made.
+    /// `None` for a synthetic one.
     file: Option<Vec<u8>>,
     scenery: Option<Scenery>,
     panorama: Panorama,
-    /// The camera that looked last, and what it depends on.
+    /// The last camera, and what it depends on.
     view: Option<(ViewKey, PanoramaView)>,
 }
 
@@ -55,12 +55,12 @@ impl StudioBackground {
     /// The background that the page asks for, whose file or pixels are these.
     ///
     /// # Errors
-    /// Where it cannot be read, or is no panorama.
+    /// If it cannot be read, or is not a panorama.
     pub(super) fn open(asked: &BackgroundRequest, bytes: &[u8]) -> Result<Self, Refusal> {
         match asked {
             BackgroundRequest::Panorama { id } => {
                 let scenery = Scenery::from_id(id);
-                let none = || Refusal(format!("there is no panorama {id}"));
+                let none = || Refusal(format!("unknown panorama {id}"));
                 Ok(Self::made(scenery.ok_or_else(none)?)?)
             }
             BackgroundRequest::Photo { name } => Self::photo(name, bytes.to_vec()),
@@ -91,7 +91,7 @@ impl StudioBackground {
     /// A photograph.
     ///
     /// # Errors
-    /// Where it cannot be read, or has values that are no light.
+    /// If it cannot be read, or has a value that is negative or not finite.
     pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         let opened = OpenedFile::read(name, bytes, None)?;
         let (name, file) = (opened.name, opened.bytes);
@@ -115,7 +115,7 @@ impl StudioBackground {
     /// A panorama: linear light in HDR or EXR, or any picture that is twice as wide as high.
     ///
     /// # Errors
-    /// Where it cannot be read or has another shape.
+    /// If it cannot be read or has another shape.
     pub(super) fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         let opened = OpenedFile::read(name, bytes, None)?;
         let Extent { width, height } = opened.image.stored().planes.extent();
@@ -151,10 +151,10 @@ impl StudioBackground {
         })
     }
 
-    /// The panorama of this id that is made, or that of a file of a kept scene: one that is made is known by its name.
+    /// The synthetic panorama of this id, or that of a saved scene's file: a synthetic one is known by its name.
     ///
     /// # Errors
-    /// Where it cannot be read.
+    /// If it cannot be read.
     pub(super) fn kept(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         let made = Scenery::ALL
             .into_iter()
@@ -175,7 +175,7 @@ impl StudioBackground {
         }
     }
 
-    /// Whether it is a panorama, and the id of one that is made.
+    /// Whether it is a panorama, and the id of a synthetic one.
     pub(super) fn panorama_id(&self) -> Option<Option<&'static str>> {
         match &self.content {
             Content::Photo(_) => None,
@@ -186,7 +186,7 @@ impl StudioBackground {
     /// The file that is kept with a scene.
     ///
     /// # Errors
-    /// Where a panorama that is made cannot be encoded.
+    /// If a panorama that is made cannot be encoded.
     pub(super) fn file(&self) -> Result<Vec<u8>, Refusal> {
         match &self.content {
             Content::Photo(photo) => Ok(photo.file.clone()),
@@ -200,7 +200,7 @@ impl StudioBackground {
         }
     }
 
-    /// The size of a scene's picture, where that of a panorama's is given.
+    /// The size of a scene's picture, from the given size for a panorama.
     pub(super) fn extent(&self, of_panorama: [u32; 2]) -> Extent {
         match &self.content {
             Content::Photo(photo) => photo.picture.planes().extent(),
@@ -237,7 +237,7 @@ impl StudioBackground {
         }
     }
 
-    /// What a scene is told of it, after [`StudioBackground::prepare`].
+    /// The background as a scene takes it, after [`StudioBackground::prepare`].
     pub(super) fn for_scene(&self) -> SceneBackground<'_> {
         match &self.content {
             Content::Photo(photo) => SceneBackground::Picture(photo.shown()),
@@ -245,7 +245,7 @@ impl StudioBackground {
         }
     }
 
-    /// What is seen of it after light has turned by so many radians, after [`StudioBackground::prepare`].
+    /// The visible part after the light has rotated by so many radians, after [`StudioBackground::prepare`].
     pub(super) fn seen(&self, setting: &SceneEnvironment, turn: f64) -> Rgb<Linear> {
         match &self.content {
             Content::Photo(photo) => photo.shown().clone(),
@@ -288,7 +288,7 @@ pub(super) fn made_panoramas() -> Result<Vec<(Scenery, Vec<u8>)>, Refusal> {
     Scenery::ALL.into_iter().map(made).collect()
 }
 
-/// A panorama as bright as a screen can show it: by the median, so that a sun does not make all else black.
+/// A panorama exposed for a screen by its median, so that a sun does not make everything else black.
 fn thumbnail(panorama: &Panorama) -> Vec<u8> {
     let planes = panorama.image().planes().resized(THUMBNAIL);
     let mut values: Vec<f32> = planes.plane(1).to_vec();

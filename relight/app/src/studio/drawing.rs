@@ -13,10 +13,10 @@ use super::pixels::{covering, rgba, shown};
 
 /// How much of a pixel an object covers at least where it counts as seen.
 const SEEN: f32 = 0.5;
-/// A larger part of a picture that is clipped is told.
+/// A clipped part of the background larger than this is reported.
 const MUCH_CLIPPED: f32 = 0.25;
 
-/// The setting that was made last, with all that it depends on: a background, the scene without objects and without the
+/// The last setting, with its inputs: a background, the scene without objects and without the
 /// light's angle, and its longest side. While only those change it stays.
 #[derive(Default)]
 pub(super) struct KeptEnvironment(Option<((SceneDescription, Option<u32>), SceneEnvironment)>);
@@ -25,7 +25,7 @@ impl KeptEnvironment {
     /// The setting of a scene, `longest` pixels at most; the background is made ready for it.
     ///
     /// # Errors
-    /// Where there is no light.
+    /// If the light is dark.
     pub(super) fn of(
         &mut self,
         scene: &SceneDescription,
@@ -77,7 +77,7 @@ impl<'a> Drawing<'a> {
     /// Objects as a scene describes them; `before`: as they were photographed, without shadows.
     ///
     /// # Errors
-    /// Where an object cannot stand where it should.
+    /// If an object cannot stand where it should.
     pub(super) fn new(
         scene: &SceneDescription,
         setting: &'a SceneEnvironment,
@@ -114,7 +114,7 @@ impl<'a> Drawing<'a> {
         Ok((picture, boxes.collect()))
     }
 
-    /// The background, then for each object its colours and its shadow; and where each lies.
+    /// The background, then for each object its colours and its shadow, with their places.
     ///
     /// # Errors
     /// Those of the render layers.
@@ -140,16 +140,14 @@ impl<'a> Drawing<'a> {
         if let Some(sun) = &self.setting.sun {
             let sure = 100.0 * sun.confidence;
             notes.push(format!(
-                "light comes from the sun in the picture ({sure:.0} % sure)"
+                "lit by the sun in the picture ({sure:.0} % confidence)"
             ));
         }
         if let Some(exposure) = &self.setting.exposure
             && exposure.clipped > MUCH_CLIPPED
         {
             let part = 100.0 * exposure.clipped;
-            notes.push(format!(
-                "{part:.0} % of the background is too bright to be shown"
-            ));
+            notes.push(format!("{part:.0} % of the background is clipped to white"));
         }
         notes
     }

@@ -9,7 +9,7 @@ use relit_data::causes::with_causes;
 pub(super) struct Refusal(pub(super) String);
 
 impl Refusal {
-    /// With what went wrong behind it.
+    /// With the underlying error.
     pub(super) fn because(what: &str, cause: &(dyn Error + 'static)) -> Self {
         Self(format!("{what}: {}", with_causes(cause)))
     }

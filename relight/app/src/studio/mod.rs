@@ -1,4 +1,4 @@
-//! The engine: it keeps photographs, masks, a background and what was computed of them, and answers messages.
+//! The engine: it keeps photographs, masks, a background and their results, and answers messages.
 //!
 //! | file | concern |
 //! | --- | --- |
@@ -41,7 +41,7 @@ use request::{FileFormat, Request};
 
 /// The most objects of a scene.
 const MAX_OBJECTS: usize = 12;
-/// The size of a panorama's picture where nothing is said.
+/// The default size of a panorama's picture.
 const PANORAMA_PICTURE: [u32; 2] = [1280, 960];
 
 /// The engine of the page: it answers messages, one after the other.
@@ -73,7 +73,7 @@ impl Objects {
     }
 }
 
-/// What is said, and the pictures and files with it.
+/// The fields of an answer, and the pictures and files with it.
 type Answer = (Value, Vec<Vec<u8>>);
 
 impl Studio {
@@ -164,7 +164,7 @@ impl Studio {
         let others = self.objects.0.keys().filter(|&&key| key != number).count();
         if others >= MAX_OBJECTS {
             return refused(format!(
-                "there are {others} objects already, and a scene has at most that many: remove one first"
+                "a scene has at most {MAX_OBJECTS} objects: remove one first"
             ));
         }
         let answer = told(&object);
@@ -206,7 +206,7 @@ impl Studio {
         Ok((says, Vec::new()))
     }
 
-    /// A scene as it is drawn while it is worked on: smaller, of objects that are ready; in layers or in one picture.
+    /// A scene in the preview: smaller, with the objects that are ready, in layers or as one picture.
     fn draw(
         &mut self,
         scene: &PageScene,
@@ -283,7 +283,9 @@ impl Studio {
     fn import(&mut self, archive: &[u8]) -> Result<Answer, Refusal> {
         let (described, files) = SceneFiles::unpacked(archive)?;
         if described.objects.len() > MAX_OBJECTS {
-            return refused(format!("a scene has at most {MAX_OBJECTS} objects"));
+            return refused(format!(
+                "the scene has more objects than are possible: at most {MAX_OBJECTS}"
+            ));
         }
         let background_name = described.background.to_string_lossy();
         let content = files.content(&described.background)?.clone();
@@ -332,7 +334,7 @@ fn no_background() -> Refusal {
 
 fn no_object(number: u32) -> Refusal {
     Refusal(format!(
-        "there is no object {number}: open its photograph again"
+        "unknown object {number}: open its photograph again"
     ))
 }
 
@@ -381,7 +383,7 @@ fn backgrounds() -> Result<Answer, Refusal> {
     Ok((json!({ "panoramas": panoramas }), thumbnails))
 }
 
-/// The brightest shading, but for one pixel in a hundred: what is shown as white.
+/// The 99th percentile of the shading, which is shown as white.
 fn most_shading(shading: &Planes<1>) -> f32 {
     let mut values: Vec<f32> = shading
         .plane(0)

@@ -1,4 +1,4 @@
-//! An object of the page: its file, its mask, and what was computed of it.
+//! An object of the page: its file, its mask, and its results.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub(super) const MAX_PIXELS: usize = 2_000_000;
 const MAX_READ: usize = 100_000_000;
 /// How errors name the mask of a photograph.
 const MASK: &str = "mask.png";
-/// The height of an object of which the scene is shown while it is worked on, pixels.
+/// The height of an object in the preview, while the scene is edited, pixels.
 const PREVIEW_ROWS: usize = 320;
 /// The most that the longest side of its photograph has then.
 const PREVIEW_SIDE: usize = 1024;
@@ -52,7 +52,7 @@ enum Content {
 struct Cut {
     /// As a screen shows it, and as GrabCut sees it.
     shown: RgbImage,
-    /// A mask that a person made; without one the file's own counts, if it has any.
+    /// The user's mask; without one, the file's own, if it has one.
     mask: Option<GrayImage>,
     /// The photograph with its mask.
     photo: Option<Photo>,
@@ -64,7 +64,7 @@ impl StudioObject {
     /// Opens a file.
     ///
     /// # Errors
-    /// Where it is no photograph and no captured object, or too large.
+    /// If it is neither a photograph nor a captured object, or is too large.
     pub(super) fn open(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
         if is_captured(name) {
             let captured = CapturedObject::from_bytes(&bytes)?;
@@ -84,7 +84,7 @@ impl StudioObject {
     /// Opens a photograph with the mask that was kept with it.
     ///
     /// # Errors
-    /// Where it is no photograph, or the mask is none.
+    /// If the photograph or the mask cannot be read.
     pub(super) fn open_masked(
         name: &str,
         bytes: Vec<u8>,
@@ -120,12 +120,12 @@ impl StudioObject {
     /// A photograph that a browser has decoded.
     ///
     /// # Errors
-    /// Where the pixels are not as many as they should be.
+    /// If the pixels are not as many as they should be.
     pub(super) fn from_pixels(name: &str, size: [u32; 2], rgba: &[u8]) -> Result<Self, Refusal> {
         Self::open(&format!("{}.png", stem(name)), png_of(name, size, rgba)?)
     }
 
-    /// What it is made of: a photograph, which is decomposed, or maps that were measured.
+    /// Its source: a photograph, which is decomposed, or measured maps.
     pub(super) const fn kind(&self) -> &'static str {
         match self.content {
             Content::Photo(_) => "photo",
@@ -148,7 +148,7 @@ impl StudioObject {
         }
     }
 
-    /// Its mask for the page; none where nobody and nothing has said where the object is.
+    /// Its mask for the page; `None` until the object is marked or found.
     pub(super) fn mask(&self) -> Option<Vec<u8>> {
         match &self.content {
             Content::Photo(cut) => {
@@ -170,7 +170,7 @@ impl StudioObject {
     /// Cuts the object out by hints; with `auto` and without a rectangle by its plain background.
     ///
     /// # Errors
-    /// Where the hints do not fit, the background is not plain, or nothing is left.
+    /// If the hints do not fit, the background is not plain, or nothing is left.
     pub(super) fn cut_out(
         &mut self,
         rect: Option<[i32; 4]>,
@@ -200,7 +200,7 @@ impl StudioObject {
         Ok(mask)
     }
 
-    /// Reads the photograph with its mask, where there is one: the same that `relight` reads of its files.
+    /// Reads the photograph with its mask, if it has one, as `relight` reads its files.
     fn read_photo(&mut self) -> Result<(), Refusal> {
         let Content::Photo(cut) = &mut self.content else {
             return Ok(());
@@ -235,10 +235,10 @@ impl StudioObject {
         }
     }
 
-    /// The photograph decomposed as it is; none of a captured object.
+    /// The decomposed photograph; `None` for a captured object.
     ///
     /// # Errors
-    /// Where it is not cut out yet, or cannot be decomposed.
+    /// If it is not cut out yet, or cannot be decomposed.
     pub(super) fn decomposed(&mut self, decomposer: &Decomposer) -> Result<Decomposition, Refusal> {
         let photo = self.photo()?.clone().at_most(PREVIEW_SIDE);
         let options = photo.options(&DecomposeOptions::default());
@@ -248,7 +248,7 @@ impl StudioObject {
     /// Makes the object ready to be shown while the scene is worked on.
     ///
     /// # Errors
-    /// Where it is not cut out yet, or cannot be decomposed.
+    /// If it is not cut out yet, or cannot be decomposed.
     pub(super) fn prepare(&mut self, decomposer: &Decomposer) -> Result<(), Refusal> {
         if self.prepared().is_some() {
             return Ok(());
@@ -279,7 +279,7 @@ impl StudioObject {
     /// The object as `relight insert` puts it into a scene.
     ///
     /// # Errors
-    /// Where it is not cut out yet, or cannot be decomposed.
+    /// If it is not cut out yet, or cannot be decomposed.
     pub(super) fn subject(
         &mut self,
         setting: &SceneEnvironment,
@@ -305,11 +305,11 @@ pub(super) struct OpenedFile {
 }
 
 impl OpenedFile {
-    /// Decodes a file, after it was made smaller where it is too large. `transfer` says how integers are encoded, where the
-    /// file is not to be asked.
+    /// Decodes a file, reduced if it is too large. `transfer` is the encoding of integers, in place of
+    /// that of the file.
     ///
     /// # Errors
-    /// Where it is no picture that can be read.
+    /// If it cannot be read as a picture.
     pub(super) fn read(
         name: &str,
         bytes: Vec<u8>,
@@ -324,7 +324,7 @@ impl OpenedFile {
             && !has_at_most(MAX_READ)
         {
             return refused(format!(
-                "{name} has {width} x {height} pixels: at most {} million are read",
+                "{name} has {width} x {height} pixels: the limit is {} million",
                 MAX_READ / 1_000_000
             ));
         }
@@ -355,7 +355,7 @@ impl OpenedFile {
 /// The pixels that a browser has decoded, in a PNG.
 ///
 /// # Errors
-/// Where they are not as many as they should be.
+/// If they are not as many as they should be.
 pub(super) fn png_of(
     name: &str,
     [width, height]: [u32; 2],

@@ -62,7 +62,7 @@ impl PageScene {
     /// The scene as a file has it, with the files of its background and of each object.
     ///
     /// # Errors
-    /// Where something is missing or unknown, or a number is out of its range.
+    /// If something is missing or unknown, or a number is out of its range.
     pub(super) fn described(
         &self,
         background: PathBuf,
@@ -94,7 +94,7 @@ impl PageScene {
     /// The page's scene of a file's, whose objects have these numbers.
     ///
     /// # Errors
-    /// Where its light is one that the page has not.
+    /// If its light is one that the page has not.
     pub(super) fn new(scene: &SceneDescription, numbers: &[u32]) -> Result<Self, Refusal> {
         let objects = scene.objects.iter().zip(numbers);
         let mut rest = fields(scene)?;
@@ -149,12 +149,12 @@ impl PageLight {
     fn new(light: &LightDescription) -> Result<Self, Refusal> {
         if light.panorama.is_some() || light.coefficients.is_some() {
             return refused(
-                "the page cannot open scenes with light from a file of its own: relight insert can",
+                "the page cannot open a scene with light from a file: use relight insert",
             );
         }
         if light.object.is_some() {
             return refused(
-                "the page cannot open scenes with light from an object of the background: relight insert can",
+                "the page cannot open a scene with light from an object of the background: use relight insert",
             );
         }
         let found = light.lamp()?;
@@ -176,7 +176,7 @@ impl PageLight {
     }
 }
 
-/// The colour in the text of a lamp: what is no number behind its angles.
+/// The colour in the text of a lamp: the part after the angles that is not a number.
 fn colour_of(lamp: &str) -> Option<&str> {
     let mut parts = lamp.split(',').skip(2).map(str::trim);
     parts.find(|part| part.parse::<f64>().is_err())

@@ -1,4 +1,4 @@
-//! Pictures as a page takes them: red, green, blue and alpha in 8 bits.
+//! Pictures for a page: red, green, blue and alpha in 8 bits.
 
 use std::sync::OnceLock;
 

@@ -41,7 +41,7 @@ pub(super) enum Request {
     Mask {
         object: u32,
         rect: Option<[i32; 4]>,
-        /// Without a rectangle the plain background says where the object is.
+        /// Without a rectangle, the object is found by its plain background.
         #[serde(default)]
         auto: bool,
         #[serde(default)]
@@ -71,7 +71,7 @@ pub(super) enum Request {
     },
     /// The scene and all it needs in an archive.
     Export { scene: PageScene, name: String },
-    /// Such an archive in place of all that is there.
+    /// Opens such an archive in place of everything.
     Import,
 }
 

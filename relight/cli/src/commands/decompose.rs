@@ -18,7 +18,7 @@ use crate::folder::OutputFolder;
 use crate::inputs::NormalsArgument;
 use crate::photos::{NetworkArguments, PhotoArguments, name_lost, outcome};
 
-/// Each photograph takes its memory, gigabytes where it is large.
+/// Each photograph takes memory, gigabytes if it is large.
 const MAX_SIDE_BY_SIDE: usize = 4;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -38,19 +38,18 @@ pub(crate) struct Arguments {
     photos: PhotoArguments,
     #[command(flatten)]
     folder: OutputFolder,
-    /// Of each shard the first so many samples, which are spread over the turn.
+    /// Decompose only the first N samples of each shard, which are spread over the turn.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     count: Option<u32>,
-    /// How many photographs are decomposed in parallel [default: one a core, at most 4].
+    /// Photographs decomposed in parallel [default: one per core, at most 4].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
     #[command(flatten, next_help_heading = "Network")]
     network: NetworkArguments,
-    /// Leave out the mirror image: faster, and a little worse.
+    /// Do not average with the mirror image: faster, and slightly worse.
     #[arg(long)]
     no_mirror: bool,
-    /// Take the normals of another network: the published file of MoGe-2 or Metric3D, or one of 256 x 256 pixels (see the
-    /// manual).
+    /// Take the normals from MoGe-2 or Metric3D, as published, or a network of 256 x 256 pixels.
     #[arg(long, value_name = "FILE.onnx")]
     normals: Option<PathBuf>,
     #[command(flatten)]
@@ -58,7 +57,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         let faults = self.frames_fault().or_else(|| self.mask_fault());
         faults.or_else(|| self.normals_fault())
@@ -66,7 +65,7 @@ impl Arguments {
 
     fn normals_fault(&self) -> Option<String> {
         let is_lone = self.normals.is_none() && self.normals_frame.normals_y.is_some();
-        is_lone.then(|| "--normals-y is for --normals, and that is not given".to_owned())
+        is_lone.then(|| "--normals-y needs --normals".to_owned())
     }
 
     fn frames_fault(&self) -> Option<String> {
@@ -77,7 +76,7 @@ impl Arguments {
             .find(|path| PhotoInput::has_frames(path))
         else {
             let given = self.count.is_some();
-            return given.then(|| "--count is for shards, and there is none".to_owned());
+            return given.then(|| "--count needs a shard (.tar)".to_owned());
         };
         let given = [
             ("--mask", self.photos.mask.is_some()),
@@ -87,7 +86,7 @@ impl Arguments {
         let (option, _) = given.into_iter().find(|(_, is_given)| *is_given)?;
         let frames = frames.display();
         Some(format!(
-            "{option} is for photographs: the frames of {frames} have masks of their own and are sRGB"
+            "{option} is for photographs: the frames of {frames} have their own masks and are sRGB"
         ))
     }
 
@@ -96,7 +95,7 @@ impl Arguments {
         let is_one = matches!(self.photos.photos.as_slice(), [photo] if !photo.is_dir());
         (!is_one).then(|| {
             let mask = mask.display();
-            format!("--mask {mask}: one mask belongs to one photograph; give a folder of masks")
+            format!("--mask {mask} is one mask for several photographs: give a folder of masks")
         })
     }
 
@@ -115,7 +114,7 @@ impl Arguments {
             decomposer.read_normals(path, self.normals_frame.normals_y)?;
             let name = decomposer.normals_network().unwrap_or_default();
             let event = json!({ "event": "normals", "file": path, "network": name });
-            console.say(&format!("{}: taken for {name}", path.display()), &event);
+            console.say(&format!("{}: recognised as {name}", path.display()), &event);
         }
         Ok((decomposer, name))
     }
@@ -156,7 +155,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     outcome(&found, lost, "decomposed")
 }
 
-/// What is said of a photograph.
+/// What is reported about a photograph.
 struct Decomposed {
     text: String,
     event: Value,

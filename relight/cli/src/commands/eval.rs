@@ -66,7 +66,7 @@ enum Protocol {
         #[command(flatten)]
         set: SetArguments,
     },
-    /// Light: MSE, SMSE and SSIM of the shading that it makes on the true normals.
+    /// Light: MSE, SMSE and SSIM of its shading on the true normals.
     Light {
         #[command(flatten)]
         set: SetArguments,
@@ -90,23 +90,23 @@ enum Protocol {
         #[command(flatten)]
         weights: WeightsArgument,
     },
-    /// Whole turns in unknown rooms: normals, albedo, and whether what is confident is right.
+    /// Whole turns in unknown light: normals, albedo, and whether confident pixels are right.
     Turn(TurnArguments),
 }
 
 #[derive(Subcommand)]
 enum RelightingStep {
-    /// Make the set: objects, each under many lights. Objects that are there are kept.
+    /// Make the set: objects, each under many lights; existing objects are kept.
     Make(MakeArguments),
 }
 
-/// The ground truth, and the table of how far it is met.
+/// The ground truth, and the table of scores.
 #[derive(Args)]
 struct TableArguments {
     /// The folder of the ground truth.
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// Write the table as JSON, with all single scores, to this file.
+    /// Write the table as JSON, with all single scores.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -122,7 +122,7 @@ struct TurnArguments {
 /// The estimates that are measured besides the baselines.
 #[derive(Args)]
 struct EstimateArguments {
-    /// A folder of estimates, with a folder for each image. May be given several times.
+    /// A folder of estimates, with a folder for each image; can be repeated.
     #[arg(long, value_name = "DIR")]
     predictions: Vec<PathBuf>,
     #[command(flatten)]
@@ -135,10 +135,10 @@ struct SetArguments {
     table: TableArguments,
     #[command(flatten)]
     estimates: EstimateArguments,
-    /// How the folder of the ground truth is laid out.
+    /// The layout of the ground truth's folder.
     #[arg(long, value_name = "LAYOUT", default_value = TruthLayout::Mit.name(), value_parser = layout_parser())]
     layout: TruthLayout,
-    /// Compare so many images only, spread evenly over the set.
+    /// Compare only N images, spread evenly over the set.
     #[arg(long, value_name = "N")]
     count: Option<usize>,
 }
@@ -153,13 +153,13 @@ fn layout_parser() -> impl TypedValueParser<Value = TruthLayout> {
 struct MakeArguments {
     #[command(flatten)]
     folder: OutputFolder,
-    /// How many objects to make.
+    /// Number of objects.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=999))]
     objects: u16,
-    /// Under how many lights.
+    /// Lights for each object.
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(2..=99))]
     lights: u16,
-    /// The longest side of the pictures, which are square, pixels.
+    /// Width and height of the pictures, pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=2048))]
     size: u32,
     #[command(flatten)]
@@ -168,19 +168,18 @@ struct MakeArguments {
 
 const INPUTS: Choices<IntrinsicInput> = &[
     ("diffuse", "Without highlights", IntrinsicInput::Diffuse),
-    ("original", "As it was taken", IntrinsicInput::Original),
+    ("original", "As taken", IntrinsicInput::Original),
 ];
 
 impl Arguments {
-    /// What is wrong with the arguments together.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         match &self.protocol {
             Protocol::Mit { set, .. }
             | Protocol::Normals { set }
             | Protocol::Light { set, .. }
-            | Protocol::Highlight { set } => {
-                (set.count == Some(0)).then(|| "--count 0 leaves no image to compare".to_owned())
-            }
+            | Protocol::Highlight { set } => (set.count == Some(0))
+                .then(|| "--count 0 compares nothing: give 1 or more".to_owned()),
             Protocol::Relighting { .. } | Protocol::Turn(_) => None,
         }
     }
@@ -253,7 +252,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             estimates,
             weights,
         } => {
-            let table = table.as_ref().ok_or("--data is missing")?;
+            let table = table.as_ref().ok_or("give the ground truth with --data")?;
             relighting(table, estimates, weights, console)
         }
         Protocol::Turn(arguments) => turns(arguments, console),

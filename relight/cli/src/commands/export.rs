@@ -25,13 +25,13 @@ pub(crate) struct Arguments {
     /// The file to write: .glb or .exr.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Vertices of the relief in a GLB along the longer side of the picture.
+    /// Vertices of a GLB's relief along the picture's longer side.
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(2..=2048))]
     vertices: u32,
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         let is_known = ["glb", "exr"]
             .iter()

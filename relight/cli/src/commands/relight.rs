@@ -27,45 +27,45 @@ use crate::values::{WHITE_BALANCES, one_of, within};
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight relight mug.jpg --mask mug-mask.png --light studio.hdr -o relit.png
-      the mug in the light of a panorama, and before it
+      the mug in the light of a panorama, which is also the background
   relight relight mug.jpg --mask mug-mask.png --lamp 60,30,3200K --background photo -o relit.png
-      in the light of a warm lamp from the right, at its own place
+      in the light of a warm lamp from the right, in its own photograph
   relight relight mug.jpg --mask mug-mask.png --light studio.hdr --rotate 360 -o rotation.mp4
       a video in which the light rotates once
   relight relight photos --mask masks --lamp -45,40 -o relit
       many photographs: relit/<name>.png";
 
-/// The longest side of a video's frames where nothing is said.
+/// The default for the longest side of a video's frames.
 const MOVIE_SIDE: usize = 1080;
-/// What `--light` takes for the light that the photograph was taken in.
+/// The value of `--light` for the photograph's own light.
 const OWN: &str = "own";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     photos: PhotoArguments,
-    /// The picture (.png, .jpg, .exr), or for --rotate a video (.mp4, .webm); of several photographs a folder. It is made
-    /// where it is missing.
+    /// The picture (.png, .jpg, .exr), with --rotate the video (.mp4, .webm); for several photographs a folder, created if
+    /// missing.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// What is behind the object [default: the panorama that lights it; with --light own the photograph; else grey].
+    /// The background [default: the light's panorama; with --light own the photograph; else grey].
     #[arg(long, value_enum)]
     background: Option<BackgroundName>,
-    /// How many degrees of a panorama the longer side of the picture shows.
+    /// Angle of view into a panorama along the picture's longer side.
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = within(1.0..=150.0, "degrees"))]
     fov: f64,
-    /// How the colour of the light is shown.
+    /// White balance of the result.
     #[arg(long, value_parser = one_of(WHITE_BALANCES), default_value = "light")]
     white_balance: WhiteBalance,
-    /// Brightness in stops. With 0 the strongest light is as strong as in the photograph.
+    /// Brightness in stops; at 0 the strongest light is as strong as in the photograph.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = within(-20.0_f32..=20.0, "stops"), allow_hyphen_values = true)]
     exposure: f32,
-    /// The longest side of the result, pixels [default: the photograph's; of a video at most 1080].
+    /// The longest side of the result, pixels [default: the photograph's; a video's at most 1080].
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=16_384))]
     size: Option<u32>,
     #[command(flatten, next_help_heading = "Light")]
     light: LightArguments,
-    /// Even light besides the lamp, as a part of it.
+    /// Ambient light, as a part of the lamp's.
     #[arg(long, value_name = "PART", default_value_t = 0.15, value_parser = within(0.0..=10.0, "a part"), requires = "lamp")]
     ambient: f64,
     #[command(flatten, next_help_heading = "Video")]
@@ -76,11 +76,11 @@ pub(crate) struct Arguments {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum BackgroundName {
-    /// The photograph: the object stays where it is.
+    /// The photograph; the object stays in place.
     Photo,
-    /// The panorama that lights it.
+    /// The panorama that lights the object.
     Light,
-    /// Grey of 18 %.
+    /// 18 % grey.
     Grey,
     /// Black.
     Black,
@@ -91,24 +91,22 @@ enum BackgroundName {
 /// `--light` as this verb takes it.
 pub(crate) fn or_own(light: Arg) -> Arg {
     light.value_name("FILE|own").help(
-        "The light: a panorama (.hdr, .exr) with what is behind the object in its middle, or coefficients (.txt); or own, the \
-         photograph's light as it was estimated, to change its exposure or to rotate it",
+        "The light: a panorama (.hdr, .exr; its centre is behind the object), coefficients (.txt), or own: the \
+         photograph's estimated light",
     )
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         if self.light.is_empty() {
             return Some(
-                "give the new light by --light FILE or --lamp AZIMUTH,ELEVATION".to_owned(),
+                "give the new light with --light FILE or --lamp AZIMUTH,ELEVATION".to_owned(),
             );
         }
         let has_file = self.light.light.is_some() && !self.is_own_light();
         if self.background == Some(BackgroundName::Light) && !has_file {
-            return Some(
-                "--background light: there is no panorama; give one by --light".to_owned(),
-            );
+            return Some("--background light needs a panorama: give one with --light".to_owned());
         }
         if self.is_set() {
             return None;
@@ -172,7 +170,7 @@ impl Arguments {
 /// All that is the same for every photograph.
 struct Run<'a> {
     arguments: &'a Arguments,
-    /// Read when the first photograph is there: it takes its time.
+    /// Read with the first photograph, since reading is slow.
     network: OnceLock<Network>,
     light: Option<LightSource>,
     reading: PhotoReading,
@@ -248,7 +246,7 @@ impl Run<'_> {
         let note = photo.mask_note.as_ref();
         let note = note.map_or_else(String::new, |note| format!("; the mask {note}"));
         let text = format!(
-            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposing{note}",
+            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposition{note}",
             output.display(),
         );
         let event = json!({
@@ -264,7 +262,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Nothing that is read may be overwritten, and the folders of what is written are made.
+    /// Refuses to overwrite inputs, and makes the folders of outputs.
     fn check_outputs(&self, output: &Path, name: &str) -> Result<(), Box<dyn Error>> {
         let arguments = self.arguments;
         if arguments.is_set() {

@@ -14,23 +14,23 @@ use crate::commands::CommandResult;
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight serve
-      the app in a browser of this machine: open the address that is printed
+      the app in a browser on this machine: open the printed address
   relight serve --listen 0.0.0.0:8430
-      for a phone in the same network, which scans the code; the address holds a token";
+      for a phone in the same network: scan the code; the address contains a token";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Where to listen; a port alone is this machine's own. Browsers other than this machine's get in by a token.
+    /// Address and port; a port alone is for this machine only. Other machines need the token.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8430")]
     listen: ListenAddress,
-    /// A file that holds the token, which only its owner and its group can read. Where there is none, it is made with a random
-    /// token [default: a random token, where other machines can reach the address].
+    /// A file with the token, readable by owner and group only; created if missing [default: a random token, if other machines
+    /// can connect].
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
-    /// A name by which this machine is known to browsers, beside its addresses.
+    /// A host name of this machine for browsers, besides its addresses.
     #[arg(long, value_name = "NAME")]
     name: Vec<String>,
-    /// The folder of the page [default: the one that was built or installed with this program].
+    /// The page's folder [default: as built or installed with relight].
     #[arg(long, value_name = "FOLDER")]
     page: Option<PathBuf>,
 }
@@ -53,7 +53,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         let url = &announcement.url;
         let mut text = format!("open {url} (end with Ctrl+C)");
         if !announcement.address.ip().is_loopback() {
-            text += "\nbrowsers keep the page for work without a network only from https or from this machine itself";
+            text += "\nbrowsers store the page for offline use only over https or on this machine";
             if let Some(code) = &announcement.qr {
                 text = format!("{text}\n{code}");
             }

@@ -21,11 +21,11 @@ Examples:
   relight synth samples --count 50000 -o warmup
       procedural objects under random light, each with its ground truth
   relight synth samples --count 50000 --meshes meshes --panoramas hdri --textures photos -o warmup
-      with files of one's own
+      with your own files
   relight synth turns --count 20 --panoramas hdri -o turns
       whole turns as shards, with their ground truth
   relight synth panoramas -o panoramas
-      the panoramas that are used where none are given, as EXR
+      the default panoramas, as EXR
   relight synth library --meshes furniture meshes --panoramas hdri -o library.relib
       objects and panoramas packed into one file, for --meshes and --panoramas";
 
@@ -39,9 +39,9 @@ pub(crate) struct Arguments {
 enum Product {
     /// Pictures of objects, each with its ground truth.
     Samples(SampleArguments),
-    /// Whole turns as shards, as relit-extract writes them: the object stands still, the light rotates.
+    /// Whole turns as shards, as from relit-extract: the object stands still, the light rotates.
     Turns(TurnArguments),
-    /// Objects and panoramas, packed into one file to learn from, with a table of their authors and licences.
+    /// Objects and panoramas packed into one file for training, with a table of authors and licences.
     Library(LibraryArguments),
     /// The synthetic panoramas.
     Panoramas(OutputFolder),
@@ -49,29 +49,29 @@ enum Product {
 
 #[derive(Args)]
 struct LibraryArguments {
-    /// The file to write, .relib; its table is written beside it as .csv and .md.
+    /// The file to write, .relib; its table is written next to it as .csv and .md.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Folders of .obj, .gltf, .glb and archives of Sweet Home 3D (.sh3f), also in folders within them.
+    /// Folders of .obj, .gltf, .glb and Sweet Home 3D archives (.sh3f), with their subfolders.
     #[arg(long, value_name = "FOLDER", num_args = 1.., required_unless_present = "panoramas")]
     meshes: Vec<PathBuf>,
-    /// Folders of .hdr and .exr, also in folders within them.
+    /// Folders of .hdr and .exr, with their subfolders.
     #[arg(long, value_name = "FOLDER", num_args = 1..)]
     panoramas: Vec<PathBuf>,
 }
 
 #[derive(Args)]
 struct SampleArguments {
-    /// How many samples.
+    /// Number of samples.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     count: u64,
     /// Views of each object.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
-    /// Samples of each view, in other materials and light.
+    /// Samples of each view, each in another material and light.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     lightings: u32,
-    /// An sRGB camera without noise, clipping on purpose, or compression.
+    /// Use an sRGB camera without noise, deliberate clipping or compression.
     #[arg(long)]
     plain_camera: bool,
     #[command(flatten)]
@@ -80,7 +80,7 @@ struct SampleArguments {
 
 #[derive(Args)]
 struct TurnArguments {
-    /// How many turns.
+    /// Number of turns.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     count: u64,
     /// Frames of a turn.
@@ -95,21 +95,21 @@ struct TurnArguments {
 struct PictureArguments {
     #[command(flatten)]
     folder: OutputFolder,
-    /// The longest side of the pictures, which are square, pixels.
+    /// Width and height of the pictures, pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = clap::value_parser!(u32).range(16..=2048))]
     size: u32,
-    /// What light there is.
+    /// Kind of light.
     #[arg(long, value_name = "KIND", default_value = "mixed", value_parser = one_of(LIGHT_KINDS))]
     light_kind: LightKind,
     #[command(flatten, next_help_heading = "Objects and light")]
     sources: ObjectSources,
-    /// Pictures to lay onto objects: .png, .jpg.
+    /// Pictures for textures: .png, .jpg.
     #[arg(long, value_name = "FOLDER")]
     textures: Option<PathBuf>,
-    /// Keep the albedo that files of meshes have [default: in half of the samples].
+    /// Keep the meshes' own albedo in all samples [default: in half of them].
     #[arg(long)]
     own_albedo: bool,
-    /// Take from packed libraries what is for validation only [default: what is for training].
+    /// Use the validation part of packed libraries [default: the training part].
     #[arg(long)]
     validation: bool,
 }
@@ -144,7 +144,10 @@ fn library(arguments: &LibraryArguments, console: Console) -> CommandResult {
         .extension()
         .is_none_or(|found| found != LIBRARY_EXTENSION)
     {
-        let fault = format!("{} does not end in .{LIBRARY_EXTENSION}", out.display());
+        let fault = format!(
+            "--output {}: give a name that ends in .{LIBRARY_EXTENSION}",
+            out.display()
+        );
         return Err(fault.into());
     }
     let sources = LibrarySources {
@@ -164,7 +167,7 @@ fn library(arguments: &LibraryArguments, console: Console) -> CommandResult {
     }
     for origin in summary.without_licence() {
         let text = format!(
-            "{origin}: no licence is known, so nobody can tell what may be learned from it: write an origin.toml there"
+            "{origin}: the licence is unknown, so it is not certain that training on it is allowed: write an origin.toml there"
         );
         let event = json!({ "event": "no_licence", "origin": origin });
         console.warn_with(&text, &event);
@@ -205,7 +208,7 @@ fn report_library(out: &Path, summary: &LibrarySummary, console: Console) {
     console.say(&text, &event);
 }
 
-/// Warns of meshes whose files do not say how they look.
+/// Warns of meshes whose files have no materials.
 fn tell_of_plain_meshes(library: &Library, console: Console) -> Result<(), &'static str> {
     let plain = library
         .meshes
@@ -214,12 +217,12 @@ fn tell_of_plain_meshes(library: &Library, console: Console) -> Result<(), &'sta
     let plain: Vec<&str> = plain.map(|(name, _)| name.as_str()).collect();
     if plain.len() == library.meshes.len() {
         return Err(
-            "--own-albedo: no mesh says how it looks: give a folder with some whose files have materials, by --meshes",
+            "--own-albedo: no mesh has materials: give meshes with materials with --meshes",
         );
     }
     if !plain.is_empty() {
         let text = format!(
-            "{} of {} meshes do not say how they look, and are painted: {}",
+            "{} of {} meshes have no materials and are painted: {}",
             plain.len(),
             library.meshes.len(),
             plain.join(", ")
@@ -261,7 +264,7 @@ impl PictureArguments {
         let SynthSummary { new, kept, .. } = written;
         let out = &self.folder.output;
         console.say(
-            &format!("{}: {new} {what} written, {kept} were there", out.display()),
+            &format!("{}: {new} {what} written, {kept} kept", out.display()),
             &json!({ "event": what, "out": out, "new": new, "kept": kept }),
         );
     }

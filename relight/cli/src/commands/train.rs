@@ -32,12 +32,12 @@ use crate::commands::CommandResult;
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight train decompose -o run
-      the network of relight decompose, on samples that are made while it trains
+      the network of relight decompose, on samples that are made during training
   relight train decompose --settings relight/cli/weights/decompose.toml -o run
-      as the weights that come with relight were trained, from the folders meshes and panoramas of what
-      relight/cli/weights/README.md names
+      one run from scratch, on the library of 'make training-data'; the built-in weights were trained by
+      another recipe (relight/cli/weights/README.md)
   relight train decompose --settings my.toml -o run --resume
-      goes on with a run that was stopped, to the same losses
+      continue a run that was stopped, with the same losses
   relight train normal -o normal
   relight train light --turns shards --normal-net normal/normal-net.safetensors -o light
   relight train joint --turns shards --light-net light/light-net.safetensors \
@@ -46,10 +46,10 @@ Examples:
   relight train turn -o turn
       the network of relight turn
   torchrun --no-python --nproc-per-node 4 relight train decompose --threads 2 -o run
-      four processes of one machine, each with its part of every batch; also by RANK, WORLD_SIZE, MASTER_ADDR,
-      MASTER_PORT and LOCAL_RANK, as scripts of Slurm and operators of Kubernetes set them
+      four processes on one machine, each with its part of every batch; also with RANK, WORLD_SIZE, MASTER_ADDR,
+      MASTER_PORT and LOCAL_RANK, as Slurm scripts and Kubernetes operators set them
 
-In the folder of a run: checkpoint.safetensors, losses.csv, validation.png, and at the end the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
+The folder of a run contains checkpoint.safetensors, losses.csv, validation.png and, at the end, the averaged weights. Ctrl-C ends a run with a checkpoint (exit code 3).";
 
 /// Signals within this time count as one: `timeout` sends two.
 const TOGETHER: Duration = Duration::from_secs(1);
@@ -70,13 +70,13 @@ enum TaskName {
     Spec(PaperArguments),
     /// Normal-Net's warm-up, on composed samples.
     Normal(PaperArguments),
-    /// Light-Net from nothing, on turns; Normal-Net stays as it is.
+    /// Light-Net from scratch, on turns; Normal-Net is fixed.
     Light(PaperArguments),
-    /// Normal-Net, on turns; Light-Net stays as it is.
+    /// Normal-Net, on turns; Light-Net is fixed.
     Joint(PaperArguments),
     /// The net for specular reflectance and smoothness, on the highlights of turns.
     Specular(PaperArguments),
-    /// The network of whole turns: normals from the harmonics of a turn in an unknown room.
+    /// The network of `relight turn`: normals from the harmonics of a turn in unknown light.
     Turn(RunArguments),
 }
 
@@ -87,7 +87,7 @@ struct PaperArguments {
     /// Turns: a shard, or a folder that relit-extract has written.
     #[arg(long, value_name = "SHARDS", help_heading = "Turns and networks")]
     turns: Option<PathBuf>,
-    /// Turns to validate on: how near to rank one their reflectance is.
+    /// Turns to validate on, by how near to rank one their reflectance is.
     #[arg(long, value_name = "SHARDS", help_heading = "Turns and networks")]
     validation_turns: Option<PathBuf>,
     /// The weights of Spec-Net, for light, joint and specular.
@@ -103,7 +103,7 @@ struct PaperArguments {
 
 #[derive(Args)]
 struct RunArguments {
-    /// The folder of the run; made where it is missing.
+    /// The folder of the run; created if missing.
     #[arg(
         short,
         long,
@@ -111,25 +111,25 @@ struct RunArguments {
         required_unless_present = "print_settings"
     )]
     output: Option<PathBuf>,
-    /// Settings, a TOML file. What it does not name has its default.
+    /// Settings file (TOML); missing keys have their defaults.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Go on with the run in the folder; where there is none, one begins.
+    /// Resume the run in the folder, or start one if it has none.
     #[arg(long)]
     resume: bool,
-    /// Begin with these weights.
+    /// Start from these weights.
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Threads of the network [default: one a core].
+    /// Threads of the network [default: one per core].
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     threads: Option<usize>,
     /// Data-loader workers: threads that compose samples.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     workers: usize,
-    /// Where the network is computed: cpu, cuda:N, or cuda: of several processes on a machine, a GPU for each.
+    /// Device of the network: cpu, cuda:N, or cuda (of several processes on a machine, one GPU each).
     #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
     device: DeviceName,
-    /// Print the settings with all defaults, and do nothing.
+    /// Print the settings with all defaults, and exit.
     #[arg(long)]
     print_settings: bool,
 }
@@ -238,7 +238,7 @@ impl RunArguments {
     fn folder(&self) -> Result<&Path, &'static str> {
         self.output
             .as_deref()
-            .ok_or("--output RUN is missing: where the run is kept")
+            .ok_or("give the folder of the run with --output")
     }
 
     /// Meets the other processes that a launcher has started, if it has; sets the number of the network's threads. What
@@ -264,7 +264,7 @@ impl RunArguments {
     }
 }
 
-/// Process 0 says whom it waits for: a process that was not started would keep it without a word.
+/// Process 0 reports whom it waits for: a process that was not started would block it silently.
 fn tell_of_waiting(launch: &Launch, console: Console) {
     if launch.rank.index() > 0 {
         return;
@@ -282,7 +282,7 @@ fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
     path.map(Weights::read).transpose()
 }
 
-/// Makes the run of a task, and tells how it came out; or prints the settings.
+/// Runs a task and reports the outcome; or prints the settings.
 fn train<S: Serialize, T: TrainingTask>(
     (settings, run): (S, RunSettings),
     arguments: &RunArguments,
@@ -352,7 +352,7 @@ fn report(outcome: &RunOutcome, console: Console) {
         .map(|path| path.display().to_string())
         .collect();
     let end = if outcome.stopped {
-        "stopped; go on with --resume"
+        "stopped; continue with --resume"
     } else {
         "done"
     };
@@ -365,7 +365,7 @@ fn report(outcome: &RunOutcome, console: Console) {
     );
 }
 
-/// Shows a run on the terminal. Any process but the first has no bar, and says only what it alone knows.
+/// Shows a run on the terminal. Processes other than the first have no bar, and report only what they alone know.
 struct RunProgress {
     console: Console,
     process: u32,

@@ -20,11 +20,11 @@ use crate::shipped;
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight weights export -o relight.onnx
-      the network of relight decompose for any ONNX engine, for pictures of any size
+      the network of relight decompose, for any ONNX engine and pictures of any size
   relight weights export net.safetensors --net normal-net -o normal-net.onnx
       the paper's Normal-Net";
 
-/// What a file of our network of photographs says of itself: the same for all of its weights.
+/// Metadata of an ONNX file of our network of photographs, the same for all weights.
 const DECOMPOSER_FACTS: [(&str, &str); 7] = [
     (
         "input",
@@ -60,7 +60,7 @@ const DECOMPOSER_FACTS: [(&str, &str); 7] = [
     ),
 ];
 
-/// What a file of the weights that come with the program says beside.
+/// Further metadata of an ONNX file of the built-in weights.
 const SHIPPED_FACTS: [(&str, &str); 2] = [
     ("licence", "MIT OR Apache-2.0"),
     (
@@ -78,31 +78,31 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Check weights against a network, and write them with it as ONNX or alone as safetensors.
+    /// Check weights, and write them as safetensors or, with their network, as ONNX.
     Export(Export),
 }
 
 #[derive(Args)]
 struct Export {
-    /// The weights (.safetensors) [default: those that come with the program].
+    /// The weights (.safetensors) [default: built in].
     #[arg(value_name = "IN")]
     input: Option<PathBuf>,
     /// The file to write: .onnx or .safetensors.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// The network that they are for.
+    /// The network of the weights.
     #[arg(long, value_enum, default_value_t = NetName::Decomposer)]
     net: NetName,
-    /// Write 32 bits a number in place of 16.
+    /// Write 32-bit numbers instead of 16-bit ones.
     #[arg(long)]
     single: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum NetName {
-    /// Ours of photographs, with the heads that the weights have.
+    /// That of relight decompose, with the weights' heads.
     Decomposer,
-    /// Ours of turns.
+    /// That of relight turn.
     TurnNet,
     /// The paper's Spec-Net.
     SpecNet,
@@ -112,14 +112,14 @@ enum NetName {
     LightNet,
     /// The paper's Light-Net as released.
     LightNetReleased,
-    /// The paper's net for specular reflectance and smoothness, with a pooled head.
+    /// The paper's net for reflectance and smoothness, pooled head.
     ReflectanceNet,
     /// The same with the released head.
     ReflectanceNetReleased,
 }
 
 impl NetName {
-    /// What reads the weights that come with the program, if any do.
+    /// The reader of the built-in weights, if there are any.
     fn shipped(self) -> Option<fn() -> Result<Weights, NetError>> {
         match self {
             Self::Decomposer => Some(shipped::weights),
@@ -144,11 +144,11 @@ impl NetName {
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         let Verb::Export(export) = &self.verb;
         if export.input.is_none() && export.net.shipped().is_none() {
-            return Some("give the weights: none of this network come with the program".to_owned());
+            return Some("give the weights: the program contains none for this network".to_owned());
         }
         let output = export.output.display();
         let is_known = export.ending().is_some();
@@ -166,7 +166,7 @@ impl Export {
 }
 
 impl Export {
-    /// The weights that are given, or those that come with the program.
+    /// The given weights, or the built-in ones.
     fn weights(&self) -> Result<Weights, Box<dyn Error>> {
         match (&self.input, self.net.shipped()) {
             (Some(path), _) => Ok(Weights::read(path)?),
@@ -175,7 +175,7 @@ impl Export {
         }
     }
 
-    /// What an ONNX file says of itself.
+    /// The metadata of an ONNX file.
     fn facts(&self) -> Vec<(&'static str, &'static str)> {
         let mut facts = Vec::new();
         if matches!(self.net, NetName::Decomposer) {

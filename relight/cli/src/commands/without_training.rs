@@ -1,4 +1,4 @@
-//! `relight train` in a program that was built without training: says how to get it.
+//! `relight train` in a program built without training: prints how to build it.
 
 use clap::Args;
 use relit_console::Console;

@@ -121,7 +121,7 @@ fn the_program_decomposes_what_it_can_and_names_what_it_left_out() {
         (
             "weights export --net normal-net -o w.onnx",
             2,
-            "come with the program",
+            "contains none",
         ),
         (
             "weights export w.safetensors -o ./w.safetensors",

@@ -15,12 +15,12 @@ use crate::image::ImageError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CapturedObjectError {
-    /// The file cannot be read or written, or is no captured object.
+    /// The file cannot be read or written, or is not a captured object.
     #[error("{} {fault}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: String,
     },
     /// Its content cannot be used.
@@ -53,6 +53,6 @@ impl CapturedObjectError {
 
 impl From<zip::result::ZipError> for CapturedObjectError {
     fn from(fault: zip::result::ZipError) -> Self {
-        Self::Content(format!("it is no ZIP archive, or damaged: {fault}"))
+        Self::Content(format!("it is not a ZIP archive, or is damaged: {fault}"))
     }
 }

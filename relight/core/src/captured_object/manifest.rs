@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::CapturedObjectError;
 use crate::image::Extent;
 
-/// What the file says it is.
+/// The file's schema.
 pub const CAPTURED_OBJECT_SCHEMA: &str = "relight.asset/1";
 /// The entry that describes the others.
 pub(super) const MANIFEST: &str = "asset.json";
@@ -28,7 +28,7 @@ pub(super) struct Manifest {
     pub(super) white: BTreeMap<String, f32>,
 }
 
-/// Refuses sizes that no file has.
+/// Refuses sizes beyond the limits of the format.
 pub(super) fn check_size(extent: Extent) -> Result<(), CapturedObjectError> {
     let Extent { width, height } = extent;
     let sides = 1..=MAX_SIDE;
@@ -36,6 +36,6 @@ pub(super) fn check_size(extent: Extent) -> Result<(), CapturedObjectError> {
         return Ok(());
     }
     Err(CapturedObjectError::Content(format!(
-        "{width} x {height} pixels are not from 1 x 1 to {MAX_SIDE} a side and {MAX_PIXELS} in all"
+        "{width} x {height} pixels: the limits are 1 to {MAX_SIDE} a side and {MAX_PIXELS} in total"
     )))
 }

@@ -40,7 +40,7 @@ impl CapturedObject {
     /// An object of these maps. Coverage and confidence are brought to 0 to 1, what is not a number to 0.
     ///
     /// # Errors
-    /// Where they differ in size, or are too large for a file.
+    /// If they differ in size, or are too large for a file.
     pub fn new(
         name: impl Into<String>,
         surface: Surface,
@@ -64,7 +64,7 @@ impl CapturedObject {
         })
     }
 
-    /// What it is called.
+    /// Its name.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name

@@ -14,7 +14,7 @@ use crate::render::{Gloss, Surface};
 
 /// The longest `asset.json`, bytes.
 const MAX_MANIFEST: u64 = 1 << 16;
-/// The most bytes that decoding a map may take beside the map itself.
+/// The most bytes that decoding a map may take besides the map itself.
 const DECODER: u64 = 1 << 20;
 /// Bytes of a map, at most, for each pixel: an incompressible image of four channels of 16 bits.
 const BYTES_A_PIXEL: u64 = 9;
@@ -22,16 +22,16 @@ const BYTES_A_PIXEL: u64 = 9;
 type Archive<'a> = ZipArchive<Cursor<&'a [u8]>>;
 
 impl CapturedObject {
-    /// Reads the content of a file. Bytes that are no captured object are refused and need no more memory than a file of
-    /// the largest size that is allowed: 8192 pixels a side, 2^24 in all.
+    /// Reads the content of a file. Bytes that are not a captured object are refused, and take no more memory than a file of
+    /// the largest size allowed: 8192 pixels a side, 2^24 in total.
     ///
     /// # Errors
-    /// Where it is no captured object that this program knows.
+    /// If it is not a captured object that this version can read.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, CapturedObjectError> {
         let length = bytes.len() as u64;
         if length > Self::MAX_BYTES {
             return Err(CapturedObjectError::Content(format!(
-                "it has {length} bytes, and at most {} are read",
+                "it has {length} bytes; the limit is {}",
                 Self::MAX_BYTES
             )));
         }
@@ -58,7 +58,7 @@ fn manifest(archive: &mut Archive<'_>) -> Result<Manifest, CapturedObjectError> 
     if schema.schema != CAPTURED_OBJECT_SCHEMA {
         let found: String = schema.schema.chars().take(80).collect();
         return Err(CapturedObjectError::Content(format!(
-            "it says that it is {found:?}, and this program reads {CAPTURED_OBJECT_SCHEMA:?}: a newer relight may read it"
+            "its schema is {found:?}, this version reads {CAPTURED_OBJECT_SCHEMA:?}: use a newer relight"
         )));
     }
     serde_json::from_slice(&json).map_err(CapturedObjectError::entry(MANIFEST))
@@ -70,7 +70,7 @@ struct Schema {
     schema: String,
 }
 
-/// The bytes of an entry that has at most so many.
+/// The bytes of an entry, up to a limit.
 fn entry(
     archive: &mut Archive<'_>,
     name: &'static str,
@@ -125,7 +125,7 @@ impl Maps<'_> {
         if white.is_finite() && white >= 0.0 {
             return Ok(white);
         }
-        let reason = format!("white.{map} is no number from 0 up");
+        let reason = format!("white.{map} is not a number from 0 up");
         Err(CapturedObjectError::entry(MANIFEST)(reason))
     }
 

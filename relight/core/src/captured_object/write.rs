@@ -18,7 +18,7 @@ impl CapturedObject {
     /// The content of a file.
     ///
     /// # Errors
-    /// Where a map cannot be encoded.
+    /// If a map cannot be encoded.
     pub fn to_bytes(&self) -> Result<Vec<u8>, CapturedObjectError> {
         let surface = self.surface();
         let mut white = BTreeMap::new();

@@ -17,7 +17,7 @@ use crate::light::{LightError, Normals, Panorama, ShLight, YAxis};
 /// Writes values of 0 to 1 as integers; others are clipped.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<(), ImageError> {
     write(path, &encode_png(path, planes, depth)?)
 }
@@ -26,7 +26,7 @@ pub fn write_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<(), Im
 /// plus the column's.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write_png_of(
     path: &Path,
     extent: Extent,
@@ -39,7 +39,7 @@ pub fn write_png_of(
 /// Writes values of 0 to 1 with 8 bits and a little loss; others are clipped.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write_jpeg(path: &Path, planes: &Planes<3>) -> Result<(), ImageError> {
     write(path, &encode_jpeg(path, planes)?)
 }
@@ -47,15 +47,15 @@ pub fn write_jpeg(path: &Path, planes: &Planes<3>) -> Result<(), ImageError> {
 /// Writes the values as they are, 32-bit floating point.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write_exr(path: &Path, planes: &Planes<3>) -> Result<(), ImageError> {
     write(path, &encode_exr(path, planes)?)
 }
 
-/// Reads the colours of an image as [`StoredImage::read`], and says what its numbers were.
+/// Reads the colours of an image as [`StoredImage::read`], and returns the type of its numbers.
 ///
 /// # Errors
-/// Where the file cannot be read or is no image of a known format.
+/// If the file cannot be read or is not an image of a known format.
 pub fn read_planes(path: &Path) -> Result<(Planes<3>, Samples), ImageError> {
     let image = StoredImage::read(path)?;
     Ok((image.planes, image.samples))
@@ -74,7 +74,7 @@ impl StoredImage {
     /// Reads an image; see [`StoredImage::from_bytes`].
     ///
     /// # Errors
-    /// Where the file cannot be read or is no image of a known format.
+    /// If the file cannot be read or is not an image of a known format.
     pub fn read(path: &Path) -> Result<Self, ImageError> {
         let bytes = fs::read(path).map_err(ImageError::open(path))?;
         Self::from_bytes(path, &bytes)
@@ -85,7 +85,7 @@ impl ColourImage {
     /// Reads a picture; see [`ColourImage::from_bytes`].
     ///
     /// # Errors
-    /// Where the file cannot be read or is no image of a known format, or its colours cannot be converted.
+    /// If the file cannot be read or is not an image of a known format, or its colours cannot be converted.
     pub fn read(path: &Path, transfer: Option<Transfer>) -> Result<Self, ImageError> {
         let bytes = fs::read(path).map_err(ImageError::open(path))?;
         Self::from_bytes(path, &bytes, transfer)
@@ -97,7 +97,7 @@ impl Rgb<Linear> {
     /// [`ColourImage::from_bytes`]. Alpha is left out; grey becomes three equal channels.
     ///
     /// # Errors
-    /// Where the file cannot be read or is no image of these formats.
+    /// If the file cannot be read or is not an image of these formats.
     pub fn read(path: &Path, transfer: Transfer) -> Result<Self, ImageError> {
         Ok(ColourImage::read(path, Some(transfer))?.into_light())
     }
@@ -105,7 +105,7 @@ impl Rgb<Linear> {
     /// Writes the light as it is, in 32-bit floating point values.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write_exr(&self, path: &Path) -> Result<(), ImageError> {
         write_exr(path, self.planes())
     }
@@ -115,7 +115,7 @@ impl Rgb<Srgb> {
     /// Writes an 8-bit PNG; values beyond 0 to 1 are clipped.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write_png(&self, path: &Path) -> Result<(), ImageError> {
         write_png(path, self.planes(), Depth::Eight)
     }
@@ -125,7 +125,7 @@ impl Panorama {
     /// Reads an HDR (Radiance) or EXR file.
     ///
     /// # Errors
-    /// Where it cannot be read, is of integers, is not twice as wide as high, or has values that are not finite.
+    /// If it cannot be read, is of integers, is not twice as wide as high, or has values that are not finite.
     pub fn read(path: &Path) -> Result<Self, ImageError> {
         let bytes = fs::read(path).map_err(ImageError::open(path))?;
         Self::from_bytes(path, &bytes)
@@ -134,10 +134,10 @@ impl Panorama {
 
 impl<Y: YAxis> Normals<Y> {
     /// Reads a PNG, 8 or 16 bits, of colours `(n + 1) / 2`, or an EXR of the vectors themselves. No
-    /// file says which way y points: the caller does, by `Y`.
+    /// file does not state the direction of y: the caller gives it by `Y`.
     ///
     /// # Errors
-    /// Where the file cannot be read or is no image.
+    /// If the file cannot be read or is not an image.
     pub fn read(path: &Path) -> Result<Self, ImageError> {
         let (planes, samples) = read_planes(path)?;
         Ok(match samples {
@@ -149,7 +149,7 @@ impl<Y: YAxis> Normals<Y> {
     /// Writes a PNG of colours `(n + 1) / 2`.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write_png(&self, path: &Path, depth: Depth) -> Result<(), ImageError> {
         let extent = self.planes().extent();
         write_png_of(path, extent, depth, |at| self.colour_at(at))
@@ -160,7 +160,7 @@ impl ShLight {
     /// Reads the text form.
     ///
     /// # Errors
-    /// Where the file cannot be read or holds something else.
+    /// If the file cannot be read or holds something else.
     pub fn read(path: &Path) -> Result<Self, ImageError> {
         let text = text::read(path).map_err(ImageError::open(path))?;
         text.parse().map_err(|error: LightError| ImageError::Form {
@@ -172,7 +172,7 @@ impl ShLight {
     /// Writes the text form.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), ImageError> {
         let written = write_whole(path, self.to_string().as_bytes());
         written.map_err(|source| ImageError::Write {
@@ -195,21 +195,25 @@ impl CapturedObject {
     /// Reads a file, or that in a folder of `relight turn`.
     ///
     /// # Errors
-    /// Where it cannot be read or is no captured object that this program knows.
+    /// If it cannot be read or is not a captured object that this version can read.
     pub fn read(path: &Path) -> Result<Self, CapturedObjectError> {
         let path = &file_of(path);
         let read = CapturedObjectError::file(path, "cannot be read");
         let mut content = Vec::new();
         let mut file = File::open(path).map_err(&read)?.take(Self::MAX_BYTES + 1);
         file.read_to_end(&mut content).map_err(&read)?;
-        let is_none = CapturedObjectError::file(path, "is no object that relight can light");
+        let is_none = CapturedObjectError::file(
+            path,
+            "is not a captured object: give object.relit, or the folder of relight \
+             turn",
+        );
         Self::from_bytes(&content).map_err(is_none)
     }
 
     /// Writes the file, whole or not at all.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), CapturedObjectError> {
         let write = CapturedObjectError::file(path, "cannot be written");
         write_whole(path, &self.to_bytes()?).map_err(write)

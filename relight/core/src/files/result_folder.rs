@@ -17,7 +17,7 @@ use relit_data::durable::{Partial, publish, sync_folder};
 pub enum FolderFault {
     /// It holds something else: its name.
     Foreign(PathBuf, String),
-    /// There is something that is no folder.
+    /// The path exists and is not a folder.
     NoFolder(PathBuf),
     /// It cannot be read.
     Read(PathBuf, io::Error),
@@ -47,11 +47,11 @@ pub struct ResultFolder {
 }
 
 impl ResultFolder {
-    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and nothing else, and
-    /// what it is to lie in can be written.
+    /// Whether results may be written to the folder `out`: it is missing, empty, or holds only earlier results, and
+    /// its parent can be written.
     ///
     /// # Errors
-    /// [`FolderFault::Foreign`] or [`FolderFault::NoFolder`], or where a folder cannot be read or written.
+    /// [`FolderFault::Foreign`] or [`FolderFault::NoFolder`], or if a folder cannot be read or written.
     pub fn check(self, out: &Path) -> Result<(), FolderFault> {
         let no_folder = |path: &Path| FolderFault::NoFolder(path.to_owned());
         out.file_name().ok_or_else(|| no_folder(out))?;
@@ -77,7 +77,7 @@ impl ResultFolder {
         Ok(())
     }
 
-    /// Whether a folder is empty or holds results and nothing else.
+    /// Whether a folder is empty or holds only results.
     fn check_names(self, folder: &Path) -> Result<(), FolderFault> {
         let names = names_in(folder).map_err(FolderFault::read(folder))?;
         // Without the marker, files of these names can be anything's.
@@ -94,7 +94,7 @@ impl ResultFolder {
     /// Lets `fill` write files into a hidden folder, which then takes the name `out`, in place of earlier results.
     ///
     /// # Errors
-    /// Those of [`Self::check`], where a file cannot be written, or `fill` fails: then `out` is as it was.
+    /// Those of [`Self::check`], if a file cannot be written, or `fill` fails: then `out` is as it was.
     pub fn write<T, E: From<FolderFault>>(
         self,
         out: &Path,
@@ -125,7 +125,7 @@ impl ResultFolder {
         written
     }
 
-    /// Puts back what a run that was killed had moved away, or removes it where the new folder is in its place.
+    /// Restores what a killed run had moved away, or removes it if the new folder is in its place.
     fn recover(self, out: &Path) -> Result<(), FolderFault> {
         let earlier = hidden_beside(out, "earlier");
         if out.exists() {
@@ -163,7 +163,7 @@ impl ResultFolder {
         self.remove(&earlier)
     }
 
-    /// Removes a folder with the results in it; what else it holds stays, with the folder, and is an error.
+    /// Removes a folder with the results in it; other content stays, with the folder, and is an error.
     fn remove(self, folder: &Path) -> Result<(), FolderFault> {
         if !folder.exists() {
             return Ok(());

@@ -33,7 +33,7 @@ pub enum Samples {
 /// Values of 0 to 1 in a JPEG of good quality; others are clipped.
 ///
 /// # Errors
-/// Where the picture, called `path`, cannot be encoded.
+/// If the picture, called `path`, cannot be encoded.
 pub fn encode_jpeg(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageError> {
     let [width, height] = planes.extent().sides();
     let mut bytes = Vec::new();
@@ -51,7 +51,7 @@ pub fn encode_jpeg(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageErro
 /// The values as they are, 32-bit floating point, in an EXR.
 ///
 /// # Errors
-/// Where the picture, called `path`, cannot be encoded.
+/// If the picture, called `path`, cannot be encoded.
 pub fn encode_exr(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageError> {
     let [width, height] = planes.extent().sides();
     let values: Vec<f32> = interleaved(planes, |v| [v]);
@@ -72,8 +72,8 @@ impl Planes<3> {
     }
 }
 
-/// An image as it is stored, without any conversion of colour: a mask, normals, or what else has no colours. Where it has
-/// some see [`ColourImage`](super::ColourImage).
+/// An image as stored, without colour conversion: a mask, normals, or other data. For
+/// colours see [`ColourImage`](super::ColourImage).
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredImage {
     /// The colours: integers scaled to 0 to 1, floating point values as they are. Grey is three equal
@@ -90,7 +90,7 @@ impl StoredImage {
     /// format holds multiplied with it, are divided by it. Errors name it as `path`.
     ///
     /// # Errors
-    /// Where it is no image of a known format, too large, or cut off.
+    /// If it is not an image of a known format, is too large, or is cut off.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ImageError> {
         let mut image = decode(path, bytes)?;
         if let DynamicImage::ImageRgba32F(pixels) = &mut image {

@@ -19,7 +19,7 @@ pub trait ColourSpace: Copy + Debug + Send + Sync + 'static {
     fn from_linear(light: f32) -> f32;
 }
 
-/// Values in proportion to light; there is no upper bound.
+/// Values in proportion to light, without an upper bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Linear {}
 

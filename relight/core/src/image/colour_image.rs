@@ -1,4 +1,4 @@
-//! Pictures of colours, with what their files say that the numbers stand for.
+//! Pictures of colours, with the encoding of their numbers.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use relit_data::still::Colour;
 
 use super::{ColourSpace, ImageError, Linear, Planes, Rgb, Samples, Srgb, StoredImage, Transfer};
 
-/// A picture of colours: its numbers as they are stored, and what they stand for.
+/// A picture of colours: its numbers as stored, and their encoding.
 ///
 /// ```
 /// use std::path::Path;
@@ -25,12 +25,12 @@ pub struct ColourImage {
 }
 
 impl ColourImage {
-    /// Decodes the content of a file. What integers stand for says `transfer`, or else the file: a colour profile or a
-    /// statement of another kind; without any they are sRGB. Floating point values are light, in the primaries that the
+    /// Decodes the content of a file. The encoding of integers is `transfer`, or else that of the file: a colour profile or a
+    /// statement of another kind; by default sRGB. Floating point values are light, in the primaries that the
     /// file states. Errors name it as `path`.
     ///
     /// # Errors
-    /// Where it is no image of a known format, too large or cut off, or its colours cannot be converted.
+    /// If it is not an image of a known format, is too large or cut off, or its colours cannot be converted.
     pub fn from_bytes(
         path: &Path,
         bytes: &[u8],
@@ -75,7 +75,7 @@ impl ColourImage {
         )
     }
 
-    /// The values as a screen takes them: sRGB. Beyond 1 in floating point.
+    /// The values for a screen, in sRGB; floating point may exceed 1.
     #[must_use]
     pub fn to_srgb(&self) -> Rgb<Srgb> {
         if self.colour.is_srgb() {
@@ -105,7 +105,7 @@ fn in_light(mut planes: Planes<3>, colour: &Colour, samples: Samples) -> Rgb<Lin
     Rgb::new(planes)
 }
 
-/// What the numbers of a file stand for: as `transfer` says, or else the file.
+/// The encoding of a file's numbers: `transfer`, or else that of the file.
 pub(super) fn colour_of(
     path: &Path,
     bytes: &[u8],

@@ -1,4 +1,4 @@
-//! Pictures made smaller in their files, for those who have little memory.
+//! Pictures reduced while they are decoded, to save memory.
 
 use std::path::Path;
 
@@ -22,12 +22,12 @@ pub struct DownscaledFile {
 }
 
 impl DownscaledFile {
-    /// The picture of a file with at most so many pixels, turned as it is displayed; none where the file has no more, or has
-    /// floating point values with alpha. Integers are averaged as they are encoded, and become sRGB where they are none;
-    /// what they stand for says `transfer`, or else the file. Errors name it as `path`.
+    /// The picture of a file with at most so many pixels, turned as it is displayed; `None` if the file has no more, or has
+    /// floating point values with alpha. Integers are averaged as encoded, and converted to sRGB;
+    /// their encoding is `transfer`, or else that of the file. Errors name it as `path`.
     ///
     /// # Errors
-    /// Where it is no image of a known format, too large or cut off, or its colours cannot be converted.
+    /// If it is not an image of a known format, is too large or cut off, or its colours cannot be converted.
     pub fn new(
         path: &Path,
         bytes: &[u8],

@@ -1,4 +1,4 @@
-//! What can be wrong with an image or its file.
+//! Errors of images and their files.
 
 use std::fmt::Display;
 use std::io;
@@ -11,14 +11,14 @@ use relit_data::mask::MaskFault;
 
 use super::Extent;
 
-/// What is wrong with an image or its file.
+/// An error of an image or its file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
     /// Images that belong together, or the planes of one, differ in size.
     #[error("{0}")]
     Size(String),
-    /// A file is no mask of an object.
+    /// A file is not a mask of an object.
     #[error("the mask {} {fault}", path.display())]
     NotAMask {
         /// The file.
@@ -47,7 +47,7 @@ pub enum ImageError {
     Colour {
         /// The file.
         path: PathBuf,
-        /// What it says of its colours.
+        /// The encoding that it states.
         fault: ColourError,
     },
     /// The file cannot be written.

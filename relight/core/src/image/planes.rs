@@ -5,8 +5,8 @@ use std::array;
 use super::{Extent, ImageError, check_extent};
 use crate::parallel;
 
-/// `C` planes of one size, each row by row from the top. What the values mean is said by the types
-/// that hold planes, such as [`Rgb`](super::Rgb).
+/// `C` planes of one size, each row by row from the top. The types that hold planes, such as
+/// [`Rgb`](super::Rgb), state what the values mean.
 ///
 /// ```
 /// use relight_core::image::{Extent, Planes};
@@ -40,7 +40,7 @@ impl<const C: usize> Planes<C> {
     /// The planes of an image, each of `extent.pixels()` values.
     ///
     /// # Errors
-    /// Where a plane has another length.
+    /// If a plane has another length.
     pub fn from_planes(extent: Extent, planes: [Vec<f32>; C]) -> Result<Self, ImageError> {
         match planes.iter().find(|plane| plane.len() != extent.pixels()) {
             None => Ok(Self { extent, planes }),
@@ -65,10 +65,10 @@ impl<const C: usize> Planes<C> {
         image
     }
 
-    /// Images of one size side by side, `columns` in a row; places beyond the last are 0.
+    /// Images of one size in a grid with `columns` in a row; cells beyond the last are 0.
     ///
     /// # Errors
-    /// Where an image has another size than the first.
+    /// If an image has another size than the first.
     pub fn sheet(tiles: &[Self], columns: usize) -> Result<Self, ImageError> {
         let tile = tiles.first().map_or(Extent::new(0, 0), Self::extent);
         let columns = columns.max(1);
@@ -176,7 +176,7 @@ impl<const C: usize> Planes<C> {
         self
     }
 
-    /// Calls `fill(y, row)` for every row, side by side where there are threads; `row` has one slice a
+    /// Calls `fill(y, row)` for every row, in parallel if there are threads; `row` has one slice a
     /// channel.
     pub fn fill_rows(&mut self, fill: impl Fn(usize, [&mut [f32]; C]) + Sync) {
         let width = self.extent.width.max(1);

@@ -6,13 +6,13 @@ use super::codec::to_integer;
 use super::{Depth, Extent, ImageError, Planes};
 use crate::parallel;
 
-/// Rows that are computed side by side.
+/// Rows that are computed in parallel.
 const ROWS: usize = 64;
 
 /// Values of 0 to 1 as integers in a PNG; others are clipped.
 ///
 /// # Errors
-/// Where the picture, called `path`, cannot be encoded.
+/// If the picture, called `path`, cannot be encoded.
 pub fn encode_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<Vec<u8>, ImageError> {
     let [red, green, blue] = planes.planes();
     encode_png_of(path, planes.extent(), depth, |at| {
@@ -23,7 +23,7 @@ pub fn encode_png(path: &Path, planes: &Planes<3>, depth: Depth) -> Result<Vec<u
 /// The same of a picture whose pixels are computed: `pixel` is given a row's number times the width, plus the column's.
 ///
 /// # Errors
-/// Where the picture, called `path`, cannot be encoded.
+/// If the picture, called `path`, cannot be encoded.
 pub fn encode_png_of(
     path: &Path,
     extent: Extent,

@@ -37,8 +37,8 @@ impl<const C: usize> Planes<C> {
         self.resized_part(&Part::all(self.extent()), &Part::all(extent))
     }
 
-    /// A part, `target`, of an image in another size, of which this is the part `source`. The image is 0 beside that
-    /// part, and ends where it ends even where the part goes on.
+    /// Resamples this image, which is the part `source` of a larger one, to the part `target` of that image in another size.
+    /// Outside `source` the larger image is 0.
     ///
     /// # Panics
     /// Where this has another size than `source`, or `target` reaches beyond its image.
@@ -136,7 +136,7 @@ pub fn beside(extent: Extent, at: usize) -> [Option<usize>; 4] {
     ]
 }
 
-/// For each of `to` pixels of a line: the pixels of a line of `from` that it is made of, with weights.
+/// For each of `to` pixels of a line: the source pixels of a line of `from`, with weights.
 fn taps(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
     if to <= from {
         let single = |(at, share): (usize, f64)| (at, share as f32);

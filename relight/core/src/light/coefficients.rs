@@ -33,7 +33,7 @@ impl ShLight {
     /// The light of these coefficients, (l, m) at index `l (l + 1) + m`.
     ///
     /// # Errors
-    /// Where their number is not that of an order, or one is not finite.
+    /// If their number is not that of an order, or one is not finite.
     pub fn new(coefficients: Vec<[f64; 3]>) -> Result<Self, LightError> {
         let order = Order::from_coefficients(coefficients.len())?;
         if coefficients.iter().flatten().all(|value| value.is_finite()) {
@@ -130,7 +130,7 @@ impl fmt::Display for ShLight {
 impl FromStr for ShLight {
     type Err = LightError;
 
-    /// Reads one line a coefficient; numbers are parted by blanks or commas, empty lines and those
+    /// Reads one line a coefficient; numbers are separated by blanks or commas, empty lines and those
     /// that begin with # are passed over.
     fn from_str(text: &str) -> Result<Self, LightError> {
         let lines = text.lines().enumerate();
@@ -142,7 +142,7 @@ impl FromStr for ShLight {
             .map(|(at, line)| {
                 three_numbers(line).ok_or_else(|| {
                 LightError::Coefficients(format!(
-                    "line {} of the coefficients has not three finite numbers (red, green, blue)",
+                    "line {} of the coefficients is not three finite numbers (red, green, blue)",
                     at + 1
                 ))
             })

@@ -52,7 +52,7 @@ impl Direction {
         dot(self.0, other.0)
     }
 
-    /// A unit vector that was made by arithmetic which keeps the length.
+    /// A unit vector from arithmetic that keeps the length.
     pub(super) const fn from_unit(components: [f64; 3]) -> Self {
         Self(components)
     }

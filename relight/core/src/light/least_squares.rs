@@ -32,7 +32,7 @@ impl NormalEquations {
         }
     }
 
-    /// Adds equations of which the sums of products are known: of factors `i` and `j <= i`, and of factor `i`
+    /// Adds equations by their sums of products: of factors `i` and `j <= i`, and of factor `i`
     /// and the value.
     pub fn add_sums(
         &mut self,
@@ -59,7 +59,7 @@ impl NormalEquations {
         }
     }
 
-    /// The solution by Cholesky's decomposition; none where the matrix has no full rank.
+    /// The solution by Cholesky's decomposition; `None` if the matrix has no full rank.
     pub fn solve(mut self) -> Option<Vec<[f64; 3]>> {
         let n = self.unknowns;
         let largest = (0..n).map(|i| self.matrix[i * n + i]).fold(0.0, f64::max);

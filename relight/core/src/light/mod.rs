@@ -1,4 +1,4 @@
-//! Light from far away, and the directions that it comes from. Knows nothing of how it is rendered.
+//! Distant light and its directions. Knows nothing of rendering.
 //!
 //! The frame of everything here is the viewer's: x to the right, y up, z out of the image to the
 //! viewer. A [`Panorama`]'s middle column is what the viewer sees behind the object (-z), its right

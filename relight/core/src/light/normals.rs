@@ -31,7 +31,7 @@ impl YAxis for YDown {
     type Opposite = YUp;
 }
 
-/// A map of unit normals, one a pixel; the zero vector where there is no surface.
+/// A map of unit normals, one a pixel; the zero vector outside the object.
 ///
 /// Only [`Normals<YUp>`] can be lit. The other kind has to be turned over:
 ///
@@ -75,7 +75,7 @@ impl<Y: YAxis> Normals<Y> {
         }
     }
 
-    /// The map whose colours `(n + 1) / 2`, 0 to 1, these are; black stands for no surface.
+    /// The map with these colours `(n + 1) / 2`, 0 to 1; black is outside the object.
     #[must_use]
     pub fn from_colours(mut colours: Planes<3>) -> Self {
         let [red, green, blue] = colours.planes_mut();
@@ -86,7 +86,7 @@ impl<Y: YAxis> Normals<Y> {
         Self::new(colours)
     }
 
-    /// The colours `(n + 1) / 2` that a file holds; black where there is no surface.
+    /// The colours `(n + 1) / 2` that a file holds; black outside the object.
     #[must_use]
     pub fn to_colours(&self) -> Planes<3> {
         let mut colours = self.planes.clone();
@@ -121,7 +121,7 @@ impl<Y: YAxis> Normals<Y> {
     /// The same map with no surface where the mask is below one half.
     ///
     /// # Errors
-    /// Where the mask has another size.
+    /// If the mask has another size.
     pub fn masked(mut self, mask: &Planes<1>) -> Result<Self, ImageError> {
         check_extent("mask", mask.extent(), self.extent())?;
         for plane in self.planes.planes_mut() {
@@ -132,7 +132,7 @@ impl<Y: YAxis> Normals<Y> {
         Ok(self)
     }
 
-    /// The same map with the normal of the nearest surface where the mask is true and there is none.
+    /// The same map; pixels of the mask without a normal get the nearest one.
     ///
     /// # Panics
     /// Where the mask is not as long as the map has pixels.
@@ -148,7 +148,7 @@ impl<Y: YAxis> Normals<Y> {
         }
     }
 
-    /// Whether there is no surface anywhere.
+    /// Whether all normals are zero.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.planes
@@ -221,7 +221,7 @@ impl Normals<YUp> {
     }
 }
 
-/// The colour `(n + 1) / 2` of a normal; black where there is no surface.
+/// The colour `(n + 1) / 2` of a normal; black outside the object.
 fn colour(normal: [f32; 3]) -> [f32; 3] {
     let is_surface = normal.iter().any(|&v| v != 0.0);
     normal.map(|v| if is_surface { v.midpoint(1.0) } else { 0.0 })

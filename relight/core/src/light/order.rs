@@ -4,7 +4,7 @@ use super::LightError;
 
 /// The highest band of an expansion in spherical harmonics, 0 to 64.
 ///
-/// The orders that relight uses stand here and nowhere else:
+/// All orders that relight uses:
 ///
 /// | constant | order | for |
 /// | --- | --- | --- |
@@ -13,7 +13,7 @@ use super::LightError;
 /// | [`Order::GLOSS`] | 6 | what the gloss of a turning object shows of its light |
 /// | [`Order::LAMP`] | 8 | rooms with lamps around an object on a table |
 /// | [`Order::HIGHLIGHT`] | 24 | panoramas and lamps that are given for a photograph: sharp enough for highlights |
-/// | [`Order::RENDER`] | 48 | a panorama that lights given maps, where nothing else is asked for |
+/// | [`Order::RENDER`] | 48 | a panorama that lights given maps, by default |
 /// | [`Order::HIGHEST`] | 64 | the highest that can be asked for |
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Order(u8);
@@ -47,7 +47,7 @@ impl Order {
         match u8::try_from(highest) {
             Ok(order) if highest <= Self::MAX => Ok(Self(order)),
             _ => Err(LightError::Coefficients(format!(
-                "spherical harmonics of order {highest} were asked for, and {} is the highest",
+                "spherical harmonics of order {highest} are not supported: the highest order is {}",
                 Self::MAX
             ))),
         }
@@ -65,12 +65,12 @@ impl Order {
         (self.get() + 1) * (self.get() + 1)
     }
 
-    /// The order that has so many coefficients.
+    /// The order with so many coefficients.
     pub(super) fn from_coefficients(count: usize) -> Result<Self, LightError> {
         let side = count.isqrt();
         if count == 0 || side * side != count {
             return Err(LightError::Coefficients(format!(
-                "{count} coefficients were given where 1, 4, 9, 16, ... make an order"
+                "{count} coefficients are not an order: give 1, 4, 9, 16, ..."
             )));
         }
         Self::new(side - 1)

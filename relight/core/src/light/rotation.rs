@@ -36,7 +36,7 @@ impl Rotation {
         ])
     }
 
-    /// The rotation whose matrix, row by row, this is; none where it is no rotation.
+    /// The rotation with this matrix, row by row; `None` if the matrix is not a rotation.
     #[must_use]
     pub fn from_matrix(matrix: [[f64; 3]; 3]) -> Option<Self> {
         let rotation = Self(matrix);

@@ -3,7 +3,7 @@
 use super::{Rotation, ShLight};
 
 impl ShLight {
-    /// The light after a rotation: what came from d comes from where d is turned to.
+    /// The light after a rotation: light from d comes from the rotated d.
     ///
     /// Ivanic and Ruedenberg, *Rotation Matrices for Real Spherical Harmonics*, J. Phys. Chem. 100 (1996),
     /// with their correction of 1998: the matrix of band l follows from those of bands 1 and l - 1.

@@ -19,11 +19,11 @@ impl AngularError {
     pub const LIMITS: [f64; 3] = [11.25, 22.5, 30.0];
 }
 
-/// The angles between two normal maps, of which the planes are x, y and z in the same axes. The
+/// The angles between two normal maps, whose planes are x, y and z in the same axes. The
 /// vectors need not be of length 1.
 ///
 /// # Errors
-/// As [`Comparison::new`]; [`MetricError::Incomparable`] where a vector under the mask has no length.
+/// As [`Comparison::new`]; [`MetricError::Incomparable`] if a vector under the mask has no length.
 pub fn angular_error(
     extent: Extent,
     truth: [&[f32]; 3],

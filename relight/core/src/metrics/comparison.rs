@@ -24,7 +24,7 @@ impl<'a> Comparison<'a> {
     /// size, at the pixels where `mask` is true.
     ///
     /// # Errors
-    /// [`MetricError::EmptyMask`], or [`MetricError::Incomparable`] where sizes or channels differ or a value under the mask
+    /// [`MetricError::EmptyMask`], or [`MetricError::Incomparable`] if sizes or channels differ or a value under the mask
     /// is not finite.
     pub fn new(
         extent: Extent,
@@ -84,7 +84,7 @@ pub(super) fn check_length(
         return Ok(());
     }
     Err(MetricError::Incomparable(format!(
-        "{what} has {found} values where {expected} pixels are compared: the images are not of one size"
+        "{what} has {found} values instead of {expected}: the images differ in size"
     )))
 }
 

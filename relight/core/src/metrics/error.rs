@@ -4,15 +4,13 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MetricError {
-    /// The images, or what is said of them, cannot be compared.
+    /// The images, or the settings of the comparison, do not fit.
     #[error("{0}")]
     Incomparable(String),
     /// No pixel counts.
-    #[error("no pixel is to be compared: the mask is empty")]
+    #[error("the mask is empty: nothing to compare")]
     EmptyMask,
     /// The ground truth is zero wherever it counts.
-    #[error(
-        "the ground truth is zero at every pixel that counts: no error in relation to it can be given"
-    )]
+    #[error("the ground truth is zero at every compared pixel: the relative error is undefined")]
     DarkGroundTruth,
 }

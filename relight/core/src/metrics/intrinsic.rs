@@ -3,7 +3,7 @@
 use super::{Comparison, MetricError, ScaleFit, Windows};
 use crate::image::Extent;
 
-/// What a number named SMSE or LMSE is of: published tables use both and often do not say which.
+/// The quantity that SMSE or LMSE measures: published tables use both, often without stating which.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Convention {
     /// Grey images (the mean of the channels), the ground truth scaled to a maximum of 1 under the mask,
@@ -41,7 +41,7 @@ pub struct IntrinsicError {
 /// estimate of one plane stands for each channel of the ground truth.
 ///
 /// # Errors
-/// As [`Comparison::new`] and [`Comparison::lmse`]; [`MetricError::DarkGroundTruth`] where the ground truth has
+/// As [`Comparison::new`] and [`Comparison::lmse`]; [`MetricError::DarkGroundTruth`] if the ground truth has
 /// no positive value to be scaled by.
 pub fn intrinsic_error(
     convention: Convention,

@@ -13,7 +13,7 @@
 //! | SSIM, DSSIM | [`Comparison::ssim`] | Wang et al. 2004, "Image quality assessment: from error visibility to structural similarity" |
 //! | angle between normals | [`angular_error`] | |
 //!
-//! What cannot be measured is an error that says why: [`MetricError`]. Sums are kept in `f64`.
+//! A failed measurement is a [`MetricError`] with the reason. Sums are kept in `f64`.
 //!
 //! ```
 //! use relight_core::image::Extent;

@@ -4,7 +4,7 @@ use super::comparison::Channel;
 use super::{Comparison, MetricError};
 use crate::image::Extent;
 
-/// Which scales are fitted to the estimate before it is compared, by least squares under the mask.
+/// The scales that are fitted to the estimate before the comparison, by least squares under the mask.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ScaleFit {
     /// None: the values are compared as they are.
@@ -110,7 +110,7 @@ impl Comparison<'_> {
     /// estimate's units.
     ///
     /// # Errors
-    /// [`MetricError::Incomparable`] where no window fits, [`MetricError::DarkGroundTruth`] where the ground truth is 0 in all windows.
+    /// [`MetricError::Incomparable`] if no window fits, [`MetricError::DarkGroundTruth`] if the ground truth is 0 in all windows.
     pub fn lmse(&self, fit: ScaleFit, windows: Windows) -> Result<f64, MetricError> {
         windows.check(self.extent)?;
         let mut totals = vec![Total::default(); self.channels.len()];

@@ -35,7 +35,7 @@ impl Comparison<'_> {
     /// inside the image and have their middle under the mask.
     ///
     /// # Errors
-    /// [`MetricError::Incomparable`] where no window fits, or none has its middle under the mask.
+    /// [`MetricError::Incomparable`] if no window fits, or none has its middle under the mask.
     pub fn ssim(&self) -> Result<f64, MetricError> {
         let weights = weights();
         let window = weights.len();
@@ -46,7 +46,7 @@ impl Comparison<'_> {
         let middles = self.middles(window);
         if middles.is_empty() {
             return Err(MetricError::Incomparable(format!(
-                "no window of {window}x{window} pixels has its middle under the mask"
+                "no window of {window}x{window} pixels has its centre in the mask"
             )));
         }
         let similarity = |channel: &Channel<'_>| {

@@ -1,4 +1,4 @@
-//! Why a data set, or one sample of it, cannot be given.
+//! Errors of a data set, and of one sample.
 
 use std::fmt::Display;
 use std::io;
@@ -26,15 +26,15 @@ pub enum OpenError {
     Dataset {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         source: relit_data::shard::ShardError,
     },
-    /// There are no samples in it, or its files do not belong together.
+    /// It contains no samples, or its files do not belong together.
     #[error("{} {fault}", path.display())]
     Content {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong, and what should be there.
+        /// The fault, and what is expected.
         fault: String,
     },
     /// A thread cannot be started.
@@ -43,11 +43,11 @@ pub enum OpenError {
 }
 
 impl OpenError {
-    /// That a folder has none of what is `expected` in it.
+    /// A folder contains none of what is `expected`.
     pub(super) fn empty(path: &Path, expected: &str) -> Self {
         Self::Content {
             path: path.to_owned(),
-            fault: format!("holds no samples: {expected} were expected in it"),
+            fault: format!("holds no samples: expected {expected}"),
         }
     }
 }
@@ -109,8 +109,8 @@ pub struct DamagedSample {
     pub fault: SampleFault,
 }
 
-/// A batch of which samples are damaged. What is whole of it is there as well: who wants to go on
-/// without the rest takes it, and has seen that something is missing.
+/// A batch with damaged samples. Its intact samples are included: a caller that accepts the loss
+/// can go on with them.
 #[derive(Debug, thiserror::Error)]
 #[error("{} samples of a batch are damaged: {}", damage.len(), listed(damage))]
 pub struct DamagedBatch<B> {

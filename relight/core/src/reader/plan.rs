@@ -1,4 +1,4 @@
-//! In which order samples are drawn. Knows how many there are and nothing of what they are.
+//! The order in which samples are drawn. Knows their number and not their content.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-/// Where one sample is: the position in a turn, or in what else holds samples in an order.
+/// The position of one sample in a turn, or in another ordered set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SampleId {
     /// Which turn, from 0.
@@ -18,9 +18,9 @@ pub struct SampleId {
 /// Which samples make a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Draw {
-    /// Neighbours of one turn: in a shard of `relit-extract` any 12 cover the whole turn. Where a run
-    /// begins is drawn anew for each epoch; the last run of a turn goes on at the turn's start. It
-    /// is shorter where the turn is no multiple of the batch.
+    /// Neighbours of one turn: in a shard of `relit-extract` any 12 cover the whole turn. The start
+    /// of a run is drawn again for each epoch; the last run of a turn goes on at the turn's start. It
+    /// is shorter if the turn is not a multiple of the batch.
     Neighbours,
     /// Samples from anywhere.
     Mixed,
@@ -33,7 +33,7 @@ pub struct DrawPlan {
     pub batch: u32,
     /// Which of them go together.
     pub draw: Draw,
-    /// The seed of the shuffle; none draws in the order in which the samples stand.
+    /// The seed of the shuffle; `None` draws in stored order.
     pub seed: Option<u64>,
     /// Which process draws: each draws its own batches.
     pub rank: Rank,
@@ -55,7 +55,7 @@ impl Rank {
         world_size: 1,
     };
 
-    /// The process `index` of `world_size`; none where there is no such process.
+    /// The process `index` of `world_size`; `None` if `index` is out of range.
     #[must_use]
     pub const fn new(index: u32, world_size: u32) -> Option<Self> {
         if index < world_size {
@@ -78,7 +78,7 @@ impl Rank {
     }
 }
 
-/// A position between two samples of a plan, to go on from. It is the same for all processes.
+/// A position between two samples of a plan, to resume from. It is the same for all processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Cursor {
     /// Which time all samples are drawn, from 0.
@@ -87,7 +87,7 @@ pub struct Cursor {
     pub sample: u64,
 }
 
-/// The samples of a batch, and the cursor behind it.
+/// The samples of a batch, and the cursor after it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Job {
     pub(super) samples: Vec<SampleId>,
@@ -107,7 +107,7 @@ impl DrawPlan {
     }
 
     /// The batches of this rank from a cursor on, up to the end of the epoch before `end`. `turns` are the numbers
-    /// of samples. The cursor behind a batch is behind those that the other ranks take along with it.
+    /// of samples. The cursor after a batch is also after the batches that the other ranks take with it.
     pub(super) fn jobs(
         self,
         turns: &[u32],
@@ -163,7 +163,7 @@ impl DrawPlan {
 enum Groups {
     /// Neighbours: where each begins, how many samples it has, and how many its turn has.
     Runs(Vec<Run>),
-    /// All samples, of which each batch takes the next.
+    /// All samples; each batch takes the next ones.
     Mixed { samples: Vec<SampleId>, batch: u32 },
 }
 

@@ -26,7 +26,7 @@ pub trait Source: Send + Sync + 'static {
     ) -> (Self::Batch, Vec<DamagedSample>);
 }
 
-/// What is drawn, from where to where, and by how many threads.
+/// The range of the stream, and the number of its threads.
 #[derive(Debug, Clone, Copy)]
 pub struct Streaming {
     /// Which samples make which batch.
@@ -38,11 +38,11 @@ pub struct Streaming {
     pub until_epoch: u64,
     /// Threads that decode.
     pub threads: NonZeroUsize,
-    /// How many finished batches each of them holds ready, at least 1.
+    /// The number of finished batches that each keeps ready, at least 1.
     pub ahead: usize,
 }
 
-/// A batch, and the cursor from which a stream goes on behind it.
+/// A batch, and the cursor after it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawn<B> {
     /// The samples.
@@ -53,8 +53,8 @@ pub struct Drawn<B> {
 
 /// An iterator over batches in the order of the plan, whatever the number of threads.
 ///
-/// A batch with damaged samples comes as an error, which holds the rest of it; the stream goes on
-/// behind it. Memory is bounded: each thread works on one batch and holds `ahead` more. Dropped, it
+/// A batch with damaged samples is an error that contains its intact samples; the stream continues
+/// after it. Memory is bounded: each thread works on one batch and keeps `ahead` more. Dropped, it
 /// ends its threads.
 ///
 /// ```no_run
@@ -168,7 +168,7 @@ impl<S: Source> Drop for Stream<S> {
     }
 }
 
-/// Makes every `threads`-th batch, from `index` on, until nobody wants more.
+/// Makes every `threads`-th batch, from `index` on, until the receiver is gone.
 fn decode<S: Source>(
     source: &S,
     streaming: Streaming,
@@ -204,7 +204,7 @@ mod tests {
     use super::*;
     use crate::reader::{Draw, Rank, SampleFault};
 
-    /// Turns of which the samples are their own numbers; one of them is damaged.
+    /// Turns whose samples are their own numbers; one of them is damaged.
     struct Numbers;
 
     impl Source for Numbers {

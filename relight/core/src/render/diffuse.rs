@@ -64,7 +64,7 @@ pub struct DiffuseLayer {
     coefficients: [[f64; 3]; 9],
     /// The order of the light that counts.
     order: Order,
-    /// What the bands beyond 2 add, where there are any.
+    /// The contribution of the bands beyond 2, if there are any.
     higher: Option<HigherBands>,
 }
 
@@ -105,7 +105,7 @@ impl DiffuseLayer {
         }
     }
 
-    /// The shading S, 0 where there is no surface.
+    /// The shading S, 0 outside the object.
     #[must_use]
     pub fn shading(&self, normals: &Normals<YUp>) -> Rgb<Linear> {
         let mut shading = Planes::zeros(normals.extent());
@@ -158,7 +158,7 @@ pub(super) fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
 }
 
 impl HigherBands {
-    /// Those of a light; none where it has no even band beyond 2.
+    /// Those of a light; `None` if it has no even band beyond 2.
     fn from_light(light: &ShLight) -> Option<Self> {
         if light.order().get() < 4 {
             return None;

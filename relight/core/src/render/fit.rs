@@ -11,12 +11,12 @@ const RIDGE: f64 = 1e-8;
 /// the pixels where `mask` (row by row, as long as the image) is true and a normal is known: what the
 /// paper's representation can hold of the shading.
 ///
-/// `stiffness`, 0 or more, draws the bands 1 and 2 towards none, by that part of the equations' mean
+/// `stiffness`, 0 or more, regularises the bands 1 and 2 towards 0, by that part of the equations' mean
 /// diagonal. 0 gives the best fit; 1e-3 keeps light that the normals hardly show, such as that from
 /// behind, small.
 ///
 /// # Errors
-/// Where there is no such pixel, or the shading is not finite.
+/// If no pixel qualifies, or the shading is not finite.
 ///
 /// ```
 /// use relight_core::light::{Normals, Order, ShLight};
@@ -44,7 +44,7 @@ pub fn fit_light(
     )
 }
 
-/// The same, with the bands 1 and 2 drawn towards those of the light `near`, of which the first three bands count.
+/// The same, with bands 1 and 2 regularised towards those of the light `near`; only its bands 0 to 2 count.
 ///
 /// # Errors
 /// As [`fit_light`].

@@ -65,7 +65,7 @@ impl Rendering {
     /// The image I = A S + H.
     ///
     /// # Errors
-    /// Where the albedo has another size.
+    /// If the albedo has another size.
     pub fn image(&self, albedo: &Rgb<Linear>) -> Result<Rgb<Linear>, ImageError> {
         let mut image = self.shading.clone();
         let extent = image.planes().extent();

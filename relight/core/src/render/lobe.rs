@@ -21,7 +21,7 @@ use crate::light::{Normals, Order, Quadrature, ShLight, YUp, polar_functions};
 ///   k_1 = 2π / (α + 2), k_l = k_(l-2) (α - l + 2) / (α + l + 1).
 /// - H(n) = s_p Σ k_l(α) G_lm Y_lm(n) (Funk-Hecke), where negative ringing is cut off.
 ///
-/// What is lost are the bands of the light beyond its order, and those of G beyond the layer's.
+/// The light's bands beyond its order are lost, and those of G beyond the layer's.
 ///
 /// ```
 /// use relight_core::light::{Normals, Order, ShLight};
@@ -62,10 +62,10 @@ impl LobeLayer {
         }
     }
 
-    /// The highlight H, 0 where there is no surface.
+    /// The highlight H, 0 outside the object.
     ///
     /// # Errors
-    /// Where the maps differ in size.
+    /// If the maps differ in size.
     pub fn highlight(
         &self,
         normals: &Normals<YUp>,

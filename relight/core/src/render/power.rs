@@ -13,9 +13,9 @@ use crate::light::{Normals, ShLight, YUp};
 /// defined. Here it is sign(v) |v|^α: odd like the harmonics of band 1, and smooth through 0. H itself may
 /// become negative; it is passed on as it is.
 ///
-/// A power of a sum's terms is not the power of the sum: this is no approximation of the Blinn-Phong
-/// highlight but for small α, and its size depends on α by orders of magnitude. It is here so that results can be
-/// compared with the paper's; [`LobeLayer`](super::LobeLayer) is what comes close to the ground truth.
+/// A power of a sum's terms is not the power of the sum: it approximates the Blinn-Phong highlight
+/// only for small α, and its size depends on α by orders of magnitude. It serves to compare results with the
+/// paper's; [`LobeLayer`](super::LobeLayer) is close to the ground truth.
 ///
 /// ```
 /// use relight_core::light::{Normals, Order, ShLight};
@@ -34,7 +34,7 @@ pub struct PowerLayer {
 }
 
 impl PowerLayer {
-    /// The layer for a light, of which the first nine coefficients count.
+    /// The layer for a light; only its first nine coefficients count.
     #[must_use]
     pub fn new(light: &ShLight) -> Self {
         let mut coefficients = [[0.0; 3]; 9];
@@ -44,10 +44,10 @@ impl PowerLayer {
         Self { coefficients }
     }
 
-    /// The highlight H, 0 where there is no surface.
+    /// The highlight H, 0 outside the object.
     ///
     /// # Errors
-    /// Where the maps differ in size.
+    /// If the maps differ in size.
     pub fn highlight(
         &self,
         normals: &Normals<YUp>,

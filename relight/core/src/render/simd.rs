@@ -22,7 +22,7 @@ const BLOCK: usize = 256 * WIDTH;
 #[repr(align(64))]
 pub(super) struct Lanes([f32; WIDTH]);
 
-/// What formulas are written in: `f64` where they are differentiated, [`Lanes`] where they are fast.
+/// The number type of formulas: `f64` to differentiate, [`Lanes`] for speed.
 pub(super) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
@@ -108,7 +108,7 @@ impl Lanes {
         self.map(|v| v.max(0.0))
     }
 
-    /// 1 where a unit normal stands, 0 where there is no surface.
+    /// 1 where a unit normal stands, 0 outside the object.
     #[inline(always)]
     pub(super) fn surface([x, y, z]: [Self; 3]) -> Self {
         (x * x + y * y + z * z).map(|square| if square > 0.25 { 1.0 } else { 0.0 })
@@ -156,7 +156,7 @@ fn exp2(power: f32) -> f32 {
     scale * (1.0 + rest * (1.0 + rest * (0.5 + rest * (1.0 / 6.0 + rest * high))))
 }
 
-/// What is done to a group of pixels with `I` values each, giving `O` values.
+/// A function from `I` to `O` values for a group of pixels.
 pub(super) trait Kernel<const I: usize, const O: usize>: Sync {
     /// Memory that is used again for every group.
     type Scratch;
@@ -169,7 +169,7 @@ pub(super) trait Kernel<const I: usize, const O: usize>: Sync {
     fn run(&self, scratch: &mut Self::Scratch, inputs: [Lanes; I]) -> [Lanes; O];
 }
 
-/// Runs a kernel over planes of one length, side by side where there are threads.
+/// Runs a kernel over planes of one length, in parallel if there are threads.
 pub(super) fn run<const I: usize, const O: usize>(
     kernel: &impl Kernel<I, O>,
     inputs: [&[f32]; I],

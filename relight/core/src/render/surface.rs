@@ -1,4 +1,4 @@
-//! What is lit: the maps of an object.
+//! A surface to light: the maps of an object.
 
 use crate::image::{Extent, ImageError, Linear, Planes, Rgb, check_extent};
 use crate::light::{Normals, YUp};
@@ -18,7 +18,7 @@ impl Gloss {
     /// The gloss of these maps.
     ///
     /// # Errors
-    /// Where they differ in size.
+    /// If they differ in size.
     pub fn new(reflectance: Planes<3>, smoothness: Planes<1>) -> Result<Self, ImageError> {
         check_extent(
             "map of smoothness",
@@ -71,7 +71,7 @@ impl Surface {
     /// An object of these maps; without `gloss` it is diffuse.
     ///
     /// # Errors
-    /// Where they differ in size.
+    /// If they differ in size.
     pub fn new(
         normals: Normals<YUp>,
         albedo: Rgb<Linear>,
@@ -91,7 +91,7 @@ impl Surface {
     /// The same object with another gloss.
     ///
     /// # Errors
-    /// Where the gloss has another size.
+    /// If the gloss has another size.
     pub fn with_gloss(self, gloss: Option<Gloss>) -> Result<Self, ImageError> {
         Self::new(self.normals, self.albedo, gloss)
     }

@@ -24,11 +24,11 @@ use relight_synth::{BlinnPhong, GBuffer, Library, Lighting, Material, Recipe, Sh
 
 /// Mean irradiance over all normals under each light: white then has half the value that clips.
 const IRRADIANCE: f32 = 0.5;
-/// What `Recipe` draws, and what is drawn here: numbers of streams that it does not use.
+/// Numbers of random streams that `Recipe` does not use.
 const LIGHT_STREAM: u64 = 101;
 const OBJECT_STREAM: u64 = 102;
 
-/// What an evaluation set consists of. The same recipe and library make the same set.
+/// The settings of an evaluation set. The same recipe and library make the same set.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RelightingRecipe {
     /// How many objects; the paper has 100.
@@ -37,7 +37,7 @@ pub struct RelightingRecipe {
     pub lights: usize,
     /// Width and height of the images, 16..=2048 pixels.
     pub size: u32,
-    /// What all is drawn from.
+    /// The seed of all draws.
     pub seed: u64,
     /// Whether objects cast shadows on themselves.
     pub shadows: bool,
@@ -98,7 +98,7 @@ impl RelightingRecipe {
     }
 }
 
-/// What all objects of a folder were made of.
+/// The inputs of all objects of a folder.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Origin {
     lights: usize,
@@ -130,7 +130,7 @@ impl Origin {
         }
     }
 
-    /// Writes itself into the folder, or compares itself with what is there.
+    /// Writes itself into the folder, or compares itself with the existing file.
     fn describe(&self, out: &Path) -> Result<(), EvalError> {
         let path = out.join(Self::FILE);
         match fs::read(&path) {
@@ -150,12 +150,12 @@ impl Origin {
     }
 }
 
-/// Writes an evaluation set into the folder `out`, objects side by side on rayon's threads;
-/// `progress` is told each object. Objects that are there are kept: a call that was interrupted can be
+/// Writes an evaluation set into the folder `out`, objects in parallel on rayon's threads;
+/// `progress` is called for each object. Existing objects are kept: an interrupted call can be
 /// repeated, also for more objects. `relighting.json` is written last.
 ///
 /// # Errors
-/// Where the folder holds objects of another recipe, a setting is out of range or a file cannot be written.
+/// If the folder holds objects of another recipe, a setting is out of range or a file cannot be written.
 pub fn make_relighting(
     recipe: &RelightingRecipe,
     library: &Library,

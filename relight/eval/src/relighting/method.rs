@@ -12,7 +12,7 @@ use relight_photo::decompose::{DecomposeOptions, Decomposer, Decomposition, Spec
 use relight_photo::relighting::{MaterialChange, RelightableObject};
 
 /// What cannot be done with an object.
-const NOT_RELIT: &str = "cannot be decomposed or shown in other light";
+const NOT_RELIT: &str = "cannot be decomposed or relit";
 
 /// Where relit images come from.
 #[derive(Debug, Clone)]
@@ -25,10 +25,10 @@ pub enum RelightMethod<'d> {
     Oracle(SpecularForm),
     /// What was predicted: the relit images, under the names that the set has.
     Predictions(Predictions),
-    /// What `relight relight` makes of the image: layers, light and hedge. Of the image's light the mean irradiance is given,
-    /// as all lights of a set have the same: how bright the new light is beside it cannot be seen.
+    /// The result of `relight relight` on the image: layers, light and hedge. The mean irradiance of the image's light is
+    /// given, since all lights of a set have the same: an image does not show how bright its light is compared with the new one.
     Photograph(&'d Decomposer),
-    /// What `relight decompose` makes of it, with the same given: its normals, albedo and gloss, rendered as those of the
+    /// The result of `relight decompose` with the same inputs: its normals, albedo and gloss, rendered as those of the
     /// oracle.
     Maps(&'d Decomposer),
 }
@@ -45,7 +45,7 @@ impl RelightMethod<'_> {
         }
     }
 
-    /// What is the same for all lights.
+    /// What all lights share.
     pub(super) fn prepare<'a>(
         &'a self,
         set: &'a RelightingSet,

@@ -1,5 +1,5 @@
 //! Relighting: one image of an object in, the same object under other lights out. The paper's table
-//! has 100 objects under 30 lights each: from the image under one light to the 29 others, matt and
+//! has 100 objects under 30 lights each: from the image under one light to the 29 others, diffuse and
 //! with highlights.
 
 mod make;
@@ -19,7 +19,7 @@ use set::{Object, Part, object_folder};
 /// MSE and DSSIM of relit images, for each method: the mean over all objects and target lights.
 ///
 /// # Errors
-/// Where the set or a prediction cannot be read or measured.
+/// If the set or a prediction cannot be read or measured.
 pub fn evaluate_relighting(
     set: &RelightingSet,
     split: &str,
@@ -28,7 +28,7 @@ pub fn evaluate_relighting(
 ) -> Result<ScoreTable, EvalError> {
     let notes = vec![
         set.about(),
-        "one image in; out the images under all other lights; images: how many were compared"
+        "input: one image; output: the images under all other lights; images: how many were compared"
             .to_owned(),
         format!("SSIM by {}", SSIM_WINDOW),
     ];

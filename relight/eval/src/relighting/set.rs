@@ -12,7 +12,7 @@ use relight_core::image::{Extent, Linear, Planes, Rgb, Transfer};
 use relight_core::light::{Normals, ShLight, YUp};
 use relight_core::render::{Gloss, Surface};
 
-/// What the description says it is.
+/// The description's schema.
 pub(super) const SCHEMA: &str = "relight.relighting/2";
 /// The description of a set.
 pub(super) const FILE: &str = "relighting.json";
@@ -20,7 +20,7 @@ pub(super) const FILE: &str = "relighting.json";
 /// The objects of a set and its lights:
 ///
 /// ```text
-/// relighting.json             what there is, and what it was made of; written last
+/// relighting.json             the contents and their inputs; written last
 /// lights/<ll>.txt             the light as coefficients of order 24, in the units of the images
 /// <ooo>/{mask,normal,albedo}.png      the ground truth of an object: 16 bits, linear, y up
 /// <ooo>/<ll>-diffuse.png      the object without highlights under a light, sRGB
@@ -37,7 +37,7 @@ pub struct RelightingSet {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Index {
     pub(super) schema: String,
-    /// What it was made by and of.
+    /// Its program and inputs.
     pub(super) about: String,
     pub(super) lights: Vec<String>,
     pub(super) objects: Vec<ObjectEntry>,
@@ -95,7 +95,7 @@ impl RelightingSet {
     /// Opens the set in the folder `root`.
     ///
     /// # Errors
-    /// Where a file of it cannot be read, or is of another version.
+    /// If a file of it cannot be read, or is of another version.
     pub fn open(root: &Path) -> Result<Self, EvalError> {
         let path = root.join(FILE);
         let bytes = fs::read(&path).map_err(EvalError::read(&path))?;
@@ -126,7 +126,7 @@ impl RelightingSet {
         &self.lights
     }
 
-    /// What it was made of, as a sentence.
+    /// Its inputs, as a sentence.
     pub(super) fn about(&self) -> String {
         self.index.about.clone()
     }
@@ -167,7 +167,7 @@ impl Object {
     }
 }
 
-/// The values of an image file, of which the size must be this.
+/// The values of an image file, which must have this size.
 pub(super) fn read_image(path: PathBuf, expected: Extent) -> Result<Planes<3>, EvalError> {
     let (planes, _) = read_planes(&path)?;
     if planes.extent() == expected {

@@ -15,7 +15,7 @@ use crate::relighting::{
 const SIDES: RangeInclusive<f64> = 16.0..=16_384.0;
 /// Brightness, stops.
 const STOPS: RangeInclusive<f64> = -20.0..=20.0;
-/// Angles of which more than one turn is of use, degrees.
+/// The range of angles that may exceed one turn, degrees.
 const TURNS: RangeInclusive<f64> = -3600.0..=3600.0;
 /// What a channel is multiplied with.
 const TINTS: RangeInclusive<f64> = 0.0..=1000.0;
@@ -55,10 +55,10 @@ pub struct SceneDescription {
     /// How many degrees the camera looks down into a panorama.
     #[serde(default = "default_down")]
     pub down: f64,
-    /// How many degrees the camera looks down on the ground where the objects stand.
+    /// The angle at which the camera looks down on the ground of the objects, degrees.
     #[serde(default)]
     pub tilt: Option<f64>,
-    /// The light; without any it is taken from the background.
+    /// The light; by default that of the background.
     #[serde(default)]
     pub light: LightDescription,
     /// Whether brightness, white balance and grain of the objects follow the background.
@@ -75,7 +75,7 @@ pub struct SceneDescription {
     pub objects: Vec<ObjectDescription>,
 }
 
-/// Where the light comes from, at most one of panorama, lamp, coefficients and object, and how far it is rotated.
+/// The source of the light, at most one of panorama, lamp, coefficients and object, and its rotation.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightDescription {
@@ -113,13 +113,13 @@ pub struct ObjectDescription {
     /// Its height in parts of the picture's.
     #[serde(default = "default_height")]
     pub height: f64,
-    /// Degrees by which it is turned in the plane, counter-clockwise.
+    /// Rotation in the plane, degrees, counter-clockwise.
     #[serde(default)]
     pub rotation: f64,
     /// What its albedo is multiplied with.
     #[serde(default = "default_tint")]
     pub tint: [f32; 3],
-    /// The part of even light that it reflects, and its smoothness, in place of the gloss that was found.
+    /// The part of even light that it reflects, and its smoothness, in place of the estimated gloss.
     #[serde(default)]
     pub gloss: Option<[f32; 2]>,
     /// Its brightness in stops.
@@ -131,7 +131,7 @@ pub struct ObjectDescription {
 }
 
 impl SceneDescription {
-    /// Objects before a background, and all else as a file that does not name it has it.
+    /// Objects before a background, and defaults for everything else.
     #[must_use]
     pub fn new(background: PathBuf, objects: Vec<ObjectDescription>) -> Self {
         Self {
@@ -151,10 +151,13 @@ impl SceneDescription {
     /// Reads a description, and checks its numbers.
     ///
     /// # Errors
-    /// Where the text is no TOML, or says what a scene cannot be.
+    /// If the text is not TOML, or a value is not allowed.
     pub fn parse(text: &str) -> Result<Self, InsertError> {
         let scene: Self = toml::from_str(text).map_err(|fault| {
-            InsertError::Input(format!("it is no scene: {}", fault.to_string().trim_end()))
+            InsertError::Input(format!(
+                "it is not a scene: {}",
+                fault.to_string().trim_end()
+            ))
         })?;
         scene.check()?;
         Ok(scene)
@@ -163,7 +166,7 @@ impl SceneDescription {
     /// The text of the scene, which [`SceneDescription::parse`] reads back as it was.
     ///
     /// # Errors
-    /// Where a path is no Unicode.
+    /// If a path is not Unicode.
     pub fn to_toml(&self) -> Result<String, InsertError> {
         toml::to_string(self)
             .map_err(|fault| InsertError::Input(format!("it cannot be written: {fault}")))
@@ -188,7 +191,7 @@ impl SceneDescription {
         Extent::new(width, height)
     }
 
-    /// Whether all that is said can be.
+    /// Checks that all values are in range.
     ///
     /// # Errors
     /// [`InsertError`] names the first number that is out of its range; the number of objects comes last.
@@ -221,7 +224,7 @@ impl LightDescription {
     /// The lamp, if the light is one.
     ///
     /// # Errors
-    /// Where its text is none.
+    /// If its text is none.
     pub fn lamp(&self) -> Result<Option<DiscLamp>, InsertError> {
         let Some(text) = &self.lamp else {
             return Ok(None);
@@ -322,14 +325,14 @@ impl ObjectDescription {
     }
 }
 
-/// Whether each number, with its name, lies in its range, which is told in words too. One that is none lies in no range.
+/// Checks that each number, with its name, lies in its range, also given in words. NaN lies in no range.
 fn check_all<const N: usize>(
     numbers: [(&str, f64, RangeInclusive<f64>, &str); N],
 ) -> Result<(), InsertError> {
     for (what, value, range, allowed) in numbers {
         if !range.contains(&value) {
             return Err(InsertError::Input(format!(
-                "{what} is {value}, it has to be {allowed}"
+                "{what} is {value}: it has to be {allowed}"
             )));
         }
     }

@@ -1,4 +1,4 @@
-//! What of a background an inserted object has to follow: brightness, white balance, grain. Knows pictures only.
+//! Properties of a background that an inserted object adopts: brightness, white balance, grain. Knows pictures only.
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::statistics::above_part;
@@ -7,7 +7,7 @@ use relight_core::statistics::above_part;
 const BRIGHT: f32 = 0.8;
 /// The part of the values that is brighter than a picture's bright places.
 const BRIGHTEST_PART: f64 = 0.05;
-/// The least and the most by which an object is made darker or brighter.
+/// The limits of an object's change of brightness.
 const LEVELS: (f32, f32) = (0.05, 1.5);
 /// How far a channel of the light's colour may be from grey.
 const CASTS: (f32, f32) = (0.7, 1.4);
@@ -20,9 +20,9 @@ const SMOOTHEST_PART: f64 = 0.1;
 /// Grain is as fine as the pixels: in half the size it has half the deviation. A square that keeps more than this part of it there
 /// shows gravel, cloth or leaves.
 const FINE: f32 = 0.75;
-/// Deviations below this are those of rounding to 8 bits: nothing is to be told of how fine they are.
+/// Deviations below this come from rounding to 8 bits: they say nothing about the grain.
 const ROUNDING: f32 = 2e-3;
-/// The part of the squares that have to show nothing but grain, so that it is known.
+/// The part of the squares that must show only grain for it to be measured.
 const MIN_PART: f64 = 0.02;
 /// The most grain that a camera makes.
 const MAX_GRAIN: f32 = 0.06;
@@ -119,7 +119,7 @@ pub(crate) fn grain(picture: &Planes<3>, alpha: Option<&Planes<1>>) -> f32 {
         .min(MAX_GRAIN)
 }
 
-/// The deviation in a square of so many pixels a side, of which the first has this column and row; the pixels about it are read too.
+/// The deviation in a square of so many pixels a side, whose first has this column and row; the pixels around it are read too.
 fn deviation(values: &[f32], width: usize, [left, top]: [usize; 2], side: usize) -> f32 {
     let mut sum = 0.0;
     for y in top + 1..=top + side {

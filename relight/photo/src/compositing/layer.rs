@@ -4,7 +4,7 @@ use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
 
 use super::harmonisation::noise;
 
-/// An object as it is seen in a scene, ready to be put on any background.
+/// An object as seen in a scene, ready for any background.
 #[derive(Debug, Clone)]
 pub struct SceneLayer {
     /// Column and row of its first pixel; it may begin outside.
@@ -80,7 +80,7 @@ impl SceneLayer {
     }
 }
 
-/// Changes the pixels of a picture that lie under an image of which the first pixel is at `place`; `change` is given the pixel of the
+/// Changes the pixels of a picture that lie under an image whose first pixel is at `place`; `change` takes the pixel of the
 /// image, the value and the channel.
 fn over(
     picture: &mut Planes<3>,

@@ -1,10 +1,10 @@
-//! Objects in another picture, with their shadows: a scene as a text, what its background says of light and ground, and the
+//! Objects in another picture, with their shadows: a scene as text, the light and ground of its background, and the
 //! picture of it. Knows neither files nor terminals.
 //!
 //! | file | concern |
 //! | --- | --- |
 //! | `description` | a scene as a text in TOML |
-//! | `scene_environment` | what a background says of the objects: light, size, tilt of the ground, brightness |
+//! | `scene_environment` | what a background determines: light, size, tilt of the ground, brightness |
 //! | `scene`, `scene_object`, `layer` | objects in a new picture |
 //! | `shadow` | what an object keeps from the ground |
 //! | `harmonisation` | brightness, white balance and grain of a background |

@@ -25,7 +25,7 @@ impl<'a> InsertScene<'a> {
     /// degrees (0 to 90), with objects from back to front.
     ///
     /// # Errors
-    /// Where an object would lie outside, or be larger than can be.
+    /// If an object would lie outside, or be larger than can be.
     pub(crate) fn new(
         extent: Extent,
         (light, panorama): (ShLight, Panorama),
@@ -47,7 +47,7 @@ impl<'a> InsertScene<'a> {
         })
     }
 
-    /// All objects as they are seen after the light has turned about the vertical by so many radians, from back to front.
+    /// All objects after the light has rotated about the vertical by so many radians, from back to front.
     ///
     /// # Errors
     /// Those of the render layers.
@@ -243,7 +243,7 @@ mod tests {
         (lamp.light().unwrap(), lamp.panorama())
     }
 
-    /// Where the object stands in its own photograph.
+    /// The object's place in its own photograph.
     const OWN_PLACE: Placement = Placement {
         at: [32.0 / 60.0, 40.0 / 50.0],
         height: 30.0 / 50.0,

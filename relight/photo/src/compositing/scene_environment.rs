@@ -1,4 +1,4 @@
-//! What a background says of the objects that are put before it: their light, how far their ground is looked down on, and
+//! What a background determines for inserted objects: their light, the tilt of their ground, and
 //! how bright they are. Opens no files.
 
 use std::f32::consts::PI;
@@ -18,9 +18,9 @@ use crate::relighting::{
 const WHITE: f32 = 1.4;
 /// The size of a panorama from which shadows are drawn, at most.
 const MAX_AROUND: Extent = Extent::new(512, 256);
-/// The longer side of the picture of a panorama by which it is exposed, pixels.
+/// The longer side of a panorama's picture for its exposure, pixels.
 const LOOK: usize = 160;
-/// Photographs are brought to this much more than the size in which they are shown.
+/// Photographs are resized to this multiple of their displayed size.
 const RESERVE: f64 = 1.25;
 /// The shortest that the longest side of a photograph is made, pixels.
 const MIN_SIDE: usize = 32;
@@ -34,22 +34,22 @@ const TILTS: (f64, f64) = (5.0, 89.0);
 pub enum SceneBackground<'a> {
     /// A photograph, or the first frame of a video.
     Picture(&'a Rgb<Linear>),
-    /// A panorama, of which a part is seen.
+    /// A panorama; the background shows part of it.
     Panorama(&'a Panorama),
 }
 
-/// What follows from a scene's description and its background, before the objects are known.
+/// The setting of a scene: what follows from its description and background, before the objects.
 #[derive(Debug, Clone)]
 pub struct SceneEnvironment {
     /// Width and height of the picture.
     pub extent: Extent,
-    /// The light: the one that is given, or that of the background.
+    /// The light: the given one, or that of the background.
     pub light: LightSource,
     /// How far the camera looks down on the ground of the objects, degrees.
     pub tilt: f64,
     /// What the background asks of the objects.
     pub matching: Harmonisation,
-    /// The sun that is seen in a picture from which the light is taken.
+    /// The sun in a picture that gives the light.
     pub sun: Option<SeenSun>,
     /// How a panorama is exposed.
     pub exposure: Option<PanoramaExposure>,
@@ -65,7 +65,7 @@ impl SceneEnvironment {
     /// The setting of a scene before a background. Light that is not `given` is taken from the background.
     ///
     /// # Errors
-    /// [`InsertError::Dark`] where there is no light.
+    /// [`InsertError::Dark`] if the light is dark.
     pub fn new(
         scene: &SceneDescription,
         background: SceneBackground<'_>,
@@ -163,7 +163,7 @@ impl SceneEnvironment {
         InsertScene::new(self.extent, light, self.tilt, self.matching, objects)
     }
 
-    /// What is seen of a panorama that has turned by so many radians, as bright as it is shown.
+    /// The visible part of a panorama that has rotated by so many radians, at its exposure.
     #[must_use]
     pub fn seen(&self, view: &PanoramaView, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
         shown(view, panorama, turn, self.panorama_scale)

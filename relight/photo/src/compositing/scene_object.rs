@@ -1,4 +1,4 @@
-//! An object of a scene: where it stands and how it is shown.
+//! An object of a scene: its place and its appearance.
 
 use relight_core::image::Extent;
 
@@ -21,7 +21,7 @@ pub struct SceneObject<'a> {
     pub exposure: f32,
     /// How much of its shadow is seen, 0 to 1.
     pub shadow: f32,
-    /// Whether it is shown in the scene's light; else in that of its photograph.
+    /// Whether it is relit by the scene; else it keeps the light of its photograph.
     pub relit: bool,
 }
 
@@ -39,14 +39,14 @@ impl<'a> SceneObject<'a> {
         }
     }
 
-    /// Refuses what cannot stand in a picture of this size.
+    /// Refuses an object that does not fit into a picture of this size.
     pub(crate) fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
         let wrong = |fault| InsertError::Object { number, fault };
         let Placement { at, height, .. } = self.placement;
         let alpha = &self.subject.matte.alpha;
         if !self.placement.is_seen(alpha, extent) {
             return Err(wrong(format!(
-                "would lie wholly outside the picture: its place is {},{}, in parts of the picture's sides",
+                "would lie completely outside the picture: its place is {},{} in parts of width and height",
                 at[0], at[1]
             )));
         }

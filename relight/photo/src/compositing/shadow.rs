@@ -18,15 +18,15 @@ const HALF_PATTERN: i64 = PATTERN as i64 / 2;
 const RAYS: usize = 12;
 /// How many times its width the object's shadow is looked for to both sides, and its height above and below.
 const REACH: f64 = 1.5;
-/// The part of the object's height over which a shadow that goes on ends where it is no longer looked for.
+/// The part of the object's height over which a shadow fades out at the end of the computed area.
 const FADE: f32 = 0.125;
 /// The part of the object's lowest points that may lie below the ground: normals at the rim are rough.
 const BELOW_GROUND: f64 = 0.03;
 /// How far a ray goes at a time, cells: less than one.
 const STEP: f32 = 0.8;
-/// Steps that lead no further than to a block beside: at once where nothing can be met there.
+/// Steps to at most a neighbouring block: taken at once if nothing can be hit there.
 const LEAP: i32 = (BLOCK as f32 / STEP) as i32 - 1;
-/// Steps that are looked at one by one before it is asked again whether anything can be met.
+/// Single steps before the next check whether anything can be hit.
 const LOOKS: i32 = 4;
 /// Bits behind the point of a place in fixed point; shapes and their grounds have a few hundred cells.
 const FIXED_BITS: u32 = 16;
@@ -53,7 +53,7 @@ struct Ray {
     towards: [f32; 3],
     /// One over each part of the direction, so that the shape's box is found without a division.
     over: [f32; 3],
-    /// The sides by which it enters the shape's box, and those by which it leaves it.
+    /// The sides where it enters the shape's box, and those where it leaves it.
     sides: [[f32; 3]; 2],
     light: [f32; 3],
 }
@@ -64,7 +64,7 @@ impl Ray {
         self.within(2, z, self.within(1, y, 0.0..f32::INFINITY))
     }
 
-    /// The columns from which the box is met so far along.
+    /// The columns from which the box is hit at such a distance.
     fn columns(&self, inside: &Range<f32>) -> Range<f32> {
         let [one, other] = self.sides.map(|side| side[0]);
         let back = [inside.start, inside.end].map(|along| -along * self.towards[0]);
@@ -123,7 +123,7 @@ impl Shadow {
         shadow.ending(FADE * height as f32).trimmed()
     }
 
-    /// The same shadow, which fades to nothing over so many cells before each of its borders.
+    /// The same shadow, fading out over so many cells before each of its borders.
     fn ending(mut self, over: f32) -> Self {
         let Extent { width, height } = self.arriving.extent();
         let part = |at: usize, count: usize| (at.min(count - 1 - at) as f32 / over).min(1.0);
@@ -254,7 +254,7 @@ impl HeightField {
         ]
     }
 
-    /// Whether the shape is in the way from a point in a direction, `inside` of which rows and depths of the box are passed. Its cells
+    /// Whether the shape blocks a ray from a point; `inside` is the part of the ray within the rows and depths of the box. Cells
     /// are 1 wide; rows lie below y = 0.
     fn blocks(&self, from: [f32; 3], ray: &Ray, inside: &Range<f32>) -> bool {
         let mut walk = Walk::through(ray, from, inside);
@@ -305,7 +305,7 @@ struct Walk {
 }
 
 impl Walk {
-    /// From where a ray that starts at a point enters the box to where it leaves it.
+    /// The range in which a ray from a point is inside the box.
     fn through(ray: &Ray, from: [f32; 3], inside: &Range<f32>) -> Self {
         let Range {
             start: enter,
@@ -417,12 +417,12 @@ fn mean_of_patterns(arriving: &Planes<3>) -> Planes<3> {
     along(&along(arriving, true), false)
 }
 
-/// A place so many steps on, as far as there are any.
+/// The place so many steps further, within the limits.
 fn step_from(at: usize, steps: i64, count: usize) -> usize {
     (at as i64 + steps).clamp(0, count as i64 - 1) as usize
 }
 
-/// Of the sides of a box with these corners those by which a direction enters it, and those by which it leaves it.
+/// The sides where a direction enters a box with these corners, and those where it leaves it.
 fn sides([low, high]: [[f32; 3]; 2], towards: [f32; 3]) -> [[f32; 3]; 2] {
     let of = |enters: bool| {
         [0, 1, 2].map(|axis| {
@@ -461,7 +461,7 @@ mod tests {
         lamp.panorama(Extent::new(128, 64))
     }
 
-    /// What arrives at a cell of the relief's columns and rows, or beside them.
+    /// The light that arrives at a cell of the relief's columns and rows, or outside them.
     fn arriving(shadow: &Shadow, x: i64, y: i64) -> f32 {
         let Extent { width, height } = shadow.arriving.extent();
         let [x, y] = [x - shadow.from[0], y - shadow.from[1]];

@@ -1,11 +1,11 @@
-//! What the pictures and vectors of other networks for normals mean: told by the names of what goes in and comes out.
+//! Conventions of other networks for normals, recognised by the names of their inputs and outputs.
 
 use crate::nets::{OnnxSignature, OnnxValue};
 use relight_core::image::Extent;
 use relight_core::light::NormalsFrame;
 use tract_onnx::pb::tensor_proto::DataType;
 
-/// Tokens that MoGe-2 divides a picture into: the middle of those that it was trained on.
+/// The number of MoGe-2's tokens: the middle of its training range.
 const TOKENS: i64 = 1800;
 /// Width and height of Metric3D's pictures where the file leaves them open, pixels.
 const METRIC3D_SIDE: usize = 518;
@@ -13,7 +13,7 @@ const METRIC3D_SIDE: usize = 518;
 /// How a network for normals is used.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Convention {
-    /// What it was taken for.
+    /// The kind of network, in words.
     pub(super) name: &'static str,
     /// Of its pictures.
     pub(super) extent: Extent,
@@ -49,7 +49,7 @@ pub(super) enum Channels {
 /// Axes of vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Axes {
-    /// x right, z to the viewer; the caller says which way y points.
+    /// x right, z to the viewer; the caller gives the direction of y.
     Viewer,
     /// OpenCV's: x right, y down, z away from the viewer.
     Camera,
@@ -76,7 +76,7 @@ impl Values {
 }
 
 impl Axes {
-    /// The way in which y points where nobody says it.
+    /// The direction of y, if the caller gives none.
     pub(super) fn frame(self) -> NormalsFrame {
         match self {
             Self::Viewer => NormalsFrame::YUp,
@@ -86,7 +86,7 @@ impl Axes {
 }
 
 impl Convention {
-    /// How the network of this signature is used for pictures of `side` x `side` pixels, or why it cannot be.
+    /// How a network of this signature is used on pictures of `side` x `side` pixels, or why it cannot be used.
     pub(super) fn from_signature(signature: &OnnxSignature, side: usize) -> Result<Self, String> {
         if let Some(tokens) = signature.input("num_tokens") {
             return Self::moge(signature, tokens, side);
@@ -105,7 +105,7 @@ impl Convention {
                 axes: Axes::Viewer,
             }),
             inputs => Err(format!(
-                "its inputs are {}: neither one picture, nor those of MoGe-2 (image, num_tokens)",
+                "its inputs are {}: give a network of one picture, or MoGe-2 (image, num_tokens)",
                 named(inputs)
             )),
         }
@@ -114,12 +114,12 @@ impl Convention {
     fn moge(signature: &OnnxSignature, tokens: &OnnxValue, side: usize) -> Result<Self, String> {
         let output = signature.output("normal").ok_or_else(|| {
             format!(
-                "it looks like MoGe-2 without normals: its outputs are {}; take a model whose name ends in -normal",
+                "it looks like MoGe-2 without normals (outputs {}): give a model whose name ends in -normal",
                 named(&signature.outputs)
             )
         })?;
         if tokens.element != DataType::Int64 {
-            return Err("its input num_tokens is no whole number".to_owned());
+            return Err("its input num_tokens is not a 64-bit integer".to_owned());
         }
         let picture = picture_of(signature, &tokens.name)?;
         Ok(Self {
@@ -148,7 +148,7 @@ impl Convention {
     }
 }
 
-/// The one input beside `other`, which has to be a picture.
+/// The one input besides `other`, which has to be a picture.
 fn picture_of<'a>(signature: &'a OnnxSignature, other: &str) -> Result<&'a OnnxValue, String> {
     let mut rest = signature.inputs.iter().filter(|input| input.name != other);
     match (rest.next(), rest.next()) {

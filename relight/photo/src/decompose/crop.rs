@@ -20,7 +20,7 @@ pub struct CropSquare {
 
 impl CropSquare {
     /// The square around the pixels where the mask is at least one half, with 4 % more than their longer
-    /// side; none where there are none.
+    /// side; `None` without such pixels.
     #[must_use]
     pub fn around(mask: &Planes<1>) -> Option<Self> {
         let sides = bounds(mask)?;
@@ -46,7 +46,7 @@ impl CropSquare {
         }
     }
 
-    /// What a photograph shows there, in another size; 0 beyond its edges.
+    /// That part of a photograph in another size; 0 beyond its edges.
     pub fn resized<const C: usize>(&self, image: &Planes<C>, extent: Extent) -> Planes<C> {
         let all = Window {
             at: [0; 2],
@@ -80,7 +80,7 @@ impl Window {
     }
 }
 
-/// The columns and rows in which a mask is somewhere at least one half; none where it is empty.
+/// The columns and rows in which a mask is somewhere at least one half; `None` if it is empty.
 fn bounds(mask: &Planes<1>) -> Option<[Range<usize>; 2]> {
     let Extent { width, .. } = mask.extent();
     let mut low = [usize::MAX; 2];

@@ -26,7 +26,7 @@ use relit_data::spec_net_gate::{self, SPEC_NET_GATE};
 pub const MAX_PIXELS: usize = 64_000_000;
 /// Width and height of the picture that the network sees.
 pub const WORKING_SIDE: usize = 256;
-/// By how much normals are tilted further before light is fitted to them: the network's are a little flatter than the true ones.
+/// The factor that tilts normals before light is fitted to them: the network's are slightly flatter than the true ones.
 /// Measured on synthetic objects (docs/results/decomposition.md).
 const TILT: f32 = 1.1;
 
@@ -86,13 +86,13 @@ pub struct Decomposition {
     /// The highlight H, grey; 0 where none was separated.
     pub highlight: Planes<1>,
     /// Per pixel, which part of its darkness is expected to be paint, 0..=1: near 1 print, near 0 shadow, in between where
-    /// the network cannot tell. None where it was not asked for, and of weights without that head.
+    /// the network cannot tell. `None` if it was not asked for, and of weights without that head.
     pub paint: Option<Planes<1>>,
-    /// The light of order 2 around the object, by its shading and by what the network says of it: grey, as the
+    /// The light of order 2 around the object, from its shading and the network's prediction: grey, as the
     /// shading is. The colour of the light is part of the albedo.
     pub light: ShLight,
-    /// The light of order 2 whose irradiance on the normals is nearest to the shading, whatever the network says. Its side is
-    /// less sure, but it holds what of the light reaches the object: relighting begins with it.
+    /// The light of order 2 whose irradiance on the normals is nearest to the shading, without the network's prediction. Its
+    /// direction is less certain, but it has the light that reaches the object: relighting starts from it.
     pub shading_light: ShLight,
     /// The gloss of the whole object, where a highlight was separated and [`Self::shading_light`] explains it.
     pub gloss: Option<FittedGloss>,
@@ -126,7 +126,7 @@ pub struct Decomposition {
 /// ```
 pub struct Decomposer {
     scales: Scales,
-    /// Whether the network tells paint from shadow.
+    /// Whether the network separates paint from shadow.
     tells_paint: bool,
     normals: Option<OtherNormals>,
 }
@@ -144,7 +144,7 @@ impl Decomposer {
     /// The network with these weights, for pictures of [`WORKING_SIDE`].
     ///
     /// # Errors
-    /// Where the weights are not this network's.
+    /// If the weights are not this network's.
     pub fn new(weights: &Weights) -> Result<Self, DecomposeError> {
         Self::with_side(weights, WORKING_SIDE)
     }
@@ -152,7 +152,7 @@ impl Decomposer {
     /// The network with these weights, for pictures of `side` x `side` pixels, a multiple of 32.
     ///
     /// # Errors
-    /// Where the weights are not this network's, or it cannot take such pictures.
+    /// If the weights are not this network's, or it cannot take such pictures.
     pub fn with_side(weights: &Weights, side: usize) -> Result<Self, DecomposeError> {
         let graph = decomposer_of(weights);
         let net = |weights: &Weights, side: usize| -> Result<Box<dyn MapsNet>, NetError> {
@@ -191,10 +191,10 @@ impl Decomposer {
     /// MoGe-2's and Metric3D's published files are known by the names of their inputs and outputs, and used as they are. Any
     /// other takes one picture, 1 x 3 x side x side, (x - 0.5) / 0.5 of the sRGB values x, 0 outside the mask; and answers
     /// with 1 x 3 x side x side, vectors of any length, or with 1 x 2 x side x side, slopes (p, q) of normals (p, q, 1).
-    /// `frame` says which way y points; where it is none, y points as a known network has it, and else up.
+    /// `frame` is the direction of y; by default that of a known network, else up.
     ///
     /// # Errors
-    /// Where it cannot be read or run, or answers something else; then all stays as it was.
+    /// If it cannot be read or run, or has other outputs; then nothing changes.
     #[cfg(feature = "files")]
     pub fn read_normals(
         &mut self,
@@ -206,7 +206,7 @@ impl Decomposer {
         Ok(())
     }
 
-    /// What the other network for normals was taken for, in words; none where there is none.
+    /// The kind of network that [`Self::read_normals`] recognised, in words; `None` if none was read.
     #[must_use]
     pub fn normals_network(&self) -> Option<&'static str> {
         self.normals.as_ref().map(OtherNormals::name)
@@ -222,7 +222,7 @@ impl Decomposer {
     /// of the picture that are negative or no numbers count as black.
     ///
     /// # Errors
-    /// Where the mask has another size or is empty, the picture is black under it or has more than [`MAX_PIXELS`], or the
+    /// If the mask has another size or is empty, the picture is black under it or has more than [`MAX_PIXELS`], or the
     /// network fails.
     pub fn decompose(
         &self,
@@ -356,7 +356,7 @@ impl CutObject {
         })
     }
 
-    /// The part of the pixels under the mask of which all channels have at least so much light.
+    /// The part of the pixels under the mask whose channels all have at least so much light.
     fn saturated(&self, from: f32) -> f64 {
         let [red, green, blue] = self.picture.planes();
         let (mut all, mut full) = (0_u64, 0_u64);
@@ -372,7 +372,7 @@ impl CutObject {
 pub(super) fn check_size(extent: Extent) -> Result<(), DecomposeError> {
     if extent.width.saturating_mul(extent.height) > MAX_PIXELS {
         return Err(DecomposeError::Photo(format!(
-            "the photograph has {} x {} pixels, and at most {MAX_PIXELS} are decomposed: make the photograph smaller",
+            "the photograph has {} x {} pixels; the limit is {MAX_PIXELS}: make it smaller",
             extent.width, extent.height
         )));
     }
@@ -401,7 +401,7 @@ struct FittedLight {
     gloss: Option<FittedGloss>,
 }
 
-/// A value as light: black where it is negative or no number.
+/// A value as light: black if it is negative or NaN.
 fn usable(value: f32) -> f32 {
     if value.is_finite() {
         value.max(0.0)

@@ -1,4 +1,4 @@
-//! What the decomposing network sees of a picture, and what its answer means: the same for training
+//! The decomposing network's input, and the meaning of its output: the same for training
 //! and for use.
 
 use crate::nets::{INPUTS, OUTPUTS};
@@ -38,13 +38,13 @@ pub struct AnsweredMaps {
     pub shading: Planes<1>,
     /// Highlight, grey, in the picture's units.
     pub highlight: Planes<1>,
-    /// How much of the darkness is paint rather than shadow, 0..=1; 0 of a network that does not tell it.
+    /// How much of the darkness is paint rather than shadow, 0..=1; 0 from a network without that head.
     pub paint: Planes<1>,
 }
 
 impl EncodedPicture {
-    /// Encodes a linear picture under a mask (0..=1, in the object from one half). Values that are no numbers
-    /// count as black.
+    /// Encodes a linear picture under a mask (0..=1, in the object from one half). NaN
+    /// counts as black.
     ///
     /// # Panics
     /// Where the mask has another size.

@@ -29,29 +29,29 @@ pub enum DecomposeError {
     #[error("{0}")]
     Photo(String),
     /// There is nothing under the mask.
-    #[error("the mask is empty: it is nowhere at least one half")]
+    #[error("the mask is empty: no pixel is at least one half")]
     EmptyMask,
-    /// There is no light on the object.
-    #[error("the picture is black all over the object: nothing is lit")]
+    /// The object is black.
+    #[error("the object is black: give a brighter photograph, or another mask")]
     Unlit,
     /// A photograph without light.
-    #[error("{} is black all over: there is no object to be seen", path.display())]
+    #[error("{} is completely black: give a brighter photograph", path.display())]
     Black {
         /// The photograph.
         path: PathBuf,
     },
-    /// Nothing says where the object is.
+    /// The object's place is unknown.
     #[error(
-        "{} does not say where the object is: it has no alpha, and its background is not black. \
-         Make a mask with `relit-mask` and give it by --mask, or the rectangle around the object by --rect",
+        "{} does not say where the object is: give a mask with --mask (`relit-mask` makes one), or a rectangle around the \
+         object with --rect",
         path.display()
     )]
     NoMask {
         /// The photograph.
         path: PathBuf,
     },
-    /// A file says of its colours what is not converted.
-    #[error("{} {fault}: convert it to sRGB or EXR, or say by --transfer how to read it", path.display())]
+    /// A file states colours that cannot be converted.
+    #[error("{} {fault}: convert it to sRGB or EXR, or give its encoding with --transfer", path.display())]
     Colour {
         /// The photograph.
         path: PathBuf,
@@ -72,12 +72,12 @@ pub enum DecomposeError {
     /// No light can be fitted.
     #[error("no light can be fitted")]
     Light(#[from] LightError),
-    /// A file or folder is not there, or cannot be used for what is asked.
+    /// A file or folder is missing, or cannot be used for its purpose.
     #[error("{} {fault}", path.display())]
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: String,
     },
 }
@@ -111,8 +111,8 @@ impl From<FolderFault> for DecomposeError {
             FolderFault::Foreign(path, name) => Self::file(
                 &path,
                 format!(
-                    "holds {name}, which is no file of a decomposition: give a folder that is new, empty, or holds an \
-                     earlier decomposition and nothing else"
+                    "holds {name}, which is not part of a decomposition: give a folder that is new, empty, or holds only an \
+                     earlier decomposition"
                 ),
             ),
             FolderFault::NoFolder(path) => Self::file(

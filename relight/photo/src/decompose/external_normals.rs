@@ -51,13 +51,13 @@ impl OtherNormals {
         }
     }
 
-    /// What the network was taken for, in words.
+    /// The kind of network, in words.
     pub(super) fn name(&self) -> &'static str {
         self.convention.name
     }
 
-    /// The normals of a linear picture of the network's size, none outside the mask; `None` where the
-    /// answer is no map of normals.
+    /// The normals of a linear picture of the network's size, none outside the mask; `None` if the
+    /// answer is not a map of normals.
     pub(super) fn run(
         &self,
         picture: &Planes<3>,
@@ -113,7 +113,7 @@ impl OtherNormals {
         (square, [(width - square) / 2, (height - square) / 2])
     }
 
-    /// The vectors of an answer, as large as what the network takes.
+    /// The vectors of an answer, in the size of the network's input.
     fn vectors(&self, shape: &[usize], values: &[f32]) -> Option<Planes<3>> {
         let extent = self.convention.extent;
         let Extent { width, height } = extent;

@@ -21,8 +21,8 @@ pub struct FittedGloss {
     pub residual: f64,
 }
 
-/// The gloss whose highlight in this light is nearest to the one that is given: the best of a few
-/// smoothnesses, each with its s_p by least squares. None where there is no highlight, or none that
+/// The gloss whose highlight in this light is nearest to the given one: the best of a few
+/// smoothnesses, each with its s_p by least squares. `None` without a highlight that
 /// the light explains.
 pub fn fit_gloss(
     light: &ShLight,

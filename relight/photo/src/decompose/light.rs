@@ -1,4 +1,4 @@
-//! The light of a photograph: what the network says of it, and the fit to the shading that begins there.
+//! The light of a photograph: the network's prediction, and the fit to the shading that starts from it.
 
 use crate::nets::LIGHT_OUTPUTS;
 use relight_core::image::{Linear, Rgb};
@@ -7,7 +7,7 @@ use relight_core::render::{cosine_lobe, fit_light_near};
 
 /// Keeps the light from behind, which normals hardly show, small: see [`fit_light_near`].
 const STIFFNESS: f64 = 1e-3;
-/// The same towards what the network says. Chosen on synthetic objects: a stiffer fit finds the light's side a little better
+/// The same towards the network's prediction. Chosen on synthetic objects: a stiffer fit finds the light's side a little better
 /// and explains the shading less (docs/results/decomposition.md).
 const STIFFNESS_TO_PREDICTION: f64 = 1e-2;
 /// Longest band 1 of a light, in parts of its mean. A single lamp has √3; far above it, the fit follows cast shadows to
@@ -18,13 +18,13 @@ const STIFFER_FITS: usize = 8;
 /// The coefficients that change sign in the mirror image, left and right: those that are odd in x.
 const ODD_IN_X: [usize; 3] = [3, 4, 7];
 
-/// The coefficients of order 2 of grey irradiance, where nothing is in the light's way, in units of the mean shading of an
-/// object: what the network's head for light answers.
+/// The output of the network's head for light: coefficients of order 2 of the unblocked grey irradiance, in units of the mean
+/// shading of the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedLight([f64; LIGHT_OUTPUTS]);
 
 impl PredictedLight {
-    /// What the network answers; none where these are not so many numbers.
+    /// From the network's output; `None` if it has another length.
     pub(super) fn from_output(answer: &[f32]) -> Option<Self> {
         let numbers: [f32; LIGHT_OUTPUTS] = answer.try_into().ok()?;
         let is_light = numbers.iter().all(|value| value.is_finite());
@@ -70,8 +70,8 @@ impl PredictedLight {
     }
 }
 
-/// The light of a shading, grey and of mean 1: the nearest one by least squares, drawn to what the network says where it says
-/// something, as stiff as it has to be to be one that there can be.
+/// The light of a shading, grey and of mean 1: the nearest one by least squares, regularised towards the network's
+/// prediction, if it gives one. The stiffness grows while the light is too one-sided to exist.
 pub(super) fn light_of_shading(
     normals: &Normals<YUp>,
     shading: &Rgb<Linear>,
@@ -94,7 +94,7 @@ pub(super) fn light_of_shading(
     Ok(light)
 }
 
-/// Whether band 1 is longer than that of any light; it is grey, so that one channel says it.
+/// Whether band 1 is longer than that of any light; it is grey, so one channel suffices.
 fn is_too_one_sided(light: &ShLight) -> bool {
     let [mean, a, b, c] = [0, 1, 2, 3].map(|at: usize| light.coefficients()[at][1]);
     (a * a + b * b + c * c).sqrt() > MAX_ONE_SIDED * mean

@@ -1,4 +1,4 @@
-//! Where the object is: what a photograph, a file or a rectangle says of it.
+//! The object's mask: from a photograph, a file or a rectangle.
 
 use super::crop::inside;
 use relight_core::image::{Extent, Planes, beside};
@@ -6,10 +6,10 @@ use relit_data::geometry::Rect;
 
 /// Encoded values up to this count as nearly black: 12 of 255.
 pub(super) const NEARLY_BLACK: f32 = 12.5 / 255.0;
-/// The part of the photograph's edge that is black where its background is.
+/// The least black part of the photograph's edge for a black background.
 const BLACK_EDGE: f64 = 0.95;
 
-/// What said where the object is.
+/// The source of the mask.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MaskSource {
@@ -70,8 +70,8 @@ fn binary(mask: Planes<1>) -> Planes<1> {
     mask.map(|value| f32::from(u8::from(value >= 0.5)))
 }
 
-/// The largest part of the photograph that is not black, with the dark places in it. Values that are no numbers
-/// are black.
+/// The largest part of the photograph that is not black, with the dark places in it. NaN
+/// is black.
 fn before_black(encoded: &Planes<3>) -> Result<Planes<1>, NoObject> {
     let extent = encoded.extent();
     let [red, green, blue] = encoded.planes();

@@ -57,7 +57,7 @@ impl MapsNet for Engine {
 /// log shading, highlight, paint.
 pub(super) type Fields = Planes<9>;
 
-/// What the network says of a picture.
+/// The network's output for a picture.
 pub(super) struct Look {
     pub(super) fields: Fields,
     pub(super) light: Option<PredictedLight>,
@@ -83,7 +83,7 @@ const SHAPE_OF_LAYERS: f32 = 0.8;
 /// Keeps logarithms of dark values finite.
 const DARKEST: f32 = 1e-4;
 
-/// What is said of a picture of the network's size; with `mirror`, the mean of that and of what is said of its mirror image.
+/// The answer for a picture of the network's size; with `mirror`, averaged with the answer for its mirror image.
 pub(super) fn look(
     net: &dyn MapsNet,
     picture: &Planes<3>,
@@ -183,7 +183,7 @@ fn without_gaps(normals: Normals<YUp>, mask: &[bool]) -> Normals<YUp> {
     }
 }
 
-/// The fields of a mirror image as those of the picture: a normal's x points the other way.
+/// The fields of a mirror image as those of the picture: a normal's x changes its sign.
 fn turned_back(fields: Fields) -> Fields {
     let mut fields = fields.mirrored();
     for value in &mut *fields.planes_mut()[0] {
@@ -206,7 +206,7 @@ pub(super) struct Whole {
     pub(super) picture: Planes<3>,
     pub(super) mask: Planes<1>,
     pub(super) fields: Fields,
-    /// As it was said at the coarse scale, which is that of the training.
+    /// The prediction at the coarse scale, the scale of the training.
     pub(super) light: Option<PredictedLight>,
 }
 

@@ -24,13 +24,13 @@ pub struct Photo {
     pub mask_source: MaskSource,
     /// What a person may want to know of the mask's file, after "the mask".
     pub mask_note: Option<String>,
-    /// The alpha that its file has, 0 to 1, as it stands there.
+    /// The file's alpha, 0 to 1.
     pub alpha: Option<Planes<1>>,
     saturated_from: f32,
     saturated_fraction: Option<f64>,
 }
 
-/// What is known of a photograph beside its file.
+/// What is known about a photograph besides its file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PhotoHints<'a> {
     /// A picture of the mask, and how errors name it.
@@ -46,7 +46,7 @@ impl Photo {
     /// black background, or the rectangle. Errors name it as `path`, and its stem is the photograph's name.
     ///
     /// # Errors
-    /// Where it is no picture, too large or encoded in an unknown way, or nothing says where the object is.
+    /// If it is not a picture, is too large or encoded in an unknown way, or does not show where the object is.
     pub fn from_bytes(
         path: &Path,
         bytes: &[u8],
@@ -66,7 +66,7 @@ impl Photo {
     /// The same of a picture in memory, called `path`.
     ///
     /// # Errors
-    /// Where it is too large, or nothing says where the object is.
+    /// If it is too large, or the object's place is unknown.
     pub fn from_image(
         path: &Path,
         image: ColourImage,
@@ -108,10 +108,10 @@ impl Photo {
         })
     }
 
-    /// A frame of a data set, which has its mask and what is known of its saturation.
+    /// A frame of a data set, with its mask and its saturation.
     ///
     /// # Errors
-    /// Where the mask is empty.
+    /// If the mask is empty.
     pub fn from_frame(
         name: String,
         picture: Rgb<Linear>,
@@ -131,7 +131,7 @@ impl Photo {
         })
     }
 
-    /// The photograph with a longest side of at most so many pixels.
+    /// The photograph, reduced to a longest side.
     #[must_use]
     pub fn at_most(mut self, longest: usize) -> Self {
         let Extent { width, height } = self.picture.planes().extent();
@@ -164,15 +164,15 @@ pub(crate) fn stem(path: &Path) -> String {
     stem.to_string_lossy().into_owned()
 }
 
-/// The size that a file says it has; none where it cannot be read.
+/// The size that a file states; `None` if it cannot be read.
 #[must_use]
 pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
     let (width, height) = relit_data::still::stored_size(bytes)?;
     Some(Extent::new(width as usize, height as usize))
 }
 
-/// That a mask has the photograph's size. One of a photograph that was not turned as its Exif orientation says is told from
-/// any other.
+/// Checks that a mask has the photograph's size. A mask of the photograph before its Exif orientation was applied gets its own
+/// message.
 fn check_extent(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), DecomposeError> {
     let is_turned = found == Extent::new(expected.height, expected.width) && found != expected;
     // Exif's orientations from 5 on swap the sides.
@@ -180,8 +180,8 @@ fn check_extent(found: Extent, expected: Extent, bytes: &[u8]) -> Result<(), Dec
         relit_data::still::orientation(bytes).map(relit_data::still::Orientation::to_exif);
     if is_turned && orientation.is_some_and(|number| number >= 5) {
         return Err(DecomposeError::Photo(format!(
-            "the mask has {} x {} pixels as the photograph is stored, which is displayed turned to {} x {}: make the mask again \
-             with this version's relit-mask, or turn it",
+            "the mask has {} x {} pixels, as stored; the photograph is displayed rotated, {} x {}: rotate the mask, or make \
+             it again with relit-mask",
             found.width, found.height, expected.width, expected.height
         )));
     }
@@ -199,8 +199,8 @@ fn check_mask(mask: &Planes<1>, rectangle: Option<Rect>) -> Result<(), Decompose
     Err(DecomposeError::Photo(
         if rectangle.clipped_to(width, height).is_some() {
             format!(
-                "in the rectangle {rectangle} there is nothing of the object: by the photograph's alpha or black \
-             background it lies elsewhere"
+                "the rectangle {rectangle} contains nothing of the object: the photograph's alpha or black background places \
+                 it elsewhere"
             )
         } else {
             format!(

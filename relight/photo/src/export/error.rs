@@ -1,4 +1,4 @@
-//! What can be wrong with an export.
+//! Errors of an export.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ pub enum ExportError {
     Source {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: String,
     },
     /// The object covers no pixel.

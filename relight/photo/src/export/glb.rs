@@ -37,7 +37,7 @@ const BLEED: usize = 4;
 /// The content of a GLB file: the object on this mesh. The longer side of the picture is a metre long.
 ///
 /// # Errors
-/// Where a map cannot be encoded, or the file would be too large.
+/// If a map cannot be encoded, or the file would be too large.
 pub fn to_glb(object: &CapturedObject, mesh: &ObjectMesh) -> Result<Vec<u8>, ExportError> {
     let mut parts = Parts::default();
     let positions = &mesh.positions;
@@ -102,8 +102,7 @@ fn packed(mut json: Vec<u8>, mut binary: Vec<u8>) -> Result<Vec<u8>, ExportError
     json.resize(json.len().next_multiple_of(4), b' ');
     binary.resize(binary.len().next_multiple_of(4), 0);
     let length = 12 + 8 + json.len() + 8 + binary.len();
-    let too_large =
-        |_| ExportError::Encode(format!("{length} bytes are more than the 4 GiB of a GLB"));
+    let too_large = |_| ExportError::Encode(format!("{length} bytes exceed the 4 GiB of a GLB"));
     let whole = u32::try_from(length).map_err(too_large)?;
     let mut file = Vec::with_capacity(length);
     for word in [MAGIC, VERSION, whole, json.len() as u32, JSON] {
@@ -225,7 +224,7 @@ fn colours(object: &CapturedObject) -> Result<Vec<u8>, ExportError> {
     Ok(png)
 }
 
-/// Normals as glTF has them, which is as we have them; towards the viewer where there is no surface.
+/// Normals in glTF's frame, which is ours; towards the viewer outside the object.
 fn normal_map(object: &CapturedObject) -> Result<Vec<u8>, ExportError> {
     let normals = object.surface().normals();
     let all = vec![true; normals.extent().pixels()];

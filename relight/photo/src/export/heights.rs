@@ -9,7 +9,7 @@ use crate::relighting::HeightSolver;
 
 /// Normals that face the viewer less than this count as if they did so much: the rim is as steep as can be seen.
 const MIN_FACING: f32 = 0.12;
-/// Rounds of the solver for each pixel of the longer side: what is left of the residual is e^-17.
+/// Rounds of the solver for each pixel of the longer side: they reduce the residual to e^-17.
 const ROUNDS: usize = 4;
 
 /// The heights towards the viewer, in pixels, of the pixels inside; 0 elsewhere. Differences from pixel to pixel are

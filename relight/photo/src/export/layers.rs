@@ -21,7 +21,7 @@ const MAX_SIDE: usize = 512;
 /// The content of the file.
 ///
 /// # Errors
-/// Where it cannot be encoded.
+/// If it cannot be encoded.
 pub fn to_layers(object: &CapturedObject) -> Result<Vec<u8>, ExportError> {
     let surface = object.surface();
     let alpha = object.alpha().plane(0);

@@ -22,7 +22,7 @@ impl ObjectMesh {
     /// The integrated normals of an object, with so many vertices on the longer side of the picture, at least 2.
     ///
     /// # Errors
-    /// [`ExportError::Empty`] where the object is nowhere.
+    /// [`ExportError::Empty`] if the object is nowhere.
     pub fn relief(object: &CapturedObject, vertices: usize) -> Result<Self, ExportError> {
         if object.alpha().plane(0).iter().all(|&alpha| alpha < 0.5) {
             return Err(ExportError::Empty);

@@ -15,7 +15,7 @@ use super::ExportError;
 /// The figures of a decomposition, and those of a turn.
 const FIGURES: [&str; 2] = ["decomposition.json", "turn.json"];
 
-/// What the figures say that the maps do not.
+/// The figures that the maps do not have.
 #[derive(Deserialize)]
 struct MapFigures {
     white: MapWhites,
@@ -40,7 +40,7 @@ struct EvenGloss {
 /// Reads an object: a file `*.relit`, or a folder with `object.relit` or with the maps of a decomposition or a turn.
 ///
 /// # Errors
-/// Where it holds no object, or where a file cannot be read.
+/// If it holds no object, or if a file cannot be read.
 pub fn read_object(path: &Path) -> Result<CapturedObject, ExportError> {
     if !path.exists() {
         return Err(ExportError::Missing(path.to_owned()));
@@ -70,7 +70,7 @@ fn read_maps(folder: &Path, figures: &str) -> Result<CapturedObject, ExportError
         serde_json::from_slice(&json).map_err(|error| wrong(error.to_string()))?;
     let white = figures.white.albedo;
     if !(white.is_finite() && white >= 0.0) {
-        return Err(wrong("white.albedo is no number from 0 up".to_owned()));
+        return Err(wrong("white.albedo is not a number from 0 up".to_owned()));
     }
     let (mask, _) = read_planes(&folder.join("mask.png"))?;
     let alpha = Planes::from_planes(mask.extent(), [mask.plane(0).to_vec()])?;

@@ -25,7 +25,7 @@ pub enum BackgroundFile {
 }
 
 impl BackgroundFile {
-    /// How the colours of a video are converted to sRGB, in words; none where they are taken as sRGB.
+    /// The conversion of a video's colours to sRGB, in words; `None` if they are read as sRGB.
     #[must_use]
     pub fn colour_conversion(&self) -> Option<String> {
         match self {
@@ -37,7 +37,7 @@ impl BackgroundFile {
     /// Reads the background of a scene: a video, an HDR or EXR file twice as wide as high as a panorama, or a photograph.
     ///
     /// # Errors
-    /// Where it cannot be read, or has values that are no light.
+    /// If it cannot be read, or has a value that is negative or not finite.
     pub fn read(path: &Path, scene: &SceneDescription) -> Result<Self, InsertError> {
         if has_extension(path, &VIDEO_EXTENSIONS) {
             let movie = MovieReader::open(path, FrameTiming::Even)?;
@@ -52,7 +52,7 @@ impl BackgroundFile {
         Self::from_picture(path, picture)
     }
 
-    /// A panorama, of which the scene shows a part.
+    /// A panorama; the scene shows part of it.
     #[must_use]
     pub fn from_panorama(panorama: Panorama, scene: &SceneDescription) -> Self {
         let view = PanoramaView::new(scene.panorama_extent(), scene.fov, scene.down);
@@ -62,7 +62,7 @@ impl BackgroundFile {
     /// A photograph, which errors name as `path`.
     ///
     /// # Errors
-    /// Where it has values that are no light.
+    /// If it has a value that is negative or not finite.
     pub fn from_picture(path: &Path, picture: Rgb<Linear>) -> Result<Self, InsertError> {
         let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
         if !picture.planes().planes().into_iter().all(is_light) {

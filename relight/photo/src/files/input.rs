@@ -31,7 +31,7 @@ pub struct PhotoReading {
 }
 
 impl PhotoReading {
-    /// The mask of a photograph of this name: the file that is given itself, or the photograph's in the folder that is given.
+    /// The mask of a photograph of this name: the given file, or the photograph's in the given folder.
     #[must_use]
     pub fn mask_path(given: &Path, name: &str) -> PathBuf {
         if given.is_dir() {
@@ -60,7 +60,7 @@ pub struct FoundPhotos {
     pub unused: Vec<UnusedFile>,
 }
 
-/// A file of a folder of photographs that is none of those that are read.
+/// A file in a folder of photographs that is not read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnusedFile {
     /// The file.
@@ -81,7 +81,7 @@ impl PhotoInput {
     /// turn the first `most`.
     ///
     /// # Errors
-    /// Where a folder cannot be read or holds none, a shard cannot be opened, or two photographs would
+    /// If a folder cannot be read or holds none, a shard cannot be opened, or two photographs would
     /// be written to one folder.
     pub fn find(paths: &[PathBuf], most: Option<u32>) -> Result<FoundPhotos, DecomposeError> {
         let (mut found, mut unused) = (Vec::new(), Vec::new());
@@ -117,12 +117,12 @@ impl PhotoInput {
     /// are, also where a file system ignores case.
     ///
     /// # Errors
-    /// [`DecomposeError::Names`], or where the folder cannot be listed.
+    /// [`DecomposeError::Names`], or if the folder cannot be listed.
     pub fn check_result(path: &Path) -> Result<(), DecomposeError> {
         match alike_beside(path).map_err(DecomposeError::read(path))? {
             None => Ok(()),
             Some(other) => Err(DecomposeError::Names(format!(
-                "{} would replace {} where a file system ignores case: rename the photograph, or give another folder by \
+                "{} would replace {} where a file system ignores case: rename the photograph, or give another folder with \
                  --output",
                 path.display(),
                 path.with_file_name(other).display()
@@ -146,7 +146,7 @@ impl PhotoInput {
     /// black background, or the rectangle. A frame of a shard has its own.
     ///
     /// # Errors
-    /// Where a file cannot be read or does not fit, or nothing says where the object is.
+    /// If a file cannot be read or does not fit, or the object's place is unknown.
     pub fn load(&self, reading: &PhotoReading) -> Result<Photo, DecomposeError> {
         match self {
             Self::File(path) => read_file(path, reading),
@@ -155,7 +155,7 @@ impl PhotoInput {
     }
 }
 
-/// Photographs, each with the path under which it was found: its own, or that of its data set.
+/// Photographs, each with its path, or that of its data set.
 type Found = Vec<(PathBuf, PhotoInput)>;
 
 fn add_folder(
@@ -176,7 +176,7 @@ fn add_folder(
         if path.is_file() {
             files.push(path);
         } else if !has_frames && holds_pictures(&path) {
-            let what = "is not used: it is a folder within; give it by its name";
+            let what = "is not used: it is a subfolder; name it as a photograph folder of its own";
             unused.push(UnusedFile::new(path, what));
         }
     }
@@ -214,8 +214,8 @@ fn holds_pictures(folder: &Path) -> bool {
     !folder.join(FIGURES).exists() && entries.map(|entry| entry.path()).any(is_picture)
 }
 
-/// Why a file of a folder is left out; none where it is taken for a photograph: by its content, or by a name that
-/// promises one, so that reading it says what is wrong.
+/// Why a file of a folder is left out; `None` if it counts as a photograph: by its content, or by a name that
+/// promises one, so that reading it reports the fault.
 fn use_of(path: PathBuf) -> Option<UnusedFile> {
     let mut head = Vec::new();
     let file = fs::File::open(&path);
@@ -243,7 +243,7 @@ fn add_turns(found: &mut Found, path: &Path, most: Option<u32>) -> Result<(), De
     Ok(())
 }
 
-/// Whether every file and every turn has a folder of its own for its results, also where a file system ignores case.
+/// Checks that every file and every turn has its own folder for results, also if a file system ignores case.
 fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
     let mut names = BTreeMap::new();
     let mut last_turn = None;
@@ -261,8 +261,8 @@ fn check_names(inputs: &Found) -> Result<(), DecomposeError> {
         let Some(name) = name else { continue };
         if let Some(first) = names.insert(folded(&name), path) {
             return Err(DecomposeError::Names(format!(
-                "{} and {} would both be written to {name}, at least where a file system ignores case: rename one, or give \
-                 them different folders by --output, one after the other",
+                "{} and {} would both be written to {name} (case is ignored): rename one, or decompose them in two runs with \
+                 different --output",
                 first.display(),
                 path.display()
             )));
@@ -306,7 +306,7 @@ fn mask_file(given: &Path, name: &str) -> Result<PathBuf, DecomposeError> {
         Ok(path)
     } else {
         Err(DecomposeError::Photo(format!(
-            "there is no mask {}, which belongs to the photograph",
+            "the photograph's mask {} is missing",
             path.display()
         )))
     }

@@ -52,16 +52,16 @@ pub struct InsertionOutput<'a> {
 }
 
 impl InsertSource {
-    /// Reads what a scene says of an object; its paths are relative to `folder`.
+    /// Reads an object of a scene; its paths are relative to `folder`.
     ///
     /// # Errors
-    /// Where a file cannot be read, or a captured object is given a mask.
+    /// If a file cannot be read, or a captured object is given a mask.
     pub fn read(object: &ObjectDescription, folder: &Path) -> Result<Self, InsertError> {
         let path = folder.join(&object.photo);
         if CapturedObject::is_named(&path) {
             if object.mask.is_some() {
                 return Err(InsertError::Input(format!(
-                    "{}: it has its own mask, give none",
+                    "{} has its own mask: do not give one",
                     path.display()
                 )));
             }
@@ -81,7 +81,7 @@ impl<'a> Insertion<'a> {
     /// Everything but the objects: the first frame of a video is read, and the light, where the scene names one in files.
     ///
     /// # Errors
-    /// Where a file cannot be read, or there is no light.
+    /// If a file cannot be read, or the light is dark.
     pub fn new(
         scene: &SceneDescription,
         mut background: BackgroundFile,
@@ -95,10 +95,10 @@ impl<'a> Insertion<'a> {
         Self::before(scene, (background, first), light, decomposer, options)
     }
 
-    /// The same in a light that is given, whatever the scene names, or else in the background's.
+    /// The same in a given light, which replaces that of the scene, or else in the background's.
     ///
     /// # Errors
-    /// Where the first frame of a video cannot be read, or there is no light.
+    /// If the first frame of a video cannot be read, or the light is dark.
     pub fn in_light(
         scene: &SceneDescription,
         mut background: BackgroundFile,
@@ -138,7 +138,7 @@ impl<'a> Insertion<'a> {
     /// An object, decomposed no larger than it has to be.
     ///
     /// # Errors
-    /// Where it cannot be decomposed.
+    /// If it cannot be decomposed.
     pub fn subject(
         &self,
         object: &ObjectDescription,
@@ -153,7 +153,7 @@ impl<'a> Insertion<'a> {
         })
     }
 
-    /// How many frames are written; none where the background has as many as it has.
+    /// How many frames are written; `None` if the background has as many as it has.
     #[must_use]
     pub fn frames(&self, output: &InsertionOutput<'_>) -> Option<u32> {
         match (OutputKind::from_path(output.path), &self.background) {
@@ -166,7 +166,7 @@ impl<'a> Insertion<'a> {
     /// Writes the picture or the video; how many frames it has. `written` is called after each.
     ///
     /// # Errors
-    /// Where a frame cannot be read, composed or written.
+    /// If a frame cannot be read, composed or written.
     pub fn write(
         &mut self,
         scene: &InsertScene<'_>,
@@ -206,7 +206,7 @@ impl<'a> Insertion<'a> {
         }
     }
 
-    /// A video whose frames have the objects before them, which do not move.
+    /// A video with still objects before its frames.
     fn film_over(
         &mut self,
         scene: &InsertScene<'_>,
@@ -269,7 +269,7 @@ fn first_of(background: &mut BackgroundFile) -> Result<Option<Rgb<Linear>>, Inse
     }
 }
 
-/// What of a background stands still.
+/// The still part of a background.
 fn still_of<'a>(
     background: &'a BackgroundFile,
     first: Option<&'a Rgb<Linear>>,
@@ -307,7 +307,7 @@ fn given_light(
     };
     let SceneBackground::Picture(picture) = background else {
         return Err(InsertError::Input(
-            "light.object: a panorama shows its light itself; give a photograph or a video"
+            "light.object needs a photograph or a video as the background, not a panorama"
                 .to_owned(),
         ));
     };

@@ -17,7 +17,7 @@ impl LightSource {
     /// Reads a text file of coefficients (`.txt`), or else a panorama.
     ///
     /// # Errors
-    /// Where the file cannot be read or holds no light.
+    /// If the file cannot be read or holds no light.
     pub fn read(path: &Path) -> Result<Self, InsertError> {
         Ok(if Self::is_text(path) {
             Self::Coefficients(ShLight::read(path)?)

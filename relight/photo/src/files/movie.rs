@@ -18,7 +18,7 @@ use crate::relighting::InsertError;
 
 /// The colours of what is written, as a filter.
 const COLOURS: &str = "setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1";
-/// How many frames each thread computes before they are encoded.
+/// The number of frames that each thread computes before they are encoded.
 const FRAMES_A_THREAD: u32 = 2;
 
 /// What a video file is encoded as.
@@ -35,14 +35,14 @@ pub enum MovieFormat {
 #[non_exhaustive]
 pub enum MovieError {
     /// The program is not there.
-    #[error("a video needs the program ffmpeg, which cannot be started: install it")]
+    #[error("ffmpeg, which videos need, cannot be started: install it")]
     NoProgram(#[source] io::Error),
     /// A video cannot be written or read.
     #[error("{} {fault}", path.display())]
     File {
         /// The video.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         fault: String,
     },
 }
@@ -135,7 +135,7 @@ impl MovieWriter {
     /// Whether `ffmpeg` can be started.
     ///
     /// # Errors
-    /// [`MovieError::NoProgram`] where it cannot.
+    /// [`MovieError::NoProgram`] if it cannot.
     pub fn check() -> Result<(), MovieError> {
         Command::new("ffmpeg")
             .arg("-version")
@@ -148,10 +148,10 @@ impl MovieWriter {
     }
 
     /// Starts `ffmpeg` for frames of one size. The last line of an odd width or height is shown twice, since
-    /// both formats halve the resolution of colours. The folder is made where there is none.
+    /// both formats halve the resolution of colours. A missing folder is made.
     ///
     /// # Errors
-    /// Where the program cannot be started, or the folder not be made.
+    /// If the program cannot be started, or the folder not be made.
     pub fn create(
         path: &Path,
         format: MovieFormat,
@@ -190,11 +190,11 @@ impl MovieWriter {
         })
     }
 
-    /// Writes a video of `count` frames. Some are computed side by side; they are encoded in order, and `written` is
+    /// Writes a video of `count` frames. Some are computed in parallel; they are encoded in order, and `written` is
     /// called after each.
     ///
     /// # Errors
-    /// Where a frame cannot be computed, or the video not be written. There is no video of no frames.
+    /// If a frame cannot be computed, the video cannot be written, or `count` is 0.
     pub fn write_frames<E: From<MovieError> + Send>(
         path: &Path,
         (format, frames_per_second): (MovieFormat, u32),
@@ -223,7 +223,7 @@ impl MovieWriter {
     /// Adds a frame; values beyond 0 to 1 are clipped.
     ///
     /// # Errors
-    /// Where it has another size, or the program has ended.
+    /// If it has another size, or the program has ended.
     pub fn push(&mut self, frame: &Rgb<Srgb>) -> Result<(), MovieError> {
         let found = frame.planes().extent();
         if found != self.extent {
@@ -245,7 +245,7 @@ impl MovieWriter {
     /// Waits for the program and gives the file its name.
     ///
     /// # Errors
-    /// Where the program failed, or the file cannot be given its name.
+    /// If the program failed, or the file cannot be given its name.
     pub fn finish(mut self) -> Result<(), MovieError> {
         drop(self.program.stdin.take());
         let is_done = self.program.wait().is_ok_and(|status| status.success());
@@ -337,8 +337,8 @@ fn partial_name(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// What is said of a program that said nothing.
-pub(super) const SILENT: &str = "it ended without a word";
+/// The reason for a program that printed none.
+pub(super) const SILENT: &str = "it ended without a message";
 
 /// Reads all that a program writes, and keeps its last line.
 pub(super) fn last_line(mut pipe: ChildStderr) -> Option<String> {

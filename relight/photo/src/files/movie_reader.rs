@@ -18,7 +18,7 @@ const MAX_PIXELS: usize = 1 << 26;
 const STREAM: &str = "V:0";
 /// Pixels that are not square are stretched to squares; FFmpeg has turned the frame already.
 const SQUARE_PIXELS: &str = "scale='max(1,round(iw*max(1,sar)))':'max(1,round(ih/min(1,sar)))'";
-/// Videos with more rows have the matrix of BT.709 where they state none, as players take it.
+/// Videos with more rows have the matrix of BT.709 by default, as in players.
 const MAX_SD_ROWS: usize = 576;
 
 /// Which frames of a video are read.
@@ -26,7 +26,7 @@ const MAX_SD_ROWS: usize = 576;
 pub enum FrameTiming {
     /// Each once, whenever it is shown.
     Each,
-    /// What is seen at even intervals, by the video's frame rate.
+    /// Frames at even intervals, by the video's frame rate.
     Even,
 }
 
@@ -46,7 +46,7 @@ impl MovieReader {
     /// Starts `ffmpeg` for a file.
     ///
     /// # Errors
-    /// Where a program cannot be started, the file is no video, or its colours cannot be converted.
+    /// If a program cannot be started, the file is not a video, or its colours cannot be converted.
     pub fn open(path: &Path, timing: FrameTiming) -> Result<Self, MovieError> {
         let facts = Facts::probe(path)?;
         let frame_rate = facts
@@ -113,7 +113,7 @@ impl MovieReader {
         self.frame_rate
     }
 
-    /// How its colours are converted to sRGB, in words; none where they are taken as sRGB.
+    /// The conversion of its colours to sRGB, in words; `None` if they are read as sRGB.
     #[must_use]
     pub fn colour_conversion(&self) -> Option<String> {
         self.wide.as_ref().map(|wide| wide.to_srgb.to_string())
@@ -122,7 +122,7 @@ impl MovieReader {
     /// The next frame; none after the last.
     ///
     /// # Errors
-    /// Where the program fails, or the file ends in the middle of a frame.
+    /// If the program fails, or the file ends in the middle of a frame.
     pub fn frame(&mut self) -> Result<Option<Rgb<Srgb>>, MovieError> {
         let Some(pipe) = &mut self.program.stdout else {
             return Ok(None);
@@ -240,7 +240,7 @@ fn unread(path: &Path, output: &Output) -> MovieError {
     )
 }
 
-/// What `ffprobe` says of a video and its first frame.
+/// The output of `ffprobe` for a video and its first frame.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct Facts {

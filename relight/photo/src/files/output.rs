@@ -46,11 +46,11 @@ impl OutputKind {
     }
 }
 
-/// Writes a picture: linear into an EXR, encoded into a JPEG, and with 8 bits into any other file, a PNG. The folder is made
-/// where there is none.
+/// Writes a picture: linear into an EXR, encoded into a JPEG, and with 8 bits into any other file, a PNG. A missing folder
+/// is made.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write_picture(path: &Path, picture: &Rgb<Linear>) -> Result<(), ImageError> {
     match OutputKind::from_path(path) {
         Some(OutputKind::Exr) => picture.write_exr(path),

@@ -1,4 +1,4 @@
-//! What is written of a decomposition: a folder that appears when it is whole.
+//! The files of a decomposition: a folder that appears when it is complete.
 
 use std::path::Path;
 
@@ -37,7 +37,7 @@ const RESULTS: ResultFolder = ResultFolder {
     marker: FIGURES,
     holds: |name| FILES.contains(&name),
 };
-/// What it says it is.
+/// Its schema.
 const SCHEMA: &str = "relight.decomposition/1";
 /// Width and height of the lit ball, and of the pictures of the sheet, pixels.
 const TILE: usize = 256;
@@ -99,7 +99,7 @@ struct FigureLight {
     residual: f64,
 }
 
-/// A decomposition together with what it was made of, ready to be written.
+/// A decomposition with its inputs, ready to be written.
 #[derive(Debug, Clone, Copy)]
 pub struct DecompositionFiles<'a> {
     /// The photograph.
@@ -113,20 +113,20 @@ pub struct DecompositionFiles<'a> {
 }
 
 impl DecompositionFiles<'_> {
-    /// Writes all files into the folder `out`, which appears when they are there. An earlier
+    /// Writes all files into the folder `out`, which appears when they are complete. An earlier
     /// decomposition in it is replaced.
     ///
     /// # Errors
-    /// As [`Self::check`], or where a file cannot be written: then the folder is as it was.
+    /// As [`Self::check`], or if a file cannot be written: then the folder is as it was.
     pub fn write(&self, out: &Path) -> Result<DecompositionFigures, DecomposeError> {
         RESULTS.write(out, |folder| self.write_files(folder))
     }
 
-    /// Whether a decomposition may be written to the folder `out`: it is not there, empty, or holds the files of an
+    /// Whether a decomposition may be written to the folder `out`: it is missing, empty, or holds the files of an
     /// earlier decomposition and nothing else.
     ///
     /// # Errors
-    /// Where it holds something else or is no folder, or cannot be read.
+    /// If it holds something else, is not a folder, or cannot be read.
     pub fn check(out: &Path) -> Result<(), DecomposeError> {
         Ok(RESULTS.check(out)?)
     }
@@ -301,7 +301,7 @@ fn write_grey(path: &Path, light: &Planes<1>) -> Result<f32, ImageError> {
     Ok(white)
 }
 
-/// The light that the largest value of a file stands for: 1 where all fits in, so that files can be compared.
+/// The light of the largest value of a file: 1 if everything fits, so that files can be compared.
 fn white_of<const C: usize>(light: &Planes<C>) -> f32 {
     let values = light.planes().into_iter().flatten();
     values.fold(1.0_f32, |a, &b| a.max(b))

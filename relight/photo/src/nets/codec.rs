@@ -21,27 +21,31 @@ impl Weights {
     /// are times the scale of their output channel, which the tensor `NAME.scale` has.
     ///
     /// # Errors
-    /// A sentence that says what is wrong.
+    /// A sentence with the reason.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         if bytes.starts_with(b"PK") {
             return Err(
-                "PyTorch saved it: make a safetensors file of it (docs/guide/photograph.md)"
+                "it is a PyTorch file: convert it to safetensors (docs/guide/photograph.md)"
                     .to_owned(),
             );
         }
         let file = SafeTensors::deserialize(bytes)
-            .map_err(|error| format!("it is no safetensors file ({error})"))?;
+            .map_err(|error| format!("it is not a safetensors file ({error})"))?;
         let views = file.iter();
         let views = views.filter(|(name, _)| !is_of_integers(&file, name));
         views
             .map(|(name, view)| {
-                let mut values = decode(view.dtype(), view.data())
-                    .ok_or_else(|| format!("{name} holds {:?}, which is not read", view.dtype()))?;
+                let mut values = decode(view.dtype(), view.data()).ok_or_else(|| {
+                    format!(
+                        "{name} has the type {:?}, which is not supported",
+                        view.dtype()
+                    )
+                })?;
                 if view.dtype() == Dtype::I8 {
                     scale(&mut values, &file, name)?;
                 }
                 let tensor = Tensor::new(view.shape().to_vec(), values)
-                    .ok_or_else(|| format!("{name} is not as long as its shape says"))?;
+                    .ok_or_else(|| format!("the length of {name} does not match its shape"))?;
                 Ok((name.to_owned(), tensor))
             })
             .collect()
@@ -50,7 +54,7 @@ impl Weights {
     /// The bytes of a safetensors file, with facts about them in its header.
     ///
     /// # Errors
-    /// A sentence: where a value is too large for the precision, or what the format's writer answers.
+    /// A sentence: a value is too large for the precision, or the error of the format's writer.
     pub fn to_safetensors(
         &self,
         precision: WeightPrecision,
@@ -83,7 +87,7 @@ impl Weights {
         for (name, tensor) in self.iter() {
             if let Some(&value) = tensor.values().iter().find(|value| overflows(value)) {
                 return Err(NetError::Weights(format!(
-                    "{name} holds {value}, and half precision ends at 65504: write it in single precision"
+                    "{name} holds {value}, beyond the 65504 of half precision: write it in single precision"
                 )));
             }
         }

@@ -11,7 +11,7 @@
 //! highlight (1, before softplus), and log shading as two: an offset, and the share of the picture's
 //! own log luminance (logit). With [`decomposer_with_heads`] there are two more. `paint`: how much of a pixel's
 //! darkness is paint rather than shadow (1, logit). `light`, a vector of [`LIGHT_OUTPUTS`] numbers: the coefficients of order 2
-//! of the grey irradiance that arrives from all around where nothing is in its way, in units of the mean shading.
+//! of the unblocked grey irradiance from all around, in units of the mean shading.
 
 use super::graph::{Graph, GroupedLayers, Value};
 use super::weights::Weights;
@@ -60,7 +60,7 @@ pub fn decomposer() -> Graph {
     })
 }
 
-/// The same network with a head that tells paint from shadow, and one that tells the light.
+/// The same network with a head that separates paint from shadow, and one that predicts the light.
 #[must_use]
 pub fn decomposer_with_heads() -> Graph {
     build(Heads {
@@ -69,7 +69,7 @@ pub fn decomposer_with_heads() -> Graph {
     })
 }
 
-/// The network that has these weights: with the heads for paint and for light, where they have them.
+/// The network of these weights: with the heads for paint and for light, if they have them.
 #[must_use]
 pub fn decomposer_of(weights: &Weights) -> Graph {
     let have = |prefix: &str| {
@@ -115,7 +115,7 @@ fn build(heads: Heads) -> Graph {
     net
 }
 
-/// From the coarsest features to what they say of the light, wherever in the picture they are.
+/// From the coarsest features to the light, independent of their place in the picture.
 fn light(net: &mut Graph, middle: Value) -> Value {
     let named = |layer: usize| format!("{LIGHT_PARAMETERS}{layer}");
     let value = net.pointwise(named(0), middle, LIGHT_HIDDEN);

@@ -1,4 +1,4 @@
-//! What can go wrong with weights and inference.
+//! Errors of weights and inference.
 
 use std::io;
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NetError {
-    /// Weights that are not the network's, or that it or a file cannot hold.
+    /// Weights of another network, or that do not fit into it or a file.
     #[error("{0}")]
     Weights(String),
     /// A file that cannot be read or written.
@@ -25,7 +25,7 @@ pub enum NetError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: String,
     },
     /// A network that cannot be run, or cannot take such a picture.
@@ -34,7 +34,7 @@ pub enum NetError {
 }
 
 impl NetError {
-    /// That weights lack a parameter.
+    /// Weights lack a parameter.
     #[must_use]
     pub fn missing(net: &str, name: &str) -> Self {
         Self::Weights(format!(

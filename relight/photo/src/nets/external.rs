@@ -19,7 +19,7 @@ pub struct ExternalPart {
     pub length: u64,
 }
 
-/// The bytes of an ONNX file with the values of all its tensors: `read` gives those that stand in other files. None where all
+/// The bytes of an ONNX file with the values of all its tensors: `read` gives those that stand in other files. `None` if all
 /// stand in it already.
 ///
 /// # Errors
@@ -93,11 +93,11 @@ fn part_of(tensor: &TensorProto) -> Result<ExternalPart, String> {
         && expected != given
     {
         return Err(wrong(&format!(
-            "has {given} bytes where its shape has {expected}"
+            "has {given} bytes; its shape needs {expected}"
         )));
     }
     let length = given.or(expected);
-    let length = length.ok_or_else(|| wrong("has a shape or type that is not known"))?;
+    let length = length.ok_or_else(|| wrong("has an unknown shape or type"))?;
     Ok(ExternalPart {
         location: location.value.clone(),
         offset: number("offset")?.unwrap_or(0),
@@ -105,7 +105,7 @@ fn part_of(tensor: &TensorProto) -> Result<ExternalPart, String> {
     })
 }
 
-/// How many bytes the values of a tensor have; none where its shape is none, or its type is not known.
+/// How many bytes the values of a tensor have; `None` if its shape or type is not known.
 fn bytes_of(tensor: &TensorProto) -> Option<u64> {
     let count = tensor.dims.iter().try_fold(1_u64, |count, &side| {
         count.checked_mul(u64::try_from(side).ok()?)

@@ -52,10 +52,10 @@ impl Weights {
     }
 }
 
-/// Reads an ONNX file with all its weights, also those that stand in files beside it.
+/// Reads an ONNX file with all its weights, also those in other files of its folder.
 ///
 /// # Errors
-/// [`NetError::Io`] where it cannot be read, [`NetError::File`] where such a file cannot, or what it says of them is damaged.
+/// [`NetError::Io`] if it cannot be read, [`NetError::File`] if such a file cannot, or what it says of them is damaged.
 pub fn read_onnx(path: &Path) -> Result<Vec<u8>, NetError> {
     let bytes = fs::read(path).map_err(not_read(path))?;
     let merged = with_external_weights(&bytes, |part| read_part(path, part));
@@ -72,7 +72,7 @@ fn read_part(onnx: &Path, part: &ExternalPart) -> Result<Vec<u8>, String> {
     let named = Path::new(&location);
     let wrong = |what: &str| {
         format!(
-            "its weights stand in the file {:?}, which {what}",
+            "its weights are in the file {:?}, which {what}",
             part.location
         )
     };
@@ -80,12 +80,12 @@ fn read_part(onnx: &Path, part: &ExternalPart) -> Result<Vec<u8>, String> {
     let lies_below = parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
         && !location.contains(':');
     if !lies_below || named.file_name().is_none() {
-        return Err(wrong("does not lie in its folder"));
+        return Err(wrong("is outside its folder"));
     }
     let unread = |fault: io::Error| wrong(&format!("cannot be read: {fault}"));
     let path = onnx.with_file_name(named);
     if !path.exists() {
-        return Err(wrong("is not there: put it beside it"));
+        return Err(wrong("is missing: put it into the same folder"));
     }
     let mut file = File::open(&path).map_err(unread)?;
     let metadata = file.metadata().map_err(unread)?;

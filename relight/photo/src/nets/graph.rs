@@ -1,4 +1,4 @@
-//! A network as data: operations in the order in which they are computed.
+//! A network as data: operations in order of computation.
 //!
 //! The tensor model that is trained, the ONNX file and the list of parameters are all made from one
 //! [`Graph`], so they cannot differ. Values have a number of channels and, where they are pictures,
@@ -22,7 +22,7 @@ pub struct Parameter {
     pub name: String,
     /// Its shape; a weight's first number is the outputs.
     pub shape: Vec<usize>,
-    /// What it is for.
+    /// Its purpose.
     pub role: Role,
 }
 
@@ -148,7 +148,7 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// A network with one input picture of so many channels, and that input.
+    /// A network with one input picture, and that input.
     #[must_use]
     pub fn new(name: &'static str, channels: usize) -> (Self, Value) {
         let input = Node {
@@ -413,7 +413,7 @@ impl GroupedLayers {
         net.relu(value)
     }
 
-    /// Two layers whose result is added to what went in.
+    /// Two layers whose result is added to their input.
     pub(super) fn residual(&self, net: &mut Graph, name: &str, of: Value) -> Value {
         let channels = net.node(of).channels;
         let value = self.layer(net, &format!("{name}.0"), of, channels, 1);

@@ -49,10 +49,10 @@ impl Inference {
     }
 
     /// Makes the content of an ONNX file ready for one picture of `channels` channels, `width` x `height` pixels. Further
-    /// inputs, by their names, are the `given` numbers: the picture goes into the input that is none of them.
+    /// inputs, by their names, are the `given` numbers: the picture goes into the remaining input.
     ///
     /// # Errors
-    /// [`NetError::File`], which names it as `path`, where it is no network or cannot take such a picture.
+    /// [`NetError::File`], which names it as `path`, if it is not a network or cannot take such a picture.
     pub fn from_onnx(
         path: &Path,
         bytes: &[u8],

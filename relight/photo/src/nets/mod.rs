@@ -4,7 +4,7 @@
 //! [`paper`] has the paper's four networks with the released shapes and parameter names, and
 //! [`decomposer`] and [`turn_network`] ours. [`Weights`] reads safetensors,
 //! [`to_onnx`] writes what any engine runs, and [`Inference`] runs it here.
-//! Knows nothing of pictures, colour or light: tensors go in and come out.
+//! Knows tensors only, not pictures, colour or light.
 //!
 //! ```
 //! use relight_photo::nets::{Inference, Weights, decomposer};

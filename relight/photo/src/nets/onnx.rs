@@ -30,10 +30,10 @@ const SAME: i64 = 0;
 const INFERRED: i64 = -1;
 
 /// The graph with its weights as the bytes of an ONNX file. In half precision weights are kept so, and computed with as 32 bits.
-/// `facts` are what the file says of itself.
+/// `facts` are the metadata of the file.
 ///
 /// # Errors
-/// What [`Weights::fitted_to`] answers, or [`NetError::Weights`] where half precision cannot hold a weight.
+/// What [`Weights::fitted_to`] answers, or [`NetError::Weights`] if half precision cannot hold a weight.
 pub fn to_onnx(
     graph: &Graph,
     weights: &Weights,

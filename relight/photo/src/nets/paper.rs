@@ -14,7 +14,7 @@ pub const REFLECTANCE_OUTPUTS: usize = 4;
 
 /// Output channels of the encoder's steps; all but the first halve the picture.
 const ENCODER: [usize; 6] = [16, 32, 64, 128, 256, 256];
-/// Output channels of the decoder's steps, each of which doubles the picture.
+/// Output channels of the decoder's steps. Each step doubles the picture.
 const DECODER: [usize; 5] = [256, 128, 64, 32, 16];
 /// Convolutions between encoder and decoder.
 const MIDDLE: usize = 4;

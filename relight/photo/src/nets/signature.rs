@@ -1,4 +1,4 @@
-//! What goes into and comes out of a network in an ONNX file, without its weights.
+//! The inputs and outputs of a network in an ONNX file, without its weights.
 
 use prost::Message;
 use tract_onnx::pb::tensor_proto::DataType;
@@ -21,12 +21,12 @@ pub struct OnnxValue {
     pub name: String,
     /// What its numbers are.
     pub element: DataType,
-    /// Its sides; none where a side is not fixed, and no sides where it is one number or the file does not say.
+    /// Its sides; `None` if a side is not fixed, and no sides if it is one number or the file does not state them.
     pub sides: Vec<Option<usize>>,
 }
 
 impl OnnxSignature {
-    /// The signature in the content of a file; none where it is no ONNX file.
+    /// The signature in the content of a file; `None` if it is not an ONNX file.
     #[must_use]
     pub fn read(bytes: &[u8]) -> Option<Self> {
         let graph = ModelProto::decode(bytes).ok()?.graph?;

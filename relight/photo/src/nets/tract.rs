@@ -13,7 +13,7 @@ use super::weights::Tensor;
 /// A network in tract.
 pub(super) struct TractPlan {
     shape: [usize; 4],
-    /// What goes into each input; none for the picture.
+    /// The value of each input; `None` for the picture.
     inputs: Vec<Option<TractTensor>>,
     plan: Arc<TypedRunnableModel>,
 }
@@ -28,7 +28,7 @@ impl TractPlan {
         if plan.inputs.contains(&None) {
             Ok(plan)
         } else {
-            Err("it takes no picture".to_owned())
+            Err("it has no input for a picture".to_owned())
         }
     }
 
@@ -113,7 +113,7 @@ fn with_threads<R>(work: impl FnOnce() -> R) -> R {
 }
 
 /// Marks the upper halves of this thread's vector registers as unused. tract's kernels for AVX leave them in use, and then
-/// every instruction without AVX, of which the rest of tract and this program consist, is up to twenty times slower on some
+/// every instruction without AVX (the rest of tract and of this program) is up to twenty times slower on some
 /// processors (Intel, "64 and IA-32 Architectures Optimization Reference Manual": mixing AVX code with SSE code).
 #[cfg(target_arch = "x86_64")]
 fn clear_upper_halves() {

@@ -69,7 +69,7 @@ pub fn turn_network() -> Graph {
     net
 }
 
-/// What the blocks say and what each pixel has of its own, through three convolutions.
+/// The output of the blocks and each pixel's own channels, through three convolutions.
 fn head(net: &mut Graph, names: [&str; 3], blocks: Value, stem: Value, outputs: usize) -> Value {
     let [fine, first, last] = names.map(str::to_owned);
     let value = net.convolution(fine, blocks, FINE * BLOCK * BLOCK, 1);

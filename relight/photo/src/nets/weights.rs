@@ -13,7 +13,7 @@ pub struct Tensor {
 }
 
 impl Tensor {
-    /// A tensor of these values; `None` where they are not as many as the shape says.
+    /// A tensor of these values; `None` if their number does not match the shape.
     #[must_use]
     pub fn new(shape: Vec<usize>, values: Vec<f32>) -> Option<Self> {
         let count = shape
@@ -154,7 +154,7 @@ impl Weights {
 }
 
 impl Weights {
-    /// The same without those whose names begin so: a network that gets a head less.
+    /// The same without weights whose names begin with this: for a network with a head less.
     #[must_use]
     pub fn without(&self, prefix: &str) -> Self {
         let named = |name: &str| name.trim_start_matches("module.").starts_with(prefix);

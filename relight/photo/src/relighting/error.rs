@@ -9,7 +9,7 @@ use relight_core::light::LightError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InsertError {
-    /// A photograph has values that are no light.
+    /// A photograph has a value that is negative or not finite.
     #[error(
         "the photograph has a value that is negative, infinite or not a number at column {x}, row {y}"
     )]
@@ -28,8 +28,8 @@ pub enum InsertError {
     /// Light cannot be used.
     #[error(transparent)]
     Light(#[from] LightError),
-    /// There is no light at all.
-    #[error("the light is dark: it has no radiance from anywhere")]
+    /// The light is dark.
+    #[error("the light is completely dark: give another light")]
     Dark,
     /// A text describes no scene, the parts of one cannot be used together, or a video of it cannot be read or written.
     #[error("{0}")]
@@ -50,7 +50,7 @@ pub enum InsertError {
     Object {
         /// Which, from 1.
         number: usize,
-        /// What is wrong.
+        /// The fault.
         fault: String,
     },
 }

@@ -18,7 +18,7 @@ const BLOCK_BITS: u32 = 3;
 /// The side of a block, cells.
 pub(crate) const BLOCK: usize = 1 << BLOCK_BITS;
 
-/// How far an object reaches towards the viewer, cell by cell. What is behind is not seen: it is taken to be the front,
+/// The height of an object towards the viewer, cell by cell. The back is not seen: it is assumed to be the front,
 /// mirrored at the plane of the rim.
 #[derive(Debug, Clone)]
 pub(crate) struct HeightField {
@@ -36,7 +36,7 @@ pub(crate) struct HeightField {
 }
 
 impl HeightField {
-    /// The shape whose normals these are, where alpha is at least one half; none where that is nowhere.
+    /// The shape whose normals these are, where alpha is at least one half; `None` if it is less everywhere.
     ///
     /// Heights are those whose differences from cell to cell are nearest to the slopes that the normals have, by least squares.
     pub(crate) fn new(normals: &Normals<YUp>, alpha: &Planes<1>) -> Option<Self> {
@@ -109,18 +109,18 @@ fn near(half: &[f32], extent: Extent) -> Vec<f32> {
 /// A cell with its neighbours inside.
 struct Cell {
     at: u32,
-    /// The four neighbours, left, right, above and below; itself where there is none.
+    /// The four neighbours, left, right, above and below; the cell itself in place of a missing one.
     around: [u32; 4],
     /// How many there are not.
     missing: f32,
     /// One over the number of neighbours.
     share: f32,
-    /// How much higher it is than they are in the mean, by the slopes.
+    /// How much higher it is than their mean, by the slopes.
     step: f32,
 }
 
 impl Cell {
-    /// None where it has no neighbour.
+    /// `None` if it has no neighbour.
     fn new(at: usize, extent: Extent, inside: &[bool], slopes: &[[f32; 2]]) -> Option<Self> {
         let (mut cell, mut count) = ([at as u32; 4], 0.0);
         let mut sum = 0.0;
@@ -185,7 +185,7 @@ impl HeightSolver {
     }
 }
 
-/// The mean height of the cells that have one outside beside them.
+/// The mean height of the cells with a neighbour outside.
 fn rim_height(heights: &[f32], inside: &[bool], extent: Extent) -> f32 {
     let is_rim = |at: usize| {
         inside[at]

@@ -132,10 +132,10 @@ impl FromStr for DiscLamp {
         for part in parts {
             match part.parse::<f64>() {
                 Ok(size) if (1.0..=180.0).contains(&size) => lamp.size = size,
-                Ok(_) => return Err("a lamp is 1 to 180 degrees large".to_owned()),
+                Ok(_) => return Err("give a size from 1 to 180 degrees".to_owned()),
                 Err(_) => {
                     lamp.colour = colour(part).ok_or_else(|| {
-                        format!("{part:?} is no colour: give #rrggbb, or 1667K to 25000K")
+                        format!("{part:?} is not a colour: give #rrggbb, or 1667K to 25000K")
                     })?;
                 }
             }

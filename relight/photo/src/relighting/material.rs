@@ -22,12 +22,12 @@ impl ObjectGloss {
     }
 }
 
-/// What is to be another material than it was.
+/// Changes of the material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaterialChange {
     /// What the albedo is multiplied with.
     pub tint: [f32; 3],
-    /// Gloss in place of that which was found; a reflectance of 0 makes the object diffuse.
+    /// Gloss in place of the estimated one; a reflectance of 0 makes the object diffuse.
     pub gloss: Option<ObjectGloss>,
 }
 

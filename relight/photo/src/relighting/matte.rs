@@ -1,20 +1,20 @@
-//! How much of each pixel the object covers, and its colours freed of what lay behind it. Knows nothing of light.
+//! How much of each pixel the object covers, and its colours without the background's. Knows nothing of light.
 
 use super::smooth::{blurred, weighted_mean};
 use relight_core::image::{Extent, Planes};
 
-/// How far a matte may lie from the mask where colours say otherwise: on the mask's edge, and at the band's ends.
+/// How far a matte may differ from the mask if the colours contradict it: on the mask's edge, and at the band's ends.
 const GEOMETRY_DEVIATIONS: (f32, f32) = (0.25, 0.12);
 /// The deviation of colours that counts where they do not vary at all, as a part of them.
 const MIN_DEVIATION: f32 = 0.08;
-/// The most by which it may, whatever the colours say: a mask is rarely wrong by more than its edge is soft, and a bite out of the
-/// object is seen at once.
+/// The most by which it may differ, whatever the colours are: a mask is rarely wrong by more than the width of its soft edge,
+/// and a bite out of the object is visible at once.
 const MAX_FROM_MASK: f32 = 0.4;
 /// The weight of what lies near the edge, where nothing from further inside or outside is near.
 const EDGE_WEIGHT: f32 = 1e-3;
 /// The part of the variance nearby that colours have about that of the nearest place.
 const NEAREST_VARIANCE: f32 = 0.2;
-/// The standard deviations by which a colour of which the object covers nothing may lie from those near it; the more it covers, the
+/// How far a colour may lie from those near it where the object covers nothing, standard deviations; the more it covers, the
 /// further.
 const SPREAD: f32 = 1.5;
 /// Steps in which the most probable alpha is found.
@@ -30,7 +30,7 @@ const EDGE_PART: f64 = 1.0 / 160.0;
 pub(crate) struct Matte {
     /// The part of each pixel that the object covers, 0 to 1.
     pub(crate) alpha: Planes<1>,
-    /// The object's colours, linear, also where it covers little or nothing of a pixel: those of its edge go on there.
+    /// The object's colours, linear, also where it covers little or nothing of a pixel: those of its edge are continued there.
     pub(crate) foreground: Planes<3>,
 }
 
@@ -41,7 +41,7 @@ impl Matte {
     /// In that band, F and B are colours of the object and of the background: the means nearby, or those of the nearest places,
     /// whichever explain the pixel better. Alpha is the most probable value where colours are spread about
     /// `alpha F + (1 - alpha) B` as those of both sides are, and alpha about the smoothed mask. So a bright place of a
-    /// many-coloured object stays its own before a bright wall, and its shadow on the ground is no part of it. The
+    /// many-coloured object stays part of it before a bright wall, and its shadow on the ground does not become part of it. The
     /// colours are F and the part alpha of the residual, as in Forte, "Approximate Fast Foreground Colour Estimation" (2021), as
     /// far as the object's colours reach: the residual of a many-coloured background would be black and white dots on the rim.
     ///
@@ -85,7 +85,7 @@ impl Matte {
         matte.continued(2 * edge + 1)
     }
 
-    /// The matte of a cut-out picture, whose colours are the object's own wherever it covers something.
+    /// The matte of a cut-out picture, whose colours are the object's own.
     ///
     /// # Panics
     /// Where alpha has another size.
@@ -99,7 +99,7 @@ impl Matte {
         matte.continued(1)
     }
 
-    /// How many pixels wide the soft edge of an object of this size is taken to be, where nothing is known of the lens.
+    /// The assumed width of the soft edge of an object of this size, pixels, for an unknown lens.
     #[must_use]
     pub(crate) fn edge_for(extent: Extent) -> usize {
         let side = extent.width.max(extent.height) as f64;
@@ -159,7 +159,7 @@ impl Neighbours {
         }
     }
 
-    /// The mean colour and that of the nearest place; none where nothing is near.
+    /// The mean colour and that of the nearest place; `None` without one nearby.
     fn at(&self, x: usize, y: usize) -> Option<[SideColour; 2]> {
         if self.weight.pixel(x, y)[0] <= 0.0 {
             return None;
@@ -364,7 +364,7 @@ mod tests {
         assert_eq!(matte.alpha.pixel(1, 1), [0.0]);
     }
 
-    /// An object of two colours, one of which is nearly that of the wall behind it, with a handle of five pixels.
+    /// An object of two colours, one nearly that of the wall behind it, with a handle of five pixels.
     fn cup() -> (Planes<3>, Planes<1>) {
         let extent = Extent::new(80, 60);
         let is_body = |x: usize, y: usize| (10..50).contains(&x) && (8..52).contains(&y);

@@ -1,4 +1,4 @@
-//! An object at the size and the angle at which it stands in a picture: all that neither light nor its place changes.
+//! An object at its size and rotation in a picture: everything that does not depend on light or place.
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
@@ -29,7 +29,7 @@ impl PlacedObject {
         }
     }
 
-    /// The shape of the object whose own normals these are; none where it covers no pixel by a half.
+    /// The shape of the object whose own normals these are; `None` if it covers no pixel by a half.
     pub(crate) fn relief(&self, normals: &Normals<YUp>) -> Option<&HeightField> {
         if self.relief.get().is_none() {
             // Not within `get_or_init`: while this thread waits for others, it may take over another frame that comes here.
@@ -69,7 +69,7 @@ impl LastPlaced {
         self.lock().clone()
     }
 
-    /// What is kept is always whole, whoever had the lock.
+    /// The kept value is always complete, whoever had the lock.
     fn lock(&self) -> MutexGuard<'_, Option<Arc<PlacedObject>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -1,4 +1,4 @@
-//! Where an object stands in a picture, and how its pixels get there: another size, turned, moved.
+//! The place of an object in a picture, and its transformation: scaled, rotated, moved.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ pub struct Placement {
     pub at: [f64; 2],
     /// Its height in parts of the picture's.
     pub height: f64,
-    /// Degrees by which it is turned in the plane, counter-clockwise.
+    /// Rotation in the plane, degrees, counter-clockwise.
     pub rotation: f64,
 }
 
@@ -29,7 +29,7 @@ impl Placement {
     }
 }
 
-/// From an object's own pixels to those of a scene: another size, and turned about the middle.
+/// From an object's own pixels to those of a scene: scaled, and rotated about the centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Fit {
     reduced: Extent,
@@ -56,7 +56,7 @@ impl Fit {
     }
 }
 
-/// The image turned counter-clockwise about its middle, in as large a rectangle as it needs; 0 where there is nothing.
+/// The image rotated counter-clockwise about its centre, in the rectangle that it needs; 0 outside.
 fn rotated<const C: usize>(image: &Planes<C>, angle: f64) -> Planes<C> {
     if angle == 0.0 {
         return image.clone();
@@ -131,7 +131,7 @@ impl Foot {
         }
     }
 
-    /// Where the first pixel of a layer lies, so that its lower edge is where it is wanted.
+    /// The place of a layer's first pixel for a wanted place of its lower edge.
     pub(crate) fn first_pixel(&self, placement: Placement, scene: Extent) -> [i64; 2] {
         [
             (placement.at[0] * scene.width as f64 - self.across).round() as i64,

@@ -1,4 +1,4 @@
-//! An object out of a photograph, decomposed so that it can be shown in another light.
+//! An object from a photograph, decomposed for relighting.
 
 use std::sync::Arc;
 
@@ -54,23 +54,23 @@ pub struct RelightableObject {
     /// In units in which the mean shading is 1.
     albedo: Planes<3>,
     shading: Shading,
-    /// What the highlight has that gloss in the own light has not.
+    /// The highlight minus the gloss in the photograph's own light.
     highlight: Planes<1>,
     gloss: Option<ObjectGloss>,
     /// Foreground less diffuse part and highlight.
     rest: Planes<3>,
-    /// The light in which the object was, grey, of order 2, in units in which the mean shading is 1.
+    /// The photograph's light, grey, of order 2, in units in which the mean shading is 1.
     pub light: ShLight,
     last_standing: LastPlaced,
 }
 
 impl RelightableObject {
     /// Decomposes the object that a mask (1 on it, else 0) shows in a photograph of linear light. Of a cut-out
-    /// picture, `alpha` is what its file says; else alpha and the colours of its edge are estimated.
+    /// picture, `alpha` is that of its file; else alpha and the colours of its edge are estimated.
     ///
     /// # Errors
-    /// Where the photograph has values that are no light, mask or alpha have another size, the mask is empty, or the network
-    /// fails.
+    /// If the photograph has a value that is negative or not finite, mask or alpha have another size, the mask is empty, or the
+    /// network fails.
     pub fn new(
         photo: &Rgb<Linear>,
         mask: &Planes<1>,
@@ -111,7 +111,7 @@ impl RelightableObject {
     /// its albedo is; its gloss is the mean over what it covers.
     ///
     /// # Errors
-    /// Where it covers no pixel by a half.
+    /// If it covers no pixel by a half.
     pub fn from_captured(asset: &CapturedObject) -> Result<Self, InsertError> {
         let (extent, surface) = (asset.extent(), asset.surface());
         let mask = asset.alpha().clone().map(|a| f32::from(u8::from(a >= 0.5)));
@@ -229,11 +229,11 @@ impl RelightableObject {
     /// H' = lobe(E') + w (H - lobe(E))
     /// ```
     ///
-    /// where t and u say how far the decomposition is believed. Of a photograph's t is 0.6. u is 0.2 where it is dark (S up to
-    /// 0.15) to 0.8 where it is bright (from 0.5 on), 0.25 more where the network is certain what of the darkness is paint, and
-    /// as much less where it cannot tell. Of a captured object's both are 1. So relief and fine texture stay, shadows stay as
-    /// far as the light comes from where it came from, no brightness changes by more than can be believed, and the photograph's
-    /// own light gives the photograph.
+    /// where t and u are the confidence in the decomposition. For a photograph t is 0.6. u is 0.2 where it is dark (S up to
+    /// 0.15) to 0.8 where it is bright (from 0.5 on), 0.25 more where the network is certain how much of the dark is paint, and
+    /// as much less where it is uncertain. For a captured object both are 1. So relief and fine texture stay, shadows stay as
+    /// far as the light comes from the same directions, brightness changes only as far as the confidence allows, and the
+    /// photograph's own light gives the photograph.
     ///
     /// # Errors
     /// None for a subject, whose maps have one size; those of the render layers in general.
@@ -308,7 +308,7 @@ fn smoothed(normals: &Normals<YUp>, wanted: &[bool], side: usize) -> Normals<YUp
     }
 }
 
-/// Light from everywhere, of which a white diffuse surface is 1.
+/// Light from everywhere, in which a white diffuse surface is 1.
 fn even_light() -> ShLight {
     let light = ShLight::even(Order::TWO, [1.0; 3]);
     let exposure = f64::from(exposure_for(&light));

@@ -34,7 +34,7 @@ impl<'a> Shot<'a> {
     /// [`exposure_between`]. A panorama behind it is as bright as a white diffuse surface in its light would be.
     ///
     /// # Errors
-    /// Where the photograph is not the subject's.
+    /// If the photograph is not the subject's.
     pub fn new(
         photo: &'a Rgb<Linear>,
         subject: &'a RelightableObject,

@@ -1,4 +1,4 @@
-//! The shading of a photograph beside that of its light: relief, shadows, and what neither says.
+//! The shading of a photograph compared with that of its light: relief, shadows, and the uncertain rest.
 
 use relight_core::image::Planes;
 
@@ -9,7 +9,7 @@ pub(crate) const DARK: f32 = 0.05;
 /// The most and the least that the shading may be of what the light makes on the normals; what is beyond it is kept as a
 /// difference.
 const RATIOS: (f32, f32) = (0.25, 4.0);
-/// Details of shading up to this part of the object's side are relief; larger ones are shadows, of which as much is kept as the
+/// Details of shading up to this part of the object's side are relief; larger ones are shadows, kept as far as the
 /// lights are alike.
 const RELIEF: f64 = 0.04;
 /// The most pixels over which the mean change of an object is taken, evenly from all of them: enough for a mean.
@@ -18,24 +18,25 @@ const MEAN_PIXELS: usize = 4096;
 /// The part of the mean change of a photographed object's brightness, as a logarithm, that is kept. This and the next ones were
 /// chosen on synthetic objects (docs/results/relighting.md).
 const KEPT_OF_MEAN: f32 = 0.6;
-/// The part of what is beside the mean where the shading is dark, which may be paint, and where it is bright.
+/// The part of the change's deviation from the mean that is kept where the shading is dark, which may be paint, and where it
+/// is bright.
 const KEPT_BESIDE: (f32, f32) = (0.2, 0.8);
-/// By how much more of it is kept where it is certain what is paint than where nobody can tell.
+/// How much more of it is kept where the paint is certain than where it is uncertain.
 const KEPT_IF_CERTAIN: f32 = 0.5;
 /// Shading that counts as dark, and as bright.
 const DARK_AND_BRIGHT: (f32, f32) = (0.15, 0.5);
 
-/// How little the decomposition of a photograph is believed: see [`Shading::hedge`].
+/// The uncertainty of the decomposition of a photograph: see [`Shading::hedge`].
 #[derive(Debug, Clone)]
 struct Doubt {
     /// Pixels over which the mean change is taken.
     sample: Vec<usize>,
-    /// The part of a change beside the mean that is kept, per pixel.
+    /// The part of a change's deviation from the mean that is kept, per pixel.
     kept_beside: Vec<f32>,
 }
 
-/// The part of a change beside the mean that is kept at a place of this `ln(S + d)`, of whose darkness the part `paint` is
-/// expected to be paint, if something tells it.
+/// The part of a change's deviation from the mean that is kept at a place of this `ln(S + d)`; `paint` is the part of its
+/// darkness expected to be paint, if known.
 fn kept_beside(seen: f32, paint: Option<f32>) -> f32 {
     let (dark, bright) = DARK_AND_BRIGHT;
     let (dark, bright) = ((dark + DARK).ln(), (bright + DARK).ln());
@@ -51,20 +52,20 @@ fn kept_beside(seen: f32, paint: Option<f32>) -> f32 {
 pub(crate) struct Shading {
     /// The logarithm of the fine part of D.
     relief: Vec<f32>,
-    /// The logarithm of the coarse part of D: shadows, bounced light, and what order 2 cannot say.
+    /// The logarithm of the coarse part of D: shadows, bounced light, and what order 2 cannot represent.
     shadow: Vec<f32>,
     /// What the bounds of D leave of S.
     residual: Vec<f32>,
     /// The logarithm of S + d.
     seen: Vec<f32>,
-    /// None where it is taken for the truth.
+    /// `None` if it counts as the ground truth.
     doubt: Option<Doubt>,
     /// E.
     pub(crate) own: Vec<f32>,
 }
 
 impl Shading {
-    /// Of the shading that was found and the irradiance of the light on the normals, where it is `wanted`, taken for the truth.
+    /// From the estimated shading and the irradiance of the light on the normals, where it is `wanted`, as the ground truth.
     pub(crate) fn new(shading: &Planes<1>, own: &Planes<3>, wanted: &[bool]) -> Self {
         let extent = shading.extent();
         // The light is grey: its channels are equal.
@@ -107,7 +108,7 @@ impl Shading {
         result
     }
 
-    /// The same of a photograph, which is believed in part, where it is `wanted`; `paint` is what of its darkness is expected to
+    /// The same for a photograph, with partial confidence, where it is `wanted`; `paint` is the part of its darkness expected to
     /// be paint, 0..=1.
     pub(crate) fn doubted(mut self, paint: Option<&Planes<1>>, wanted: &[bool]) -> Self {
         let kept = |(at, &seen)| kept_beside(seen, paint.map(|paint| paint.plane(0)[at]));
@@ -145,11 +146,11 @@ impl Shading {
         (new + DARK).ln() - self.seen[at]
     }
 
-    /// What the pixel is multiplied with, so that its brightness changes no more than can be believed.
+    /// What the pixel is multiplied with, so that its brightness changes only as far as the confidence allows.
     ///
-    /// Dark may be paint that was taken for shadow, and normals are off by 25 degrees: the new shading S' is a guess whose errors
-    /// grow with its distance from the shading S of the photograph. So of its change c only parts are kept: t of the mean m over
-    /// the object, which says how bright the light is on the side that is seen, and u of what is beside it:
+    /// Dark may be paint mistaken for shadow, and normals are off by 25 degrees: the new shading S' is a guess whose errors
+    /// grow with its distance from the shading S of the photograph. So only parts of its change c are kept: t of the mean m over
+    /// the object, which is the brightness of the light on the visible side, and u of the deviation from m:
     /// `exp(-(1 - t) m - (1 - u) (c - m))`. It is 1 in the light of the photograph.
     pub(crate) fn hedge(&self, at: usize, new: [f32; 3], mean_change: f32) -> f32 {
         let Some(Doubt { kept_beside, .. }) = &self.doubt else {

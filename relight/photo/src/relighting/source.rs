@@ -5,7 +5,7 @@ use relight_core::image::Extent;
 use relight_core::light::{Order, Panorama, ShLight};
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
 
-/// The size of a panorama that stands for a lamp or coefficients, from which shadows are drawn.
+/// The size of the panorama of a lamp or coefficients for casting shadows.
 const DRAWN: Extent = Extent::new(256, 128);
 
 /// New light.
@@ -20,10 +20,10 @@ pub enum LightSource {
 }
 
 impl LightSource {
-    /// The light as coefficients: all those that are given, or enough for highlights.
+    /// The light as coefficients: all given ones, or enough for highlights.
     ///
     /// # Errors
-    /// [`InsertError::Dark`] where no surface receives any of it.
+    /// [`InsertError::Dark`] if no surface receives any of it.
     pub fn light(&self) -> Result<ShLight, InsertError> {
         let light = match self {
             Self::Panorama(panorama) => panorama.project(Order::HIGHLIGHT),
@@ -71,7 +71,7 @@ pub fn exposure_between(old: &ShLight, new: &ShLight) -> f32 {
 }
 
 /// How much two lights come from the same side, 0 to 1: 1 for lights of one shape, whatever their strength and
-/// colour, 0 for opposite ones. It says how far shadows that were found in the one are right in the other.
+/// colour, 0 for opposite ones. It is the part of the shadows in the one that hold in the other.
 ///
 /// With a and b the irradiance of bands 1 and 2, each over that of band 0, it is `1 - |a - b| / (|a| + |b|)`.
 #[must_use]

@@ -1,9 +1,9 @@
-//! The sun, or a bare lamp, that is seen in a picture: all that a picture shows of where hard light comes from without knowing
-//! what stands in it.
+//! The sun, or a bare lamp, that is seen in a picture: the only sign of the direction of hard light that needs no
+//! knowledge of the picture's content.
 
 use relight_core::image::{Extent, Planes, beside};
 
-/// The longer side of the picture in which it is looked for, pixels.
+/// The longer side of the picture that is searched, pixels.
 const LOOK: usize = 256;
 /// Values from which on all channels are clipped.
 const CLIPPED: f32 = 0.92;
@@ -14,7 +14,7 @@ const MAX_PART: f64 = 0.03;
 const FILLED: f64 = 0.55;
 /// The lower part of a picture shows what mirrors the sun.
 const MAX_HEIGHT: f64 = 0.6;
-/// The part of all that is clipped that it is at least.
+/// The least part of all clipped pixels that belongs to it.
 const SHARE: f64 = 0.5;
 
 /// A sun that is seen.
@@ -22,12 +22,12 @@ const SHARE: f64 = 0.5;
 pub struct SeenSun {
     /// Column and row of its middle, -1 to 1 from left to right and from the upper edge to the lower.
     pub place: [f64; 2],
-    /// How sure it is, 0 to 1: the part of all that is clipped that it is, and how the glow around it falls off.
+    /// The confidence, 0 to 1: its part of all clipped pixels, and how the glow around it falls off.
     pub confidence: f64,
 }
 
 impl SeenSun {
-    /// The sun in linear light: one small, round, clipped place in the upper part, in a glow that falls off. None where nothing
+    /// The sun in linear light: one small, round, clipped place in the upper part, in a glow that falls off. `None` if nothing
     /// is like that.
     #[must_use]
     pub(crate) fn find(picture: &Planes<3>) -> Option<Self> {

@@ -1,4 +1,4 @@
-//! Light out of a plain picture: what it shows is taken for a part of a panorama, and the rest is made up from it.
+//! Light from a plain picture: it becomes part of a panorama, and the rest is extrapolated from it.
 
 use std::f64::consts::PI;
 
@@ -8,13 +8,13 @@ use relight_core::light::{Panorama, ShLight};
 
 /// The size of the panorama that is made.
 const MADE: Extent = Extent::new(128, 64);
-/// What lies beside the picture is as coarse as this.
+/// The coarseness of the surroundings outside the picture.
 const COARSE: Extent = Extent::new(12, 8);
-/// Values from which on a picture is clipped: windows, lamps and the sky are brighter than it can say.
+/// Values from which on a picture is clipped: windows, lamps and the sky are brighter than it can show.
 const CLIPPED: f32 = 0.92;
 /// How many times as strong as the mean of all else the sun lights what faces it.
 const SUN: f64 = 4.0;
-/// How many times brighter what is clipped is taken to be.
+/// The assumed brightness of clipped pixels, as a multiple.
 const BEYOND: f32 = 6.0;
 
 impl LightSource {
@@ -23,7 +23,7 @@ impl LightSource {
     ///
     /// A sun that is seen in the picture lights four times as strongly as all else, from one place: its shadows are hard.
     ///
-    /// It is a guess. What lights a scene is mostly beside the picture.
+    /// It is a guess: most of a scene's light comes from outside the picture.
     #[must_use]
     pub(crate) fn from_picture(picture: &Rgb<Linear>, field: f64, sun: Option<SeenSun>) -> Self {
         let extent = picture.planes().extent();
@@ -54,7 +54,7 @@ impl LightSource {
     }
 }
 
-/// Adds a sun that is seen in a picture of which half the angles are these.
+/// Adds a sun that is seen in a picture; `angles` are half its angles of view.
 fn add_sun(made: &mut Planes<3>, sun: SeenSun, angles: [f64; 2]) {
     let pixel = |place: f64, side: usize| {
         ((place + 0.5) * side as f64).clamp(0.0, side as f64 - 1.0) as usize

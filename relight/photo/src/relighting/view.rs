@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use relight_core::image::{Extent, Linear, Planes, Rgb};
 use relight_core::light::Panorama;
 
-/// A camera in the middle of a panorama, which looks where the viewer does (-z), or lower.
+/// A camera in the centre of a panorama that looks along the viewer's axis (-z), or lower.
 ///
 /// ```
 /// use relight_core::image::Extent;

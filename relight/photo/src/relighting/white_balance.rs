@@ -38,7 +38,7 @@ impl WhiteBalance {
     /// Light as it is shown.
     ///
     /// # Errors
-    /// Where the light is dark.
+    /// If the light is dark.
     pub fn shown(self, source: LightSource) -> Result<LightSource, InsertError> {
         if self == Self::Light {
             return Ok(source);

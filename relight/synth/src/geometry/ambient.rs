@@ -7,12 +7,12 @@ use glam::Vec3;
 use super::{GBuffer, Occluder};
 use crate::random::{mix, stream, unit_of};
 
-/// Farthest thing that counts as in the way; the object is about 2 large.
+/// Farthest distance at which something blocks; the object is about 2 large.
 const REACH: f32 = 4.0;
 
 impl GBuffer {
     /// For each pixel, the part of even light from all around that is not blocked, weighted by the
-    /// cosine to the normal: 1 where nothing is near. `rays` a pixel, smoothed over neighbours of the
+    /// cosine to the normal: 1 in the open. `rays` a pixel, smoothed over neighbours of the
     /// same surface.
     pub(crate) fn ambient_visibility(&self, occluder: &Occluder, rays: u32, seed: u64) -> Vec<f32> {
         let open = |k: usize| {

@@ -1,4 +1,4 @@
-//! The geometry buffer: what is known of the surface at each pixel before there is light.
+//! The geometry buffer: the surface at each pixel, independent of light.
 
 use glam::{Affine3A, DVec4, Mat3, Vec2, Vec3, Vec4};
 
@@ -11,7 +11,7 @@ use relight_core::light::{Normals, YUp};
 /// How far above the surface rays of light start: the object is about 1 large.
 const LIFT: f32 = 1e-3;
 
-/// What is seen of an object, pixel by pixel: made once, it can be given any albedo and any light.
+/// The visible surface of an object, pixel by pixel: made once, for any albedo and any light.
 /// Only covered pixels are kept, row by row from the upper left; all lists run along them, in the viewer's frame unless told
 /// otherwise.
 #[derive(Debug, Clone)]
@@ -33,7 +33,7 @@ pub struct GBuffer {
     pub object_points: Vec<Vec3>,
     /// Texture coordinates, where the mesh has them.
     pub(crate) texture: Option<Vec<Vec2>>,
-    /// None of a mesh whose file says nothing of it.
+    /// `None` for a mesh whose file does not have it.
     own: Vec<OwnSurface>,
     /// Takes the gradient of a height, in the mesh's own frame and unit, into the viewer's frame.
     pub(crate) gradient_map: Mat3,
@@ -88,7 +88,7 @@ impl GBuffer {
         self.pixels.is_empty()
     }
 
-    /// How the mesh's own file says that the surface looks, where it says anything.
+    /// The surface's look from the mesh's own file, if it has one.
     pub(crate) fn own_surface(&self) -> Option<&[OwnSurface]> {
         let own = &self.own;
         (own.len() == self.len() && !own.is_empty()).then_some(own)
@@ -202,7 +202,7 @@ impl<'a> Posed<'a> {
         }
     }
 
-    /// Adds what is seen of a triangle at a pixel; false where, by rounding, the pixel is missed.
+    /// Adds the surface of a triangle at a pixel; false if the pixel is missed by rounding.
     fn resolve(&self, number: u32, column: u32, row: u32, surface: &mut GBuffer) -> bool {
         let corners = self.mesh.triangles[number as usize];
         let inside = Triangle::new(corners, &self.projected)

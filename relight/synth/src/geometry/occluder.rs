@@ -1,4 +1,4 @@
-//! What stands in the way of light.
+//! What blocks light.
 
 use std::time::Duration;
 
@@ -80,7 +80,7 @@ impl Occluder {
         })
     }
 
-    /// Whether anything stands between a point and what lies from it in a direction (of unit length)
+    /// Whether anything blocks a ray from a point in a direction (of unit length)
     /// up to a distance.
     pub(crate) fn blocks(&self, from: Vec3, direction: Vec3, distance: f32) -> bool {
         let ray = Ray::new(Vec3A::from(from), Vec3A::from(direction), 0.0, distance);

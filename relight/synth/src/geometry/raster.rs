@@ -55,7 +55,7 @@ pub(super) struct Triangle {
 }
 
 impl Triangle {
-    /// None where its picture has no area.
+    /// `None` if its picture has no area.
     pub(super) fn new(corners: [u32; 3], vertices: &[Projected]) -> Option<Self> {
         let places = corners.map(|v| vertices[v as usize]);
         let lines = [0, 1, 2].map(|k| {
@@ -89,7 +89,7 @@ impl Triangle {
         [range(low.x, high.x), range(low.y, high.y)]
     }
 
-    /// The weights at a pixel's centre; none where it lies outside.
+    /// The weights at a pixel's centre; `None` if it lies outside.
     pub(super) fn weights(&self, column: usize, row: usize) -> Option<Weights> {
         let centre = DVec3::new(column as f64 + 0.5, row as f64 + 0.5, 1.0);
         let parts = self.lines.map(|line| line.dot(centre));

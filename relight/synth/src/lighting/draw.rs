@@ -103,7 +103,7 @@ impl Lighting {
 }
 
 impl SyntheticLamp {
-    /// A lamp that lights a good part of what is seen, of this irradiance.
+    /// A lamp of this irradiance that lights a good part of the visible surface.
     pub(crate) fn draw(random: &mut Random, buffer: &GBuffer, strength: f32) -> Self {
         let towards = lighting_direction(random, buffer);
         let (emitter, rays) = if random.chance(0.3) {
@@ -130,8 +130,8 @@ impl SyntheticLamp {
 }
 
 impl Environment {
-    /// At a random rotation: about the vertical mostly, with a little tilt, else any. None where there
-    /// are no panoramas.
+    /// At a random rotation: about the vertical mostly, with a little tilt, else any. `None` without
+    /// panoramas.
     fn draw(
         random: &mut Random,
         panoramas: &Panoramas,
@@ -168,7 +168,7 @@ impl Environment {
     }
 }
 
-/// A direction from which a good part of what is seen is lit.
+/// A direction from which a good part of the visible surface is lit.
 fn lighting_direction(random: &mut Random, buffer: &GBuffer) -> Vec3 {
     let mut best = (Vec3::Z, f32::NEG_INFINITY);
     for _ in 0..6 {

@@ -88,7 +88,7 @@ impl Panoramas {
         }
     }
 
-    /// Keeps those of which the name is wanted.
+    /// Keeps those whose name is wanted.
     pub(crate) fn retain(&mut self, wanted: impl Fn(&str) -> bool) {
         self.entries.retain(|entry| wanted(&entry.name));
     }
@@ -119,7 +119,7 @@ impl Panoramas {
 }
 
 impl Environment {
-    /// The light as the coefficients whose irradiance the method takes; none where it casts rays.
+    /// The light as the coefficients whose irradiance the method takes; `None` if it casts rays.
     pub(super) fn smooth(&self, panoramas: &Panoramas) -> Option<ShLight> {
         match self.method {
             Method::OrderTwo => Some(self.coefficients(Order::TWO, panoramas)),
@@ -176,7 +176,7 @@ struct SkyRay {
 }
 
 impl<'a> Sky<'a> {
-    /// None where there is no such panorama.
+    /// `None` if this panorama does not exist.
     pub(super) fn new(
         environment: &Environment,
         panoramas: &'a Panoramas,
@@ -233,7 +233,7 @@ impl<'a> Sky<'a> {
         }
     }
 
-    /// Adds the panorama's light. Without an occluder nothing is in the way but the horizon.
+    /// Adds the panorama's light. Without an occluder only the horizon blocks it.
     pub(super) fn light(
         &self,
         buffer: &GBuffer,
@@ -271,7 +271,7 @@ impl<'a> Sky<'a> {
     }
 }
 
-/// A point of a surface, which knows from where light matters to it.
+/// A point of a surface, with the directions from which light reaches it.
 struct Point<'a> {
     normal: Vec3,
     towards_eye: Vec3,

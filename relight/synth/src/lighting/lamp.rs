@@ -1,4 +1,4 @@
-//! Lamps: where their light comes from, and what is in its way.
+//! Lamps: the directions of their light, and what blocks it.
 
 use std::f32::consts::TAU;
 
@@ -138,7 +138,7 @@ impl Emitter {
         self.at(raised)
     }
 
-    /// Its middle; `far` stands for the distance of what is far away.
+    /// Its centre; `far` is the distance for distant lamps.
     pub(crate) fn middle(self, far: f32) -> Vec3 {
         match self {
             Self::Distant { .. } => self.towards() * far,

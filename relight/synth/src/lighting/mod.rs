@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | `lamp` | one lamp: its rays, its shadows |
 //! | `environment` | light from all around: by order-2 coefficients, or by rays |
-//! | `shaded` | what light makes of a surface; each kind of light is added by itself |
+//! | `shaded` | shading and highlight of a surface; each kind of light is added separately |
 //! | `scene` | a buffer with what blocks its light; whole lightings |
 //! | `draw` | random lightings |
 
@@ -43,7 +43,7 @@ pub struct Lighting {
     pub(crate) environment: Option<Environment>,
     /// Irradiance of even light from all around.
     pub(crate) ambient: Vec3,
-    /// Light that comes from the object's own lit parts to its hollows, as a factor of what they send back: 1 where all of
+    /// Light from the object's own lit parts in its hollows, as a factor of what they send back: 1 where all of
     /// it arrives.
     pub(crate) bounce: Vec3,
     /// Whether the object blocks light: without, there are neither cast shadows nor dark hollows.
@@ -67,7 +67,7 @@ impl Lighting {
         }
     }
 
-    /// All light but what bounces, as coefficients of an order: where nothing is in the way, their
+    /// All light except what bounces, as coefficients of an order: without shadows, their
     /// diffuse layer is the shading, smoothed where lamps are.
     #[must_use]
     pub fn coefficients(&self, order: Order, panoramas: &Panoramas) -> ShLight {

@@ -5,11 +5,11 @@ use super::{Lighting, Material, Panoramas, Shaded};
 use crate::geometry::{GBuffer, Occluder};
 use crate::random::stream;
 
-/// What a camera sees of an object and what can be in the way of light: made once, lit as often as one
-/// likes. What is slow is kept: the buffer, the tree for rays, and how open each pixel is.
+/// What a camera sees of an object, and what can block light: made once, lit as often as one
+/// likes. Slow results are kept: the buffer, the tree for rays, and how open each pixel is.
 pub struct SyntheticScene {
     buffer: GBuffer,
-    /// None where light is never blocked.
+    /// `None` if light is never blocked.
     shade: Option<Shade>,
 }
 
@@ -19,7 +19,7 @@ struct Shade {
 }
 
 impl SyntheticScene {
-    /// A scene in which nothing is ever in the way of light.
+    /// A scene in which nothing blocks light.
     pub(crate) fn open(buffer: GBuffer) -> Self {
         Self {
             buffer,
@@ -27,7 +27,7 @@ impl SyntheticScene {
         }
     }
 
-    /// A scene with shadows. `rays` rays a pixel tell how much of the sky it sees.
+    /// A scene with shadows. `rays` rays a pixel measure how much of the sky it sees.
     pub(crate) fn shaded(buffer: GBuffer, occluder: Occluder, rays: u32, seed: u64) -> Self {
         let open = buffer.ambient_visibility(&occluder, rays, seed);
         Self {

@@ -1,4 +1,4 @@
-//! What light makes of a surface: shading and highlight.
+//! Shading and highlight of a surface in a light.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -16,11 +16,11 @@ pub struct Material {
     pub albedo: Vec<Vec3>,
     /// Unit normals, with relief.
     pub normals: Vec<Vec3>,
-    /// Its highlights; none where it is Lambertian.
+    /// Its highlights; `None` if it is Lambertian.
     pub gloss: Option<BlinnPhong>,
 }
 
-/// How Blinn and Phong's highlight looks: `reflectance x max(0, n . b)^exponent`, where b lies half way
+/// The Blinn-Phong highlight: `reflectance x max(0, n . b)^exponent`, where b lies half way
 /// between the light and the eye.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BlinnPhong {

@@ -1,4 +1,4 @@
-//! Panoramas out of nothing but a seed: a studio with soft boxes, a room with a window, a sky, even
+//! Panoramas from a seed: a studio with soft boxes, a room with a window, a sky, even
 //! light. Knows directions only.
 
 use glam::Vec3;
@@ -41,7 +41,7 @@ impl Surroundings {
     /// The panorama of this kind and seed, linear radiance.
     ///
     /// # Errors
-    /// [`LightError::Empty`] where `extent` has no pixels.
+    /// [`LightError::Empty`] if `extent` has no pixels.
     pub(crate) fn panorama(self, seed: u64, extent: Extent) -> Result<Panorama, LightError> {
         let mut random = Random::new(stream(seed, self as u64));
         let place: Box<dyn Fn(Vec3) -> Vec3> = match self {

@@ -1,4 +1,4 @@
-//! Files that a mesh's file names: they lie in its folder, or below. Names are those of the computer on which it was written,
+//! Files that a mesh's file names, in its folder or below. Names are those of the computer on which it was written,
 //! whose letters may differ in case and whose folders may be others.
 
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use percent_encoding::percent_decode_str;
 
-/// The file that lies beside a mesh by the address that glTF has for it; none where there is no such file.
+/// The file at an address in a glTF file, relative to it; `None` if it does not exist.
 pub(super) fn by_address(mesh: &Path, address: &str) -> Option<PathBuf> {
     let decoded = percent_decode_str(address).decode_utf8().ok();
     // Some programs do not encode what a file has of per cent signs.
@@ -14,8 +14,8 @@ pub(super) fn by_address(mesh: &Path, address: &str) -> Option<PathBuf> {
     names.filter_map(|name| within(mesh, name)).next()
 }
 
-/// The file that lies beside a mesh by the name that a Wavefront file has for it; none where there is no such file. Such
-/// names are often those of another computer: where nothing lies there, the file is looked for beside the mesh.
+/// The file at a name in a Wavefront file, relative to it; `None` if it does not exist. Such
+/// names are often paths of another computer: then the file is looked for in the folder of the mesh.
 pub(super) fn by_name(mesh: &Path, name: &str) -> Option<PathBuf> {
     let name = name.trim();
     within(mesh, name).or_else(|| within(mesh, name.rsplit(['/', '\\']).next()?))

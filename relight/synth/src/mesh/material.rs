@@ -1,4 +1,4 @@
-//! What a mesh's own file says of its surface: colours, pictures of them, roughness and metal, as in glTF 2.0. Knows nothing of
+//! The surface from a mesh's own file: colours, pictures of them, roughness and metal, as in glTF 2.0. Knows nothing of
 //! light.
 
 use std::collections::BTreeSet;
@@ -26,7 +26,7 @@ pub(crate) struct MeshMaterial {
     pub(crate) factors: Option<PlacedPicture>,
 }
 
-/// A picture, and where texture coordinates lie on it.
+/// A picture, and the mapping of texture coordinates onto it.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedPicture {
     pub(crate) image: Arc<TextureImage>,
@@ -35,7 +35,7 @@ pub(crate) struct PlacedPicture {
 }
 
 impl PlacedPicture {
-    /// The value at texture coordinates, the mean of all where there are none.
+    /// The value at texture coordinates; without them the mean of all.
     fn at(&self, coordinates: Option<Vec2>) -> Vec3 {
         let place = |at: Vec2| self.placed.map_or(at, |placed| placed.transform_point2(at));
         match coordinates.map(place).filter(|place| place.is_finite()) {
@@ -77,7 +77,7 @@ impl Default for MeshMaterial {
 }
 
 impl MeshMaterial {
-    /// The look at a place of the pictures, under a colour that multiplies them; where there are no texture coordinates, that
+    /// The look at a place of the pictures, under a colour that multiplies them; without texture coordinates,
     /// of the pictures' means.
     fn at(&self, place: Option<Vec2>, paint: Vec3) -> OwnSurface {
         let looked_up = |picture: &PlacedPicture| picture.at(place);
@@ -103,7 +103,7 @@ impl MeshMaterials {
         self.of_triangle.iter().map(|&one| one as usize).collect()
     }
 
-    /// Whether they say more than one colour for all, as programs write for an object that has none.
+    /// Whether they have more than one colour for all, which programs write for an object without colours.
     pub(crate) fn tell_anything(&self) -> bool {
         let used = self.used();
         let mut used = used.iter().filter_map(|&one| self.all.get(one));

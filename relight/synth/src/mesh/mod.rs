@@ -1,5 +1,5 @@
 //! Triangle meshes with a normal for each corner. Knows nothing of cameras or light; `obj` and
-//! `gltf` read files, `material` is what they say of the surface, and `mtl` reads it for `obj`.
+//! `gltf` read files, `material` is their surface, and `mtl` reads it for `obj`.
 
 mod beside;
 mod gltf;
@@ -43,24 +43,24 @@ pub struct Mesh {
     /// As in [`RawMesh::colours`].
     colours: Vec<[Vec3; 3]>,
     materials: Option<MeshMaterials>,
-    /// What the mesh's file names and is not used, as its pictures where they are not there: each in words of its own.
+    /// Parts of the mesh's file that are not used, such as missing pictures: each in words.
     pub left_out: Vec<String>,
 }
 
-/// Why a file is no mesh that is read.
+/// The fault of a file in an unknown format.
 pub(super) const NOT_READ: &str =
     "is not a mesh of a kind that can be read: give .obj, .gltf or .glb";
-/// Why triangles are no surface.
+/// The fault of triangles without an area.
 const EMPTY: &str = "it has no triangle with an area";
 
 impl Mesh {
     /// Reads a mesh: Wavefront (`.obj`) or glTF 2.0 (`.gltf`, `.glb`). All its parts become one
     /// surface; its own normals are not used, those of faces within 50 degrees are blended. Materials with pictures or of several
-    /// colours are read, from the files beside it that it names, and colours of vertices; one colour for all is not taken for
+    /// colours are read, from the files that it names, and colours of vertices; one colour for all is not used as
     /// the object's. What of that cannot be used is left out: see [`Self::left_out`].
     ///
     /// # Errors
-    /// [`SynthError::Unusable`] where the file is damaged, holds no surface or is of another kind, [`SynthError::Io`] where it
+    /// [`SynthError::Unusable`] if the file is damaged, holds no surface or is of another kind, [`SynthError::Io`] if it
     /// cannot be read.
     pub fn read(path: &Path) -> Result<Self, SynthError> {
         let is_known = has_extension(path, &["obj", "gltf", "glb"]);
@@ -98,13 +98,13 @@ impl Mesh {
         })
     }
 
-    /// Whether the mesh's file says how it looks.
+    /// Whether the mesh's file has materials.
     #[must_use]
     pub fn has_own_surface(&self) -> bool {
         self.materials.is_some()
     }
 
-    /// The look of a triangle at weights of its corners, where the mesh's file says one.
+    /// The look of a triangle at weights of its corners, if the mesh's file has one.
     pub(super) fn own_surface(&self, triangle: usize, weights: [f32; 3]) -> Option<OwnSurface> {
         let materials = self.materials.as_ref()?;
         let corners = self.texture.get(triangle);
@@ -117,7 +117,7 @@ impl Mesh {
         Some(materials.at(triangle, place, paint))
     }
 
-    /// The digest of all that the mesh's pictures follow from.
+    /// The digest of everything that determines the mesh's pictures.
     pub(super) fn digest(&self) -> Digest {
         let mut bytes = Vec::new();
         let mut add = |values: &[f32]| bytes.extend(values.iter().flat_map(|x| x.to_le_bytes()));
@@ -158,10 +158,14 @@ fn check(raw: &RawMesh) -> Result<(), String> {
         for &vertex in corners {
             match raw.positions.get(vertex as usize) {
                 Some(position) if position.is_finite() => {}
-                Some(_) => return Err(format!("vertex {vertex} is not at a finite place")),
+                Some(_) => {
+                    return Err(format!(
+                        "vertex {vertex} has a coordinate that is not finite"
+                    ));
+                }
                 None => {
                     return Err(format!(
-                        "triangle {triangle} names vertex {vertex} of {count}"
+                        "triangle {triangle} names vertex {vertex}; there are {count}"
                     ));
                 }
             }
@@ -178,10 +182,10 @@ fn too_large(triangles: usize) -> String {
 }
 
 impl RawMesh {
-    /// What the bytes of a file hold, by its extension.
+    /// The content of a file's bytes, by its extension.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// The fault, in words.
     pub(crate) fn parsed(path: &Path, bytes: &[u8]) -> Result<Self, String> {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         match extension.to_str() {
@@ -195,7 +199,7 @@ impl RawMesh {
     /// triangle uses.
     ///
     /// # Errors
-    /// Where it has no triangles, or their vertices are not there.
+    /// If it has no triangles, or their vertices are not there.
     pub(crate) fn welded(self) -> Result<Self, String> {
         check(&self)?;
         let mut places: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.positions.len());
@@ -318,7 +322,7 @@ impl Face {
     }
 }
 
-/// Which corners of which faces meet at each vertex.
+/// The corners of faces that meet at each vertex.
 struct CornersAround {
     starts: Vec<u32>,
     /// Three times the face, plus the corner.

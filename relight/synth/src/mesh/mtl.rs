@@ -1,5 +1,5 @@
-//! Materials of Wavefront files: their colour, its picture, and how sharp the highlight is. All else in them is left out, also
-//! where it is damaged: programs write many things there.
+//! Materials of Wavefront files: their colour, its picture, and how sharp the highlight is. Everything else is ignored, also if
+//! it is damaged: programs write many things there.
 
 use glam::{Affine2, Vec2, Vec3};
 
@@ -66,7 +66,7 @@ pub(super) fn materials(text: &str) -> Vec<MtlMaterial> {
     all
 }
 
-/// Finite numbers; none where something else stands among them.
+/// Finite numbers; `None` if something else stands among them.
 fn numbers(text: &str) -> Option<Vec<f32>> {
     let words = without_comment(text).split_whitespace();
     let number = |word: &str| word.parse().ok().filter(|number: &f32| number.is_finite());
@@ -124,7 +124,7 @@ fn option(text: &str) -> Option<(&'static str, usize)> {
     options.find(|(name, _)| name.eq_ignore_ascii_case(word))
 }
 
-/// Whether at most so many numbers follow an option; else so many words.
+/// Whether the values of an option are numbers; else they are words.
 fn takes_numbers(option: &str) -> bool {
     ["-bm", "-boost", "-mm", "-o", "-s", "-t", "-texres"].contains(&option)
 }

@@ -3,10 +3,10 @@
 use earcut::Earcut;
 use glam::{DVec3, Vec3};
 
-/// Part of a polygon's squared area by which a triangle may face the other way and still be flat, as rounding makes it.
+/// Part of a polygon's squared area by which a triangle may face backwards by rounding and still be flat.
 const FLAT: f64 = 1e-9;
 
-/// Cuts polygons into triangles. Kept for many of them, as it keeps its memory.
+/// Cuts polygons into triangles. Reused for many of them, since it keeps its memory.
 pub(super) struct Triangulator {
     earcut: Earcut<f64>,
     ears: Vec<usize>,
@@ -21,7 +21,7 @@ impl Triangulator {
     }
 
     /// The triangles of a polygon by its corners' numbers, all turning as the polygon does: a fan about the first corner
-    /// where that covers it, as for all that are convex; ears that are clipped on the polygon's plane where not.
+    /// if that covers it, as for every convex one; else ears clipped on the polygon's plane.
     pub(super) fn triangles(&mut self, corners: &[Vec3]) -> Vec<[usize; 3]> {
         let fan = (2..corners.len()).map(|k| [0, k - 1, k]);
         let normal = normal(corners);
@@ -69,7 +69,7 @@ fn normal(corners: &[Vec3]) -> DVec3 {
         .sum()
 }
 
-/// The axis along which a direction is longest; none of a direction without a finite length.
+/// The longest axis of a direction; `None` for one without a finite length.
 fn dominant(direction: DVec3) -> Option<usize> {
     let length = direction.length_squared();
     (length.is_finite() && length > 0.0).then(|| direction.abs().max_position())

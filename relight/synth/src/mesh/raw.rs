@@ -10,8 +10,8 @@ pub(crate) const NO_TEXTURE: [Vec2; 3] = [Vec2::NAN; 3];
 /// Colours of a triangle that has none.
 const WHITE: [Vec3; 3] = [Vec3::ONE; 3];
 
-/// What a file or a generator gives: positions, triangles by index, and texture coordinates and colours for
-/// each corner and materials where there are any.
+/// The result of a file or a generator: positions, triangles by index, and texture coordinates and colours for
+/// each corner and materials, if there are any.
 #[derive(Debug, Default)]
 pub(crate) struct RawMesh {
     pub(crate) positions: Vec<Vec3>,
@@ -21,7 +21,7 @@ pub(crate) struct RawMesh {
     /// For each triangle up to the last that has some: linear colours by which its material's is multiplied.
     pub(crate) colours: Vec<[Vec3; 3]>,
     pub(crate) materials: MeshMaterials,
-    /// What of the file is not used, in words.
+    /// Unused parts of the file, in words.
     pub(crate) left_out: Vec<String>,
 }
 
@@ -47,7 +47,7 @@ impl RawMesh {
         self.materials.push(triangle.material);
     }
 
-    /// Whether the file says more of the surface than one colour for all, as programs write for an object that has none.
+    /// Whether the file has more than one colour for all, which programs write for an object without colours.
     pub(crate) fn has_own_surface(&self) -> bool {
         let mut colours = self.colours.iter().flatten();
         let first = colours.next().copied().unwrap_or(Vec3::ONE);

@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-/// The text of a file. A line that is not UTF-8 is Latin-1, which can hold no error.
+/// The text of a file. A line that is not UTF-8 is read as Latin-1, which always succeeds.
 pub(super) fn decoded(bytes: &[u8]) -> Cow<'_, str> {
     match bytes {
         [0xEF, 0xBB, 0xBF, rest @ ..] => utf8_or_latin1(rest),

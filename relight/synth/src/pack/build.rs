@@ -38,7 +38,7 @@ pub struct LibrarySources {
     pub panoramas: Vec<PathBuf>,
 }
 
-/// What a library holds, and what it does not.
+/// The contents of a library, and what was left out.
 #[derive(Debug, Clone, Default)]
 pub struct LibrarySummary {
     /// Its objects.
@@ -47,14 +47,14 @@ pub struct LibrarySummary {
     pub panoramas: Vec<LibraryEntry>,
     /// How many objects and panoramas are left out, by the reason.
     pub left_out: BTreeMap<String, usize>,
-    /// Files that cannot be read, and what objects are used without, as pictures that are not there.
+    /// Files that cannot be read, and missing parts of used objects, such as pictures.
     pub faults: Vec<LeftOut>,
     /// Of the file.
     pub bytes: usize,
 }
 
 impl LibrarySummary {
-    /// The origins of which no licence is known.
+    /// The origins whose licence is unknown.
     #[must_use]
     pub fn without_licence(&self) -> Vec<&str> {
         let entries = self.objects.iter().chain(&self.panoramas);
@@ -66,11 +66,11 @@ impl LibrarySummary {
     }
 }
 
-/// Builds a library and writes it to `out`, with its table beside it as `.csv` and `.md`. What cannot be read is left
-/// out. `progress` is called with how many files there are, and then once a file.
+/// Builds a library and writes it to `out`, with its table as `.csv` and `.md` in the same folder. What cannot be read is left
+/// out. `progress` is called with the number of files, and then once a file.
 ///
 /// # Errors
-/// Where a folder is not there or holds nothing, where no object or no panorama is left of those that were asked for, or
+/// If a folder is not there or holds nothing, if no object or no panorama is left of those that were asked for, or
 /// where a file cannot be written.
 pub fn build_library(
     sources: &LibrarySources,
@@ -203,7 +203,7 @@ impl Building {
         }
     }
 
-    /// Numbers the pictures, of which each is there once.
+    /// Numbers the pictures. Each is kept once.
     fn finish(mut self) -> (Parts, LibrarySummary, Vec<Row>) {
         let mut parts = Parts {
             objects: Vec::new(),

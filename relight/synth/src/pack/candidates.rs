@@ -1,4 +1,4 @@
-//! Which objects and panoramas there are to choose from, and where each comes from.
+//! The objects and panoramas to choose from, and their origins.
 
 use std::path::{Path, PathBuf};
 
@@ -19,14 +19,14 @@ const FURNITURE: &str = "sh3f";
 pub(super) struct Candidate {
     pub(super) path: PathBuf,
     pub(super) entry: LibraryEntry,
-    /// Whether its catalogue says that it belongs into a wall.
+    /// Whether its catalogue places it in a wall.
     pub(super) is_door_or_window: bool,
-    /// Why it is not to be learned from, where its folder says so.
+    /// Why it is excluded from training, if its folder says so.
     pub(super) leave_out: Option<String>,
     pub(super) rotation: Mat3,
 }
 
-/// Objects, and the archives from which they were unpacked: files are there as long as these are.
+/// Objects, and the archives from which they were unpacked: the files exist as long as these.
 #[derive(Default)]
 pub(super) struct Candidates {
     pub(super) all: Vec<Candidate>,
@@ -37,7 +37,7 @@ impl Candidates {
     /// All objects in folders, in those within them and in archives there; archives may also be named themselves.
     ///
     /// # Errors
-    /// Where there are none, or a folder or an archive cannot be read.
+    /// If none is found, or a folder or an archive cannot be read.
     pub(super) fn objects(folders: &[PathBuf]) -> Result<Self, SynthError> {
         let mut candidates = Self::default();
         let mut origins = Origins::default();
@@ -67,7 +67,7 @@ impl Candidates {
     /// All panoramas in folders and in those within them.
     ///
     /// # Errors
-    /// Where there are none, or a folder cannot be read.
+    /// If none is found, or a folder cannot be read.
     pub(super) fn panoramas(folders: &[PathBuf]) -> Result<Self, SynthError> {
         let mut candidates = Self::default();
         let mut origins = Origins::default();

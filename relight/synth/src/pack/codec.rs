@@ -142,7 +142,7 @@ impl<T: Copy + Eq + Hash> Numbered<T> {
 /// A mesh as bytes. Pictures are numbered in their order in the second list, each with what its values are.
 ///
 /// # Errors
-/// Where a number is not finite.
+/// If a number is not finite.
 pub(super) fn encode_mesh(raw: &RawMesh) -> Result<(PackedMesh, Vec<u8>, Pictures), String> {
     let EncodedMaterials {
         materials,
@@ -268,7 +268,7 @@ fn encode_materials(of: &MeshMaterials) -> Result<EncodedMaterials, String> {
     })
 }
 
-/// Numbers column by column, each as its difference from the one before, the low bytes before the high ones.
+/// Numbers column by column, each as its difference from the previous one, low bytes first.
 fn push_columns<const N: usize>(bytes: &mut Vec<u8>, rows: &[[u16; N]]) {
     for column in 0..N {
         let values = || rows.iter().map(move |row| row[column]);
@@ -361,10 +361,10 @@ impl<'a> Rest<'a> {
     }
 }
 
-/// The mesh that bytes hold. `picture` gives those of the library by their numbers.
+/// The mesh in bytes. `picture` gives the library's pictures by number.
 ///
 /// # Errors
-/// Where the bytes are not what the catalogue says.
+/// If the bytes are not what the catalogue says.
 pub(super) fn decode_mesh(
     packed: &PackedMesh,
     bytes: &[u8],
@@ -392,7 +392,7 @@ pub(super) fn decode_mesh(
             None => Ok(Vec2::NAN),
             Some(number) => {
                 let place = places.get(number as usize);
-                let place = place.ok_or("it names texture coordinates that are not there")?;
+                let place = place.ok_or("it names texture coordinates that are missing")?;
                 Ok::<Vec2, String>(grid.value(*place).into())
             }
         };
@@ -411,7 +411,7 @@ pub(super) fn decode_mesh(
         raw.colours = colours.as_chunks::<3>().0.to_vec();
     }
     if !rest.0.is_empty() {
-        return Err("it is longer than its catalogue says".to_owned());
+        return Err("it is longer than its catalogue states".to_owned());
     }
     decode_materials(packed, &mut raw, picture)?;
     Ok(raw)
@@ -424,7 +424,7 @@ fn decode_materials(
 ) -> Result<(), String> {
     for &(material, count) in &packed.runs {
         if material.is_some_and(|number| number >= packed.materials.len()) {
-            return Err("it names a material that is not there".to_owned());
+            return Err("it names a material that is missing".to_owned());
         }
         if count > packed.triangles - raw.materials.of_triangle.len() {
             return Err("its materials have too many triangles".to_owned());
@@ -485,7 +485,7 @@ pub(super) fn encode_panorama(panorama: &Panorama) -> (PackedPanorama, Vec<u8>) 
 /// The panorama that bytes hold.
 ///
 /// # Errors
-/// Where the bytes are not what the catalogue says.
+/// If the bytes are not what the catalogue says.
 pub(super) fn decode_panorama(packed: PackedPanorama, bytes: &[u8]) -> Result<Panorama, String> {
     let PackedPanorama { width, height } = packed;
     if !(8..=MAX_PANORAMA).contains(&width) || width != 2 * height {

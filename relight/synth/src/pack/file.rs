@@ -35,7 +35,7 @@ pub(super) struct Catalogue {
     pub(super) panoramas: Vec<PackedEntry<PackedPanorama>>,
 }
 
-/// Whether a picture's values are colours; else they are numbers.
+/// Whether a picture's values are colours; else they are data.
 type IsColours = bool;
 pub(super) type PackedObject = PackedEntry<PackedMesh>;
 
@@ -47,7 +47,7 @@ pub(super) struct PackedEntry<T> {
     pub(super) content: T,
 }
 
-/// What is drawn from of a packed library.
+/// The part of a packed library to draw from.
 #[derive(Debug, Default)]
 pub(crate) struct Contents {
     pub(crate) meshes: Vec<(String, Mesh)>,
@@ -78,7 +78,7 @@ pub(super) struct Parts {
 /// The bytes of a library's file: the same parts give the same bytes.
 ///
 /// # Errors
-/// In words; with parts of any size that fit into memory there is none.
+/// In words; does not occur with parts that fit into memory.
 pub(super) fn encode(parts: Parts) -> Result<Vec<u8>, String> {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
     let small = SimpleFileOptions::default()
@@ -130,11 +130,11 @@ impl Wanted {
 /// Reads a library from its bytes; errors name it as `path`.
 ///
 /// # Errors
-/// [`SynthError::Unusable`] where it is damaged.
+/// [`SynthError::Unusable`] if it is damaged.
 pub(crate) fn read(path: &Path, bytes: &[u8], wanted: Wanted) -> Result<Contents, SynthError> {
     contents(bytes, wanted).map_err(|why| {
         let fault = format!(
-            "is not a library that can be read: {why}; build it again by relight synth library"
+            "is not a library that can be read: {why}; build it again with relight synth library"
         );
         SynthError::unusable(path, fault)
     })
@@ -146,7 +146,7 @@ fn contents(bytes: &[u8], wanted: Wanted) -> Result<Contents, String> {
         .map_err(|fault| format!("its catalogue is damaged: {fault}"))?;
     if catalogue.format != FORMAT {
         return Err(format!(
-            "its format is {:?}, and {FORMAT:?} is read",
+            "its format is {:?}; this version reads {FORMAT:?}",
             catalogue.format
         ));
     }
@@ -197,7 +197,7 @@ fn meshes(archive: &Archive<'_>, catalogue: &Catalogue) -> Result<Vec<(String, M
         .collect::<Result<_, String>>()?;
     let picture = |number: usize, kind: PictureKind| {
         let found = pictures.get(number).filter(|(_, own)| *own == kind);
-        let found = found.ok_or_else(|| format!("it names picture {number}, which is not there"));
+        let found = found.ok_or_else(|| format!("it names picture {number}, which is missing"));
         found.map(|(image, _)| Arc::clone(image))
     };
     let numbered = catalogue.objects.par_iter().enumerate();
@@ -212,7 +212,7 @@ fn meshes(archive: &Archive<'_>, catalogue: &Catalogue) -> Result<Vec<(String, M
         .collect()
 }
 
-/// A zip archive in memory, whose parts are read side by side.
+/// A zip archive in memory, whose parts are read in parallel.
 struct Archive<'a>(ZipArchive<Cursor<&'a [u8]>>);
 
 impl<'a> Archive<'a> {

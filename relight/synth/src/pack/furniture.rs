@@ -58,7 +58,7 @@ impl Furniture {
     /// Unpacks an archive into a folder of its own.
     ///
     /// # Errors
-    /// Where it is damaged or has no catalogue.
+    /// If it is damaged or has no catalogue.
     pub(super) fn open(path: &Path) -> Result<Self, SynthError> {
         let damaged = |fault: &dyn std::fmt::Display| {
             SynthError::unusable(path, format!("is not an archive of furniture: {fault}"))

@@ -1,8 +1,8 @@
-//! Packed libraries: many objects and panoramas in one file, with who made each and under which licence.
+//! Packed libraries: many objects and panoramas in one file, with the author and licence of each.
 //!
 //! | file | concern |
 //! | --- | --- |
-//! | `build` | a library out of folders and archives; what is left out |
+//! | `build` | a library from folders and archives; what is left out |
 //! | `candidates` | which files there are, and where each comes from |
 //! | `furniture` | archives of Sweet Home 3D and their catalogues |
 //! | `origin` | `origin.toml`: who made the files of a folder |
@@ -10,7 +10,7 @@
 //! | `orient` | triangles that face one way |
 //! | `codec` | meshes and panoramas as bytes |
 //! | `file` | the file: a zip archive with a catalogue |
-//! | `table` | the table beside it |
+//! | `table` | the table of contents, as `.csv` and `.md` |
 
 mod build;
 mod candidates;
@@ -35,7 +35,7 @@ pub(crate) use file::{Contents, Wanted, read};
 /// What the file of a packed library ends in.
 pub const LIBRARY_EXTENSION: &str = "relib";
 
-/// Of so many objects and panoramas one is for validation only.
+/// One of so many objects and panoramas is for validation only.
 const VALIDATION: u64 = 10;
 
 /// An object or a panorama of a packed library: what it is, and whose.
@@ -43,7 +43,7 @@ const VALIDATION: u64 = 10;
 pub struct LibraryEntry {
     /// Its name in the library; the same in each build.
     pub name: String,
-    /// What it shows, in words.
+    /// Its description.
     pub title: String,
     /// The category of its catalogue; empty without one.
     pub category: String,
@@ -57,7 +57,7 @@ pub struct LibraryEntry {
     pub is_for_validation: bool,
 }
 
-/// What is said where nothing is known of an author or a licence.
+/// Stands for an unknown author or licence.
 const UNKNOWN: &str = "unknown";
 
 /// Whether what has this name is for validation only: one of ten, by a hash of the name alone, so that it stays so in

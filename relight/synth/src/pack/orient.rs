@@ -1,4 +1,4 @@
-//! Triangles that face one way: neighbours alike, and each part of a mesh outwards.
+//! Consistent orientation of triangles: neighbours alike, and each part of a mesh outwards.
 //!
 //! Which side of a part is outside is voted for by rays, as in Takayama et al. 2014, "A simple method for correcting facet
 //! orientations in polygon meshes based on ray casting": light comes to it from far away.
@@ -179,7 +179,7 @@ mod tests {
     use super::*;
     use crate::shape::ShapeKind;
 
-    /// A ball, of which every third triangle faces inwards where `is_mixed`, else all of them.
+    /// A ball. If `is_mixed`, every third triangle faces inwards, else all of them.
     fn ball(is_mixed: bool) -> RawMesh {
         let ball = ShapeKind::Sphere.build(0);
         let mut raw = RawMesh {

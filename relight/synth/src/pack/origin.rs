@@ -1,4 +1,4 @@
-//! `origin.toml`: who made the files of a folder, and under which licence.
+//! `origin.toml`: the author and licence of the files of a folder.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,7 +11,7 @@ use crate::SynthError;
 /// The file's name.
 pub(super) const ORIGIN: &str = "origin.toml";
 
-/// What a file says of all files in its folder and below, or of one of them.
+/// The origin that a file states for all files in its folder and below, or for one of them.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Origin {
@@ -20,7 +20,7 @@ pub(super) struct Origin {
     pub(super) author: Option<String>,
     pub(super) licence: Option<String>,
     pub(super) origin: Option<String>,
-    /// Whether it is for validation only, where a hash of its name is not to say.
+    /// Whether it is for validation only, in place of the hash of its name.
     pub(super) validation: Option<bool>,
     /// Why it is not to be learned from.
     pub(super) leave_out: Option<String>,
@@ -35,10 +35,10 @@ pub(super) struct Origins {
 }
 
 impl Origins {
-    /// What is said of a file below `root`: the nearest [`ORIGIN`] counts.
+    /// The origin of a file below `root`: the nearest [`ORIGIN`] counts.
     ///
     /// # Errors
-    /// Where that file is damaged.
+    /// If that file is damaged.
     pub(super) fn of(&mut self, root: &Path, path: &Path) -> Result<Origin, SynthError> {
         for folder in path.ancestors().skip(1) {
             if let Some(origin) = self.folder(folder)? {

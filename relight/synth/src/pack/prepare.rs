@@ -17,14 +17,14 @@ use crate::texture::{PictureKind, TextureImage};
 const MAX_TRIANGLES: usize = 30_000;
 /// Thinner than this part of its size, an object is flat.
 const FLAT: f32 = 0.02;
-/// A picture of which more is see-through is cut out, as those of leaves,
+/// A picture with a larger see-through part is cut out, as those of leaves,
 const CUT_OUT: f32 = 0.1;
 /// and an object is left out where such pictures cover more of its surface than this.
 const MAX_CUT_OUT: f32 = 0.05;
 /// Directions in which an object's thickness is measured: the normals of its largest triangles.
 const DIRECTIONS: usize = 48;
 
-/// Words at the end of a title that say that an object belongs to a room.
+/// Words at the end of a title of objects that belong to a building.
 const OF_ROOMS: [&str; 10] = [
     "wall", "walls", "window", "windows", "door", "doors", "floor", "ceiling", "roof", "plane",
 ];
@@ -150,7 +150,7 @@ fn is_part_of_room(candidate: &Candidate) -> bool {
         || OF_ROOMS.contains(&last)
 }
 
-/// The mesh with vertices joined, without triangles that have no area, or that are there twice.
+/// The mesh with vertices joined, without triangles of no area and duplicates.
 fn repaired(mut raw: RawMesh) -> Result<RawMesh, String> {
     let is_finite = |place: &Vec3| place.is_finite();
     if raw.positions.iter().all(is_finite) {
@@ -203,7 +203,7 @@ fn is_flat(raw: &RawMesh) -> bool {
         .any(|thickness| thickness < FLAT * largest)
 }
 
-/// Whether much of the surface is pictures of which much is see-through.
+/// Whether much of the surface is covered by see-through pictures.
 fn is_cut_out(raw: &RawMesh) -> bool {
     let is_cut_out = |number: &u32| {
         let material = raw.materials.all.get(*number as usize);

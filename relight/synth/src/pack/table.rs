@@ -1,4 +1,4 @@
-//! The table beside a library: `.csv` with a line for each object and panorama, and `.md` with what weights' cards need.
+//! The table of a library: `.csv` with a line for each object and panorama, and `.md` with the facts for model cards.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -11,7 +11,7 @@ use crate::SynthError;
 
 const COLUMNS: &str = "kind,name,title,category,author,licence,origin,part,triangles,note\n";
 
-/// An object or a panorama, and what came of it.
+/// An object or a panorama, and whether it was packed.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
     pub(super) kind: &'static str,

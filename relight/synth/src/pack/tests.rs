@@ -40,7 +40,7 @@ fn png(at: impl Fn(u32) -> u8) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// An archive of furniture: five models of which one lacks its picture, one is broken, one is a window, one is flat.
+/// An archive of furniture with five models: one lacks its picture, one is broken, one is a window, one is flat.
 fn write_furniture(path: &Path) {
     let mut archive = ZipWriter::new(File::create(path).unwrap());
     let mut add = |name: &str, bytes: &[u8]| {

@@ -69,7 +69,7 @@ impl Frame {
 /// Neighbours that a normal needs.
 const MIN_NEIGHBOURS: usize = 8;
 
-/// The direction in which the points within `radius` of `origin` vary least, up to its sign. None where there are too
+/// The direction in which the points within `radius` of `origin` vary least, up to its sign. `None` if there are too
 /// few of them.
 fn normal_of_neighbours(points: &[Vec3], origin: Vec3, radius: f32) -> Option<Vec3> {
     let near = |point: &&Vec3| point.distance_squared(origin) < radius * radius;

@@ -55,7 +55,7 @@ pub(super) enum Form {
 }
 
 impl Mark {
-    /// How much of it there is at a point, 0..=1. `unit` of the frame in object units makes the edge as sharp for all
+    /// Its coverage at a point, 0..=1. `unit` of the frame in object units makes the edge as sharp for all
     /// sizes.
     pub(super) fn coverage(&self, point: Vec3) -> f32 {
         let inside = self.form.depth(self.frame.place(point));

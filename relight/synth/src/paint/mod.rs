@@ -81,7 +81,7 @@ impl Paint {
         }
     }
 
-    /// The mesh's own albedo, of which `mean` is the mean.
+    /// The mesh's own albedo; `mean` is its mean.
     pub(super) fn own(mean: Vec3) -> Self {
         Self {
             kind: AlbedoKind::Own,
@@ -90,7 +90,7 @@ impl Paint {
         }
     }
 
-    /// A random paint for an object on which `points` lie; `pictures` tells how many there are to
+    /// A random paint for an object on which `points` lie; `pictures` is the number of pictures to
     /// choose from.
     pub(super) fn draw(random: &mut Random, points: &[Vec3], pictures: usize) -> Self {
         let kind = AlbedoKind::draw(random);

@@ -21,7 +21,7 @@ pub(crate) enum AlbedoKind {
     Print,
     /// Patterns of two to five colours.
     Patterned,
-    /// What the file of the mesh says.
+    /// From the mesh's file.
     Own,
 }
 

@@ -11,7 +11,7 @@ use super::mark::Mark;
 use super::palette::Palette;
 use super::writing::Writing;
 
-/// Where a coat of paint lies. Lengths are in the object's own frame, in which it is about 2 large.
+/// The area of a coat of paint. Lengths are in the object's own frame, in which it is about 2 large.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Pattern {
@@ -66,7 +66,7 @@ pub(super) struct Canvas<'a> {
 }
 
 impl Canvas<'_> {
-    /// One of the points, or any where there are none.
+    /// One of the points; any point without them.
     fn point(&self, random: &mut Random) -> Vec3 {
         match self.points.get(random.index(self.points.len())) {
             Some(&point) => point,
@@ -195,7 +195,7 @@ impl Pattern {
         }
     }
 
-    /// Lays the pattern in a colour over what is there.
+    /// Lays the pattern over the paint in a colour.
     pub(super) fn paint(
         &self,
         colour: Vec3,

@@ -13,7 +13,7 @@ use super::writing::Writing;
 /// A colour, and where it is printed.
 type Print = (Vec3, Pattern);
 
-/// What is printed on an object.
+/// The print on an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Design {
     /// A label with lines of glyphs on it.

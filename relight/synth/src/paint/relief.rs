@@ -101,7 +101,7 @@ mod tests {
     use crate::shape::ShapeKind;
     use crate::view::{Pose, Projection};
 
-    /// Normals of a plane that leans as the height field says.
+    /// Normals of a plane with the slopes of the height field.
     #[test]
     fn normals_lean_against_the_slope_of_the_height() {
         let mesh = ShapeKind::Plane.build(0);

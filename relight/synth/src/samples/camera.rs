@@ -19,9 +19,9 @@ pub(crate) struct CameraModel {
     pub response: Response,
     /// Standard deviation of the noise that does not depend on light, as a part of the clipping level.
     pub read_noise: f32,
-    /// That of the noise of light itself, at the clipping level; it falls with the light's root.
+    /// Standard deviation of shot noise at the clipping level; it falls with the light's root.
     pub shot_noise: f32,
-    /// Quality of the JPEG compression, 1..=100; none where there is none.
+    /// Quality of the JPEG compression, 1..=100; `None` without compression.
     pub jpeg: Option<u8>,
 }
 
@@ -152,7 +152,7 @@ impl CameraModel {
         image.iter().enumerate().map(value).collect()
     }
 
-    /// The picture after its compression, where there is one.
+    /// The picture after its compression, if it is compressed.
     pub(crate) fn compressed(&self, picture: RgbImage) -> RgbImage {
         let Some(quality) = self.jpeg else {
             return picture;

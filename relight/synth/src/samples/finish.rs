@@ -1,4 +1,4 @@
-//! What an object is made of: paint, relief and gloss together.
+//! The finish of an object: paint, relief and gloss.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -12,14 +12,14 @@ use crate::random::Random;
 
 /// Part of the objects that have relief.
 const RELIEF: f32 = 0.35;
-/// How many of the objects that come with a look of their own keep it.
+/// The part of the objects with materials that keep them.
 const OWN: f32 = 0.5;
 /// Exponents of highlights.
 const BROADEST: f32 = 4.0;
 const SHARPEST: f32 = 150.0;
-/// What a surface that is no metal reflects at its highlight.
+/// The part that a non-metal reflects at its highlight.
 const DIELECTRIC: f32 = 0.04;
-/// Rougher than this, a surface has no highlight that could be told from its diffuse light.
+/// Rougher than this, a surface's highlight cannot be separated from its diffuse light.
 const ROUGHEST: f32 = 0.9;
 
 /// Paint, relief and gloss.
@@ -35,7 +35,7 @@ pub(crate) struct Finish {
 
 impl Finish {
     /// A random finish for what a buffer shows; it is glossy with the probability `glossy`. Half of the objects that come
-    /// with a look of their own keep it, with the gloss of that; with `own` all do.
+    /// with materials keep them, with their gloss; with `own` all do.
     pub(crate) fn draw(
         random: &mut Random,
         buffer: &GBuffer,
@@ -51,7 +51,7 @@ impl Finish {
         Self::painted(random, buffer, library, glossy)
     }
 
-    /// The same for an object whose own look, if it has one, is painted over.
+    /// The same for an object whose materials, if it has any, are painted over.
     pub(crate) fn painted(
         random: &mut Random,
         buffer: &GBuffer,
@@ -71,7 +71,7 @@ impl Finish {
         }
     }
 
-    /// What the mesh's own file says, one gloss for all of the surface.
+    /// From the mesh's own file, one gloss for the whole surface.
     fn own(surface: &[OwnSurface]) -> Self {
         let albedo: Vec3 = surface.iter().map(own_albedo).sum();
         Self {
@@ -125,7 +125,7 @@ impl BlinnPhong {
         }
     }
 
-    /// The highlights of a surface whose file says how rough it is; none of a dull one. The exponent is 2 / roughness^4 - 2
+    /// The highlights of a surface whose file states its roughness; `None` for a dull one. The exponent is 2 / roughness^4 - 2
     /// (Karis 2013, "Specular BRDF Reference"), and as much brighter as it gathers light, (exponent + 8) / 8 (Hoffman 2013,
     /// "Background: Physics and Math of Shading").
     fn from_surface(surface: &[OwnSurface]) -> Option<Self> {

@@ -16,7 +16,7 @@ use crate::library::Library;
 
 /// The description of a folder of samples.
 const FILE: &str = "synth.json";
-/// What it says it is.
+/// Its schema.
 const SCHEMA: &str = "relight.synth/1";
 
 /// What a folder of samples was made of.
@@ -59,12 +59,12 @@ pub struct SynthSummary {
     pub kept: u64,
 }
 
-/// Writes the samples 0 to `count - 1` of a recipe into the folder `out`, side by side on rayon's
-/// threads; `progress` is told each sample that is done. A sample's folder, `<number>` with six digits,
+/// Writes the samples 0 to `count - 1` of a recipe into the folder `out`, in parallel on rayon's
+/// threads; `progress` is called for each finished sample. A sample's folder, `<number>` with six digits,
 /// appears when all its files are in it. A call that was interrupted can be repeated, and goes on.
 ///
 /// # Errors
-/// Where a setting is out of range, the folder holds something else or is being written, or a file
+/// If a setting is out of range, the folder holds something else or is being written, or a file
 /// cannot be written: samples that are done stay.
 pub fn write_samples(
     recipe: &Recipe,
@@ -105,7 +105,7 @@ impl SampleFolder {
         handle.try_lock().map_err(|reason| match reason {
             TryLockError::WouldBlock => SynthError::unusable(
                 path,
-                "is written by another process: wait until it ends, or give another folder",
+                "is being written by another process: wait until it ends, or give another folder",
             ),
             TryLockError::Error(source) => SynthError::write(path)(source),
         })?;
@@ -181,7 +181,7 @@ pub(crate) fn holds_samples(folder: &Path) -> bool {
     folder.join(FILE).exists()
 }
 
-/// Writes the description, or compares it with the one that is there.
+/// Writes the description, or compares it with the existing one.
 fn describe(folder: &Path, origin: &Origin) -> Result<(), SynthError> {
     let path = folder.join(FILE);
     let there = match fs::read(&path) {

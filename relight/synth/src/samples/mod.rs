@@ -1,4 +1,4 @@
-//! Samples: what is drawn from a seed, the picture of it with its ground truth, and a folder of them.
+//! Samples: the draws from a seed, the picture with its ground truth, and a folder of them.
 
 pub(crate) mod camera;
 pub(crate) mod finish;

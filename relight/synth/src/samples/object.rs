@@ -46,6 +46,6 @@ pub struct SyntheticView {
     pub(crate) pose: Pose,
     /// How it is seen.
     pub(crate) projection: Projection,
-    /// What is seen.
+    /// The visible surface.
     pub scene: SyntheticScene,
 }

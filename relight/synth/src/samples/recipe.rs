@@ -20,17 +20,17 @@ use crate::view::{Pose, Projection};
 
 /// Rays a pixel by which a scene learns how much of the sky it sees.
 pub(crate) const AMBIENT_RAYS: u32 = 16;
-/// Part of the objects that are meshes, where there are any.
+/// Part of the objects that are meshes, if there are any.
 const MESHES: f32 = 0.25;
 /// Least part of the picture that an object covers, where another view of it covers more.
 const MIN_COVER: f32 = 0.12;
 /// Views that are drawn at most until one covers as much.
 const DRAWS: usize = 4;
 
-/// How samples are made. The same recipe and library give the same samples.
+/// The settings of samples. The same recipe and library give the same samples.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Recipe {
-    /// What all is drawn from.
+    /// The seed of all draws.
     pub seed: u64,
     /// Width and height of the pictures, 16..=2048 pixels.
     pub size: u32,
@@ -42,9 +42,9 @@ pub struct Recipe {
     pub views: u32,
     /// Materials and lightings of each view, 1 and above.
     pub lightings: u32,
-    /// Whether the camera is a random one; else it is the plain one.
+    /// Whether the camera is random; else it is the plain one.
     pub random_camera: bool,
-    /// Whether all objects whose file says how they look keep that; else half of them.
+    /// Whether all objects with materials keep them; else half of them.
     pub own_albedo: bool,
 }
 

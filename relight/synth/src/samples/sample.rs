@@ -1,4 +1,4 @@
-//! One sample: a picture, its ground truth, and every number that it was made of.
+//! One sample: a picture, its ground truth, and all its parameters.
 
 use glam::Vec3;
 use image::{GrayImage, RgbImage};
@@ -20,7 +20,7 @@ use relight_core::light::{Order, ShLight};
 pub(crate) struct Description {
     /// The sample's number.
     pub number: u64,
-    /// What it was drawn from.
+    /// The seed of its draws.
     pub seed: u64,
     /// The object.
     pub object: ObjectSource,
@@ -28,12 +28,12 @@ pub(crate) struct Description {
     pub pose: Pose,
     /// How it is seen.
     pub projection: Projection,
-    /// What it is made of.
+    /// The object's finish.
     pub finish: Finish,
     /// The name of the panorama that the lighting has.
     pub panorama: Option<String>,
-    /// All light but what bounces, as nine coefficients in the viewer's frame, times the camera's gain:
-    /// their diffuse layer is the shading where nothing is in the way.
+    /// All light except what bounces, as nine coefficients in the viewer's frame, times the camera's gain:
+    /// without shadows, their diffuse layer is the shading.
     pub coefficients: [[f64; 3]; 9],
     /// The light.
     pub lighting: Lighting,
@@ -79,7 +79,7 @@ pub struct SynthSample<'a> {
     pub(crate) description: Description,
 }
 
-/// What the largest value in a file of 16 bits stands for.
+/// The light of the largest value in a 16-bit file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Whites {
     /// In `shading.png`.
@@ -116,7 +116,7 @@ impl<'a> SynthSample<'a> {
         &self.description.coefficients
     }
 
-    /// The light, 0..=1, for a value of the picture, 0..=1: what its camera's response takes back.
+    /// The light, 0..=1, for a value of the picture, 0..=1: the inverse of its camera's response.
     #[must_use]
     pub fn light_of(&self, value: f32) -> f32 {
         self.description.camera.response.decode(value)

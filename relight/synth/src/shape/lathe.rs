@@ -14,7 +14,7 @@ const AROUND: u32 = 96;
 /// Points of a rounded outline.
 const FINE: usize = 40;
 
-/// A random body.
+/// A random solid.
 pub(super) fn draw(random: &mut Random) -> RawMesh {
     let outer = outline(random);
     let widest = outer.iter().map(|p| p.x).fold(0.0, f32::max);

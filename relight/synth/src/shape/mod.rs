@@ -19,7 +19,7 @@ use super::random::Random;
 pub enum ShapeKind {
     /// One to nine rounded primitives, blended into one another, with bumps, twists, shells, cuts.
     Blend,
-    /// A body of revolution: vases, cups with walls and handles, cylinders.
+    /// A solid of revolution: vases, cups with walls and handles, cylinders.
     Lathe,
     /// Boxes, piled or hollow: flat faces, sharp edges, dark insides.
     Boxes,
@@ -32,7 +32,7 @@ pub enum ShapeKind {
 }
 
 impl ShapeKind {
-    /// The kinds of which a random object is one, each with its weight: what trained best.
+    /// The kinds of random objects, each with its weight: what trained best.
     pub(super) const WEIGHTS: [(Self, f32); 4] = [
         (Self::Blend, 0.62),
         (Self::Lathe, 0.15),

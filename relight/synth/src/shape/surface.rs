@@ -15,8 +15,8 @@ const STEP: f32 = 2.0 * REACH / (SIDE - 1) as f32;
 /// How much faster than a true distance a field may grow: blends, twists and bumps bend it.
 const STEEPEST: f32 = 2.0;
 
-/// Adds a grid of `columns` x `rows` cells, of which `place` gives the points for u and v in -1..=1;
-/// the side is outside from which u runs right and v up.
+/// Adds a grid of `columns` x `rows` cells, whose points `place` gives for u and v in -1..=1;
+/// seen from outside, u runs right and v up.
 pub(super) fn add_grid(
     raw: &mut RawMesh,
     columns: u32,

@@ -40,10 +40,10 @@ struct Header {
 }
 
 impl TransferCache {
-    /// Views in a folder, which is made where it is missing.
+    /// Views in a folder, created if missing.
     ///
     /// # Errors
-    /// [`SynthError`] where the folder cannot be made.
+    /// [`SynthError`] if the folder cannot be made.
     pub fn open(
         folder: &Path,
         recipe: TransferRecipe,
@@ -57,10 +57,10 @@ impl TransferCache {
         })
     }
 
-    /// The turn of a seed: the view of a number in a random material and room.
+    /// The turn of a seed: a view in a random material and environment light.
     ///
     /// # Errors
-    /// [`SynthError`] where the view cannot be written.
+    /// [`SynthError`] if the view cannot be written.
     pub fn turn(
         &self,
         library: &Library,
@@ -137,7 +137,7 @@ fn push_vectors(bytes: &mut Vec<u8>, vectors: &[Vec3]) {
     }
 }
 
-/// None where the bytes are not those of a whole file.
+/// `None` if the bytes are not those of a whole file.
 fn decode(bytes: &[u8]) -> Option<RadianceTransfer> {
     let digest_length = Digest::hash(&[]).to_string().len();
     let (bytes, digest) = bytes.split_at_checked(bytes.len().checked_sub(digest_length)?)?;

@@ -11,7 +11,7 @@ use crate::random::Random;
 /// Sets of directions, each turned otherwise: pixels beside each other have different ones.
 const SETS: usize = 16;
 
-/// What each pixel of a view makes of light from all around. All lists run along the covered pixels.
+/// The response of each pixel of a view to light from all around. All lists run along the covered pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RadianceTransfer {
     /// Width and height, pixels.
@@ -22,7 +22,7 @@ pub(crate) struct RadianceTransfer {
     pub pixels: Vec<u32>,
     /// Unit vectors to the eye, in the viewer's frame.
     pub towards_eye: Vec<Vec3>,
-    /// Whether nothing stands in the way of what the pixel mirrors.
+    /// Whether what the pixel mirrors is not blocked.
     pub(super) mirrors: Vec<bool>,
     /// The blocked part of the cosine, in harmonics of the table's frame.
     pub(super) blocked: Vec<[f32; COEFFICIENTS]>,

@@ -22,7 +22,7 @@ pub(crate) type CurveCoefficients = [[f32; 3]; CURVE_COEFFICIENTS];
 pub(crate) struct TransferMaterial {
     /// Whether it has no diffuse part: its albedo is the colour of what it mirrors.
     pub is_metal: bool,
-    /// What it mirrors head-on, of even light: 0.04 of plastic, 0 of a surface without gloss. Of metal 1.
+    /// The part of even light that it mirrors head-on: 0.04 for plastic, 0 without gloss, 1 for metal.
     pub reflectance: f32,
     /// How that changes as the surface is seen from aside.
     pub lobe: TransferLobe,

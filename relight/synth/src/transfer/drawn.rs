@@ -1,4 +1,4 @@
-//! A view in a random material, room and camera: what a network of turns learns from.
+//! A view in a random material, environment light and camera, for training the network of turns.
 
 use std::f32::consts::TAU;
 
@@ -22,11 +22,11 @@ const HALF_VECTOR: f32 = 0.5;
 const TINTED: f32 = 0.2;
 /// Part of the objects of one colour.
 const PLAIN: f32 = 0.35;
-/// Part of the turns whose angles are off and whose frames are not all there.
+/// Part of the turns with errors of the angle and missing frames.
 const MISTIMED: f32 = 0.4;
 /// Part of the turns whose highlights clip.
 const CLIPPED: f32 = 0.3;
-/// Part of the turns whose elevation is not known well, and how far it is off, degrees.
+/// Part of the turns with an error of the elevation, and its size, degrees.
 const UNSURE: f32 = 0.5;
 const ELEVATION_ERROR_DEG: f32 = 4.0;
 const MAX_ELEVATION_ERROR_DEG: f32 = 8.0;
@@ -42,7 +42,7 @@ pub struct DrawnTurn {
     pub pixels: Vec<u32>,
     /// Curves over the table's angle, with noise, clipping and errors of the angle.
     pub curves: Vec<CurveCoefficients>,
-    /// The elevation that is said, radians; the true one is near.
+    /// The stated elevation, radians; the true one is near.
     pub elevation: f32,
     /// Unit normals in the viewer's frame.
     pub normals: Vec<Vec3>,
@@ -54,7 +54,7 @@ impl DrawnTurn {
     /// How turns are drawn: another number draws another turn of a seed.
     pub const RECIPE: u32 = 2;
 
-    /// The turn of a seed: the view in a random material and room.
+    /// The turn of a seed: the view in a random material and environment light.
     pub(super) fn draw(view: &RadianceTransfer, rooms: &Rooms, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let finish = finish(view, &mut random);
@@ -126,7 +126,7 @@ impl DrawnTurn {
         }
     }
 
-    /// What is left of the curves where the table's angle is not known well.
+    /// The curves with errors of the table's angle.
     fn mistime(&mut self, random: &mut Random) {
         let Some(timing) = TableTiming::draw(random) else {
             return;
@@ -136,7 +136,7 @@ impl DrawnTurn {
         }
     }
 
-    /// The mirror image, left and right: the table turns the other way then.
+    /// The left-right mirror image, in which the table turns the other way.
     fn mirror(&mut self) {
         let mut order: Vec<usize> = (0..self.pixels.len()).collect();
         let size = self.size;

@@ -1,5 +1,5 @@
-//! Precomputed radiance transfer of an object on the turntable: what each pixel makes of light from all around, cast
-//! once and then lit by any room over a whole turn, without a ray.
+//! Precomputed radiance transfer of an object on the turntable: the response of each pixel to light from all around, cast
+//! once and then lit by any environment over a whole turn, without a ray.
 //!
 //! In the table's frame (x to the camera's right, y level and away from the camera, z up the axis) the light L and what
 //! a pixel takes of it T are written in real spherical harmonics about the axis. With the pairs of order m as complex
@@ -9,7 +9,7 @@
 //! I(a) = c_0 + Re Σ_m c_m e^(i m a),    c_m = Σ_l T_lm conj(L_lm)
 //! ```
 //!
-//! T of a matt surface is the cosine's, known in closed form (Ramamoorthi and Hanrahan, "An Efficient Representation
+//! T of a Lambertian surface is the cosine's, known in closed form (Ramamoorthi and Hanrahan, "An Efficient Representation
 //! for Irradiance Environment Maps", 2001), less the sum over the directions that the object or the plate block (Sloan,
 //! Kautz and Snyder, "Precomputed Radiance Transfer", 2002).
 //!
@@ -21,7 +21,7 @@
 //! | `views` | which objects and poses are drawn |
 //! | `cache` | views on disk |
 //! | `timing` | the table's angle as a rig knows it |
-//! | `drawn` | a view in a random material, room and camera |
+//! | `drawn` | a view in a random material, environment light and camera |
 //! | `photo_view` | a view for photographs: what a device needs to light it without a ray |
 //! | `photo_plan` | the material, light and camera of one such photograph |
 
@@ -54,7 +54,7 @@ const COEFFICIENTS: usize = TRANSFER_ORDER.coefficients();
 /// Coefficients of what bounces: it is smooth.
 const BOUNCE_COEFFICIENTS: usize = Order::TWO.coefficients();
 
-/// What is left of a band of radiance in irradiance.
+/// The factor of a band from radiance to irradiance.
 fn cosine_band(l: usize) -> f32 {
     cosine_lobe(l) as f32
 }

@@ -1,4 +1,4 @@
-//! The material, light and camera of a photograph of a cast view: every number of it but those of its noise.
+//! The material, light and camera of a photograph of a cast view: all its parameters except the noise.
 //!
 //! The chances of lamps, ambient light, gloss and cameras are those of [`Recipe`](crate::Recipe).
 
@@ -16,7 +16,7 @@ use crate::samples::camera::{CameraModel, Response};
 const BY_LAMP: f32 = 0.8;
 /// Part of the surfaces with gloss.
 const GLOSSY: f32 = 0.35;
-/// Part of these whose highlights have a colour of their own.
+/// Part of these with coloured highlights.
 const COLOURED_GLOSS: f32 = 0.2;
 /// Part of the surfaces of one colour.
 const PLAIN: f32 = 0.2;
@@ -26,7 +26,7 @@ const OTHER_HUES: f32 = 0.2;
 const PRINTED: f32 = 0.3;
 /// Part of the cameras without noise and compression, whose response is sRGB.
 const PLAIN_CAMERA: f32 = 0.5;
-/// Part of the pictures whose values are taken for sRGB, whatever the camera's response: the user of a photograph does not know
+/// Part of the pictures whose values are read as sRGB, whatever the camera's response: the user of a photograph does not know
 /// it either. Hardly more, as albedo times shading is not such a picture.
 const TAKEN_AS_SRGB: f32 = 0.1;
 /// Part of the cameras, but for the plain ones, whose pictures are not quite sharp.
@@ -45,7 +45,7 @@ pub struct PhotoPlan {
     pub contrast: f32,
     /// The one colour of a surface that has only one; 0 where it has more.
     pub plain: [f32; 3],
-    /// What is printed on it.
+    /// The print on it.
     pub print: Option<PhotoPrint>,
     /// The lamps.
     pub lamps: Vec<PhotoLamp>,
@@ -99,11 +99,11 @@ pub struct PhotoCamera {
     pub level: f32,
     /// Of the response, the power `1 / gamma`; none: sRGB.
     pub gamma: Option<f32>,
-    /// Whether the picture's values are taken for sRGB afterwards.
+    /// Whether the picture's values are read as sRGB afterwards.
     pub taken_as_srgb: bool,
     /// Standard deviation of the noise that does not depend on light.
     pub read_noise: f32,
-    /// That of the noise of light itself, at the clipping level.
+    /// Standard deviation of shot noise at the clipping level.
     pub shot_noise: f32,
     /// Standard deviation of its blur, pixels.
     pub blur: f32,

@@ -1,4 +1,4 @@
-//! A view for photographs: what a device needs to light it in any way without a ray.
+//! A view for photographs: the data for a device to light it in any way without rays.
 //!
 //! Light from all around goes by the harmonics of the viewer's frame, as in a turn's view. They have no sharp shadows: those
 //! come from a few lamps whose visibility is cast with the view.
@@ -21,7 +21,7 @@ use crate::turn::Stand;
 
 /// Part of the closed objects that stand on a black table.
 const ON_TABLE: f32 = 0.4;
-/// Part of the objects that are meshes, where there are any.
+/// Part of the objects that are meshes, if there are any.
 const MESHES: f32 = 0.6;
 /// The camera over that table, degrees.
 const ELEVATIONS: std::ops::Range<f32> = 0.0..50.0;
@@ -31,7 +31,7 @@ const FAR: f32 = 1e3;
 /// How views for photographs are drawn and cast. The same recipe and library give the same views.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PhotoViewRecipe {
-    /// What all is drawn from.
+    /// The seed of all draws.
     pub seed: u64,
     /// Width and height, pixels.
     pub size: u32,
@@ -79,7 +79,7 @@ impl PhotoView {
     pub const POINTS: usize = 1;
     /// Unit vectors to the eye, 3 planes.
     pub const TOWARDS_EYE: usize = 4;
-    /// 1 where nothing stands in the way of what a pixel mirrors.
+    /// 1 where what a pixel mirrors is not blocked.
     pub const MIRRORS: usize = 7;
     /// Where the surface is in the mesh's own frame, within the unit sphere, 3 planes.
     pub const OBJECT_POINTS: usize = 8;
@@ -87,7 +87,7 @@ impl PhotoView {
     pub const BLOCKED: usize = 11;
     /// The irradiance that an object of the albedo 1 throws back onto a pixel, a plane for each of 9 harmonics.
     pub const BOUNCED: usize = Self::BLOCKED + Self::ORDER.coefficients();
-    /// Planes in all.
+    /// The number of planes.
     pub const BASE: usize = Self::BOUNCED + BOUNCE_COEFFICIENTS;
 }
 
@@ -132,11 +132,11 @@ fn view_lamp(lamp: &SyntheticLamp) -> ViewLamp {
     }
 }
 
-/// What a camera sees of an object, and what stands in the way of light.
+/// What a camera sees of an object, and what blocks light.
 pub(super) struct Seen {
     buffer: GBuffer,
     occluder: Occluder,
-    /// Upwards from the table in the viewer's frame, where it stands on one.
+    /// The table's upward axis in the viewer's frame, if it stands on one.
     table: Option<Vec3>,
 }
 

@@ -67,7 +67,7 @@ impl Rooms {
         self.panoramas.is_empty()
     }
 
-    /// The room of a seed, in the table's frame; even light where there are no panoramas.
+    /// The room of a seed, in the table's frame; even light without panoramas.
     #[must_use]
     pub fn draw(&self, seed: u64) -> ShLight {
         let mut random = Random::new(seed);

@@ -98,7 +98,7 @@ fn value(curve: &CurveCoefficients, angle: f64, c: usize) -> f64 {
     sum
 }
 
-/// An object of which parts shade others, on a plate.
+/// An object on a plate, with parts that shadow others.
 fn standing(size: u32, rays: u32) -> (RadianceTransfer, GBuffer, Occluder) {
     let mesh: Mesh = ShapeKind::Blend.build(2);
     let elevation = 0.35;

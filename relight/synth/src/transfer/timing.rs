@@ -22,14 +22,14 @@ const MAX_GAP: usize = 6;
 /// Ridge on the coefficients, as a part of the mean of the diagonal. Numerical.
 const RIDGE: f64 = 1e-6;
 
-/// What becomes of a curve where its angles are off: its coefficients by least squares over the frames that are there.
+/// A curve with errors of its angles: its coefficients by least squares over the existing frames.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct TableTiming {
     /// Row by row: what each true coefficient adds to each that is found.
     matrix: [[f32; CURVE_COEFFICIENTS]; CURVE_COEFFICIENTS],
 }
 
-/// A frame: where the table is said to be and where it is, radians.
+/// A frame: the stated and the true angle of the table, radians.
 #[derive(Debug, Clone, Copy)]
 struct FrameAngle {
     said: f64,
@@ -37,7 +37,7 @@ struct FrameAngle {
 }
 
 impl TableTiming {
-    /// A turn's timing; none where its equations have no solution.
+    /// A turn's timing; `None` if its equations have no solution.
     pub(super) fn draw(random: &mut Random) -> Option<Self> {
         let angles = frame_angles(random);
         Self::from_angles(&angles)

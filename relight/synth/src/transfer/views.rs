@@ -20,7 +20,7 @@ const FINISHES: u64 = 3;
 /// How views are drawn and cast. The same recipe and library give the same views.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TransferRecipe {
-    /// What all is drawn from.
+    /// The seed of all draws.
     pub seed: u64,
     /// Width and height, pixels.
     pub size: u32,

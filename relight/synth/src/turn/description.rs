@@ -1,4 +1,4 @@
-//! What turns are made of, and what is true of their frames, as it stands in files.
+//! The inputs of turns and the ground truth of their frames, as in files.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,13 +19,13 @@ pub struct TurnRecipe {
     pub frames: u32,
 }
 
-/// What a turn is made of, as it stands in `turn.json`.
+/// The inputs of a turn, as in `turn.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TurnDescription {
     /// `relight.turn/1`.
     pub(crate) schema: String,
-    /// What it was drawn from: the recipe's seed and the turn's number.
+    /// The seed of its draws: the recipe's seed and the turn's number.
     pub(crate) seed: u64,
     /// The turn's number.
     pub(crate) number: u64,
@@ -38,7 +38,7 @@ pub struct TurnDescription {
     /// The table's axis in the viewer's frame, upwards. At the table's angle `a`, the light has turned by
     /// `-a` about it (right-hand rule).
     pub axis: [f64; 3],
-    /// What it is made of.
+    /// The object's finish.
     pub(crate) finish: Finish,
     /// The name of the panorama that the lighting has.
     pub(crate) panorama: Option<String>,
@@ -60,7 +60,7 @@ pub struct FrameTruth {
     pub index: u32,
     /// The table's angle, degrees.
     pub angle_deg: f64,
-    /// What 65535 stands for in the frame's `shading` and `highlight`.
+    /// The value of 65535 in the frame's `shading` and `highlight`.
     pub(crate) white: Whites,
     /// All light but what bounces, as nine coefficients in the viewer's frame, with the camera's gain.
     pub coefficients: [[f64; 3]; 9],

@@ -13,7 +13,7 @@ use crate::samples::png::{Sixteen, encode_sixteen};
 /// The folder of the ground truth of all turns.
 const TRUTH: &str = "truth";
 
-/// Where the ground truth of a session lies in a data set.
+/// The path of a session's ground truth in a data set.
 pub(super) fn ground_truth_of(out: &Path, session: &str) -> PathBuf {
     out.join(TRUTH).join(session)
 }
@@ -42,7 +42,7 @@ impl GroundTruthFolder {
         fs::write(&path, bytes).map_err(SynthError::write(&path))
     }
 
-    /// What all frames share.
+    /// Writes what all frames share.
     pub(super) fn write_object(&self, turn: &SimulatedTurn<'_>) -> Result<(), SynthError> {
         let (buffer, material) = (turn.scene.buffer(), &turn.material);
         self.write("turn.json", &turn.json())?;

@@ -37,15 +37,15 @@ pub(crate) use stand::{Stand, standing_object};
 
 pub use description::{FrameTruth, TurnDescription, TurnRecipe};
 
-/// Frames that are made side by side before they are written.
+/// Frames that are made in parallel before they are written.
 const BATCH: u32 = 32;
 
 /// Writes the turns 0 to `count - 1` into the data set in the folder `out`: shards in the format of
-/// `relit-extract`, and beside them `truth/<session>/`. Frames are made side by side on rayon's threads.
-/// Turns that the data set already describes are kept. `progress` is told each frame that is done.
+/// `relit-extract`, and next to them `truth/<session>/`. Frames are made in parallel on rayon's threads.
+/// Turns that the data set already describes are kept. `progress` is called for each finished frame.
 ///
 /// # Errors
-/// Where a setting is out of range, `out` holds another data set, or a file cannot be written: turns
+/// If a setting is out of range, `out` holds another data set, or a file cannot be written: turns
 /// that are whole stay.
 pub fn write_turns(
     turns: &TurnRecipe,
@@ -179,7 +179,7 @@ fn write_turn(
     Ok((entry, files.shards))
 }
 
-/// The smallest rectangle around the object; empty where there is none.
+/// The smallest rectangle around the object; empty without one.
 fn bounding_box(mask: &GrayImage) -> Rect {
     let inside = mask
         .enumerate_pixels()

@@ -228,7 +228,7 @@ impl<'a> SimulatedTurn<'a> {
     }
 }
 
-/// What is seen of an object on the plate.
+/// The visible surface of an object on the plate.
 fn scene(recipe: &Recipe, stand: &Stand, mesh: &Mesh, seed: u64) -> SyntheticScene {
     let placement = stand.placement(mesh);
     let buffer = GBuffer::render(mesh, placement, stand.projection, recipe.size);

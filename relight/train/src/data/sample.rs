@@ -1,4 +1,4 @@
-//! One made picture with its truth, as the arrays that a batch is made of.
+//! One synthetic picture with its ground truth, as arrays for a batch.
 
 use glam::Vec3;
 use half::f16;
@@ -13,12 +13,12 @@ use relight_synth::SynthSample;
 /// Planes of a sample: the input, the linear picture, shading, albedo, normals, highlight.
 const PLANES: usize = INPUTS + 3 + 1 + 3 + 3 + 1;
 
-/// How the values of a made picture are taken for light.
+/// How the values of a synthetic picture are converted to light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Linearisation {
     /// By the response of the camera that made it: the picture is exactly albedo times shading plus highlight.
     Exact,
-    /// As sRGB, as a photograph is taken whose camera nobody knows.
+    /// As sRGB, like a photograph from an unknown camera.
     AsSrgb,
 }
 
@@ -28,7 +28,7 @@ pub(crate) enum Linearisation {
 pub(crate) struct TruthArrays {
     extent: Extent,
     values: Vec<f16>,
-    /// What the head for light should answer; 0 where the light is not known.
+    /// The ground truth of the head for light; 0 if the light is not known.
     light: [f32; LIGHT_OUTPUTS],
 }
 
@@ -47,9 +47,9 @@ pub struct TruthBatch {
     pub albedo: Tensor,
     /// Unit normals, y up.
     pub normals: Tensor,
-    /// Highlight, 1 channel, in whites: what of it the picture shows.
+    /// Visible highlight, 1 channel, in whites.
     pub highlight: Tensor,
-    /// What the head for light should answer, `batch x 9`; 0 where the light is not known.
+    /// The ground truth of the head for light, `batch x 9`; 0 if the light is not known.
     pub light: Tensor,
 }
 

@@ -17,7 +17,7 @@ pub(crate) struct Symmetry {
 }
 
 impl Symmetry {
-    /// The one that the lowest three bits of a number say.
+    /// The one numbered by the lowest three bits.
     pub(crate) fn from_bits(bits: u64) -> Self {
         Self {
             mirrored: bits & 1 == 1,

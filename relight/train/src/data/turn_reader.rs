@@ -23,7 +23,7 @@ pub(crate) struct TurnReader {
     stream: Stream<Turns>,
     plan: DrawPlan,
     cursor: Cursor,
-    /// The epoch of the last group of which frames could be read.
+    /// The epoch of the last group with readable frames.
     readable: u64,
 }
 
@@ -47,12 +47,12 @@ pub(crate) struct TurnTensors {
     pub spec_net: Vec<bool>,
 }
 
-/// What is left of a group of frames.
+/// The readable frames of a group.
 #[derive(Debug)]
 pub(crate) struct TurnGroup {
-    /// Its frames; none where fewer than two can be read.
+    /// Its frames; `None` if fewer than two can be read.
     pub frames: Option<TurnTensors>,
-    /// What of it was damaged.
+    /// Its damage.
     pub damage: Option<String>,
 }
 
@@ -73,7 +73,7 @@ impl TurnReader {
         })
     }
 
-    /// Leaves all but each so many groups to other processes, which go on from the same cursor.
+    /// Keeps one group of so many; other processes read the others from the same cursor.
     ///
     /// # Errors
     /// [`TrainError::Data`].
@@ -114,7 +114,7 @@ impl TurnReader {
     /// The next group of this process, in 32 or 64 bits.
     ///
     /// # Errors
-    /// [`TrainError::Torch`]; [`TrainError::Refused`] where a whole epoch has no group with two frames.
+    /// [`TrainError::Torch`]; [`TrainError::Refused`] if a whole epoch has no group with two frames.
     pub(crate) fn next_group(
         &mut self,
         kind: Kind,
@@ -143,7 +143,7 @@ impl TurnReader {
     }
 }
 
-/// That a data set has no two frames of one turn that can be read.
+/// A data set has no two readable frames of one turn.
 pub(crate) fn no_frames() -> TrainError {
     TrainError::Refused("the turns have no batch of two frames that can be read".to_owned())
 }
@@ -180,7 +180,7 @@ fn tensors(batch: &TurnBatch, kind: Kind, device: Device) -> Result<TurnTensors,
 }
 
 /// Whether the gate opens for a frame that has no record, as in the layout of the paper's released data set: by the
-/// saturated part of the pixels that are there.
+/// saturated part of the existing pixels.
 fn is_saturated(batch: &TurnBatch, frame: usize) -> bool {
     let pixels = batch.extent.pixels();
     let level = Srgb::to_linear(SATURATED_VALUE);

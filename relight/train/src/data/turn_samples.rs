@@ -1,4 +1,4 @@
-//! What the network of turns learns from: views of objects on the table, each in a random room, as tensors.
+//! Training data of the network of turns: views of objects on the table, each in a random environment light, as tensors.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use relight_turn::{NetworkTurn, PhaseHypothesis, network_input};
 /// Views that are drawn for training, for validation.
 const TRAINING: u64 = 41;
 const VALIDATION: u64 = 42;
-/// Of the turns that are drawn, one in so many has the phase of its second harmonic, in one of two directions.
+/// One of so many drawn turns has the phase of its second harmonic, in one of two directions.
 const BY_SECOND: u64 = 3;
 
 /// Views and rooms to draw from.
@@ -70,7 +70,7 @@ impl TurnViews {
         Self::new(settings, folder, library, VALIDATION)
     }
 
-    /// What of the folders is not used.
+    /// Unused files of the folders.
     pub(crate) fn left_out(&self) -> &[LeftOut] {
         &self.library.left_out
     }

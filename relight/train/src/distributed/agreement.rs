@@ -10,7 +10,7 @@ use crate::error::TrainError;
 
 const HASH: Crc<u64> = Crc::<u64>::new(&CRC_64_XZ);
 
-/// A fact by what it is called, in the plural, and as text.
+/// A fact: its name in the plural, and its text.
 pub(crate) type Fact = (&'static str, String);
 
 /// Compares facts, which all processes have in the same order.
@@ -30,15 +30,15 @@ pub(crate) fn agree(group: &ProcessGroup, facts: &[Fact]) -> Result<(), TrainErr
         if let Some(fact) = differs {
             let what = facts[fact].0;
             return Err(TrainError::Refused(format!(
-                "{what} of process {process} are not those of process 0: start all processes with the same program, command \
-                 and files, and a folder for the run that all of them see"
+                "{what} of process {process} are not those of process 0: start all processes with the same program, command, \
+                 files and shared run folder"
             )));
         }
     }
     Ok(())
 }
 
-/// A few numbers that tell parameters apart, whatever the number of threads that made them.
+/// A few numbers that identify parameters, independent of the number of threads.
 ///
 /// # Errors
 /// [`TrainError::Torch`].

@@ -5,12 +5,12 @@ use relight_core::reader::Rank;
 
 use crate::error::TrainError;
 
-/// The rank of this process among those of a run, and where they meet.
+/// The rank of this process in a run, and the address of its rendezvous.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
     /// Which process this is, and how many there are.
     pub rank: Rank,
-    /// Which process of its machine this is, where the launcher says it: the number of its GPU.
+    /// The process's number on its machine, if the launcher gives it: the number of its GPU.
     pub local: Option<usize>,
     /// The host name or address of process 0.
     pub address: String,
@@ -79,8 +79,8 @@ impl Launch {
 
 fn incomplete(set: &str, missing: &str) -> TrainError {
     TrainError::Refused(format!(
-        "{set} is set and {missing} is not: to train with several processes, set RANK, WORLD_SIZE, MASTER_ADDR and \
-         MASTER_PORT for each of them, as torchrun does; for one process, unset RANK and WORLD_SIZE"
+        "{set} is set and {missing} is not: set RANK, WORLD_SIZE, MASTER_ADDR and MASTER_PORT for each process, as torchrun \
+         does, or unset RANK and WORLD_SIZE"
     ))
 }
 

@@ -52,7 +52,7 @@ unsafe extern "C" {
     fn relight_group_leave(group: *mut RawGroup);
 }
 
-/// This process and the others of its run. All of them make the same calls in the same order.
+/// The processes of a run. All of them make the same calls in the same order.
 #[derive(Debug)]
 pub struct ProcessGroup {
     rank: Rank,
@@ -60,7 +60,7 @@ pub struct ProcessGroup {
 }
 
 impl ProcessGroup {
-    /// Meets the other processes; all of them are there when it returns.
+    /// Waits for the other processes; all have joined when it returns.
     ///
     /// # Errors
     /// [`TrainError::Refused`].
@@ -97,7 +97,8 @@ impl ProcessGroup {
             }
         })
         .map_err(not_joined)?;
-        let raw = NonNull::new(raw).ok_or_else(|| not_joined("c10d made no group".to_owned()))?;
+        let raw = NonNull::new(raw)
+            .ok_or_else(|| not_joined("c10d did not create a group".to_owned()))?;
         let rank = launch.rank;
         Ok(Self { rank, raw })
     }
@@ -114,7 +115,7 @@ impl ProcessGroup {
         self.rank.index() == 0
     }
 
-    /// Replaces numbers by their sums over all processes, which have the same number of them.
+    /// Replaces numbers by their sums over all processes; each has equally many.
     ///
     /// # Errors
     /// [`TrainError::ProcessLost`].
@@ -184,7 +185,7 @@ impl ProcessGroup {
     }
 }
 
-/// That a setting cannot be divided among the processes.
+/// A setting cannot be divided among the processes.
 pub(crate) fn indivisible(name: &str, value: u64, rank: Rank, needed: &str) -> TrainError {
     let of = rank.world_size();
     TrainError::Refused(format!("{name} is {value}: {of} processes need {needed}"))

@@ -13,8 +13,8 @@ use crate::error::TrainError;
 use crate::settings::RunSettings;
 use relight_photo::nets::Weights;
 
-/// The number of steps in a saved memory, in thousands and the rest: 32 bits hold both exactly. Steps of which nothing could
-/// be learned do not count, so it is not that of the run.
+/// The number of steps in a saved memory, in thousands and the rest: 32 bits hold both exactly. Skipped steps
+/// do not count, so it differs from the step of the run.
 const STEPS: &str = "steps";
 const STEPS_PART: u64 = 1000;
 
@@ -88,7 +88,7 @@ impl Adam {
     /// Goes on from a memory that was saved.
     ///
     /// # Errors
-    /// [`TrainError::Refused`] where it is another network's.
+    /// [`TrainError::Refused`] if it is another network's.
     pub fn recall(&mut self, memory: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.first, &memory.under("first."))?;
         copy_into(&mut self.second, &memory.under("second."))?;

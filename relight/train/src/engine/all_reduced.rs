@@ -74,7 +74,7 @@ impl AllReducedLosses {
         })
     }
 
-    /// What this process adds to the all-reduced loss, to be descended; none where it has nothing.
+    /// What this process adds to the all-reduced loss, to be descended; `None` if it has nothing.
     ///
     /// # Errors
     /// [`TrainError::Torch`].

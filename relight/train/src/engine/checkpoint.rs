@@ -1,4 +1,4 @@
-//! A run on disk: one file that is whole or not there, from which the run goes on to the same losses.
+//! A run on disk: one complete file or none, from which the run resumes with the same losses.
 
 use std::collections::HashMap;
 use std::fs;
@@ -23,7 +23,7 @@ pub struct Checkpoint {
     pub step: u64,
     /// The settings, as TOML: another run's are refused.
     pub settings: String,
-    /// What the run was given beside its settings: another run's is refused.
+    /// The inputs of the run besides its settings: those of another run are refused.
     pub inputs: String,
     /// The cursor in the data; the file names it `place`.
     pub cursor: String,
@@ -59,7 +59,7 @@ impl Checkpoint {
         durable::write_whole(&path, &bytes).map_err(TrainError::io(&path, "written"))
     }
 
-    /// Reads the one in a run's folder; none where there is none.
+    /// Reads the checkpoint in a run's folder; `None` if it has none.
     ///
     /// # Errors
     /// [`TrainError::Io`] or [`TrainError::Refused`].
@@ -86,11 +86,13 @@ impl Checkpoint {
                 .ok_or_else(|| format!("it has no {name}"))
         };
         if fact("schema")? != SCHEMA {
-            return Err(format!("it is no {SCHEMA}"));
+            return Err(format!("it is not a {SCHEMA}"));
         }
         Ok(Self {
             task: fact("task")?,
-            step: fact("step")?.parse().map_err(|_| "its step is no number")?,
+            step: fact("step")?
+                .parse()
+                .map_err(|_| "its step is not a number")?,
             settings: fact("settings")?,
             inputs: fact("inputs")?,
             cursor: fact("place")?,

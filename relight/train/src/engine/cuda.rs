@@ -11,7 +11,7 @@ use crate::error::TrainError;
 /// The GPU of a number, from 0.
 ///
 /// # Errors
-/// [`TrainError::Refused`] where libtorch has no library for CUDA that can be loaded, or finds fewer GPUs.
+/// [`TrainError::Refused`] if libtorch has no library for CUDA that can be loaded, or finds fewer GPUs.
 pub fn cuda_device(number: usize) -> Result<Device, TrainError> {
     load()?;
     let count = Cuda::device_count();
@@ -21,7 +21,7 @@ pub fn cuda_device(number: usize) -> Result<Device, TrainError> {
         Ok(Device::Cuda(number))
     } else {
         Err(TrainError::Refused(format!(
-            "there is no GPU {number}, counted from 0: libtorch finds {count} here"
+            "GPU {number}, counted from 0, does not exist: libtorch finds {count}"
         )))
     }
 }
@@ -45,8 +45,8 @@ fn load() -> Result<(), TrainError> {
     };
     let library = library.map_err(|fault| {
         TrainError::Refused(format!(
-            "libtorch's library for CUDA cannot be loaded: PyTorch for CUDA is needed with all its packages, its folder torch as \
-             LIBTORCH where relight is built, or torch/lib in LD_LIBRARY_PATH where it runs ({fault})"
+            "libtorch's CUDA library cannot be loaded ({fault}): install PyTorch for CUDA; give its folder torch as LIBTORCH \
+             to the build, or torch/lib in LD_LIBRARY_PATH"
         ))
     });
     std::mem::forget(library?);

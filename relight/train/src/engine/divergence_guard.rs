@@ -1,4 +1,4 @@
-//! Stops a run that has gone wrong: losses that are no numbers or explode, heads that collapse.
+//! Stops a run that has gone wrong: losses that are not finite or explode, heads that collapse.
 
 use std::collections::BTreeMap;
 
@@ -56,8 +56,7 @@ impl DivergenceGuard {
         match collapsed {
             None => Ok(()),
             Some((head, spread)) => Err(TrainError::Refused(format!(
-                "at step {step} the answers for {head} have hardly any variation left ({spread:.2e} of the ground truth's): \
-                 the head has collapsed, and the run ends"
+                "the run ends at step {step}: the head {head} has collapsed, with {spread:.2e} of the ground truth's variation"
             ))),
         }
     }
@@ -74,7 +73,7 @@ fn bad_loss(step: u64, loss: &str, value: f64) -> TrainError {
         part => part,
     };
     TrainError::Refused(format!(
-        "at step {step} the {loss} is {value}: the run ends before this step is made"
+        "the run ends before step {step}: the {loss} is {value}"
     ))
 }
 

@@ -12,12 +12,12 @@ const TINY: f64 = 1e-6;
 /// A chord so short counts as its square, for a gradient where it is 0.
 const CHORD_FLOOR: f64 = 0.02;
 
-/// A mean, and what it is a mean over: so that the mean over several parts of a batch can be made of theirs.
+/// A mean with its weight, so that means over parts of a batch can be combined.
 #[derive(Debug)]
 pub(crate) struct Mean {
     /// The mean.
     pub value: Tensor,
-    /// How much it is taken over, one number without gradient; above 0 where there is a mean.
+    /// Its weight, one number without gradient; above 0 if there is a mean.
     pub over: Tensor,
 }
 

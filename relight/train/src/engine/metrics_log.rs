@@ -18,14 +18,14 @@ pub struct MetricsLog {
 }
 
 impl MetricsLog {
-    /// The journal in a run's folder; a resumed run goes on behind the line of its last step.
+    /// The journal in a run's folder; a resumed run continues after the line of its last step.
     ///
     /// # Errors
-    /// [`TrainError::Io`], [`TrainError::Refused`] where another program has it open.
+    /// [`TrainError::Io`], [`TrainError::Refused`] if another program has it open.
     pub fn open(folder: &Path, from_step: u64) -> Result<Self, TrainError> {
         let running = || {
             TrainError::Refused(format!(
-                "the run in {} is being made by another program: wait for its end, or give another folder",
+                "another program is writing the run in {}: wait until it ends, or give another folder",
                 folder.display()
             ))
         };
@@ -64,7 +64,7 @@ impl MetricsLog {
     }
 }
 
-/// Opens the table without the lines of steps after `from_step`, which a run that is resumed makes again.
+/// Opens the table without the lines of steps after `from_step`, which a resumed run repeats.
 fn open_table(path: &Path, from_step: u64) -> io::Result<File> {
     let kept = match std::fs::read_to_string(path) {
         Ok(text) => {

@@ -97,7 +97,7 @@ impl Model {
     /// Takes over weights.
     ///
     /// # Errors
-    /// [`TrainError::Refused`] where they are another network's.
+    /// [`TrainError::Refused`] if they are another network's.
     pub fn recall(&mut self, weights: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.parameters, weights)
     }
@@ -220,7 +220,7 @@ fn channels_last(tensor: &Tensor) -> Result<Tensor, tch::TchError> {
 /// Copies saved numbers into tensors of the same names and shapes.
 ///
 /// # Errors
-/// [`TrainError::Refused`] where one is missing or has another shape.
+/// [`TrainError::Refused`] if one is missing or has another shape.
 pub(crate) fn copy_into(
     tensors: &mut BTreeMap<String, Tensor>,
     saved: &Weights,

@@ -28,7 +28,7 @@ use relight_photo::nets::WeightPrecision;
 /// itself be waiting for this one: only the neighbours of a lost process notice at once. Launchers kill after 30 seconds.
 const SUCCESSION: Duration = Duration::from_secs(3);
 
-/// What a run says while it goes on.
+/// Events of a run.
 pub trait TrainObserver {
     /// A step was made. `losses` have their weights.
     fn step(&mut self, step: u64, losses: &BTreeMap<String, f64>);
@@ -44,7 +44,7 @@ pub trait TrainObserver {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct RunOutcome {
-    /// Steps made in all.
+    /// Steps made in total.
     pub steps: u64,
     /// Whether it was asked to stop before its last step.
     pub stopped: bool,
@@ -75,11 +75,11 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Begins a run in a folder, or goes on with the one that is there (`resume`); among the processes of a group, all of
+    /// Begins a run in a folder, or resumes the existing one (`resume`); among the processes of a group, all of
     /// which open it with the same arguments.
     ///
     /// # Errors
-    /// [`TrainError::Refused`] where there is one without `resume`, or another one; [`TrainError::Io`],
+    /// [`TrainError::Refused`] if there is one without `resume`, or another one; [`TrainError::Io`],
     /// [`TrainError::ProcessLost`].
     pub fn open(
         task: &'a mut dyn TrainingTask,
@@ -95,7 +95,7 @@ impl<'a> Run<'a> {
             None => 0,
             Some(_) if !resume => {
                 return Err(TrainError::Refused(format!(
-                    "{} holds a run already: go on with --resume, or give another folder",
+                    "{} already holds a run: continue it with --resume, or give another folder",
                     folder.display()
                 )));
             }
@@ -132,7 +132,7 @@ impl<'a> Run<'a> {
     /// weights at the end.
     ///
     /// # Errors
-    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Refused`] where another process is lost:
+    /// Whatever a step fails with: the last checkpoint stays. [`TrainError::Refused`] if another process is lost:
     /// the run is
     /// saved.
     pub fn finish(
@@ -281,7 +281,7 @@ impl<'a> Run<'a> {
         journal.scalars(step, &values)
     }
 
-    /// Ends the run of which another process is lost: the first of those that are left saves it.
+    /// Ends the run after another process was lost: the first of the remaining processes saves it.
     fn end_early(&mut self, lost: TrainError, observer: &mut dyn TrainObserver) -> TrainError {
         let path = Checkpoint::path(self.folder);
         let path = path.display();
@@ -372,7 +372,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// What has to be the same in all processes.
+/// Facts that have to be equal in all processes.
 fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
     let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
     let weights = fingerprint(task.learner().model.parameters())?;
@@ -404,11 +404,10 @@ fn recall(
         )));
     }
     if let Some(setting) = task.differing_setting(&checkpoint.settings) {
-        return Err(other(format!("its settings are others: {setting}")));
+        return Err(other(format!("its settings differ: {setting}")));
     }
     if checkpoint.inputs != inputs {
-        let fault =
-            "it was trained on other turns, or with other networks beside the one that learns";
+        let fault = "it was trained on other turns, or with other fixed networks";
         return Err(other(fault.to_owned()));
     }
     task.go_to(&checkpoint.cursor).map_err(other)?;

@@ -1,4 +1,4 @@
-//! What a run trains, on what, and what it hears of it: the losses of a step, the figures of a validation.
+//! A training task: the networks, the data, the losses of a step, and the figures of a validation.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -28,13 +28,13 @@ pub trait TrainingTask {
     /// Its name, as on the command line.
     fn name(&self) -> &'static str;
 
-    /// The settings that make the run what it is, as TOML.
+    /// The settings that determine the run, as TOML.
     fn settings(&self) -> String;
 
     /// The first setting that another run's settings have otherwise.
     fn differing_setting(&self, other: &str) -> Option<String>;
 
-    /// What it was given beside its settings and what learns, as text that is the same where that is.
+    /// A text that identifies the inputs, apart from the settings and the trained weights.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
@@ -45,10 +45,10 @@ pub trait TrainingTask {
     /// Takes this process's part of the work from now on. Called before the first step.
     ///
     /// # Errors
-    /// [`TrainError::Refused`] where the settings leave no equal parts.
+    /// [`TrainError::Refused`] if the settings leave no equal parts.
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
 
-    /// What of a user's own files it does not use.
+    /// Unused files of the user.
     fn left_out(&self) -> &[LeftOut] {
         &[]
     }
@@ -69,7 +69,7 @@ pub trait TrainingTask {
     /// Whatever keeps them from being computed.
     fn validate(&mut self) -> Result<Validation, TrainError>;
 
-    /// The cursor in data that are read one after the other, to go on from; empty where there are none.
+    /// The cursor in data that are read in order, to resume from; empty without such data.
     fn cursor(&self) -> String {
         String::new()
     }
@@ -77,7 +77,7 @@ pub trait TrainingTask {
     /// Goes on from such a cursor.
     ///
     /// # Errors
-    /// A sentence that says why it cannot.
+    /// A sentence with the reason.
     fn go_to(&mut self, _place: &str) -> Result<(), String> {
         Ok(())
     }

@@ -45,7 +45,7 @@ impl LossTerms {
         });
     }
 
-    /// Says that there is nothing in the batch that this loss could be taken of.
+    /// Notes that the batch has no data for this loss.
     pub(crate) fn add_nothing(&mut self, name: &'static str, coefficient: f64) {
         let mean = None;
         self.0.push(Term {
@@ -61,7 +61,7 @@ impl LossTerms {
         self.0.iter().all(|term| term.mean.is_none())
     }
 
-    /// What each loss is a mean over, and its value; 0 and 0 where there is nothing.
+    /// The weight and value of each loss; 0 and 0 without data.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
@@ -74,7 +74,7 @@ impl LossTerms {
         self.0.iter().map(mean).collect()
     }
 
-    /// The weighted sum, in which each loss counts the part that `parts` says: 1 for all of it. None where there is
+    /// The weighted sum, with each loss scaled by its entry of `parts`: 1 for all of it. `None` if there is
     /// nothing.
     ///
     /// # Errors

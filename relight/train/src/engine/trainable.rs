@@ -106,7 +106,7 @@ impl Trainable {
     /// Goes on from a state that was saved.
     ///
     /// # Errors
-    /// [`TrainError::Refused`] where it is another network's.
+    /// [`TrainError::Refused`] if it is another network's.
     pub fn recall(&mut self, state: &Weights) -> Result<(), TrainError> {
         let own = state.under(&format!("{}.", self.name));
         self.model.recall(&own.under("model."))?;

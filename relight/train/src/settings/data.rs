@@ -11,7 +11,7 @@ use crate::error::TrainError;
 const MAX_SAMPLES: u64 = 1_000_000;
 const MAX_SIZE: u32 = 1024;
 
-/// Of what photographs are made: the table `[data]`.
+/// The data of photographs: the table `[data]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DataSettings {
@@ -19,7 +19,7 @@ pub struct DataSettings {
     pub size: u32,
     /// Views from which each step draws.
     pub views: u64,
-    /// Views that are cast anew at each step, in place of the oldest.
+    /// New views cast at each step, in place of the oldest.
     pub new_views: u64,
     /// Rays a pixel of a view.
     pub rays: u32,
@@ -34,7 +34,7 @@ pub struct DataSettings {
     /// A folder of panoramas, or the training part of a packed library, in place of the synthetic ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub panoramas: Option<PathBuf>,
-    /// Samples on which the network is validated, made from seeds that it does not train on.
+    /// Validation samples, from seeds that are not used in training.
     pub validation: u64,
 }
 
@@ -54,7 +54,7 @@ impl Default for DataSettings {
     }
 }
 
-/// What a step takes from turns: the table `[turns]`.
+/// The turns of a step: the table `[turns]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TurnSettings {

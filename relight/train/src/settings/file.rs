@@ -8,14 +8,14 @@ use serde::de::DeserializeOwned;
 
 use crate::error::TrainError;
 
-/// Settings that a run may change when it goes on: what it learns does not depend on them.
+/// Settings that a resumed run may change: they do not affect what it learns.
 const CHANGEABLE: [&str; 3] = [
     "run.log_every",
     "run.checkpoint_minutes",
     "data.view_folder",
 ];
 
-/// Reads settings from a TOML file; what it does not name has its default, and an unknown name is an error.
+/// Reads settings from a TOML file; missing keys have their defaults, and unknown keys are errors.
 ///
 /// # Errors
 /// [`TrainError::Io`], [`TrainError::Refused`].
@@ -23,7 +23,7 @@ pub fn read_settings<S: DeserializeOwned>(path: &Path) -> Result<S, TrainError> 
     let text = text::read(path).map_err(TrainError::io(path, "read"))?;
     toml::from_str(&text).map_err(|fault| {
         TrainError::Refused(format!(
-            "{} is no file of settings: {fault}",
+            "{} is not a settings file: {fault}",
             path.display()
         ))
     })

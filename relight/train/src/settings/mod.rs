@@ -200,7 +200,7 @@ fn positive(name: &str, value: f64) -> Result<(), TrainError> {
     ensure(value > 0.0 && value.is_finite(), name, value, "above 0")
 }
 
-/// Says which setting is not allowed, and what is.
+/// The error of a setting that is not allowed.
 fn ensure(
     is_allowed: bool,
     name: &str,

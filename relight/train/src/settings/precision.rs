@@ -17,7 +17,7 @@ pub enum ComputePrecision {
 }
 
 impl ComputePrecision {
-    /// The type of parameters, of what goes in and of what comes out.
+    /// The type of parameters, inputs and outputs.
     #[must_use]
     pub fn kind(self) -> Kind {
         match self {

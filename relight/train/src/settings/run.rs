@@ -14,9 +14,9 @@ const MAX_MINUTES: f64 = 1e6;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunSettings {
-    /// Of the initial weights and of all draws.
+    /// The seed of the initial weights and of all draws.
     pub seed: u64,
-    /// Steps in all, at least 1.
+    /// Steps of the whole run, at least 1.
     pub steps: u64,
     /// Samples of a step, at least 1.
     pub batch: u64,

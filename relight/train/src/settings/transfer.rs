@@ -15,12 +15,12 @@ const MAX_VIEWS: u64 = 1_000_000;
 pub struct TransferSettings {
     /// Width and height, a multiple of 32.
     pub size: u32,
-    /// Views in all; each is cast once.
+    /// The number of views; each is cast once.
     pub views: u64,
-    /// The folder in which views are kept; runs can share it. `views` in the folder of the run where there is none.
+    /// The folder in which views are kept; runs can share it. Default: `views` in the folder of the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub view_folder: Option<PathBuf>,
-    /// Views that are there from the first step on.
+    /// Views that exist from the first step on.
     pub first_views: u64,
     /// Views that join at each step, until all have.
     pub new_views: u64,
@@ -40,7 +40,7 @@ pub struct TransferSettings {
     /// none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation_panoramas: Option<PathBuf>,
-    /// Turns on which the network is validated, of procedural shapes that it does not train on.
+    /// Validation turns, of procedural shapes that are not used in training.
     pub validation: u64,
 }
 

@@ -37,7 +37,7 @@ pub struct AnsweredTensors {
     pub shading: Tensor,
     /// Highlight in whites, 1 channel.
     pub highlight: Tensor,
-    /// How much of the darkness is paint, as a logit, 1 channel; none of a network without that head.
+    /// How much of the darkness is paint, as a logit, 1 channel; `None` for a network without that head.
     pub paint: Option<Tensor>,
     /// The light, `batch x 9` as [`relight_photo::decompose::PredictedLight`] has it; none of a network without that head.
     pub light: Option<Tensor>,

@@ -30,7 +30,7 @@ pub struct DecomposeTask {
 }
 
 impl DecomposeTask {
-    /// Reads what photographs are made of, and begins with `weights`, or with random ones.
+    /// Reads the data of photographs, and starts from `weights`, or from random ones.
     ///
     /// # Errors
     /// Settings out of range, files that cannot be read, weights that do not fit.

@@ -1,4 +1,4 @@
-//! What is trained, and by which losses: the network of photographs, the network of turns, the paper's phases.
+//! Networks and their losses: the network of photographs, the network of turns, the paper's phases.
 
 pub(crate) mod contact_sheet;
 pub(crate) mod decompose;

@@ -1,4 +1,4 @@
-//! The networks of the paper's phases: which one a phase trains, which ones it is given, and what it descends on them.
+//! The networks of the paper's phases: the one that a phase trains, the given ones, and their losses.
 
 use std::iter;
 use std::path::PathBuf;
@@ -62,7 +62,7 @@ impl PhaseNetworks {
     /// Reads the networks that the phase is given.
     ///
     /// # Errors
-    /// [`TrainError::Refused`] where one is missing, those of [`Model::new`].
+    /// [`TrainError::Refused`] if one is missing, those of [`Model::new`].
     pub(crate) fn new(
         phase: PaperPhase,
         settings: &PaperSettings,
@@ -117,7 +117,7 @@ impl PhaseNetworks {
         }
     }
 
-    /// The loss on a batch of composed samples; none where the phase has none.
+    /// The loss on a batch of composed samples, if the phase has one.
     pub(crate) fn on_truth(
         &self,
         own: &Model,
@@ -191,7 +191,7 @@ impl PhaseNetworks {
         ])
     }
 
-    /// The loss on a batch of turns; none where the gate of saturation is closed.
+    /// The loss on a batch of turns; `None` if the gate of saturation is closed.
     pub(crate) fn on_turns(
         &self,
         own: &Model,

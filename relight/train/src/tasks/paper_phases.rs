@@ -101,7 +101,7 @@ fn low_rank(of: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
     low_rank_loss(&rows(of, mask)?)
 }
 
-/// The frames for which the gate of saturation opens Spec-Net, and their masks; none where they are fewer than two.
+/// The frames for which the gate of saturation opens Spec-Net, and their masks; `None` if they are fewer than two.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
@@ -135,7 +135,7 @@ pub(crate) fn diffuse_chromaticity(
     chromaticity(&picture.f_sub(&highlight)?.f_clamp(DARKEST, 1.0)?)
 }
 
-/// Low-rank loss of the chromaticity that Spec-Net's diffuse pictures have; none where the gate opens for fewer than
+/// Low-rank loss of the chromaticity that Spec-Net's diffuse pictures have; `None` if the gate opens for fewer than
 /// two frames.
 ///
 /// # Errors
@@ -197,7 +197,7 @@ pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Trut
     })
 }
 
-/// Scale-invariant error of the shading that Light-Net's light makes of the true normals of composed samples.
+/// Scale-invariant error of the shading by Light-Net's light on the true normals of composed samples.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
@@ -274,7 +274,7 @@ fn gate(turns: &TurnTensors) -> Result<Tensor, TrainError> {
 }
 
 /// Mean squared difference between Spec-Net's highlight and the one that the answered reflectance and smoothness
-/// render; none where the gate opens for no frame.
+/// render; `None` if the gate opens for no frame.
 ///
 /// # Errors
 /// [`TrainError::Torch`].

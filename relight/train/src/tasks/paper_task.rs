@@ -34,10 +34,10 @@ pub struct PaperTask {
 }
 
 impl PaperTask {
-    /// Reads what photographs are made of, opens the turns, and makes the networks.
+    /// Reads the data of photographs, opens the turns, and makes the networks.
     ///
     /// # Errors
-    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Refused`] where the phase
+    /// Settings out of range, files that cannot be read, weights that do not fit, [`TrainError::Refused`] if the phase
     /// needs what is not given.
     pub fn new(
         phase: PaperPhase,
@@ -51,13 +51,13 @@ impl PaperTask {
         }
         if inputs.turns.is_some() && !phase.learns_from_turns() {
             return Err(TrainError::Refused(format!(
-                "relight train {} learns from synthetic photographs, not from turns: leave --turns away",
+                "relight train {} learns from synthetic photographs, not from turns: omit --turns",
                 phase.name()
             )));
         }
         if inputs.held_out.is_some() && !phase.is_judged_by_turns() {
             return Err(TrainError::Refused(format!(
-                "relight train {} has no figures on turns: leave --validation-turns away",
+                "relight train {} does not validate on turns: omit --validation-turns",
                 phase.name()
             )));
         }
@@ -128,7 +128,7 @@ impl PaperTask {
         Ok(())
     }
 
-    /// The coefficient of the supervised term on composed samples: 1 where there are no turns.
+    /// The coefficient of the supervised term on composed samples: 1 without turns.
     fn supervised(&self) -> f64 {
         match (&self.networks, &self.turns) {
             (PhaseNetworks::Specular { .. }, _) => 0.0,
@@ -233,7 +233,7 @@ impl TrainingTask for PaperTask {
         match (&mut self.turns, cursor) {
             (Some(reader), Some(cursor)) => reader.go_to(cursor).map_err(|error| error.to_string()),
             (None, None) => Ok(()),
-            _ => Err("it was trained with turns, or without, and this run is not".to_owned()),
+            _ => Err("one of the two runs has turns, the other has not".to_owned()),
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Which part of a picture's darkness is paint, and which is lack of light: what the head for paint learns.
+//! The part of a picture's darkness that is paint rather than lack of light: the target of the head for paint.
 //!
 //! A pixel of albedo R under a shading S is darker than the object's brightest place by `ln(R_b / R) + ln(S_b / S)`. The
-//! first summand's part of the sum is what is paint. Bright pixels say nothing, so each counts as its darkness does.
+//! first summand's part of the sum is what is paint. Bright pixels carry no information, so each is weighted by its darkness.
 
 use tch::Tensor;
 

@@ -16,15 +16,15 @@ use relight_core::reader::Rank;
 use relight_photo::nets::{LOG_MEANS, Weights, turn_network};
 use relight_synth::{DrawnTurn, LeftOut, stream};
 
-/// What the expected error counts beside the normals.
+/// The loss coefficient of the expected error; that of the normals is 1.
 const EXPECTED_ERROR: f64 = 0.05;
-/// What the albedo counts beside them.
+/// The loss coefficient of the albedo; that of the normals is 1.
 const ALBEDO: f64 = 0.5;
 /// Range of the logarithm of the expected chord while training.
 const LOG_CHORD: (f64, f64) = (-4.0, 1.0);
 /// Turns of a batch of validation.
 const VALIDATION_BATCH: usize = 8;
-/// Expected errors at which validation says how many pixels keep them, degrees.
+/// Expected errors for which validation counts the pixels within them, degrees.
 const WITHIN_DEG: [(f64, &str); 2] = [(10.0, "within_10"), (20.0, "within_20")];
 
 /// Training of the network of whole turns.
@@ -81,7 +81,7 @@ impl TurnNetworkTask {
     }
 }
 
-/// Unit normals, and the logarithm of the chord by which they are expected to be off.
+/// Unit normals, and the logarithm of their expected chord error.
 fn answered(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
     let normals = answer.f_narrow(1, 0, 3)?;
     let length = normals
@@ -96,7 +96,7 @@ fn answered(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
 }
 
 /// How far the logarithm of the albedo is off at each pixel and channel, 0 outside the masks. Each channel of a turn is in a
-/// unit of its own: that in which it is off by 0 in the mean.
+/// unit of its own, in which its mean error is 0.
 fn albedo_errors(answer: &Tensor, batch: &TurnBatch) -> Result<Tensor, TrainError> {
     let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
     let errors = answer

@@ -1,4 +1,4 @@
-//! What networks are judged by while they train: turns and composed samples on which none of them trains.
+//! Validation during training: on turns and composed samples that no network trains on.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,11 +18,11 @@ use relight_synth::{Library, Recipe, stream};
 const TURN_BATCHES: usize = 4;
 /// Samples of a batch of composed samples.
 const SAMPLE_BATCH: usize = 16;
-/// Part of the pictures whose values are taken for sRGB, whatever the camera's response.
+/// Part of the pictures whose values are read as sRGB, whatever the camera's response.
 const TAKEN_AS_SRGB: f64 = 0.10;
-/// Part of the pictures that a plain camera takes (sRGB, no noise, no compression); the others are taken as the recipe says.
+/// Part of the pictures that a plain camera takes (sRGB, no noise, no compression); the others follow the recipe.
 const PLAIN: f64 = 0.5;
-/// A highlight is there from this part of white on.
+/// The least part of white that counts as a highlight.
 const SEEN_HIGHLIGHT: f64 = 0.05;
 
 /// Figures by name, each a mean over what was looked at.
@@ -32,7 +32,7 @@ pub(crate) type Figures = BTreeMap<String, f64>;
 #[derive(Debug)]
 pub(crate) struct HeldOutTurns {
     batches: Vec<TurnTensors>,
-    /// What of them was damaged, until it was said.
+    /// The damage in them, until it is reported.
     damage: Option<String>,
 }
 
@@ -75,13 +75,13 @@ impl HeldOutTurns {
     }
 }
 
-/// Ray-cast samples of objects that are never trained on: their shapes are made, none of them is a mesh.
+/// Ray-cast samples of objects that are never trained on, all procedural.
 #[derive(Debug)]
 pub(crate) struct HeldOutSamples {
     recipe: Recipe,
     library: Library,
     count: u64,
-    /// Made when they are needed first: only one process of several looks at them.
+    /// Made at their first use, in one process only.
     samples: OnceLock<Vec<TruthArrays>>,
 }
 

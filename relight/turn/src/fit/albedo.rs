@@ -1,4 +1,4 @@
-//! The albedo of pixels whose normals are hardly to be trusted: by those around them that are. Knows nothing of light.
+//! The albedo of pixels with uncertain normals, from their neighbours with certain ones. Knows nothing of light.
 //!
 //! A wrong normal has a wrong shading, and so its pixel a wrong albedo. Albedos of one surface are alike where its
 //! colour is, and the chromaticity of a pixel's mean light shows that without any normal.

@@ -26,7 +26,7 @@ const RELATIVE_RESIDUAL: f64 = 0.005;
 const COMMON: f64 = 0.08;
 /// Error of normals where the turn does not determine them, radians. By hand.
 pub(crate) const UNOBSERVABLE: f64 = 1.0;
-/// Error of a normal nearly all of whose light is clipped, radians. By hand.
+/// Error of a normal whose light is nearly all clipped, radians. By hand.
 const CLIPPED: f64 = 0.8;
 
 /// The pixels of a turn as they are fitted.
@@ -38,10 +38,10 @@ pub(crate) struct FittedPixels<'a> {
     pub(crate) fits: &'a [PixelFit],
 }
 
-/// What a pixel's normal is expected to be off by itself, radians.
+/// The expected error of a pixel's normal alone, radians.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OwnError {
-    /// By what is left of its curve, and by what is clipped.
+    /// From its curve's residual, and from its clipped part.
     deviation: f64,
     /// By how far it is from the normals around it.
     inconsistency: f64,
@@ -57,7 +57,7 @@ impl OwnError {
     }
 }
 
-/// What all normals of a turn are expected to be off, radians.
+/// The expected error of all normals of a turn, radians.
 pub(crate) fn common_error(elevation: Elevation, is_fit: bool) -> f64 {
     let unobservable = if is_fit { 0.0 } else { UNOBSERVABLE };
     COMMON
@@ -65,7 +65,7 @@ pub(crate) fn common_error(elevation: Elevation, is_fit: bool) -> f64 {
         .hypot(unobservable)
 }
 
-/// What each pixel's normal is expected to be off by itself.
+/// The expected error of each pixel's normal alone.
 pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
     let FittedPixels {
         curves,

@@ -86,7 +86,7 @@ struct Projection {
 }
 
 impl Projection {
-    /// The albedo that is shrunk toward another one, by this much beside what the curve says.
+    /// The albedo, shrunk toward another one with this weight relative to the curve.
     fn shrunk(self, to: f64, by: f64) -> f64 {
         if self.own + by > 1e-12 {
             ((self.along + by * to) / (self.own + by)).max(0.0)
@@ -219,7 +219,7 @@ impl CurveStatistics {
     }
 
     /// The albedo that fits the curve best, shrunk toward one from which albedos of an object are `spread` away: as far
-    /// as what is left of the curve, taken for noise of `freedom` degrees of freedom, lets it be any other.
+    /// as the curve's residual, as noise of `freedom` degrees of freedom, leaves it uncertain.
     pub(crate) fn shrunk_albedo(
         &self,
         harmonics: &PixelHarmonics,

@@ -6,11 +6,11 @@ use relight_core::light::{Order, Panorama, ShLight};
 
 use crate::error::TurnError;
 
-/// The light of a file: the coefficients that it holds, or a panorama (.hdr, .exr) projected to the order that gloss is
+/// The light of a file: its coefficients, or a panorama (.hdr, .exr) projected to the order that gloss is
 /// fitted with.
 ///
 /// # Errors
-/// Where the file cannot be read.
+/// If the file cannot be read.
 pub fn read_given_light(path: &Path) -> Result<ShLight, TurnError> {
     let is_panorama = path.extension().is_some_and(|ending| {
         ending.eq_ignore_ascii_case("hdr") || ending.eq_ignore_ascii_case("exr")

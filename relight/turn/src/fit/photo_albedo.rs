@@ -8,16 +8,16 @@ use relight_photo::nets::Weights;
 use crate::error::TurnError;
 use crate::observe::curves::TurnCurves;
 
-/// Frames that are decomposed, spread over the turn. Measured: with twelve the error is no less.
+/// Frames that are decomposed, spread over the turn. Measured: twelve do not reduce the error.
 const FRAMES: usize = 4;
 /// The least albedo that counts: darker ones are noise. Numerical.
 const DARKEST: f32 = 1e-4;
 
-/// The albedo of the decomposing network: the geometric mean over a few frames of the turn, each of which the network
-/// sees in another light. Its unit is not known.
+/// The albedo of the decomposing network: the geometric mean over a few frames of the turn, each in
+/// another light. Its unit is not known.
 ///
 /// # Errors
-/// Where the network fails.
+/// If the network fails.
 pub(crate) fn photo_albedo(
     weights: &Weights,
     frames: &[Rgb<Linear>],

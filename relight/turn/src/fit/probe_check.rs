@@ -1,4 +1,4 @@
-//! Whether a ball is where it is said to be: the light that is fitted to it has to fit it, and no circle beside it
+//! Checks the place given for a ball: the light that is fitted to it has to fit it, and no other circle
 //! has a clearly smaller residual. Knows nothing of what the light is used for.
 
 use crate::error::TurnError;
@@ -22,7 +22,7 @@ const STEPS: [f64; 3] = [-1.0, 0.0, 1.0];
 const REFINED: i32 = 3;
 /// Largest residual of a grey ball by its own light, over that by an even light. By hand.
 const MAX_OF_GREY: f64 = 0.3;
-/// The same of a chrome ball, of whose small windows the panorama keeps less. By hand.
+/// The same of a chrome ball; the panorama resolves its small windows less. By hand.
 const MAX_OF_CHROME: f64 = 0.6;
 /// Largest part of the given circle's residual with which another one is the ball. By hand.
 const CLEARLY: f64 = 0.6;
@@ -49,10 +49,10 @@ struct Shown<'a> {
     ball: ProbeBall,
 }
 
-/// The residual of a ball's own light, over the variation, 0 to 1, at the place that was given for it.
+/// The residual of a ball's own light, over the variation, 0 to 1, at its given place.
 ///
 /// # Errors
-/// [`TurnError::NoBall`] where that is most of it, [`TurnError::Misplaced`] where another circle has a clearly
+/// [`TurnError::NoBall`] if that is most of it, [`TurnError::Misplaced`] if another circle has a clearly
 /// smaller one.
 pub(crate) fn check(
     curves: &TurnCurves,
@@ -140,7 +140,7 @@ impl Shown<'_> {
         }
     }
 
-    /// The residual of the light fitted to a ball in a circle, over that of an even light; none where the circle is not
+    /// The residual of the light fitted to a ball in a circle, over that of an even light; `None` if the circle is not
     /// in the picture, or nothing varies in it.
     fn residual(&self, circle: Circle) -> Option<f64> {
         let wanted =

@@ -25,7 +25,7 @@ pub struct ProbeLight {
     pub light: ShLight,
     /// How many frames it was measured in.
     pub frames: u32,
-    /// What the ball was taken for.
+    /// The kind of ball assumed.
     pub ball: ProbeBall,
     /// What it looks like.
     pub looks: ProbeBall,
@@ -46,7 +46,7 @@ impl ProbeBuilder {
     /// The light.
     ///
     /// # Errors
-    /// Where the frames tell too little, or the ball is not where it is said to be: [`TurnError::Misplaced`] and
+    /// If the frames show too little, or the ball is not at the given place: [`TurnError::Misplaced`] and
     /// [`TurnError::NoBall`].
     pub(crate) fn finish(self) -> Result<ProbeLight, TurnError> {
         let Probe {
@@ -131,7 +131,7 @@ mod tests {
         light
     }
 
-    /// What is seen beside the ball: above, an environment that moves past, and below, the table.
+    /// The surroundings of the ball in the picture: above, an environment that moves past; below, the table.
     fn behind(angle_deg: f64, x: usize, y: usize) -> [f32; 3] {
         if y > 50 {
             return [0.5, 0.45, 0.4];
@@ -149,7 +149,7 @@ mod tests {
         try_measure(probe(ball), shown).unwrap()
     }
 
-    /// The same for a ball that is said to be elsewhere.
+    /// The same for a ball at another given place.
     fn try_measure(
         probe: Probe,
         shown: impl Fn(&ShLight, &Normals<YUp>) -> Planes<3>,

@@ -1,5 +1,5 @@
-//! The residual of a pixel's curve, and which parts of the turn its fit may believe by it: not those in which it is in
-//! another's shadow or shows a highlight.
+//! The residual of a pixel's curve, and the parts of the turn that its fit may use: not those in which it lies in
+//! shadow or shows a highlight.
 
 use relight_core::statistics::upper_median;
 
@@ -9,7 +9,7 @@ use crate::model::harmonics::COEFFICIENTS;
 use crate::model::shading::{PixelHarmonics, ShadingModel};
 use crate::observe::curves::TurnCurves;
 
-/// Least share of what is seen that the model is taken to fit, 0 to 1. By hand.
+/// Least share of the observed light that the model is assumed to fit, 0 to 1. By hand.
 const MIN_MODEL: f64 = 0.1;
 
 /// Residual whose weight is one quarter, in standard deviations. By hand.
@@ -17,8 +17,8 @@ const WIDTH: f64 = 2.0;
 /// Least standard deviation, in parts of the pixel's mean light. By hand.
 const MIN_DEVIATION: f64 = 0.01;
 
-/// The light by which what is left of a pixel is measured: the model's mean over the turn, or a tenth of what is
-/// seen where that is more.
+/// The unit of a pixel's residual: the model's mean over the turn, or a tenth of what is
+/// seen, if that is more.
 fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, model: &ShadingModel) -> f64 {
     let harmonics = model.harmonics(fit.normal);
     let predicted: f64 = (0..3).map(|c| fit.albedo[c] * harmonics.base[c][0]).sum();
@@ -27,7 +27,7 @@ fn reference(curves: &TurnCurves, pixel: usize, fit: &PixelFit, model: &ShadingM
 }
 
 /// How much more light than the fit's each part of the turn has, the mean of the channels, over the
-/// [`reference`]; none where all channels are clipped.
+/// [`reference`]; `None` if all channels are clipped.
 pub(crate) fn residuals(
     curves: &TurnCurves,
     pixel: usize,

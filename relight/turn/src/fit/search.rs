@@ -1,4 +1,4 @@
-//! The normal of one pixel: the one whose curve is nearest to what was seen.
+//! The normal of one pixel: the one whose curve is nearest to the observed one.
 
 use rayon::prelude::*;
 
@@ -12,7 +12,7 @@ const CANDIDATES: usize = 400;
 const REFINED: usize = 3;
 /// First step of a refinement, radians. By hand: half the distance of candidates.
 const FIRST_STEP: f64 = 0.06;
-/// Step at which it is told which of the candidates is the best, radians. By hand.
+/// Step at which the best candidate is chosen, radians. By hand.
 const ROUGH_STEP: f64 = 0.01;
 /// Step at which a refinement ends, radians. Numerical.
 const LAST_STEP: f64 = 2e-4;
@@ -38,7 +38,7 @@ pub(crate) struct PixelFit {
     /// In the viewer's frame.
     pub(crate) normal: [f64; 3],
     pub(crate) albedo: [f64; 3],
-    /// What is left of the curve, over the energy of its variation.
+    /// The residual of the curve, over the energy of its variation.
     pub(crate) residual: f64,
 }
 

@@ -31,7 +31,7 @@ pub struct TurnSolution {
     /// The light, where it was measured.
     pub(crate) measured: Option<ShLight>,
     pub(crate) conditioning: Conditioning,
-    /// None where the object has none.
+    /// `None` if the object has none.
     pub(crate) gloss: Option<FoundGloss>,
 }
 
@@ -77,7 +77,7 @@ impl TurnSolution {
         }))
     }
 
-    /// How far each normal is to be trusted, 0 to 1: one half where it is expected to be off by 11.5 degrees.
+    /// The confidence in each normal, 0 to 1: one half at an expected error of 11.5 degrees.
     #[must_use]
     pub fn confidence(&self, curves: &TurnCurves) -> Planes<1> {
         curves.map(|pixel| [confidence(self.expected_errors[pixel]) as f32])
@@ -92,7 +92,7 @@ impl TurnSolution {
     /// The light to order 2, in the viewer's frame at the table's angle 0.
     ///
     /// # Errors
-    /// Where a term is not finite.
+    /// If a term is not finite.
     pub fn light(&self) -> Result<ShLight, LightError> {
         let light = match &self.measured {
             Some(measured) => measured.clone(),
@@ -101,13 +101,13 @@ impl TurnSolution {
         Ok(light.with_order(Order::TWO))
     }
 
-    /// What the object is taken for.
+    /// The object's assumed material.
     #[must_use]
     pub const fn material(&self) -> MaterialKind {
         self.model.material
     }
 
-    /// What is to be thought of the normals and the albedo.
+    /// The verdict on the normals and the albedo.
     #[must_use]
     pub const fn verdict(&self) -> TurnVerdict {
         self.conditioning.verdict

@@ -24,11 +24,11 @@ const CALIBRATION: f64 = 1.14;
 /// Smoothness (exponent of the lobe) of metal in unknown light, which no turn determines. By convention.
 const METAL_SMOOTHNESS: f64 = 60.0;
 
-/// What the network of turns says of a turn, with the light that goes with it. The albedo is the mean of what it answers and
+/// The network's answer for a turn, with the fitted light. The albedo is the mean of its answer and
 /// of what the network of photographs has `seen`.
 ///
 /// # Errors
-/// Where the exposure was wrong, or no light fits the curves.
+/// If the exposure was wrong, or no light fits the curves.
 pub(crate) fn solve_by_network(
     curves: &TurnCurves,
     found: &TurnPrediction,

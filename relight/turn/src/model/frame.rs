@@ -13,18 +13,18 @@ const USUAL_UNCERTAINTY_DEG: f64 = 8.0;
 /// Uncertainty of one that was measured, degrees. By hand.
 const GIVEN_UNCERTAINTY_DEG: f64 = 1.0;
 
-/// Where an elevation or a rotation direction comes from.
+/// The source of an elevation or a rotation direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FactSource {
-    /// Nobody said: what is usual on this rig.
+    /// Unknown: the usual value of this rig.
     #[default]
     Assumed,
     /// The caller.
     Given,
     /// The session: it is known of the rig.
     Rig,
-    /// The network of turns, which is clearly surer of its normals this way.
+    /// The network of turns, whose expected errors are clearly smaller this way.
     Network,
 }
 
@@ -37,7 +37,7 @@ pub struct Elevation {
 }
 
 impl Elevation {
-    /// What is usual where nothing is known: 18 degrees, and 8 either way.
+    /// The default for an unknown elevation: 18 ± 8 degrees.
     #[must_use]
     pub const fn assumed() -> Self {
         Self {

@@ -11,7 +11,7 @@ use crate::model::harmonics::{COEFFICIENTS, GLOSS_ORDER, HarmonicTerm};
 /// Terms of a channel's light.
 pub(crate) const TERMS: usize = (GLOSS_ORDER + 1) * (GLOSS_ORDER + 1);
 
-/// The first of them: those that a Lambertian surface shows but for little.
+/// The first of them, which nearly determine a Lambertian surface.
 pub(crate) const LAMBERTIAN_TERMS: usize = LAMBERTIAN_BANDS * LAMBERTIAN_BANDS;
 
 const LAMBERTIAN_BANDS: usize = 3;
@@ -63,7 +63,7 @@ impl TableLight {
     /// The same as coefficients in the table's frame.
     ///
     /// # Errors
-    /// Where a term is not finite.
+    /// If a term is not finite.
     pub(crate) fn light(&self) -> Result<ShLight, LightError> {
         let mut coefficients = vec![[0.0; 3]; TERMS];
         for at in 0..TERMS {
@@ -88,7 +88,7 @@ impl TableLight {
         self.scaled(|l, _| MIRROR * cosine_lobe(l) / PI)
     }
 
-    /// The light of which a white Lambertian surface shows this, as far as it shows it well.
+    /// The light that gives this irradiance on a white Lambertian surface, in the bands that it shows well.
     pub(crate) fn light_of_irradiance(self) -> Self {
         self.scaled(|l, _| {
             if l < LAMBERTIAN_BANDS {

@@ -14,7 +14,7 @@ pub(crate) struct ShadingModel {
     pub(crate) frame: TableFrame,
     /// What a white diffuse surface shows along its normal; metal does not show it.
     pub(crate) diffuse: TableLight,
-    /// What gloss shows beside the diffuse part; of metal, what a white one shows.
+    /// The glossy part besides the diffuse one; for metal, that of a white one.
     pub(crate) gloss: TableLight,
     pub(crate) material: MaterialKind,
 }
@@ -50,7 +50,7 @@ impl ShadingModel {
     /// The light in the viewer's frame, at the table's angle 0, as far as it is seen in the base layer.
     ///
     /// # Errors
-    /// Where a term is not finite.
+    /// If a term is not finite.
     pub(crate) fn light(&self) -> Result<ShLight, LightError> {
         let light = match self.material {
             MaterialKind::Diffuse => self.diffuse.light_of_irradiance(),

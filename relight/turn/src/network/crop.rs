@@ -11,7 +11,7 @@ use crate::observe::curves::TurnCurves;
 const SIDE: usize = 128;
 /// Part of the grid's side that the object takes. By convention: as of the objects that it was trained on.
 const FILL: f32 = 0.9;
-/// What a pixel at the mask's edge counts beside one inside. By hand: it shows some of the background.
+/// The weight of a pixel at the mask's edge relative to one inside. By hand: it shows some of the background.
 const EDGE: f32 = 0.02;
 /// Ridge on the harmonics, as a part of the mean of the diagonal. Numerical.
 const RIDGE: f64 = 1e-6;
@@ -59,7 +59,7 @@ impl Crop {
         }
     }
 
-    /// The mirror image, left and right, of which the table turns the other way.
+    /// The left-right mirror image, whose table turns the other way.
     pub(crate) fn mirrored(&self) -> Self {
         let side = GRID as u32;
         let mut cells: Vec<(u32, [[f32; 3]; COEFFICIENTS])> = self
@@ -204,7 +204,7 @@ impl<'a> CoveredPixels<'a> {
         (x < extent.width && y < extent.height).then(|| self.numbers[y * extent.width + x])?
     }
 
-    /// The pixels of a cell and what each counts; none where fewer than half of them are under the mask.
+    /// The pixels of a cell and what each counts; `None` if fewer than half of them are under the mask.
     fn of_cell(&self, cell: u32, corner: [f32; 2], step: f32) -> Option<Vec<(usize, f32)>> {
         let at = [cell as usize % GRID, cell as usize / GRID];
         let range = |axis: usize| {

@@ -1,6 +1,6 @@
 //! The harmonics of a turn as the planes that the network of turns is given.
 //!
-//! Normals do not depend on a pixel's albedo, on the light's strength, or on which way the room is turned. So harmonics
+//! Normals do not depend on a pixel's albedo, on the light's strength, or on the rotation of the environment light. So harmonics
 //! are divided by the curve's mean, by their effective value over the object, and turned by the phase of the light, which
 //! is read from the curves themselves.
 
@@ -10,11 +10,11 @@ use num_complex::Complex32;
 use relight_photo::nets::{LOG_MEANS, TURN_INPUTS};
 use serde::Serialize;
 
-/// Harmonics of which the network sees all channels.
+/// Harmonics that the network sees in all channels.
 const COLOURED: usize = 4;
-/// Harmonics that it sees in all.
+/// Harmonics that it sees.
 const HARMONICS: usize = 6;
-/// Harmonics that it also sees undivided, and of which it is told the mean.
+/// Harmonics that it also sees undivided, with their mean.
 const STRONG: usize = 2;
 /// Terms of a curve.
 const TERMS: usize = 2 * HARMONICS + 1;
@@ -30,8 +30,8 @@ const DARK: f32 = 0.1;
 /// Largest logarithm of a mean beside that of all. By hand.
 const MAX_LOG: f32 = 3.0;
 
-/// Which way the room is taken to be turned. The phase of the first harmonic says it, where that is strong; in a room
-/// that is bright on two opposite sides that of the second says it, up to half a turn.
+/// The assumed rotation of the environment light. The phase of the first harmonic gives it, if that is strong; in an environment
+/// that is bright on two opposite sides, that of the second gives it, up to half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PhaseHypothesis {
@@ -216,7 +216,7 @@ impl Ratios {
         }
     }
 
-    /// The harmonics as they are where the room is turned back by this phase.
+    /// The harmonics with the environment light rotated back by this phase.
     fn turned(&self, phase: f32) -> Vec<Vec<Harmonic>> {
         let harmonics = self.harmonics.iter().enumerate();
         harmonics

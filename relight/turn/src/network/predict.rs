@@ -1,4 +1,4 @@
-//! Normals and albedo of a turn by the network, in an unknown room.
+//! Normals and albedo of a turn by the network, in unknown light.
 
 use rayon::prelude::*;
 use relight_core::image::{Linear, Planes, Rgb};
@@ -17,7 +17,7 @@ pub struct TurnNetwork {
     plan: Inference,
 }
 
-/// What the network says of a turn.
+/// The network's answer for a turn.
 #[derive(Debug, Clone)]
 pub(crate) struct TurnPrediction {
     /// Unit normals under the mask.
@@ -35,7 +35,7 @@ pub(crate) struct TurnPrediction {
 pub(crate) struct NetworkFigures {
     /// Of its answer.
     pub(crate) expected_error_deg: f32,
-    /// The least if the table turned the other way.
+    /// The least one if the table turned the other way.
     pub(crate) other_direction_deg: f32,
 }
 
@@ -55,7 +55,7 @@ impl NetworkFigures {
     }
 }
 
-/// Range of the logarithm of the expected chord: 1 degree to all that there is.
+/// Range of the logarithm of the expected chord: 1 degree to the maximum.
 const LOG_CHORD: (f32, f32) = (-4.0, 0.7);
 
 /// A normal and its expected error.
@@ -84,7 +84,7 @@ impl NetworkNormal {
     }
 }
 
-/// What the network says of a cell: the normal, the logarithm of its expected chord, and that of albedo over the curve's mean.
+/// The network's answer for a cell: the normal, the logarithm of its expected chord, and that of albedo over the curve's mean.
 type Cell = [f32; 7];
 
 type Cells = Vec<Option<Cell>>;
@@ -93,17 +93,17 @@ impl TurnNetwork {
     /// The network with these weights.
     ///
     /// # Errors
-    /// [`NetError`] where they are another network's.
+    /// [`NetError`] if they are another network's.
     pub fn new(weights: &Weights) -> Result<Self, NetError> {
         let plan = Inference::new(&turn_network(), weights, (GRID, GRID))?;
         Ok(Self { plan })
     }
 
-    /// Normals and what they are expected to be off by. Of the hypotheses of the light's phase that with the least
-    /// expected error is taken, and of it the mean of what is said of the turn and of its mirror image.
+    /// Normals and their expected errors, averaged over the turn and its mirror image. Of the hypotheses of the light's
+    /// phase, the one with the least expected error is taken.
     ///
     /// # Errors
-    /// [`NetError`] where the network fails.
+    /// [`NetError`] if the network fails.
     pub(crate) fn predict(
         &self,
         curves: &TurnCurves,
@@ -123,7 +123,7 @@ impl TurnNetwork {
         Ok(spread(curves, &crop, &cells, figures))
     }
 
-    /// The phase with which the network expects the least mean error, that error, and what it says.
+    /// The phase with which the network expects the least mean error, that error, and its answer.
     fn surest(
         &self,
         crop: &Crop,
@@ -171,7 +171,7 @@ impl TurnNetwork {
     }
 }
 
-/// The mean of what the network says of a turn and of its mirror image.
+/// The mean of the network's answers for a turn and for its mirror image.
 fn mean_of_looks(seen: &Cells, in_mirror: &Cells) -> Cells {
     (0..GRID * GRID)
         .map(|at| {

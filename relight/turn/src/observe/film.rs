@@ -1,4 +1,4 @@
-//! What the video of a turn shows beside the object: a ball that measures its light.
+//! The ball in the video of a turn that measures its light.
 
 use std::collections::HashMap;
 
@@ -22,10 +22,10 @@ const BLOCK: usize = 16;
 /// video differ by 0.01 to 0.02, by JPEG and scaling.
 const MAX_DIFFERENT: f64 = 0.12;
 
-/// Reads the ball in the video of a turn. `progress` is told how many of the turn's frames are done, and how many there are.
+/// Reads the ball in the video of a turn. `progress` is called with the number of frames done, and of all frames.
 ///
 /// # Errors
-/// Where the video cannot be read, is not that of the turn, or the ball is not in it or under the object's mask.
+/// If the video cannot be read, is not that of the turn, or the ball is not in it or under the object's mask.
 pub(crate) fn film(
     recording: &Recording,
     turn: &ReadTurn,
@@ -58,7 +58,7 @@ pub(crate) fn film(
     Ok(ball)
 }
 
-/// Whether a session is the one of which the shard's records speak.
+/// Checks that a session is the one named in the shard's records.
 fn check_session(recording: &Recording, origin: Option<&TurnOrigin>) -> Result<(), TurnError> {
     let (Some(_), Some(origin)) = (&recording.manifest, origin) else {
         return Ok(());

@@ -33,7 +33,7 @@ impl MirrorPanorama {
         }
     }
 
-    /// What a ball of these normals shows. What is clipped in it counts as white.
+    /// The picture of a ball with these normals. Clipped pixels count as white.
     pub(crate) fn from_curves(curves: &TurnCurves, normals: &Planes<3>, frame: TableFrame) -> Self {
         let white = curves.clipped_value();
         let mut panorama = Self::new(frame);
@@ -62,7 +62,7 @@ impl MirrorPanorama {
         self.counts[cell] += 1.0;
     }
 
-    /// What the same direction showed in the mean; none where it was never added.
+    /// What the same direction showed in the mean; `None` if it was never added.
     pub(crate) fn seen(&self, angle: f64, normal: [f64; 3]) -> Option<[f64; 3]> {
         let cell = self.cell(angle, normal);
         mean(&self.sums[cell..=cell], &self.counts[cell..=cell])
@@ -82,7 +82,7 @@ impl MirrorPanorama {
         row * COLUMNS + column
     }
 
-    /// What it shows, as coefficients; directions that it never shows are as bright as their row, or as all.
+    /// Its coefficients; directions that it never shows are as bright as their row, or as all.
     pub(crate) fn light(&self) -> Result<ShLight, TurnError> {
         let all = self.all().ok_or(TurnError::NoLight)?;
         let order = Order::GLOSS;

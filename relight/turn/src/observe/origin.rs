@@ -1,4 +1,4 @@
-//! What a shard was made from: its entry in `dataset.json`, and the session or video that lies near.
+//! The origin of a shard: its entry in `dataset.json`, and the session or video nearby.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -37,7 +37,7 @@ pub(crate) fn session_of<'a>(dataset: &'a Dataset, shard: &Path) -> Option<&'a S
 /// one around it, or in a folder of that.
 ///
 /// # Errors
-/// [`TurnError::NoSession`] where it is in none of them; that of opening what is there.
+/// [`TurnError::NoSession`] if it is in none of them; that of opening what is there.
 pub(crate) fn recording_of(shard: &Path) -> Result<Recording, TurnError> {
     let nothing = || TurnError::NoSession(shard.to_owned());
     let (dataset, folder) = dataset_of(shard).ok_or_else(nothing)?;

@@ -1,4 +1,4 @@
-//! A ball on the table, diffuse grey or chrome, which measures the light, and what the picture shows at and around it.
+//! A ball on the table, diffuse grey or chrome, that measures the light, and the picture at and around it.
 
 use std::fmt;
 
@@ -28,7 +28,7 @@ pub enum ProbeBall {
 pub(crate) struct Probe {
     /// Where it is.
     pub(crate) place: ProbePlace,
-    /// What it is made of; what it looks like where that is not known.
+    /// Its material; by default as it looks.
     pub(crate) ball: Option<ProbeBall>,
     /// The camera over the table.
     pub(crate) elevation: Elevation,
@@ -54,7 +54,7 @@ impl ProbeBuilder {
     /// Takes up a frame at an angle of the table, degrees.
     ///
     /// # Errors
-    /// [`TurnError::Setting`] where the ball is not in it.
+    /// [`TurnError::Setting`] if the ball is not in it.
     pub(crate) fn push(&mut self, angle_deg: f64, frame: &Rgb<Srgb>) -> Result<(), TurnError> {
         let (picture, place) = (frame.planes(), self.probe.place);
         if !place.is_within(picture.extent()) {
@@ -80,7 +80,7 @@ impl ProbeBuilder {
     /// The curves of the square.
     ///
     /// # Errors
-    /// Where the frames tell too little.
+    /// If the frames show too little.
     pub(crate) fn curves(self) -> Result<TurnCurves, TurnError> {
         let nothing = || TurnError::Refused(NOTHING.to_owned());
         self.builder.ok_or_else(nothing)?.finish()

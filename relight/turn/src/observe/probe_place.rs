@@ -29,7 +29,7 @@ impl ProbePlace {
     /// A ball with its middle at `x`, `y`.
     ///
     /// # Errors
-    /// [`TurnError::Setting`] where the radius is less than 4 pixels or a number is not finite.
+    /// [`TurnError::Setting`] if the radius is less than 4 pixels or a number is not finite.
     pub fn new([x, y]: [f64; 2], radius: f64) -> Result<Self, TurnError> {
         if !(x.is_finite() && y.is_finite() && radius.is_finite() && radius >= 4.0) {
             return Err(TurnError::Setting {

@@ -21,7 +21,7 @@ use crate::observe::curves::{CurveBuilder, NOTHING, TurnCurves};
 /// Frames that are drawn at a time. By convention of the shards: twelve neighbours cover the whole turn.
 const BATCH: u32 = 12;
 
-/// Which way the table turns, and what says so.
+/// The rotation direction, and its source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct TableRotation {
     /// Seen from above, as the table's angle grows.
@@ -30,7 +30,7 @@ pub struct TableRotation {
     pub source: FactSource,
 }
 
-/// What the records of a shard say of the video that it was made from.
+/// The video that a shard was made from, by its records.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct TurnOrigin {
     /// The session's id.
@@ -52,13 +52,13 @@ pub struct ReadTurn {
     pub first: Vec<Rgb<Linear>>,
     /// Where the frames stand in the turn's video, from 0, and the table's angle of each, degrees.
     pub(crate) sources: Vec<(u64, f64)>,
-    /// The video itself; none where the frames have no records.
+    /// The video itself; `None` if the frames have no records.
     pub(crate) origin: Option<TurnOrigin>,
     /// 1 on the object, else 0.
     pub mask: Planes<1>,
-    /// Whether frames have their angles; else they are taken for evenly spread over one turn.
+    /// Whether frames have their angles; else they are assumed to be evenly spread over one turn.
     pub has_angles: bool,
-    /// What is wrong with frames that are left out.
+    /// The faults of frames that are left out.
     pub damage: Vec<String>,
 }
 
@@ -77,11 +77,11 @@ impl ReadTurn {
     }
 }
 
-/// Reads the turn of a shard, or of what else [`Turns::open`] takes, once through. `progress` is told how many
-/// frames are done, and how many there are.
+/// Reads the turn of a shard, or of another input of [`Turns::open`], once. `progress` is called with the
+/// number of frames done, and of all frames.
 ///
 /// # Errors
-/// Where it cannot be opened, holds several turns, or shows too little.
+/// If it cannot be opened, holds several turns, or shows too little.
 pub fn read_curves(
     path: &Path,
     rotation: TableRotation,
@@ -206,8 +206,8 @@ impl Reader {
         if *self.has_angles.get_or_insert(recorded.is_some()) != recorded.is_some() {
             let key = &frame.key;
             self.damage.push(match recorded {
-                Some(_) => format!("{key} has an angle and others have none: it is left out"),
-                None => format!("{key} has no angle and others do: it is left out"),
+                Some(_) => format!("{key} has an angle, others have none: it is left out"),
+                None => format!("{key} has no angle, others have one: it is left out"),
             });
             return None;
         }
@@ -225,8 +225,8 @@ impl Reader {
         let indices = self.last_index as u64 + 1;
         if !has_angles && indices > self.frames.into() {
             return Err(TurnError::Refused(format!(
-                "the frames have no angles, and only {} of at least {indices} of the turn are there: without angles, a turn \
-                 has to be whole",
+                "the frames have no angles, and only {} of at least {indices} are there: without angles, a turn has to be \
+                 complete",
                 self.frames
             )));
         }

@@ -29,7 +29,7 @@ impl TurnVerdict {
         matches!(self, Self::Good | Self::NotLambertian | Self::Uncertain)
     }
 
-    /// What to do where the camera's exposure makes the turn worthless.
+    /// What to do if the camera's exposure makes the turn useless.
     pub(crate) const fn exposure_advice(self) -> Option<&'static str> {
         match self {
             Self::Overexposed | Self::Underexposed => self.advice(),
@@ -37,21 +37,21 @@ impl TurnVerdict {
         }
     }
 
-    /// What to do about it, in one sentence; none where all is well.
+    /// What to do about it, in one sentence; `None` if all is well.
     #[must_use]
     pub const fn advice(self) -> Option<&'static str> {
         match self {
             Self::Good => None,
             Self::TooEven => Some(
-                "the environment light is too even for normals and albedo: turn on one lamp at the side, and capture the turn again",
+                "the environment light is too even for normals and albedo: turn on one lamp at the side, and capture again",
             ),
             Self::NotLambertian => Some(
-                "most of what varies over the turn is shadows or highlights, which the normals do not explain: \
-                 do not trust them where the confidence is low",
+                "most of the variation is shadows or highlights, which the normals do not explain: do not trust them where \
+                 the confidence is low",
             ),
             Self::Overexposed => Some(
-                "the object is overexposed: nearly all of it is clipped over half of the turn or more; \
-                 shorten the exposure or lower the gain, and capture the turn again",
+                "the object is overexposed: nearly all of it is clipped for half the turn or more; lower exposure or \
+                 gain, and capture again",
             ),
             Self::Underexposed => Some(
                 "the object is underexposed: nearly all of it is black; \
@@ -61,8 +61,8 @@ impl TurnVerdict {
                 "the frames cover only part of a turn: do not trust normals where the confidence is low, or capture a whole turn",
             ),
             Self::Uncertain => Some(
-                "the network of turns is not sure of the normals: do not trust them where the confidence is low, \
-                 or measure the light (--light, --light-ball)",
+                "the network of turns is uncertain of the normals: do not trust them where the confidence is low; for a black \
+                 or metal object, measure the light (--light-ball)",
             ),
         }
     }

@@ -1,4 +1,4 @@
-//! The contact sheet: what was seen and what was found, side by side.
+//! The contact sheet: input and results, side by side.
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Normals, ShLight};

@@ -1,4 +1,4 @@
-//! What is written of a turn: a folder that appears when it is whole.
+//! The files of a turn: a folder that appears when it is complete.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use crate::solving::SolvedTurn;
 
 /// The file of figures.
 const FIGURES: &str = "turn.json";
-/// What is written beside the figures.
+/// What is written besides the figures.
 const FILES: [&str; 8] = [
     "normal.png",
     "albedo.png",
@@ -32,33 +32,33 @@ const RESULTS: ResultFolder = ResultFolder {
     holds: |name| name == FIGURES || FILES.contains(&name),
 };
 
-/// What it says it is.
+/// Its schema.
 const SCHEMA: &str = "relight.solved_turn/1";
 
-/// A solved turn with all that is written of it.
+/// A solved turn with all its files.
 #[derive(Debug, Clone, Copy)]
 pub struct TurnFiles<'a> {
     /// What was read and found.
     pub solved: &'a SolvedTurn,
-    /// Where the light is from: a file's name, or none where it was found.
+    /// The source of the light: a file's name, or `None` if it was estimated.
     pub light_source: Option<&'a str>,
 }
 
 impl TurnFiles<'_> {
-    /// Whether results may be written to the folder `out`: it is not there, empty, or holds earlier results and
-    /// nothing else.
+    /// Whether results may be written to the folder `out`: it is missing, empty, or holds only earlier
+    /// results.
     ///
     /// # Errors
-    /// Where it holds something else, or cannot be read or written.
+    /// If it holds something else, or cannot be read or written.
     pub fn check(out: &Path) -> Result<(), TurnError> {
         Ok(RESULTS.check(out)?)
     }
 
-    /// Writes all files into the folder `out`, which appears when they are there; an earlier result in it is
+    /// Writes all files into the folder `out`, which appears when they are complete; an earlier result in it is
     /// replaced. Gives the figures that `turn.json` holds.
     ///
     /// # Errors
-    /// Where the folder holds something else or a file cannot be written: then the folder is as it was.
+    /// If the folder holds something else or a file cannot be written: then the folder is as it was.
     pub fn write(&self, out: &Path) -> Result<Value, TurnError> {
         RESULTS.write(out, |folder| self.write_files(folder))
     }

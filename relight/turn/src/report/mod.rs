@@ -1,4 +1,4 @@
-//! What is written of a solved turn.
+//! The files of a solved turn.
 
 pub(crate) mod contact_sheet;
 pub(crate) mod files;

@@ -15,7 +15,7 @@ use crate::photos::NetworkArguments;
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   relight insert cup.jpg --mask cup-mask.png --into room.jpg --at 0.4,0.9 --height 0.3 -o out.png
-      the cup in another photograph, in the light that is taken from it
+      the cup in another photograph, in the light estimated from it
   relight insert bear.jpg cup.jpg --mask masks --into room.hdr --at 0.6,0.85 --height 0.5 \\
       --at 0.35,0.95 --height 0.3 -o out.png
       two objects, from back to front, in a panorama; their masks are masks/bear.png and masks/cup.png
@@ -24,21 +24,21 @@ Examples:
   relight insert mug --into room.hdr -o out.png
       an object that relight turn has captured: its folder, or mug/object.relit
   relight insert --scene scene.toml -o out.png
-      all of it from a file (docs/guide/photograph.md)";
+      everything from a file (docs/guide/photograph.md)";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Photographs of the objects, from back to front, or captured objects (object.relit, or the folder of relight turn).
+    /// The objects, from back to front: photographs, or captured objects (object.relit, or the folder of relight turn).
     #[arg(value_name = "PHOTO", required_unless_present = "scene")]
     photos: Vec<PathBuf>,
-    /// A scene, which describes background, light and objects in full, in place of the options below.
+    /// A scene file with background, light and objects, in place of the options below.
     #[arg(
         long,
         value_name = "FILE.toml",
         conflicts_with_all = ["photos", "into", "mask", "at", "height", "light", "lamp", "light_angle"]
     )]
     scene: Option<PathBuf>,
-    /// The picture (.png, .jpg, .exr), or a video (.mp4, .webm). Its folder is made where there is none.
+    /// The picture (.png, .jpg, .exr) or video (.mp4, .webm); its folder is created if missing.
     #[arg(short, long, value_name = "OUT")]
     pub(super) output: PathBuf,
     /// The background: a photograph, a panorama (HDR or EXR, twice as wide as high), or a video.
@@ -57,22 +57,22 @@ pub(crate) struct Arguments {
     pub(super) network: NetworkArguments,
 }
 
-/// What is said of the objects; what is given once holds for all, what is given as often as there are objects for one each.
+/// Options of the objects: given once, an option applies to all; given once for each object, to one each.
 #[derive(Args)]
 struct ObjectArguments {
     /// A mask, white on the object, or a folder of masks, PHOTO.png.
     #[arg(long, value_name = "FILE|DIR", action = ArgAction::Append)]
     mask: Vec<PathBuf>,
-    /// The middle of the lower edge of the object in the picture, in parts of its width and height from the upper left.
+    /// Centre of the object's lower edge, in parts of width and height from the upper left.
     #[arg(long, value_name = "X,Y", value_parser = place, action = ArgAction::Append)]
     at: Vec<[f64; 2]>,
-    /// The height of the object in parts of that of the picture.
+    /// The object's height, as a part of the picture's.
     #[arg(long, value_name = "PART", value_parser = number, action = ArgAction::Append)]
     height: Vec<f64>,
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         let count = self.photos.len();
         let object = &self.object;
@@ -86,7 +86,7 @@ impl Arguments {
             .find(|&(_, given)| given > 1 && given != count);
         if let Some((name, given)) = odd {
             return Some(format!(
-                "{name} is given {given} times for {count} photographs: give it once, or for each"
+                "{name} is given {given} times for {count} photographs: give it once, or once for each"
             ));
         }
         if let [mask] = object.mask.as_slice()
@@ -177,7 +177,7 @@ impl ObjectArguments {
     }
 }
 
-/// What is said of an object: for it alone, or for all.
+/// The value for an object: its own, or the one for all.
 fn of<T: Clone>(given: &[T], number: usize) -> Option<T> {
     match given {
         [one] => Some(one.clone()),

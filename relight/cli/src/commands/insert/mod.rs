@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     if let Some(conversion) = background.colour_conversion() {
         let path = file(&scene.background);
         console.warn(&format!(
-            "{}: the colours are converted: {conversion}",
+            "{}: colours converted: {conversion}",
             path.display()
         ));
     }
@@ -93,11 +93,10 @@ fn takes_light(scene: &SceneDescription, setting: &SceneEnvironment) -> bool {
 fn sun_described(sun: Option<SeenSun>) -> String {
     match sun {
         Some(sun) => format!(
-            "; the sun is seen in the picture, with a confidence of {:.1}",
+            "; sun found in the picture (confidence {:.1})",
             sun.confidence
         ),
-        None => "; no sun is seen in the picture, so that shadows are soft: --lamp \
-                 AZIMUTH,ELEVATION,2 makes them hard"
+        None => "; no sun found in the picture, so shadows are soft: --lamp AZIMUTH,ELEVATION,2 makes them hard"
             .to_owned(),
     }
 }
@@ -105,12 +104,12 @@ fn sun_described(sun: Option<SeenSun>) -> String {
 /// How a panorama was exposed, in words.
 fn described(exposure: PanoramaExposure) -> String {
     let reason = if exposure.for_objects {
-        ", as its objects ask for"
+        ", so that the objects are not too dark"
     } else {
         ""
     };
     format!(
-        "; exposed by {:+.1} stops{reason}, {:.0} % of the picture clip",
+        "; exposure {:+.1} stops{reason}; {:.0} % of the picture clips",
         exposure.stops,
         100.0 * exposure.clipped
     )
@@ -125,11 +124,11 @@ fn check_output(background: &BackgroundFile, arguments: &Arguments) -> Result<()
     let output = arguments.output.display();
     match background {
         BackgroundFile::Photo(_) if is_movie => Err(format!(
-            "{output}: a photograph does not move; give .png, .jpg or .exr"
+            "{output}: a photograph gives a picture; give .png, .jpg or .exr"
         )),
         BackgroundFile::Panorama(_) if is_movie && arguments.rotation.rotate.is_none() => {
             Err(format!(
-                "{output}: a panorama moves with --rotate DEGREES; give it, or .png, .jpg or .exr"
+                "{output}: give --rotate DEGREES for a video before a panorama, or .png, .jpg or .exr"
             ))
         }
         BackgroundFile::Movie(_) if !is_movie => {

@@ -43,13 +43,13 @@ pub(crate) struct Arguments {
 enum RenderedResult {
     /// An image, or with --rotate a video in which the light rotates.
     Image(Box<ImageArguments>),
-    /// A sheet of the object in many materials: smoothness 5 to 200 across, from 0 to 40 % of reflected light down.
+    /// The object in many materials: smoothness 5 to 200 across, reflectance 0 to 40 % down.
     Materials(Box<MaterialsArguments>),
 }
 
 #[derive(Args)]
 struct ImageArguments {
-    /// The image (.png, .exr), or for --rotate a video (.mp4, .webm) or a folder for PNG frames.
+    /// The image (.png, .exr), or with --rotate a video (.mp4, .webm) or a folder for PNG frames.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     #[command(flatten)]
@@ -70,8 +70,8 @@ struct MaterialsArguments {
 /// The object, its light, and how it is shown.
 #[derive(Args)]
 struct RenderArguments {
-    /// Brightness in stops beyond a white diffuse surface under even light of radiance 1, or "auto": a white diffuse
-    /// surface that faces the strongest light is white.
+    /// Brightness in stops: 0 shows a white surface in even light of radiance 1 as white; auto, one that faces the strongest
+    /// light.
     #[arg(long, value_name = "STOPS", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     exposure: Exposure,
     #[command(flatten)]
@@ -80,11 +80,11 @@ struct RenderArguments {
     object: ObjectArguments,
     #[command(flatten, next_help_heading = "Light")]
     light: LightArguments,
-    /// The order of spherical harmonics to which the light is brought; the paper's is 2, highlights need more
-    /// [default: that of a file of coefficients, else 48].
+    /// Order of the light's spherical harmonics; the paper's is 2, highlights need more [default: that of the coefficients, else
+    /// 48].
     #[arg(long, value_name = "0-64", value_parser = clap::value_parser!(u8).range(0..=Order::MAX as i64))]
     order: Option<u8>,
-    /// Write the coefficients of the light to this file, too.
+    /// Also write the light's coefficients to this file.
     #[arg(long, value_name = "FILE")]
     save_light: Option<PathBuf>,
 }
@@ -96,7 +96,7 @@ enum Exposure {
 }
 
 impl Arguments {
-    /// What is wrong with the combination of arguments, if anything is.
+    /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
         match &self.result {
             RenderedResult::Image(arguments) => {
@@ -112,7 +112,7 @@ impl Arguments {
     }
 }
 
-/// What is wrong with the name of what is written.
+/// The fault of the output's name, if there is one.
 fn output_fault(output: &Path, rotates: bool) -> Option<String> {
     let is_folder = output.extension().is_none();
     let wanted = match OutputKind::from_path(output) {
@@ -128,7 +128,7 @@ fn output_fault(output: &Path, rotates: bool) -> Option<String> {
 impl RenderArguments {
     fn fault(&self) -> Option<String> {
         if self.light.is_empty() {
-            return Some("give the light by --light FILE or --lamp AZIMUTH,ELEVATION".to_owned());
+            return Some("give the light with --light FILE or --lamp AZIMUTH,ELEVATION".to_owned());
         }
         match &self.object.smoothness {
             Map::Even([first, others @ ..]) if others.iter().any(|value| value != first) => {
@@ -138,7 +138,7 @@ impl RenderArguments {
         }
     }
 
-    /// The light, rotated; it is written where that is asked for.
+    /// The light, rotated; written to a file on request.
     fn read_light(&self) -> Result<ShLight, Box<dyn Error>> {
         let order = self.order.map(|order| Order::new(order.into()));
         let order = order.transpose()?;

@@ -28,18 +28,18 @@ pub(super) struct ObjectArguments {
     /// A captured object in place of maps: object.relit, or the folder of relight turn.
     #[arg(value_name = "OBJECT", help_heading = None::<&'static str>, conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
     object: Option<PathBuf>,
-    /// Normals: PNG of 8 or 16 bits, colours (n + 1) / 2, black outside; or EXR of vectors. x right, z to the viewer.
+    /// Normals, x to the right, z to the viewer: a PNG of (n + 1) / 2, black outside, or an EXR of vectors.
     #[arg(long, value_name = "FILE", required_unless_present = "object")]
     normals: Option<PathBuf>,
     #[command(flatten)]
     normals_frame: NormalsArgument,
-    /// A grey image; the object is where it is at least one half [default: where there are normals].
+    /// A grey image, at least one half on the object [default: where normals are].
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
-    /// Albedo: a file, or a linear value or three (0.8, or 0.8,0.5,0.3).
+    /// Albedo: a file, or one or three linear values (0.8, or 0.8,0.5,0.3).
     #[arg(long, value_name = "FILE|VALUE", default_value = "0.8", value_parser = map)]
     albedo: Map,
-    /// Specular reflectance s_p: a file, or a linear value or three; without it the object is diffuse.
+    /// Specular reflectance s_p: a file, or one or three linear values [default: none, diffuse].
     #[arg(long, value_name = "FILE|VALUE", value_parser = map)]
     reflectance: Option<Map>,
     /// Smoothness α: a value, an EXR, or an 8-bit PNG of values 0 to 255.
@@ -53,8 +53,8 @@ impl ObjectArguments {
     /// Reads the object.
     ///
     /// # Errors
-    /// Where a file cannot be read, the maps differ in size, a map has a value that is negative or not
-    /// finite, or there is no surface.
+    /// If a file cannot be read, the maps differ in size, a map has a value that is negative or not
+    /// finite, or no pixel shows the object.
     pub(super) fn read(&self) -> Result<Surface, Box<dyn Error>> {
         if let Some(path) = &self.object {
             return Ok(CapturedObject::read(path)?.surface().clone());
@@ -92,10 +92,9 @@ impl ObjectArguments {
         };
         if normals.is_empty() {
             let path = path.display();
-            return Err(format!(
-                "{path} shows no surface: it has no normals, or none inside the mask"
-            )
-            .into());
+            return Err(
+                format!("{path} has no normals inside the mask: give another map or mask").into(),
+            );
         }
         Ok(normals)
     }
@@ -134,7 +133,7 @@ impl ObjectArguments {
     }
 }
 
-/// Whether no value is negative or not finite.
+/// Whether all values are finite and not negative.
 fn check_values(path: &Path, what: &'static str, planes: &Planes<3>) -> Result<(), ImageError> {
     let mut values = planes.planes().into_iter().flatten();
     if values.all(|value| value.is_finite() && *value >= 0.0) {
@@ -143,19 +142,19 @@ fn check_values(path: &Path, what: &'static str, planes: &Planes<3>) -> Result<(
     Err(ImageError::Form {
         path: path.to_owned(),
         fault: format!(
-            "is no map of {what}: it has a value that is negative, infinite or not a number"
+            "is not a map of {what}: it has a value that is negative, infinite or not a number"
         ),
     })
 }
 
-/// One number, three numbers parted by commas, or else a file.
+/// One number, three numbers separated by commas, or else a file.
 fn map(text: &str) -> Result<Map, String> {
     let numbers: Result<Vec<f32>, _> = text.split(',').map(str::parse).collect();
     match numbers.as_deref() {
         Err(_) => Ok(Map::File(text.into())),
         Ok(&[value]) if is_value(value) => Ok(Map::Even([value; 3])),
         Ok(&[r, g, b]) if [r, g, b].into_iter().all(is_value) => Ok(Map::Even([r, g, b])),
-        Ok(_) => Err("give a file, or one or three numbers that are not negative".to_owned()),
+        Ok(_) => Err("give a file, or one or three numbers from 0 up".to_owned()),
     }
 }
 

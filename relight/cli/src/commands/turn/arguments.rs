@@ -21,9 +21,9 @@ Examples:
   relight turn 20261120T093015Z-mug.tar -o mug
       a turn in unknown light: mug/normal.png, albedo.png, light.txt, object.relit ...
   relight turn mug.tar --elevation 18 --rotation counter-clockwise -o mug
-      the turn of a bare clip: its data set does not say how the rig is built
+      the turn of a video clip, whose data set does not describe the rig
   relight turn mug.tar --light light.txt -o mug
-      the light was measured: coefficients in the viewer's frame at the table's angle 0, or a panorama";
+      the light was measured: coefficients in the viewer's frame at table angle 0, or a panorama";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -32,20 +32,18 @@ pub(crate) struct Arguments {
     pub(super) shard: PathBuf,
     #[command(flatten)]
     pub(super) folder: OutputFolder,
-    /// How high the camera looks down on the table, degrees: 0 from the side, 90 from above [default: as the data set or the
-    /// session says; else 18 ± 8].
+    /// The camera's elevation, degrees: 0 from the side, 90 from above [default: that of the data set or session, else 18 ± 8].
     #[arg(long, value_name = "DEGREES", value_parser = elevation, help_heading = "Rig")]
     elevation: Option<Elevation>,
-    /// Which way the table turns as its angle grows, seen from above [default: as the data set or the session says; else the one
-    /// in which the network is clearly surer; else counter-clockwise].
+    /// Direction in which the table turns as its angle grows, from above [default: that of the data set or session, else the
+    /// network's if clear, else counter-clockwise].
     #[arg(long, value_name = "WAY", value_parser = one_of(ROTATIONS), help_heading = "Rig")]
     rotation: Option<RotationDirection>,
-    /// The light where it is known, in the viewer's frame at the angle 0 of the table: a panorama (.hdr, .exr), or coefficients
-    /// of spherical harmonics up to order 6 (.txt).
+    /// Known light, in the viewer's frame at table angle 0: a panorama (.hdr, .exr), or coefficients up to order 6 (.txt).
     #[arg(long, value_name = "FILE", help_heading = "Light")]
     pub(super) light: Option<PathBuf>,
-    /// A ball on the table, diffuse grey or chrome, which measures the light: its middle and radius in the video, pixels, and
-    /// what it is made of [default: what it looks like]. The albedo of the ball is then 1.
+    /// A ball on the table that measures the light: centre and radius in the video, pixels, and material [default: as it looks];
+    /// its albedo counts as 1.
     #[arg(
         long,
         value_name = "X,Y,R[,grey|chrome]",
@@ -53,8 +51,8 @@ pub(crate) struct Arguments {
         help_heading = "Light"
     )]
     light_ball: Option<LightBall>,
-    /// With --light-ball: the session from which the shard was made, or its video [default: what dataset.json names, beside
-    /// the data set]. Needs the program ffmpeg.
+    /// With --light-ball: the session of the shard, or its video [default: named by dataset.json, next to the data set]; needs
+    /// ffmpeg.
     #[arg(
         long,
         value_name = "PATH",
@@ -77,7 +75,7 @@ struct LightBall {
 }
 
 impl Arguments {
-    /// What is known of the turn beforehand.
+    /// What is known about the turn beforehand.
     pub(super) fn options(&self) -> Result<TurnOptions<'_>, Box<dyn Error>> {
         let light = match (&self.light, self.light_ball) {
             (Some(path), _) => TurnLight::Given(read_given_light(path)?),
@@ -121,12 +119,12 @@ const ROTATIONS: Choices<RotationDirection> = &[
 const MATERIALS: Choices<MaterialKind> = &[
     (
         "diffuse",
-        "It scatters light, with gloss or without",
+        "Scatters light, with or without gloss",
         MaterialKind::Diffuse,
     ),
     (
         "metal",
-        "It only reflects, in its own colour",
+        "Only reflects light, in its own colour",
         MaterialKind::Metal,
     ),
 ];

@@ -56,7 +56,7 @@ fn solve(arguments: &Arguments, console: Console) -> Result<SolvedTurn, Box<dyn 
     Ok(solved)
 }
 
-/// Where the light is from; none where it is to be found.
+/// The source of the light; `None` if it is to be estimated.
 fn light_source(arguments: &Arguments, solved: &SolvedTurn) -> Option<String> {
     let given = arguments.light.as_ref();
     let given = given.map(|path| path.display().to_string());
@@ -64,11 +64,11 @@ fn light_source(arguments: &Arguments, solved: &SolvedTurn) -> Option<String> {
     given.or_else(|| measured.map(|measured| format!("probe, {}", measured.ball)))
 }
 
-/// How it came out.
+/// The result, in words.
 fn text(arguments: &Arguments, solved: &SolvedTurn, [reading, all]: [f64; 2]) -> String {
     format!(
-        "{}: {} frames over {:.0} degrees in {reading:.1} s, all in {all:.1} s; normals expected within {:.0} degrees (median), \
-         light {}, material {}",
+        "{}: {} frames over {:.0} degrees in {reading:.1} s, {all:.1} s in total; normals expected within {:.0} degrees \
+         (median), light {}, material {}",
         arguments.folder.output.display(),
         solved.turn.curves.frames(),
         solved.turn.curves.coverage_deg(),

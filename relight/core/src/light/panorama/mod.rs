@@ -12,9 +12,9 @@ pub use sampler::{DrawnLight, LightSampler};
 
 use crate::image::{ColourImage, Extent, ImageError, Linear, Planes, Rgb, Samples};
 
-/// Linear radiance from all around, as an equirectangular image of which every pixel has one radiance.
+/// Linear radiance from all around, as an equirectangular image whose every pixel has one radiance.
 ///
-/// The middle column is what the viewer sees behind the object (-z), right of it is to the right (+x),
+/// The middle column is behind the object (-z), right of it is to the right (+x),
 /// the left and right edge meet at the viewer's back (+z); rows go down from the zenith (+y).
 ///
 /// ```
@@ -31,14 +31,14 @@ pub struct Panorama {
     image: Rgb<Linear>,
 }
 
-/// Files of fewer rows are no panoramas.
+/// Files with fewer rows are refused.
 const MIN_HEIGHT: usize = 4;
 
 impl Panorama {
     /// The panorama that an image of radiance shows.
     ///
     /// # Errors
-    /// Where it has no pixels, or a value is infinite or not a number.
+    /// If it has no pixels, or a value is infinite or not a number.
     pub fn new(image: Rgb<Linear>) -> Result<Self, LightError> {
         if image.planes().extent().pixels() == 0 {
             return Err(LightError::Empty);
@@ -54,7 +54,7 @@ impl Panorama {
     /// Decodes the content of an HDR (Radiance) or EXR file; errors name it as `path`.
     ///
     /// # Errors
-    /// Where it is no image, is of integers, is not twice as wide as high, or has values that are not finite.
+    /// If it is not an image, holds integers, is not twice as wide as high, or has values that are not finite.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, ImageError> {
         let image = ColourImage::from_bytes(path, bytes, None)?;
         let wrong = |fault| ImageError::Form {
@@ -63,7 +63,7 @@ impl Panorama {
         };
         if image.stored().samples == Samples::Integer {
             let fault =
-                "holds 8- or 16-bit integers; a panorama is an HDR or EXR file of linear radiance";
+                "holds 8- or 16-bit integers: give a panorama in linear radiance, HDR or EXR";
             return Err(wrong(fault.to_owned()));
         }
         let Extent { width, height } = image.stored().planes.extent();
@@ -72,7 +72,7 @@ impl Panorama {
                 "has {width} x {height} pixels; a panorama is twice as wide as high, and at least {MIN_HEIGHT} pixels high"
             )));
         }
-        Self::new(image.into_light()).map_err(|error| wrong(format!("is no panorama: {error}")))
+        Self::new(image.into_light()).map_err(|error| wrong(format!("is not a panorama: {error}")))
     }
 
     /// The light as it is seen in the middle of each pixel.
@@ -126,7 +126,7 @@ impl Panorama {
         (nearest(across, width), nearest(down, height))
     }
 
-    /// The radiance from a direction: that of the pixel that lies there.
+    /// The radiance from a direction: that of its pixel.
     #[must_use]
     pub fn radiance(&self, from: Direction) -> [f32; 3] {
         let (x, y) = self.pixel_towards(from);

@@ -1,4 +1,4 @@
-//! Where data sets keep which part of a sample, and how their files are to be understood.
+//! The files of a sample in each data set, and their conventions.
 
 use std::fmt;
 use std::path::{Path, PathBuf};

@@ -13,7 +13,7 @@ use layout::Entry;
 pub use layout::TruthLayout;
 
 /// An image and its ground truth. A data set has some of these parts and lacks others;
-/// all that are there have the size of the mask.
+/// all maps have the size of the mask.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruthSample {
     /// Its name within the set; parts of it are separated by `/`.
@@ -54,7 +54,7 @@ impl TruthSet {
     /// Finds the samples in the folder `root`, in the order of their names.
     ///
     /// # Errors
-    /// [`OpenError::Read`], or [`OpenError::Content`] where there are none.
+    /// [`OpenError::Read`], or [`OpenError::Content`] if it contains no samples.
     pub fn open(root: &Path, layout: TruthLayout) -> Result<Self, OpenError> {
         let entries = layout.entries(root)?;
         if entries.is_empty() {
@@ -68,7 +68,7 @@ impl TruthSet {
         self.entries.iter().map(|entry| entry.name.as_str())
     }
 
-    /// Keeps `count` samples, spread evenly over the set; all where there are no more.
+    /// Keeps `count` samples, spread evenly over the set; all if the set has fewer.
     #[must_use]
     pub fn spread(mut self, count: usize) -> Self {
         let all = self.entries.len();

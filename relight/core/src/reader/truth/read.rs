@@ -54,7 +54,7 @@ struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    /// The image in a file of which the largest value stands for `white`.
+    /// The image in a file whose largest value stands for `white`.
     fn colour(&self, role: Role, white: f32) -> Result<Option<Rgb<Linear>>, SampleFault> {
         let transfer = self.layout.transfer(role);
         let image = self.read(role, |path| Rgb::<Linear>::read(path, transfer))?;
@@ -113,7 +113,7 @@ impl Parts<'_> {
         })
     }
 
-    /// What `read` makes of the file of this role; none where the sample may lack it and does.
+    /// The result of `read` on the file of this role; `None` if the file is optional and missing.
     fn read<T>(
         &self,
         role: Role,

@@ -27,7 +27,7 @@ impl Encoding {
     }
 }
 
-/// What is known of one frame of a batch.
+/// The record of one frame of a batch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TurnFrame {
     /// `<turn>/<index>`, the sample's key in a shard.
@@ -41,7 +41,7 @@ pub struct TurnFrame {
 pub struct TurnBatch {
     /// Width and height of all images; 0 x 0 for a batch without frames.
     pub extent: Extent,
-    /// What is known of each frame.
+    /// The record of each frame.
     pub frames: Vec<TurnFrame>,
     /// frames x 3 x rows x columns, 0..=1, exactly 0 outside the mask.
     pub images: Vec<f32>,

@@ -18,7 +18,7 @@ use crate::reader::{DamagedSample, OpenError, SampleFault};
 pub(super) struct FolderTurn {
     name: String,
     folder: PathBuf,
-    /// The file of each frame, in order of time; none where it is missing.
+    /// The file of each frame, in order of time; `None` if it is missing.
     files: Vec<Option<String>>,
     /// The frame at each position.
     order: Vec<u32>,
@@ -27,7 +27,7 @@ pub(super) struct FolderTurn {
 }
 
 impl FolderTurn {
-    /// Looks for the frames of the video `name`, of which there should be `expected`.
+    /// Looks for the frames of the video `name`; `expected` is their number.
     pub(super) fn open(root: &Path, name: &str, expected: Option<u32>) -> Result<Self, OpenError> {
         let folder = root.join("imgs").join(name);
         let numbered: BTreeMap<u32, String> = listed(&folder, Path::is_file)?

@@ -20,8 +20,8 @@ pub use batch::{Encoding, TurnBatch, TurnFrame};
 /// The turns of a data set. Each is a shard, or a folder of images; its samples are numbered by
 /// their position, in an order in which any 12 neighbours cover the whole turn.
 ///
-/// Opening it finds out where samples stand and reads none of them. What is lost is told then as
-/// [`DamagedSample`] of the batch that it belongs to, in each epoch.
+/// Opening finds the samples' places and reads none of them. A sample that is lost is then reported as
+/// [`DamagedSample`] of its batch, in each epoch.
 pub struct Turns {
     turns: Vec<Turn>,
     encoding: Encoding,
@@ -36,7 +36,7 @@ impl Turns {
     /// Opens
     ///
     /// - a shard, `*.tar`, by the rule of WebDataset with members `png`, `mask.png` and `json`;
-    /// - a folder that `relit-extract` has written, in either layout: `dataset.json` tells what
+    /// - a folder that `relit-extract` has written, in either layout: `dataset.json` states what
     ///   should be there;
     /// - a folder of shards;
     /// - a folder in the layout of the paper's released data set: `imgs/<video>/<k>.png` (or `.jpg`)

@@ -35,7 +35,7 @@ enum Slot {
 }
 
 impl ShardTurn {
-    /// Looks for the samples of a shard, of which there should be `expected`.
+    /// Looks for the samples of a shard; `expected` is their number.
     pub(super) fn open(path: &Path, expected: Option<u32>) -> Result<Self, OpenError> {
         let failed = |source| OpenError::Read {
             path: path.to_owned(),
@@ -71,7 +71,7 @@ impl ShardTurn {
         u32::try_from(self.slots.len()).unwrap_or(u32::MAX)
     }
 
-    /// Why none of its samples is there, where that is so: it may be no shard at all.
+    /// Why no sample was found, if none was: the file may not be a shard.
     pub(super) fn whole_loss(&self) -> Option<&str> {
         let mut losses = self.slots.iter().map(|slot| match slot {
             Slot::At(_) => None,
@@ -99,7 +99,7 @@ impl ShardTurn {
             Some(Slot::At(place)) => self.read(place).map_err(damage)?,
             Some(Slot::Lost(why)) => return Err(damage(SampleFault::Part(why.clone()))),
             None => {
-                let why = "there is no such sample".to_owned();
+                let why = "the sample is missing".to_owned();
                 return Err(damage(SampleFault::Part(why)));
             }
         };
@@ -142,7 +142,7 @@ fn add_missing(slots: &mut Vec<Slot>, expected: Option<u32>) {
     let expected = expected.map_or(0, |count| count as usize);
     let found = slots.len();
     for _ in found..expected {
-        let why = format!("the data set tells of {expected} samples, and {found} were found");
+        let why = format!("the data set lists {expected} samples; {found} were found");
         slots.push(Slot::Lost(why));
     }
 }

@@ -15,7 +15,7 @@ impl File<'_> {
     fn accessor(&self, number: usize) -> Result<&Accessor, String> {
         let all = &self.document.accessors;
         all.get(number)
-            .ok_or_else(|| format!("it names accessor {number} of {}", all.len()))
+            .ok_or_else(|| format!("it names accessor {number}, and has {}", all.len()))
     }
 
     /// Whether the items of an accessor stand in the file.
@@ -105,7 +105,7 @@ impl File<'_> {
         let accessor = self.accessor(number)?;
         if accessor.sparse.is_some() {
             return Err(format!(
-                "accessor {number} is sparse, which is not read: save it with all its items"
+                "accessor {number} is sparse, which is not supported: save it with all its items"
             ));
         }
         let (kind, count) = (accessor.component_type, accessor.count);

@@ -1,4 +1,4 @@
-//! What is read of a glTF file's JSON. All else in it is left out, also where it is not as it should be: it is not needed.
+//! The part of a glTF file's JSON that is read. The rest is ignored, also if it is invalid.
 
 use std::collections::BTreeMap;
 
@@ -136,7 +136,7 @@ pub(super) struct Material {
     pub(super) extensions: MaterialExtensions,
 }
 
-/// What is missing is 1.
+/// Missing values are 1.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct MetallicRoughness {
@@ -156,7 +156,7 @@ pub(super) struct MaterialExtensions {
     pub(super) glossy: Option<SpecularGlossiness>,
 }
 
-/// What is missing is 1.
+/// Missing values are 1.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct SpecularGlossiness {
@@ -192,7 +192,7 @@ pub(super) struct TextureTransform {
 }
 
 impl TextureInfo {
-    /// The number of the texture coordinates on which the picture lies.
+    /// The number of the picture's texture coordinates.
     pub(super) fn coordinates(&self) -> usize {
         let transform = self.extensions.transform.as_ref();
         let other = transform.and_then(|transform| transform.tex_coord);

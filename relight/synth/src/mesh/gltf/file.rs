@@ -1,4 +1,4 @@
-//! The parts of a glTF file: its JSON, and the bytes of its buffers, which lie within it or beside it.
+//! The parts of a glTF file: its JSON, and the bytes of its buffers, which lie within it or in files of its folder.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -79,7 +79,7 @@ impl<'a> File<'a> {
         let views = &self.document.buffer_views;
         let view = views
             .get(number)
-            .ok_or_else(|| format!("buffer view {number} of {} is named", views.len()))?;
+            .ok_or_else(|| format!("buffer view {number} is named; there are {}", views.len()))?;
         let bytes = match self.buffers.get(view.buffer) {
             Some(Ok(bytes)) => bytes,
             Some(Err(why)) => {
@@ -99,7 +99,7 @@ impl<'a> File<'a> {
     /// The bytes of a picture.
     pub(super) fn picture(&self, number: usize) -> Result<Cow<'_, [u8]>, String> {
         let image = self.document.images.get(number);
-        let image = image.ok_or_else(|| "is not there".to_owned())?;
+        let image = image.ok_or_else(|| "is missing".to_owned())?;
         match (image.buffer_view, &image.uri) {
             (Some(view), _) => Ok(Cow::Borrowed(self.view(view)?)),
             (None, Some(uri)) => Ok(Cow::Owned(linked(self.path, uri)?)),
@@ -108,9 +108,9 @@ impl<'a> File<'a> {
     }
 }
 
-/// That an extension is needed and not read.
+/// An extension is required and not supported.
 pub(super) fn not_read(extension: &str) -> String {
-    format!("it needs the glTF extension {extension}, which is not read: save it without it")
+    format!("it needs the glTF extension {extension}, which is not supported: save it without")
 }
 
 /// The JSON of a binary file and its first buffer.
@@ -127,9 +127,7 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     let length = number(8).ok_or_else(cut_off)? as usize;
     if length > bytes.len() || length < HEADER {
         let found = bytes.len();
-        return Err(format!(
-            "it says that it is {length} bytes long, and is {found}"
-        ));
+        return Err(format!("its header states {length} bytes; it has {found}"));
     }
     let (mut json, mut binary) = (None, None);
     let mut at = HEADER;
@@ -165,7 +163,7 @@ fn check(document: &Document) -> Result<(), String> {
     }
 }
 
-/// What an address stands for: data within it, or a file in the folder of the mesh.
+/// The target of an address: data within it, or a file in the folder of the mesh.
 fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (kind, text) = data.split_once(',').ok_or("holds no data")?;
@@ -176,9 +174,8 @@ fn linked(path: &Path, uri: &str) -> Result<Vec<u8>, String> {
             .decode(text)
             .map_err(|fault| format!("holds damaged data: {fault}"));
     }
-    let beside = by_address(path, uri).ok_or_else(|| {
-        format!("is the file {uri:?}, which is not there in the folder of the mesh")
-    })?;
+    let beside = by_address(path, uri)
+        .ok_or_else(|| format!("is the file {uri:?}, which is missing in the mesh's folder"))?;
     std::fs::read(&beside)
         .map_err(|fault| format!("is the file {uri:?}, which cannot be read: {fault}"))
 }

@@ -36,7 +36,7 @@ pub(super) fn read(
 /// The pictures of a file's materials, each read once.
 struct Pictures<'a> {
     file: &'a File<'a>,
-    /// By number and what its values are; none of those that cannot be used.
+    /// By number and type of values; `None` for those that cannot be used.
     read: HashMap<(usize, PictureKind), Option<Arc<TextureImage>>>,
     left_out: &'a mut Vec<String>,
 }
@@ -108,11 +108,11 @@ impl Pictures<'_> {
         let textures = &self.file.document.textures;
         let of = textures
             .get(texture)
-            .ok_or_else(|| format!("its texture {texture} of {} is not there", textures.len()))?;
+            .ok_or_else(|| format!("its texture {texture} of {} is missing", textures.len()))?;
         let webp = of.extensions.webp.as_ref().and_then(|webp| webp.source);
         of.source.or(webp).ok_or_else(|| {
             let why = match of.extensions.others.keys().next() {
-                Some(extension) => format!("is in a format that is not read ({extension})"),
+                Some(extension) => format!("is in an unsupported format ({extension})"),
                 None => "has no picture".to_owned(),
             };
             format!("its texture {texture}, counted from 0, {why}")

@@ -1,5 +1,5 @@
-//! glTF 2.0 files: JSON with its buffers beside it or inside, or one binary file. Positions, texture coordinates and colours
-//! of triangles are read, placed as the scene's nodes say, and their materials with pictures.
+//! glTF 2.0 files: JSON with its buffers in files or inside, or one binary file. Positions, texture coordinates and colours
+//! of triangles are read, placed by the scene's nodes, and their materials with pictures.
 //!
 //! Read here and not by a library: the one that is maintained refuses valid files for what is not needed of them, and ends the
 //! program at some that are not.
@@ -56,8 +56,8 @@ impl Reader<'_> {
         let meshes = &self.file.document.meshes;
         let mesh = meshes
             .get(number)
-            .ok_or_else(|| format!("it names mesh {number} of {}", meshes.len()))?;
-        let bound = "its skeletons are not read: what they carry lies as it was modelled";
+            .ok_or_else(|| format!("it names mesh {number}, and has {}", meshes.len()))?;
+        let bound = "its skeletons are not read: skinned parts stay in the modelled pose";
         if node.skin.is_some() && !self.raw.left_out.iter().any(|what| what == bound) {
             self.raw.left_out.push(bound.to_owned());
         }
@@ -87,7 +87,9 @@ impl Reader<'_> {
             None => (0..count as u32).collect(),
         };
         if let Some(&vertex) = order.iter().find(|&&vertex| vertex as usize >= count) {
-            return Err(format!("a triangle names vertex {vertex} of {count}"));
+            return Err(format!(
+                "a triangle names vertex {vertex}; there are {count}"
+            ));
         }
         let first = self.raw.positions.len() as u32;
         self.raw.positions.extend(positions);
@@ -100,7 +102,7 @@ impl Reader<'_> {
         self.push(primitive, first, &triangles)
     }
 
-    /// Adds triangles of vertices from `first` on, with what the part says of their corners.
+    /// Adds triangles of vertices from `first` on, with the part's attributes of their corners.
     fn push(&mut self, part: &Primitive, first: u32, triangles: &[[u32; 3]]) -> Result<(), String> {
         let count = self.raw.triangles.len() + triangles.len();
         if count > MAX_TRIANGLES {

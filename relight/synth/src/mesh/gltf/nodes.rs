@@ -16,9 +16,9 @@ pub(super) fn placed(document: &Document) -> Result<Vec<(&Node, Mat4)>, String> 
         .collect();
     while let Some((number, parent)) = waiting.pop() {
         let node = document.nodes.get(number);
-        let node = node.ok_or_else(|| format!("it names node {number} of {count}"))?;
+        let node = node.ok_or_else(|| format!("it names node {number}, and has {count}"))?;
         if placed.len() + waiting.len() + node.children.len() > MAX_NODES {
-            return Err("its nodes go in a circle, or there are too many".to_owned());
+            return Err("its nodes form a cycle, or there are too many".to_owned());
         }
         let place = parent * local(node);
         placed.push((node, place));
@@ -27,7 +27,7 @@ pub(super) fn placed(document: &Document) -> Result<Vec<(&Node, Mat4)>, String> 
     Ok(placed)
 }
 
-/// The uppermost nodes of the default scene; of a file without scenes, those that are no other's child.
+/// The uppermost nodes of the default scene; of a file without scenes, those without a parent.
 fn roots(document: &Document) -> Vec<usize> {
     let default = document
         .scene

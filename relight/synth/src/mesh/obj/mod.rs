@@ -1,4 +1,4 @@
-//! Wavefront files and the materials beside them, as programs write them.
+//! Wavefront files and their materials, as programs write them.
 //!
 //! Read here and not by a library: none of those that are maintained reads concave polygons, text that is not UTF-8, lines that
 //! go on and colours of vertices alike, and says the line in which a file is damaged.
@@ -18,7 +18,7 @@ use super::raw::{RawMesh, RawTriangle};
 use super::text::{Statements, decoded, keyword, readings, without_comment};
 use crate::texture::{PictureKind, TextureImage};
 
-/// Names of materials by which programs say that there is none.
+/// Names that programs give to a missing material.
 const NO_MATERIAL: [&str; 3] = ["", "none", "(null)"];
 
 /// Most files of materials that one statement may be read as.
@@ -119,7 +119,7 @@ impl ObjFile {
         let numbers = numbers(text)?;
         let Some(&[x, y, z]) = numbers.first_chunk() else {
             let count = numbers.len();
-            return Err(format!("a vertex has {count} coordinates in place of 3"));
+            return Err(format!("a vertex has {count} coordinates instead of 3"));
         };
         // One number more is a weight, which only curves use; one behind a colour is its opacity.
         if let [_, _, _, red, green, blue] | [_, _, _, red, green, blue, _] = *numbers {
@@ -214,11 +214,11 @@ impl ObjFile {
             if !self.texture.is_empty() && texture > self.texture.len() {
                 let count = self.texture.len();
                 return Err(format!(
-                    "a face names texture coordinates {texture} of {count}"
+                    "a face names texture coordinates {texture}; there are {count}"
                 ));
             }
             let found = self.positions.get(number).copied();
-            found.ok_or_else(|| format!("a face names vertex {} of {count}", number + 1))
+            found.ok_or_else(|| format!("a face names vertex {}; there are {count}", number + 1))
         };
         corners.iter().map(place).collect()
     }
@@ -239,7 +239,10 @@ impl ObjFile {
 
 fn numbers(text: &str) -> Result<Vec<f32>, String> {
     let words = without_comment(text).split_whitespace();
-    let number = |word: &str| word.parse().map_err(|_| format!("{word:?} is no number"));
+    let number = |word: &str| {
+        word.parse()
+            .map_err(|_| format!("{word:?} is not a number"))
+    };
     words.map(number).collect()
 }
 
@@ -256,7 +259,7 @@ fn index(text: &str, count: usize) -> Result<u32, String> {
             .map(|count| count.saturating_add(number)),
     };
     let place = place.and_then(|place| u32::try_from(place).ok());
-    place.ok_or_else(|| format!("a face names corner {number}, and {count} are there"))
+    place.ok_or_else(|| format!("a face names corner {number}; there are {count}"))
 }
 
 /// The materials that faces name, by the number of the name.
@@ -289,7 +292,7 @@ impl Materials {
             left_out.extend(
                 missing
                     .iter()
-                    .map(|name| format!("its materials {name:?} are not there")),
+                    .map(|name| format!("its materials {name:?} are missing")),
             );
             if missing.is_empty() {
                 let names = unknown.join(", ");
@@ -395,7 +398,7 @@ fn split(mesh: &Path, named: &str) -> Vec<Result<PathBuf, String>> {
 /// The pictures of a file's materials, each read once.
 struct Pictures<'a> {
     path: &'a Path,
-    /// By name; none of those that cannot be used.
+    /// By name; `None` for those that cannot be used.
     read: HashMap<String, Option<Arc<TextureImage>>>,
 }
 
@@ -437,7 +440,7 @@ impl<'a> Pictures<'a> {
 
 fn picture(path: &Path, name: &str) -> Result<TextureImage, String> {
     let file = readings(name).find_map(|name| by_name(path, name));
-    let file = file.ok_or_else(|| "is not there".to_owned())?;
+    let file = file.ok_or_else(|| "is missing".to_owned())?;
     let bytes = std::fs::read(file).map_err(|fault| format!("cannot be read: {fault}"))?;
     TextureImage::decoded(&bytes, PictureKind::Colours)
         .map_err(|fault| format!("cannot be used: {fault}"))

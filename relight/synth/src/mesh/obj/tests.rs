@@ -12,7 +12,7 @@ const MATERIALS: &str = "newmtl red\nKd 0.8 0.1 0.1\nnewmtl blue\nKd 0.1 0.2 0.8
 /// The square in both of them.
 const COLOURED: &str = "usemtl red\nf 1 2 3\nusemtl blue\nf 1 3 4\n";
 
-/// Reads a mesh with other files beside it.
+/// Reads a mesh with other files in its folder.
 fn read_beside(obj: &[u8], others: &[(&str, &[u8])]) -> Result<Mesh, SynthError> {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes) in others {

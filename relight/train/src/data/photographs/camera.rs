@@ -25,7 +25,7 @@ const POWER: f64 = 2.4;
 #[derive(Debug)]
 pub(super) struct NoiseTiles(Tensor);
 
-/// What cameras make of light.
+/// From light to camera values.
 #[derive(Debug)]
 pub(super) struct Photographed {
     /// Linear light as whoever has the picture takes it, clipped at 1.

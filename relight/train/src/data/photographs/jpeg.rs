@@ -1,4 +1,4 @@
-//! What JPEG compression takes from a picture (ITU T.81): cosines of 8 x 8 blocks, rounded.
+//! The loss of JPEG compression (ITU T.81): cosines of 8 x 8 blocks, rounded.
 
 use std::f64::consts::PI;
 

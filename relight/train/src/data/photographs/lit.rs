@@ -30,7 +30,7 @@ const PRINT_EDGE: f64 = 15.0;
 const BILINEAR: i64 = 0;
 const BORDER: i64 = 1;
 
-/// A photograph that is to be made: the view's place in the pool, and all else.
+/// A photograph to be made: the view's place in the pool, and all other parameters.
 #[derive(Debug, Clone)]
 pub(super) struct PlannedPhoto {
     pub(super) place: usize,

@@ -5,8 +5,8 @@
 //! | `view_loader` | threads that cast views |
 //! | `view_pool` | the views of a step, on the device |
 //! | `lit` | views in a light |
-//! | `camera`, `jpeg` | what a camera makes of it |
-//! | `truth` | what a network sees of it, and what it should answer |
+//! | `camera`, `jpeg` | from light to camera values |
+//! | `truth` | the network's input, and its ground truth |
 //!
 //! A batch is a function of the settings and its step, whatever the number of threads and processes. Sample i of each batch
 //! is of a view whose number is i modulo the batch: where several processes share the batches, each casts the views of its
@@ -49,7 +49,7 @@ pub struct Photographs {
     kind: Kind,
     rank: Rank,
     resources: Resources,
-    /// Opened with the first batch, whose step says where.
+    /// Opened with the first batch, at the position of its step.
     open: Option<OpenPool>,
 }
 
@@ -107,7 +107,7 @@ impl Photographs {
         &self.source.library
     }
 
-    /// What of the folders is not used.
+    /// Unused files of the folders.
     pub(crate) fn left_out(&self) -> &[LeftOut] {
         &self.source.library.left_out
     }
@@ -129,7 +129,7 @@ impl Photographs {
     /// The batch of a step; steps are asked for one after the other.
     ///
     /// # Errors
-    /// [`TrainError::Stopped`] where the run is asked to stop before the views are cast, [`TrainError::Fault`],
+    /// [`TrainError::Stopped`] if the run is asked to stop before the views are cast, [`TrainError::Fault`],
     /// [`TrainError::Torch`].
     pub fn batch(&mut self, step: u64) -> Result<TruthBatch, TrainError> {
         let newest = self.data.views_at(step);

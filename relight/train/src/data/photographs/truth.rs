@@ -1,4 +1,4 @@
-//! From lit and photographed views to what a network sees, and what it should answer.
+//! From lit and photographed views to the network's input and ground truth.
 
 use relight_core::render::cosine_lobe;
 use relight_photo::decompose::{LOG_FLOOR, MAX_LIGHT};

@@ -31,7 +31,7 @@ pub(super) struct ViewSource {
     pub(super) library: Library,
 }
 
-/// A view, by its number; none where casting it panicked.
+/// A view, by its number; `None` if casting it panicked.
 type Cast = (u64, Option<PhotoView>);
 
 /// Threads that cast views.
@@ -106,7 +106,7 @@ impl ViewLoader {
     /// The next view.
     ///
     /// # Errors
-    /// [`TrainError::Fault`] where casting panicked: a fault of the program. [`TrainError::Stopped`].
+    /// [`TrainError::Fault`] if casting panicked: a fault of the program. [`TrainError::Stopped`].
     pub(super) fn next_view(&mut self) -> Result<PhotoView, TrainError> {
         loop {
             if let Some(view) = self.early.remove(&self.next) {

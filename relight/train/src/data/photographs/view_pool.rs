@@ -43,7 +43,7 @@ impl ViewPool {
         })
     }
 
-    /// How many views there is room for.
+    /// The number of views that fit.
     pub(super) fn len(&self) -> usize {
         self.lamps.len()
     }
@@ -86,7 +86,7 @@ impl ViewPool {
         self.chosen(&self.finishes, at)
     }
 
-    /// What is seen of lamps, each by its view's place and its number.
+    /// The visible parts of lamps, each by its view's place and its number.
     pub(super) fn visibility(
         &self,
         chosen: impl Iterator<Item = (usize, usize)>,

@@ -23,7 +23,7 @@ const RIDGE: f64 = 1e-5;
 /// beyond the second are those that metal shows.
 ///
 /// # Errors
-/// Where a map has another size, or no light fits the curves.
+/// If a map has another size, or no light fits the curves.
 pub fn fit_turn_light(
     curves: &TurnCurves,
     surface: &Surface,
@@ -58,7 +58,7 @@ pub fn fit_turn_light(
 }
 
 /// The shading model that fits the curves of these normals and albedos best, for an object without gloss or of metal: one
-/// linear fit of the light. What gloss shows of a light that is not known can hardly be told from what the diffuse part shows.
+/// linear fit of the light. In an unknown light, gloss and the diffuse part can hardly be separated.
 pub(crate) fn fit_model(
     statistics: &[&CurveStatistics],
     normals: &[[f64; 3]],
@@ -109,7 +109,7 @@ pub(crate) fn fit_model(
 }
 
 /// The residual of the light that fits an evenly coloured Lambertian object of these normals best, over that of an even
-/// light; none where nothing varies.
+/// light; `None` if nothing varies.
 pub(crate) fn relative_residual(
     statistics: &[&CurveStatistics],
     normals: &[[f64; 3]],

@@ -87,7 +87,7 @@ pub fn solve_in_light(
     }
 }
 
-/// An object of a material in a known light, of which the lobe is to be found.
+/// An object of a material in a known light, whose lobe is to be found.
 #[derive(Debug, Clone, Copy)]
 struct Finish {
     frame: TableFrame,
@@ -95,7 +95,7 @@ struct Finish {
     material: MaterialKind,
 }
 
-/// What gloss, or metal, makes of the light that a mirror would show.
+/// The light that a mirror would show, as gloss or metal shows it.
 #[derive(Debug, Clone, Copy)]
 struct Lobe {
     strength: f64,
@@ -232,7 +232,7 @@ impl Solver<'_> {
             });
     }
 
-    /// What each pixel's normal is expected to be off by itself.
+    /// The expected error of each pixel's normal alone.
     fn own_errors(&self) -> Vec<OwnError> {
         own_errors(FittedPixels {
             curves: self.curves,

@@ -138,7 +138,7 @@ impl Conditioning {
     }
 }
 
-/// What is observable in the light of a pixel, all channels together.
+/// The observable part of the light at a pixel, all channels together.
 enum PixelLight {
     /// Modulation, and the part beyond the second harmonic.
     Curve { modulation: f64, beyond: f64 },

@@ -23,7 +23,7 @@ const MIN_PARTS: usize = 8;
 /// Least gap between parts with frames that is not covered, in usual gaps. By hand.
 const HOLE: f64 = 3.0;
 
-/// What is wrong with frames of which nothing is left.
+/// The fault of frames without a usable pixel.
 pub(crate) const NOTHING: &str = "no frame has a pixel under the mask";
 
 /// Gathers the frames of a turn, in any order, into [`TurnCurves`]. Its memory does not grow with the number of frames.
@@ -67,7 +67,7 @@ impl CurveBuilder {
     /// For the pixels under a mask: where it is at least one half.
     ///
     /// # Errors
-    /// Where there are none.
+    /// If no pixel is under it.
     pub(crate) fn new(extent: Extent, mask: &[f32]) -> Result<Self, TurnError> {
         let places: Vec<usize> = (0..extent.pixels().min(mask.len()))
             .filter(|&at| mask[at] >= 0.5)
@@ -87,11 +87,11 @@ impl CurveBuilder {
         })
     }
 
-    /// Takes a frame up: its angle, degrees, and its planes of linear red, green and blue. Frames at angles
-    /// that are no number are left out.
+    /// Takes a frame up: its angle, degrees, and its planes of linear red, green and blue. Frames whose angle is
+    /// not a number are left out.
     ///
     /// # Errors
-    /// Where it has another size.
+    /// If it has another size.
     pub(crate) fn push(
         &mut self,
         angle_deg: f64,
@@ -102,7 +102,7 @@ impl CurveBuilder {
             let [found, expected] =
                 [extent, self.extent].map(|size| format!("{} x {}", size.width, size.height));
             return Err(TurnError::Refused(format!(
-                "a frame has {found} pixels where {expected} are needed"
+                "a frame has {found} pixels instead of {expected}"
             )));
         }
         if !angle_deg.is_finite() {
@@ -127,12 +127,12 @@ impl CurveBuilder {
     /// The curves of all frames.
     ///
     /// # Errors
-    /// Where the frames do not tell two harmonics.
+    /// If the frames do not determine two harmonics.
     pub(crate) fn finish(self) -> Result<TurnCurves, TurnError> {
         let seen: Vec<usize> = (0..PARTS).filter(|&at| self.parts[at].frames > 0).collect();
         if seen.len() < MIN_PARTS {
             return Err(TurnError::Refused(format!(
-                "{} different angles were found: five terms a pixel need at least {MIN_PARTS}, spread over the turn",
+                "{} different angles were found: at least {MIN_PARTS}, spread over the turn, are needed",
                 seen.len()
             )));
         }
@@ -234,7 +234,7 @@ impl TurnCurves {
         1.0 - weights.iter().map(|&weight| f64::from(weight)).sum::<f64>() / weights.len() as f64
     }
 
-    /// Where the pixels under the mask stand in the frame, row by row.
+    /// The places of the pixels under the mask in the frame, row by row.
     pub(crate) fn places(&self) -> &[usize] {
         &self.places
     }
@@ -261,7 +261,7 @@ impl TurnCurves {
         &self.values[pixel * self.parts()..][..self.parts()]
     }
 
-    /// How much each of them counts, 0 or 1: nothing where it is clipped.
+    /// The weight of each, 0 or 1: 0 if it is clipped.
     pub(crate) fn weights(&self, pixel: usize) -> &[[f32; 3]] {
         &self.weights[pixel * self.parts()..][..self.parts()]
     }
@@ -289,7 +289,7 @@ impl TurnCurves {
         places.map(move |&at| map.pixel(at % width, at / width).map(f64::from))
     }
 
-    /// How many degrees of the turn the frames cover: all but gaps that are much larger than what is usual between them.
+    /// The degrees of the turn that the frames cover: all except gaps much larger than the usual distance.
     #[must_use]
     pub fn coverage_deg(&self) -> f64 {
         let mut angles: Vec<f64> = self.angles.iter().map(|angle| angle.to_degrees()).collect();

@@ -44,7 +44,7 @@ impl TurnSolution {
     /// colour and normal of the nearest pixel inside.
     ///
     /// # Errors
-    /// Where the maps are too large for a file.
+    /// If the maps are too large for a file.
     pub(crate) fn captured_object(&self, turn: &ReadTurn) -> Result<CapturedObject, TurnError> {
         let curves = &turn.curves;
         let extent = curves.extent();
