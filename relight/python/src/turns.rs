@@ -12,7 +12,7 @@ use relit_data::rig::RotationDirection;
 
 use crate::arrays::Array;
 use crate::failure::{choice, unlocked};
-use crate::light::{GivenLight, Light};
+use crate::light::{Light, LightInput};
 use crate::networks::turn_networks;
 
 /// What is found of a turn, by name, and what its user should know.
@@ -22,7 +22,7 @@ pub(crate) fn solve_turn<'py>(
     shard: PathBuf,
     rotation: Option<String>,
     elevation: Option<f64>,
-    light: Option<GivenLight<'py>>,
+    light: Option<LightInput<'py>>,
     material: &str,
 ) -> PyResult<(Bound<'py, PyDict>, Vec<String>)> {
     let directions = [

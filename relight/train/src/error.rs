@@ -19,7 +19,7 @@ pub enum TrainError {
     /// A data set cannot be opened.
     #[error(transparent)]
     Data(#[from] relight_core::reader::OpenError),
-    /// A sheet of answers could not be encoded.
+    /// A sheet of predictions could not be encoded.
     #[error(transparent)]
     Encode(#[from] relit_data::shard::ShardError),
     /// What is wrong, and what to do: with something that was given, as a setting, an option, a checkpoint or a GPU, or

@@ -1,6 +1,6 @@
 //! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [metal]`.
 //!
-//! TRUTH is a rendered session (`normal_gt.png`, `albedo_gt.png`, `truth.json`) or a folder that `relight synth turns`
+//! TRUTH is a rendered session (`normal_gt.png`, `albedo_gt.png`, `truth.json`) or a folder that `relight synth sequences`
 //! wrote (`normal.png`, `albedo.png`, `turn.json`). `metal` says what the object is of.
 #![allow(clippy::print_stdout, reason = "the example is a program of its own")]
 

@@ -38,7 +38,7 @@ const HEADERS: [(HeaderName, &str); 6] = [
 
 /// The address of this machine that a connection was made to.
 #[derive(Debug, Clone, Copy)]
-pub struct Local(pub IpAddr);
+pub struct LocalAddress(pub IpAddr);
 
 /// Which requests are let in.
 #[derive(Debug)]
@@ -177,9 +177,9 @@ pub async fn guard(
     request: Request,
     next: Next,
 ) -> Response {
-    let local = request.extensions().get::<Local>().copied();
+    let local = request.extensions().get::<LocalAddress>().copied();
     let admitted = match local {
-        Some(Local(ip)) => policy.admit(ip, request.uri(), request.headers()),
+        Some(LocalAddress(ip)) => policy.admit(ip, request.uri(), request.headers()),
         None => Err(Failure::broken("the connection's address is not known")),
     };
     let mut response = match admitted {

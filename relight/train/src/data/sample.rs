@@ -6,7 +6,7 @@ use tch::{Device, Kind, Tensor};
 
 use crate::error::TrainError;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
-use relight_photo::decompose::{EncodedPicture, PredictedLight};
+use relight_photo::decompose::{NetworkInput, PredictedLight};
 use relight_photo::nets::{INPUTS, LIGHT_OUTPUTS};
 use relight_synth::SynthSample;
 
@@ -28,7 +28,7 @@ pub(crate) enum Linearisation {
 pub(crate) struct TruthArrays {
     extent: Extent,
     values: Vec<f16>,
-    /// What the head for light should answer; 0 where the light is not known.
+    /// What the head for light should predict; 0 where the light is not known.
     light: [f32; LIGHT_OUTPUTS],
 }
 
@@ -49,7 +49,7 @@ pub struct TruthBatch {
     pub normals: Tensor,
     /// Highlight, 1 channel, in whites: what of it the picture shows.
     pub highlight: Tensor,
-    /// What the head for light should answer, `batch x 9`; 0 where the light is not known.
+    /// What the head for light should predict, `batch x 9`; 0 where the light is not known.
     pub light: Tensor,
 }
 
@@ -60,7 +60,7 @@ impl TruthArrays {
             linear(sample, linearisation),
             sample.view.scene.buffer().mask(),
         );
-        let encoded = EncodedPicture::new(&picture, &mask);
+        let encoded = NetworkInput::new(&picture, &mask);
         let extent = encoded.extent();
         let pixels = extent.pixels();
         let mut values = Vec::with_capacity(PLANES * pixels);

@@ -27,7 +27,7 @@ pub struct PaperInputs {
     /// A data set of turns.
     pub turns: Option<PathBuf>,
     /// A data set of turns that the networks are judged by, and that should not be among `turns`.
-    pub held_out: Option<PathBuf>,
+    pub validation_turns: Option<PathBuf>,
     /// Weights to begin with.
     pub weights: Option<Weights>,
     /// Spec-Net's weights.
@@ -117,8 +117,8 @@ impl PhaseNetworks {
         }
     }
 
-    /// The loss on a batch of composed samples; none where the phase has none.
-    pub(crate) fn on_truth(
+    /// The loss on a batch of synthetic samples; none where the phase has none.
+    pub(crate) fn supervised_loss(
         &self,
         own: &Model,
         batch: &TruthBatch,
@@ -131,7 +131,7 @@ impl PhaseNetworks {
         }
     }
 
-    /// How well the phase's network does on composed samples.
+    /// How well the phase's network does on synthetic samples.
     pub(crate) fn sample_figures(
         &self,
         own: &Model,
@@ -192,7 +192,7 @@ impl PhaseNetworks {
     }
 
     /// The loss on a batch of turns; none where the gate of saturation is closed.
-    pub(crate) fn on_turns(
+    pub(crate) fn turn_loss(
         &self,
         own: &Model,
         turns: &TurnTensors,

@@ -47,7 +47,7 @@ fn report_camera(console: Console, info: &DeviceInfo) {
     }
     let modes: Vec<String> = info.modes.iter().map(ToString::to_string).collect();
     let controls: Vec<Value> = controls.iter().map(as_json).collect();
-    console.say(
+    console.print(
         &text,
         &Event::Camera {
             address: info.address.to_string(),
@@ -112,5 +112,5 @@ fn report_turntable(console: Console) {
         [address] => format!("{address}: a port that a turntable's controller may be at"),
         several => several.join("\n"),
     };
-    console.say(&text, &Event::Turntable { addresses });
+    console.print(&text, &Event::Turntable { addresses });
 }

@@ -16,7 +16,7 @@ use tokio::time::timeout;
 
 use super::library::Library;
 use super::permits::{Permits, Work};
-use super::processing::{MayProcess, present};
+use super::processing::{ProcessingHandle, present};
 use crate::processing::EditorTarget;
 
 /// Where the editor is served.
@@ -41,7 +41,7 @@ pub(super) struct EditorPath {
 /// used it for 15 minutes. One mask is open at a time. While the rig captures, the editor is held.
 pub(super) async fn open(
     State(library): State<Arc<Library>>,
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
 ) -> Result<Json<EditorPath>, Failure> {
@@ -59,7 +59,7 @@ pub(super) async fn open(
 ///
 /// Without a mask: what was drawn is lost.
 pub(super) async fn close(
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(permits): State<Arc<Permits>>,
 ) -> Result<StatusCode, Failure> {
     let processing = present(processing)?;
@@ -72,7 +72,7 @@ pub(super) async fn close(
 
 /// Hands a request to the editor, and its answer back.
 pub(super) async fn pass_on(
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(permits): State<Arc<Permits>>,
     request: Request,
 ) -> Result<Response, Failure> {

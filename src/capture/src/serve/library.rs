@@ -241,7 +241,7 @@ impl Library {
     }
 
     /// Writes note and rating of a session to its manifest.
-    pub(super) fn remark(
+    pub(super) fn annotate(
         &self,
         id: &str,
         note: Option<&str>,
@@ -255,7 +255,7 @@ impl Library {
             return Err(Failure::bad("a rating is a number from 1 to 5"));
         }
         let note = note.map(str::trim).filter(|note| !note.is_empty());
-        let written = session::remark(&self.ended(id)?, note, rating);
+        let written = session::annotate(&self.ended(id)?, note, rating);
         written.map_err(|error| Failure::broken(with_causes(&error)))
     }
 

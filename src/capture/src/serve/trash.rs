@@ -32,7 +32,7 @@ impl Library {
     }
 
     /// Moves a session to the trash.
-    pub(super) fn put_away(&self, id: &str) -> Result<(), Failure> {
+    pub(super) fn move_to_trash(&self, id: &str) -> Result<(), Failure> {
         let folder = self.ended(id)?;
         let trash = self.root.join(TRASH);
         fs::create_dir_all(&trash).map_err(not_moved(id))?;

@@ -356,7 +356,7 @@ mod tests {
         writer.lines.write_all(b"{\"n\":2,").unwrap();
         writer.sync().unwrap();
         let index = FrameIndex::parse(&fs::read(path).unwrap()).unwrap();
-        assert!(!index.is_torn());
+        assert!(!index.is_truncated());
         assert_eq!(index.entries(), [entry(0), entry(1)]);
         assert_eq!(writer.index, index);
     }

@@ -141,7 +141,7 @@ impl PartialManifest {
 /// What was joined.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct Merged {
+pub struct MergedDataset {
     /// The description, as it was written.
     pub dataset: Dataset,
     /// Number of tasks.
@@ -160,7 +160,10 @@ pub struct Merged {
 /// [`ShardError::PartialManifests`] if a task or a recording is missing or is there twice, if all failed, if tasks saw
 /// different recordings or settings, or a file is missing; then nothing is written.
 /// [`ShardError::Locked`] while a task is running, [`ShardError::Description`], [`ShardError::Io`].
-pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Merged, ShardError> {
+pub fn merge(
+    out: &Path,
+    length: &dyn Fn(&str) -> io::Result<u64>,
+) -> Result<MergedDataset, ShardError> {
     let folder = OutputFolder::lock_existing(out)?;
     let pieces = read_pieces(out)?;
     let mut problems = Vec::new();
@@ -190,7 +193,7 @@ pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Mer
 ///
 /// # Errors
 /// As [`Dataset::read`].
-pub fn described_so_far(out: &Path) -> Result<(Dataset, Option<String>), ShardError> {
+pub fn read_partial(out: &Path) -> Result<(Dataset, Option<String>), ShardError> {
     let none = match Dataset::read(out) {
         Err(none @ ShardError::NoDataset(_)) => none,
         read => return Ok((read?, None)),
@@ -233,7 +236,7 @@ fn read_pieces(out: &Path) -> Result<Vec<PartialManifest>, ShardError> {
 }
 
 /// The pieces joined, and what is wrong with them; `None` if they do not belong together.
-fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged> {
+fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<MergedDataset> {
     let Some(first) = pieces.first() else {
         problems.push("there are none".to_owned());
         return None;
@@ -297,7 +300,7 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
             }
         }
     }
-    Some(Merged {
+    Some(MergedDataset {
         dataset,
         tasks: first.count,
         left_out,

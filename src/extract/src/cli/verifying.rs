@@ -23,7 +23,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
     let count = report.problems.len();
     for problem in &report.problems[..count.min(console.most_lines(MAX_PRINTED))] {
         let (file, sample, what) = (&problem.file, &problem.sample, &problem.what);
-        console.say(
+        console.print(
             &problem.to_string(),
             &Event::Problem {
                 session: problem.session.clone(),
@@ -43,7 +43,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         0 => "no problems".to_owned(),
         n => count_of(n as u64, "problem"),
     };
-    console.say(
+    console.print(
         &format!(
             "{}: {}, {}, {} read back: {summary}",
             out.display(),

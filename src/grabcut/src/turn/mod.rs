@@ -1,10 +1,10 @@
 //! What a whole turn says of each pixel: the object stands still, the room passes by, the table lies below.
 
 pub(crate) mod backdrop;
-pub(crate) mod courses;
 pub(crate) mod disc;
 pub(crate) mod edge;
 pub(crate) mod enclosed_regions;
+pub(crate) mod pixel_series;
 pub(crate) mod registration;
 pub(crate) mod rim;
 pub(crate) mod statistics;
