@@ -99,7 +99,7 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     let read = read_curves(&shard, TableRotation::default(), &|_, _| {}).unwrap();
     assert_eq!((read.curves.frames(), read.damage.len()), (60, 0));
     assert!(read.has_angles);
-    let elevation = Elevation::given(degrees).unwrap();
+    let elevation = Elevation::measured(degrees).unwrap();
     let found = solve_in_light(&read.curves, &light, elevation, MaterialKind::Diffuse);
     let mask: Vec<bool> = read.mask.plane(0).iter().map(|&m| m >= 0.5).collect();
     let normals = found.normals(&read.curves);

@@ -111,7 +111,7 @@ impl TurnSet {
             shard: shard.clone(),
             normals: Normals::<YUp>::read(&truth.join("normal.png"))?,
             albedo: Rgb::<Linear>::read(&truth.join("albedo.png"), Transfer::Linear)?,
-            elevation: Elevation::given(out.atan2(up).to_degrees())?,
+            elevation: Elevation::measured(out.atan2(up).to_degrees())?,
             light: read_light(&truth.join("light.txt"))?,
         })
     }
@@ -342,7 +342,7 @@ mod tests {
 
     #[test]
     fn an_answer_turned_about_the_axis_is_found_out() {
-        let elevation = Elevation::given(20.0).unwrap();
+        let elevation = Elevation::measured(20.0).unwrap();
         let [x, y, z] = TableFrame::new(elevation).axis();
         let axis = Direction::new(x, y, z).unwrap();
         let turn = Rotation::about(axis, 17.0_f64.to_radians());

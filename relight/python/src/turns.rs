@@ -45,7 +45,7 @@ pub(crate) fn solve_turn<'py>(
         };
         let options = TurnOptions {
             rotation,
-            elevation: elevation.map(Elevation::given).transpose()?,
+            elevation: elevation.map(Elevation::measured).transpose()?,
             light,
             material,
         };

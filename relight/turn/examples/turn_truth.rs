@@ -102,7 +102,7 @@ impl Truth {
         Ok(Self {
             mask: mask.collect(),
             surface: Surface::new(normals, albedo, None)?,
-            elevation: Elevation::given(degrees)?,
+            elevation: Elevation::measured(degrees)?,
         })
     }
 

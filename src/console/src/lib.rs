@@ -129,7 +129,7 @@ impl Console {
     }
 
     /// Largest number of lines of a long list: `for_people`, or all for a machine.
-    pub fn most_lines(self, for_people: usize) -> usize {
+    pub fn max_lines(self, for_people: usize) -> usize {
         if self.json { usize::MAX } else { for_people }
     }
 

@@ -214,7 +214,7 @@ impl Job {
         thumbnails.sort_by_key(|(index, _)| *index);
         notices.extend(notices_of_lost(&lost));
         if let Some(align) = &stage.align {
-            notices.extend(stability.notices(align.aligner.least_confidence()));
+            notices.extend(stability.notices(align.aligner.min_confidence()));
         }
         let taken: Vec<_> = (0..samples).filter_map(|k| writer.sample(k)).collect();
         let findings = quality::findings(&taken, options.frames);
@@ -407,7 +407,7 @@ impl Job {
                 if left_out == 1 { "is" } else { "are" },
             )));
         }
-        if let Some(frame) = plan.runs_back_at() {
+        if let Some(frame) = plan.reversal_frame() {
             notices.push(Notice::Warning(format!(
                 "the table's angle goes back at frame {frame}: check {INDEX_FILE} there"
             )));

@@ -68,17 +68,17 @@ impl Stability {
         }
     }
 
-    /// What a user should know; frames below `least_confidence` were not registered.
-    pub(super) fn notices(&self, least_confidence: f64) -> Vec<Notice> {
+    /// What a user should know; frames below `min_confidence` were not registered.
+    pub(super) fn notices(&self, min_confidence: f64) -> Vec<Notice> {
         let mut notices = Vec::new();
         if let Some(first) = self.unregistered.iter().min() {
             let all = count_of(self.frames, "frame");
             notices.push(Notice::Warning(match self.unregistered.len() {
                 1 => format!(
-                    "1 of {all} could not be registered (its align_confidence is below {least_confidence:.2}) and is as it was taken: frame {first}"
+                    "1 of {all} could not be registered (its align_confidence is below {min_confidence:.2}) and is as it was taken: frame {first}"
                 ),
                 count => format!(
-                    "{count} of {all} could not be registered (their align_confidence is below {least_confidence:.2}) and are as they were taken, the first is frame {first}"
+                    "{count} of {all} could not be registered (their align_confidence is below {min_confidence:.2}) and are as they were taken, the first is frame {first}"
                 ),
             }));
         }

@@ -52,7 +52,7 @@ async fn index(
             None if policy.is_open() => home(),
             None => refused(),
         },
-        None if policy.lets_in(&headers) => answer(&files, INDEX, &headers),
+        None if policy.is_authorised(&headers) => answer(&files, INDEX, &headers),
         None => refused(),
     }
 }

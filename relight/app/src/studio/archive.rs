@@ -162,7 +162,7 @@ fn missing(name: &str) -> StudioError {
 }
 
 fn damaged(fault: &(dyn std::error::Error + 'static)) -> StudioError {
-    StudioError::because(
+    StudioError::with_cause(
         "the file is no scene that was kept: it is no ZIP archive, or damaged",
         fault,
     )

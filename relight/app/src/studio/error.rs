@@ -10,7 +10,7 @@ pub(super) struct StudioError(pub(super) String);
 
 impl StudioError {
     /// With what went wrong behind it.
-    pub(super) fn because(what: &str, cause: &(dyn Error + 'static)) -> Self {
+    pub(super) fn with_cause(what: &str, cause: &(dyn Error + 'static)) -> Self {
         Self(format!("{what}: {}", with_causes(cause)))
     }
 }

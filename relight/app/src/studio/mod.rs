@@ -98,7 +98,8 @@ impl Studio {
 
     fn answered(&mut self, message: &[u8]) -> Result<Answer, StudioError> {
         let parts = unpack(message)?;
-        let unknown = |fault| StudioError::because("the engine does not know this request", &fault);
+        let unknown =
+            |fault| StudioError::with_cause("the engine does not know this request", &fault);
         let request: Request =
             serde_json::from_slice(parts[0]).map_err::<StudioError, _>(unknown)?;
         let part = |what| match parts.get(1) {

@@ -55,7 +55,7 @@ pub(crate) struct PlacedObjectCache(Mutex<Option<Arc<PlacedObject>>>);
 
 impl PlacedObjectCache {
     /// An object that covers its own pixels so far, as it stands by this fit.
-    pub(crate) fn by(&self, fit: Fit, alpha: &Planes<1>) -> Arc<PlacedObject> {
+    pub(crate) fn get_or_place(&self, fit: Fit, alpha: &Planes<1>) -> Arc<PlacedObject> {
         if let Some(placed) = self.get().filter(|placed| placed.fit == fit) {
             return placed;
         }
@@ -106,8 +106,11 @@ mod tests {
     #[test]
     fn what_stands_as_before_is_not_made_again() {
         let last = PlacedObjectCache::default();
-        let first = last.by(fit(0.5, 0.0), &disc());
-        assert!(Arc::ptr_eq(&first, &last.by(fit(0.5, 0.0), &disc())));
+        let first = last.get_or_place(fit(0.5, 0.0), &disc());
+        assert!(Arc::ptr_eq(
+            &first,
+            &last.get_or_place(fit(0.5, 0.0), &disc())
+        ));
         let shape = first.height_field(&Normals::sphere(40)).unwrap();
         let again = first.height_field(&Normals::sphere(40)).unwrap();
         assert!(std::ptr::eq(shape, again));
@@ -116,9 +119,9 @@ mod tests {
     #[test]
     fn what_stands_otherwise_is() {
         let last = PlacedObjectCache::default();
-        let first = last.by(fit(0.5, 0.0), &disc());
+        let first = last.get_or_place(fit(0.5, 0.0), &disc());
         for other in [fit(0.6, 0.0), fit(0.5, 20.0)] {
-            let changed = last.by(other, &disc());
+            let changed = last.get_or_place(other, &disc());
             assert_eq!(changed.fit, other);
             assert_ne!(changed.alpha.extent(), first.alpha.extent());
         }

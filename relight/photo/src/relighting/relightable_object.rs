@@ -61,7 +61,7 @@ pub struct RelightableObject {
     rest: Planes<3>,
     /// The light in which the object was, grey, of order 2, in units in which the mean shading is 1.
     pub light: ShLight,
-    last_standing: PlacedObjectCache,
+    placed_cache: PlacedObjectCache,
 }
 
 impl RelightableObject {
@@ -138,7 +138,7 @@ impl RelightableObject {
             gloss: surface.gloss().map(|gloss| mean_gloss(gloss, &covered)),
             rest: Planes::zeros(extent),
             light,
-            last_standing: PlacedObjectCache::default(),
+            placed_cache: PlacedObjectCache::default(),
         })
     }
 
@@ -199,7 +199,7 @@ impl RelightableObject {
             gloss,
             rest,
             light: found.shading_light.clone(),
-            last_standing: PlacedObjectCache::default(),
+            placed_cache: PlacedObjectCache::default(),
         })
     }
 
@@ -211,7 +211,7 @@ impl RelightableObject {
 
     /// The object as it stands by this fit.
     pub(crate) fn placed(&self, fit: Fit) -> Arc<PlacedObject> {
-        self.last_standing.by(fit, &self.matte.alpha)
+        self.placed_cache.get_or_place(fit, &self.matte.alpha)
     }
 
     /// The object's colours in another light, in the units of [`RelightableObject::light`] (see

@@ -30,7 +30,7 @@ impl AllReducedLosses {
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub(crate) fn alone(losses: &StepLosses) -> Result<Self, TrainError> {
+    pub(crate) fn single_process(losses: &StepLosses) -> Result<Self, TrainError> {
         let means = losses.terms.means()?;
         let value = |&(over, value): &(f64, f64)| (over > 0.0).then_some(value);
         let values: Vec<_> = means.iter().map(value).collect();

@@ -226,7 +226,7 @@ impl<'a> Run<'a> {
         }
         let reduced = match &self.group {
             Some(group) => AllReducedLosses::new(&losses, stop, group)?,
-            None => AllReducedLosses::alone(&losses)?,
+            None => AllReducedLosses::single_process(&losses)?,
         };
         // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.
         if !reduced.values.is_empty() {
@@ -255,7 +255,7 @@ impl<'a> Run<'a> {
         if let Some(group) = &self.group {
             group.sum_gradients(trainable.model.parameters())?;
         }
-        trainable.learn(learning_rate, self.settings.max_grad_norm)
+        trainable.step(learning_rate, self.settings.max_grad_norm)
     }
 
     fn log(

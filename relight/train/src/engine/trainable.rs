@@ -54,7 +54,7 @@ impl Trainable {
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn learn(&mut self, learning_rate: f64, max_grad_norm: f64) -> Result<f64, TrainError> {
+    pub fn step(&mut self, learning_rate: f64, max_grad_norm: f64) -> Result<f64, TrainError> {
         let norm = self
             .adam
             .step(self.model.parameters(), learning_rate, max_grad_norm)?;

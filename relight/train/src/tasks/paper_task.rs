@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use tch::{Kind, Tensor};
 
-use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed};
+use super::paper_networks::{PaperInputs, PhaseNetworks, missing_option, trained_graph};
 use super::validation::{ValidationSamples, ValidationTurns};
 use crate::data::photographs::Photographs;
 use crate::data::turn_reader::{TurnGroup, TurnReader};
@@ -47,7 +47,7 @@ impl PaperTask {
     ) -> Result<Self, TrainError> {
         settings.check()?;
         if phase.needs_turns() && inputs.turns.is_none() {
-            return Err(needed(phase, "--turns"));
+            return Err(missing_option(phase, "--turns"));
         }
         if inputs.turns.is_some() && !phase.uses_turns() {
             return Err(TrainError::Refused(format!(
@@ -61,7 +61,7 @@ impl PaperTask {
                 phase.name()
             )));
         }
-        let graph = learned(phase);
+        let graph = trained_graph(phase);
         let weights = inputs.weights.as_ref();
         let kind = settings.run.precision.kind();
         let seed = stream(settings.run.seed, 31);
@@ -169,7 +169,7 @@ impl TrainingTask for PaperTask {
             .turns
             .as_ref()
             .map_or(String::new(), TurnReader::identity);
-        for model in self.networks.given() {
+        for model in self.networks.frozen_models() {
             inputs += &fingerprint(model.parameters())?;
         }
         Ok(inputs)
@@ -182,8 +182,8 @@ impl TrainingTask for PaperTask {
         }
         if let Some(reader) = &mut self.turns {
             if !groups.is_multiple_of(u64::from(rank.world_size())) {
-                let needed = format!("a multiple of {}", rank.world_size());
-                return Err(indivisible("turns.groups", groups, rank, &needed));
+                let missing_option = format!("a multiple of {}", rank.world_size());
+                return Err(indivisible("turns.groups", groups, rank, &missing_option));
             }
             reader.set_rank(rank)?;
         }

@@ -65,7 +65,7 @@ impl Worker {
     }
 
     /// Holds the program, or lets it go on.
-    pub(super) fn hold(&mut self, held: bool) {
+    pub(super) fn set_paused(&mut self, held: bool) {
         if held != self.is_held {
             self.is_held = held;
             self.signal(if held { Signal::STOP } else { Signal::CONT });

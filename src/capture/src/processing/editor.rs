@@ -59,7 +59,7 @@ impl OpenEditor {
         let mut heard = ProgramEvent::default();
         let until = Instant::now() + START;
         loop {
-            worker.hold(is_busy());
+            worker.set_paused(is_busy());
             worker.read_events(&mut heard);
             if let Some(target) = target(&heard) {
                 return Ok(Self {
@@ -95,7 +95,7 @@ impl OpenEditor {
     /// Holds it while the rig is busy. False once it is over: accepted, discarded, or left alone.
     pub(super) fn poll(&mut self, held: bool) -> bool {
         self.worker.read_events(&mut self.heard);
-        self.worker.hold(held);
+        self.worker.set_paused(held);
         let is_running = matches!(self.worker.ended(&mut self.heard), Ok(None));
         is_running && self.used.elapsed() < UNUSED
     }

@@ -156,7 +156,7 @@ fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
     if is_cancelled {
         running.worker.end();
     } else {
-        running.worker.hold(should_pause);
+        running.worker.set_paused(should_pause);
     }
     running.worker.read_events(&mut running.heard);
     if let Some((done, of)) = running.heard.take_progress() {

@@ -108,7 +108,7 @@ async fn inner_request(
     let path = format!("/{}", path.strip_prefix(PLACE).unwrap_or_default());
     let uri: Uri = path
         .parse()
-        .map_err(|_| Failure::bad("the editor has no such path"))?;
+        .map_err(|_| Failure::bad_request("the editor has no such path"))?;
     let body = timeout(SKETCH, to_bytes(body, MAX_SKETCH)).await;
     let body = body.map_err(|_| {
         let error = "the drawing did not come in time";
@@ -128,7 +128,7 @@ async fn inner_request(
     }
     let value = |text: String| {
         HeaderValue::from_str(&text)
-            .map_err(|_| Failure::broken("the editor's address cannot be written"))
+            .map_err(|_| Failure::internal("the editor's address cannot be written"))
     };
     headers.insert(header::HOST, value(target.address.to_string())?);
     let token = value(format!("Bearer {}", target.token))?;

@@ -38,7 +38,8 @@ pub(super) async fn picture(
     QueryParams(PreviewQuery { after }): QueryParams<PreviewQuery>,
 ) -> Result<Response, Failure> {
     let Some(after) = after else {
-        let none = || Failure::busy("there is no picture yet: the camera has not delivered one");
+        let none =
+            || Failure::unavailable("there is no picture yet: the camera has not delivered one");
         return Ok(jpeg(monitor.preview().ok_or_else(none)?));
     };
     let _permit = permit(&permits.viewers, "viewers of the preview")?;

@@ -121,7 +121,7 @@ impl NewDataset {
         self.make_parent(&entry.file)?;
         let mut copy = PartialFile::create(self.path(), &entry.file)?;
         io::copy(&mut source, &mut copy).map_err(ShardError::io("copy", &path))?;
-        compare(&entry.file, (entry.bytes, entry.blake3), source.found())?;
+        compare(&entry.file, (entry.bytes, entry.blake3), source.digest())?;
         copy.seal()?.publish().map(|_| ())
     }
 

@@ -167,7 +167,7 @@ impl PartialFile {
 
     /// Writes and syncs all bytes to disk.
     pub(super) fn seal(self) -> Result<SealedFile, ShardError> {
-        let (bytes, blake3) = self.writer.found();
+        let (bytes, blake3) = self.writer.digest();
         let partial = self.writer.into_inner();
         let path = partial.target().to_owned();
         let sealed = partial.seal().map_err(ShardError::io("write", &path))?;

@@ -117,7 +117,7 @@ pub struct Aligner {
     /// Pixels of a frame in one of the finest template.
     unit: f64,
     required_regions: RequiredRegions,
-    least_confidence: f64,
+    min_confidence: f64,
     motion: Motion,
 }
 
@@ -218,7 +218,7 @@ impl Aligner {
             templates,
             reach,
             unit,
-            least_confidence: MIN_CONFIDENCE,
+            min_confidence: MIN_CONFIDENCE,
             motion: Motion::default(),
         };
         let found: Vec<Alignment> = samples
@@ -230,15 +230,15 @@ impl Aligner {
         let usable = found.get(reference)?.shift.is_some();
         let registered = found.iter().filter(|found| found.shift.is_some());
         let usual = middle(registered.map(|found| found.confidence).collect());
-        aligner.least_confidence = MIN_CONFIDENCE.max(MIN_OF_MEDIAN * usual);
+        aligner.min_confidence = MIN_CONFIDENCE.max(MIN_OF_MEDIAN * usual);
         aligner.motion = Motion::from_alignments(&found, reference);
         usable.then_some(aligner)
     }
 
     /// The confidence below which a frame of this turn is not registered, 0..=1.
     #[must_use]
-    pub fn least_confidence(&self) -> f64 {
-        self.least_confidence
+    pub fn min_confidence(&self) -> f64 {
+        self.min_confidence
     }
 
     /// Where the object is in a frame, in pixels of the frame.
@@ -274,7 +274,7 @@ impl Aligner {
 
     fn located(&self, lumas: &[GrayImage], buffers: &mut GradientBuffers) -> Alignment {
         let gradients = self.gradients(lumas, buffers);
-        let sure = |fit: &Fit| fit.correlation >= self.least_confidence;
+        let sure = |fit: &Fit| fit.correlation >= self.min_confidence;
         let coarsest = self.templates.len() - 1;
         let reach = self.reach / (1_u32 << coarsest) as f64;
         let start = self.templates[coarsest].search(&gradients[coarsest], reach);

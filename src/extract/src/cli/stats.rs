@@ -35,7 +35,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
     if let Some(problem) = &problem {
         console.warn(problem);
     }
-    let most = console.most_lines(MAX_PRINTED);
+    let most = console.max_lines(MAX_PRINTED);
     let longest = |name: &str, of: fn(&SessionEntry) -> &str| {
         let lengths = sessions.iter().map(|entry| of(entry).chars().count());
         lengths.max().unwrap_or_default().max(name.len())

@@ -14,7 +14,7 @@ const BAND: usize = 2;
 const REACH: usize = 4;
 /// A mean needs at least so many pixels.
 const MIN_PIXELS: usize = 3;
-/// Courses that differ by less than this, as a root of the mean square, say nothing.
+/// Series that differ by less than this, as a root of the mean square, say nothing.
 const NOISE: f32 = 0.004;
 
 /// The object with its edge where the courses show it.

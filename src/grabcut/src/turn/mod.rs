@@ -12,4 +12,4 @@ pub(crate) mod subspace;
 pub(crate) mod table;
 pub(crate) mod table_model;
 pub(crate) mod temporal_evidence;
-pub(crate) mod whiskers;
+pub(crate) mod thin_parts;

@@ -16,7 +16,7 @@ use super::rim::without_rim;
 use super::table::{Turntable, find_turntable};
 use super::table_model::{TableModel, TurnObservations};
 use super::temporal_evidence::{Curves, TemporalEvidence, luminance};
-use super::whiskers::whiskers;
+use super::thin_parts::thin_parts;
 use crate::MaskError;
 use crate::bitmap::Bitmap;
 use crate::cut::grab_cut;
@@ -64,7 +64,7 @@ const WHITE: u8 = 250;
 /// And is so in this share of the frames.
 const WHITE_FRAMES: f64 = 0.9;
 /// Shorter thin parts of the object stay, pixels.
-const MIN_WHISKER: usize = 6;
+const MIN_THIN_PART: usize = 6;
 /// What the table's model says at least of a pixel that is background at first, as a logarithm.
 const SURELY_TABLE: f32 = 2.0;
 
@@ -515,7 +515,7 @@ pub(crate) fn segment(
         edge::along_series(&turn.series, object)
     });
     change(&mut labels, fine.size, |object| {
-        object.minus(&whiskers(&turn.series, object, MIN_WHISKER))
+        object.minus(&thin_parts(&turn.series, object, MIN_THIN_PART))
     });
     // From where the object is on average to where it is in the frame.
     change(&mut labels, fine.size, |object| {

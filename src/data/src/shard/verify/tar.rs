@@ -269,7 +269,7 @@ impl<'a, 'b> TarCheck<'a, 'b> {
             Err(error) => check.note(None, format!("it could not be read to its end: {error}")),
         }
         let shard = check.shard;
-        if let Err(error) = compare(&shard.file, (shard.bytes, shard.blake3), source.found()) {
+        if let Err(error) = compare(&shard.file, (shard.bytes, shard.blake3), source.digest()) {
             check.note(None, with_causes(&error));
         }
         let complete = seen

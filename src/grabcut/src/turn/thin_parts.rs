@@ -21,7 +21,7 @@ const NOISE: f32 = 1e-5;
 const MOSTLY: f64 = 0.35;
 
 /// The thin parts of `object` that are at least `least` pixels long and show what lies on both sides of them.
-pub(crate) fn whiskers(series: &PixelSeries, object: &Bitmap, least: usize) -> Bitmap {
+pub(crate) fn thin_parts(series: &PixelSeries, object: &Bitmap, least: usize) -> Bitmap {
     let width = series.size().0;
     let radius = ((width as f64 * WIDTH).round() as usize).max(1);
     let thin = object.minus(&object.opened(radius));
@@ -144,7 +144,7 @@ mod tests {
         let series = PixelSeries::new(&frames, SIZE);
         let whisker = |x: usize, y: usize| rim(y) && (40..80).contains(&x);
         let object = bitmap(|x, y| body(x, y) || stick(x, y) || whisker(x, y));
-        assert_eq!(whiskers(&series, &object, 8), bitmap(whisker));
-        assert_eq!(whiskers(&series, &object, 50).count(), 0);
+        assert_eq!(thin_parts(&series, &object, 8), bitmap(whisker));
+        assert_eq!(thin_parts(&series, &object, 50).count(), 0);
     }
 }
