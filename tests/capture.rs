@@ -19,7 +19,9 @@ use relit_camera::{
     Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, FrameFault,
     Mode, Rates, open,
 };
-use relit_capture::capture::{End, Recorder, RecordingPlan, Window, recover, recover_session};
+use relit_capture::capture::{
+    EndReason, Recorder, RecordingPlan, Window, recover, recover_session,
+};
 use relit_capture::preview::Preview;
 use relit_capture::state::{Monitor, TakeSummary, Verdict};
 use relit_clock::Clock;
@@ -222,7 +224,7 @@ fn plan(root: &Path, clock: &Clock, max_dropped: u64) -> RecordingPlan {
 
 /// Begins to record; the time of the turn is known before the first frame comes.
 fn start(camera: Box<dyn Camera>, plan: RecordingPlan, window: Window) -> Recorder {
-    let _participant = plan.clock.clone().take_part();
+    let _participant = plan.clock.clone().participate();
     let recorder = Recorder::start(camera, plan).unwrap();
     recorder.announce(window);
     recorder
@@ -347,7 +349,7 @@ fn a_whole_turn_is_a_clean_take_of_exactly_its_frames() {
 fn a_turn_may_be_announced_seconds_after_it_began() {
     let root = tempfile::tempdir().unwrap();
     let clock = Clock::virtual_time();
-    let _part = clock.take_part();
+    let _part = clock.participate();
     let begun = clock.now_us();
     let camera = Scripted::new(&clock, steps(stream(210, begun)));
     let mut plan = plan(root.path(), &clock, 0);
@@ -517,7 +519,7 @@ fn another_size_than_agreed_ends_the_recording() {
 fn a_recording_can_be_stopped() {
     let root = tempfile::tempdir().unwrap();
     let clock = Clock::virtual_time();
-    let _part = clock.take_part();
+    let _part = clock.participate();
     let begun = clock.now_us();
     let camera = Scripted::new(&clock, steps(stream(3000, begun)));
     let mut plan = plan(root.path(), &clock, 0);
@@ -529,9 +531,9 @@ fn a_recording_can_be_stopped() {
     recorder.stop();
     assert!(recorder.wait_ended(Duration::from_millis(100)));
     let (_camera, recorded) = recorder.wait().unwrap();
-    assert!(matches!(recorded.end(), End::Stopped));
+    assert!(matches!(recorded.end(), EndReason::Stopped));
     let take = Take::read(root.path(), recorded.finish(&|_| None, &[]).unwrap());
-    take.check_rejected(&[&End::Stopped.to_string()]);
+    take.check_rejected(&[&EndReason::Stopped.to_string()]);
     assert_eq!((take.frames_in_video(), take.summary.frames), (91, 91));
 }
 

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use relit_capture::capture::{CaptureError, Settings, Stopped};
-use relit_capture::command::{Command, Refused, Rig};
+use relit_capture::capture::{CaptureError, Settings, StopReason};
+use relit_capture::command::{Command, CommandError, Rig};
 use relit_capture::daemon::Daemon;
 use relit_capture::state::{LogLine, Phase, RigState, Verdict};
 use relit_data::causes::with_causes;
@@ -72,7 +72,7 @@ fn an_object_is_captured_and_a_second_start_is_refused() {
     once(&daemon, |_| daemon.monitor().preview().is_some());
     daemon.command(start("mug")).unwrap();
     let again = daemon.command(start("mug")).unwrap_err();
-    assert!(matches!(again, Refused::Busy(_)), "{again}");
+    assert!(matches!(again, CommandError::Busy(_)), "{again}");
     let state = once(&daemon, |state| {
         state.last_take.is_some() && state.phase == Phase::Idle
     });
@@ -111,7 +111,7 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
     once(&daemon, |_| moves(&daemon));
     daemon.command(Command::Stop).unwrap();
     once(&daemon, |state| state.phase == Phase::Idle);
-    let is_noted = |line: &LogLine| line.what == Stopped::Person.to_string();
+    let is_noted = |line: &LogLine| line.what == StopReason::Person.to_string();
     let state = once(&daemon, |state| state.log.iter().any(is_noted));
     assert!(state.faults.is_empty(), "{:?}", state.faults);
     once(&daemon, |state| state.table.state == "Idle");
@@ -123,7 +123,10 @@ fn a_stop_reaches_a_jog_and_an_end_reaches_a_take() {
     let take = daemon.monitor().state().last_take.unwrap();
     assert_eq!(take.verdict, Verdict::Aborted);
     let reason = take.reason.unwrap();
-    assert!(reason.contains(&Stopped::Shutdown.to_string()), "{reason}");
+    assert!(
+        reason.contains(&StopReason::Shutdown.to_string()),
+        "{reason}"
+    );
     assert!(daemon.command(start("mug")).is_err());
 }
 
@@ -186,11 +189,14 @@ fn commands_that_make_no_sense_are_refused_where_they_are_given() {
     let root = tempfile::tempdir().unwrap();
     let daemon = Daemon::start(settings(root.path(), "", "none")).unwrap();
     let refused = |command: Command| daemon.command(command).unwrap_err();
-    assert!(matches!(refused(start("a/b")), Refused::Invalid(_)));
-    assert!(matches!(refused(Command::Home), Refused::Unavailable(_)));
+    assert!(matches!(refused(start("a/b")), CommandError::Invalid(_)));
+    assert!(matches!(
+        refused(Command::Home),
+        CommandError::Unavailable(_)
+    ));
     assert!(matches!(
         refused(Command::Jog { degrees: f64::NAN }),
-        Refused::Invalid(_)
+        CommandError::Invalid(_)
     ));
 }
 
@@ -216,7 +222,7 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
         Command::Jog { degrees: 5.0 },
     ] {
         let refused = daemon.command(command).unwrap_err();
-        assert_eq!(refused, Refused::Unavailable(pressed.clone()));
+        assert_eq!(refused, CommandError::Unavailable(pressed.clone()));
     }
     daemon.simulator().unwrap().press_emergency_stop(false);
     let state = once(&daemon, |state| !state.table.emergency_stop);
@@ -229,7 +235,7 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
     once(&daemon, |state| state.phase == Phase::Idle);
     let refused = daemon.command(start("mug")).unwrap_err();
     assert!(
-        matches!(&refused, Refused::Unavailable(why) if *why != pressed),
+        matches!(&refused, CommandError::Unavailable(why) if *why != pressed),
         "{refused}"
     );
     // The jog that was interrupted is still being wound up.
@@ -252,7 +258,7 @@ fn a_speed_that_the_table_does_not_reach_is_refused_before_start() {
     assert_eq!(state.table.max_degrees_per_second, Some(36.0));
     let refused = daemon.command(start("mug")).unwrap_err();
     assert!(
-        matches!(&refused, Refused::Unavailable(why) if is_named(why, &["36", "72"])),
+        matches!(&refused, CommandError::Unavailable(why) if is_named(why, &["36", "72"])),
         "{refused}"
     );
     let advice = daemon.monitor().state().advice;

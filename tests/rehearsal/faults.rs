@@ -9,7 +9,7 @@ use std::time::Duration;
 use relit_camera::{
     self as camera, Camera, CameraError, CameraMode, Control, DeviceInfo, Frame, Mode,
 };
-use relit_capture::capture::{CaptureError, Settings, Stopped};
+use relit_capture::capture::{CaptureError, Settings, StopReason};
 use relit_capture::state::{LogLine, Phase, TakeSummary, Verdict};
 use relit_data::session::{Status, recordings};
 use relit_turntable::simulator::{SimulatedPort, SimulatedTable, SimulatorOptions};
@@ -214,15 +214,15 @@ fn a_stop_ends_the_take_within_five_seconds_and_stops_the_table() {
     let mut asked_us = 0;
     let take = interfere_in_the_turn(&mut rig, || {
         asked_us = clock.now_us();
-        stop.ask(Stopped::Shutdown);
+        stop.request(StopReason::Shutdown);
     });
     let took_us = clock.now_us() - asked_us;
     assert!(took_us < 5_000_000, "{took_us} us");
-    check_aborted(&rig, &take, &Stopped::Shutdown.to_string());
+    check_aborted(&rig, &take, &StopReason::Shutdown.to_string());
     assert!(take.is_stopped);
     // Another capture while the program ends is refused.
     let error = rig.capture().unwrap_err();
-    assert!(matches!(error, CaptureError::Stopped(Stopped::Shutdown)));
+    assert!(matches!(error, CaptureError::Stopped(StopReason::Shutdown)));
 }
 
 /// Checks that a take is whole although its table did not turn back.
@@ -245,7 +245,9 @@ fn check_whole(rig: &Rehearsal, take: &TakeSummary) {
 fn a_stop_while_the_table_turns_back_stops_the_table_and_costs_no_take() {
     let mut rig = Rehearsal::whole(SHORT, "");
     let stop = rig.stop.clone();
-    let take = interfere_in(Phase::Unwinding, &mut rig, || stop.ask(Stopped::Shutdown));
+    let take = interfere_in(Phase::Unwinding, &mut rig, || {
+        stop.request(StopReason::Shutdown)
+    });
     check_whole(&rig, &take);
     let state = rig.monitor.state();
     assert!(state.faults.is_empty(), "{:?}", state.faults);
@@ -279,8 +281,8 @@ fn an_emergency_stop_while_the_table_turns_back_costs_no_take() {
 fn a_take_that_was_stopped_in_its_turn_keeps_the_angles_it_had() {
     let mut rig = Rehearsal::whole(SHORT, "");
     let stop = rig.stop.clone();
-    let take = interfere_in_the_turn(&mut rig, || stop.ask(Stopped::Person));
-    check_aborted(&rig, &take, &Stopped::Person.to_string());
+    let take = interfere_in_the_turn(&mut rig, || stop.request(StopReason::Person));
+    check_aborted(&rig, &take, &StopReason::Person.to_string());
     assert!(take.is_stopped);
     let session = rig.session(&take);
     let entries = session.frames.as_ref().unwrap().entries();

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use relit_capture::capture::{
-    CaptureContext, CaptureError, Captured, Equipment, Settings, StopRequest, capture,
+    CaptureContext, CaptureError, CaptureOutcome, Equipment, Settings, StopRequest, capture,
 };
 use relit_capture::state::{Monitor, TakeSummary};
 use relit_clock::Participant;
@@ -70,7 +70,7 @@ impl Rehearsal {
             equipment,
             monitor: Monitor::default(),
             stop: StopRequest::new(&clock),
-            _part: clock.take_part(),
+            _part: clock.participate(),
         }
     }
 
@@ -81,7 +81,7 @@ impl Rehearsal {
         self.equipment = Equipment::new(settings).unwrap();
         let clock = self.equipment.clock();
         self.stop = StopRequest::new(&clock);
-        self._part = clock.take_part();
+        self._part = clock.participate();
         self
     }
 
@@ -90,7 +90,7 @@ impl Rehearsal {
         Ok(self.capture_all()?.take)
     }
 
-    pub(crate) fn capture_all(&mut self) -> Result<Captured, CaptureError> {
+    pub(crate) fn capture_all(&mut self) -> Result<CaptureOutcome, CaptureError> {
         let context = CaptureContext {
             monitor: &self.monitor,
             preview: None,

@@ -57,7 +57,7 @@ impl Drop for Unplugged {
 
 /// One buffer that the kernel handed to a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Handed {
+pub(crate) struct DeliveredBuffer {
     pub(crate) sequence: u64,
     pub(crate) t_us: i64,
 }
@@ -88,12 +88,12 @@ impl BufferTrace {
     }
 
     /// Ends the record.
-    pub(crate) fn end(self) -> Vec<Handed> {
+    pub(crate) fn end(self) -> Vec<DeliveredBuffer> {
         Self::switch("0");
         let text = fs::read_to_string(format!("{TRACING}/trace")).unwrap();
         let handed = text.lines().filter(|line| line.contains("v4l2_dqbuf: "));
         handed
-            .map(|line| Handed {
+            .map(|line| DeliveredBuffer {
                 sequence: number_after(line, " sequence = "),
                 t_us: i64::try_from(number_after(line, " timestamp = ") / 1000).unwrap(),
             })

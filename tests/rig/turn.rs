@@ -5,7 +5,7 @@ use std::path::Path;
 use image::{GrayImage, Luma};
 use relit_data::session::{FrameEntry, Status};
 
-use crate::camera::{BufferTrace, Handed, VIVID, Vivid};
+use crate::camera::{BufferTrace, DeliveredBuffer, VIVID, Vivid};
 use crate::program::{Running, extract, sessions};
 use crate::turntable;
 
@@ -51,7 +51,7 @@ fn every_frame_that_the_kernel_handed_out_during_the_turn_is_in_the_session() {
 }
 
 /// What the kernel handed out from the first recorded frame to the last.
-fn between(handed: &[Handed], entries: &[FrameEntry]) -> Vec<Handed> {
+fn between(handed: &[DeliveredBuffer], entries: &[FrameEntry]) -> Vec<DeliveredBuffer> {
     let time = entries[0].t_us..=entries[entries.len() - 1].t_us;
     let of_turn = handed.iter().filter(|frame| time.contains(&frame.t_us));
     of_turn.copied().collect()
@@ -59,7 +59,7 @@ fn between(handed: &[Handed], entries: &[FrameEntry]) -> Vec<Handed> {
 
 /// Each frame's stamp and number are the kernel's. A number that the driver gave twice is raised,
 /// as numbers in a session grow.
-fn check_counted(entries: &[FrameEntry], handed: &[Handed]) {
+fn check_counted(entries: &[FrameEntry], handed: &[DeliveredBuffer]) {
     let mut least = 0;
     for (entry, frame) in entries.iter().zip(handed) {
         let number = frame.sequence.max(least);

@@ -22,7 +22,7 @@
 #[cfg(target_arch = "wasm32")]
 mod browser;
 mod message;
-mod scenery;
+mod procedural_panorama;
 #[cfg(feature = "server")]
 pub mod server;
 mod studio;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use relight_photo::decompose::{DecomposeError, DecomposeOptions, Decomposer, SpecularGate};
-use relight_photo::files::{FoundPhotos, PhotoInput, PhotoReading, UnusedFile};
+use relight_photo::files::{PhotoInput, PhotoList, PhotoReading, UnusedFile};
 use relight_photo::nets::{NetError, Weights};
 use relit_console::{Console, Outcome};
 use relit_data::geometry::Rect;
@@ -54,7 +54,7 @@ impl PhotoArguments {
         most: Option<u32>,
         output: &Path,
         console: Console,
-    ) -> Result<FoundPhotos, DecomposeError> {
+    ) -> Result<PhotoList, DecomposeError> {
         let mut found = PhotoInput::find(&self.photos, most)?;
         found
             .unused
@@ -65,7 +65,7 @@ impl PhotoArguments {
 }
 
 /// The outcome of a run with so many lost photographs.
-pub(crate) fn outcome(found: &FoundPhotos, lost: usize, what: &str) -> CommandResult {
+pub(crate) fn outcome(found: &PhotoList, lost: usize, what: &str) -> CommandResult {
     match lost {
         0 if found.unused.is_empty() => Ok(Outcome::Success),
         _ if lost > 0 && lost == found.inputs.len() => {

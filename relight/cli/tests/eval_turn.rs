@@ -1,4 +1,4 @@
-//! `relight eval turn` as a user runs it, on turns that `relight synth turns` makes.
+//! `relight eval turn` as a user runs it, on turns that `relight synth sequences` makes.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,7 +22,7 @@ fn relight(arguments: &[&str]) -> Output {
 fn write_turn(folder: &Path) {
     let made = relight(&[
         "synth",
-        "turns",
+        "sequences",
         "--light-kind",
         "monte-carlo",
         "--seed",

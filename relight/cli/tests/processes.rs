@@ -14,7 +14,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
+use relight_synth::{Folders, Library, Recipe, SequenceRecipe, write_sequences};
 use relight_train::{Checkpoint, TABLE};
 use relit_test_support::is_named;
 use rustix::process::{Pid, Signal, kill_process};
@@ -194,7 +194,7 @@ fn two_and_four_processes_reach_the_weights_of_one() {
 #[test]
 fn groups_of_frames_are_divided_and_none_is_split() {
     let data = tempfile::tempdir().unwrap();
-    let recipe = TurnRecipe {
+    let recipe = SequenceRecipe {
         recipe: Recipe {
             size: 32,
             ..Recipe::default()
@@ -203,7 +203,7 @@ fn groups_of_frames_are_divided_and_none_is_split() {
     };
     let library = Library::read(&Folders::default()).unwrap();
     // Nine groups an epoch, the last of each turn short: steps of four go over its end.
-    write_turns(&recipe, &library, 3, data.path(), &|| {}).unwrap();
+    write_sequences(&recipe, &library, 3, data.path(), &|| {}).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("settings.toml");
     let text = format!("{}[turns]\ngroups = 4\n", settings(4, "double"));

@@ -1,4 +1,4 @@
-//! Whole turns from `relight synth turns`, through the files and the program.
+//! Whole turns from `relight synth sequences`, through the files and the program.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -16,7 +16,8 @@ use relight_core::light::{Normals, Order, ShLight, YUp};
 use relight_core::metrics::{Comparison, ScaleFit, angular_error};
 use relight_core::render::Surface;
 use relight_synth::{
-    Folders, FrameTruth, Library, LightKind, Recipe, TurnDescription, TurnRecipe, write_turns,
+    Folders, FrameTruth, Library, LightKind, Recipe, SequenceDescription, SequenceRecipe,
+    write_sequences,
 };
 use relight_turn::{
     Elevation, MaterialKind, TableFrame, TableRotation, TurnError, fit_turn_light, read_curves,
@@ -30,7 +31,7 @@ const SESSION: &str = "synth-8-0000";
 
 /// A turn in light of order 2 without shadows, and where its truth is.
 fn turn(folder: &Path, frames: u32) -> (PathBuf, PathBuf) {
-    let recipe = TurnRecipe {
+    let recipe = SequenceRecipe {
         recipe: Recipe {
             seed: SEED,
             size: 48,
@@ -41,7 +42,7 @@ fn turn(folder: &Path, frames: u32) -> (PathBuf, PathBuf) {
         frames,
     };
     let library = Library::read(&Folders::default()).unwrap();
-    write_turns(&recipe, &library, 1, folder, &|| {}).unwrap();
+    write_sequences(&recipe, &library, 1, folder, &|| {}).unwrap();
     (
         folder.join(format!("{SESSION}.tar")),
         folder.join("truth").join(SESSION),
@@ -51,7 +52,7 @@ fn turn(folder: &Path, frames: u32) -> (PathBuf, PathBuf) {
 /// The elevation, and the light at the angle 0.
 fn truth(folder: &Path) -> (f64, ShLight) {
     let json = fs::read(folder.join("turn.json")).unwrap();
-    let description: TurnDescription = serde_json::from_slice(&json).unwrap();
+    let description: SequenceDescription = serde_json::from_slice(&json).unwrap();
     let [_, y, z] = description.axis;
     let lines = fs::read_to_string(folder.join("frames.jsonl")).unwrap();
     let first: FrameTruth = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
@@ -98,7 +99,7 @@ fn a_turn_in_light_of_order_two_gives_normals_albedo_and_light_back() {
     let read = read_curves(&shard, TableRotation::default(), &|_, _| {}).unwrap();
     assert_eq!((read.curves.frames(), read.damage.len()), (60, 0));
     assert!(read.has_angles);
-    let elevation = Elevation::given(degrees).unwrap();
+    let elevation = Elevation::measured(degrees).unwrap();
     let found = solve_in_light(&read.curves, &light, elevation, MaterialKind::Diffuse);
     let mask: Vec<bool> = read.mask.plane(0).iter().map(|&m| m >= 0.5).collect();
     let normals = found.normals(&read.curves);

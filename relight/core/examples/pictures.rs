@@ -11,7 +11,7 @@ use std::path::Path;
 use relight_core::image::{Extent, Linear, Planes, Rgb, Srgb};
 use relight_core::light::{Direction, Normals, Order, Panorama, YUp};
 use relight_core::render::{
-    DiffuseForm, DiffuseLayer, Gloss, LobeLayer, Look, PowerLayer, SpecularForm, Surface,
+    DiffuseForm, DiffuseLayer, Gloss, LobeLayer, PowerLayer, RenderSettings, SpecularForm, Surface,
     exposure_for,
 };
 
@@ -95,11 +95,11 @@ fn highlights() -> Result<Rgb<Linear>, Box<dyn Error>> {
 fn turn() -> Result<Rgb<Linear>, Box<dyn Error>> {
     let surface = mug(192)?;
     let light = studio(Extent::new(256, 128))?.project(Order::new(24)?);
-    let look = look(exposure_for(&light));
+    let settings = settings(exposure_for(&light));
     let colours = Rgb::<Srgb>::new(surface.normals().to_colours()).to_linear();
     let mut tiles = vec![colours.into_planes(), surface.albedo().planes().clone()];
     for step in 0..6 {
-        let image = look.turned(&surface, &light, f64::from(step) / 6.0)?;
+        let image = settings.turned(&surface, &light, f64::from(step) / 6.0)?;
         tiles.push(image.into_planes());
     }
     Ok(Rgb::new(Planes::sheet(&tiles, 4)?))
@@ -108,8 +108,8 @@ fn turn() -> Result<Rgb<Linear>, Box<dyn Error>> {
 /// The mug in more and less reflecting and smooth materials.
 fn materials() -> Result<Rgb<Linear>, Box<dyn Error>> {
     let light = studio(Extent::new(256, 128))?.project(Order::new(24)?);
-    let look = look(exposure_for(&light));
-    Ok(look.sweep(
+    let settings = settings(exposure_for(&light));
+    Ok(settings.sweep(
         &mug(128)?,
         &light,
         &[0.04, 0.15, 0.4],
@@ -117,8 +117,8 @@ fn materials() -> Result<Rgb<Linear>, Box<dyn Error>> {
     )?)
 }
 
-fn look(exposure: f32) -> Look {
-    Look {
+fn settings(exposure: f32) -> RenderSettings {
+    RenderSettings {
         diffuse: DiffuseForm::Irradiance,
         specular: SpecularForm::Lobe,
         exposure,

@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let batch = drawn?.batch;
         samples += batch.frames.len();
         sum += batch.images.first().copied().unwrap_or_default();
-        stream.give_back(batch);
+        stream.recycle(batch);
     }
     let seconds = start.elapsed().as_secs_f64();
     let rate = samples as f64 / seconds;

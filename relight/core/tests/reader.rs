@@ -15,7 +15,7 @@ use std::sync::Arc;
 use image::{GrayImage, Luma, Rgb as Pixel, RgbImage};
 use relight_core::image::{Extent, Planes};
 use relight_core::reader::{
-    Cursor, DamagedBatch, DrawPlan, Drawn, Encoding, OpenError, Source, Stream, Streaming,
+    Cursor, DamagedBatch, DrawPlan, Encoding, OpenError, Source, Stream, StreamedBatch, Streaming,
     TruthLayout, TruthSet, TurnBatch, Turns,
 };
 use relit_data::causes::with_causes;
@@ -71,7 +71,7 @@ fn open(path: &Path) -> Arc<Turns> {
     Arc::new(Turns::open(path, Encoding::Srgb).unwrap())
 }
 
-type Item = Result<Drawn<TurnBatch>, DamagedBatch<Drawn<TurnBatch>>>;
+type Item = Result<StreamedBatch<TurnBatch>, DamagedBatch<StreamedBatch<TurnBatch>>>;
 
 fn stream(turns: &Arc<Turns>, threads: usize, from: Cursor) -> Vec<Item> {
     let streaming = Streaming {
@@ -84,11 +84,11 @@ fn stream(turns: &Arc<Turns>, threads: usize, from: Cursor) -> Vec<Item> {
     Stream::start(turns, streaming).unwrap().collect()
 }
 
-fn whole(items: Vec<Item>) -> Vec<Drawn<TurnBatch>> {
+fn whole(items: Vec<Item>) -> Vec<StreamedBatch<TurnBatch>> {
     items.into_iter().map(|item| item.unwrap()).collect()
 }
 
-fn keys(drawn: &[Drawn<TurnBatch>]) -> Vec<String> {
+fn keys(drawn: &[StreamedBatch<TurnBatch>]) -> Vec<String> {
     let frames = drawn.iter().flat_map(|drawn| &drawn.batch.frames);
     frames.map(|frame| frame.key.clone()).collect()
 }
@@ -124,7 +124,7 @@ fn a_shard_is_given_as_it_was_written() {
     seen.sort();
     let all: Vec<String> = (0..30).map(|index| format!("turn/{index:04}")).collect();
     assert_eq!(seen, all);
-    for Drawn { batch, .. } in &drawn {
+    for StreamedBatch { batch, .. } in &drawn {
         assert_eq!(batch.extent, Extent::new(9, 7));
         for (at, frame) in batch.frames.iter().enumerate() {
             let record = frame.record.as_ref().unwrap();
@@ -183,7 +183,7 @@ fn memory_that_is_given_back_leaves_no_trace() {
     for expected in expected {
         let drawn = stream.next().unwrap().unwrap();
         assert_eq!(drawn, expected);
-        stream.give_back(drawn.batch);
+        stream.recycle(drawn.batch);
     }
     assert!(stream.next().is_none());
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use relight_core::image::{Linear, Rgb, Transfer};
 use relight_core::light::{Direction, Normals, Rotation, ShLight, YUp};
 use relight_core::statistics::median;
-use relight_synth::TurnDescription;
+use relight_synth::SequenceDescription;
 use relight_turn::{
     Elevation, MaterialKind, SolvedTurn, TableFrame, TurnError, TurnLight, TurnNetworks,
     TurnOptions, TurnVerdict, solve_turn,
@@ -64,7 +64,7 @@ pub struct TurnScores {
     lines: [TurnLine; METHODS.len()],
 }
 
-/// Turns in the layout of `relight synth turns`, with their ground truth.
+/// Turns in the layout of `relight synth sequences`, with their ground truth.
 struct TurnSet {
     folder: PathBuf,
     turns: Vec<(String, PathBuf)>,
@@ -81,7 +81,7 @@ struct TrueTurn {
 
 impl TurnSet {
     fn open(folder: &Path) -> Result<Self, EvalError> {
-        let fault = "holds no turns of relight synth turns";
+        let fault = "holds no turns of relight synth sequences";
         let dataset = Dataset::read(folder).map_err(EvalError::file(folder, fault))?;
         let shard = |id: &str| {
             dataset
@@ -104,20 +104,20 @@ impl TurnSet {
         let truth = self.folder.join("truth").join(id);
         let path = truth.join("turn.json");
         let json = std::fs::read(&path).map_err(EvalError::read(&path))?;
-        let description: TurnDescription =
+        let description: SequenceDescription =
             serde_json::from_slice(&json).map_err(EvalError::file(&path, NO_SET))?;
         let [_, up, out] = description.axis;
         Ok(TrueTurn {
             shard: shard.clone(),
             normals: Normals::<YUp>::read(&truth.join("normal.png"))?,
             albedo: Rgb::<Linear>::read(&truth.join("albedo.png"), Transfer::Linear)?,
-            elevation: Elevation::given(out.atan2(up).to_degrees())?,
+            elevation: Elevation::measured(out.atan2(up).to_degrees())?,
             light: read_light(&truth.join("light.txt"))?,
         })
     }
 }
 
-/// Solves every turn of a data set of `relight synth turns` by every method; `split` is what the table calls them. `progress`
+/// Solves every turn of a data set of `relight synth sequences` by every method; `split` is what the table calls them. `progress`
 /// is called for each turn and method.
 ///
 /// # Errors
@@ -137,9 +137,9 @@ pub fn evaluate_turns(
     for number in 0..set.turns.len() {
         let truth = set.read(number)?;
         for (line, (_, knows_light)) in lines.iter_mut().zip(METHODS) {
-            let answer = truth.solve(knows_light, networks)?;
+            let solved = truth.solve(knows_light, networks)?;
             line.turns
-                .push(score(&set.turns[number].0, &truth, &answer));
+                .push(score(&set.turns[number].0, &truth, &solved));
             progress(steps);
         }
     }
@@ -165,9 +165,9 @@ impl TrueTurn {
     }
 }
 
-fn score(name: &str, truth: &TrueTurn, answer: &SolvedTurn) -> TurnScore {
-    let (curves, solution) = (&answer.turn.curves, &answer.solution);
-    let mask = &answer.turn.mask;
+fn score(name: &str, truth: &TrueTurn, solved: &SolvedTurn) -> TurnScore {
+    let (curves, solution) = (&solved.turn.curves, &solved.solution);
+    let mask = &solved.turn.mask;
     let true_normals = truth.normals.planes().planes();
     let inside: Vec<usize> = (0..mask.extent().pixels())
         .filter(|&at| mask.plane(0)[at] >= 0.5)
@@ -342,7 +342,7 @@ mod tests {
 
     #[test]
     fn an_answer_turned_about_the_axis_is_found_out() {
-        let elevation = Elevation::given(20.0).unwrap();
+        let elevation = Elevation::measured(20.0).unwrap();
         let [x, y, z] = TableFrame::new(elevation).axis();
         let axis = Direction::new(x, y, z).unwrap();
         let turn = Rotation::about(axis, 17.0_f64.to_radians());

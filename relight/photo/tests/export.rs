@@ -29,7 +29,7 @@ fn ball(side: usize, is_glossy: bool) -> CapturedObject {
 }
 
 fn glb(object: &CapturedObject) -> gltf::Gltf {
-    let mesh = ObjectMesh::relief(object, 64).unwrap();
+    let mesh = ObjectMesh::from_object(object, 64).unwrap();
     gltf::Gltf::from_slice(&to_glb(object, &mesh).unwrap()).unwrap()
 }
 

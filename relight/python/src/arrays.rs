@@ -19,7 +19,7 @@ const ARRAY: &str = "array";
 
 /// A picture from the package: a path, or a contiguous array of rows, columns and 3 or 4 channels.
 #[derive(FromPyObject)]
-pub(crate) enum GivenPicture<'py> {
+pub(crate) enum PictureInput<'py> {
     Path(PathBuf),
     Bytes(PyReadonlyArray3<'py, u8>),
     Words(PyReadonlyArray3<'py, u16>),
@@ -32,7 +32,7 @@ pub(crate) enum Picture {
     Memory(DynamicImage),
 }
 
-impl GivenPicture<'_> {
+impl PictureInput<'_> {
     /// A copy.
     pub(crate) fn owned(&self) -> PyResult<Picture> {
         let image = match self {

@@ -9,17 +9,17 @@ use relight_core::image::Extent;
 use relight_core::light::{Order, Panorama, ShLight};
 use relight_photo::relighting::{DiscLamp, LightSource};
 
-use crate::arrays::{GivenPicture, Picture};
+use crate::arrays::{Picture, PictureInput};
 use crate::failure::Failure;
 
 /// Light from the package.
 #[derive(FromPyObject)]
-pub(crate) enum GivenLight<'py> {
+pub(crate) enum LightInput<'py> {
     /// `AZIMUTH,ELEVATION[,COLOUR][,SIZE]`, and the ambient light.
     Lamp(String, f64),
     Coefficients(PyReadonlyArray2<'py, f64>),
     /// A panorama, or a file of light.
-    Picture(GivenPicture<'py>),
+    Picture(PictureInput<'py>),
 }
 
 /// The same, copied: Python may change its array meanwhile.
@@ -29,7 +29,7 @@ pub(crate) enum Light {
     Panorama(Picture),
 }
 
-impl GivenLight<'_> {
+impl LightInput<'_> {
     /// A copy.
     pub(crate) fn owned(&self) -> PyResult<Light> {
         Ok(match self {
@@ -46,7 +46,7 @@ impl GivenLight<'_> {
                 let light = light.map_err(|error| PyValueError::new_err(error.to_string()))?;
                 Light::Source(LightSource::Coefficients(light))
             }
-            Self::Picture(GivenPicture::Path(path)) => Light::File(path.clone()),
+            Self::Picture(PictureInput::Path(path)) => Light::File(path.clone()),
             Self::Picture(picture) => Light::Panorama(picture.owned()?),
         })
     }

@@ -4,13 +4,13 @@ use std::sync::OnceLock;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use relight_photo::decompose::{Decomposer, EncodedPicture};
+use relight_photo::decompose::{Decomposer, NetworkInput};
 use relight_photo::nets::{Inference, Weights, decomposer_of};
 use relight_turn::{TurnNetwork, TurnNetworks};
 
 use crate::arrays::Array;
 use crate::failure::{Failure, unlocked};
-use crate::photographs::GivenPhotograph;
+use crate::photographs::PhotographInput;
 
 /// Makes a network once, when it is first needed; each thread that needs it meanwhile waits.
 fn once<T>(
@@ -50,7 +50,7 @@ pub(crate) fn turn_networks() -> Result<&'static TurnNetworks, Failure> {
 #[pyfunction]
 pub(crate) fn network_maps<'py>(
     py: Python<'py>,
-    photograph: GivenPhotograph<'py>,
+    photograph: PhotographInput<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let photograph = photograph.owned()?;
     let (maps, light) = unlocked(py, || {
@@ -59,7 +59,7 @@ pub(crate) fn network_maps<'py>(
         let graph = decomposer_of(&weights);
         let extent = photo.mask.extent();
         let inference = Inference::new(&graph, &weights, (extent.width, extent.height))?;
-        let encoded = EncodedPicture::new(photo.picture.planes(), &photo.mask);
+        let encoded = NetworkInput::new(photo.picture.planes(), &photo.mask);
         let outputs = inference.run(encoded.values())?;
         // The heads for pixels have four sides, that for light two.
         let (pixels, light): (Vec<_>, Vec<_>) = outputs

@@ -14,21 +14,21 @@ use relight_photo::decompose::{
 };
 use relight_photo::files::{BackgroundFile, InsertSource, Insertion};
 use relight_photo::relighting::{
-    Backdrop, LightSource, PanoramaView, RelightableObject, Shot, WhiteBalance,
+    Backdrop, LightSource, PanoramaView, RelightableObject, RelightingSequence, WhiteBalance,
 };
 use relit_data::geometry::Rect;
 use relit_grabcut::{Hints, Seeds, SegmentSettings, segment};
 
-use crate::arrays::{Array, GivenPicture, Picture, read, transfer};
+use crate::arrays::{Array, Picture, PictureInput, read, transfer};
 use crate::failure::{Failure, choice, unlocked};
-use crate::light::GivenLight;
+use crate::light::LightInput;
 use crate::networks::decomposer;
 
 /// A photograph from the package: the picture, its mask, a rectangle, and the encoding of integers.
 #[derive(FromPyObject)]
-pub(crate) struct GivenPhotograph<'py>(
-    GivenPicture<'py>,
-    Option<GivenPicture<'py>>,
+pub(crate) struct PhotographInput<'py>(
+    PictureInput<'py>,
+    Option<PictureInput<'py>>,
     Option<(i32, i32, u32, u32)>,
     Option<String>,
 );
@@ -41,13 +41,13 @@ pub(crate) struct Photograph {
     transfer: Option<Transfer>,
 }
 
-impl GivenPhotograph<'_> {
+impl PhotographInput<'_> {
     /// A copy.
     pub(crate) fn owned(&self) -> PyResult<Photograph> {
         let Self(picture, mask, rectangle, encoding) = self;
         Ok(Photograph {
             picture: picture.owned()?,
-            mask: mask.as_ref().map(GivenPicture::owned).transpose()?,
+            mask: mask.as_ref().map(PictureInput::owned).transpose()?,
             rectangle: rectangle.map(|(x, y, w, h)| Rect::new(x, y, w, h)),
             transfer: transfer(encoding.as_deref())?,
         })
@@ -94,7 +94,7 @@ fn gate(name: &str) -> PyResult<SpecularGate> {
 #[pyfunction]
 pub(crate) fn decompose<'py>(
     py: Python<'py>,
-    photograph: GivenPhotograph<'py>,
+    photograph: PhotographInput<'py>,
     highlights: &str,
     mirror: bool,
 ) -> PyResult<(Bound<'py, PyDict>, Option<String>)> {
@@ -174,8 +174,8 @@ type RelitPictures<'py> = (Vec<Bound<'py, PyArrayDyn<f32>>>, Option<String>);
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn relight<'py>(
     py: Python<'py>,
-    photograph: GivenPhotograph<'py>,
-    light: Option<GivenLight<'py>>,
+    photograph: PhotographInput<'py>,
+    light: Option<LightInput<'py>>,
     turned: Vec<f64>,
     background: Option<String>,
     field: f64,
@@ -210,12 +210,18 @@ pub(crate) fn relight<'py>(
             Some(longest) => photo.at_most(longest),
             None => photo,
         };
-        let subject = RelightableObject::from_photo(&photo, decomposer()?, &options)?;
+        let relightable = RelightableObject::from_photo(&photo, decomposer()?, &options)?;
         let extent = photo.picture.planes().extent();
         let backdrop = backdrop(background, light.as_ref(), field, extent)?;
-        let own = LightSource::Coefficients(subject.light.clone());
+        let own = LightSource::Coefficients(relightable.light.clone());
         let light = light.as_ref().unwrap_or(&own).light()?;
-        let shot = Shot::new(&photo.picture, &subject, &light, backdrop, exposure.exp2())?;
+        let shot = RelightingSequence::new(
+            &photo.picture,
+            &relightable,
+            &light,
+            backdrop,
+            exposure.exp2(),
+        )?;
         let picture = |degrees: &f64| {
             let picture = shot.picture(degrees.to_radians())?;
             Ok::<_, Failure>(Array::from_planes(picture.planes()))
@@ -265,13 +271,13 @@ fn balance(name: &str) -> PyResult<WhiteBalance> {
 #[pyfunction]
 pub(crate) fn insert<'py>(
     py: Python<'py>,
-    photographs: Vec<GivenPhotograph<'py>>,
-    into: GivenPicture<'py>,
+    photographs: Vec<PhotographInput<'py>>,
+    into: PictureInput<'py>,
     scene: &str,
-    light: Option<GivenLight<'py>>,
+    light: Option<LightInput<'py>>,
     highlights: &str,
 ) -> PyResult<(Bound<'py, PyArrayDyn<f32>>, Vec<String>)> {
-    let photographs = photographs.iter().map(GivenPhotograph::owned);
+    let photographs = photographs.iter().map(PhotographInput::owned);
     let photographs = photographs.collect::<PyResult<Vec<_>>>()?;
     let into = into.owned()?;
     let light = light.map(|light| light.owned()).transpose()?;
@@ -287,16 +293,17 @@ pub(crate) fn insert<'py>(
         let background = background(into, &scene)?;
         let light = light.map(|light| light.source()).transpose()?;
         let insertion = Insertion::in_light(&scene, background, light, decomposer()?, options)?;
-        let (mut subjects, mut notes) = (Vec::new(), Vec::new());
+        let (mut relightables, mut notes) = (Vec::new(), Vec::new());
         for (object, source) in scene.objects.iter().zip(sources) {
             if let InsertSource::Photo(photo) = &source {
                 notes.extend(photo.mask_note.clone());
             }
-            subjects.push(insertion.subject(object, source)?);
+            relightables.push(insertion.relightable(object, source)?);
         }
-        let pairs = scene.objects.iter().zip(&subjects);
-        let objects = pairs.map(|(object, subject)| SceneObject::described(object, subject));
-        let set = insertion.setting().scene(objects.collect())?;
+        let pairs = scene.objects.iter().zip(&relightables);
+        let objects =
+            pairs.map(|(object, relightable)| SceneObject::described(object, relightable));
+        let set = insertion.environment().scene(objects.collect())?;
         let picture = insertion.picture(&set)?;
         Ok((Array::from_planes(picture.planes()), notes))
     })?;
@@ -345,13 +352,13 @@ fn background(picture: Picture, scene: &SceneDescription) -> Result<BackgroundFi
 #[pyfunction]
 pub(crate) fn mask<'py>(
     py: Python<'py>,
-    image: GivenPicture<'py>,
+    image: PictureInput<'py>,
     rectangle: Option<(i32, i32, u32, u32)>,
-    seeds: Option<GivenPicture<'py>>,
+    seeds: Option<PictureInput<'py>>,
     keep_all: bool,
 ) -> PyResult<(Bound<'py, PyArrayDyn<bool>>, Vec<String>)> {
     let image = image.owned()?;
-    let seeds = seeds.as_ref().map(GivenPicture::owned).transpose()?;
+    let seeds = seeds.as_ref().map(PictureInput::owned).transpose()?;
     let (mask, warnings) = unlocked(py, || {
         let shown = image.colours(None)?.to_srgb();
         let extent = shown.planes().extent();

@@ -131,7 +131,7 @@ impl BatchStream {
             .collect::<Result<_, _>>()
             .map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
         if let Ok(stream) = self.stream.lock() {
-            stream.give_back(batch);
+            stream.recycle(batch);
         }
         Ok(Some((images, masks, keys, records, damage, next)))
     }

@@ -8,15 +8,15 @@ use pyo3::prelude::*;
 use relight_core::image::{ColourSpace, Planes, Rgb, Srgb};
 use relight_core::light::{Direction, Normals, Order, Rotation, YUp};
 use relight_core::render::{
-    DiffuseForm, EXPOSURE, Gloss, Look, SpecularForm, Surface, exposure_for,
+    DiffuseForm, EXPOSURE, Gloss, RenderSettings, SpecularForm, Surface, exposure_for,
 };
 
 use crate::arrays::{Array, to_planes};
 use crate::failure::{Failure, choice, unlocked};
-use crate::light::GivenLight;
+use crate::light::LightInput;
 
 /// Reflectance and smoothness from Python.
-type GivenGloss<'py> = (PyReadonlyArray3<'py, f32>, PyReadonlyArray2<'py, f32>);
+type GlossInput<'py> = (PyReadonlyArray3<'py, f32>, PyReadonlyArray2<'py, f32>);
 
 /// An object that is given by its maps under a light: a picture for each angle by which it has turned, degrees. Without an
 /// exposure, in stops, a white diffuse surface that faces the strongest light is white.
@@ -26,8 +26,8 @@ pub(crate) fn render<'py>(
     py: Python<'py>,
     normals: PyReadonlyArray3<'py, f32>,
     albedo: PyReadonlyArray3<'py, f32>,
-    gloss: Option<GivenGloss<'py>>,
-    light: GivenLight<'py>,
+    gloss: Option<GlossInput<'py>>,
+    light: LightInput<'py>,
     order: usize,
     turned: Vec<f64>,
     exposure: Option<f32>,
@@ -75,13 +75,13 @@ pub(crate) fn render<'py>(
             // It does not change as light turns: one for all pictures.
             None => lights.first().map_or(1.0, exposure_for),
         };
-        let look = Look {
+        let settings = RenderSettings {
             diffuse,
             specular,
             exposure,
         };
         let picture = |light| {
-            let picture = look.image(&surface, light)?;
+            let picture = settings.image(&surface, light)?;
             Ok::<_, Failure>(Array::from_planes(picture.planes()))
         };
         lights.iter().map(picture).collect::<Result<Vec<_>, _>>()

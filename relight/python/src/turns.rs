@@ -12,7 +12,7 @@ use relit_data::rig::RotationDirection;
 
 use crate::arrays::Array;
 use crate::failure::{choice, unlocked};
-use crate::light::{GivenLight, Light};
+use crate::light::{Light, LightInput};
 use crate::networks::turn_networks;
 
 /// The results of a turn by name, and its warnings.
@@ -22,7 +22,7 @@ pub(crate) fn solve_turn<'py>(
     shard: PathBuf,
     rotation: Option<String>,
     elevation: Option<f64>,
-    light: Option<GivenLight<'py>>,
+    light: Option<LightInput<'py>>,
     material: &str,
 ) -> PyResult<(Bound<'py, PyDict>, Vec<String>)> {
     let directions = [
@@ -45,7 +45,7 @@ pub(crate) fn solve_turn<'py>(
         };
         let options = TurnOptions {
             rotation,
-            elevation: elevation.map(Elevation::given).transpose()?,
+            elevation: elevation.map(Elevation::measured).transpose()?,
             light,
             material,
         };

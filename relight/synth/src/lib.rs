@@ -8,7 +8,7 @@
 //! | `lighting` | lamps and panoramas on what is seen; `studio` makes panoramas out of nothing but a seed |
 //! | `samples` | `recipe` draws objects, `view`s, `finish`es and lights; `camera` makes 8-bit values of light; `folder` writes |
 //! | `library`, `pack` | what there is to draw from; many objects and panoramas in one file |
-//! | `turn` | whole turns as shards |
+//! | `sequence` | whole turns as shards |
 //! | `transfer` | views for any environment light without rays: of photographs and of whole turns |
 //!
 //! All of it follows from a seed: the same seed gives the same bytes on any number of threads. What is
@@ -37,16 +37,16 @@ mod pack;
 mod paint;
 mod random;
 mod samples;
+mod sequence;
 mod shape;
 mod texture;
 mod transfer;
-mod turn;
 mod vectors;
 pub(crate) mod view;
 
 pub use error::SynthError;
 pub use geometry::GBuffer;
-pub use library::{Folders, LeftOut, Library, made_panoramas};
+pub use library::{Folders, Library, SkippedFile, made_panoramas};
 pub use lighting::{BlinnPhong, LightKind, Lighting, Material, Panoramas, Shaded, SyntheticScene};
 pub use mesh::Mesh;
 pub use pack::{LIBRARY_EXTENSION, LibraryEntry, LibrarySources, LibrarySummary, build_library};
@@ -55,9 +55,9 @@ pub use samples::folder::{SynthSummary, write_samples};
 pub use samples::object::{ObjectSource, SyntheticView};
 pub use samples::recipe::Recipe;
 pub use samples::sample::SynthSample;
+pub use sequence::{FrameTruth, SequenceDescription, SequenceRecipe, write_sequences};
 pub use shape::ShapeKind;
 pub use transfer::{
-    DrawnTurn, PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint, PhotoView,
-    PhotoViewRecipe, Rooms, TransferCache, TransferRecipe, ViewLamp,
+    EnvironmentLights, PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint, PhotoView,
+    PhotoViewRecipe, TransferCache, TransferRecipe, TurnSample, ViewLamp,
 };
-pub use turn::{FrameTruth, TurnDescription, TurnRecipe, write_turns};

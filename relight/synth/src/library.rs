@@ -12,7 +12,7 @@ use super::SynthError;
 use super::lighting::Panoramas;
 use super::lighting::studio::Surroundings;
 use super::mesh::{Mesh, NOT_READ};
-use super::pack::{self, Contents, Wanted};
+use super::pack::{self, LibraryContents, LibraryFilter};
 use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
@@ -37,21 +37,21 @@ pub struct Library {
     /// The panoramas, never none.
     pub panoramas: Panoramas,
     /// Unused files of the folders.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<SkippedFile>,
     /// Of meshes and panoramas from packed libraries, by name: whether they are for validation only.
     pub(crate) is_for_validation: BTreeMap<String, bool>,
 }
 
 /// Something of a user's own that is not used.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LeftOut {
+pub struct SkippedFile {
     /// The file.
     pub path: PathBuf,
     /// The part, and the reason.
     pub what: String,
 }
 
-impl fmt::Display for LeftOut {
+impl fmt::Display for SkippedFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.path.display(), self.what)
     }
@@ -90,7 +90,7 @@ impl Library {
     /// # Errors
     /// If a folder holds no file of its kind; whatever is wrong with a file.
     pub fn read(folders: &Folders) -> Result<Self, SynthError> {
-        let packed = Contents::from_folders(folders)?;
+        let packed = LibraryContents::from_folders(folders)?;
         let (meshes, mut left_out) = match &folders.meshes {
             Some(path) if pack::is_packed(path) => (packed.meshes, Vec::new()),
             Some(folder) => read_meshes(folder)?,
@@ -109,7 +109,7 @@ impl Library {
             None => made_panoramas()?,
         };
         unused.retain(|one| !folders.use_elsewhere(&one.path));
-        unused.sort_by(|one: &LeftOut, other| one.path.cmp(&other.path));
+        unused.sort_by(|one: &SkippedFile, other| one.path.cmp(&other.path));
         unused.dedup_by(|one, other| one.path == other.path);
         left_out.append(&mut unused);
         let mut pictures: Vec<TextureImage> =
@@ -130,7 +130,7 @@ impl Library {
     /// # Errors
     /// [`SynthError::Unusable`] if it is damaged.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self, SynthError> {
-        let contents = pack::read(path, bytes, Wanted::ALL)?;
+        let contents = pack::read(path, bytes, LibraryFilter::ALL)?;
         let pictures = contents.panoramas.iter();
         Ok(Self {
             pictures: pictures.map(|(_, panorama)| picture_of(panorama)).collect(),
@@ -210,7 +210,7 @@ impl Library {
     }
 }
 
-impl Contents {
+impl LibraryContents {
     /// The wanted part of packed libraries given in place of folders; each is read once.
     fn from_folders(folders: &Folders) -> Result<Self, SynthError> {
         let packed = |path: &Option<PathBuf>| path.clone().filter(|path| pack::is_packed(path));
@@ -219,7 +219,7 @@ impl Contents {
         let paths: BTreeSet<&PathBuf> = meshes.iter().chain(&panoramas).collect();
         for path in paths {
             let bytes = fs::read(path).map_err(SynthError::read(path))?;
-            let wanted = Wanted {
+            let wanted = LibraryFilter {
                 meshes: meshes.as_ref() == Some(path),
                 panoramas: panoramas.as_ref() == Some(path),
             };
@@ -303,7 +303,7 @@ const OTHER_MESHES: [&str; 35] = [
 type NamedMeshes = Vec<(String, Mesh)>;
 
 /// All meshes of a folder and its subfolders, and the unused files.
-fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<LeftOut>), SynthError> {
+fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<SkippedFile>), SynthError> {
     let files = files_below(folder)?;
     let (wanted, others): (Vec<PathBuf>, Vec<PathBuf>) =
         files.into_iter().partition(|path| MESHES.includes(path));
@@ -311,14 +311,14 @@ fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<LeftOut>), SynthError>
     let others = others
         .into_iter()
         .filter_map(|path| Some((kind(&path)?, path)));
-    let others = others.map(|(kind, path)| LeftOut {
+    let others = others.map(|(kind, path)| SkippedFile {
         path,
         what: format!(
             "files of meshes in the format {} are not read: save it as .glb, .gltf or .obj",
             kind.to_uppercase()
         ),
     });
-    let mut left_out: Vec<LeftOut> = others.collect();
+    let mut left_out: Vec<SkippedFile> = others.collect();
     if wanted.is_empty() {
         return Err(match left_out.first() {
             Some(first) => SynthError::unusable(&first.path, NOT_READ),
@@ -328,7 +328,7 @@ fn read_meshes(folder: &Path) -> Result<(NamedMeshes, Vec<LeftOut>), SynthError>
     let mut meshes = Vec::with_capacity(wanted.len());
     for path in wanted {
         let mesh = Mesh::read(&path)?;
-        left_out.extend(mesh.left_out.iter().map(|what| LeftOut {
+        left_out.extend(mesh.left_out.iter().map(|what| SkippedFile {
             path: path.clone(),
             what: what.clone(),
         }));
@@ -392,7 +392,7 @@ impl FileKind {
 fn read_all<T>(
     folder: &Path,
     wanted: &FileKind,
-    left_out: &mut Vec<LeftOut>,
+    left_out: &mut Vec<SkippedFile>,
     read: impl Fn(&Path) -> Result<T, SynthError>,
 ) -> Result<Vec<(String, T)>, SynthError> {
     let mut files = members(folder)?;
@@ -402,7 +402,7 @@ fn read_all<T>(
     if paths.is_empty() {
         return Err(wanted.missing(folder));
     }
-    left_out.extend(others.into_iter().map(|path| LeftOut {
+    left_out.extend(others.into_iter().map(|path| SkippedFile {
         path,
         what: format!(
             "{} are read from files that end in .{}",
@@ -462,7 +462,7 @@ mod tests {
             ..Folders::default()
         })
         .unwrap();
-        let of = |one: &LeftOut| one.path.strip_prefix(folder.path()).unwrap().to_owned();
+        let of = |one: &SkippedFile| one.path.strip_prefix(folder.path()).unwrap().to_owned();
         let named: Vec<PathBuf> = library.left_out.iter().map(of).collect();
         assert_eq!(named, ["notes.txt", "sky.jpg.part"].map(PathBuf::from));
     }
@@ -531,7 +531,7 @@ mod tests {
             ("photo.png", ""),
         ]);
         let library = Library::read(&folders).unwrap();
-        let of = |one: &LeftOut| one.path.strip_prefix(folder.path()).unwrap().to_owned();
+        let of = |one: &SkippedFile| one.path.strip_prefix(folder.path()).unwrap().to_owned();
         let mut paths: Vec<PathBuf> = library.left_out.iter().map(of).collect();
         paths.sort();
         assert_eq!(

@@ -14,7 +14,7 @@ pub(super) struct Noise {
 
 /// A value and its gradient by position.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sloped {
+pub(super) struct ValueGradient {
     pub(super) value: f32,
     pub(super) gradient: Vec3,
 }
@@ -59,7 +59,7 @@ impl Noise {
     }
 
     /// The noise and its gradient at a point.
-    pub(super) fn sloped(&self, point: Vec3) -> Sloped {
+    pub(super) fn sloped(&self, point: Vec3) -> ValueGradient {
         let Cell { inside, directions } = self.cell(point);
         let [a, b, c, d, e, f, g, h] = ramps(inside, &directions);
         let [u, v, w] = blend(inside).to_array();
@@ -77,7 +77,7 @@ impl Noise {
         );
         let below = lerp(lerp(a, b, u), lerp(c, d, u), v);
         let above = lerp(lerp(e, f, u), lerp(g, h, u), v);
-        Sloped {
+        ValueGradient {
             value: lerp(below, above, w),
             gradient: (mixed(low, high, w) + along * slope) * self.frequency,
         }

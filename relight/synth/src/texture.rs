@@ -24,7 +24,7 @@ pub(crate) struct TextureImage {
     height: usize,
     texels: Texels,
     mean: Vec3,
-    see_through: f32,
+    transparent_fraction: f32,
 }
 
 /// Values of a picture, row by row.
@@ -96,7 +96,7 @@ impl TextureImage {
             height,
             texels,
             mean: sum / count.max(1) as f32,
-            see_through: 0.0,
+            transparent_fraction: 0.0,
         }
     }
 
@@ -118,10 +118,10 @@ impl TextureImage {
     pub(crate) fn decoded(bytes: &[u8], kind: PictureKind) -> Result<Self, FileError> {
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
         let image = reader.decode()?;
-        let see_through = see_through(&image);
+        let transparent_fraction = transparent_fraction(&image);
         Ok(Self {
-            see_through,
-            ..Self::reduced(&image.into_rgb8(), kind, MAX_SIDE)
+            transparent_fraction,
+            ..Self::downscaled(&image.into_rgb8(), kind, MAX_SIDE)
         })
     }
 
@@ -137,7 +137,7 @@ impl TextureImage {
         limits.max_image_height = Some(longest);
         reader.limits(limits);
         let image = reader.decode()?.into_rgb8();
-        Ok(Self::reduced(&image, kind, MAX_SIDE))
+        Ok(Self::downscaled(&image, kind, MAX_SIDE))
     }
 
     /// The picture as a JPEG with sides of at most `longest`.
@@ -160,7 +160,7 @@ impl TextureImage {
     }
 
     /// Means over squares of the picture, so that no side is longer than `longest`.
-    fn reduced(image: &RgbImage, kind: PictureKind, longest: usize) -> Self {
+    fn downscaled(image: &RgbImage, kind: PictureKind, longest: usize) -> Self {
         let (width, height) = (image.width() as usize, image.height() as usize);
         if width.max(height) <= longest {
             let texels = image.pixels().map(|pixel| pixel.0).collect();
@@ -178,8 +178,8 @@ impl TextureImage {
     }
 
     /// Part of the picture that is transparent in its file; it is shown as opaque.
-    pub(crate) fn see_through(&self) -> f32 {
-        self.see_through
+    pub(crate) fn transparent_fraction(&self) -> f32 {
+        self.transparent_fraction
     }
 
     /// All that [`Self::at`] follows from, as bytes.
@@ -228,7 +228,7 @@ impl TextureImage {
 }
 
 /// The part of an image's pixels that are less than half opaque.
-fn see_through(image: &DynamicImage) -> f32 {
+fn transparent_fraction(image: &DynamicImage) -> f32 {
     if !image.color().has_alpha() {
         return 0.0;
     }
@@ -326,6 +326,6 @@ mod tests {
             .write_to(&mut Cursor::new(&mut png), image::ImageFormat::Png)
             .unwrap();
         let picture = TextureImage::decoded(&png, PictureKind::Colours).unwrap();
-        assert_eq!(picture.see_through(), 0.5);
+        assert_eq!(picture.transparent_fraction(), 0.5);
     }
 }

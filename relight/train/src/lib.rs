@@ -67,7 +67,7 @@ pub use settings::{
     PaperLossCoefficients, PaperPhase, PaperSettings, RunSettings, TransferSettings,
     TurnNetworkSettings, TurnSettings, read_settings,
 };
-pub use tasks::decompose::AnsweredTensors;
+pub use tasks::decompose::PredictedTensors;
 pub use tasks::decompose_task::DecomposeTask;
 pub use tasks::paper_networks::PaperInputs;
 pub use tasks::paper_task::PaperTask;

@@ -13,16 +13,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use relight_core::image::{Extent, Planes};
-use relight_photo::decompose::EncodedPicture;
+use relight_photo::decompose::NetworkInput;
 use relight_photo::nets::paper::{Head, light_net, normal_net, spec_net};
 use relight_photo::nets::{Graph, Inference, Weights, decomposer, decomposer_with_heads};
-use relight_synth::{Folders, Library, Recipe, TurnRecipe, write_turns};
+use relight_synth::{Folders, Library, Recipe, SequenceRecipe, write_sequences};
 use relight_train::{
-    Adam, AnsweredTensors, Checkpoint, ComputePrecision, DataSettings, DecomposeSettings,
-    DecomposeTask, MetricsLog, Model, PaperInputs, PaperLossCoefficients, PaperPhase,
-    PaperSettings, PaperTask, Photographs, ProcessGroup, Resources, Run, RunOutcome, RunSettings,
-    StepLosses, TABLE, TrainError, TrainObserver, Trainable, TrainingTask, TransferSettings,
-    TurnNetworkSettings, TurnNetworkTask, Validation, read_settings,
+    Adam, Checkpoint, ComputePrecision, DataSettings, DecomposeSettings, DecomposeTask, MetricsLog,
+    Model, PaperInputs, PaperLossCoefficients, PaperPhase, PaperSettings, PaperTask, Photographs,
+    PredictedTensors, ProcessGroup, Resources, Run, RunOutcome, RunSettings, StepLosses, TABLE,
+    TrainError, TrainObserver, Trainable, TrainingTask, TransferSettings, TurnNetworkSettings,
+    TurnNetworkTask, Validation, read_settings,
 };
 use tch::{Device, Kind, Tensor};
 
@@ -107,7 +107,7 @@ fn a_run_that_was_saved_goes_on_to_the_same_losses() {
     let graph = light_net(Head::Pooled);
     let second = Model::new(graph, &weights, Device::Cpu, ComputePrecision::Single).unwrap();
     let mut adam = Adam::new(&RunSettings::default(), second.parameters()).unwrap();
-    adam.recall(&memory).unwrap();
+    adam.load_state(&memory).unwrap();
     assert_eq!(descend(&second, &mut adam, 3), undisturbed);
 }
 
@@ -120,7 +120,7 @@ fn the_memory_of_another_network_is_refused() {
         .unwrap();
     let other = model(decomposer(), ComputePrecision::Single);
     let mut adam = Adam::new(&RunSettings::default(), other.parameters()).unwrap();
-    assert!(adam.recall(&memory).is_err());
+    assert!(adam.load_state(&memory).is_err());
 }
 
 /// Small settings: a run of seconds.
@@ -345,13 +345,13 @@ fn answers_mean_the_same_on_tensors_as_one_by_one() {
         [x, y, x + y].map(|v| (v as f32 / 90.0).powi(2))
     });
     let mask = Planes::from_fn(Extent::new(side, side), |x, _| [f32::from(u8::from(x > 9))]);
-    let encoded = EncodedPicture::new(&picture, &mask);
+    let encoded = NetworkInput::new(&picture, &mask);
     tch::manual_seed(4);
     let answer = Tensor::randn([1, 9, SIDE, SIDE], (Kind::Float, Device::Cpu)) * 2.0;
     let flat = Vec::<f32>::try_from(answer.flatten(0, -1)).unwrap();
     let plain = encoded.decode(&flat);
     let input = Tensor::from_slice(encoded.values()).view([1, 7, SIDE, SIDE]);
-    let tensors = AnsweredTensors::new(&input, &answer).unwrap();
+    let tensors = PredictedTensors::new(&input, &answer).unwrap();
     let inside = input.narrow(1, 3, 1);
     let largest = |tensor: &Tensor, planes: Vec<&[f32]>, scale: f64| {
         let values = Vec::<f32>::try_from((tensor * &inside * scale).flatten(0, -1)).unwrap();
@@ -374,7 +374,7 @@ fn answers_mean_the_same_on_tensors_as_one_by_one() {
 
 fn turns() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let recipe = TurnRecipe {
+    let recipe = SequenceRecipe {
         recipe: Recipe {
             size: 32,
             ..Recipe::default()
@@ -382,7 +382,7 @@ fn turns() -> tempfile::TempDir {
         frames: 24,
     };
     let library = Library::read(&Folders::default()).unwrap();
-    write_turns(&recipe, &library, 2, folder.path(), &|| {}).unwrap();
+    write_sequences(&recipe, &library, 2, folder.path(), &|| {}).unwrap();
     folder
 }
 
@@ -416,7 +416,7 @@ fn every_phase_of_the_paper_makes_its_steps_and_goes_on_where_it_was_stopped() {
         PaperPhase::Specular,
     ] {
         let inputs = PaperInputs {
-            turns: inputs.turns.clone().filter(|_| phase.learns_from_turns()),
+            turns: inputs.turns.clone().filter(|_| phase.uses_turns()),
             ..inputs.clone()
         };
         let task = || PaperTask::new(phase, paper_settings(3), resources(), &inputs).unwrap();
@@ -436,7 +436,7 @@ fn turns_that_are_held_out_are_judged_at_the_start_and_at_the_end() {
     let turns = turns();
     let inputs = PaperInputs {
         turns: Some(turns.path().to_owned()),
-        held_out: Some(turns.path().to_owned()),
+        validation_turns: Some(turns.path().to_owned()),
         normal: Some(Weights::initial(&normal_net(), 2)),
         ..PaperInputs::default()
     };
@@ -536,7 +536,7 @@ fn a_damaged_sample_of_a_turn_is_told_and_the_run_goes_on() {
 
 /// A network of which every second step has nothing to learn from, as where the gate of saturation is closed.
 struct EverySecondStep {
-    learner: Trainable,
+    trainable: Trainable,
 }
 
 impl EverySecondStep {
@@ -548,7 +548,7 @@ impl EverySecondStep {
         let graph = light_net(Head::Pooled);
         let weights = Weights::initial(&graph, 5);
         Self {
-            learner: Trainable::new(graph, Some(&weights), &run, Device::Cpu).unwrap(),
+            trainable: Trainable::new(graph, Some(&weights), &run, Device::Cpu).unwrap(),
         }
     }
 }
@@ -566,8 +566,8 @@ impl TrainingTask for EverySecondStep {
     fn join(&mut self, _: &ProcessGroup) -> Result<(), TrainError> {
         Ok(())
     }
-    fn learner(&mut self) -> &mut Trainable {
-        &mut self.learner
+    fn trainable(&mut self) -> &mut Trainable {
+        &mut self.trainable
     }
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let mut losses = StepLosses::default();
@@ -577,7 +577,7 @@ impl TrainingTask for EverySecondStep {
                 0.1 * step as f64,
                 (Kind::Float, Device::Cpu),
             );
-            let answer = &self.learner.model.forward(&input)?[0];
+            let answer = &self.trainable.model.forward(&input)?[0];
             losses
                 .terms
                 .add("square", 1.0, answer.square().mean(None))?;

@@ -1,6 +1,6 @@
 //! Holds `relight turn` against truth: `turn_truth SHARD TRUTH [metal]`.
 //!
-//! TRUTH is a rendered session (`normal_gt.png`, `albedo_gt.png`, `truth.json`) or a folder that `relight synth turns`
+//! TRUTH is a rendered session (`normal_gt.png`, `albedo_gt.png`, `truth.json`) or a folder that `relight synth sequences`
 //! wrote (`normal.png`, `albedo.png`, `turn.json`). `metal` gives the material.
 #![allow(clippy::print_stdout, reason = "the example is a program of its own")]
 
@@ -102,7 +102,7 @@ impl Truth {
         Ok(Self {
             mask: mask.collect(),
             surface: Surface::new(normals, albedo, None)?,
-            elevation: Elevation::given(degrees)?,
+            elevation: Elevation::measured(degrees)?,
         })
     }
 

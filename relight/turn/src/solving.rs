@@ -17,11 +17,11 @@ use crate::fit::unknown_light::solve_by_network;
 use crate::model::frame::{Elevation, FactSource};
 use crate::model::material::MaterialKind;
 use crate::network::predict::{NetworkFigures, TurnNetwork, TurnPrediction};
-use crate::observe::film::film;
 use crate::observe::origin::{dataset_of, recording_of, session_of};
 use crate::observe::probe::{Probe, ProbeBall};
 use crate::observe::probe_place::ProbePlace;
 use crate::observe::reading::{ReadTurn, TableRotation, read_curves};
+use crate::observe::video_probe::probe_from_video;
 
 /// What is known about a turn beforehand.
 #[derive(Debug, Clone, Default)]
@@ -116,7 +116,7 @@ pub fn solve_turn(
                 ball,
                 elevation,
             };
-            Some(film(recording, &turn, probe, progress)?.finish()?)
+            Some(probe_from_video(recording, &turn, probe, progress)?.finish()?)
         }
         _ => None,
     };

@@ -30,7 +30,7 @@ pub(crate) fn environment() -> ShLight {
 }
 
 pub(crate) fn elevation() -> Elevation {
-    Elevation::given(ELEVATION).unwrap()
+    Elevation::measured(ELEVATION).unwrap()
 }
 
 /// A ball in three colours.

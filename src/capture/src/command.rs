@@ -39,7 +39,7 @@ pub enum Command {
 /// Why a command was not taken: a sentence for the person who gave it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Refused {
+pub enum CommandError {
     /// Something else is under way.
     #[error("{0}")]
     Busy(String),
@@ -51,7 +51,7 @@ pub enum Refused {
     Unavailable(String),
 }
 
-impl From<Obstacle> for Refused {
+impl From<Obstacle> for CommandError {
     fn from(obstacle: Obstacle) -> Self {
         Self::Unavailable(obstacle.to_string())
     }
@@ -62,12 +62,12 @@ impl Command {
     /// question.
     ///
     /// # Errors
-    /// [`Refused::Unavailable`] with what is in the way.
-    pub fn check(&self, state: &RigState) -> Result<(), Refused> {
+    /// [`CommandError::Unavailable`] with what is in the way.
+    pub fn check(&self, state: &RigState) -> Result<(), CommandError> {
         let moves = matches!(self, Self::Home | Self::Jog { .. } | Self::Reset);
         if moves && !state.has_table() {
             let none = "no turntable is known: give --turntable".to_owned();
-            return Err(Refused::Unavailable(none));
+            return Err(CommandError::Unavailable(none));
         }
         let obstacle = match self {
             Self::Start { .. } => state.obstacle_to_take(),
@@ -85,8 +85,8 @@ pub trait Rig: Send + Sync {
     /// Takes a command; the result shows in the monitor.
     ///
     /// # Errors
-    /// [`Refused`] if it cannot be begun.
-    fn command(&self, command: Command) -> Result<(), Refused>;
+    /// [`CommandError`] if it cannot be begun.
+    fn command(&self, command: Command) -> Result<(), CommandError>;
 
     /// The state and the newest picture.
     fn monitor(&self) -> &Monitor;

@@ -30,7 +30,7 @@
 //!
 //! let clock = Clock::virtual_time();
 //! // From here on, time passes only while this thread waits.
-//! let _participant = clock.take_part();
+//! let _participant = clock.participate();
 //! let gate = Arc::new(Waitable::new(&clock, false));
 //! let opener = clock.spawn("opener", {
 //!     let (clock, gate) = (clock.clone(), Arc::clone(&gate));
@@ -148,7 +148,7 @@ impl Clock {
                 std::thread::sleep(Duration::from_micros(left));
             }
             Kind::Virtual(scheduler) => {
-                let _participant = self.take_part();
+                let _participant = self.participate();
                 if let Some(ticket) = scheduler.register(None, Some(us), Location::caller()) {
                     scheduler.block(ticket);
                 }

@@ -29,7 +29,7 @@ pub(super) struct Ticket(u64);
 
 /// How a wait ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ended {
+pub(super) enum WaitOutcome {
     /// The deadline has come, or a notification.
     Woken,
     /// There is a deadlock, and this thread is already unwinding.
@@ -163,7 +163,7 @@ impl Scheduler {
     }
 
     /// Performs a registered wait. The caller must hold no lock.
-    pub(super) fn block(&self, ticket: Ticket) -> Ended {
+    pub(super) fn block(&self, ticket: Ticket) -> WaitOutcome {
         let Ticket(ticket) = ticket;
         let mut state = self.lock();
         state.running -= 1;
@@ -185,7 +185,7 @@ impl Scheduler {
             };
             self.advance(&mut state);
         }
-        Ended::Woken
+        WaitOutcome::Woken
     }
 
     /// Wakes all threads that wait for `id`. When this returns, they count as running.
@@ -262,11 +262,11 @@ impl State {
     clippy::panic,
     reason = "a deadlock is an error in the program, and a wait cannot return it"
 )]
-fn give_up(report: String) -> Ended {
+fn give_up(report: String) -> WaitOutcome {
     if !thread::panicking() {
         panic!("{report}");
     }
-    Ended::Abandoned
+    WaitOutcome::Abandoned
 }
 
 impl fmt::Debug for Scheduler {

@@ -68,7 +68,7 @@ fn a_paced_clock_is_no_faster_than_its_pace() {
 #[test]
 fn a_paced_clock_wakes_whoever_is_next_whatever_the_others_wait_for() {
     let clock = Clock::paced(1000.0);
-    let _participant = clock.take_part();
+    let _participant = clock.participate();
     let value = Waitable::new(&clock, 0);
     clock.scope(|scope| {
         scope.spawn("late", || clock.sleep(SECOND * 9)).unwrap();
@@ -88,7 +88,7 @@ fn a_paced_clock_wakes_whoever_is_next_whatever_the_others_wait_for() {
 #[test]
 fn no_time_passes_while_a_thread_that_takes_part_runs() {
     let clock = Clock::virtual_time();
-    let _participant = clock.take_part();
+    let _participant = clock.participate();
     let start_us = clock.now_us();
     let sleeper = clock
         .spawn("sleeper", {
@@ -108,7 +108,7 @@ fn no_time_passes_while_a_thread_that_takes_part_runs() {
 #[test]
 fn who_is_notified_looks_before_time_passes() {
     let clock = Clock::virtual_time();
-    let _participant = clock.take_part();
+    let _participant = clock.participate();
     let value = Arc::new(Waitable::new(&clock, 0));
     let seen = clock
         .spawn("watcher", {
@@ -153,7 +153,7 @@ fn a_wait_ends_at_its_deadline_with_a_last_look() {
 #[test]
 fn a_deadlock_is_reported_with_threads_and_places() {
     let clock = Clock::virtual_time();
-    let _participant = clock.take_part();
+    let _participant = clock.participate();
     let value = Arc::new(Waitable::new(&clock, ()));
     let other = clock
         .spawn("other", {
@@ -174,7 +174,7 @@ fn a_deadlock_is_reported_with_threads_and_places() {
 #[test]
 fn a_thread_that_panics_takes_no_part_any_more_and_its_end_is_seen() {
     let clock = Clock::virtual_time();
-    let _participant = clock.take_part();
+    let _participant = clock.participate();
     let broken = clock.spawn("broken", || panic!("as asked")).unwrap();
     clock.sleep(SECOND);
     assert!(broken.is_finished());
@@ -192,7 +192,7 @@ fn a_thread_that_panics_takes_no_part_any_more_and_its_end_is_seen() {
 #[test]
 fn a_scope_waits_for_its_threads_on_the_clock() {
     for clock in [Clock::virtual_time(), Clock::monotonic()] {
-        let _participant = clock.take_part();
+        let _participant = clock.participate();
         let ended = AtomicUsize::new(0);
         clock.scope(|scope| {
             for naps in [1, 20] {
@@ -221,7 +221,7 @@ proptest! {
         let clock = if paced { Clock::paced(1e6) } else { Clock::virtual_time() };
         let start_us = clock.now_us();
         let log = Mutex::new(Vec::new());
-        let participant = clock.take_part();
+        let participant = clock.participate();
         clock.scope(|scope| {
             for naps in &naps {
                 let (clock, log) = (&clock, &log);
@@ -251,7 +251,7 @@ proptest! {
         timeout_us in 1..2000_u64,
     ) {
         let clock = Clock::virtual_time();
-        let participant = clock.take_part();
+        let participant = clock.participate();
         let slot = Waitable::new(&clock, None);
         let late = clock.scope(|scope| {
             let taker = scope.spawn("taker", || {

@@ -94,7 +94,7 @@ impl<T> ScopedJoinHandle<'_, T> {
 impl Clock {
     /// Makes this thread a participant until the returned value is dropped. Other threads may also
     /// wait on the clock; they participate during their waits only.
-    pub fn take_part(&self) -> Participant {
+    pub fn participate(&self) -> Participant {
         if let Some(scheduler) = self.scheduler() {
             scheduler.enter();
         }

@@ -5,7 +5,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::Clock;
-use super::scheduler::{Ended, WaitId};
+use super::scheduler::{WaitId, WaitOutcome};
 
 /// A value behind a lock, with waits for its changes that have deadlines on a clock.
 ///
@@ -97,7 +97,7 @@ impl<T> Waitable<T> {
         place: &'static Location<'static>,
         look: &mut dyn FnMut(&mut T) -> Option<R>,
     ) -> Option<R> {
-        let _participant = self.clock.take_part();
+        let _participant = self.clock.participate();
         let mut value = self.lock();
         loop {
             if let Some(found) = look(&mut value) {
@@ -118,8 +118,8 @@ impl<T> Waitable<T> {
             let ticket = scheduler.register(Some(self.id), deadline_us, place)?;
             drop(value);
             return match scheduler.block(ticket) {
-                Ended::Woken => Some(self.lock()),
-                Ended::Abandoned => None,
+                WaitOutcome::Woken => Some(self.lock()),
+                WaitOutcome::Abandoned => None,
             };
         }
         let Some(deadline_us) = deadline_us else {

@@ -11,10 +11,10 @@ const DAY: u64 = 24 * HOUR;
 /// ```
 /// use std::time::Duration;
 ///
-/// assert_eq!(relit_console::in_words(Duration::from_secs(8000)), "2 h 14 min");
+/// assert_eq!(relit_console::format_duration(Duration::from_secs(8000)), "2 h 14 min");
 /// ```
 #[must_use]
-pub fn in_words(time: Duration) -> String {
+pub fn format_duration(time: Duration) -> String {
     let minutes = time.as_secs_f64() / MINUTE as f64;
     let seconds = MINUTE * minutes.ceil() as u64;
     let (days, hours) = (seconds / DAY, seconds % DAY / HOUR);
@@ -41,7 +41,7 @@ mod tests {
             (90_000, "1 day 1 h"),
             (200_000, "2 days 7 h"),
         ] {
-            assert_eq!(in_words(Duration::from_secs(seconds)), words);
+            assert_eq!(format_duration(Duration::from_secs(seconds)), words);
         }
     }
 }

@@ -37,7 +37,7 @@ mod options;
 mod progress;
 mod totals;
 
-pub use duration::in_words;
+pub use duration::format_duration;
 pub use event::{Check, Done, Event};
 pub use manual::written_manual;
 pub use options::ConsoleOptions;
@@ -98,7 +98,7 @@ impl Console {
     }
 
     /// A result: `text` for a person, `event`, such as an [`Event`], as one JSON line for a machine.
-    pub fn say(self, text: &str, event: &impl Serialize) {
+    pub fn print(self, text: &str, event: &impl Serialize) {
         if self.json {
             print_line(&json_of(event));
         } else {
@@ -107,14 +107,14 @@ impl Console {
     }
 
     /// Text for a person; nothing for a machine.
-    pub fn say_to_people(self, text: &str) {
+    pub fn print_text(self, text: &str) {
         if !self.json {
             print_line(text);
         }
     }
 
     /// What is being done: on standard error for a person, as a JSON line for a machine.
-    pub fn say_phase(self, text: &str, event: &impl Serialize) {
+    pub fn print_phase(self, text: &str, event: &impl Serialize) {
         if self.json {
             print_line(&json_of(event));
         } else {
@@ -129,7 +129,7 @@ impl Console {
     }
 
     /// Largest number of lines of a long list: `for_people`, or all for a machine.
-    pub fn most_lines(self, for_people: usize) -> usize {
+    pub fn max_lines(self, for_people: usize) -> usize {
         if self.json { usize::MAX } else { for_people }
     }
 
@@ -143,7 +143,7 @@ impl Console {
     }
 
     /// A warning about a session.
-    pub fn warn_in(self, session: &str, text: &str) {
+    pub fn warn_for(self, session: &str, text: &str) {
         let event = Event::Warning {
             session: Some(session.to_owned()),
             message: text.to_owned(),
@@ -165,7 +165,7 @@ impl Console {
     }
 
     /// An error that concerns one of several inputs, and its session, if it is one.
-    pub fn error_in(self, input: &Path, session: Option<&str>, error: &(dyn Error + 'static)) {
+    pub fn error_for(self, input: &Path, session: Option<&str>, error: &(dyn Error + 'static)) {
         self.print_error(&with_causes(error), Some(input), session);
     }
 

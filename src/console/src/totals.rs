@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Console, Event, in_words};
+use super::{Console, Event, format_duration};
 
 /// Counts the recordings of a run, and the time that the work on one takes.
 #[derive(Debug)]
@@ -57,10 +57,10 @@ impl RunTotals {
         }
         let left = self.left();
         let until = match left {
-            Some(left) if done < of => format!(", about {} left", in_words(left)),
+            Some(left) if done < of => format!(", about {} left", format_duration(left)),
             _ => String::new(),
         };
-        console.say_phase(
+        console.print_phase(
             &format!("{done} of {of} recordings done{until}"),
             &Event::Total {
                 done,

@@ -130,12 +130,12 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// removed again: what fails before its first file leaves nothing behind.
 #[derive(Debug)]
 #[must_use = "what was made is removed with it while it is empty"]
-pub struct MadeFolder {
+pub struct CreatedFolder {
     /// Those that were made, the outermost first.
     made: Vec<PathBuf>,
 }
 
-impl MadeFolder {
+impl CreatedFolder {
     /// Makes the folder, and those around it, where they are missing.
     ///
     /// # Errors
@@ -157,7 +157,7 @@ impl MadeFolder {
     }
 }
 
-impl Drop for MadeFolder {
+impl Drop for CreatedFolder {
     fn drop(&mut self) {
         for folder in self.made.iter().rev() {
             // One that holds something stays, and so do those around it.
@@ -219,12 +219,12 @@ mod tests {
     fn a_folder_that_was_made_and_stays_empty_is_removed_with_those_around_it() {
         let root = tempfile::tempdir().unwrap();
         let (outer, inner) = (root.path().join("a"), root.path().join("a/b"));
-        drop(MadeFolder::make(&inner).unwrap());
+        drop(CreatedFolder::make(&inner).unwrap());
         assert!(!outer.exists() && root.path().exists());
         fs::create_dir(&outer).unwrap();
-        drop(MadeFolder::make(&inner).unwrap());
+        drop(CreatedFolder::make(&inner).unwrap());
         assert!(outer.exists() && !inner.exists(), "it was there before");
-        let made = MadeFolder::make(&inner).unwrap();
+        let made = CreatedFolder::make(&inner).unwrap();
         fs::write(inner.join("file"), "").unwrap();
         drop(made);
         assert!(inner.join("file").exists());

@@ -82,7 +82,7 @@ pub(crate) fn composed(name: &str) -> String {
 /// # Errors
 /// If the folder is there and cannot be listed.
 #[cfg(feature = "files")]
-pub fn alike_beside(path: &Path) -> io::Result<Option<OsString>> {
+pub fn name_differing_in_case(path: &Path) -> io::Result<Option<OsString>> {
     let (Some(name), Some(folder)) = (path.file_name(), path.parent()) else {
         return Ok(None);
     };
@@ -200,11 +200,11 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         fs::write(at("Mug.png"), "").unwrap();
         assert_eq!(
-            alike_beside(&at("mug.PNG")).unwrap(),
+            name_differing_in_case(&at("mug.PNG")).unwrap(),
             Some("Mug.png".into())
         );
-        assert_eq!(alike_beside(&at("Mug.png")).unwrap(), None);
-        assert_eq!(alike_beside(&at("cup.png")).unwrap(), None);
-        assert_eq!(alike_beside(&at("none/cup.png")).unwrap(), None);
+        assert_eq!(name_differing_in_case(&at("Mug.png")).unwrap(), None);
+        assert_eq!(name_differing_in_case(&at("cup.png")).unwrap(), None);
+        assert_eq!(name_differing_in_case(&at("none/cup.png")).unwrap(), None);
     }
 }

@@ -10,7 +10,7 @@ use image::{GrayImage, RgbaImage};
 use rayon::ThreadPoolBuilder;
 use relit_data::image_stats::MaskSpans;
 use relit_data::shard::{Digest, encode_rgb};
-use relit_extract::mask_doubts;
+use relit_extract::mask_warnings;
 use relit_extract::{
     AlignBuffers, AlignSample, Aligner, CropView, ScaleBuffers, Scaler, bounding_box, cut,
     square_around,
@@ -57,7 +57,7 @@ fn measure(path: &Path, mask: &GrayImage, frames: u64, side: u32) -> Result<(), 
     let [mut opened, mut hashed, mut looked, mut learnt] = [Duration::ZERO; 4];
     let video = timed(&mut opened, || Video::open(path))?;
     timed(&mut hashed, || Digest::hash_file(path))?;
-    timed(&mut looked, || mask_doubts(&video, mask, None))?;
+    timed(&mut looked, || mask_warnings(&video, mask, None))?;
     let object = bounding_box(mask).ok_or("the mask is empty")?;
     let crop = square_around(object, 0.05, (video.facts().width, video.facts().height));
     let crop_mask = cut(mask, crop);

@@ -12,9 +12,9 @@ use relit_data::session::{
 };
 use relit_data::shard::{Dataset, OutputFolder};
 
-use super::dataset_index::Catalog;
+use super::dataset_index::DatasetIndex;
 use super::job::Job;
-use super::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally};
+use super::{ExtractError, ExtractOptions, ExtractSummary, Observer, RecordingOutcome};
 
 /// Brings recordings to the local disk, and takes extracted sessions away from there; `()` leaves everything where it is.
 pub(super) trait StorageBackend {
@@ -38,15 +38,15 @@ pub(super) trait StorageBackend {
 
 impl StorageBackend for () {}
 
-/// Extracts the recordings `found` into the folder `out`, and adds the outcomes to `tally`.
+/// Extracts the recordings `found` into the folder `out`, and adds the outcomes to `summary`.
 pub(super) fn extract_recordings(
     found: &[PathBuf],
     out: &Path,
     options: &ExtractOptions,
     observer: &dyn Observer,
     storage: &dyn StorageBackend,
-    mut tally: Tally,
-) -> Result<Tally, ExtractError> {
+    mut summary: ExtractSummary,
+) -> Result<ExtractSummary, ExtractError> {
     if out.join(session::MANIFEST_FILE).exists() {
         return Err(into_session(out));
     }
@@ -61,7 +61,7 @@ pub(super) fn extract_recordings(
             ExtractError::Refused(format!("the worker threads could not be started: {error}"))
         })?;
     let mut run = Run {
-        catalog: Catalog::open(&folder, found, options)?,
+        catalog: DatasetIndex::open(&folder, found, options)?,
         folder,
         options,
         pool,
@@ -73,14 +73,14 @@ pub(super) fn extract_recordings(
     observer.planned((0..found.len()).filter(takes).count());
     for (position, recording) in found.iter().enumerate() {
         if options.task.is_none_or(|task| task.takes(position)) {
-            run.extract(position, recording, &mut tally)?;
+            run.extract(position, recording, &mut summary)?;
         } else if recording.exists() {
             // Another task may be at it right now: of two names that are alike, the first is extracted, whoever has it.
             let name = recording_name(recording);
             run.names.entry(folded(&name)).or_insert(name);
         }
     }
-    Ok(tally)
+    Ok(summary)
 }
 
 pub(super) fn into_session(out: &Path) -> ExtractError {
@@ -97,11 +97,11 @@ pub(super) fn find(
     out: &Path,
     options: &ExtractOptions,
     observer: &dyn Observer,
-    tally: &mut Tally,
+    summary: &mut ExtractSummary,
 ) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut report = |path: &Path, outcome: RecordingOutcome| {
-        tally.count(&outcome);
+        summary.count(&outcome);
         observer.ended(path, None, &outcome);
     };
     for input in inputs {
@@ -152,7 +152,7 @@ fn is_same(path: &Path, other: &Path) -> bool {
 /// One extraction into one data set.
 struct Run<'a> {
     folder: OutputFolder,
-    catalog: Catalog,
+    catalog: DatasetIndex,
     options: &'a ExtractOptions,
     pool: ThreadPool,
     /// Names of the recordings so far, by what they are where case is ignored.
@@ -167,7 +167,7 @@ impl Run<'_> {
         &mut self,
         position: usize,
         recording: &Path,
-        tally: &mut Tally,
+        summary: &mut ExtractSummary,
     ) -> Result<(), ExtractError> {
         // What a panic leaves behind of this recording lies under temporary names.
         let extracted = panic::catch_unwind(AssertUnwindSafe(|| self.extract_one(recording)));
@@ -175,7 +175,7 @@ impl Run<'_> {
             let text = "a fault of the program, described above: please report it";
             Err(ExtractError::Refused(text.to_owned()))
         }));
-        tally.count(&outcome);
+        summary.count(&outcome);
         let name = recording_name(recording);
         self.observer.ended(recording, Some(&name), &outcome);
         self.catalog.note(&self.folder, position, &outcome)?;

@@ -1,4 +1,4 @@
-//! The description of what is extracted: that of the data set, or a task's piece of it.
+//! The description of what is extracted: that of the data set, or a task's part of it.
 
 use std::path::{Path, PathBuf};
 
@@ -11,15 +11,15 @@ use relit_data::shard::{
 use super::{ExtractError, ExtractOptions, RecordingOutcome};
 
 /// The description in the output folder.
-pub(super) enum Catalog {
+pub(super) enum DatasetIndex {
     /// `dataset.json`.
     Whole(Dataset),
-    /// A task's piece.
-    Piece(Box<PartialManifest>),
+    /// A task's part.
+    Partial(Box<PartialManifest>),
 }
 
-impl Catalog {
-    /// That in the folder, or a new one. A task's piece of an earlier run over other recordings is started
+impl DatasetIndex {
+    /// That in the folder, or a new one. A task's part of an earlier run over other recordings is started
     /// again, with the sessions that it holds.
     pub(super) fn open(
         folder: &OutputFolder,
@@ -41,20 +41,20 @@ impl Catalog {
             name.to_string_lossy().into_owned()
         };
         let dataset = match PartialManifest::read(out, task)? {
-            Some(piece) => piece.dataset,
+            Some(partial) => partial.dataset,
             None => Dataset::new(settings.clone()),
         };
         check_settings(out, &dataset.settings, &settings)?;
-        let piece = PartialManifest::new(task, found.iter().map(name).collect(), dataset);
-        // A task without recordings has a piece too, so that none is missing.
-        piece.write(out)?;
-        Ok(Self::Piece(Box::new(piece)))
+        let partial = PartialManifest::new(task, found.iter().map(name).collect(), dataset);
+        // A task without recordings has a part too, so that none is missing.
+        partial.write(out)?;
+        Ok(Self::Partial(Box::new(partial)))
     }
 
     pub(super) fn dataset(&self) -> &Dataset {
         match self {
             Self::Whole(dataset) => dataset,
-            Self::Piece(piece) => &piece.dataset,
+            Self::Partial(partial) => &partial.dataset,
         }
     }
 
@@ -74,7 +74,7 @@ impl Catalog {
                 *dataset = changed;
             }
             // It is written with the outcome.
-            Self::Piece(piece) => piece.dataset.replace(entry, shards),
+            Self::Partial(partial) => partial.dataset.replace(entry, shards),
         }
         Ok(())
     }
@@ -86,7 +86,7 @@ impl Catalog {
         position: usize,
         outcome: &RecordingOutcome,
     ) -> Result<(), ExtractError> {
-        let Self::Piece(piece) = self else {
+        let Self::Partial(partial) = self else {
             return Ok(());
         };
         let outcome = match outcome {
@@ -102,8 +102,8 @@ impl Catalog {
                 why: with_causes(error),
             },
         };
-        piece.outcomes.insert(position, outcome);
-        Ok(piece.write(folder.path())?)
+        partial.outcomes.insert(position, outcome);
+        Ok(partial.write(folder.path())?)
     }
 }
 

@@ -29,7 +29,7 @@ pub enum ExtractError {
     },
     /// The mask cannot be held against the video.
     #[error(transparent)]
-    MaskDoubts(#[from] relit_grabcut::MaskError),
+    MaskWarnings(#[from] relit_grabcut::MaskError),
     /// The recording cannot be used.
     #[error(transparent)]
     Session(#[from] session::SessionError),
@@ -79,7 +79,7 @@ impl ExtractError {
 
     /// Whether the recording itself is the reason: it holds too little of a turn, and is left out.
     #[must_use]
-    pub fn leaves_out(&self) -> bool {
+    pub fn skips_recording(&self) -> bool {
         matches!(
             self,
             Self::TooLittle(_) | Self::Session(session::SessionError::NoFrames(_))

@@ -19,7 +19,7 @@ use relit_data::shard::{
 use relit_video::Video;
 
 use super::interpolate::ShiftCourse;
-use super::mask_doubts::mask_doubts;
+use super::mask_warnings::mask_warnings;
 use super::object::ObjectMask;
 use super::pipeline::{self, LostFrame, ProcessedFrame, Stage};
 use super::plan::{Assignment, Assignments, Plan};
@@ -84,8 +84,8 @@ impl Job {
     }
 
     /// What a few frames of the video say against the mask, and how much that is.
-    fn doubts_about_the_mask(&self) -> (Vec<Notice>, Option<MaskMisfit>) {
-        match mask_doubts(&self.video, &self.mask.image, self.mask.frame) {
+    fn check_mask(&self) -> (Vec<Notice>, Option<MaskMisfit>) {
+        match mask_warnings(&self.video, &self.mask.image, self.mask.frame) {
             Ok((reasons, misfit)) => (reasons.into_iter().map(Notice::Warning).collect(), misfit),
             Err(error) => {
                 let text = format!("the mask could not be checked: {}", with_causes(&error));
@@ -145,7 +145,7 @@ impl Job {
         let mut notices = self.notices.clone();
         notices.extend(self.notices_of_plan(&plan, options.frames));
         let mut stage = self.stage(options)?;
-        let mut steadiness = Stability::new(options.max_shift);
+        let mut stability = Stability::new(options.max_shift);
         let mut writer = ShardWriter::create(
             folder.path(),
             options.layout,
@@ -156,12 +156,12 @@ impl Job {
         let mut thumbnails = Vec::new();
         let mut assignments = plan.assignments();
         let mut lost = Vec::new();
-        let mut doubts = None;
+        let mut warnings = None;
         let mut course = ShiftCourse::default();
         let mut waiting = Assignments::new();
         pool.in_place_scope(|scope| {
             // The look at the mask takes one thread for a while, and the others go on.
-            scope.spawn(|_| doubts = Some(self.doubts_about_the_mask()));
+            scope.spawn(|_| warnings = Some(self.check_mask()));
             if options.align != Align::Off {
                 stage.align = self.align(&stage, &plan, options, pool)?;
             }
@@ -176,7 +176,7 @@ impl Job {
                             waiting.entry(frame.number).or_default().extend(assigned);
                             return Ok(());
                         }
-                        steadiness.add(frame.number, alignment, frame.interpolated);
+                        stability.add(frame.number, alignment, frame.interpolated);
                     }
                     for &sample in assigned {
                         let record = self.record(&stage, &plan, &frame, sample, options);
@@ -202,19 +202,19 @@ impl Job {
             }
             Ok::<(), ExtractError>(())
         })?;
-        let (doubts, misfit) = doubts.unwrap_or_default();
-        notices.extend(doubts);
+        let (warnings, misfit) = warnings.unwrap_or_default();
+        notices.extend(warnings);
         if options.align != Align::Off && stage.align.is_none() {
             notices.push(Notice::Warning(
                 "the object has too little structure to measure its shifts: they are unknown"
                     .to_owned(),
             ));
         }
-        steadiness.check()?;
+        stability.check()?;
         thumbnails.sort_by_key(|(index, _)| *index);
         notices.extend(notices_of_lost(&lost));
         if let Some(align) = &stage.align {
-            notices.extend(steadiness.notices(align.aligner.least_confidence()));
+            notices.extend(stability.notices(align.aligner.min_confidence()));
         }
         let taken: Vec<_> = (0..samples).filter_map(|k| writer.sample(k)).collect();
         let findings = quality::findings(&taken, options.frames);
@@ -336,7 +336,7 @@ impl Job {
         let (frames, reference) = frames_to_align(chosen, keys, self.mask.frame);
         let mut samples = stage.align_samples(&frames, pool)?;
         if !frames.contains(&reference) {
-            samples.extend(stage.sought_sample(reference));
+            samples.extend(stage.sample_by_index(reference));
         }
         // If the mask's frame is lost, the nearest one takes its place.
         let nearest = samples
@@ -407,7 +407,7 @@ impl Job {
                 if left_out == 1 { "is" } else { "are" },
             )));
         }
-        if let Some(frame) = plan.runs_back_at() {
+        if let Some(frame) = plan.reversal_frame() {
             notices.push(Notice::Warning(format!(
                 "the table's angle goes back at frame {frame}: check {INDEX_FILE} there"
             )));

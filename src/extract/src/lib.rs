@@ -26,8 +26,8 @@
 //!     ..ExtractOptions::default()
 //! };
 //! // The observer `()` ignores the progress.
-//! let tally = extract(&[recording.to_owned()], out.path(), &options, &())?;
-//! assert_eq!((tally.extracted, tally.failed), (1, 0));
+//! let summary = extract(&[recording.to_owned()], out.path(), &options, &())?;
+//! assert_eq!((summary.extracted, summary.failed), (1, 0));
 //!
 //! let dataset = Dataset::read(out.path())?;
 //! assert_eq!(dataset.sessions[0].samples, 24);
@@ -44,7 +44,7 @@ mod dataset_index;
 mod error;
 mod interpolate;
 mod job;
-mod mask_doubts;
+mod mask_warnings;
 mod object;
 pub mod objects;
 mod observer;
@@ -63,8 +63,8 @@ pub use align::{AlignBuffers, AlignSample, Aligner, Alignment};
 pub use crop::{bounding_box, cut, square_around};
 pub use crop_view::CropView;
 pub use error::ExtractError;
-pub use mask_doubts::mask_doubts;
-pub use observer::{Observer, RecordingOutcome, Tally};
+pub use mask_warnings::mask_warnings;
+pub use observer::{ExtractSummary, Observer, RecordingOutcome};
 pub use options::{ExtractOptions, MAX_MARGIN, MAX_SHIFT, MAX_SIDE};
 pub use scale::{APRON, ScaleBuffers, Scaler};
 
@@ -81,11 +81,11 @@ pub fn extract(
     out: &Path,
     options: &ExtractOptions,
     observer: &dyn Observer,
-) -> Result<Tally, ExtractError> {
+) -> Result<ExtractSummary, ExtractError> {
     if inputs.iter().any(|input| objects::is_url(input)) || objects::is_url(out) {
         return objects::extract(inputs, out, options, observer);
     }
-    let mut tally = Tally::default();
-    let found = batch::find(inputs, out, options, observer, &mut tally);
-    batch::extract_recordings(&found, out, options, observer, &(), tally)
+    let mut summary = ExtractSummary::default();
+    let found = batch::find(inputs, out, options, observer, &mut summary);
+    batch::extract_recordings(&found, out, options, observer, &(), summary)
 }

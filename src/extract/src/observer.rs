@@ -42,7 +42,7 @@ impl RecordingOutcome {
     /// The outcome; some errors are not failures.
     pub(super) fn from_result(result: Result<Self, ExtractError>) -> Self {
         result.unwrap_or_else(|error| {
-            if error.leaves_out() {
+            if error.skips_recording() {
                 Self::LeftOut(error)
             } else {
                 Self::Failed(error)
@@ -54,7 +54,7 @@ impl RecordingOutcome {
 /// The outcome of an extraction: numbers of recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
-pub struct Tally {
+pub struct ExtractSummary {
     /// Recordings that were extracted.
     pub extracted: usize,
     /// Extracted or skipped recordings with losses.
@@ -73,7 +73,7 @@ pub struct Tally {
     pub failed: usize,
 }
 
-impl Tally {
+impl ExtractSummary {
     /// Counts a recording.
     pub(super) fn count(&mut self, outcome: &RecordingOutcome) {
         match outcome {

@@ -348,7 +348,7 @@ impl Stage<'_> {
     }
 
     /// The crop of one frame, found by the file's index; `None` if it cannot be decoded.
-    pub(super) fn sought_sample(&self, frame: u64) -> Option<(u64, AlignSample)> {
+    pub(super) fn sample_by_index(&self, frame: u64) -> Option<(u64, AlignSample)> {
         let whole = self.video.frame(frame).ok()?;
         let mut crop = RgbaImage::new(self.crop.w, self.crop.h);
         let (left, top) = (-i64::from(self.crop.x), -i64::from(self.crop.y));

@@ -7,7 +7,7 @@ use relit_data::shard::SamplingBasis;
 use relit_video::Video;
 
 use super::ExtractError;
-use super::select::{Candidate, Selection, runs_back_at, time_gaps};
+use super::select::{Candidate, Selection, reversal_frame, time_gaps};
 use super::timeline::timeline;
 
 /// The frames of a video that may be chosen, and those that were chosen.
@@ -107,8 +107,8 @@ impl Plan {
     }
 
     /// The frame at which the angle goes backwards, if there is one.
-    pub(super) fn runs_back_at(&self) -> Option<u64> {
-        runs_back_at(&self.candidates)
+    pub(super) fn reversal_frame(&self) -> Option<u64> {
+        reversal_frame(&self.candidates)
     }
 
     /// The samples to which each chosen frame is assigned.

@@ -211,7 +211,7 @@ fn median_step(positions: &[f64]) -> f64 {
 }
 
 /// The first frame at which the table goes back against its direction by more than a degree.
-pub(super) fn runs_back_at(candidates: &[Candidate]) -> Option<u64> {
+pub(super) fn reversal_frame(candidates: &[Candidate]) -> Option<u64> {
     let angles: Option<Vec<f64>> = candidates.iter().map(|c| c.angle_deg).collect();
     let angles = angles?;
     let direction = (angles.last()? - angles.first()?).signum();
@@ -372,10 +372,10 @@ mod tests {
     fn an_angle_that_goes_back_is_found() {
         let angles =
             |wrong: f64| (0..150).map(move |n| if n == 50 { wrong } else { 2.4 * f64::from(n) });
-        assert_eq!(runs_back_at(&turned(angles(0.0))), Some(50));
-        assert_eq!(runs_back_at(&turned(angles(120.0))), None);
+        assert_eq!(reversal_frame(&turned(angles(0.0))), Some(50));
+        assert_eq!(reversal_frame(&turned(angles(120.0))), None);
         let backwards = angles(120.0).map(|angle| -angle);
-        assert_eq!(runs_back_at(&turned(backwards)), None);
+        assert_eq!(reversal_frame(&turned(backwards)), None);
     }
 
     #[test]

@@ -68,17 +68,17 @@ impl Stability {
         }
     }
 
-    /// What a user should know; frames below `least_confidence` were not registered.
-    pub(super) fn notices(&self, least_confidence: f64) -> Vec<Notice> {
+    /// What a user should know; frames below `min_confidence` were not registered.
+    pub(super) fn notices(&self, min_confidence: f64) -> Vec<Notice> {
         let mut notices = Vec::new();
         if let Some(first) = self.unregistered.iter().min() {
             let all = count_of(self.frames, "frame");
             notices.push(Notice::Warning(match self.unregistered.len() {
                 1 => format!(
-                    "1 of {all} could not be aligned (its align_confidence is below {least_confidence:.2}) and stays as recorded: frame {first}"
+                    "1 of {all} could not be aligned (its align_confidence is below {min_confidence:.2}) and stays as recorded: frame {first}"
                 ),
                 count => format!(
-                    "{count} of {all} could not be aligned (their align_confidence is below {least_confidence:.2}) and stay as recorded, the first is frame {first}"
+                    "{count} of {all} could not be aligned (their align_confidence is below {min_confidence:.2}) and stay as recorded, the first is frame {first}"
                 ),
             }));
         }
@@ -116,37 +116,37 @@ mod tests {
 
     #[test]
     fn the_first_frame_beyond_the_largest_shift_is_named_in_any_order() {
-        let mut steadiness = Stability::new(8.0);
+        let mut stability = Stability::new(8.0);
         for (frame, dx) in [(3, 1.0), (9, -8.5), (7, 9.0), (8, 2.0)] {
-            steadiness.add(frame, &moved_by(dx), None);
+            stability.add(frame, &moved_by(dx), None);
         }
-        let error = steadiness.check().unwrap_err().to_string();
+        let error = stability.check().unwrap_err().to_string();
         assert!(error.contains("frame 7 "), "{error}");
         assert!(Stability::new(8.0).check().is_ok());
     }
 
     #[test]
     fn frames_that_cannot_be_registered_are_counted() {
-        let mut steadiness = Stability::new(8.0);
-        steadiness.add(1, &moved_by(0.2), None);
-        assert!(steadiness.notices(0.3).is_empty());
+        let mut stability = Stability::new(8.0);
+        stability.add(1, &moved_by(0.2), None);
+        assert!(stability.notices(0.3).is_empty());
         let lost = Alignment {
             shift: None,
             uncertainty: f64::INFINITY,
             confidence: 0.1,
             turned: None,
         };
-        steadiness.add(6, &lost, None);
-        let text = steadiness.notices(0.5).remove(0).text().to_owned();
+        stability.add(6, &lost, None);
+        let text = stability.notices(0.5).remove(0).text().to_owned();
         assert!(is_named(&text, &["1", "2 frames", "frame 6"]), "{text}");
-        steadiness.add(5, &lost, None);
-        let text = steadiness.notices(0.5).remove(0).text().to_owned();
+        stability.add(5, &lost, None);
+        let text = stability.notices(0.5).remove(0).text().to_owned();
         assert!(
             is_named(&text, &["2", "3 frames", "frame 5", "0.50"]),
             "{text}"
         );
-        steadiness.add(7, &moved_by(0.3), Some(0.14));
-        let text = steadiness.notices(0.5).remove(1).text().to_owned();
+        stability.add(7, &moved_by(0.3), Some(0.14));
+        let text = stability.notices(0.5).remove(1).text().to_owned();
         assert!(is_named(&text, &["1", "4 frames", "0.14 pixels"]), "{text}");
     }
 }

@@ -8,7 +8,7 @@ const KEPT_FROM: f64 = 0.3;
 
 /// The cleaned mask, and what was changed.
 #[derive(Debug)]
-pub(super) struct Cleaned {
+pub(super) struct CleanedMask {
     pub(super) mask: Bitmap,
     /// Number of 8-connected components before the clean-up.
     pub(super) components: usize,
@@ -26,7 +26,7 @@ pub(super) struct Cleaned {
 
 /// Keeps the largest component and those of a similar size, or with `keep_all` every one, and fills
 /// holes of at most `fill_to` times the object's area, except those in which the seeds mark background.
-pub(super) fn clean(raw: &Bitmap, marks: &[Mark], keep_all: bool, fill_to: f64) -> Cleaned {
+pub(super) fn clean(raw: &Bitmap, marks: &[Mark], keep_all: bool, fill_to: f64) -> CleanedMask {
     let components = raw.components(Connectivity::Eight);
     let largest = components.largest();
     let least = largest.map_or(0.0, |at| components.list[at].area as f64 * KEPT_FROM);
@@ -34,7 +34,7 @@ pub(super) fn clean(raw: &Bitmap, marks: &[Mark], keep_all: bool, fill_to: f64) 
     let kept = raw.map(|at, _| components.at(at).is_some_and(is_kept));
     let (mask, holes, closed_by_marks) = fill_holes(&kept, marks, fill_to);
     let all = || components.list.iter().enumerate();
-    Cleaned {
+    CleanedMask {
         components: components.list.len(),
         kept: all().filter(|&(index, _)| is_kept(index)).count(),
         dropped: all()

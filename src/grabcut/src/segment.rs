@@ -8,7 +8,7 @@ use super::bitmap::{Bitmap, Component, Connectivity};
 use super::cut::energy::CutEnergy;
 use super::cut::grab_cut::Label;
 use super::cut::pyramid;
-use super::cut::pyramid::FirstModels;
+use super::cut::pyramid::InitialModels;
 use super::hints::trimap::Trimap;
 use super::settings::{MAX_PIXELS, MIN_SIDE};
 use super::turn::statistics;
@@ -250,7 +250,7 @@ fn by_hints(
         first,
         rect,
     } = initial(hints, size)?;
-    let cut = |labels: Vec<Label>, first: FirstModels| {
+    let cut = |labels: Vec<Label>, first: InitialModels| {
         let raw = pyramid::segment(frame, labels, first, effort)?;
         Ok(finish(&raw, size, hints, rect, settings, FILLED_OF_FRAME))
     };
@@ -260,7 +260,7 @@ fn by_hints(
     let energy = CutEnergy::new(frame, rect);
     let energy = |mask: &Mask| energy.of(&Bitmap::from_mask(&mask.image));
     let (chosen, other) = match (
-        cut(labels.clone(), FirstModels::All),
+        cut(labels.clone(), InitialModels::All),
         cut(labels.clone(), first),
     ) {
         (Ok(plain), Ok(ranked)) => {
@@ -279,8 +279,8 @@ fn by_hints(
     }
     let middle = in_ellipse(&labels, rect, size.0);
     let more = [
-        cut(labels, FirstModels::Ranked(OTHER_SHARE)),
-        cut(middle, FirstModels::All),
+        cut(labels, InitialModels::Ranked(OTHER_SHARE)),
+        cut(middle, InitialModels::All),
     ];
     let others = other.into_iter().chain(more.into_iter().flatten());
     let best = others

@@ -3,7 +3,7 @@
 use relit_data::geometry::Rect;
 
 use super::bitmap::{Bitmap, Component};
-use super::cleanup::Cleaned;
+use super::cleanup::CleanedMask;
 use super::{Hints, Seeds};
 
 /// A mask that covers a smaller fraction of the frame is small.
@@ -39,7 +39,7 @@ pub(super) fn hole_filled(&Component { area, bounds }: &Component) -> String {
 pub(super) fn warnings(
     hints: &Hints,
     used: Option<Rect>,
-    cleaned: &Cleaned,
+    cleaned: &CleanedMask,
     size: (u32, u32),
 ) -> Vec<String> {
     let area = cleaned.mask.count() as f64;
@@ -110,7 +110,7 @@ fn dropped(components: &[Component], area: f64) -> Option<String> {
 }
 
 /// The hole that was filled and that is worth a warning.
-pub(super) fn filled(cleaned: &Cleaned, area: f64) -> Option<&Component> {
+pub(super) fn filled(cleaned: &CleanedMask, area: f64) -> Option<&Component> {
     let largest = cleaned.holes.iter().max_by_key(|hole| hole.area);
     let large = largest.filter(|hole| hole.area as f64 >= LARGE_PART * area);
     // A person who closes an opening by mistake does not see it.

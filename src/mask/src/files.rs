@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use relit_data::durable::{self, MadeFolder};
+use relit_data::durable::{self, CreatedFolder};
 
 use super::{MaskRecord, MaskingError};
 
@@ -69,9 +69,9 @@ pub(super) fn check_replaceable(files: &MaskFiles, force: bool) -> Result<(), Ma
 
 /// Makes the mask's folder, before anybody works on a mask that cannot be kept. While nothing is in it, it goes with what is
 /// returned.
-pub(super) fn make_folder(files: &MaskFiles) -> Result<MadeFolder, MaskingError> {
+pub(super) fn make_folder(files: &MaskFiles) -> Result<CreatedFolder, MaskingError> {
     let folder = files.mask.parent().unwrap_or(Path::new(""));
-    MadeFolder::make(folder).map_err(MaskingError::io(folder, "made"))
+    CreatedFolder::make(folder).map_err(MaskingError::io(folder, "made"))
 }
 
 /// The record in a file, if there is such a file.

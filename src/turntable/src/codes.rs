@@ -87,7 +87,7 @@ impl fmt::Display for Alarm {
 }
 
 /// What an `error:` number means, of those that the lines of this program can get.
-pub(super) fn meaning_of_error(code: u8) -> &'static str {
+pub(super) fn describe_error(code: u8) -> &'static str {
     match code {
         3 | 20 => "a command it does not know",
         5 => "homing is switched off ($22)",

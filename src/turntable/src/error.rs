@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::codes::{Alarm, meaning_of_error};
+use super::codes::{Alarm, describe_error};
 use super::protocol::{ControllerState, LineFault, SendError};
 use super::supervisor::MotionFault;
 use crate::lockfile::LockError;
@@ -78,7 +78,7 @@ pub enum TurntableError {
         milliseconds: u64,
     },
     /// The controller refused a line.
-    #[error("the controller refused {block:?} with error:{code}, {}", meaning_of_error(*.code))]
+    #[error("the controller refused {block:?} with error:{code}, {}", describe_error(*.code))]
     Refused {
         /// The line.
         block: String,

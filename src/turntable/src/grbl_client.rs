@@ -10,7 +10,7 @@ use super::codes::Alarm;
 use super::error::TurntableError;
 use super::handshake;
 use super::identity::Identity;
-use super::io_thread::{IoThread, Link};
+use super::io_thread::{Connection, IoThread};
 use super::port::{self, Port, SerialPort};
 use super::protocol::{ControllerState, Counts, LineOutcome, Message, ReplyTimeout};
 use super::status::TableStatus;
@@ -29,7 +29,7 @@ const BRISK: f64 = 30.0;
 /// A table, owned by this process. Dropping it stops the table.
 pub struct Table {
     // Fields are dropped in this order: the port is closed, and only then its lock is released.
-    link: Link,
+    connection: Connection,
     _io_thread: IoThread,
     _lock: Option<LockFile>,
     identity: Identity,
@@ -43,7 +43,7 @@ impl Table {
     /// # Errors
     /// [`TurntableError::NoController`], or what else failed during the exchange.
     pub fn open(port: impl Port, options: &TableOptions) -> Result<Table, TurntableError> {
-        Self::greet(Box::new(port), None, options)
+        Self::handshake(Box::new(port), None, options)
     }
 
     /// Opens a serial port exclusively.
@@ -54,7 +54,7 @@ impl Table {
         // Opening the port resets an Arduino: this must not happen to another owner's table.
         let lock = port::claim(path, &options.runtime_folder)?;
         let port = SerialPort::open(path)?;
-        Self::greet(Box::new(port), Some(lock), options)
+        Self::handshake(Box::new(port), Some(lock), options)
     }
 
     /// The same, and ends a program of the toolkit that has the port, which stops its table then.
@@ -80,16 +80,17 @@ impl Table {
         }
     }
 
-    fn greet(
+    fn handshake(
         port: Box<dyn Port>,
         lock: Option<LockFile>,
         options: &TableOptions,
     ) -> Result<Table, TurntableError> {
         let resets = port.resets();
-        let (link, io_thread) = Link::start(port, &options.clock, handshake::UNKNOWN_CONTROLLER)?;
-        let (identity, was_stopped) = handshake::greet(&link, resets, options)?;
+        let (connection, io_thread) =
+            Connection::start(port, &options.clock, handshake::UNKNOWN_CONTROLLER)?;
+        let (identity, was_stopped) = handshake::run(&connection, resets, options)?;
         Ok(Table {
-            link,
+            connection,
             _io_thread: io_thread,
             _lock: lock,
             identity,
@@ -109,18 +110,18 @@ impl Table {
         self.was_stopped
     }
 
-    /// Counters of lines, reports and wire errors since the table was opened.
+    /// Counters of lines, reports and line errors since the table was opened.
     #[must_use]
     pub fn counts(&self) -> Counts {
-        self.link.supervisor().counts()
+        self.connection.supervisor().counts()
     }
 
     pub(super) fn clock(&self) -> &Clock {
-        self.link.clock()
+        self.connection.clock()
     }
 
-    pub(super) fn link(&self) -> &Link {
-        &self.link
+    pub(super) fn connection(&self) -> &Connection {
+        &self.connection
     }
 
     /// The table's present status.
@@ -128,7 +129,7 @@ impl Table {
     /// # Errors
     /// [`TurntableError::Silent`].
     pub fn status(&self) -> Result<TableStatus, TurntableError> {
-        self.link.status()
+        self.connection.status()
     }
 
     /// The range in which the table may turn, degrees from the angle 0.
@@ -143,7 +144,7 @@ impl Table {
     /// # Errors
     /// [`TurntableError::BeyondLimit`], [`TurntableError::NotReady`], or what ended the motion.
     pub fn jog(&self, degrees: f64, speed: Option<f64>) -> Result<TableStatus, TurntableError> {
-        let speed = speed.unwrap_or_else(|| self.brisk());
+        let speed = speed.unwrap_or_else(|| self.default_speed());
         self.identity.check_speed(speed)?;
         if !degrees.is_finite() {
             return Err(TurntableError::OutOfRange {
@@ -170,7 +171,7 @@ impl Table {
     }
 
     /// Speed of unwinding, and of jogs without a given speed, degrees/s.
-    pub(super) fn brisk(&self) -> f64 {
+    pub(super) fn default_speed(&self) -> f64 {
         self.identity.max_degrees_per_second.min(BRISK)
     }
 
@@ -191,7 +192,7 @@ impl Table {
     /// Checks that the angle 0 is still known to be at `zero_deg`: a controller that has restarted
     /// counts from another place.
     pub(super) fn require_zero(&self, zero_deg: f64) -> Result<(), TurntableError> {
-        let supervisor = self.link.supervisor();
+        let supervisor = self.connection.supervisor();
         match supervisor.zero_deg() {
             Some(known) if known == zero_deg => Ok(()),
             None if supervisor.has_restarted() => Err(MotionFault::Restarted(None).into()),
@@ -209,7 +210,7 @@ impl Table {
         let distance = (machine_deg - from.machine_deg).abs();
         self.launch(block, machine_deg, distance, speed)?;
         let arrived = self.wait_arrival(self.travel_time(distance, speed));
-        self.link.supervisor().end_motion();
+        self.connection.supervisor().end_motion();
         arrived
     }
 
@@ -235,7 +236,7 @@ impl Table {
             within_us: i64::try_from(time.as_micros()).unwrap_or(i64::MAX),
         })?;
         let sent = self.command(block);
-        let mut supervisor = self.link.supervisor();
+        let mut supervisor = self.connection.supervisor();
         match sent {
             Ok(_) => supervisor.motion_accepted(self.clock().now_us()),
             Err(_) => supervisor.end_motion(),
@@ -245,7 +246,7 @@ impl Table {
 
     /// Waits until the table is at its target or a fault has stopped it.
     pub(super) fn wait_arrival(&self, limit: Duration) -> Result<(), TurntableError> {
-        let ended = self.link.wait(limit + MOTION_SLACK, |supervisor| {
+        let ended = self.connection.wait(limit + MOTION_SLACK, |supervisor| {
             let arrived = supervisor
                 .motion()
                 .is_some_and(|motion| motion.is_at_target());
@@ -263,11 +264,11 @@ impl Table {
 
     /// The fault that has ended the motion, if any. Waits until the table has been stopped.
     pub(super) fn end_by_fault(&self) -> Result<Option<TurntableError>, TurntableError> {
-        let fault = self.link.supervisor().fault().cloned();
+        let fault = self.connection.supervisor().fault().cloned();
         if let Some(fault) = fault {
-            let gone = self.link.supervisor().closed().is_some();
+            let gone = self.connection.supervisor().closed().is_some();
             if !gone {
-                self.link.wait_stopped()?;
+                self.connection.wait_stopped()?;
             }
             return Ok(Some(fault.into()));
         }
@@ -279,8 +280,8 @@ impl Table {
     /// # Errors
     /// [`TurntableError::Busy`] if one is in progress.
     pub(super) fn begin(&self, goal: MotionGoal) -> Result<(), TurntableError> {
-        self.secure()?;
-        let mut supervisor = self.link.supervisor();
+        self.ensure_checked_session()?;
+        let mut supervisor = self.connection.supervisor();
         if supervisor.is_stopping() || supervisor.motion().is_some() {
             return Err(TurntableError::Busy);
         }
@@ -292,7 +293,7 @@ impl Table {
     pub(super) fn ready(&self) -> Result<TableStatus, TurntableError> {
         let status = self.status()?;
         require_released(&status)?;
-        let supervisor = self.link.supervisor();
+        let supervisor = self.connection.supervisor();
         if supervisor.is_stopping() || supervisor.motion().is_some() {
             return Err(TurntableError::Busy);
         }
@@ -310,7 +311,7 @@ impl Table {
     /// # Errors
     /// [`TurntableError::NotStopped`] if it was not reported at rest.
     pub fn stop(&self) -> Result<TableStatus, TurntableError> {
-        self.link.stop()
+        self.connection.stop()
     }
 
     /// Unlocks the table after an alarm. A controller that refuses that, as after an emergency stop, is
@@ -337,7 +338,7 @@ impl Table {
         if !locked || !matches!(refused, TurntableError::Refused { .. }) {
             return Err(refused);
         }
-        self.link.reset()?;
+        self.connection.reset()?;
         self.command("$X").map(|_| ())
     }
 
@@ -347,14 +348,14 @@ impl Table {
         let status = self.status()?;
         require_released(&status)?;
         if status.alarm.is_some_and(Alarm::is_emergency_stop) {
-            self.link.reset()?;
+            self.connection.reset()?;
         }
         Ok(())
     }
 
     /// Opens a checked session if the controller offers one and none is open.
-    pub(super) fn secure(&self) -> Result<(), TurntableError> {
-        handshake::secure(&self.link, self.identity.extras)
+    pub(super) fn ensure_checked_session(&self) -> Result<(), TurntableError> {
+        handshake::ensure_checked_session(&self.connection, self.identity.extras)
     }
 
     pub(super) fn outcome(
@@ -362,8 +363,8 @@ impl Table {
         block: &str,
         timeout: ReplyTimeout,
     ) -> Result<LineOutcome, TurntableError> {
-        self.secure()?;
-        self.link.line(block, timeout)
+        self.ensure_checked_session()?;
+        self.connection.line(block, timeout)
     }
 
     /// Sends a line and waits for its `ok`; returns the messages before it.
@@ -390,10 +391,10 @@ impl Table {
 
 impl Drop for Table {
     fn drop(&mut self) {
-        self.link.supervisor().release(self.clock().now_us());
-        if self.link.supervisor().is_stopping() {
+        self.connection.supervisor().release(self.clock().now_us());
+        if self.connection.supervisor().is_stopping() {
             // Nobody is left to receive an error. The lease, if there is one, also stops the table.
-            let _ = self.link.wait_stopped();
+            let _ = self.connection.wait_stopped();
         }
     }
 }

@@ -6,9 +6,9 @@ use super::TableOptions;
 use super::error::TurntableError;
 use super::family::Family;
 use super::identity::{GrblSettings, Identity, offers_extras};
-use super::io_thread::Link;
+use super::io_thread::Connection;
 use super::protocol::{ControllerState, Counts, LineFault, LineOutcome, Message, ReplyTimeout};
-use super::supervisor::ControllerTraits;
+use super::supervisor::ControllerFeatures;
 
 /// Longest start of an Arduino after its port was opened.
 const START_WAIT: Duration = Duration::from_secs(4);
@@ -29,7 +29,7 @@ const POLL_STAMPED: Duration = Duration::from_micros(66_667);
 const POLL_STOCK: Duration = Duration::from_millis(200);
 
 /// What is assumed of a controller until its identity is known.
-pub(super) const UNKNOWN_CONTROLLER: ControllerTraits = ControllerTraits {
+pub(super) const UNKNOWN_CONTROLLER: ControllerFeatures = ControllerFeatures {
     family: Family::Grbl,
     poll: POLL_STOCK,
     stamps: false,
@@ -39,18 +39,18 @@ pub(super) const UNKNOWN_CONTROLLER: ControllerTraits = ControllerTraits {
 
 /// Identifies the controller, stops the table if it moves, and opens a checked session if the
 /// controller offers one. The second value tells whether it had to be stopped.
-pub(super) fn greet(
-    link: &Link,
+pub(super) fn run(
+    connection: &Connection,
     resets: bool,
     options: &TableOptions,
 ) -> Result<(Identity, bool), TurntableError> {
-    let moved = wake(link, resets)?;
-    let about = about(link)?;
+    let moved = wake(connection, resets)?;
+    let about = about(connection)?;
     let extras = options.extras && offers_extras(&about);
-    secure(link, extras)?;
-    let settings = settings(link, extras)?;
+    ensure_checked_session(connection, extras)?;
+    let settings = settings(connection, extras)?;
     let identity = Identity::read(&about, &settings, extras)?;
-    link.supervisor().set_traits(ControllerTraits {
+    connection.supervisor().set_features(ControllerFeatures {
         family: identity.family,
         poll: if extras { POLL_STAMPED } else { POLL_STOCK },
         stamps: extras,
@@ -61,40 +61,43 @@ pub(super) fn greet(
 }
 
 /// Opens a checked session if the controller offers one and none is open.
-pub(super) fn secure(link: &Link, extras: bool) -> Result<(), TurntableError> {
-    if !extras || link.supervisor().is_checked() {
+pub(super) fn ensure_checked_session(
+    connection: &Connection,
+    extras: bool,
+) -> Result<(), TurntableError> {
+    if !extras || connection.supervisor().is_checked() {
         return Ok(());
     }
-    done(link, "N0", link.open_session()?).map(|_| ())
+    done(connection, "N0", connection.open_session()?).map(|_| ())
 }
 
 /// Waits for the banner and for a first report; stops a table that moves or is held, and tells
 /// whether it did.
-fn wake(link: &Link, resets: bool) -> Result<bool, TurntableError> {
+fn wake(connection: &Connection, resets: bool) -> Result<bool, TurntableError> {
     let limit = if resets { START_WAIT } else { SHORT_WAIT };
-    link.wait(limit, |supervisor| {
+    connection.wait(limit, |supervisor| {
         (supervisor.restarts() > 0).then_some(())
     });
-    let moves = match first_state(link) {
+    let moves = match first_state(connection) {
         Some(ControllerState::Idle | ControllerState::Alarm | ControllerState::Check) => false,
         Some(_) => true,
-        None => return Err(no_controller(link)),
+        None => return Err(no_controller(connection)),
     };
     if moves {
-        link.stop()?;
+        connection.stop()?;
     }
-    forget_echo(link)?;
+    forget_echo(connection)?;
     Ok(moves)
 }
 
 /// The state of the first report. A controller with a radio can take long to start, and prints what it
 /// does meanwhile: as long as it does, it is waited for.
-fn first_state(link: &Link) -> Option<ControllerState> {
+fn first_state(connection: &Connection) -> Option<ControllerState> {
     for _ in 0..PROBES {
-        let before = heard(&link.supervisor().counts());
-        let until_us = link.clock().after(PROBE_WAIT);
-        link.supervisor().want_reports(until_us);
-        let state = link.wait(PROBE_WAIT, |supervisor| {
+        let before = lines_received(&connection.supervisor().counts());
+        let until_us = connection.clock().after(PROBE_WAIT);
+        connection.supervisor().want_reports(until_us);
+        let state = connection.wait(PROBE_WAIT, |supervisor| {
             if supervisor.closed().is_some() {
                 return Some(None);
             }
@@ -103,7 +106,7 @@ fn first_state(link: &Link) -> Option<ControllerState> {
         if state.is_some() {
             return state.flatten();
         }
-        if heard(&link.supervisor().counts()) == before {
+        if lines_received(&connection.supervisor().counts()) == before {
             return None;
         }
     }
@@ -111,7 +114,7 @@ fn first_state(link: &Link) -> Option<ControllerState> {
 }
 
 /// Lines received that are neither reports nor answers.
-fn heard(counts: &Counts) -> u64 {
+fn lines_received(counts: &Counts) -> u64 {
     counts.noise + counts.messages
 }
 
@@ -119,25 +122,25 @@ fn heard(counts: &Counts) -> u64 {
 /// sends. The controller answers such lines with errors, which arrive here while no line waits for
 /// an answer, and may keep a part of one as the beginning of the next line. That next line is an
 /// empty one here, and its answer does not matter.
-fn forget_echo(link: &Link) -> Result<(), TurntableError> {
-    link.clock().sleep(ECHO_WAIT);
-    match link.line("", ReplyTimeout::AtOnce)? {
-        LineOutcome::Failed(fault) => recover(link, fault),
+fn forget_echo(connection: &Connection) -> Result<(), TurntableError> {
+    connection.clock().sleep(ECHO_WAIT);
+    match connection.line("", ReplyTimeout::AtOnce)? {
+        LineOutcome::Failed(fault) => recover(connection, fault),
         LineOutcome::Done(_) | LineOutcome::Refused(_) => Ok(()),
     }
 }
 
 /// Waits until another line can be sent after one that got no answer: the table is being stopped, unless
 /// the controller has restarted.
-fn recover(link: &Link, fault: LineFault) -> Result<(), TurntableError> {
+fn recover(connection: &Connection, fault: LineFault) -> Result<(), TurntableError> {
     match fault {
         LineFault::Restarted => Ok(()),
-        _ => link.wait_stopped(),
+        _ => connection.wait_stopped(),
     }
 }
 
-fn no_controller(link: &Link) -> TurntableError {
-    let supervisor = link.supervisor();
+fn no_controller(connection: &Connection) -> TurntableError {
+    let supervisor = connection.supervisor();
     let counts = supervisor.counts();
     let heard = match (supervisor.closed(), counts.noise) {
         (Some(why), _) => format!("the port is gone: {why}"),
@@ -147,24 +150,24 @@ fn no_controller(link: &Link) -> TurntableError {
         }
     };
     TurntableError::NoController {
-        port: link.port_name().to_owned(),
+        port: connection.port_name().to_owned(),
         heard,
     }
 }
 
 /// The answer to `$I`, complete with version and options.
-fn about(link: &Link) -> Result<Vec<Message>, TurntableError> {
+fn about(connection: &Connection) -> Result<Vec<Message>, TurntableError> {
     let mut last = Vec::new();
     for _ in 0..READINGS {
-        let outcome = link.line("$I", ReplyTimeout::AtOnce)?;
+        let outcome = connection.line("$I", ReplyTimeout::AtOnce)?;
         if outcome == LineOutcome::Refused(SESSION_OPEN) {
             // The last owner ended in the middle of a checked session: continue it.
-            done(link, "N0", link.open_session()?)?;
+            done(connection, "N0", connection.open_session()?)?;
             continue;
         }
         let mut messages = match outcome {
-            LineOutcome::Failed(fault) if recover(link, fault).is_ok() => continue,
-            outcome => done(link, "$I", outcome)?,
+            LineOutcome::Failed(fault) if recover(connection, fault).is_ok() => continue,
+            outcome => done(connection, "$I", outcome)?,
         };
         // Relatives of Grbl report more, such as their radio's state, which changes.
         messages.retain(describes_firmware);
@@ -195,16 +198,16 @@ fn lacks(about: &[Message]) -> Option<&'static str> {
 }
 
 /// The answer to `$$`, complete and twice the same: without checksums a digit could be wrong.
-fn settings(link: &Link, extras: bool) -> Result<GrblSettings, TurntableError> {
+fn settings(connection: &Connection, extras: bool) -> Result<GrblSettings, TurntableError> {
     let mut last = None;
     let mut missing = Vec::new();
     for _ in 0..READINGS {
-        let messages = match link.line("$$", ReplyTimeout::AtOnce)? {
-            LineOutcome::Failed(fault) if recover(link, fault).is_ok() => {
-                secure(link, extras)?;
+        let messages = match connection.line("$$", ReplyTimeout::AtOnce)? {
+            LineOutcome::Failed(fault) if recover(connection, fault).is_ok() => {
+                ensure_checked_session(connection, extras)?;
                 continue;
             }
-            outcome => done(link, "$$", outcome)?,
+            outcome => done(connection, "$$", outcome)?,
         };
         let settings = GrblSettings::from_messages(&messages);
         missing = settings.missing(extras);
@@ -225,13 +228,17 @@ fn settings(link: &Link, extras: bool) -> Result<GrblSettings, TurntableError> {
     }))
 }
 
-fn done(link: &Link, block: &str, outcome: LineOutcome) -> Result<Vec<Message>, TurntableError> {
+fn done(
+    connection: &Connection,
+    block: &str,
+    outcome: LineOutcome,
+) -> Result<Vec<Message>, TurntableError> {
     let block = block.to_owned();
     match outcome {
         LineOutcome::Done(messages) => Ok(messages),
         LineOutcome::Refused(code) => Err(TurntableError::Refused { block, code }),
         LineOutcome::Failed(fault) => {
-            recover(link, fault)?;
+            recover(connection, fault)?;
             Err(TurntableError::Lost { block, fault })
         }
     }

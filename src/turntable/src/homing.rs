@@ -14,7 +14,7 @@ const HOMING_OFF: u8 = 5;
 
 /// The result of homing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Homed {
+pub enum HomingResult {
     /// The index was found; the angle 0 is there.
     Index,
     /// Without an index sensor: the angle 0 is where the table stood.
@@ -28,18 +28,18 @@ impl Table {
     /// # Errors
     /// [`TurntableError::Motion`] if no index was found, [`TurntableError::EmergencyStop`] while it is
     /// pressed, or the fault that has ended the search.
-    pub fn home(&self) -> Result<Homed, TurntableError> {
+    pub fn home(&self) -> Result<HomingResult, TurntableError> {
         self.clear_emergency_stop()?;
         if !self.identity().homing {
             return self.home_where_it_stands();
         }
         self.begin(MotionGoal::Homing)?;
         let searched = self.search_index();
-        self.link().supervisor().end_motion();
+        self.connection().supervisor().end_motion();
         searched
     }
 
-    fn search_index(&self) -> Result<Homed, TurntableError> {
+    fn search_index(&self) -> Result<HomingResult, TurntableError> {
         match self.outcome("$H", HOMING)? {
             LineOutcome::Refused(HOMING_OFF) => return self.home_where_it_stands(),
             LineOutcome::Refused(code) => return Err(refused("$H", code)),
@@ -55,14 +55,16 @@ impl Table {
             let unknown = Alarm::unknown(self.identity().family);
             return Err(MotionFault::Alarm(status.alarm.unwrap_or(unknown)).into());
         }
-        self.link().supervisor().set_zero_deg(0.0);
-        Ok(Homed::Index)
+        self.connection().supervisor().set_zero_deg(0.0);
+        Ok(HomingResult::Index)
     }
 
-    fn home_where_it_stands(&self) -> Result<Homed, TurntableError> {
+    fn home_where_it_stands(&self) -> Result<HomingResult, TurntableError> {
         let status = self.ready()?;
-        self.link().supervisor().set_zero_deg(status.machine_deg);
-        Ok(Homed::WhereItStands)
+        self.connection()
+            .supervisor()
+            .set_zero_deg(status.machine_deg);
+        Ok(HomingResult::WhereItStands)
     }
 
     /// Brings the table back after an alarm of any kind: resets the controller, unlocks and homes it.
@@ -70,9 +72,9 @@ impl Table {
     /// # Errors
     /// [`TurntableError::EmergencyStop`] while the emergency stop is pressed, and the errors of
     /// [`Table::stop`] and [`Table::home`].
-    pub fn reset(&self) -> Result<Homed, TurntableError> {
+    pub fn reset(&self) -> Result<HomingResult, TurntableError> {
         require_released(&self.status()?)?;
-        self.link().reset()?;
+        self.connection().reset()?;
         self.unlock()?;
         self.home()
     }

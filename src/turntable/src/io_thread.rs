@@ -10,14 +10,14 @@ use super::error::TurntableError;
 use super::port::Port;
 use super::protocol::{LineOutcome, ReplyTimeout, SendError};
 use super::status::TableStatus;
-use super::supervisor::{ControllerTraits, MotionFault, StopOutcome, Supervisor};
+use super::supervisor::{ControllerFeatures, MotionFault, StopOutcome, Supervisor};
 use relit_clock::{Clock, JoinHandle, Waitable};
 
 /// Longest wait for bytes until the next check of time and output.
 const READ_WAIT: Duration = Duration::from_millis(2);
 /// How long a report may take, including pauses of the I/O thread on a loaded machine.
 const REPORT_WAIT: Duration = Duration::from_secs(3);
-/// How long a line's answer may take, including all repetitions. The wire normally gives up
+/// How long a line's answer may take, including all repetitions. The protocol normally gives up
 /// earlier.
 const ANSWER_WAIT: Duration = Duration::from_secs(6);
 /// Added to the time limit of a line that is not answered at once.
@@ -27,7 +27,7 @@ const STOP_WAIT: Duration = Duration::from_secs(16);
 
 /// The connection to a table. Clones share it.
 #[derive(Clone)]
-pub(super) struct Link {
+pub(super) struct Connection {
     supervisor: Arc<Waitable<Supervisor>>,
     port_name: Arc<str>,
 }
@@ -48,27 +48,27 @@ impl Drop for IoThread {
     }
 }
 
-impl Link {
+impl Connection {
     /// Starts the thread.
     pub(super) fn start(
         port: Box<dyn Port>,
         clock: &Clock,
-        traits: ControllerTraits,
-    ) -> Result<(Link, IoThread), TurntableError> {
-        let link = Link {
+        traits: ControllerFeatures,
+    ) -> Result<(Connection, IoThread), TurntableError> {
+        let connection = Connection {
             port_name: port.name().into(),
             supervisor: Arc::new(Waitable::new(clock, Supervisor::new(traits))),
         };
         let quit = Arc::new(AtomicBool::new(false));
         let thread = clock.spawn("turntable", {
-            let (supervisor, quit) = (Arc::clone(&link.supervisor), Arc::clone(&quit));
+            let (supervisor, quit) = (Arc::clone(&connection.supervisor), Arc::clone(&quit));
             move || carry(port, &supervisor, &quit)
         });
         let thread = Some(thread.map_err(|source| TurntableError::Open {
-            path: link.port_name().into(),
+            path: connection.port_name().into(),
             source,
         })?);
-        Ok((link, IoThread { quit, thread }))
+        Ok((connection, IoThread { quit, thread }))
     }
 
     pub(super) fn clock(&self) -> &Clock {
@@ -179,7 +179,7 @@ impl Link {
             None => supervisor.stopped().map(Ok),
         });
         match ended.transpose()? {
-            Some(StopOutcome::Standing | StopOutcome::Displaced) => Ok(()),
+            Some(StopOutcome::Stopped | StopOutcome::Displaced) => Ok(()),
             Some(StopOutcome::Unknown) | None => Err(TurntableError::NotStopped),
         }
     }

@@ -22,7 +22,7 @@
 //!
 //! # fn main() -> Result<(), relit_turntable::TurntableError> {
 //! let clock = Clock::virtual_time();
-//! let _participant = clock.take_part();
+//! let _participant = clock.participate();
 //! let simulated = SimulatedTable::new(&SimulatorOptions {
 //!     clock: clock.clone(),
 //!     ..SimulatorOptions::default()
@@ -76,7 +76,7 @@ pub use codes::Alarm;
 pub use error::TurntableError;
 pub use family::Family;
 pub use grbl_client::Table;
-pub use homing::Homed;
+pub use homing::HomingResult;
 pub use identity::Identity;
 pub use plan::{MARGIN_DEG, TurnPlan};
 pub use port::{Port, SerialPort};

@@ -30,7 +30,7 @@ impl Table {
     /// # Errors
     /// [`TurntableError::NotHomed`], [`TurntableError::MovedSincePlan`], or what stops a motion.
     pub fn start_turn(&self, plan: TurnPlan) -> Result<Turn<'_>, TurntableError> {
-        self.secure()?;
+        self.ensure_checked_session()?;
         let status = self.ready()?;
         if !status.homed {
             return Err(TurntableError::NotHomed);
@@ -45,7 +45,7 @@ impl Table {
         if self.identity().lease_s == Some(0.0) {
             self.set_lease()?;
         }
-        let zero_deg = self.link().supervisor().zero_deg();
+        let zero_deg = self.connection().supervisor().zero_deg();
         Turn::start(self, plan, zero_deg.ok_or(TurntableError::NotHomed)?)
     }
 
@@ -77,7 +77,7 @@ impl<'table> Turn<'table> {
         table.require_zero(zero_deg)?;
         let end_deg = zero_deg + plan.end_deg();
         let distance = (plan.end_deg() - plan.back_deg()).abs();
-        table.link().supervisor().record();
+        table.connection().supervisor().record();
         table.launch(&straight(end_deg, speed), end_deg, distance, speed)?;
         Ok(Self {
             table,
@@ -101,7 +101,7 @@ impl<'table> Turn<'table> {
     pub fn wait_constant(&mut self) -> Result<i64, TurntableError> {
         let speed = self.plan.degrees_per_second;
         let ramp = self.table.travel_time(0.0, speed) + RAMP_SLACK;
-        let found = self.table.link().wait(ramp, |supervisor| {
+        let found = self.table.connection().wait(ramp, |supervisor| {
             if supervisor.fault().is_some() {
                 return Some(None);
             }
@@ -160,7 +160,7 @@ impl<'table> Turn<'table> {
     #[must_use]
     pub fn reports_after(&self, seen: usize) -> (Vec<JournaledReport>, usize) {
         let expected = self.expected();
-        let supervisor = self.table.link().supervisor();
+        let supervisor = self.table.connection().supervisor();
         let recorded = supervisor.recorded();
         let new = recorded.get(seen..).unwrap_or_default().iter();
         let timed = new.filter_map(|report| angle_fit::timed(report, &expected));
@@ -210,7 +210,7 @@ impl<'table> Turn<'table> {
     /// Ends the monitoring; returns the reports.
     fn leave(&mut self) -> Vec<PositionReport> {
         self.over = true;
-        let mut supervisor = self.table.link().supervisor();
+        let mut supervisor = self.table.connection().supervisor();
         supervisor.end_motion();
         supervisor.take_recorded()
     }
@@ -242,7 +242,7 @@ impl FinishedTurn<'_> {
     /// The fault that has ended the turn or the way back; the table has been stopped.
     pub fn unwind(self) -> Result<(), TurntableError> {
         self.arrived?;
-        let speed = self.table.brisk();
+        let speed = self.table.default_speed();
         self.table.go(self.back_to, speed, self.zero_deg)
     }
 }

@@ -32,7 +32,7 @@ struct Bench {
 impl Bench {
     fn new(options: SimulatorOptions) -> Bench {
         let clock = Clock::virtual_time();
-        let participant = clock.take_part();
+        let participant = clock.participate();
         let table = SimulatedTable::new(&SimulatorOptions {
             clock: clock.clone(),
             ..options

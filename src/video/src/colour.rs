@@ -26,7 +26,7 @@ pub(super) struct Colour {
 
 /// What a stream or a frame states.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stated {
+pub(super) struct ColourProperties {
     format: Pixel,
     height: u32,
     range: color::Range,
@@ -35,7 +35,7 @@ pub(super) struct Stated {
     primaries: color::Primaries,
 }
 
-impl Stated {
+impl ColourProperties {
     /// What a decoder states before its first frame, by the container.
     pub(super) fn by_stream(decoder: &decoder::Video) -> Self {
         Self {

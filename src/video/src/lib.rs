@@ -44,7 +44,6 @@
 
 mod annexb;
 mod colour;
-mod contents;
 mod decoder;
 mod display;
 mod ffv1;
@@ -57,6 +56,7 @@ mod mux;
 mod nal;
 mod order;
 mod orientation;
+mod packet_contents;
 mod packets;
 mod part;
 mod photograph;
@@ -84,7 +84,7 @@ use photograph::{format_of, is_misread};
 pub use format::{BayerPattern, PixelFormat, StreamFormat};
 pub use live::LiveDecoder;
 pub use matroska::{Truncation, find_truncation};
-pub use mux::{Muxer, Written};
+pub use mux::{Muxer, WriteOutcome};
 pub use nal::is_key;
 pub use order::FrameInfo;
 pub use packets::{CodedFrame, Packets};
@@ -224,7 +224,7 @@ fn open_input(path: &Path) -> Result<Input, VideoError> {
     let name = name.ok_or_else(|| VideoError::unreadable(path, no_text))?;
     let still = format_of(path);
     let failed = |why| {
-        let why = match still.and_then(Format::unread) {
+        let why = match still.and_then(Format::unsupported) {
             Some((name, advice)) => format!("is {name}, which is not supported: {advice}"),
             None => format!(
                 "cannot be opened as a video ({why}): is it complete, and is it a video? `ffprobe` shows more"

@@ -3,7 +3,7 @@
 use ffmpeg_next::codec::{self, decoder};
 use ffmpeg_next::{Packet, frame};
 
-use super::colour::Stated;
+use super::colour::ColourProperties;
 use super::decoder::VideoDecoder;
 use super::display::Display;
 use super::lossless;
@@ -63,9 +63,11 @@ impl LiveDecoder {
             None => lossless::frame(self.format, data, self.width, self.height)
                 .ok_or_else(DecodeFault::not_whole)?,
         };
-        let colour = Stated::by_picture(&frame).colour().map_err(|fault| {
-            DecodeFault::Unusable(format!("{fault} cannot be converted to sRGB"))
-        })?;
+        let colour = ColourProperties::by_picture(&frame)
+            .colour()
+            .map_err(|fault| {
+                DecodeFault::Unusable(format!("{fault} cannot be converted to sRGB"))
+            })?;
         self.number += 1;
         let display = Display::default();
         Ok(Some(Picture::new(self.number - 1, frame, colour, display)))

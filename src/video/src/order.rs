@@ -6,8 +6,8 @@ use ffmpeg_next::codec::Id;
 use ffmpeg_next::packet::Ref;
 use ffmpeg_next::{Packet, Rational, ffi};
 
-use super::contents::{Contents, Inspector};
 use super::ffv1::slices_are_whole;
+use super::packet_contents::{Inspector, PacketContents};
 
 /// What is known of one frame before it is decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +32,7 @@ pub(super) struct Stamp {
     key: bool,
     /// For FFV1: whether its checksums are right; `None` if it has none.
     checked: Option<bool>,
-    contents: Contents,
+    contents: PacketContents,
     /// False if it is only decoded because others depend on it: the frames before the start of a
     /// clip that was trimmed without encoding it again.
     shown: bool,
@@ -54,7 +54,7 @@ impl Stamp {
     }
 
     fn is_picture(&self) -> bool {
-        self.shown && self.contents != Contents::Hidden
+        self.shown && self.contents != PacketContents::Hidden
     }
 }
 
@@ -62,7 +62,7 @@ impl Stamp {
 /// with a key frame or shows pictures before it that need what came before, and where time stamps are missing or not
 /// unique.
 pub(super) fn needs_decoding(stamps: &[Stamp]) -> bool {
-    let unclear = |stamp: &Stamp| stamp.contents == Contents::Unclear;
+    let unclear = |stamp: &Stamp| stamp.contents == PacketContents::Unclear;
     let Some(first) = stamps.first() else {
         return false;
     };
@@ -136,7 +136,7 @@ fn raw_flags(packet: &Packet) -> i32 {
 
 /// Frames in order of presentation, and their numbers by packet and by time stamp.
 #[derive(Debug)]
-pub(super) struct Ordered {
+pub(super) struct PresentationOrder {
     pub(super) frames: Vec<FrameInfo>,
     /// The frame number of each packet, in the order of the file; `None` if it is not shown.
     pub(super) number_of_packet: Vec<Option<u64>>,
@@ -148,7 +148,7 @@ pub(super) struct Ordered {
     pub(super) note: Option<String>,
 }
 
-impl Ordered {
+impl PresentationOrder {
     /// `rate` is the stream's frames per second, or 0 / anything where it is not known.
     pub(super) fn from(stamps: &[Stamp], time_base: Rational, rate: Rational) -> Self {
         let mut order = Vec::with_capacity(stamps.len());
@@ -339,16 +339,16 @@ mod tests {
             damaged: false,
             key: true,
             checked: None,
-            contents: Contents::Picture,
+            contents: PacketContents::Picture,
             shown: true,
         }
     }
 
-    fn ordered(stamps: &[Stamp]) -> Ordered {
-        Ordered::from(stamps, Rational::new(1, 1000), Rational::new(25, 1))
+    fn ordered(stamps: &[Stamp]) -> PresentationOrder {
+        PresentationOrder::from(stamps, Rational::new(1, 1000), Rational::new(25, 1))
     }
 
-    fn times(ordered: &Ordered) -> Vec<i64> {
+    fn times(ordered: &PresentationOrder) -> Vec<i64> {
         ordered.frames.iter().map(|frame| frame.t_us).collect()
     }
 
@@ -412,7 +412,7 @@ mod tests {
     #[test]
     fn hidden_pictures_have_no_number() {
         let mut stamps = [0, 40, 41, 80].map(|pts| stamp(Some(pts), Some(pts)));
-        stamps[2].contents = Contents::Hidden;
+        stamps[2].contents = PacketContents::Hidden;
         assert!(!needs_decoding(&stamps));
         let found = ordered(&stamps);
         assert_eq!(times(&found), [0, 40_000, 80_000]);
@@ -426,7 +426,7 @@ mod tests {
         let mut begins_late = whole;
         begins_late[0].key = false;
         let mut field = whole;
-        field[1].contents = Contents::Unclear;
+        field[1].contents = PacketContents::Unclear;
         let mut without_time = whole;
         without_time[2].pts = None;
         let mut leading = whole;
@@ -457,16 +457,16 @@ mod tests {
         let stamps = [0, 40, 80].map(|dts| stamp(None, Some(dts)));
         let pictures = [(Some(40), false), (Some(0), false), (Some(90), true)];
         let base = (Rational::new(1, 1000), Rational::new(25, 1));
-        let found = Ordered::from_pictures(&pictures, &stamps, base.0, base.1);
+        let found = PresentationOrder::from_pictures(&pictures, &stamps, base.0, base.1);
         assert_eq!(times(&found), [0, 40_000, 80_000]);
         assert!(found.frames[2].damaged);
-        let found = Ordered::from_pictures(&pictures[..2], &stamps, base.0, base.1);
+        let found = PresentationOrder::from_pictures(&pictures[..2], &stamps, base.0, base.1);
         assert_eq!(times(&found), [0, 40_000]);
         assert!(found.note.is_some());
         // Where some packets have time stamps, the decoder's count, and the last ones that it lacks follow.
         let stamps = [None, Some(40), None].map(|pts| stamp(pts, Some(0)));
         let pictures = [Some(40), Some(80), None].map(|stamp| (stamp, false));
-        let found = Ordered::from_pictures(&pictures, &stamps, base.0, base.1);
+        let found = PresentationOrder::from_pictures(&pictures, &stamps, base.0, base.1);
         assert_eq!(times(&found), [40_000, 80_000, 120_000]);
     }
 

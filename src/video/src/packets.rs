@@ -5,7 +5,7 @@ use ffmpeg_next::codec::Id;
 use ffmpeg_next::format::context::Input;
 
 use super::annexb::ByteStream;
-use super::contents::extra_data;
+use super::packet_contents::extra_data;
 use super::scan::Video;
 use super::{VideoError, open_input};
 

@@ -19,7 +19,7 @@ impl Video {
 
     /// As [`Self::spread`], of key frames, which are decoded alone, where there are enough.
     #[must_use]
-    pub fn quick_spread(&self, count: usize) -> Vec<u64> {
+    pub fn spread_key_frames(&self, count: usize) -> Vec<u64> {
         let damaged = |&number: &u64| {
             let at = usize::try_from(number).unwrap_or(usize::MAX);
             self.frames().get(at).is_none_or(|frame| frame.damaged)

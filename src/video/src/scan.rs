@@ -12,11 +12,13 @@ use image::RgbImage;
 use image::metadata::Orientation as Exif;
 
 use super::colour::Colour;
-use super::contents::Inspector;
 use super::decoder::{Pool, VideoDecoder};
 use super::display::Display;
-use super::order::{FrameInfo, Ordered, Stamp, mark_wrong_checksums, microseconds, needs_decoding};
-use super::seek::{Opened, first_frame, no_frames};
+use super::order::{
+    FrameInfo, PresentationOrder, Stamp, mark_wrong_checksums, microseconds, needs_decoding,
+};
+use super::packet_contents::Inspector;
+use super::seek::{OpenedStream, first_frame, no_frames};
 use super::survey::Survey;
 use super::track::{Numbering, Track};
 use super::{DecodeFault, Pending, Reader, Truncation, VideoError, find_truncation, open_input};
@@ -71,7 +73,7 @@ impl Video {
     /// # Errors
     /// [`VideoError::Unreadable`]. A file that is damaged but has frames is opened; see [`Self::damage`].
     pub fn open(path: &Path) -> Result<Self, VideoError> {
-        let mut opened = Opened::open(path)?;
+        let mut opened = OpenedStream::open(path)?;
         let stream = opened.input.stream(opened.stream);
         let stream = stream.ok_or_else(|| VideoError::no_video(path))?;
         let (time_base, rate) = (stream.time_base(), stream.avg_frame_rate());
@@ -83,7 +85,7 @@ impl Video {
         let stamps = &packets.stamps;
         let mut refused = 0;
         let (ordered, numbering) = if packets.are_pictures || !needs_decoding(stamps) {
-            let ordered = Ordered::from(stamps, time_base, rate);
+            let ordered = PresentationOrder::from(stamps, time_base, rate);
             let numbering = if ordered.stamps_are_unique() {
                 Numbering::Stamps
             } else {
@@ -94,7 +96,7 @@ impl Video {
             let survey = Survey::decode(path, index, &opened.codec)?;
             refused = survey.refused;
             let pictures = survey.pictures();
-            let ordered = Ordered::from_pictures(&pictures, stamps, time_base, rate);
+            let ordered = PresentationOrder::from_pictures(&pictures, stamps, time_base, rate);
             (ordered, Numbering::Decoder(survey.faults))
         };
         if ordered.frames.is_empty() {
@@ -203,7 +205,7 @@ impl Video {
             return Err(wrong(DecodeFault::not_whole()));
         }
         let all = Rect::new(0, 0, self.facts.width, self.facts.height);
-        if let Some(picture) = self.sought(number) {
+        if let Some(picture) = self.picture_by_index(number) {
             return picture.rgb(all).map_err(wrong);
         }
         let pending = reader

@@ -9,7 +9,7 @@ use ffmpeg_next::{Packet, frame, media};
 use image::RgbImage;
 use image::metadata::Orientation as Exif;
 
-use super::colour::{Colour, Stated};
+use super::colour::{Colour, ColourProperties};
 use super::decoder::{self as opening, VideoDecoder};
 use super::display::Display;
 use super::photograph::exif_orientation;
@@ -27,7 +27,7 @@ const MAX_PACKETS: usize = 600;
 /// # Errors
 /// As [`Video::open`]; also where nothing at the file's beginning can be decoded.
 pub fn first_picture(path: &Path) -> Result<RgbImage, VideoError> {
-    let mut opened = Opened::open(path)?;
+    let mut opened = OpenedStream::open(path)?;
     let frame = first_frame(&mut opened.input, opened.stream, &mut opened.decoder);
     let frame = frame.ok_or_else(|| no_frames(path))?;
     let (colour, display, ..) = opened.shown(path, Some(&frame))?;
@@ -47,7 +47,7 @@ pub(super) fn no_frames(path: &Path) -> VideoError {
 }
 
 /// A file's stream of pictures, and a decoder for it.
-pub(super) struct Opened {
+pub(super) struct OpenedStream {
     pub(super) input: Input,
     pub(super) stream: usize,
     /// The codec's name in FFmpeg.
@@ -55,7 +55,7 @@ pub(super) struct Opened {
     pub(super) decoder: VideoDecoder,
 }
 
-impl Opened {
+impl OpenedStream {
     pub(super) fn open(path: &Path) -> Result<Self, VideoError> {
         let input = open_input(path)?;
         let best = input.streams().best(media::Type::Video);
@@ -78,8 +78,10 @@ impl Opened {
         path: &Path,
         first: Option<&frame::Video>,
     ) -> Result<(Colour, Display, Option<Exif>, Vec<String>), VideoError> {
-        let by_stream = Stated::by_stream(&self.decoder);
-        let stated = first.map_or(by_stream, |first| Stated::by_picture(first).or(by_stream));
+        let by_stream = ColourProperties::by_stream(&self.decoder);
+        let stated = first.map_or(by_stream, |first| {
+            ColourProperties::by_picture(first).or(by_stream)
+        });
         let colour = stated.colour().map_err(|fault| {
             let why = format!(
                 "has other colours than SDR: {fault} cannot be converted to sRGB: convert the video to SDR with BT.709 colours first"
@@ -97,7 +99,7 @@ impl Opened {
 impl Video {
     /// The picture of a frame, found by the container's own index. `None` if that fails or the result
     /// is doubtful; the caller then reads from the start.
-    pub(super) fn sought(&self, number: u64) -> Option<Picture> {
+    pub(super) fn picture_by_index(&self, number: u64) -> Option<Picture> {
         if !self.track.stamps_are_unique() {
             return None;
         }
@@ -216,16 +218,16 @@ mod tests {
             let numbers = [0, 1, 29, 30, 31, last / 2, last - 1, last];
             for (pending, number) in video.read(&numbers, 1).unwrap().zip(numbers) {
                 let read = video.picture(pending).unwrap();
-                let sought = video.sought(number).unwrap();
+                let picture_by_index = video.picture_by_index(number).unwrap();
                 let (w, h) = read.size();
                 let all = Rect::new(0, 0, w, h);
-                assert_eq!(sought.number(), number);
+                assert_eq!(picture_by_index.number(), number);
                 assert!(
-                    sought.rgb(all).unwrap() == read.rgb(all).unwrap(),
+                    picture_by_index.rgb(all).unwrap() == read.rgb(all).unwrap(),
                     "{name} {number}"
                 );
             }
-            assert!(video.sought(last + 1).is_none());
+            assert!(video.picture_by_index(last + 1).is_none());
         }
     }
 

@@ -9,8 +9,8 @@ use ffmpeg_next::codec::Id;
 use ffmpeg_next::{Packet, frame};
 
 use super::annexb::ByteStream;
-use super::contents::extra_data;
 use super::decoder::{self, VideoDecoder};
+use super::packet_contents::extra_data;
 use super::reader::fault_of;
 use super::{DecodeFault, VideoError, open_input};
 

@@ -7,7 +7,9 @@ use std::process::Command;
 
 use proptest::prelude::*;
 use relit_test_support::{ffmpeg, packets};
-use relit_video::{BayerPattern, Muxer, PixelFormat, StreamFormat, Video, VideoError, Written};
+use relit_video::{
+    BayerPattern, Muxer, PixelFormat, StreamFormat, Video, VideoError, WriteOutcome,
+};
 
 fn stream(format: PixelFormat, width: u32, height: u32) -> StreamFormat {
     StreamFormat {
@@ -73,7 +75,7 @@ fn jpegs_come_back_byte_for_byte_with_their_times_to_the_millisecond() {
         .collect();
     let mut muxer = Muxer::create(&path, stream(PixelFormat::Mjpeg, 480, 360)).unwrap();
     for (jpeg, &t_us) in jpegs.iter().zip(&times) {
-        assert_eq!(muxer.write(jpeg, t_us).unwrap(), Written::Kept);
+        assert_eq!(muxer.write(jpeg, t_us).unwrap(), WriteOutcome::Kept);
     }
     muxer.finish().unwrap();
 
@@ -132,7 +134,7 @@ fn h264_begins_at_a_key_frame_and_decodes_to_the_same_pictures() {
     assert_eq!(units.len(), 45);
     let path = folder.path().join("video.mkv");
     let mut muxer = Muxer::create(&path, stream(PixelFormat::H264, 160, 120)).unwrap();
-    let written: Vec<Written> = (0..)
+    let written: Vec<WriteOutcome> = (0..)
         .zip(&units)
         .skip(3)
         .map(|(n, unit)| muxer.write(unit, n * 33_333).unwrap())
@@ -140,7 +142,7 @@ fn h264_begins_at_a_key_frame_and_decodes_to_the_same_pictures() {
     muxer.finish().unwrap();
     let left_out = written
         .iter()
-        .filter(|&&w| w == Written::BeforeKeyFrame)
+        .filter(|&&w| w == WriteOutcome::BeforeKeyFrame)
         .count();
     assert_eq!(left_out, 7);
 
@@ -203,7 +205,10 @@ fn there_and_back(raw: PixelFormat, size: (u32, u32), seed: u64) {
     let pictures: Vec<Vec<u8>> = (0..4).map(|n| noise(bytes, seed + n)).collect();
     let mut muxer = Muxer::create(&path, stream(raw, width, height)).unwrap();
     for (picture, n) in pictures.iter().zip(0..) {
-        assert_eq!(muxer.write(picture, n * 40_000).unwrap(), Written::Kept);
+        assert_eq!(
+            muxer.write(picture, n * 40_000).unwrap(),
+            WriteOutcome::Kept
+        );
     }
     muxer.finish().unwrap();
     let mut wanted = Vec::new();

@@ -38,7 +38,7 @@ const HEADERS: [(HeaderName, &str); 6] = [
 
 /// The address of this machine that a connection was made to.
 #[derive(Debug, Clone, Copy)]
-pub struct Local(pub IpAddr);
+pub struct LocalAddress(pub IpAddr);
 
 /// Which requests are let in.
 #[derive(Debug)]
@@ -72,7 +72,7 @@ impl AccessPolicy {
     fn admit(&self, local: IpAddr, uri: &Uri, headers: &HeaderMap) -> Result<(), Failure> {
         let host = self.host(local, headers)?;
         check_origin(host, headers)?;
-        if self.open_paths.contains(&uri.path()) || self.lets_in(headers) {
+        if self.open_paths.contains(&uri.path()) || self.is_authorised(headers) {
             return Ok(());
         }
         let error = "this needs the token: open the address that was printed at the start, or send \
@@ -85,7 +85,7 @@ impl AccessPolicy {
     fn host<'a>(&self, local: IpAddr, headers: &'a HeaderMap) -> Result<&'a str, Failure> {
         let mut hosts = headers.get_all(header::HOST).iter();
         let (Some(host), None) = (hosts.next(), hosts.next()) else {
-            return Err(Failure::bad("the request needs one Host header"));
+            return Err(Failure::bad_request("the request needs one Host header"));
         };
         let host = host.to_str().unwrap_or("");
         let name = without_port(host);
@@ -103,7 +103,7 @@ impl AccessPolicy {
 
     /// True where no token is requested, or the right one came.
     #[must_use]
-    pub fn lets_in(&self, headers: &HeaderMap) -> bool {
+    pub fn is_authorised(&self, headers: &HeaderMap) -> bool {
         let Some(token) = &self.token else {
             return true;
         };
@@ -177,10 +177,10 @@ pub async fn guard(
     request: Request,
     next: Next,
 ) -> Response {
-    let local = request.extensions().get::<Local>().copied();
+    let local = request.extensions().get::<LocalAddress>().copied();
     let admitted = match local {
-        Some(Local(ip)) => policy.admit(ip, request.uri(), request.headers()),
-        None => Err(Failure::broken("the connection's address is not known")),
+        Some(LocalAddress(ip)) => policy.admit(ip, request.uri(), request.headers()),
+        None => Err(Failure::internal("the connection's address is not known")),
     };
     let mut response = match admitted {
         Ok(()) => next.run(request).await,

@@ -54,9 +54,9 @@ where
             Failure::new(StatusCode::PAYLOAD_TOO_LARGE, error)
         })?;
         let value = serde_json::from_slice(&bytes);
-        value
-            .map(Self)
-            .map_err(|error| Failure::bad(format!("the body cannot be understood: {error}")))
+        value.map(Self).map_err(|error| {
+            Failure::bad_request(format!("the body cannot be understood: {error}"))
+        })
     }
 }
 

@@ -30,7 +30,7 @@ impl Failure {
     }
 
     /// 400: the request makes no sense.
-    pub fn bad(error: impl Into<String>) -> Self {
+    pub fn bad_request(error: impl Into<String>) -> Self {
         Self::new(StatusCode::BAD_REQUEST, error)
     }
 
@@ -40,19 +40,19 @@ impl Failure {
     }
 
     /// 503: it would work later.
-    pub fn busy(error: impl Into<String>) -> Self {
+    pub fn unavailable(error: impl Into<String>) -> Self {
         Self::new(StatusCode::SERVICE_UNAVAILABLE, error)
     }
 
     /// 500: it should have worked.
-    pub fn broken(error: impl Into<String>) -> Self {
+    pub fn internal(error: impl Into<String>) -> Self {
         Self::new(StatusCode::INTERNAL_SERVER_ERROR, error)
     }
 }
 
 impl From<QueryRejection> for Failure {
     fn from(query: QueryRejection) -> Self {
-        Self::bad(query.body_text())
+        Self::bad_request(query.body_text())
     }
 }
 

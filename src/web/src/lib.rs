@@ -16,12 +16,12 @@ mod listen_address;
 mod page;
 mod token;
 
-pub use access::{AccessPolicy, Local, guard};
+pub use access::{AccessPolicy, LocalAddress, guard};
 pub use address::Announcement;
 pub use extract::{BodyLimit, JsonBody, QueryParams};
 pub use failure::Failure;
 pub use forward::forward;
 pub use listen::{ConnectionLimits, GRACE, Shutdown, run, serve_page};
 pub use listen_address::ListenAddress;
-pub use page::{Entry, Index, PageAsset, SCRIPT, SKETCH, STYLE, asset, index};
+pub use page::{IndexPage, PageAsset, SCRIPT, SKETCH, STYLE, TokenQuery, asset, index};
 pub use token::Token;

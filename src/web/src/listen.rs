@@ -19,7 +19,7 @@ use tokio_io_timeout::TimeoutWriter;
 /// Asks a server to end, from any thread. Copies ask the same server.
 pub use tokio_util::sync::CancellationToken as Shutdown;
 
-use crate::access::{AccessPolicy, Local};
+use crate::access::{AccessPolicy, LocalAddress};
 use crate::address::Announcement;
 use crate::token::Token;
 
@@ -62,7 +62,7 @@ impl Default for ConnectionLimits {
 }
 
 /// Serves `router` until `shutdown` is cancelled. `connections` has as many permits as the limits allow
-/// connections; each holds one while it is open. Requests carry a [`Local`].
+/// connections; each holds one while it is open. Requests carry a [`LocalAddress`].
 pub async fn run(
     listener: TcpListener,
     router: Router,
@@ -205,7 +205,7 @@ async fn converse(socket: TcpStream, router: Router, limits: ConnectionLimits, s
     // A phone that lost its network would keep its permits for many minutes otherwise.
     let mut stream = TimeoutWriter::new(socket);
     stream.set_timeout(Some(limits.stall));
-    let router = router.layer(Extension(Local(local.ip())));
+    let router = router.layer(Extension(LocalAddress(local.ip())));
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(limits.head)

@@ -14,7 +14,7 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let _ = orientation(bytes);
     if let Ok(image) = decode(bytes) {
-        assert!(Format::sniff(bytes).is_none_or(|format| format.unread().is_none()));
+        assert!(Format::sniff(bytes).is_none_or(|format| format.unsupported().is_none()));
         drop(image);
     }
     if let Ok(colour) = Colour::from_file(bytes) {

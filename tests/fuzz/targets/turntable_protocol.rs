@@ -6,7 +6,7 @@
 #![allow(clippy::expect_used, reason = "a panic is how a target reports")]
 
 use libfuzzer_sys::fuzz_target;
-use relit_turntable::protocol::{LineOutcome, Machine, ReplyTimeout, WireEvent, parse};
+use relit_turntable::protocol::{LineOutcome, Machine, ProtocolEvent, ReplyTimeout, parse};
 
 /// Answers `ok N0`, with its checksum, to the line that opens a session.
 const OPENED: &[u8] = b"ok N0*B4B2\r\n";
@@ -31,8 +31,10 @@ fn hear(machine: &mut Machine, bytes: &[u8]) -> bool {
         assert!(machine.take_output(now_us).len() < 200);
         while let Some(event) = machine.next_event() {
             let outcome = match event {
-                WireEvent::Answered { outcome, .. } => outcome,
-                WireEvent::Status(_) | WireEvent::Reset(_) | WireEvent::Alarm(_) => continue,
+                ProtocolEvent::Answered { outcome, .. } => outcome,
+                ProtocolEvent::Status(_) | ProtocolEvent::Reset(_) | ProtocolEvent::Alarm(_) => {
+                    continue;
+                }
             };
             done |= matches!(outcome, LineOutcome::Done(_));
         }

@@ -9,7 +9,7 @@ use axum::http::header::{self, HeaderMap, HeaderName};
 use axum::middleware::from_fn_with_state;
 use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::get;
-use relit_web::{AccessPolicy, Entry, Failure, QueryParams, guard};
+use relit_web::{AccessPolicy, Failure, QueryParams, TokenQuery, guard};
 
 use super::files::{Encoding, POLICY, PageFiles};
 
@@ -42,7 +42,7 @@ pub(super) fn router(files: PageFiles, policy: Arc<AccessPolicy>) -> Router {
 async fn index(
     State(files): State<Arc<PageFiles>>,
     State(policy): State<Arc<AccessPolicy>>,
-    QueryParams(entry): QueryParams<Entry>,
+    QueryParams(entry): QueryParams<TokenQuery>,
     headers: HeaderMap,
 ) -> Response {
     let home = || Redirect::to("./").into_response();
@@ -52,7 +52,7 @@ async fn index(
             None if policy.is_open() => home(),
             None => refused(),
         },
-        None if policy.lets_in(&headers) => answer(&files, INDEX, &headers),
+        None if policy.is_authorised(&headers) => answer(&files, INDEX, &headers),
         None => refused(),
     }
 }

@@ -13,7 +13,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::background::StudioBackground;
-use super::error::{Refusal, refused};
+use super::error::{StudioError, refused};
 use super::object::{StudioObject, stem};
 use super::page_scene::ObjectFiles;
 
@@ -34,7 +34,7 @@ impl SceneFiles {
     ///
     /// # Errors
     /// If its mask cannot be encoded.
-    pub(super) fn add_object(&mut self, object: &StudioObject) -> Result<ObjectFiles, Refusal> {
+    pub(super) fn add_object(&mut self, object: &StudioObject) -> Result<ObjectFiles, StudioError> {
         let photo = self.add(&object.name, object.file.clone());
         let mask = match object.mask_file() {
             Some(mask) => {
@@ -57,7 +57,7 @@ impl SceneFiles {
     pub(super) fn add_background(
         &mut self,
         background: &StudioBackground,
-    ) -> Result<PathBuf, Refusal> {
+    ) -> Result<PathBuf, StudioError> {
         Ok(self.add(&background.name, background.file()?).into())
     }
 
@@ -88,7 +88,7 @@ impl SceneFiles {
     ///
     /// # Errors
     /// If the scene cannot be written.
-    pub(super) fn packed(&self, scene: &SceneDescription) -> Result<Vec<u8>, Refusal> {
+    pub(super) fn packed(&self, scene: &SceneDescription) -> Result<Vec<u8>, StudioError> {
         let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         archive.start_file(SCENE, stored)?;
@@ -104,10 +104,10 @@ impl SceneFiles {
     ///
     /// # Errors
     /// If it is not an archive, is too large, or its scene names a file that it does not contain.
-    pub(super) fn unpacked(archive: &[u8]) -> Result<(SceneDescription, Self), Refusal> {
+    pub(super) fn unpacked(archive: &[u8]) -> Result<(SceneDescription, Self), StudioError> {
         let mut archive = ZipArchive::new(Cursor::new(archive)).map_err(|fault| damaged(&fault))?;
         let text = text::decode(entry(&mut archive, SCENE)?);
-        let text = text.map_err(|_| Refusal("scene.toml is not UTF-8".to_owned()))?;
+        let text = text.map_err(|_| StudioError("scene.toml is not UTF-8".to_owned()))?;
         let scene = SceneDescription::parse(&text)?;
         let mut files = Self::default();
         let mut all = 0;
@@ -130,14 +130,14 @@ impl SceneFiles {
     ///
     /// # Errors
     /// If the archive lacks it.
-    pub(super) fn content(&self, path: &Path) -> Result<&Vec<u8>, Refusal> {
+    pub(super) fn content(&self, path: &Path) -> Result<&Vec<u8>, StudioError> {
         let name = path.to_string_lossy();
         let content = self.entries.get(name.as_ref());
         content.ok_or_else(|| missing(&name))
     }
 }
 
-fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>, Refusal> {
+fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>, StudioError> {
     let found = match archive.by_name(name) {
         Ok(found) => found,
         Err(ZipError::FileNotFound) => return Err(missing(name)),
@@ -155,14 +155,14 @@ fn entry(archive: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> Result<Vec<u8>,
     }
 }
 
-fn missing(name: &str) -> Refusal {
-    Refusal(format!(
+fn missing(name: &str) -> StudioError {
+    StudioError(format!(
         "the archive lacks {name}, which its scene.toml names"
     ))
 }
 
-fn damaged(fault: &(dyn std::error::Error + 'static)) -> Refusal {
-    Refusal::because(
+fn damaged(fault: &(dyn std::error::Error + 'static)) -> StudioError {
+    StudioError::with_cause(
         "this file is not a saved scene: it is not a ZIP archive, or is damaged",
         fault,
     )

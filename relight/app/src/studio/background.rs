@@ -8,11 +8,11 @@ use relight_photo::compositing::{SceneBackground, SceneDescription, SceneEnviron
 use relight_photo::relighting::PanoramaView;
 use relit_data::still::Format;
 
-use super::error::{Refusal, refused};
+use super::error::{StudioError, refused};
 use super::object::{OpenedFile, png_of, stem};
 use super::pixels::rgba;
 use super::request::BackgroundRequest;
-use crate::scenery::Scenery;
+use crate::procedural_panorama::ProceduralPanorama;
 
 /// The most columns of a panorama.
 const MAX_COLUMNS: usize = 1024;
@@ -37,13 +37,13 @@ struct PhotoBackground {
     file: Vec<u8>,
     picture: Rgb<Linear>,
     /// In the size in which it was shown last.
-    reduced: Option<(u32, Rgb<Linear>)>,
+    downscaled: Option<(u32, Rgb<Linear>)>,
 }
 
 struct PanoramaBackground {
     /// `None` for a synthetic one.
     file: Option<Vec<u8>>,
-    scenery: Option<Scenery>,
+    scenery: Option<ProceduralPanorama>,
     panorama: Panorama,
     /// The last camera, and what it depends on.
     view: Option<(ViewKey, PanoramaView)>,
@@ -56,11 +56,11 @@ impl StudioBackground {
     ///
     /// # Errors
     /// If it cannot be read, or is not a panorama.
-    pub(super) fn open(asked: &BackgroundRequest, bytes: &[u8]) -> Result<Self, Refusal> {
+    pub(super) fn open(asked: &BackgroundRequest, bytes: &[u8]) -> Result<Self, StudioError> {
         match asked {
             BackgroundRequest::Panorama { id } => {
-                let scenery = Scenery::from_id(id);
-                let none = || Refusal(format!("unknown panorama {id}"));
+                let scenery = ProceduralPanorama::from_id(id);
+                let none = || StudioError(format!("unknown panorama {id}"));
                 Ok(Self::made(scenery.ok_or_else(none)?)?)
             }
             BackgroundRequest::Photo { name } => Self::photo(name, bytes.to_vec()),
@@ -76,7 +76,7 @@ impl StudioBackground {
         }
     }
 
-    fn made(scenery: Scenery) -> Result<Self, relight_core::light::LightError> {
+    fn made(scenery: ProceduralPanorama) -> Result<Self, relight_core::light::LightError> {
         Ok(Self {
             name: format!("{}.exr", scenery.id),
             content: Content::Panorama(PanoramaBackground {
@@ -92,7 +92,7 @@ impl StudioBackground {
     ///
     /// # Errors
     /// If it cannot be read, or has a value that is negative or not finite.
-    pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
+    pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
         let opened = OpenedFile::read(name, bytes, None)?;
         let (name, file) = (opened.name, opened.bytes);
         let picture = opened.image.into_light();
@@ -107,7 +107,7 @@ impl StudioBackground {
             content: Content::Photo(PhotoBackground {
                 file,
                 picture,
-                reduced: None,
+                downscaled: None,
             }),
         })
     }
@@ -116,7 +116,7 @@ impl StudioBackground {
     ///
     /// # Errors
     /// If it cannot be read or has another shape.
-    pub(super) fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
+    pub(super) fn panorama(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
         let opened = OpenedFile::read(name, bytes, None)?;
         let Extent { width, height } = opened.image.stored().planes.extent();
         // Making it smaller rounds its sides.
@@ -155,8 +155,8 @@ impl StudioBackground {
     ///
     /// # Errors
     /// If it cannot be read.
-    pub(super) fn kept(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
-        let made = Scenery::ALL
+    pub(super) fn kept(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
+        let made = ProceduralPanorama::ALL
             .into_iter()
             .find(|scenery| name == format!("{}.exr", scenery.id));
         if let Some(scenery) = made {
@@ -187,7 +187,7 @@ impl StudioBackground {
     ///
     /// # Errors
     /// If a panorama that is made cannot be encoded.
-    pub(super) fn file(&self) -> Result<Vec<u8>, Refusal> {
+    pub(super) fn file(&self) -> Result<Vec<u8>, StudioError> {
         match &self.content {
             Content::Photo(photo) => Ok(photo.file.clone()),
             Content::Panorama(PanoramaBackground {
@@ -213,17 +213,17 @@ impl StudioBackground {
         match &mut self.content {
             Content::Photo(photo) => {
                 let Some(longest) = longest else {
-                    photo.reduced = None;
+                    photo.downscaled = None;
                     return;
                 };
                 if photo
-                    .reduced
+                    .downscaled
                     .as_ref()
                     .is_none_or(|(was, _)| *was != longest)
                 {
-                    let extent = reduced(photo.picture.planes().extent(), Some(longest));
+                    let extent = downscaled(photo.picture.planes().extent(), Some(longest));
                     let planes = photo.picture.planes().resized(extent);
-                    photo.reduced = Some((longest, Rgb::new(planes)));
+                    photo.downscaled = Some((longest, Rgb::new(planes)));
                 }
             }
             Content::Panorama(panorama) => {
@@ -246,12 +246,12 @@ impl StudioBackground {
     }
 
     /// The visible part after the light has rotated by so many radians, after [`StudioBackground::prepare`].
-    pub(super) fn seen(&self, setting: &SceneEnvironment, turn: f64) -> Rgb<Linear> {
+    pub(super) fn seen(&self, environment: &SceneEnvironment, turn: f64) -> Rgb<Linear> {
         match &self.content {
             Content::Photo(photo) => photo.shown().clone(),
             Content::Panorama(panorama) => match &panorama.view {
-                Some((_, view)) => setting.seen(view, &panorama.panorama, turn),
-                None => Rgb::new(Planes::zeros(setting.extent)),
+                Some((_, view)) => environment.seen(view, &panorama.panorama, turn),
+                None => Rgb::new(Planes::zeros(environment.extent)),
             },
         }
     }
@@ -270,9 +270,9 @@ impl StudioBackground {
 
 impl PhotoBackground {
     fn shown(&self) -> &Rgb<Linear> {
-        self.reduced
+        self.downscaled
             .as_ref()
-            .map_or(&self.picture, |(_, reduced)| reduced)
+            .map_or(&self.picture, |(_, downscaled)| downscaled)
     }
 }
 
@@ -280,12 +280,12 @@ impl PhotoBackground {
 ///
 /// # Errors
 /// None: their values are finite.
-pub(super) fn made_panoramas() -> Result<Vec<(Scenery, Vec<u8>)>, Refusal> {
-    let made = |scenery: Scenery| {
+pub(super) fn made_panoramas() -> Result<Vec<(ProceduralPanorama, Vec<u8>)>, StudioError> {
+    let made = |scenery: ProceduralPanorama| {
         let panorama = scenery.panorama_of(THUMBNAIL)?;
         Ok((scenery, thumbnail(&panorama)))
     };
-    Scenery::ALL.into_iter().map(made).collect()
+    ProceduralPanorama::ALL.into_iter().map(made).collect()
 }
 
 /// A panorama exposed for a screen by its median, so that a sun does not make everything else black.
@@ -299,7 +299,7 @@ fn thumbnail(panorama: &Panorama) -> Vec<u8> {
 }
 
 /// A size whose longer side is at most so many pixels.
-pub(super) fn reduced(extent: Extent, longest: Option<u32>) -> Extent {
+pub(super) fn downscaled(extent: Extent, longest: Option<u32>) -> Extent {
     let Extent { width, height } = extent;
     let most = longest.map_or(usize::MAX, |longest| longest.max(16) as usize);
     let own = width.max(height).max(1);

@@ -6,19 +6,19 @@
 //! | `page_scene` | the page's scene, to and from the scene of a file |
 //! | `object` | a photograph or captured object, cut out and decomposed |
 //! | `background` | what objects are put into |
-//! | `drawing` | pictures of a scene |
+//! | `renderer` | pictures of a scene |
 //! | `archive` | a scene with its files in a ZIP archive |
 //! | `pixels` | pictures as a page takes them |
 //! | `error` | what can be wrong, as a sentence |
 
 mod archive;
 mod background;
-mod drawing;
 mod error;
 mod object;
 mod page_scene;
 mod pixels;
 mod request;
+mod scene_renderer;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -33,11 +33,11 @@ use serde_json::{Value, json};
 use crate::message::{pack, unpack};
 use archive::SceneFiles;
 use background::{StudioBackground, made_panoramas};
-use drawing::{Drawing, KeptEnvironment, of_size};
-use error::{Refusal, refused};
+use error::{StudioError, refused};
 use object::StudioObject;
 use page_scene::{ObjectFiles, PageScene};
 use request::{FileFormat, Request};
+use scene_renderer::{EnvironmentCache, SceneRenderer, of_size};
 
 /// The most objects of a scene.
 const MAX_OBJECTS: usize = 12;
@@ -60,7 +60,7 @@ pub struct Studio {
     decomposer: Option<Decomposer>,
     objects: Objects,
     background: Option<StudioBackground>,
-    setting: KeptEnvironment,
+    environment: EnvironmentCache,
 }
 
 /// By the page's numbers.
@@ -68,7 +68,7 @@ pub struct Studio {
 struct Objects(BTreeMap<u32, StudioObject>);
 
 impl Objects {
-    fn get(&mut self, number: u32) -> Result<&mut StudioObject, Refusal> {
+    fn get(&mut self, number: u32) -> Result<&mut StudioObject, StudioError> {
         self.0.get_mut(&number).ok_or_else(|| no_object(number))
     }
 }
@@ -88,7 +88,7 @@ impl Studio {
     pub fn answer(&mut self, message: &[u8]) -> Vec<u8> {
         let (says, parts) = match self.answered(message) {
             Ok(answer) => answer,
-            Err(Refusal(why)) => (json!({ "error": why }), Vec::new()),
+            Err(StudioError(why)) => (json!({ "error": why }), Vec::new()),
         };
         let says = says.to_string();
         let others = parts.iter().map(Vec::as_slice);
@@ -96,10 +96,12 @@ impl Studio {
         pack(&parts)
     }
 
-    fn answered(&mut self, message: &[u8]) -> Result<Answer, Refusal> {
+    fn answered(&mut self, message: &[u8]) -> Result<Answer, StudioError> {
         let parts = unpack(message)?;
-        let unknown = |fault| Refusal::because("the engine does not know this request", &fault);
-        let request: Request = serde_json::from_slice(parts[0]).map_err::<Refusal, _>(unknown)?;
+        let unknown =
+            |fault| StudioError::with_cause("the engine does not know this request", &fault);
+        let request: Request =
+            serde_json::from_slice(parts[0]).map_err::<StudioError, _>(unknown)?;
         let part = |what| match parts.get(1) {
             Some(part) => Ok(*part),
             None => refused(format!("the request has no {what}")),
@@ -152,15 +154,16 @@ impl Studio {
         }
     }
 
-    fn load(&mut self, weights: &[u8]) -> Result<Answer, Refusal> {
-        let weights = Weights::from_bytes(weights)
-            .map_err(|why| Refusal(format!("the weights of the networks are damaged: {why}")))?;
+    fn load(&mut self, weights: &[u8]) -> Result<Answer, StudioError> {
+        let weights = Weights::from_bytes(weights).map_err(|why| {
+            StudioError(format!("the weights of the networks are damaged: {why}"))
+        })?;
         self.decomposer = Some(Decomposer::new(&weights)?);
         let says = json!({ "version": env!("CARGO_PKG_VERSION") });
         Ok((says, Vec::new()))
     }
 
-    fn opened(&mut self, number: u32, object: StudioObject) -> Result<Answer, Refusal> {
+    fn opened(&mut self, number: u32, object: StudioObject) -> Result<Answer, StudioError> {
         let others = self.objects.0.keys().filter(|&&key| key != number).count();
         if others >= MAX_OBJECTS {
             return refused(format!(
@@ -172,12 +175,12 @@ impl Studio {
         Ok(answer)
     }
 
-    fn decompose(&mut self, number: u32) -> Result<Answer, Refusal> {
+    fn decompose(&mut self, number: u32) -> Result<Answer, StudioError> {
         let decomposer = self.decomposer.as_ref().ok_or_else(no_network)?;
         let found = self.objects.get(number)?.decomposed(decomposer)?;
         let Extent { width, height } = found.shading.extent();
         let most = most_shading(&found.shading);
-        let grey = |plane: &Planes<1>, scale: f32| -> Result<Vec<u8>, Refusal> {
+        let grey = |plane: &Planes<1>, scale: f32| -> Result<Vec<u8>, StudioError> {
             let values = plane.plane(0).iter();
             let shown: Vec<f32> = values.map(|v| Srgb::from_linear(v * scale)).collect();
             let planes = [shown.clone(), shown.clone(), shown];
@@ -198,9 +201,9 @@ impl Studio {
         Ok((says, parts))
     }
 
-    fn choose(&mut self, background: StudioBackground) -> Result<Answer, Refusal> {
+    fn choose(&mut self, background: StudioBackground) -> Result<Answer, StudioError> {
         let extent = background.extent(PANORAMA_PICTURE);
-        self.setting = KeptEnvironment::default();
+        self.environment = EnvironmentCache::default();
         self.background = Some(background);
         let says = json!({ "width": extent.width, "height": extent.height });
         Ok((says, Vec::new()))
@@ -213,7 +216,7 @@ impl Studio {
         longest: u32,
         before: bool,
         layered: bool,
-    ) -> Result<Answer, Refusal> {
+    ) -> Result<Answer, StudioError> {
         let background = self.background.as_mut().ok_or_else(no_background)?;
         // A background alone needs no network.
         for placed in &scene.objects {
@@ -221,40 +224,44 @@ impl Studio {
             self.objects.get(placed.object)?.prepare(decomposer)?;
         }
         let described = of_size(in_engine(scene)?, background, longest);
-        let setting = self.setting.of(&described, background, Some(longest))?;
+        let environment = self
+            .environment
+            .get_or_make(&described, background, Some(longest))?;
         let ready = |placed: &page_scene::PageObject| {
             let object = self.objects.0.get(&placed.object);
-            let subject = object.and_then(StudioObject::prepared);
-            subject.ok_or_else(|| no_object(placed.object))
+            let relightable = object.and_then(StudioObject::prepared);
+            relightable.ok_or_else(|| no_object(placed.object))
         };
-        let subjects: Vec<&RelightableObject> =
+        let relightables: Vec<&RelightableObject> =
             scene.objects.iter().map(ready).collect::<Result<_, _>>()?;
-        let drawing = Drawing::new(&described, setting, background, &subjects, before)?;
+        let renderer =
+            SceneRenderer::new(&described, environment, background, &relightables, before)?;
         let (parts, objects) = if layered {
-            drawing.layers()?
+            renderer.layers()?
         } else {
-            let (picture, boxes) = drawing.picture()?;
+            let (picture, boxes) = renderer.picture()?;
             (vec![pixels::shown(&picture)], boxes)
         };
-        let Extent { width, height } = setting.extent;
-        let notes = drawing.notes();
+        let Extent { width, height } = environment.extent;
+        let notes = renderer.notes();
         let says = json!({ "width": width, "height": height, "objects": objects, "notes": notes });
         Ok((says, parts))
     }
 
-    fn save(&mut self, scene: &PageScene, format: FileFormat) -> Result<Answer, Refusal> {
+    fn save(&mut self, scene: &PageScene, format: FileFormat) -> Result<Answer, StudioError> {
         let decomposer = self.decomposer.as_ref().ok_or_else(no_network)?;
         let background = self.background.as_mut().ok_or_else(no_background)?;
         let described = in_engine(scene)?;
-        let setting = self.setting.of(&described, background, None)?;
-        let mut subjects = Vec::with_capacity(scene.objects.len());
+        let environment = self.environment.get_or_make(&described, background, None)?;
+        let mut relightables = Vec::with_capacity(scene.objects.len());
         for (placed, described) in scene.objects.iter().zip(&described.objects) {
             let object = self.objects.get(placed.object)?;
-            subjects.push(object.subject(setting, described, decomposer)?);
+            relightables.push(object.relightable(environment, described, decomposer)?);
         }
-        let subjects: Vec<&RelightableObject> = subjects.iter().collect();
-        let drawing = Drawing::new(&described, setting, background, &subjects, false)?;
-        let picture = drawing.picture()?.0.encode::<Srgb>().into_planes();
+        let relightables: Vec<&RelightableObject> = relightables.iter().collect();
+        let renderer =
+            SceneRenderer::new(&described, environment, background, &relightables, false)?;
+        let picture = renderer.picture()?.0.encode::<Srgb>().into_planes();
         let Extent { width, height } = picture.extent();
         let path = Path::new("the picture");
         let file = match format {
@@ -265,7 +272,7 @@ impl Studio {
         Ok((says, vec![file]))
     }
 
-    fn export(&mut self, scene: &PageScene, name: &str) -> Result<Answer, Refusal> {
+    fn export(&mut self, scene: &PageScene, name: &str) -> Result<Answer, StudioError> {
         let background = self.background.as_ref().ok_or_else(no_background)?;
         if scene.objects.is_empty() {
             return refused("the scene has no objects yet");
@@ -280,7 +287,7 @@ impl Studio {
         Ok((says, vec![files.packed(&described)?]))
     }
 
-    fn import(&mut self, archive: &[u8]) -> Result<Answer, Refusal> {
+    fn import(&mut self, archive: &[u8]) -> Result<Answer, StudioError> {
         let (described, files) = SceneFiles::unpacked(archive)?;
         if described.objects.len() > MAX_OBJECTS {
             return refused(format!(
@@ -324,16 +331,16 @@ impl Studio {
     }
 }
 
-fn no_network() -> Refusal {
-    Refusal("the networks are not loaded yet: wait a moment".to_owned())
+fn no_network() -> StudioError {
+    StudioError("the networks are not loaded yet: wait a moment".to_owned())
 }
 
-fn no_background() -> Refusal {
-    Refusal("choose a scene first".to_owned())
+fn no_background() -> StudioError {
+    StudioError("choose a scene first".to_owned())
 }
 
-fn no_object(number: u32) -> Refusal {
-    Refusal(format!(
+fn no_object(number: u32) -> StudioError {
+    StudioError(format!(
         "unknown object {number}: open its photograph again"
     ))
 }
@@ -346,7 +353,7 @@ fn told(object: &StudioObject) -> Answer {
         "kind": object.kind(),
         "width": extent.width,
         "height": extent.height,
-        "reduced": object.reduced,
+        "reduced": object.downscaled,
         "masked": mask.is_some(),
     });
     (says, std::iter::once(picture).chain(mask).collect())
@@ -355,7 +362,7 @@ fn told(object: &StudioObject) -> Answer {
 fn kept_object(
     described: &relight_photo::compositing::ObjectDescription,
     files: &SceneFiles,
-) -> Result<StudioObject, Refusal> {
+) -> Result<StudioObject, StudioError> {
     let name = described.photo.to_string_lossy();
     let content = files.content(&described.photo)?.clone();
     match &described.mask {
@@ -368,12 +375,12 @@ fn kept_object(
 }
 
 /// A scene whose files are all in the engine.
-fn in_engine(scene: &PageScene) -> Result<SceneDescription, Refusal> {
+fn in_engine(scene: &PageScene) -> Result<SceneDescription, StudioError> {
     let files = vec![ObjectFiles::default(); scene.objects.len()];
     scene.described(PathBuf::new(), files)
 }
 
-fn backgrounds() -> Result<Answer, Refusal> {
+fn backgrounds() -> Result<Answer, StudioError> {
     let made = made_panoramas()?;
     let panoramas: Vec<Value> = made
         .iter()

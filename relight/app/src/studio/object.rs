@@ -16,7 +16,7 @@ use relit_grabcut::{
     Effort, Hints, Mask, SegmentSettings, Stroke, Strokes, segment, segment_on_plain,
 };
 
-use super::error::{Refusal, refused};
+use super::error::{StudioError, refused};
 use super::pixels::{levels, on_screen, opaque, shown, stored, without_alpha};
 
 /// Larger photographs are made smaller: the page keeps several, on a phone.
@@ -39,7 +39,7 @@ pub(super) struct StudioObject {
     /// How integers are encoded, where the file is not to be asked.
     pub(super) transfer: Option<Transfer>,
     /// Whether the photograph was larger.
-    pub(super) reduced: bool,
+    pub(super) downscaled: bool,
     content: Content,
 }
 
@@ -65,16 +65,16 @@ impl StudioObject {
     ///
     /// # Errors
     /// If it is neither a photograph nor a captured object, or is too large.
-    pub(super) fn open(name: &str, bytes: Vec<u8>) -> Result<Self, Refusal> {
+    pub(super) fn open(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
         if is_captured(name) {
             let captured = CapturedObject::from_bytes(&bytes)?;
-            let subject = RelightableObject::from_captured(&captured)?;
+            let relightable = RelightableObject::from_captured(&captured)?;
             return Ok(Self {
                 name: name.to_owned(),
                 file: bytes,
                 transfer: None,
-                reduced: false,
-                content: Content::Captured(Box::new((captured, subject))),
+                downscaled: false,
+                content: Content::Captured(Box::new((captured, relightable))),
             });
         }
         let opened = OpenedFile::read(name, bytes, None)?;
@@ -90,7 +90,7 @@ impl StudioObject {
         bytes: Vec<u8>,
         mask: &[u8],
         transfer: Option<Transfer>,
-    ) -> Result<Self, Refusal> {
+    ) -> Result<Self, StudioError> {
         let opened = OpenedFile::read(name, bytes, transfer)?;
         let image = StoredImage::from_bytes(Path::new(MASK), mask)?;
         let (mask, _) = image.object_mask(Path::new(MASK))?;
@@ -99,12 +99,12 @@ impl StudioObject {
         Self::from_file(opened, mask)
     }
 
-    fn from_file(opened: OpenedFile, mask: Option<GrayImage>) -> Result<Self, Refusal> {
+    fn from_file(opened: OpenedFile, mask: Option<GrayImage>) -> Result<Self, StudioError> {
         let mut object = Self {
             name: opened.name,
             file: opened.bytes,
             transfer: opened.transfer,
-            reduced: opened.reduced,
+            downscaled: opened.downscaled,
             content: Content::Photo(Box::new(Cut {
                 shown: on_screen(&opened.image),
                 mask,
@@ -121,7 +121,11 @@ impl StudioObject {
     ///
     /// # Errors
     /// If the pixels are not as many as they should be.
-    pub(super) fn from_pixels(name: &str, size: [u32; 2], rgba: &[u8]) -> Result<Self, Refusal> {
+    pub(super) fn from_pixels(
+        name: &str,
+        size: [u32; 2],
+        rgba: &[u8],
+    ) -> Result<Self, StudioError> {
         Self::open(&format!("{}.png", stem(name)), png_of(name, size, rgba)?)
     }
 
@@ -176,7 +180,7 @@ impl StudioObject {
         rect: Option<[i32; 4]>,
         auto: bool,
         strokes: Vec<Stroke>,
-    ) -> Result<Mask, Refusal> {
+    ) -> Result<Mask, StudioError> {
         let Content::Photo(cut) = &mut self.content else {
             return refused(captured(&self.name));
         };
@@ -201,7 +205,7 @@ impl StudioObject {
     }
 
     /// Reads the photograph with its mask, if it has one, as `relight` reads its files.
-    fn read_photo(&mut self) -> Result<(), Refusal> {
+    fn read_photo(&mut self) -> Result<(), StudioError> {
         let Content::Photo(cut) = &mut self.content else {
             return Ok(());
         };
@@ -222,13 +226,13 @@ impl StudioObject {
         Ok(())
     }
 
-    fn photo(&mut self) -> Result<&Photo, Refusal> {
+    fn photo(&mut self) -> Result<&Photo, StudioError> {
         self.read_photo()?;
         let name = &self.name;
         match &self.content {
             Content::Captured(_) => refused(captured(name)),
             Content::Photo(cut) => cut.photo.as_ref().ok_or_else(|| {
-                Refusal(format!(
+                StudioError(format!(
                     "{name}: mark the object first, by a rectangle or strokes"
                 ))
             }),
@@ -239,7 +243,10 @@ impl StudioObject {
     ///
     /// # Errors
     /// If it is not cut out yet, or cannot be decomposed.
-    pub(super) fn decomposed(&mut self, decomposer: &Decomposer) -> Result<Decomposition, Refusal> {
+    pub(super) fn decomposed(
+        &mut self,
+        decomposer: &Decomposer,
+    ) -> Result<Decomposition, StudioError> {
         let photo = self.photo()?.clone().at_most(PREVIEW_SIDE);
         let options = photo.options(&DecomposeOptions::default());
         Ok(decomposer.decompose(&photo.picture, &photo.mask, &options)?)
@@ -249,7 +256,7 @@ impl StudioObject {
     ///
     /// # Errors
     /// If it is not cut out yet, or cannot be decomposed.
-    pub(super) fn prepare(&mut self, decomposer: &Decomposer) -> Result<(), Refusal> {
+    pub(super) fn prepare(&mut self, decomposer: &Decomposer) -> Result<(), StudioError> {
         if self.prepared().is_some() {
             return Ok(());
         }
@@ -260,10 +267,10 @@ impl StudioObject {
         let longest = width.max(photo.mask.extent().height);
         let longest = (longest * PREVIEW_ROWS / rows).min(PREVIEW_SIDE);
         let photo = photo.clone().at_most(longest.max(PREVIEW_ROWS));
-        let subject =
+        let relightable =
             RelightableObject::from_photo(&photo, decomposer, &DecomposeOptions::default())?;
         if let Content::Photo(cut) = &mut self.content {
-            cut.preview = Some(subject);
+            cut.preview = Some(relightable);
         }
         Ok(())
     }
@@ -280,16 +287,16 @@ impl StudioObject {
     ///
     /// # Errors
     /// If it is not cut out yet, or cannot be decomposed.
-    pub(super) fn subject(
+    pub(super) fn relightable(
         &mut self,
-        setting: &SceneEnvironment,
+        environment: &SceneEnvironment,
         described: &ObjectDescription,
         decomposer: &Decomposer,
-    ) -> Result<RelightableObject, Refusal> {
+    ) -> Result<RelightableObject, StudioError> {
         if let Content::Captured(object) = &self.content {
             return Ok(object.1.clone());
         }
-        let photo = setting.reduced(described, self.photo()?.clone());
+        let photo = environment.downscaled(described, self.photo()?.clone());
         let options = DecomposeOptions::default();
         Ok(RelightableObject::from_photo(&photo, decomposer, &options)?)
     }
@@ -301,7 +308,7 @@ pub(super) struct OpenedFile {
     pub(super) bytes: Vec<u8>,
     pub(super) transfer: Option<Transfer>,
     pub(super) image: ColourImage,
-    pub(super) reduced: bool,
+    pub(super) downscaled: bool,
 }
 
 impl OpenedFile {
@@ -314,7 +321,7 @@ impl OpenedFile {
         name: &str,
         bytes: Vec<u8>,
         transfer: Option<Transfer>,
-    ) -> Result<Self, Refusal> {
+    ) -> Result<Self, StudioError> {
         let path = Path::new(name);
         let extent = stated_extent(&bytes);
         let has_at_most = |most: usize| {
@@ -334,7 +341,7 @@ impl OpenedFile {
         } else {
             DownscaledFile::new(path, &bytes, MAX_PIXELS, transfer)?
         };
-        let reduced = smaller.is_some();
+        let downscaled = smaller.is_some();
         let (name, bytes, transfer) = match smaller {
             Some(smaller) => {
                 let name = format!("{}.{}", stem(name), smaller.ending);
@@ -347,7 +354,7 @@ impl OpenedFile {
             transfer,
             name,
             bytes,
-            reduced,
+            downscaled,
         })
     }
 }
@@ -360,7 +367,7 @@ pub(super) fn png_of(
     name: &str,
     [width, height]: [u32; 2],
     rgba: &[u8],
-) -> Result<Vec<u8>, Refusal> {
+) -> Result<Vec<u8>, StudioError> {
     if rgba.len() as u64 != 4 * u64::from(width) * u64::from(height) || rgba.is_empty() {
         return refused("the request has no pixels of its size");
     }

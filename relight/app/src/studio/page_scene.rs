@@ -8,7 +8,7 @@ use relight_photo::relighting::{DiscLamp, InsertError};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::error::{Refusal, refused};
+use super::error::{StudioError, refused};
 
 /// A scene as a file has it, but that its objects are numbers, its background is the engine's, and its lamp is in parts.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -67,7 +67,7 @@ impl PageScene {
         &self,
         background: PathBuf,
         files: Vec<ObjectFiles>,
-    ) -> Result<SceneDescription, Refusal> {
+    ) -> Result<SceneDescription, StudioError> {
         let objects = self.objects.iter().map(|object| {
             let mut described = object.rest.clone();
             described.insert("photo".to_owned(), "".into());
@@ -95,7 +95,7 @@ impl PageScene {
     ///
     /// # Errors
     /// If its light is one that the page has not.
-    pub(super) fn new(scene: &SceneDescription, numbers: &[u32]) -> Result<Self, Refusal> {
+    pub(super) fn new(scene: &SceneDescription, numbers: &[u32]) -> Result<Self, StudioError> {
         let objects = scene.objects.iter().zip(numbers);
         let mut rest = fields(scene)?;
         rest.retain(|name, _| !["background", "light", "object"].contains(&name.as_str()));
@@ -110,7 +110,7 @@ impl PageScene {
 }
 
 /// The fields of what has fields, as JSON.
-fn fields(of: &impl Serialize) -> Result<Map<String, Value>, Refusal> {
+fn fields(of: &impl Serialize) -> Result<Map<String, Value>, StudioError> {
     match serde_json::to_value(of)? {
         Value::Object(fields) => Ok(fields),
         other => refused(format!("{other} has no fields")),
@@ -118,7 +118,7 @@ fn fields(of: &impl Serialize) -> Result<Map<String, Value>, Refusal> {
 }
 
 impl PageObject {
-    fn new(object: &ObjectDescription, number: u32) -> Result<Self, Refusal> {
+    fn new(object: &ObjectDescription, number: u32) -> Result<Self, StudioError> {
         let mut rest = fields(object)?;
         rest.retain(|name, _| !["photo", "mask", "transfer"].contains(&name.as_str()));
         Ok(Self {
@@ -146,7 +146,7 @@ impl PageLight {
         }
     }
 
-    fn new(light: &LightDescription) -> Result<Self, Refusal> {
+    fn new(light: &LightDescription) -> Result<Self, StudioError> {
         if light.panorama.is_some() || light.coefficients.is_some() {
             return refused(
                 "the page cannot open a scene with light from a file: use relight insert",

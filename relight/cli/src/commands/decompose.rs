@@ -114,7 +114,7 @@ impl Arguments {
             decomposer.read_normals(path, self.normals_frame.normals_y)?;
             let name = decomposer.normals_network().unwrap_or_default();
             let event = json!({ "event": "normals", "file": path, "network": name });
-            console.say(&format!("{}: recognised as {name}", path.display()), &event);
+            console.print(&format!("{}: recognised as {name}", path.display()), &event);
         }
         Ok((decomposer, name))
     }
@@ -129,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         && let [input] = inputs.as_slice()
     {
         let done = run.decompose(input)?;
-        console.say(&done.text, &done.event);
+        console.print(&done.text, &done.event);
         return Ok(Outcome::Success);
     }
     let bar = console.progress(inputs.len() as u64, "photographs");
@@ -139,7 +139,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let decompose = |input: &PhotoInput| {
         let result = parallel::caught(|| run.decompose(input));
         match &result {
-            Ok(Ok(done)) => bar.suspend(|| console.say(&done.text, &done.event)),
+            Ok(Ok(done)) => bar.suspend(|| console.print(&done.text, &done.event)),
             Ok(Err(error)) => failed(input, &with_causes(error)),
             Err(panic) => failed(input, &panic.to_string()),
         }

@@ -41,7 +41,7 @@ Examples:
   relight eval relighting make -o relighting
   relight eval relighting --data relighting
       100 objects under 30 lights each, made by the renderer of relight synth
-  relight synth turns --light-kind monte-carlo --count 24 --frames 60 --size 128 --seed 2611 -o turns
+  relight synth sequences --light-kind monte-carlo --count 24 --frames 60 --size 128 --seed 2611 -o turns
   relight eval turn --data turns
       24 synthetic turns in rooms that no network was trained in";
 
@@ -213,7 +213,7 @@ impl TableArguments {
                 .map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
         }
         let event = json!({ "event": "table", "table": table });
-        console.say(table.to_string().trim_end(), &event);
+        console.print(table.to_string().trim_end(), &event);
         Ok(Outcome::Success)
     }
 }
@@ -318,7 +318,7 @@ fn make(arguments: &MakeArguments, console: Console) -> CommandResult {
     let text = format!("{}: {objects} objects under {lights} lights", out.display());
     let event =
         json!({ "event": "relighting_set", "output": out, "objects": objects, "lights": lights });
-    console.say(&text, &event);
+    console.print(&text, &event);
     Ok(outcome)
 }
 

@@ -51,12 +51,12 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let bytes = if has_ending(output, "exr") {
         to_layers(&object)?
     } else {
-        let mesh = ObjectMesh::relief(&object, arguments.vertices as usize)?;
+        let mesh = ObjectMesh::from_object(&object, arguments.vertices as usize)?;
         to_glb(&object, &mesh)?
     };
     write_whole(output, &bytes)
         .map_err(|error| format!("{} cannot be written: {error}", output.display()))?;
-    console.say(
+    console.print(
         &output.display().to_string(),
         &json!({ "event": "exported", "output": output, "object": object.name() }),
     );

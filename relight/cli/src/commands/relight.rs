@@ -11,8 +11,8 @@ use relight_photo::files::{
     MovieFormat, MovieWriter, OutputKind, PhotoInput, PhotoReading, write_picture,
 };
 use relight_photo::relighting::{
-    Backdrop, DiscLamp, InsertError, LightSource, PanoramaView, RelightableObject, Shot,
-    WhiteBalance, likeness,
+    Backdrop, DiscLamp, InsertError, LightSource, PanoramaView, RelightableObject,
+    RelightingSequence, WhiteBalance, likeness,
 };
 use relit_console::{Console, Outcome};
 use relit_data::causes::with_causes;
@@ -225,14 +225,16 @@ impl Run<'_> {
             }
         };
         let start = Instant::now();
-        let subject = RelightableObject::from_photo(&photo, &network.decomposer, &network.options)?;
+        let relightable =
+            RelightableObject::from_photo(&photo, &network.decomposer, &network.options)?;
         let decomposed = start.elapsed().as_secs_f64();
-        let own = LightSource::Coefficients(subject.light.clone());
+        let own = LightSource::Coefficients(relightable.light.clone());
         let source = self.light.as_ref().unwrap_or(&own);
         let light = source.light()?;
         let backdrop = self.backdrop(photo.picture.planes().extent());
         let exposure = arguments.exposure.exp2();
-        let shot = Shot::new(&photo.picture, &subject, &light, backdrop, exposure)?;
+        let shot =
+            RelightingSequence::new(&photo.picture, &relightable, &light, backdrop, exposure)?;
         let start = Instant::now();
         let frames = match OutputKind::from_path(&output) {
             Some(OutputKind::Movie(format)) => self.film(&shot, &output, format, console)?,
@@ -256,9 +258,9 @@ impl Run<'_> {
             "frames": frames,
             "seconds": seconds,
             "decompose_seconds": decomposed,
-            "likeness": likeness(&subject.light, &light),
+            "likeness": likeness(&relightable.light, &light),
         });
-        console.say(&text, &event);
+        console.print(&text, &event);
         Ok(())
     }
 
@@ -311,7 +313,7 @@ impl Run<'_> {
     /// Writes the video; how many frames it has.
     fn film(
         &self,
-        shot: &Shot<'_>,
+        shot: &RelightingSequence<'_>,
         output: &Path,
         format: MovieFormat,
         console: Console,

@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             }
         }
         let event = json!({ "event": "serving", "url": url, "address": announcement.address });
-        console.say(&text, &event);
+        console.print(&text, &event);
     };
     serve_page(files, address, token, names, announce, &Shutdown::new())?;
     Ok(Outcome::Success)

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use relight_synth::{
-    LIBRARY_EXTENSION, Library, LibrarySources, LibrarySummary, LightKind, Recipe, SynthSummary,
-    TurnRecipe, build_library, made_panoramas, write_samples, write_turns,
+    LIBRARY_EXTENSION, Library, LibrarySources, LibrarySummary, LightKind, Recipe, SequenceRecipe,
+    SynthSummary, build_library, made_panoramas, write_samples, write_sequences,
 };
 use relit_console::{Console, Outcome};
 use serde_json::json;
@@ -22,7 +22,7 @@ Examples:
       procedural objects under random light, each with its ground truth
   relight synth samples --count 50000 --meshes meshes --panoramas hdri --textures photos -o warmup
       with your own files
-  relight synth turns --count 20 --panoramas hdri -o turns
+  relight synth sequences --count 20 --panoramas hdri -o sequences
       whole turns as shards, with their ground truth
   relight synth panoramas -o panoramas
       the default panoramas, as EXR
@@ -40,7 +40,7 @@ enum Product {
     /// Pictures of objects, each with its ground truth.
     Samples(SampleArguments),
     /// Whole turns as shards, as from relit-extract: the object stands still, the light rotates.
-    Turns(TurnArguments),
+    Sequences(SequenceArguments),
     /// Objects and panoramas packed into one file for training, with a table of authors and licences.
     Library(LibraryArguments),
     /// The synthetic panoramas.
@@ -79,7 +79,7 @@ struct SampleArguments {
 }
 
 #[derive(Args)]
-struct TurnArguments {
+struct SequenceArguments {
     /// Number of turns.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     count: u64,
@@ -132,7 +132,7 @@ const LIGHT_KINDS: Choices<LightKind> = &[
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     match &arguments.product {
         Product::Samples(arguments) => samples(arguments, console),
-        Product::Turns(arguments) => turns(arguments, console),
+        Product::Sequences(arguments) => sequences(arguments, console),
         Product::Library(arguments) => library(arguments, console),
         Product::Panoramas(folder) => panoramas(&folder.output, console),
     }
@@ -205,7 +205,7 @@ fn report_library(out: &Path, summary: &LibrarySummary, console: Console) {
         "bytes": summary.bytes,
         "left_out": summary.left_out,
     });
-    console.say(&text, &event);
+    console.print(&text, &event);
 }
 
 /// Warns of meshes whose files have no materials.
@@ -263,7 +263,7 @@ impl PictureArguments {
     fn report(&self, console: Console, what: &str, written: &SynthSummary) {
         let SynthSummary { new, kept, .. } = written;
         let out = &self.folder.output;
-        console.say(
+        console.print(
             &format!("{}: {new} {what} written, {kept} kept", out.display()),
             &json!({ "event": what, "out": out, "new": new, "kept": kept }),
         );
@@ -287,16 +287,16 @@ fn samples(arguments: &SampleArguments, console: Console) -> CommandResult {
     Ok(outcome)
 }
 
-fn turns(arguments: &TurnArguments, console: Console) -> CommandResult {
+fn sequences(arguments: &SequenceArguments, console: Console) -> CommandResult {
     let pictures = &arguments.pictures;
     let (library, outcome) = pictures.library(console)?;
-    let turns = TurnRecipe {
+    let turns = SequenceRecipe {
         recipe: pictures.recipe(),
         frames: arguments.frames,
     };
     let bar = console.progress(arguments.count * u64::from(arguments.frames), "frames");
     let out = &pictures.folder.output;
-    let written = write_turns(&turns, &library, arguments.count, out, &|| bar.inc(1));
+    let written = write_sequences(&turns, &library, arguments.count, out, &|| bar.inc(1));
     bar.finish_and_clear();
     pictures.report(console, "turns", &written?);
     Ok(outcome)
@@ -310,7 +310,7 @@ fn panoramas(out: &Path, console: Console) -> CommandResult {
             .image()
             .write_exr(&out.join(format!("{name}.exr")))?;
     }
-    console.say(
+    console.print(
         &format!("{}: {} panoramas", out.display(), made.len()),
         &json!({ "event": "panoramas", "out": out, "count": made.len() }),
     );

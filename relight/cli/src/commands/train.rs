@@ -219,7 +219,7 @@ fn paper(phase: PaperPhase, arguments: &PaperArguments, console: Console) -> Com
     train((settings, run), own, console, |settings, resources| {
         let inputs = PaperInputs {
             turns: arguments.turns.clone(),
-            held_out: arguments.validation_turns.clone(),
+            validation_turns: arguments.validation_turns.clone(),
             weights: read_weights(own.weights.as_deref())?,
             spec: read_weights(arguments.spec_net.as_deref())?,
             normal: read_weights(arguments.normal_net.as_deref())?,
@@ -275,7 +275,7 @@ fn tell_of_waiting(launch: &Launch, console: Console) {
     );
     let text = format!("process 0 waits at {place} for the {others} others, five minutes at most");
     let event = json!({ "event": "waiting", "others": others, "place": place });
-    console.say(&text, &event);
+    console.print(&text, &event);
 }
 
 fn read_weights(path: Option<&Path>) -> Result<Option<Weights>, NetError> {
@@ -291,7 +291,7 @@ fn train<S: Serialize, T: TrainingTask>(
 ) -> CommandResult {
     if arguments.print_settings {
         let event = json!({ "event": "settings", "settings": settings });
-        console.say(toml::to_string(&settings)?.trim_end(), &event);
+        console.print(toml::to_string(&settings)?.trim_end(), &event);
         return Ok(Outcome::Success);
     }
     let (resources, group) = arguments.join(console)?;
@@ -356,7 +356,7 @@ fn report(outcome: &RunOutcome, console: Console) {
     } else {
         "done"
     };
-    console.say(
+    console.print(
         &format!("{} steps, {end}: {}", outcome.steps, files.join(", ")),
         &json!({
             "event": "trained", "steps": outcome.steps, "stopped": outcome.stopped,
@@ -407,14 +407,14 @@ impl TrainObserver for RunProgress {
             .collect();
         let event = json!({ "event": "validated", "step": step, "figures": figures });
         let line = format!("step {step}: {}", text.join(", "));
-        bar.suspend(|| self.console.say(&line, &event));
+        bar.suspend(|| self.console.print(&line, &event));
     }
 
     fn saved(&mut self, step: u64, path: &Path) {
         if self.console.is_json() && self.bar.is_some() {
             let path = path.display().to_string();
             let event = json!({ "event": "saved", "step": step, "path": path });
-            self.console.say("", &event);
+            self.console.print("", &event);
         }
     }
 }

@@ -217,7 +217,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         .map(|(_, tensor)| tensor.values().len())
         .sum();
     let (output, net) = (export.output.display(), graph.name());
-    console.say(
+    console.print(
         &format!("{output}: {net}, {count} parameters"),
         &json!({ "event": "exported", "output": export.output, "net": net, "parameters": count }),
     );

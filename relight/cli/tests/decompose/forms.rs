@@ -8,7 +8,7 @@ use exr::prelude::WritableImage;
 use image::{DynamicImage, ImageFormat};
 use relight_core::image::ImageError;
 use relight_photo::decompose::DecomposeError;
-use relight_photo::files::{FoundPhotos, PhotoInput};
+use relight_photo::files::{PhotoInput, PhotoList};
 
 use crate::support::{Folder, HEIGHT, WIDTH, is_inside, load, mask, object, with_mask};
 
@@ -97,7 +97,7 @@ fn every_file_of_a_folder_is_used_or_named() {
     write("later/k.jpg", &jpeg);
     write("done/albedo.png", &jpeg);
     write("done/decomposition.json", b"{}");
-    let FoundPhotos { inputs, unused } = PhotoInput::find(&[folder.path("photos")], None).unwrap();
+    let PhotoList { inputs, unused } = PhotoInput::find(&[folder.path("photos")], None).unwrap();
     let used: Vec<String> = inputs.iter().map(PhotoInput::place).collect();
     let name = |path: &str| {
         PathBuf::from(path)

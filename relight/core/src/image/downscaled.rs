@@ -133,11 +133,11 @@ mod tests {
             DownscaledFile::new(path, &file, 60_000, None).unwrap(),
             None
         );
-        let reduced = DownscaledFile::new(path, &file, 15_000, None)
+        let downscaled = DownscaledFile::new(path, &file, 15_000, None)
             .unwrap()
             .unwrap();
-        assert_eq!(reduced.ending, "png");
-        let image = StoredImage::from_bytes(path, &reduced.bytes).unwrap();
+        assert_eq!(downscaled.ending, "png");
+        let image = StoredImage::from_bytes(path, &downscaled.bytes).unwrap();
         assert_eq!(image.planes.extent(), Extent::new(150, 100));
         let [r, g, _] = image.planes.pixel(75, 20);
         assert!(
@@ -151,11 +151,11 @@ mod tests {
         let path = Path::new("a.exr");
         let bright = ramp(Extent::new(40, 40)).map(|value| value * 7.0);
         let file = encode_exr(path, &bright).unwrap();
-        let reduced = DownscaledFile::new(path, &file, 400, None)
+        let downscaled = DownscaledFile::new(path, &file, 400, None)
             .unwrap()
             .unwrap();
-        assert_eq!(reduced.ending, "exr");
-        let image = StoredImage::from_bytes(path, &reduced.bytes).unwrap();
+        assert_eq!(downscaled.ending, "exr");
+        let image = StoredImage::from_bytes(path, &downscaled.bytes).unwrap();
         assert!(image.planes.pixel(19, 0)[0] > 6.0);
     }
 

@@ -28,6 +28,6 @@ pub use error::LightError;
 pub use least_squares::NormalEquations;
 pub use normals::{Normals, NormalsFrame, YAxis, YDown, YUp};
 pub use order::Order;
-pub use panorama::{DrawnLight, LightSampler, Panorama};
+pub use panorama::{LightSample, LightSampler, Panorama};
 pub(crate) use quadrature::Quadrature;
 pub use rotation::Rotation;

@@ -19,6 +19,6 @@ mod turns;
 
 pub use error::{DamagedBatch, DamagedSample, OpenError, SampleFault};
 pub use plan::{Cursor, Draw, DrawPlan, Rank, SampleId};
-pub use stream::{Drawn, Source, Stream, Streaming};
+pub use stream::{Source, Stream, StreamedBatch, Streaming};
 pub use truth::{TruthLayout, TruthSample, TruthSet};
 pub use turns::{Encoding, TurnBatch, TurnFrame, Turns};

@@ -44,7 +44,7 @@ pub struct Streaming {
 
 /// A batch, and the cursor after it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Drawn<B> {
+pub struct StreamedBatch<B> {
     /// The samples.
     pub batch: B,
     /// The cursor behind them.
@@ -78,7 +78,7 @@ pub struct Drawn<B> {
 ///         damaged.rest
 ///     });
 ///     let (_images, _checkpoint) = (&drawn.batch.images, drawn.next);
-///     stream.give_back(drawn.batch);
+///     stream.recycle(drawn.batch);
 /// }
 /// # Ok::<(), relight_core::reader::OpenError>(())
 /// ```
@@ -93,7 +93,8 @@ pub struct Stream<S: Source> {
 /// Batches that are no longer needed.
 type Spares<B> = Mutex<Vec<B>>;
 
-type Item<S> = Result<Drawn<<S as Source>::Batch>, DamagedBatch<Drawn<<S as Source>::Batch>>>;
+type Item<S> =
+    Result<StreamedBatch<<S as Source>::Batch>, DamagedBatch<StreamedBatch<<S as Source>::Batch>>>;
 
 impl<S: Source> Stream<S> {
     /// Starts the threads.
@@ -124,7 +125,7 @@ impl<S: Source> Stream<S> {
 
     /// Takes a batch back whose values were copied elsewhere. The next one is decoded into its
     /// memory; without this a third of the reader's time goes into fresh memory.
-    pub fn give_back(&self, batch: S::Batch) {
+    pub fn recycle(&self, batch: S::Batch) {
         if let Ok(mut spares) = self.spares.lock()
             && spares.len() < self.queues.len()
         {
@@ -186,7 +187,7 @@ fn decode<S: Source>(
     for Job { samples, next } in jobs.skip(index).step_by(threads.get()) {
         let spare = spares.lock().ok().and_then(|mut spares| spares.pop());
         let (batch, damage) = source.batch(&samples, spare);
-        let drawn = Drawn { batch, next };
+        let drawn = StreamedBatch { batch, next };
         let item = if damage.is_empty() {
             Ok(drawn)
         } else {
@@ -247,7 +248,7 @@ mod tests {
         }
     }
 
-    fn drawn(threads: usize, from: Cursor) -> Vec<Drawn<Vec<SampleId>>> {
+    fn drawn(threads: usize, from: Cursor) -> Vec<StreamedBatch<Vec<SampleId>>> {
         Stream::start(&Arc::new(Numbers), streaming(threads, from, 2))
             .unwrap()
             .map(|item| item.unwrap_or_else(|damaged| damaged.rest))

@@ -20,7 +20,7 @@ pub use fit::{fit_light, fit_light_near};
 pub use layers::{EXPOSURE, Layers, Rendering, SpecularForm};
 pub use lobe::LobeLayer;
 pub use power::{PowerLayer, power_constants};
-pub use sequence::{Look, exposure_for, mirror_reflectance};
+pub use sequence::{RenderSettings, exposure_for, mirror_reflectance};
 pub use surface::{Gloss, Surface};
 
 use crate::image::{ImageError, Linear, Planes, Rgb, check_extent};

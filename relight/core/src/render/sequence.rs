@@ -10,7 +10,7 @@ use crate::light::{Direction, Rotation, ShLight};
 
 /// How a surface is rendered and shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct RenderSettings {
     /// The diffuse layer.
     pub diffuse: DiffuseForm,
     /// The specular layer.
@@ -19,7 +19,7 @@ pub struct Look {
     pub exposure: f32,
 }
 
-impl Look {
+impl RenderSettings {
     /// The image of a surface under a light.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ impl Look {
     /// from the viewer to the right).
     ///
     /// # Errors
-    /// As [`Look::image`].
+    /// As [`RenderSettings::image`].
     pub fn turned(
         &self,
         surface: &Surface,
@@ -50,7 +50,7 @@ impl Look {
     /// amount of light, in smaller and brighter highlights: see [`mirror_reflectance`].
     ///
     /// # Errors
-    /// As [`Look::image`].
+    /// As [`RenderSettings::image`].
     pub fn sweep(
         &self,
         surface: &Surface,
@@ -104,7 +104,7 @@ mod tests {
     use crate::image::Extent;
     use crate::light::{Normals, Order};
 
-    const LOOK: Look = Look {
+    const LOOK: RenderSettings = RenderSettings {
         diffuse: DiffuseForm::Irradiance,
         specular: SpecularForm::Lobe,
         exposure: 1.0,
@@ -141,8 +141,8 @@ mod tests {
         let (surface, light) = scene();
         for part in [0.0, 0.1] {
             let exposure = exposure_for(&light.rotated(&Rotation::about(Direction::UP, part)));
-            let look = Look { exposure, ..LOOK };
-            let image = look.turned(&surface, &light, part).unwrap();
+            let settings = RenderSettings { exposure, ..LOOK };
+            let image = settings.turned(&surface, &light, part).unwrap();
             let most = image.planes().plane(0).iter().copied().fold(0.0, f32::max);
             assert!((most - 1.0).abs() < 0.01, "{most}");
         }
@@ -176,11 +176,11 @@ mod tests {
             );
             let mirror =
                 Surface::new(surface.normals().clone(), black.clone(), Some(gloss)).unwrap();
-            let look = Look {
+            let settings = RenderSettings {
                 exposure: super::super::EXPOSURE,
                 ..LOOK
             };
-            let image = look.image(&mirror, &even).unwrap();
+            let image = settings.image(&mirror, &even).unwrap();
             assert!((image.planes().pixel(15, 15)[0] - 0.6).abs() < 0.01);
         }
     }

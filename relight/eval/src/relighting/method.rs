@@ -73,30 +73,30 @@ impl RelightMethod<'_> {
                 part,
             }),
             Self::Photograph(decomposer) => {
-                let photo = Photographed::new(set, object, part)?;
+                let photo = SourcePhotograph::new(set, object, part)?;
                 let mask = &photo.mask;
-                let subject = RelightableObject::new(
+                let relightable = RelightableObject::new(
                     &photo.picture,
                     mask,
                     Some(mask),
                     decomposer,
                     &photo.options,
                 );
-                let subject =
-                    Box::new(subject.map_err(EvalError::sample(&object.name, NOT_RELIT))?);
+                let relightable =
+                    Box::new(relightable.map_err(EvalError::sample(&object.name, NOT_RELIT))?);
                 Ok(Relight::RelightableObject {
                     set,
                     object,
                     photo,
-                    subject,
+                    relightable,
                 })
             }
             Self::Maps(decomposer) => {
-                let Photographed {
+                let SourcePhotograph {
                     picture,
                     mask,
                     options,
-                } = Photographed::new(set, object, part)?;
+                } = SourcePhotograph::new(set, object, part)?;
                 let found = decomposer.decompose(&picture, &mask, &options);
                 let found = found.map_err(EvalError::sample(&object.name, NOT_RELIT))?;
                 let white = mean_irradiance(&set.lights()[object.input]);
@@ -107,13 +107,13 @@ impl RelightMethod<'_> {
 }
 
 /// The image that is relit, as a photograph.
-pub(super) struct Photographed {
+pub(super) struct SourcePhotograph {
     picture: Rgb<Linear>,
     mask: Planes<1>,
     options: DecomposeOptions,
 }
 
-impl Photographed {
+impl SourcePhotograph {
     fn new(set: &RelightingSet, object: &Object, part: Part) -> Result<Self, EvalError> {
         let image = set.image(object, object.input, part)?;
         let mask = object
@@ -175,8 +175,8 @@ pub(super) enum Relight<'a> {
     RelightableObject {
         set: &'a RelightingSet,
         object: &'a Object,
-        photo: Photographed,
-        subject: Box<RelightableObject>,
+        photo: SourcePhotograph,
+        relightable: Box<RelightableObject>,
     },
 }
 
@@ -207,14 +207,14 @@ impl Relight<'_> {
                 set,
                 object,
                 photo,
-                subject,
+                relightable,
             } => {
                 let new = &set.lights()[light];
-                let exposure = mean_irradiance(&subject.light) / mean_irradiance(new);
+                let exposure = mean_irradiance(&relightable.light) / mean_irradiance(new);
                 let new = new.clone().tinted([f64::from(exposure); 3]);
-                let colours = subject.relit(&new, &MaterialChange::default());
+                let colours = relightable.relit(&new, &MaterialChange::default());
                 let colours = colours.map_err(EvalError::sample(&object.name, NOT_RELIT))?;
-                let image = shown(subject.in_place(&photo.picture, &colours));
+                let image = shown(relightable.in_place(&photo.picture, &colours));
                 Ok(cut_out(&image, &object.mask))
             }
         }

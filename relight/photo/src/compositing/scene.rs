@@ -16,7 +16,7 @@ pub struct InsertScene<'a> {
     /// The same light, as shadows are drawn from it.
     panorama: Panorama,
     tilt: f64,
-    matching: Harmonisation,
+    harmonisation: Harmonisation,
     objects: Vec<SceneObject<'a>>,
 }
 
@@ -30,19 +30,19 @@ impl<'a> InsertScene<'a> {
         extent: Extent,
         (light, panorama): (ShLight, Panorama),
         tilt: f64,
-        matching: Harmonisation,
+        harmonisation: Harmonisation,
         objects: Vec<SceneObject<'a>>,
     ) -> Result<Self, InsertError> {
         for (number, object) in objects.iter().enumerate() {
             object.check(extent, number + 1)?;
         }
-        let balance = matching.balance.map(f64::from);
+        let balance = harmonisation.balance.map(f64::from);
         Ok(Self {
             extent,
             light: light.tinted(balance),
             panorama,
             tilt: tilt.to_radians(),
-            matching,
+            harmonisation,
             objects,
         })
     }
@@ -103,25 +103,25 @@ impl<'a> InsertScene<'a> {
         light: &ShLight,
         panorama: &Panorama,
     ) -> Result<SceneLayer, InsertError> {
-        let subject = object.subject;
+        let relightable = object.relightable;
         let angle = object.placement.rotation.to_radians();
         let mut gain = object.exposure.exp2();
         let colours = if object.relit {
             // The background's brightness is no guess: it is not hedged as the light's shape is.
-            gain *= self.matching.level;
-            let scale = exposure_between(&subject.light, &self.light);
+            gain *= self.harmonisation.level;
+            let scale = exposure_between(&relightable.light, &self.light);
             // The object is turned back, and the light with it.
             let turned = if angle == 0.0 {
                 light.clone()
             } else {
                 light.rotated(&Rotation::about(Direction::VIEWER, -angle))
             };
-            subject.relit(&turned.tinted([f64::from(scale); 3]), &object.change)?
+            relightable.relit(&turned.tinted([f64::from(scale); 3]), &object.change)?
         } else {
-            subject.matte.foreground.clone()
+            relightable.matte.foreground.clone()
         };
-        let standing = subject.standing(Fit::new(
-            &subject.matte.alpha,
+        let placed = relightable.placed(Fit::new(
+            &relightable.matte.alpha,
             object.placement,
             self.extent,
         ));
@@ -129,14 +129,14 @@ impl<'a> InsertScene<'a> {
         for plane in premultiplied.planes_mut() {
             plane
                 .iter_mut()
-                .zip(subject.matte.alpha.plane(0))
+                .zip(relightable.matte.alpha.plane(0))
                 .for_each(|(v, a)| *v *= a);
         }
-        let alpha = standing.alpha.clone();
-        let colours = standing.fit.apply(&premultiplied);
-        let place = standing.foot.first_pixel(object.placement, self.extent);
+        let alpha = placed.alpha.clone();
+        let colours = placed.fit.apply(&premultiplied);
+        let place = placed.foot.first_pixel(object.placement, self.extent);
         let shadow = (object.shadow > 0.0)
-            .then(|| self.shadow(object, &standing, panorama))
+            .then(|| self.shadow(object, &placed, panorama))
             .flatten()
             .map(|(from, arriving)| GroundShadow {
                 place: [place[0] + from[0], place[1] + from[1]],
@@ -154,7 +154,7 @@ impl<'a> InsertScene<'a> {
 
     /// The grain that the picture has and an object has not.
     fn lacking_grain(&self, colours: &Planes<3>, alpha: &Planes<1>) -> f32 {
-        let wanted = self.matching.grain;
+        let wanted = self.harmonisation.grain;
         if wanted <= 0.0 {
             return 0.0;
         }
@@ -166,12 +166,12 @@ impl<'a> InsertScene<'a> {
     fn shadow(
         &self,
         object: &SceneObject<'_>,
-        standing: &PlacedObject,
+        placed: &PlacedObject,
         panorama: &Panorama,
     ) -> Option<([i64; 2], Planes<3>)> {
-        let relief = standing.relief(&object.subject.normals)?;
-        let shadow = Shadow::cast(relief, self.tilt, panorama);
-        let pixels = |cells: f64| cells / relief.scale;
+        let height_field = placed.height_field(&object.relightable.normals)?;
+        let shadow = Shadow::cast(height_field, self.tilt, panorama);
+        let pixels = |cells: f64| cells / height_field.scale;
         let extent = shadow.arriving.extent();
         let side = |cells: usize| (pixels(cells as f64).round() as usize).max(1);
         let seen = shadow
@@ -210,7 +210,7 @@ mod tests {
         }))
     }
 
-    fn subject() -> RelightableObject {
+    fn relightable() -> RelightableObject {
         let decomposer = Decomposer::with_side(&Weights::initial(&decomposer(), 3), 32).unwrap();
         let mask = Planes::from_fn(PHOTO, |x, y| [f32::from(u8::from(is_object(x, y)))]);
         RelightableObject::new(
@@ -223,9 +223,9 @@ mod tests {
         .unwrap()
     }
 
-    fn object(subject: &RelightableObject, placement: Placement) -> SceneObject<'_> {
+    fn object(relightable: &RelightableObject, placement: Placement) -> SceneObject<'_> {
         SceneObject {
-            subject,
+            relightable,
             placement,
             change: MaterialChange::default(),
             exposure: 0.0,
@@ -274,13 +274,13 @@ mod tests {
 
     #[test]
     fn an_object_stands_where_it_is_wanted_and_as_high() {
-        let subject = subject();
+        let relightable = relightable();
         let placement = Placement {
             at: [0.25, 0.75],
             height: 0.5,
             rotation: 0.0,
         };
-        let picture = composed(Extent::new(160, 120), vec![object(&subject, placement)]);
+        let picture = composed(Extent::new(160, 120), vec![object(&relightable, placement)]);
         let [left, right, top, bottom] = bounds(&picture);
         assert!(
             bottom.abs_diff(89) <= 1 && top.abs_diff(30) <= 1,
@@ -294,7 +294,7 @@ mod tests {
 
     #[test]
     fn at_its_own_place_it_covers_itself() {
-        let subject = subject();
+        let relightable = relightable();
         let placement = OWN_PLACE;
         let scene = InsertScene::new(
             PHOTO,
@@ -303,7 +303,7 @@ mod tests {
             Harmonisation::default(),
             vec![SceneObject {
                 shadow: 0.0,
-                ..object(&subject, placement)
+                ..object(&relightable, placement)
             }],
         );
         let scene = scene.unwrap();
@@ -318,7 +318,7 @@ mod tests {
 
     #[test]
     fn turned_by_a_right_angle_it_is_as_wide_as_it_was_high() {
-        let subject = subject();
+        let relightable = relightable();
         let placement = Placement {
             at: [0.5, 0.9],
             height: 0.4,
@@ -326,7 +326,7 @@ mod tests {
         };
         let [left, right, top, bottom] = bounds(&composed(
             Extent::new(160, 120),
-            vec![object(&subject, placement)],
+            vec![object(&relightable, placement)],
         ));
         let (width, height) = ((right - left + 1) as f64, (bottom - top + 1) as f64);
         assert!(
@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn the_front_covers_the_back_and_shadows_fall_on_the_ground() {
-        let subject = subject();
+        let relightable = relightable();
         let place = |x| Placement {
             at: [x, 0.9],
             height: 0.5,
@@ -350,11 +350,11 @@ mod tests {
         let front = SceneObject {
             change: black,
             relit: true,
-            ..object(&subject, place(0.5))
+            ..object(&relightable, place(0.5))
         };
         let picture = composed(
             Extent::new(160, 120),
-            vec![object(&subject, place(0.5)), front],
+            vec![object(&relightable, place(0.5)), front],
         );
         assert!(picture.planes().pixel(80, 80)[0] < 0.05);
         // The lamp is on the right: the shadow lies on the left.
@@ -364,7 +364,7 @@ mod tests {
 
     #[test]
     fn a_dark_background_with_grain_makes_the_object_so() {
-        let subject = subject();
+        let relightable = relightable();
         let placement = Placement {
             at: [0.5, 0.9],
             height: 0.7,
@@ -373,12 +373,13 @@ mod tests {
         let relit = SceneObject {
             relit: true,
             shadow: 0.0,
-            ..object(&subject, placement)
+            ..object(&relightable, placement)
         };
         let extent = Extent::new(160, 120);
         let black = Rgb::new(Planes::zeros(extent));
-        let brightness = |matching: Harmonisation, object: SceneObject<'_>| {
-            let scene = InsertScene::new(extent, lamp(), 25.0, matching, vec![object]).unwrap();
+        let brightness = |harmonisation: Harmonisation, object: SceneObject<'_>| {
+            let scene =
+                InsertScene::new(extent, lamp(), 25.0, harmonisation, vec![object]).unwrap();
             let picture = scene.compose(&black, &scene.layers(0.0).unwrap(), 0);
             let middle: Vec<f32> = (70..90)
                 .map(|x| Srgb::from_linear(picture.planes().pixel(x, 70)[1]))
@@ -418,9 +419,12 @@ mod tests {
 
     #[test]
     fn what_cannot_stand_is_named() {
-        let subject = subject();
+        let relightable = relightable();
         let refused = |placement| {
-            let objects = vec![object(&subject, OWN_PLACE), object(&subject, placement)];
+            let objects = vec![
+                object(&relightable, OWN_PLACE),
+                object(&relightable, placement),
+            ];
             InsertScene::new(PHOTO, lamp(), 25.0, Harmonisation::default(), objects)
                 .unwrap_err()
                 .to_string()
@@ -441,7 +445,7 @@ mod tests {
             assert!(found.contains("object 2"), "{found}");
         }
         let objects = vec![object(
-            &subject,
+            &relightable,
             Placement {
                 height: 4.0,
                 ..good

@@ -48,7 +48,7 @@ pub struct SceneEnvironment {
     /// How far the camera looks down on the ground of the objects, degrees.
     pub tilt: f64,
     /// What the background asks of the objects.
-    pub matching: Harmonisation,
+    pub harmonisation: Harmonisation,
     /// The sun in a picture that gives the light.
     pub sun: Option<SeenSun>,
     /// How a panorama is exposed.
@@ -71,7 +71,7 @@ impl SceneEnvironment {
         background: SceneBackground<'_>,
         given: Option<LightSource>,
     ) -> Result<Self, InsertError> {
-        let mut matching = match background {
+        let mut harmonisation = match background {
             SceneBackground::Picture(picture) if scene.matches => {
                 Harmonisation::from_background(picture)
             }
@@ -79,12 +79,12 @@ impl SceneEnvironment {
         };
         if given.is_none() {
             // Light that was taken from the background has its colour.
-            matching.balance = [1.0; 3];
+            harmonisation.balance = [1.0; 3];
         }
         if scene.white_balance == WhiteBalance::Auto
             && let SceneBackground::Picture(picture) = background
         {
-            matching.balance = Harmonisation::from_background(picture).balance;
+            harmonisation.balance = Harmonisation::from_background(picture).balance;
         }
         let sun = match background {
             SceneBackground::Picture(picture) if given.is_none() => SeenSun::find(picture.planes()),
@@ -112,7 +112,7 @@ impl SceneEnvironment {
             let bound = is_one_light.then_some(&coefficients);
             let found = exposed(scene, panorama, panorama_scale, bound);
             let gain = found.stops.exp2();
-            matching.level = if is_one_light {
+            harmonisation.level = if is_one_light {
                 gain
             } else {
                 scene.exposure.exp2()
@@ -128,7 +128,7 @@ impl SceneEnvironment {
             extent,
             light,
             tilt: Self::ground_tilt(scene, background),
-            matching,
+            harmonisation,
             sun,
             exposure,
             projected,
@@ -146,7 +146,7 @@ impl SceneEnvironment {
 
     /// The photograph of an object no larger than it has to be for its size in the scene.
     #[must_use]
-    pub fn reduced(&self, object: &ObjectDescription, photo: Photo) -> Photo {
+    pub fn downscaled(&self, object: &ObjectDescription, photo: Photo) -> Photo {
         let wanted = object.height * self.extent.height as f64 * RESERVE;
         let Extent { width, height } = photo.picture.planes().extent();
         let own = rows(&photo.mask).len().max(1) as f64;
@@ -160,7 +160,7 @@ impl SceneEnvironment {
     /// Whatever is wrong with an object or the background.
     pub fn scene<'a>(&self, objects: Vec<SceneObject<'a>>) -> Result<InsertScene<'a>, InsertError> {
         let light = (self.projected.clone(), self.around.clone());
-        InsertScene::new(self.extent, light, self.tilt, self.matching, objects)
+        InsertScene::new(self.extent, light, self.tilt, self.harmonisation, objects)
     }
 
     /// The visible part of a panorama that has rotated by so many radians, at its exposure.
@@ -254,16 +254,16 @@ mod tests {
         // The sky is even: it is brought to the brightness of a bright place, and the objects with it.
         let exposure = plain.exposure.unwrap();
         assert!(exposure.clipped == 0.0 && !exposure.for_objects);
-        assert_eq!(plain.matching.level, exposure.stops.exp2());
-        assert_eq!(plain.matching.balance, [1.0; 3]);
+        assert_eq!(plain.harmonisation.level, exposure.stops.exp2());
+        assert_eq!(plain.harmonisation.balance, [1.0; 3]);
         let view = PanoramaView::new(plain.extent, scene.fov, scene.down);
-        let shown = |setting: &SceneEnvironment| {
-            let seen = setting.seen(&view, &panorama, 0.0);
+        let shown = |environment: &SceneEnvironment| {
+            let seen = environment.seen(&view, &panorama, 0.0);
             seen.planes().pixel(100, 50)[1]
         };
         let brighter = described("size = [200, 100]\nexposure = 1.0");
         let brighter = SceneEnvironment::new(&brighter, background, None).unwrap();
-        assert!((brighter.matching.level / plain.matching.level - 2.0).abs() < 1e-5);
+        assert!((brighter.harmonisation.level / plain.harmonisation.level - 2.0).abs() < 1e-5);
         assert!((shown(&brighter) / shown(&plain) - 2.0).abs() < 1e-5);
     }
 
@@ -275,7 +275,7 @@ mod tests {
         let lamp = LightSource::Lamp("170,30".parse().unwrap());
         let scene = described("size = [200, 100]");
         let set = SceneEnvironment::new(&scene, background, Some(lamp)).unwrap();
-        assert_eq!(set.matching.level, 1.0);
+        assert_eq!(set.harmonisation.level, 1.0);
         let view = PanoramaView::new(set.extent, scene.fov, scene.down);
         let shown = set.seen(&view, &panorama, 0.0).planes().pixel(100, 50)[1];
         assert!((shown - 0.8).abs() < 0.01, "{shown}");
@@ -288,7 +288,7 @@ mod tests {
         let background = SceneBackground::Panorama(&panorama);
         let unmatched = described("size = [200, 100]\nmatch = false");
         let unmatched = SceneEnvironment::new(&unmatched, background, None).unwrap();
-        assert_eq!(unmatched.matching, Harmonisation::default());
+        assert_eq!(unmatched.harmonisation, Harmonisation::default());
         let balanced = described("size = [200, 100]\nwhite_balance = \"auto\"");
         let balanced = SceneEnvironment::new(&balanced, background, None).unwrap();
         let view = PanoramaView::new(balanced.extent, 60.0, 10.0);
@@ -305,7 +305,7 @@ mod tests {
             panic!("a lamp")
         };
         assert!((shown.colour[0] / shown.colour[2] - 1.0).abs() < 1e-6);
-        assert!(set.matching.balance[0] > set.matching.balance[2]);
+        assert!(set.harmonisation.balance[0] > set.harmonisation.balance[2]);
     }
 
     #[test]
@@ -314,21 +314,21 @@ mod tests {
         let background = SceneBackground::Picture(&picture);
         let taken = SceneEnvironment::new(&scene, background, None).unwrap();
         assert_eq!(taken.extent, Extent::new(64, 48));
-        assert!(taken.matching.level < 0.5 && taken.matching.balance == [1.0; 3]);
+        assert!(taken.harmonisation.level < 0.5 && taken.harmonisation.balance == [1.0; 3]);
         let lamp = LightSource::Lamp(DiscLamp::default());
         let given = SceneEnvironment::new(&scene, background, Some(lamp.clone())).unwrap();
         assert_eq!(given.light, lamp);
-        assert!(given.matching.balance[0] > given.matching.balance[2]);
+        assert!(given.harmonisation.balance[0] > given.harmonisation.balance[2]);
         let unmatched = SceneEnvironment::new(&described("match = false"), background, Some(lamp));
-        assert_eq!(unmatched.unwrap().matching, Harmonisation::default());
+        assert_eq!(unmatched.unwrap().harmonisation, Harmonisation::default());
     }
 
     #[test]
     fn the_ground_is_looked_down_on_as_far_as_the_camera_sees_it() {
         let panorama = sky();
         let tilt = |more: &str, background| {
-            let setting = SceneEnvironment::new(&described(more), background, None);
-            setting.unwrap().tilt
+            let environment = SceneEnvironment::new(&described(more), background, None);
+            environment.unwrap().tilt
         };
         let around = SceneBackground::Panorama(&panorama);
         // The object stands at 0.9 of the height: 0.4 x 960 / 1280 x 2 tan 30° below the middle, after 10° down.
@@ -360,15 +360,15 @@ mod tests {
         });
         let photo = Photo::from_frame("a".into(), picture, mask, None).unwrap();
         let background = dusk();
-        let setting =
+        let environment =
             SceneEnvironment::new(&described(""), SceneBackground::Picture(&background), None);
         let object = ObjectDescription {
             height: 0.5,
             ..described("").objects[0].clone()
         };
-        let reduced = setting.unwrap().reduced(&object, photo);
+        let downscaled = environment.unwrap().downscaled(&object, photo);
         // 400 x 0.5 x 48 x 1.25 / 150 pixels.
-        assert_eq!(reduced.picture.planes().extent(), Extent::new(80, 60));
-        assert_eq!(rows(&reduced.mask).len(), 30);
+        assert_eq!(downscaled.picture.planes().extent(), Extent::new(80, 60));
+        assert_eq!(rows(&downscaled.mask).len(), 30);
     }
 }

@@ -12,7 +12,7 @@ const MAX_GROWTH: f64 = 64.0;
 #[derive(Debug, Clone, Copy)]
 pub struct SceneObject<'a> {
     /// The object.
-    pub subject: &'a RelightableObject,
+    pub relightable: &'a RelightableObject,
     /// Where it stands.
     pub placement: Placement,
     /// What its material becomes.
@@ -28,9 +28,9 @@ pub struct SceneObject<'a> {
 impl<'a> SceneObject<'a> {
     /// An object as it is described, in the scene's light.
     #[must_use]
-    pub fn described(object: &ObjectDescription, subject: &'a RelightableObject) -> Self {
+    pub fn described(object: &ObjectDescription, relightable: &'a RelightableObject) -> Self {
         Self {
-            subject,
+            relightable,
             placement: object.placement(),
             change: object.change(),
             exposure: object.exposure,
@@ -43,7 +43,7 @@ impl<'a> SceneObject<'a> {
     pub(crate) fn check(&self, extent: Extent, number: usize) -> Result<(), InsertError> {
         let wrong = |fault| InsertError::Object { number, fault };
         let Placement { at, height, .. } = self.placement;
-        let alpha = &self.subject.matte.alpha;
+        let alpha = &self.relightable.matte.alpha;
         if !self.placement.is_seen(alpha, extent) {
             return Err(wrong(format!(
                 "would lie completely outside the picture: its place is {},{} in parts of width and height",

@@ -1,6 +1,6 @@
 //! From the network's maps to layers that give the picture back.
 
-use super::encoding::AnsweredMaps;
+use super::encoding::PredictedMaps;
 use relight_core::image::Planes;
 use relight_core::light::{Normals, YUp};
 
@@ -65,7 +65,7 @@ pub(super) struct LayerSums {
 
 impl LayerSums {
     /// The sums over a picture, or a strip of it, whose maps have a highlight that is possible.
-    pub(super) fn from_maps(picture: &Planes<3>, mask: &[bool], maps: &AnsweredMaps) -> Self {
+    pub(super) fn from_maps(picture: &Planes<3>, mask: &[bool], maps: &PredictedMaps) -> Self {
         let (s, h) = (maps.shading.plane(0), maps.highlight.plane(0));
         let mut sums = Self::default();
         for at in (0..mask.len()).filter(|&at| mask[at]) {
@@ -74,9 +74,9 @@ impl LayerSums {
         }
         for (light, albedo) in picture.planes().into_iter().zip(maps.albedo.planes()) {
             for at in (0..mask.len()).filter(|&at| mask[at]) {
-                let answered = f64::from(albedo[at]) * f64::from(s[at]);
-                sums.product += answered * f64::from(diffuse_part(light[at], h[at]));
-                sums.square += answered * answered;
+                let predicted = f64::from(albedo[at]) * f64::from(s[at]);
+                sums.product += predicted * f64::from(diffuse_part(light[at], h[at]));
+                sums.square += predicted * predicted;
             }
         }
         sums
@@ -119,7 +119,7 @@ impl ComposedLayers {
     pub(super) fn new(
         picture: Planes<3>,
         mask: &[bool],
-        maps: AnsweredMaps,
+        maps: PredictedMaps,
         sums: &LayerSums,
     ) -> Self {
         let (shading_scale, scale) = (sums.shading_scale() as f32, sums.albedo_scale());
@@ -139,8 +139,8 @@ impl ComposedLayers {
                 }
                 let light = diffuse[at];
                 let (shading, target) = (f64::from(s[at]), f64::from(diffuse_part(light, h[at])));
-                let answered = scale * f64::from(albedo[at]);
-                let r = (target * shading + RIDGE * answered) / (shading * shading + RIDGE);
+                let predicted = scale * f64::from(albedo[at]);
+                let r = (target * shading + RIDGE * predicted) / (shading * shading + RIDGE);
                 albedo[at] = r as f32;
                 diffuse[at] = (r * shading) as f32;
                 residual.rest += f64::from(light - diffuse[at] - h[at]).powi(2);
@@ -205,7 +205,7 @@ mod tests {
     const EXTENT: Extent = Extent::new(16, 12);
 
     /// A picture that is exactly albedo times shading and a highlight, and those.
-    fn scene() -> (Planes<3>, AnsweredMaps) {
+    fn scene() -> (Planes<3>, PredictedMaps) {
         let albedo = Planes::from_fn(EXTENT, |x, _| {
             if x < 8 {
                 [0.6, 0.3, 0.2]
@@ -220,7 +220,7 @@ mod tests {
             let [h] = highlight.pixel(x, y);
             albedo.pixel(x, y).map(|a| a * s + h)
         });
-        let maps = AnsweredMaps {
+        let maps = PredictedMaps {
             normals: Normals::new(Planes::filled(EXTENT, [0.0, 0.0, 1.0])),
             albedo,
             shading,
@@ -234,7 +234,7 @@ mod tests {
     fn composed(
         picture: Planes<3>,
         mask: &[bool],
-        mut maps: AnsweredMaps,
+        mut maps: PredictedMaps,
         with_highlight: bool,
     ) -> ComposedLayers {
         maps.highlight = if with_highlight {
@@ -259,7 +259,7 @@ mod tests {
             let picture = rows(&picture, half, first);
             let mask = mask[first * half.width..][..half.pixels()].to_vec();
             let highlight = rows(&maps.highlight, half, first);
-            let maps = AnsweredMaps {
+            let maps = PredictedMaps {
                 normals: Normals::new(Planes::filled(half, [0.0, 0.0, 1.0])),
                 albedo: rows(&maps.albedo, half, first),
                 shading: rows(&maps.shading, half, first),
@@ -303,7 +303,7 @@ mod tests {
         maps.albedo = Planes::filled(EXTENT, [0.5; 3]);
         let mask = vec![true; EXTENT.pixels()];
         let layers = composed(picture.clone(), &mask, maps.clone(), false);
-        let without = AnsweredMaps {
+        let without = PredictedMaps {
             highlight: Planes::zeros(EXTENT),
             ..maps
         };

@@ -97,7 +97,7 @@ fn bounds(mask: &Planes<1>) -> Option<[Range<usize>; 2]> {
 
 /// A picture, 0 outside its mask, and the mask, 0 or 1, in another size: each pixel is the mean of what the mask covers
 /// of its area, so that nothing of the background comes in. Both are a part of an image that is 0 elsewhere.
-pub(super) fn reduced(
+pub(super) fn downscaled(
     picture: &Planes<3>,
     mask: &Planes<1>,
     part: &Part,
@@ -179,7 +179,7 @@ mod tests {
         });
         let picture = cut_out(picture, &mask);
         let all = Part::all(extent);
-        let (small, small_mask) = reduced(&picture, &mask, &all, Extent::new(16, 16));
+        let (small, small_mask) = downscaled(&picture, &mask, &all, Extent::new(16, 16));
         let kept = inside(&small_mask);
         for (value, &inside) in small.plane(0).iter().zip(&kept) {
             let expected = if inside { 0.25 } else { 0.0 };
@@ -200,7 +200,7 @@ mod tests {
         let mask = Planes::from_fn(extent, |x, _| [f32::from(u8::from(x == 30))]);
         let picture = cut_out(Planes::filled(extent, [0.5; 3]), &mask);
         let all = Part::all(extent);
-        let (small, small_mask) = reduced(&picture, &mask, &all, Extent::new(16, 16));
+        let (small, small_mask) = downscaled(&picture, &mask, &all, Extent::new(16, 16));
         let kept = inside(&small_mask);
         assert_eq!(kept.iter().filter(|inside| **inside).count(), 16);
         let value = small.pixel(7, 3)[0];

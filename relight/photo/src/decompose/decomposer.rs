@@ -6,11 +6,11 @@ use std::path::Path;
 use super::compose::{normalised, possible_highlight};
 use super::crop::{CropSquare, Window, cut_out, inside};
 use super::error::DecomposeError;
-use super::external_normals::OtherNormals;
+use super::external_normals::ExternalNormals;
 use super::gloss::{FittedGloss, fit_gloss};
 use super::light::light_of_shading;
-use super::network_output::{Engine, MapsNet, Scales, Whole, to_maps};
-use super::tiled_compose::{Enlargement, LayerPlan};
+use super::network_output::{MapNetwork, NetworkEngine, PhotoPrediction, Scales, to_maps};
+use super::tiled_compose::{LayerPlan, MapUpscaler};
 use crate::nets::{Inference, LIGHT_PARAMETERS, NetError, Weights, decomposer_of};
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
 #[cfg(feature = "files")]
@@ -128,7 +128,7 @@ pub struct Decomposer {
     scales: Scales,
     /// Whether the network separates paint from shadow.
     tells_paint: bool,
-    normals: Option<OtherNormals>,
+    normals: Option<ExternalNormals>,
 }
 
 impl std::fmt::Debug for Decomposer {
@@ -155,10 +155,10 @@ impl Decomposer {
     /// If the weights are not this network's, or it cannot take such pictures.
     pub fn with_side(weights: &Weights, side: usize) -> Result<Self, DecomposeError> {
         let graph = decomposer_of(weights);
-        let net = |weights: &Weights, side: usize| -> Result<Box<dyn MapsNet>, NetError> {
+        let net = |weights: &Weights, side: usize| -> Result<Box<dyn MapNetwork>, NetError> {
             let graph = decomposer_of(weights);
             let inference = Inference::new(&graph, weights, (side, side))?;
-            Ok(Box::new(Engine { inference, side }))
+            Ok(Box::new(NetworkEngine { inference, side }))
         };
         let has_coarse = side.is_multiple_of(2 * graph.multiple());
         let coarse = || has_coarse.then(|| net(weights, side / 2)).transpose();
@@ -178,7 +178,10 @@ impl Decomposer {
         })
     }
 
-    pub(super) fn from_nets(fine: Box<dyn MapsNet>, coarse: Option<Box<dyn MapsNet>>) -> Self {
+    pub(super) fn from_nets(
+        fine: Box<dyn MapNetwork>,
+        coarse: Option<Box<dyn MapNetwork>>,
+    ) -> Self {
         Self {
             scales: Scales { fine, coarse },
             tells_paint: false,
@@ -202,14 +205,14 @@ impl Decomposer {
         frame: Option<NormalsFrame>,
     ) -> Result<(), DecomposeError> {
         let onnx = crate::nets::read_onnx(path)?;
-        self.normals = Some(OtherNormals::new(path, &onnx, self.side(), frame)?);
+        self.normals = Some(ExternalNormals::new(path, &onnx, self.side(), frame)?);
         Ok(())
     }
 
     /// The kind of network that [`Self::read_normals`] recognised, in words; `None` if none was read.
     #[must_use]
     pub fn normals_network(&self) -> Option<&'static str> {
-        self.normals.as_ref().map(OtherNormals::name)
+        self.normals.as_ref().map(ExternalNormals::name)
     }
 
     /// Width and height of what the network sees, pixels.
@@ -243,7 +246,7 @@ impl Decomposer {
         };
         let (region, window) = (object.region, object.window);
         let part = region.part(&window);
-        let whole = Whole::new(
+        let whole = PhotoPrediction::new(
             &self.scales,
             &object.picture,
             &object.mask,
@@ -252,7 +255,7 @@ impl Decomposer {
         )?;
         let fitted = self.fit(&whole, is_glossy)?;
         let others = self.normals.as_ref().map(|_| fitted.normals.planes());
-        let maps = Enlargement::new(&whole.fields, others, &whole.mask, part);
+        let maps = MapUpscaler::new(&whole.fields, others, &whole.mask, part);
         let CutObject {
             picture,
             inside,
@@ -289,7 +292,7 @@ impl Decomposer {
     }
 
     /// Fits light and gloss to the maps at the network's size.
-    fn fit(&self, whole: &Whole, is_glossy: bool) -> Result<FittedLight, DecomposeError> {
+    fn fit(&self, whole: &PhotoPrediction, is_glossy: bool) -> Result<FittedLight, DecomposeError> {
         let known = inside(&whole.mask);
         let maps = to_maps(whole.fields.clone(), &known)?;
         let others = match &self.normals {

@@ -12,7 +12,7 @@ const WHITE_PERCENTILE: f64 = 0.99;
 pub const MAX_LIGHT: f32 = 1.5;
 /// Keeps the logarithm of black finite.
 pub const LOG_FLOOR: f32 = 0.01;
-/// Range of the answered logarithm of shading.
+/// Range of the predicted logarithm of shading.
 pub const LOG_SHADING: (f32, f32) = (-6.0, 3.0);
 /// Least part of a normal along the line of sight, before its length is made 1.
 pub const MIN_FACING: f32 = 0.02;
@@ -21,15 +21,15 @@ pub const HIGHLIGHT_OFFSET: f32 = 3.5;
 
 /// A picture as the network sees it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EncodedPicture {
+pub struct NetworkInput {
     extent: Extent,
     values: Vec<f32>,
     white: f32,
 }
 
-/// What the network answers for a picture, 0 outside its mask.
+/// What the network predicts for a picture, 0 outside its mask.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AnsweredMaps {
+pub struct PredictedMaps {
     /// Unit normals.
     pub normals: Normals<YUp>,
     /// Linear albedo, 0..1, right up to a factor.
@@ -42,7 +42,7 @@ pub struct AnsweredMaps {
     pub paint: Planes<1>,
 }
 
-impl EncodedPicture {
+impl NetworkInput {
     /// Encodes a linear picture under a mask (0..=1, in the object from one half). NaN
     /// counts as black.
     ///
@@ -93,7 +93,7 @@ impl EncodedPicture {
     /// # Panics
     /// Where the answer has another size.
     #[must_use]
-    pub fn decode(&self, answer: &[f32]) -> AnsweredMaps {
+    pub fn decode(&self, answer: &[f32]) -> PredictedMaps {
         let (extent, pixels) = (self.extent, self.extent.pixels());
         let has_paint = answer.len() == (OUTPUTS + 1) * pixels;
         assert!(
@@ -117,7 +117,7 @@ impl EncodedPicture {
                 paint.set_pixel(x, y, [sigmoid(of(OUTPUTS))]);
             }
         }
-        AnsweredMaps {
+        PredictedMaps {
             normals: Normals::new(normals),
             albedo,
             shading,
@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn what_lies_outside_the_mask_is_zero_in_and_out() {
         let mask = Planes::from_fn(Extent::new(20, 10), |x, _| [if x < 7 { 1.0 } else { 0.0 }]);
-        let encoded = EncodedPicture::new(&ramp(), &mask);
+        let encoded = NetworkInput::new(&ramp(), &mask);
         let maps = encoded.decode(&vec![0.3; OUTPUTS * 200]);
         for y in 0..10 {
             for x in 7..20 {
@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn the_answer_about_paint_is_a_probability_and_0_where_there_is_none() {
         let mask = Planes::filled(Extent::new(20, 10), [1.0]);
-        let encoded = EncodedPicture::new(&ramp(), &mask);
+        let encoded = NetworkInput::new(&ramp(), &mask);
         let without = encoded.decode(&vec![0.3; OUTPUTS * 200]);
         assert!(without.paint.plane(0).iter().all(|&p| p == 0.0));
         let with = encoded.decode(&vec![0.0; (OUTPUTS + 1) * 200]);
@@ -204,8 +204,8 @@ mod tests {
     #[test]
     fn a_brighter_picture_is_encoded_alike() {
         let mask = Planes::filled(Extent::new(20, 10), [1.0]);
-        let plain = EncodedPicture::new(&ramp(), &mask);
-        let brighter = EncodedPicture::new(&ramp().map(|v| 8.0 * v), &mask);
+        let plain = NetworkInput::new(&ramp(), &mask);
+        let brighter = NetworkInput::new(&ramp().map(|v| 8.0 * v), &mask);
         assert!((brighter.white() / plain.white() - 8.0).abs() < 1e-5);
         let pairs = plain.values().iter().zip(brighter.values());
         assert!(pairs.clone().all(|(a, b)| (a - b).abs() < 1e-5));
@@ -214,7 +214,7 @@ mod tests {
     #[test]
     fn a_share_of_one_and_no_offset_is_the_picture_itself() {
         let mask = Planes::filled(Extent::new(20, 10), [1.0]);
-        let encoded = EncodedPicture::new(&ramp(), &mask);
+        let encoded = NetworkInput::new(&ramp(), &mask);
         let mut answer = vec![0.0; OUTPUTS * 200];
         answer[8 * 200..].fill(50.0);
         let shading = encoded.decode(&answer).shading;
@@ -228,7 +228,7 @@ mod tests {
         let mut picture = ramp();
         picture.set_pixel(3, 3, [f32::NAN, f32::INFINITY, -2.0]);
         let mask = Planes::filled(Extent::new(20, 10), [1.0]);
-        let encoded = EncodedPicture::new(&picture, &mask);
+        let encoded = NetworkInput::new(&picture, &mask);
         assert!(encoded.values().iter().all(|v| v.is_finite()));
     }
 }

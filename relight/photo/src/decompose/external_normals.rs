@@ -9,7 +9,7 @@ use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
 
 /// A network for normals, and what its pictures and vectors mean.
 #[derive(Debug)]
-pub(super) struct OtherNormals {
+pub(super) struct ExternalNormals {
     net: Inference,
     /// Of the pictures that it is asked about.
     side: usize,
@@ -18,7 +18,7 @@ pub(super) struct OtherNormals {
     frame: Option<NormalsFrame>,
 }
 
-impl OtherNormals {
+impl ExternalNormals {
     pub(super) fn new(
         path: &Path,
         onnx: &[u8],

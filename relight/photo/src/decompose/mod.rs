@@ -34,8 +34,8 @@ pub use decomposer::{
     DecomposeOptions, Decomposer, Decomposition, MAX_PIXELS, SpecularGate, WORKING_SIDE,
 };
 pub use encoding::{
-    AnsweredMaps, EncodedPicture, HIGHLIGHT_OFFSET, LOG_FLOOR, LOG_LUMINANCE, LOG_SHADING, MASK,
-    MAX_LIGHT, MIN_FACING,
+    HIGHLIGHT_OFFSET, LOG_FLOOR, LOG_LUMINANCE, LOG_SHADING, MASK, MAX_LIGHT, MIN_FACING,
+    NetworkInput, PredictedMaps,
 };
 pub use error::DecomposeError;
 pub use gloss::{FittedGloss, fit_gloss};

@@ -2,54 +2,54 @@
 
 use std::ops::Range;
 
-use super::crop::{enlarged, inside, reduced};
-use super::encoding::{AnsweredMaps, EncodedPicture, MIN_FACING};
+use super::crop::{downscaled, enlarged, inside};
+use super::encoding::{MIN_FACING, NetworkInput, PredictedMaps};
 use super::light::PredictedLight;
 use crate::nets::{Inference, NetError};
 use relight_core::image::{Extent, ImageError, Part, Planes};
 use relight_core::light::{Normals, YUp};
 use relight_core::parallel;
 
-/// What answers an encoded picture of `side` x `side` pixels.
-pub(super) trait MapsNet: Send + Sync {
+/// A network that predicts the maps of a picture of `side` x `side` pixels.
+pub(super) trait MapNetwork: Send + Sync {
     fn side(&self) -> usize;
-    fn answer(&self, encoded: &[f32]) -> Result<NetAnswer, NetError>;
+    fn predict(&self, encoded: &[f32]) -> Result<NetworkOutput, NetError>;
 }
 
-/// What a network answers.
-pub(super) struct NetAnswer {
-    /// The planes that [`EncodedPicture::decode`] takes.
+/// The output of a network.
+pub(super) struct NetworkOutput {
+    /// The planes that [`NetworkInput::decode`] takes.
     pub(super) maps: Vec<f32>,
     /// Of a network with that head.
     pub(super) light: Option<PredictedLight>,
 }
 
-/// The network in an engine.
-pub(super) struct Engine {
+/// A network in the inference engine.
+pub(super) struct NetworkEngine {
     pub(super) inference: Inference,
     pub(super) side: usize,
 }
 
-impl MapsNet for Engine {
+impl MapNetwork for NetworkEngine {
     fn side(&self) -> usize {
         self.side
     }
 
-    fn answer(&self, encoded: &[f32]) -> Result<NetAnswer, NetError> {
+    fn predict(&self, encoded: &[f32]) -> Result<NetworkOutput, NetError> {
         let outputs = self.inference.run(encoded)?;
-        let mut answer = NetAnswer {
+        let mut prediction = NetworkOutput {
             maps: Vec::new(),
             light: None,
         };
         for output in outputs {
             // The heads for pixels have four sides, that for light two.
             if output.shape().len() > 2 {
-                answer.maps.append(&mut output.into_values());
+                prediction.maps.append(&mut output.into_values());
             } else {
-                answer.light = PredictedLight::from_output(output.values());
+                prediction.light = PredictedLight::from_output(output.values());
             }
         }
-        Ok(answer)
+        Ok(prediction)
     }
 }
 
@@ -57,8 +57,8 @@ impl MapsNet for Engine {
 /// log shading, highlight, paint.
 pub(super) type Fields = Planes<9>;
 
-/// The network's output for a picture.
-pub(super) struct Look {
+/// The prediction for a picture.
+pub(super) struct Prediction {
     pub(super) fields: Fields,
     pub(super) light: Option<PredictedLight>,
 }
@@ -66,9 +66,9 @@ pub(super) struct Look {
 /// The network for pictures of two sizes. An object that fills a smaller picture is nearer to those that it was trained on,
 /// and is seen as a whole; the larger picture shows what is finer.
 pub(super) struct Scales {
-    pub(super) fine: Box<dyn MapsNet>,
+    pub(super) fine: Box<dyn MapNetwork>,
     /// For pictures of half the width and height.
-    pub(super) coarse: Option<Box<dyn MapsNet>>,
+    pub(super) coarse: Option<Box<dyn MapNetwork>>,
 }
 
 /// The planes of fields that are normals.
@@ -83,37 +83,41 @@ const SHAPE_OF_LAYERS: f32 = 0.8;
 /// Keeps logarithms of dark values finite.
 const DARKEST: f32 = 1e-4;
 
-/// The answer for a picture of the network's size; with `mirror`, averaged with the answer for its mirror image.
-pub(super) fn look(
-    net: &dyn MapsNet,
+/// The prediction for a picture of the network's size; with `mirror`, averaged with the prediction for its mirror image.
+pub(super) fn predict(
+    net: &dyn MapNetwork,
     picture: &Planes<3>,
     mask: &Planes<1>,
     mirror: bool,
-) -> Result<Look, NetError> {
-    let plain = || answered(net, picture, mask);
+) -> Result<Prediction, NetError> {
+    let plain = || predict_once(net, picture, mask);
     if !mirror {
         return plain();
     }
-    let mirrored = || answered(net, &picture.clone().mirrored(), &mask.clone().mirrored());
+    let mirrored = || predict_once(net, &picture.clone().mirrored(), &mask.clone().mirrored());
     let (plain, mirrored) = parallel::join(plain, mirrored);
     let (plain, mirrored) = (plain?, mirrored?);
     let lights = plain.light.zip(mirrored.light);
-    Ok(Look {
+    Ok(Prediction {
         fields: mean(plain.fields, turned_back(mirrored.fields)),
         light: lights.map(|(plain, mirrored)| plain.mean(mirrored.mirrored())),
     })
 }
 
-fn answered(net: &dyn MapsNet, picture: &Planes<3>, mask: &Planes<1>) -> Result<Look, NetError> {
-    let encoded = EncodedPicture::new(picture, mask);
-    let answer = net.answer(encoded.values())?;
-    Ok(Look {
-        fields: of_maps(encoded.decode(&answer.maps)),
-        light: answer.light,
+fn predict_once(
+    net: &dyn MapNetwork,
+    picture: &Planes<3>,
+    mask: &Planes<1>,
+) -> Result<Prediction, NetError> {
+    let encoded = NetworkInput::new(picture, mask);
+    let output = net.predict(encoded.values())?;
+    Ok(Prediction {
+        fields: of_maps(encoded.decode(&output.maps)),
+        light: output.light,
     })
 }
 
-fn of_maps(maps: AnsweredMaps) -> Fields {
+fn of_maps(maps: PredictedMaps) -> Fields {
     let extent = maps.shading.extent();
     let log = |value: f32| value.max(DARKEST).ln();
     let mut fields = Planes::zeros(extent);
@@ -143,7 +147,7 @@ fn of_maps(maps: AnsweredMaps) -> Fields {
 }
 
 /// The maps that fields stand for, 0 outside the mask; in the memory of the fields.
-pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<AnsweredMaps, ImageError> {
+pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<PredictedMaps, ImageError> {
     let extent = fields.extent();
     fields.fill_rows(|y, row| {
         let mask = &mask[y * extent.width..][..extent.width];
@@ -163,7 +167,7 @@ pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<AnsweredMaps,
     });
     let [x, y, z, red, green, blue, shading, highlight, paint] = fields.into_planes();
     let normals = Normals::new(Planes::from_planes(extent, [x, y, z])?);
-    Ok(AnsweredMaps {
+    Ok(PredictedMaps {
         normals: without_gaps(normals, mask),
         albedo: Planes::from_planes(extent, [red, green, blue])?,
         shading: Planes::from_planes(extent, [shading])?,
@@ -172,7 +176,7 @@ pub(super) fn to_maps(mut fields: Fields, mask: &[bool]) -> Result<AnsweredMaps,
     })
 }
 
-/// The same normals; where two answers cancelled out, the neighbour's.
+/// The same normals; where two predictions cancelled out, the neighbour's.
 fn without_gaps(normals: Normals<YUp>, mask: &[bool]) -> Normals<YUp> {
     let [x, y, z] = normals.planes().planes();
     let is_gap = |at: usize| mask[at] && (x[at], y[at], z[at]) == (0.0, 0.0, 0.0);
@@ -202,7 +206,7 @@ fn mean(mut a: Fields, b: Fields) -> Fields {
 }
 
 /// The picture and its mask at the network's size, and their fields.
-pub(super) struct Whole {
+pub(super) struct PhotoPrediction {
     pub(super) picture: Planes<3>,
     pub(super) mask: Planes<1>,
     pub(super) fields: Fields,
@@ -210,7 +214,7 @@ pub(super) struct Whole {
     pub(super) light: Option<PredictedLight>,
 }
 
-impl Whole {
+impl PhotoPrediction {
     /// Of a picture and its mask that are a part of the square around the object.
     pub(super) fn new(
         scales: &Scales,
@@ -219,10 +223,10 @@ impl Whole {
         part: &Part,
         mirror: bool,
     ) -> Result<Self, NetError> {
-        let at_scale = |net: &dyn MapsNet, mirror| {
+        let at_scale = |net: &dyn MapNetwork, mirror| {
             let extent = Extent::new(net.side(), net.side());
-            let (picture, mask) = reduced(picture, mask, part, extent);
-            let Look { fields, light } = look(net, &picture, &mask, mirror)?;
+            let (picture, mask) = downscaled(picture, mask, part, extent);
+            let Prediction { fields, light } = predict(net, &picture, &mask, mirror)?;
             Ok::<_, NetError>(Self {
                 picture,
                 mask,

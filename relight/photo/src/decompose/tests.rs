@@ -1,6 +1,6 @@
 //! The decomposer as a whole, on networks that are not trained and on stubs.
 
-use super::network_output::{MapsNet, NetAnswer, look, to_maps};
+use super::network_output::{MapNetwork, NetworkOutput, predict, to_maps};
 use super::*;
 use crate::nets::{
     INPUTS, LIGHT_PARAMETERS, NetError, OUTPUTS, Weights, decomposer, decomposer_with_heads,
@@ -14,23 +14,23 @@ struct PixelNet<F> {
     pixel: F,
 }
 
-impl<F: Fn([f32; INPUTS]) -> [f32; OUTPUTS] + Send + Sync> MapsNet for PixelNet<F> {
+impl<F: Fn([f32; INPUTS]) -> [f32; OUTPUTS] + Send + Sync> MapNetwork for PixelNet<F> {
     fn side(&self) -> usize {
         self.side
     }
 
-    fn answer(&self, encoded: &[f32]) -> Result<NetAnswer, NetError> {
+    fn predict(&self, encoded: &[f32]) -> Result<NetworkOutput, NetError> {
         let pixels = self.side * self.side;
         assert_eq!(encoded.len(), INPUTS * pixels);
-        let mut answer = vec![0.0; OUTPUTS * pixels];
+        let mut output = vec![0.0; OUTPUTS * pixels];
         for at in 0..pixels {
             let input = std::array::from_fn(|channel| encoded[channel * pixels + at]);
             for (channel, value) in (self.pixel)(input).into_iter().enumerate() {
-                answer[channel * pixels + at] = value;
+                output[channel * pixels + at] = value;
             }
         }
-        Ok(NetAnswer {
-            maps: answer,
+        Ok(NetworkOutput {
+            maps: output,
             light: None,
         })
     }
@@ -183,9 +183,9 @@ fn the_gate_opens_where_more_than_five_percent_are_saturated() {
         Box::new(PixelNet {
             side: 32,
             pixel: |input: [f32; INPUTS]| {
-                let mut answer = by_colour(input);
-                answer[6] = 9.0;
-                answer
+                let mut output = by_colour(input);
+                output[6] = 9.0;
+                output
             },
         }),
         None,
@@ -257,11 +257,11 @@ fn fields_and_maps_are_the_same_but_for_the_mask() {
         pixel: by_colour,
     };
     let mask = disc(extent, 12.0);
-    let found = look(&net, &smooth(extent), &mask, false).unwrap().fields;
+    let found = predict(&net, &smooth(extent), &mask, false).unwrap().fields;
     let inside: Vec<bool> = mask.plane(0).iter().map(|&m| m > 0.5).collect();
     let maps = to_maps(found, &inside).unwrap();
-    let encoded = EncodedPicture::new(&smooth(extent), &mask);
-    let decoded = encoded.decode(&net.answer(encoded.values()).unwrap().maps);
+    let encoded = NetworkInput::new(&smooth(extent), &mask);
+    let decoded = encoded.decode(&net.predict(encoded.values()).unwrap().maps);
     assert!(most_apart(maps.shading.plane(0), decoded.shading.plane(0)) < 1e-5);
     assert!(most_apart(maps.albedo.plane(2), decoded.albedo.plane(2)) < 1e-5);
     let [a, b] = [maps.normals, decoded.normals].map(|n| n.planes().plane(0).to_vec());

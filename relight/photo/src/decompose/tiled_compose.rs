@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::compose::{ComposedLayers, LayerSums, ResidualSums, possible_highlight};
 use super::crop::{Window, inside};
-use super::encoding::AnsweredMaps;
+use super::encoding::PredictedMaps;
 use super::network_output::{Fields, to_maps};
 use relight_core::image::{Extent, ImageError, Part, Planes};
 use relight_core::light::{Normals, YUp};
@@ -14,7 +14,7 @@ use relight_core::parallel;
 const ROWS: usize = 64;
 
 /// Maps at the network's size that are brought to another one, a strip at a time.
-pub(super) struct Enlargement {
+pub(super) struct MapUpscaler {
     /// They go on beyond the mask.
     fields: Fields,
     /// Of another network, in place of the own ones.
@@ -23,7 +23,7 @@ pub(super) struct Enlargement {
     part: Part,
 }
 
-impl Enlargement {
+impl MapUpscaler {
     /// Of fields that are known inside a mask, and another network's normals, for a part of the square around the object.
     pub(super) fn new(
         fields: &Fields,
@@ -39,7 +39,7 @@ impl Enlargement {
     }
 
     /// The maps of some rows, 0 outside the mask.
-    fn maps(&self, rows: &Range<usize>, mask: &[bool]) -> Result<AnsweredMaps, ImageError> {
+    fn maps(&self, rows: &Range<usize>, mask: &[bool]) -> Result<PredictedMaps, ImageError> {
         let mut maps = to_maps(self.rows_of(&self.fields, rows), mask)?;
         if let Some(normals) = &self.normals {
             let mut vectors = self.rows_of(normals, rows);
@@ -112,7 +112,7 @@ pub(super) struct LayerPlan<'a> {
 
 impl LayerPlan<'_> {
     /// Composes all strips: once for what is known of the whole picture only, and once more for the layers.
-    pub(super) fn compose(&self, maps: &Enlargement) -> Result<FullLayers, ImageError> {
+    pub(super) fn compose(&self, maps: &MapUpscaler) -> Result<FullLayers, ImageError> {
         let height = self.picture.extent().height;
         let strips: Vec<Range<usize>> = (0..height)
             .step_by(ROWS)
@@ -166,9 +166,9 @@ impl LayerPlan<'_> {
     /// Picture, mask and maps of some rows.
     fn strip(
         &self,
-        maps: &Enlargement,
+        maps: &MapUpscaler,
         rows: &Range<usize>,
-    ) -> Result<(Planes<3>, &[bool], AnsweredMaps), ImageError> {
+    ) -> Result<(Planes<3>, &[bool], PredictedMaps), ImageError> {
         let width = self.picture.extent().width;
         let mask = &self.inside[rows.start * width..rows.end * width];
         let picture = cut_rows(self.picture, rows.clone());

@@ -23,11 +23,11 @@ impl ObjectMesh {
     ///
     /// # Errors
     /// [`ExportError::Empty`] if the object is nowhere.
-    pub fn relief(object: &CapturedObject, vertices: usize) -> Result<Self, ExportError> {
+    pub fn from_object(object: &CapturedObject, vertices: usize) -> Result<Self, ExportError> {
         if object.alpha().plane(0).iter().all(|&alpha| alpha < 0.5) {
             return Err(ExportError::Empty);
         }
-        Ok(relief(object, vertices.max(2)))
+        Ok(grid_mesh(object, vertices.max(2)))
     }
 }
 
@@ -47,7 +47,7 @@ fn place([u, v]: [f32; 2], [width, height]: [f32; 2], z: f32) -> [f32; 3] {
 
 /// A vertex stands in the middle of each cell of a grid. A square of four is there where one of them is on the object:
 /// the alpha of the colours cuts the outline out of it.
-fn relief(object: &CapturedObject, side: usize) -> ObjectMesh {
+fn grid_mesh(object: &CapturedObject, side: usize) -> ObjectMesh {
     let picture = object.extent();
     let longest = picture.width.max(picture.height);
     let scale = (side as f64 / longest as f64).min(1.0);
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn a_ball_becomes_a_dome_whose_triangles_face_the_viewer() {
-        let mesh = ObjectMesh::relief(&ball(120), 60).unwrap();
+        let mesh = ObjectMesh::from_object(&ball(120), 60).unwrap();
         let highest = mesh.positions.iter().map(|p| p[2]).fold(0.0, f32::max);
         // The ground is the rim's mean, which on 60 vertices is 0.06 to 0.09 high.
         assert!((0.41..=0.45).contains(&highest), "{highest}");
@@ -208,7 +208,7 @@ mod tests {
         let whole = ball(8);
         let none = Planes::zeros(whole.extent());
         let empty = CapturedObject::new("none", whole.surface().clone(), none.clone(), none);
-        let error = ObjectMesh::relief(&empty.unwrap(), 8).unwrap_err();
+        let error = ObjectMesh::from_object(&empty.unwrap(), 8).unwrap_err();
         assert!(matches!(error, ExportError::Empty));
     }
 }

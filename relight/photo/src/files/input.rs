@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use relight_core::image::{Extent, ImageError, Planes, Rgb, StoredImage, Transfer};
 use relight_core::reader::{Encoding, SampleId, Source, Turns};
-use relit_data::file_names::{alike_beside, folded, has_extension, is_hidden};
+use relit_data::file_names::{folded, has_extension, is_hidden, name_differing_in_case};
 use relit_data::geometry::Rect;
 use relit_data::shard::Dataset;
 use relit_data::still::{Format, is_named};
@@ -53,7 +53,7 @@ pub enum PhotoInput {
 
 /// The photographs that paths lead to.
 #[derive(Default)]
-pub struct FoundPhotos {
+pub struct PhotoList {
     /// The photographs.
     pub inputs: Vec<PhotoInput>,
     /// The other files of the folders, apart from what operating systems leave behind.
@@ -83,7 +83,7 @@ impl PhotoInput {
     /// # Errors
     /// If a folder cannot be read or holds none, a shard cannot be opened, or two photographs would
     /// be written to one folder.
-    pub fn find(paths: &[PathBuf], most: Option<u32>) -> Result<FoundPhotos, DecomposeError> {
+    pub fn find(paths: &[PathBuf], most: Option<u32>) -> Result<PhotoList, DecomposeError> {
         let (mut found, mut unused) = (Vec::new(), Vec::new());
         for path in paths {
             if path.is_dir() {
@@ -95,7 +95,7 @@ impl PhotoInput {
             }
         }
         check_names(&found)?;
-        Ok(FoundPhotos {
+        Ok(PhotoList {
             inputs: found.into_iter().map(|(_, input)| input).collect(),
             unused,
         })
@@ -119,7 +119,7 @@ impl PhotoInput {
     /// # Errors
     /// [`DecomposeError::Names`], or if the folder cannot be listed.
     pub fn check_result(path: &Path) -> Result<(), DecomposeError> {
-        match alike_beside(path).map_err(DecomposeError::read(path))? {
+        match name_differing_in_case(path).map_err(DecomposeError::read(path))? {
             None => Ok(()),
             Some(other) => Err(DecomposeError::Names(format!(
                 "{} would replace {} where a file system ignores case: rename the photograph, or give another folder with \
@@ -223,7 +223,7 @@ fn use_of(path: PathBuf) -> Option<UnusedFile> {
     let _ = file.and_then(|file| file.take(HEAD).read_to_end(&mut head));
     match Format::sniff(&head) {
         Some(format) => {
-            let (name, advice) = format.unread()?;
+            let (name, advice) = format.unsupported()?;
             let what = format!("is {name}, which is not read: {advice}");
             Some(UnusedFile::new(path, &what))
         }

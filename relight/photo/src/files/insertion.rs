@@ -31,7 +31,7 @@ pub struct Insertion<'a> {
     background: BackgroundFile,
     /// The first frame of a video.
     first: Option<Rgb<Linear>>,
-    setting: SceneEnvironment,
+    environment: SceneEnvironment,
     /// How far the light is rotated, radians.
     angle: f64,
     decomposer: &'a Decomposer,
@@ -118,11 +118,11 @@ impl<'a> Insertion<'a> {
         options: DecomposeOptions,
     ) -> Result<Self, InsertError> {
         let still = still_of(&background, first.as_ref())?;
-        let setting = SceneEnvironment::new(scene, still, light)?;
+        let environment = SceneEnvironment::new(scene, still, light)?;
         Ok(Self {
             background,
             first,
-            setting,
+            environment,
             angle: scene.light.angle.to_radians(),
             decomposer,
             options,
@@ -131,22 +131,22 @@ impl<'a> Insertion<'a> {
 
     /// Light, size, tilt and matching.
     #[must_use]
-    pub const fn setting(&self) -> &SceneEnvironment {
-        &self.setting
+    pub const fn environment(&self) -> &SceneEnvironment {
+        &self.environment
     }
 
     /// An object, decomposed no larger than it has to be.
     ///
     /// # Errors
     /// If it cannot be decomposed.
-    pub fn subject(
+    pub fn relightable(
         &self,
         object: &ObjectDescription,
         source: InsertSource,
     ) -> Result<RelightableObject, InsertError> {
         Ok(match source {
             InsertSource::Photo(photo) => {
-                let photo = self.setting.reduced(object, *photo);
+                let photo = self.environment.downscaled(object, *photo);
                 RelightableObject::from_photo(&photo, self.decomposer, &self.options)?
             }
             InsertSource::Captured(object) => RelightableObject::from_captured(&object)?,
@@ -198,11 +198,11 @@ impl<'a> Insertion<'a> {
     fn still(&self, angle: f64) -> Rgb<Linear> {
         match &self.background {
             BackgroundFile::Photo(picture) => picture.clone(),
-            BackgroundFile::Panorama(parts) => self.setting.seen(&parts.0, &parts.1, angle),
+            BackgroundFile::Panorama(parts) => self.environment.seen(&parts.0, &parts.1, angle),
             BackgroundFile::Movie(_) => self
                 .first
                 .clone()
-                .unwrap_or_else(|| Rgb::new(Planes::zeros(self.setting.extent))),
+                .unwrap_or_else(|| Rgb::new(Planes::zeros(self.environment.extent))),
         }
     }
 
@@ -220,7 +220,7 @@ impl<'a> Insertion<'a> {
             return Err(no_frame());
         };
         let rate = movie.frame_rate();
-        let mut film = MovieWriter::create(path, format, self.setting.extent, rate)?;
+        let mut film = MovieWriter::create(path, format, self.environment.extent, rate)?;
         let mut frames = 0;
         while let Some(background) = next {
             let picture = scene.compose(&background, &layers, u64::from(frames));
@@ -242,7 +242,7 @@ impl<'a> Insertion<'a> {
         mut written: impl FnMut(),
     ) -> Result<u32, InsertError> {
         let frames = output.frames;
-        let (extent, rate) = (self.setting.extent, output.frames_per_second);
+        let (extent, rate) = (self.environment.extent, output.frames_per_second);
         let mut film = MovieWriter::create(output.path, format, extent, rate)?;
         for frame in 0..frames {
             let part = f64::from(frame) / f64::from(frames);
@@ -313,9 +313,9 @@ fn given_light(
     };
     let path = folder.join(mask);
     let (mask, _) = StoredImage::read(&path)?.object_mask(&path)?;
-    let subject =
+    let relightable =
         RelightableObject::new(picture, &mask, None, decomposer, options).map_err(|source| {
             InsertError::Input(format!("{}: {}", path.display(), with_causes(&source)))
         })?;
-    Ok(Some(LightSource::Coefficients(subject.light.clone())))
+    Ok(Some(LightSource::Coefficients(relightable.light.clone())))
 }

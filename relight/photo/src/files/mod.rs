@@ -11,7 +11,7 @@ mod output;
 mod results;
 
 pub use background::BackgroundFile;
-pub use input::{FoundPhotos, PhotoInput, PhotoReading, UnusedFile};
+pub use input::{PhotoInput, PhotoList, PhotoReading, UnusedFile};
 pub use insertion::{InsertSource, Insertion, InsertionOutput};
 pub use movie::{FrameRate, MovieError, MovieFormat, MovieWriter};
 pub use movie_reader::{FrameTiming, MovieReader};

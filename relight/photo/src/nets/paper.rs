@@ -7,9 +7,9 @@ use super::graph::{Graph, Value};
 
 /// Width and height of a picture for which the released Light-Net's first layer is made.
 pub const RELEASED_SIDE: usize = 256;
-/// Coefficients and light colour that Light-Net answers: 9 + 3.
+/// Coefficients and light colour that Light-Net predicts: 9 + 3.
 pub const LIGHT_OUTPUTS: usize = 12;
-/// What the reflectance net answers: specular reflectance (red, green, blue) and smoothness.
+/// What the reflectance net predicts: specular reflectance (red, green, blue) and smoothness.
 pub const REFLECTANCE_OUTPUTS: usize = 4;
 
 /// Output channels of the encoder's steps; all but the first halve the picture.

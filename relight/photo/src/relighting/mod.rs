@@ -50,7 +50,7 @@ pub(crate) use placed_object::PlacedObject;
 pub use placement::Placement;
 pub(crate) use placement::{Fit, rows};
 pub use relightable_object::RelightableObject;
-pub use sequence::{Backdrop, Shot};
+pub use sequence::{Backdrop, RelightingSequence};
 pub use source::{LightSource, exposure_between, likeness};
 pub use sun::SeenSun;
 pub use view::PanoramaView;

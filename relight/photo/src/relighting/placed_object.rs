@@ -15,7 +15,7 @@ pub(crate) struct PlacedObject {
     pub(crate) alpha: Planes<1>,
     pub(crate) foot: Foot,
     /// Its shape, once a shadow was asked for.
-    relief: OnceLock<Option<HeightField>>,
+    height_field: OnceLock<Option<HeightField>>,
 }
 
 impl PlacedObject {
@@ -25,20 +25,20 @@ impl PlacedObject {
             foot: Foot::from_alpha(&alpha),
             fit,
             alpha,
-            relief: OnceLock::new(),
+            height_field: OnceLock::new(),
         }
     }
 
     /// The shape of the object whose own normals these are; `None` if it covers no pixel by a half.
-    pub(crate) fn relief(&self, normals: &Normals<YUp>) -> Option<&HeightField> {
-        if self.relief.get().is_none() {
+    pub(crate) fn height_field(&self, normals: &Normals<YUp>) -> Option<&HeightField> {
+        if self.height_field.get().is_none() {
             // Not within `get_or_init`: while this thread waits for others, it may take over another frame that comes here.
-            let _ = self.relief.set(self.new_relief(normals));
+            let _ = self.height_field.set(self.new_height_field(normals));
         }
-        self.relief.get()?.as_ref()
+        self.height_field.get()?.as_ref()
     }
 
-    fn new_relief(&self, normals: &Normals<YUp>) -> Option<HeightField> {
+    fn new_height_field(&self, normals: &Normals<YUp>) -> Option<HeightField> {
         let mut turned = self.fit.apply(normals.planes());
         let (sin, cos) = (self.fit.angle.sin() as f32, self.fit.angle.cos() as f32);
         let [x, y, _] = turned.planes_mut();
@@ -51,18 +51,18 @@ impl PlacedObject {
 
 /// How an object stood last: while its light turns, or it is moved, it stands so again.
 #[derive(Debug, Default)]
-pub(crate) struct LastPlaced(Mutex<Option<Arc<PlacedObject>>>);
+pub(crate) struct PlacedObjectCache(Mutex<Option<Arc<PlacedObject>>>);
 
-impl LastPlaced {
+impl PlacedObjectCache {
     /// An object that covers its own pixels so far, as it stands by this fit.
-    pub(crate) fn by(&self, fit: Fit, alpha: &Planes<1>) -> Arc<PlacedObject> {
-        if let Some(standing) = self.get().filter(|standing| standing.fit == fit) {
-            return standing;
+    pub(crate) fn get_or_place(&self, fit: Fit, alpha: &Planes<1>) -> Arc<PlacedObject> {
+        if let Some(placed) = self.get().filter(|placed| placed.fit == fit) {
+            return placed;
         }
         // Without the lock: while this thread waits for others, it may take over another frame that comes here.
-        let standing = Arc::new(PlacedObject::new(alpha, fit));
-        *self.lock() = Some(Arc::clone(&standing));
-        standing
+        let placed = Arc::new(PlacedObject::new(alpha, fit));
+        *self.lock() = Some(Arc::clone(&placed));
+        placed
     }
 
     fn get(&self) -> Option<Arc<PlacedObject>> {
@@ -75,7 +75,7 @@ impl LastPlaced {
     }
 }
 
-impl Clone for LastPlaced {
+impl Clone for PlacedObjectCache {
     fn clone(&self) -> Self {
         Self(Mutex::new(self.get()))
     }
@@ -105,20 +105,23 @@ mod tests {
 
     #[test]
     fn what_stands_as_before_is_not_made_again() {
-        let last = LastPlaced::default();
-        let first = last.by(fit(0.5, 0.0), &disc());
-        assert!(Arc::ptr_eq(&first, &last.by(fit(0.5, 0.0), &disc())));
-        let shape = first.relief(&Normals::sphere(40)).unwrap();
-        let again = first.relief(&Normals::sphere(40)).unwrap();
+        let last = PlacedObjectCache::default();
+        let first = last.get_or_place(fit(0.5, 0.0), &disc());
+        assert!(Arc::ptr_eq(
+            &first,
+            &last.get_or_place(fit(0.5, 0.0), &disc())
+        ));
+        let shape = first.height_field(&Normals::sphere(40)).unwrap();
+        let again = first.height_field(&Normals::sphere(40)).unwrap();
         assert!(std::ptr::eq(shape, again));
     }
 
     #[test]
     fn what_stands_otherwise_is() {
-        let last = LastPlaced::default();
-        let first = last.by(fit(0.5, 0.0), &disc());
+        let last = PlacedObjectCache::default();
+        let first = last.get_or_place(fit(0.5, 0.0), &disc());
         for other in [fit(0.6, 0.0), fit(0.5, 20.0)] {
-            let changed = last.by(other, &disc());
+            let changed = last.get_or_place(other, &disc());
             assert_eq!(changed.fit, other);
             assert_ne!(changed.alpha.extent(), first.alpha.extent());
         }

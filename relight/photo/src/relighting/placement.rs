@@ -32,7 +32,7 @@ impl Placement {
 /// From an object's own pixels to those of a scene: scaled, and rotated about the centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Fit {
-    reduced: Extent,
+    downscaled: Extent,
     pub(crate) angle: f64,
 }
 
@@ -46,13 +46,13 @@ impl Fit {
         let scale = wanted / height;
         let side = |pixels: usize| ((pixels as f64 * scale).round() as usize).max(1);
         Self {
-            reduced: Extent::new(side(own.width), side(own.height)),
+            downscaled: Extent::new(side(own.width), side(own.height)),
             angle,
         }
     }
 
     pub(crate) fn apply<const C: usize>(&self, image: &Planes<C>) -> Planes<C> {
-        rotated(&image.resized(self.reduced), self.angle)
+        rotated(&image.resized(self.downscaled), self.angle)
     }
 }
 

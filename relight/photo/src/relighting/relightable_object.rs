@@ -6,7 +6,7 @@ use super::InsertError;
 use super::cut::Cut;
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
-use super::placed_object::{LastPlaced, PlacedObject};
+use super::placed_object::{PlacedObject, PlacedObjectCache};
 use super::placement::Fit;
 use super::shading::{DARK, Shading};
 use super::smooth::weighted_mean;
@@ -35,9 +35,9 @@ const REST_GROWTH: f32 = 3.0;
 /// let decomposer = Decomposer::with_side(&weights, 32)?;
 /// let photo = Rgb::new(Planes::filled(Extent::new(60, 40), [0.5, 0.4, 0.3]));
 /// let mask = Planes::from_fn(Extent::new(60, 40), |x, _| [f32::from(u8::from((10..50).contains(&x)))]);
-/// let subject = RelightableObject::new(&photo, &mask, None, &decomposer, &DecomposeOptions::default())?;
-/// let same = subject.relit(&subject.light, &MaterialChange::default())?;
-/// let shown = subject.in_place(&photo, &same);
+/// let relightable = RelightableObject::new(&photo, &mask, None, &decomposer, &DecomposeOptions::default())?;
+/// let same = relightable.relit(&relightable.light, &MaterialChange::default())?;
+/// let shown = relightable.in_place(&photo, &same);
 /// assert!((shown.planes().pixel(30, 20)[0] - 0.5).abs() < 1e-3);
 /// # Ok::<(), relight_photo::relighting::InsertError>(())
 /// ```
@@ -61,7 +61,7 @@ pub struct RelightableObject {
     rest: Planes<3>,
     /// The photograph's light, grey, of order 2, in units in which the mean shading is 1.
     pub light: ShLight,
-    last_standing: LastPlaced,
+    placed_cache: PlacedObjectCache,
 }
 
 impl RelightableObject {
@@ -138,7 +138,7 @@ impl RelightableObject {
             gloss: surface.gloss().map(|gloss| mean_gloss(gloss, &covered)),
             rest: Planes::zeros(extent),
             light,
-            last_standing: LastPlaced::default(),
+            placed_cache: PlacedObjectCache::default(),
         })
     }
 
@@ -199,7 +199,7 @@ impl RelightableObject {
             gloss,
             rest,
             light: found.shading_light.clone(),
-            last_standing: LastPlaced::default(),
+            placed_cache: PlacedObjectCache::default(),
         })
     }
 
@@ -210,8 +210,8 @@ impl RelightableObject {
     }
 
     /// The object as it stands by this fit.
-    pub(crate) fn standing(&self, fit: Fit) -> Arc<PlacedObject> {
-        self.last_standing.by(fit, &self.matte.alpha)
+    pub(crate) fn placed(&self, fit: Fit) -> Arc<PlacedObject> {
+        self.placed_cache.get_or_place(fit, &self.matte.alpha)
     }
 
     /// The object's colours in another light, in the units of [`RelightableObject::light`] (see
@@ -236,7 +236,7 @@ impl RelightableObject {
     /// photograph's own light gives the photograph.
     ///
     /// # Errors
-    /// None for a subject, whose maps have one size; those of the render layers in general.
+    /// None for a relightable, whose maps have one size; those of the render layers in general.
     pub fn relit(
         &self,
         light: &ShLight,
@@ -254,12 +254,12 @@ impl RelightableObject {
                 let irradiance = [*red, *green, *blue];
                 let shades = self.shading.at(at, irradiance, kept);
                 let own = self.shading.own[at] + DARK;
-                let hedge = self.shading.hedge(at, shades, mean_change);
+                let damping = self.shading.damping(at, shades, mean_change);
                 let colours: [f32; 3] = std::array::from_fn(|channel| {
                     let grown = ((irradiance[channel] + DARK) / own).min(REST_GROWTH);
                     let colour = self.albedo.plane(channel)[at] * shades[channel]
                         + self.rest.plane(channel)[at] * grown;
-                    colour * hedge * change.tint[channel]
+                    colour * damping * change.tint[channel]
                 });
                 [*red, *green, *blue] = colours;
             }

@@ -20,16 +20,16 @@ pub enum Backdrop {
 /// An object of a photograph, and the light in which it is to be shown. All that does not depend on the light's angle is
 /// computed once, so that nothing flickers while it turns.
 #[derive(Debug)]
-pub struct Shot<'a> {
+pub struct RelightingSequence<'a> {
     photo: &'a Rgb<Linear>,
-    subject: &'a RelightableObject,
+    relightable: &'a RelightableObject,
     /// In the subject's units.
     light: ShLight,
     backdrop: Backdrop,
     exposure: f32,
 }
 
-impl<'a> Shot<'a> {
+impl<'a> RelightingSequence<'a> {
     /// The object in this light, times `exposure`. The light is brought to the strength of the photograph's own:
     /// [`exposure_between`]. A panorama behind it is as bright as a white diffuse surface in its light would be.
     ///
@@ -37,16 +37,16 @@ impl<'a> Shot<'a> {
     /// If the photograph is not the subject's.
     pub fn new(
         photo: &'a Rgb<Linear>,
-        subject: &'a RelightableObject,
+        relightable: &'a RelightableObject,
         light: &ShLight,
         backdrop: Backdrop,
         exposure: f32,
     ) -> Result<Self, InsertError> {
-        check_extent("photograph", photo.planes().extent(), subject.photo)?;
-        let scale = exposure_between(&subject.light, light);
+        check_extent("photograph", photo.planes().extent(), relightable.photo)?;
+        let scale = exposure_between(&relightable.light, light);
         Ok(Self {
             photo,
-            subject,
+            relightable,
             light: light.clone().tinted([f64::from(scale); 3]),
             backdrop: match backdrop {
                 Backdrop::Panorama(view, panorama) => {
@@ -67,11 +67,13 @@ impl<'a> Shot<'a> {
     /// As [`RelightableObject::relit`].
     pub fn picture(&self, turn: f64) -> Result<Rgb<Linear>, InsertError> {
         let turned = self.turned(turn);
-        let relit = self.subject.relit(&turned, &MaterialChange::default())?;
+        let relit = self
+            .relightable
+            .relit(&turned, &MaterialChange::default())?;
         let colours = relit.map(|v| v * self.exposure);
         Ok(match self.background(turn) {
-            None => self.subject.in_place(self.photo, &colours),
-            Some(background) => self.subject.before(&background, &colours),
+            None => self.relightable.in_place(self.photo, &colours),
+            Some(background) => self.relightable.before(&background, &colours),
         })
     }
 

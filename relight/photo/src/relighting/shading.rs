@@ -26,7 +26,7 @@ const KEPT_IF_CERTAIN: f32 = 0.5;
 /// Shading that counts as dark, and as bright.
 const DARK_AND_BRIGHT: (f32, f32) = (0.15, 0.5);
 
-/// The uncertainty of the decomposition of a photograph: see [`Shading::hedge`].
+/// The uncertainty of the decomposition of a photograph: see [`Shading::damping`].
 #[derive(Debug, Clone)]
 struct Doubt {
     /// Pixels over which the mean change is taken.
@@ -128,7 +128,7 @@ impl Shading {
         })
     }
 
-    /// The mean over the object of the change `ln((S' + d) / (S + d))` in new irradiance; 0 where no hedge needs it.
+    /// The mean over the object of the change `ln((S' + d) / (S + d))` in new irradiance; 0 where no damping needs it.
     pub(crate) fn mean_change(&self, irradiance: &Planes<3>, kept: f32) -> f32 {
         let Some(Doubt { sample, .. }) = &self.doubt else {
             return 0.0;
@@ -152,7 +152,7 @@ impl Shading {
     /// grow with its distance from the shading S of the photograph. So only parts of its change c are kept: t of the mean m over
     /// the object, which is the brightness of the light on the visible side, and u of the deviation from m:
     /// `exp(-(1 - t) m - (1 - u) (c - m))`. It is 1 in the light of the photograph.
-    pub(crate) fn hedge(&self, at: usize, new: [f32; 3], mean_change: f32) -> f32 {
+    pub(crate) fn damping(&self, at: usize, new: [f32; 3], mean_change: f32) -> f32 {
         let Some(Doubt { kept_beside, .. }) = &self.doubt else {
             return 1.0;
         };
@@ -190,7 +190,7 @@ mod tests {
         let new = Planes::filled(Extent::new(SIDE, SIDE), [1.0; 3]);
         let mean_change = shading.mean_change(&new, 0.0);
         let new = shading.at(at, [1.0; 3], 0.0);
-        new[0] * shading.hedge(at, new, mean_change)
+        new[0] * shading.damping(at, new, mean_change)
     }
 
     #[test]
@@ -229,14 +229,14 @@ mod tests {
         assert!((same[0] - 0.1).abs() < 1e-4);
         let new = Planes::filled(Extent::new(SIDE, SIDE), [1.0; 3]);
         let mean_change = shading.mean_change(&new, 1.0);
-        assert!((shading.hedge(DARK_PLACE, same, mean_change) - 1.0).abs() < 1e-4);
+        assert!((shading.damping(DARK_PLACE, same, mean_change) - 1.0).abs() < 1e-4);
     }
 
     #[test]
     fn light_of_another_colour_keeps_its_colour() {
         let shading = half_dark();
         let new = shading.at(DARK_PLACE, [1.5, 1.0, 0.5], 0.0);
-        let hedged = new.map(|value| value * shading.hedge(DARK_PLACE, new, 0.3));
+        let hedged = new.map(|value| value * shading.damping(DARK_PLACE, new, 0.3));
         assert!((hedged[0] / hedged[1] - new[0] / new[1]).abs() < 1e-5);
     }
 

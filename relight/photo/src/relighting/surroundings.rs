@@ -31,7 +31,7 @@ impl LightSource {
             let v = if v.is_finite() { v.max(0.0) } else { 0.0 };
             if v >= CLIPPED { v * BEYOND } else { v }
         });
-        let near = radiance.resized(reduced(extent));
+        let near = radiance.resized(downscaled(extent));
         let far = radiance.resized(COARSE);
         let longest = extent.width.max(extent.height).max(1) as f64;
         let half = (field.clamp(1.0, 150.0) / 2.0).to_radians();
@@ -76,7 +76,7 @@ fn add_sun(made: &mut Planes<3>, sun: SeenSun, angles: [f64; 2]) {
 }
 
 /// The picture's size, at most that of the panorama.
-fn reduced(extent: Extent) -> Extent {
+fn downscaled(extent: Extent) -> Extent {
     Extent::new(
         extent.width.clamp(1, MADE.width),
         extent.height.clamp(1, MADE.height),

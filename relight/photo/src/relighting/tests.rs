@@ -40,7 +40,7 @@ fn photo() -> Rgb<Linear> {
     }))
 }
 
-fn subject(specular: SpecularGate) -> RelightableObject {
+fn relightable(specular: SpecularGate) -> RelightableObject {
     let options = DecomposeOptions {
         specular,
         ..DecomposeOptions::default()
@@ -60,15 +60,17 @@ fn most_apart(a: &Rgb<Linear>, b: &Rgb<Linear>) -> f32 {
 #[test]
 fn the_own_light_gives_the_photograph_back() {
     for specular in [SpecularGate::Off, SpecularGate::On] {
-        let subject = subject(specular);
-        let light = LightSource::Coefficients(subject.light.clone())
+        let relightable = relightable(specular);
+        let light = LightSource::Coefficients(relightable.light.clone())
             .light()
             .unwrap();
         let light = light
             .clone()
-            .tinted([f64::from(exposure_between(&subject.light, &light)); 3]);
-        let same = subject.relit(&light, &MaterialChange::default()).unwrap();
-        let shown = subject.in_place(&photo(), &same);
+            .tinted([f64::from(exposure_between(&relightable.light, &light)); 3]);
+        let same = relightable
+            .relit(&light, &MaterialChange::default())
+            .unwrap();
+        let shown = relightable.in_place(&photo(), &same);
         let apart = most_apart(&shown, &photo());
         assert!(apart < 0.5 / 255.0, "{apart}");
     }
@@ -76,18 +78,18 @@ fn the_own_light_gives_the_photograph_back() {
 
 #[test]
 fn other_light_changes_the_object_and_nothing_else() {
-    let subject = subject(SpecularGate::Off);
+    let relightable = relightable(SpecularGate::Off);
     let lamp = LightSource::Lamp(DiscLamp {
         azimuth: 270.0,
         ..DiscLamp::default()
     });
-    let relit = subject
+    let relit = relightable
         .relit(&lamp.light().unwrap(), &MaterialChange::default())
         .unwrap();
-    let shown = subject.in_place(&photo(), &relit);
+    let shown = relightable.in_place(&photo(), &relit);
     assert!(most_apart(&shown, &photo()) > 0.1);
-    let alpha = &subject.matte.alpha;
-    let [left, top] = subject.place;
+    let alpha = &relightable.matte.alpha;
+    let [left, top] = relightable.place;
     for y in 0..EXTENT.height {
         for x in 0..EXTENT.width {
             let inside = x.checked_sub(left).zip(y.checked_sub(top));
@@ -103,11 +105,11 @@ fn other_light_changes_the_object_and_nothing_else() {
 
 #[test]
 fn light_that_turns_once_changes_the_picture_smoothly_and_ends_where_it_began() {
-    let subject = subject(SpecularGate::On);
+    let relightable = relightable(SpecularGate::On);
     let light = LightSource::Lamp(DiscLamp::default()).light().unwrap();
     let frame = |part: f64| {
         let turn = Rotation::about(Direction::UP, part * std::f64::consts::TAU);
-        let relit = subject
+        let relit = relightable
             .relit(&light.rotated(&turn), &MaterialChange::default())
             .unwrap();
         Rgb::<Linear>::new(relit)
@@ -121,7 +123,7 @@ fn light_that_turns_once_changes_the_picture_smoothly_and_ends_where_it_began() 
 
 #[test]
 fn a_tint_colours_and_gloss_adds_light() {
-    let subject = subject(SpecularGate::Off);
+    let relightable = relightable(SpecularGate::Off);
     let light = LightSource::Lamp(DiscLamp {
         azimuth: 0.0,
         elevation: 0.0,
@@ -129,7 +131,7 @@ fn a_tint_colours_and_gloss_adds_light() {
     })
     .light()
     .unwrap();
-    let relit = |change: &MaterialChange| subject.relit(&light, change).unwrap();
+    let relit = |change: &MaterialChange| relightable.relit(&light, change).unwrap();
     let plain = relit(&MaterialChange::default());
     let red = relit(&MaterialChange {
         tint: [1.0, 0.0, 0.0],
@@ -148,12 +150,12 @@ fn a_tint_colours_and_gloss_adds_light() {
 
 #[test]
 fn pasted_edges_do_not_show_the_old_background() {
-    let subject = subject(SpecularGate::Off);
+    let relightable = relightable(SpecularGate::Off);
     let black = Rgb::new(Planes::zeros(EXTENT));
-    let own = subject
-        .relit(&subject.light, &MaterialChange::default())
+    let own = relightable
+        .relit(&relightable.light, &MaterialChange::default())
         .unwrap();
-    let pasted = subject.before(&black, &own);
+    let pasted = relightable.before(&black, &own);
     let planes = pasted.planes().planes();
     // The background is green, the object is not.
     let is_greenish = |at: usize| planes[1][at] > 1.3 * planes[0][at].max(0.02);
@@ -207,9 +209,9 @@ fn captured_ball() -> CapturedObject {
 
 #[test]
 fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_where_a_lamp_is() {
-    let subject = RelightableObject::from_captured(&captured_ball()).unwrap();
+    let relightable = RelightableObject::from_captured(&captured_ball()).unwrap();
     let none = MaterialChange::default();
-    let even = subject.relit(&subject.light, &none).unwrap();
+    let even = relightable.relit(&relightable.light, &none).unwrap();
     for (found, wanted) in even.pixel(12, 20).into_iter().zip([0.6, 0.3, 0.1]) {
         assert!((found - wanted).abs() < 1e-3, "{found} {wanted}");
     }
@@ -218,8 +220,8 @@ fn a_captured_object_has_the_colours_of_its_albedo_in_even_light_and_is_bright_w
         ..DiscLamp::default()
     });
     let light = lamp.light().unwrap();
-    let scale = f64::from(exposure_between(&subject.light, &light));
-    let lit = subject.relit(&light.tinted([scale; 3]), &none).unwrap();
+    let scale = f64::from(exposure_between(&relightable.light, &light));
+    let lit = relightable.relit(&light.tinted([scale; 3]), &none).unwrap();
     let (right, left) = (lit.pixel(28, 16)[0], lit.pixel(4, 16)[0]);
     assert!(right > 2.0 * left, "{right} {left}");
     // Where the light is strongest it is as bright as in even light.

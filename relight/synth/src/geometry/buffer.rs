@@ -2,8 +2,8 @@
 
 use glam::{Affine3A, DVec4, Mat3, Vec2, Vec3, Vec4};
 
-use super::raster::{NOTHING, Projected, Triangle, Weights, foremost};
-use crate::mesh::{Mesh, OwnSurface, blended};
+use super::raster::{NOTHING, Projected, Triangle, Weights, nearest_triangles};
+use crate::mesh::{Mesh, SurfaceSample, blended};
 use crate::view::Projection;
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, YUp};
@@ -34,7 +34,7 @@ pub struct GBuffer {
     /// Texture coordinates, where the mesh has them.
     pub(crate) texture: Option<Vec<Vec2>>,
     /// `None` for a mesh whose file does not have it.
-    own: Vec<OwnSurface>,
+    own: Vec<SurfaceSample>,
     /// Takes the gradient of a height, in the mesh's own frame and unit, into the viewer's frame.
     pub(crate) gradient_map: Mat3,
 }
@@ -49,7 +49,7 @@ impl GBuffer {
         size: u32,
     ) -> Self {
         let posed = Posed::new(mesh, placement, projection, size);
-        let seen = foremost(size, &posed.projected, &mesh.triangles);
+        let seen = nearest_triangles(size, &posed.projected, &mesh.triangles);
         let covered = (0_u32..)
             .zip(&seen)
             .filter(|(_, triangle)| **triangle != NOTHING);
@@ -89,7 +89,7 @@ impl GBuffer {
     }
 
     /// The surface's look from the mesh's own file, if it has one.
-    pub(crate) fn own_surface(&self) -> Option<&[OwnSurface]> {
+    pub(crate) fn own_surface(&self) -> Option<&[SurfaceSample]> {
         let own = &self.own;
         (own.len() == self.len() && !own.is_empty()).then_some(own)
     }

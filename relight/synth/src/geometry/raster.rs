@@ -20,7 +20,11 @@ pub(super) type Weights = [f32; 3];
 
 /// The foremost triangle at each pixel of a square picture of `size` pixels, [`NOTHING`] where there is
 /// none. Neighbours leave no gap between them.
-pub(super) fn foremost(size: u32, vertices: &[Projected], triangles: &[[u32; 3]]) -> Vec<u32> {
+pub(super) fn nearest_triangles(
+    size: u32,
+    vertices: &[Projected],
+    triangles: &[[u32; 3]],
+) -> Vec<u32> {
     let side = size as usize;
     let mut seen = vec![NOTHING; side * side];
     let mut nearest = vec![f32::NEG_INFINITY; side * side];
@@ -134,7 +138,7 @@ mod tests {
             vertex(8.0, 0.0, 2.5),
             vertex(0.0, 8.0, 0.0),
         ];
-        let seen = foremost(8, &vertices, &[[0, 1, 2], [3, 4, 5]]);
+        let seen = nearest_triangles(8, &vertices, &[[0, 1, 2], [3, 4, 5]]);
         assert_eq!(seen[0], 0);
         assert_eq!(seen[6], 1);
         assert_eq!(seen[8 * 7 + 7], NOTHING);
@@ -150,7 +154,7 @@ mod tests {
                 rim.iter().map(|&(x, y)| vertex(x, y, 0.0)).collect();
             vertices.push(centre);
             let triangles = [[0, 1, 4], [2, 1, 4], [4, 2, 3], [3, 0, 4]];
-            let seen = foremost(32, &vertices, &triangles);
+            let seen = nearest_triangles(32, &vertices, &triangles);
             assert!(seen.iter().all(|&triangle| triangle != NOTHING));
         }
     }
@@ -163,7 +167,7 @@ mod tests {
             vertex(-3.0, 2.0, 0.0),
             vertex(f32::INFINITY, 0.0, 0.0),
         ];
-        let seen = foremost(4, &vertices, &[[0, 1, 2], [0, 0, 2], [0, 1, 3]]);
+        let seen = nearest_triangles(4, &vertices, &[[0, 1, 2], [0, 0, 2], [0, 1, 3]]);
         assert!(seen.iter().all(|&triangle| triangle == NOTHING));
     }
 }

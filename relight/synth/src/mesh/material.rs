@@ -55,7 +55,7 @@ pub(crate) struct MeshMaterials {
 
 /// A surface's own look at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct OwnSurface {
+pub(crate) struct SurfaceSample {
     /// Linear red, green and blue, 0..=1: the albedo of paint, the highlights' colour of metal.
     pub colour: Vec3,
     /// 0 a mirror, 1 dull.
@@ -79,11 +79,11 @@ impl Default for MeshMaterial {
 impl MeshMaterial {
     /// The look at a place of the pictures, under a colour that multiplies them; without texture coordinates,
     /// of the pictures' means.
-    fn at(&self, place: Option<Vec2>, paint: Vec3) -> OwnSurface {
+    fn at(&self, place: Option<Vec2>, paint: Vec3) -> SurfaceSample {
         let looked_up = |picture: &PlacedPicture| picture.at(place);
         let of = |picture: &Option<PlacedPicture>| picture.as_ref().map_or(Vec3::ONE, looked_up);
         let factors = of(&self.factors);
-        OwnSurface {
+        SurfaceSample {
             colour: (self.colour * of(&self.picture) * paint).clamp(Vec3::ZERO, Vec3::ONE),
             roughness: (self.roughness * factors.y).clamp(0.0, 1.0),
             metallic: (self.metallic * factors.z).clamp(0.0, 1.0),
@@ -104,7 +104,7 @@ impl MeshMaterials {
     }
 
     /// Whether they have more than one colour for all, which programs write for an object without colours.
-    pub(crate) fn tell_anything(&self) -> bool {
+    pub(crate) fn have_variation(&self) -> bool {
         let used = self.used();
         let mut used = used.iter().filter_map(|&one| self.all.get(one));
         let Some(first) = used.next() else {
@@ -142,7 +142,7 @@ impl MeshMaterials {
     }
 
     /// The look of a triangle at a place of its pictures, under a colour that multiplies them.
-    pub(crate) fn at(&self, triangle: usize, place: Option<Vec2>, paint: Vec3) -> OwnSurface {
+    pub(crate) fn at(&self, triangle: usize, place: Option<Vec2>, paint: Vec3) -> SurfaceSample {
         let number = self.of_triangle.get(triangle).copied().unwrap_or(u32::MAX);
         match self.all.get(number as usize) {
             Some(material) => material.at(place, paint),
@@ -210,13 +210,13 @@ mod tests {
             colour,
             ..MeshMaterial::default()
         };
-        assert!(!MeshMaterials::default().tell_anything());
-        assert!(!with(vec![colour(Vec3::X), colour(Vec3::X)]).tell_anything());
-        assert!(with(vec![colour(Vec3::X), colour(Vec3::Y)]).tell_anything());
+        assert!(!MeshMaterials::default().have_variation());
+        assert!(!with(vec![colour(Vec3::X), colour(Vec3::X)]).have_variation());
+        assert!(with(vec![colour(Vec3::X), colour(Vec3::Y)]).have_variation());
         let painted = MeshMaterial {
             picture: Some(picture()),
             ..MeshMaterial::default()
         };
-        assert!(with(vec![painted]).tell_anything());
+        assert!(with(vec![painted]).have_variation());
     }
 }

@@ -1,13 +1,13 @@
 //! Triangle meshes with a normal for each corner. Knows nothing of cameras or light; `obj` and
 //! `gltf` read files, `material` is their surface, and `mtl` reads it for `obj`.
 
-mod beside;
 mod gltf;
 mod material;
 mod mtl;
 mod obj;
 mod polygon;
 mod raw;
+mod sidecar_files;
 mod text;
 
 use std::collections::HashMap;
@@ -16,7 +16,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::SynthError;
-pub(crate) use material::{MeshMaterial, MeshMaterials, OwnSurface, PlacedPicture};
+pub(crate) use material::{MeshMaterial, MeshMaterials, PlacedPicture, SurfaceSample};
 pub(crate) use raw::{NO_TEXTURE, RawMesh};
 use relit_data::file_names::has_extension;
 use relit_data::shard::Digest;
@@ -105,7 +105,7 @@ impl Mesh {
     }
 
     /// The look of a triangle at weights of its corners, if the mesh's file has one.
-    pub(super) fn own_surface(&self, triangle: usize, weights: [f32; 3]) -> Option<OwnSurface> {
+    pub(super) fn own_surface(&self, triangle: usize, weights: [f32; 3]) -> Option<SurfaceSample> {
         let materials = self.materials.as_ref()?;
         let corners = self.texture.get(triangle);
         let place = corners.map(|&corners| blended(corners, weights));

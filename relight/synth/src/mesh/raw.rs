@@ -52,7 +52,7 @@ impl RawMesh {
         let mut colours = self.colours.iter().flatten();
         let first = colours.next().copied().unwrap_or(Vec3::ONE);
         let is_partly_white = self.colours.len() < self.triangles.len() && first != Vec3::ONE;
-        self.materials.tell_anything()
+        self.materials.have_variation()
             || (!self.colours.is_empty() && is_partly_white)
             || colours.any(|&colour| colour != first)
     }

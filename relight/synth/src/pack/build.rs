@@ -15,11 +15,11 @@ use relit_data::shard::Digest;
 use super::candidates::{Candidate, Candidates};
 use super::codec::{PackedPanorama, decode_mesh, encode_panorama};
 use super::file::{PackedEntry, Parts, encode};
-use super::prepare::{Prepared, Reason};
+use super::prepare::{PreparedObject, Reason};
 use super::table::{Row, write_tables};
 use super::{LibraryEntry, UNKNOWN};
 use crate::SynthError;
-use crate::library::LeftOut;
+use crate::library::SkippedFile;
 use crate::mesh::{CREASE, Mesh};
 use crate::texture::{PictureKind, TextureImage};
 
@@ -48,7 +48,7 @@ pub struct LibrarySummary {
     /// How many objects and panoramas are left out, by the reason.
     pub left_out: BTreeMap<String, usize>,
     /// Files that cannot be read, and missing parts of used objects, such as pictures.
-    pub faults: Vec<LeftOut>,
+    pub faults: Vec<SkippedFile>,
     /// Of the file.
     pub bytes: usize,
 }
@@ -100,7 +100,7 @@ pub fn build_library(
 /// What a library is made of so far.
 #[derive(Default)]
 struct Building {
-    objects: Vec<(LibraryEntry, Prepared)>,
+    objects: Vec<(LibraryEntry, PreparedObject)>,
     panoramas: Vec<(LibraryEntry, PackedPanorama, Vec<u8>)>,
     summary: LibrarySummary,
     rows: Vec<Row>,
@@ -109,7 +109,7 @@ struct Building {
 impl Building {
     fn add_objects(&mut self, all: &[Candidate], progress: &(dyn Fn(Option<usize>) + Sync)) {
         let read = all.par_iter().map(|candidate| {
-            let prepared = Prepared::read(candidate).and_then(Prepared::checked);
+            let prepared = PreparedObject::read(candidate).and_then(PreparedObject::checked);
             progress(None);
             prepared
         });
@@ -133,7 +133,7 @@ impl Building {
                 note: prepared.missing.join("; "),
                 ..Row::new("object", entry)
             });
-            let faults = prepared.missing.iter().map(|what| LeftOut {
+            let faults = prepared.missing.iter().map(|what| SkippedFile {
                 path: PathBuf::from(&entry.name),
                 what: what.clone(),
             });
@@ -180,7 +180,7 @@ impl Building {
         let kind = format!("{what}s: {}", reason.kind());
         *self.summary.left_out.entry(kind).or_default() += 1;
         if let Reason::Unreadable(why) = reason {
-            self.summary.faults.push(LeftOut {
+            self.summary.faults.push(SkippedFile {
                 path: PathBuf::from(&candidate.entry.name),
                 what: format!("is left out: {why}"),
             });
@@ -243,7 +243,7 @@ impl Building {
     }
 }
 
-impl Prepared {
+impl PreparedObject {
     /// The same where a surface is read from it again.
     fn checked(self) -> Result<Self, Reason> {
         let grey = |_, _| {

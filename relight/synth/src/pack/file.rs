@@ -49,7 +49,7 @@ pub(super) struct PackedEntry<T> {
 
 /// The part of a packed library to draw from.
 #[derive(Debug, Default)]
-pub(crate) struct Contents {
+pub(crate) struct LibraryContents {
     pub(crate) meshes: Vec<(String, Mesh)>,
     pub(crate) panoramas: Vec<(String, Panorama)>,
     /// By name, whether it is for validation only.
@@ -115,12 +115,12 @@ pub(super) fn encode(parts: Parts) -> Result<Vec<u8>, String> {
 
 /// What a reader wants of a library.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Wanted {
+pub(crate) struct LibraryFilter {
     pub(crate) meshes: bool,
     pub(crate) panoramas: bool,
 }
 
-impl Wanted {
+impl LibraryFilter {
     pub(crate) const ALL: Self = Self {
         meshes: true,
         panoramas: true,
@@ -131,7 +131,11 @@ impl Wanted {
 ///
 /// # Errors
 /// [`SynthError::Unusable`] if it is damaged.
-pub(crate) fn read(path: &Path, bytes: &[u8], wanted: Wanted) -> Result<Contents, SynthError> {
+pub(crate) fn read(
+    path: &Path,
+    bytes: &[u8],
+    wanted: LibraryFilter,
+) -> Result<LibraryContents, SynthError> {
     contents(bytes, wanted).map_err(|why| {
         let fault = format!(
             "is not a library that can be read: {why}; build it again with relight synth library"
@@ -140,7 +144,7 @@ pub(crate) fn read(path: &Path, bytes: &[u8], wanted: Wanted) -> Result<Contents
     })
 }
 
-fn contents(bytes: &[u8], wanted: Wanted) -> Result<Contents, String> {
+fn contents(bytes: &[u8], wanted: LibraryFilter) -> Result<LibraryContents, String> {
     let archive = Archive::open(bytes)?;
     let catalogue: Catalogue = serde_json::from_slice(&archive.part(CATALOGUE)?)
         .map_err(|fault| format!("its catalogue is damaged: {fault}"))?;
@@ -150,7 +154,7 @@ fn contents(bytes: &[u8], wanted: Wanted) -> Result<Contents, String> {
             catalogue.format
         ));
     }
-    let mut contents = Contents::default();
+    let mut contents = LibraryContents::default();
     if wanted.meshes {
         contents.meshes = meshes(&archive, &catalogue)?;
         let marks = catalogue.objects.iter().map(|one| mark(&one.entry));

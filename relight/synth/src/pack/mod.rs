@@ -30,7 +30,7 @@ use relit_data::shard::Digest;
 use serde::{Deserialize, Serialize};
 
 pub use build::{LibrarySources, LibrarySummary, build_library};
-pub(crate) use file::{Contents, Wanted, read};
+pub(crate) use file::{LibraryContents, LibraryFilter, read};
 
 /// What the file of a packed library ends in.
 pub const LIBRARY_EXTENSION: &str = "relib";

@@ -76,7 +76,7 @@ impl fmt::Display for Reason {
 }
 
 /// An object that is part of a library.
-pub(super) struct Prepared {
+pub(super) struct PreparedObject {
     pub(super) mesh: PackedMesh,
     pub(super) bytes: Vec<u8>,
     /// Its pictures as JPEG.
@@ -87,7 +87,7 @@ pub(super) struct Prepared {
     pub(super) missing: Vec<String>,
 }
 
-impl Prepared {
+impl PreparedObject {
     /// Reads an object and makes it ready.
     ///
     /// # Errors
@@ -208,7 +208,7 @@ fn is_cut_out(raw: &RawMesh) -> bool {
     let is_cut_out = |number: &u32| {
         let material = raw.materials.all.get(*number as usize);
         let picture = material.and_then(|material| material.picture.as_ref());
-        picture.is_some_and(|picture| picture.image.see_through() > CUT_OUT)
+        picture.is_some_and(|picture| picture.image.transparent_fraction() > CUT_OUT)
     };
     let (mut all, mut cut_out) = (0.0, 0.0);
     for (triangle, number) in raw.triangles.iter().zip(&raw.materials.of_triangle) {

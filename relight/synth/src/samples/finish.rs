@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::GBuffer;
 use crate::library::Library;
 use crate::lighting::{BlinnPhong, Material};
-use crate::mesh::OwnSurface;
+use crate::mesh::SurfaceSample;
 use crate::paint::{AlbedoKind, Paint, Relief, possible};
 use crate::random::Random;
 
@@ -72,7 +72,7 @@ impl Finish {
     }
 
     /// From the mesh's own file, one gloss for the whole surface.
-    fn own(surface: &[OwnSurface]) -> Self {
+    fn own(surface: &[SurfaceSample]) -> Self {
         let albedo: Vec3 = surface.iter().map(own_albedo).sum();
         Self {
             paint: Paint::own(possible(albedo / surface.len() as f32)),
@@ -106,7 +106,7 @@ impl Finish {
 }
 
 /// Metal has no diffuse light.
-fn own_albedo(surface: &OwnSurface) -> Vec3 {
+fn own_albedo(surface: &SurfaceSample) -> Vec3 {
     surface.colour * (1.0 - surface.metallic)
 }
 
@@ -128,8 +128,8 @@ impl BlinnPhong {
     /// The highlights of a surface whose file states its roughness; `None` for a dull one. The exponent is 2 / roughness^4 - 2
     /// (Karis 2013, "Specular BRDF Reference"), and as much brighter as it gathers light, (exponent + 8) / 8 (Hoffman 2013,
     /// "Background: Physics and Math of Shading").
-    fn from_surface(surface: &[OwnSurface]) -> Option<Self> {
-        let mean = |of: fn(&OwnSurface) -> Vec3| {
+    fn from_surface(surface: &[SurfaceSample]) -> Option<Self> {
+        let mean = |of: fn(&SurfaceSample) -> Vec3| {
             surface.iter().map(of).sum::<Vec3>() / surface.len().max(1) as f32
         };
         let roughness = mean(|at| Vec3::splat(at.roughness)).x;

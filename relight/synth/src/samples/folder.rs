@@ -226,7 +226,7 @@ mod tests {
 
     use rayon::ThreadPoolBuilder;
 
-    use super::super::sample::{Description, Whites};
+    use super::super::sample::{Description, WhiteLevels};
     use super::*;
     use crate::library::Folders;
 
@@ -304,7 +304,7 @@ mod tests {
                 continue;
             }
             let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
-            let white: Whites = serde_json::from_value(json["white"].clone()).unwrap();
+            let white: WhiteLevels = serde_json::from_value(json["white"].clone()).unwrap();
             let map = |name: &str| image::open(sample.join(name)).unwrap().into_rgb16();
             let [albedo, shading, highlight] =
                 ["albedo.png", "shading.png", "highlight.png"].map(map);

@@ -7,14 +7,14 @@ use crate::SynthError;
 use crate::geometry::GBuffer;
 
 /// Colours as 16-bit values.
-pub(crate) struct Sixteen {
+pub(crate) struct Rgb16 {
     /// One for each covered pixel.
     values: Vec<[u16; 3]>,
     /// What 65535 stands for.
     pub(crate) white: f32,
 }
 
-impl Sixteen {
+impl Rgb16 {
     /// Colours of 0..=`white`; others are clipped.
     pub(crate) fn up_to(colours: &[Vec3], white: f32) -> Self {
         let scale = 65_535.0 / white;
@@ -43,7 +43,7 @@ impl Sixteen {
 }
 
 /// The map as PNG, 0 outside the object.
-pub(crate) fn encode_sixteen(buffer: &GBuffer, map: &Sixteen) -> Result<Vec<u8>, SynthError> {
+pub(crate) fn encode_sixteen(buffer: &GBuffer, map: &Rgb16) -> Result<Vec<u8>, SynthError> {
     let values = buffer.spread(&map.values, [0; 3]).into_flattened();
     let pixels: Vec<u8> = values.into_iter().flat_map(u16::to_be_bytes).collect();
     let mut bytes = Vec::with_capacity(pixels.len() / 2);

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::camera::CameraModel;
 use super::finish::Finish;
 use super::object::{ObjectSource, SyntheticView};
-use super::png::{Sixteen, encode_sixteen};
+use super::png::{Rgb16, encode_sixteen};
 use crate::SynthError;
 use crate::geometry::GBuffer;
 use crate::lighting::{Lighting, Material, Panoramas, Shaded};
@@ -81,7 +81,7 @@ pub struct SynthSample<'a> {
 
 /// The light of the largest value in a 16-bit file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Whites {
+pub(crate) struct WhiteLevels {
     /// In `shading.png`.
     pub shading: f32,
     /// In `highlight.png`.
@@ -125,9 +125,9 @@ impl<'a> SynthSample<'a> {
     /// The sample as files, by name.
     pub(crate) fn files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, SynthError> {
         let buffer = self.view.scene.buffer();
-        let shading = Sixteen::up_to_largest(&self.shaded.shading);
-        let highlight = Sixteen::up_to_largest(&self.shaded.highlight);
-        let whites = Whites {
+        let shading = Rgb16::up_to_largest(&self.shaded.shading);
+        let highlight = Rgb16::up_to_largest(&self.shaded.highlight);
+        let whites = WhiteLevels {
             shading: shading.white,
             highlight: highlight.white,
         };
@@ -137,11 +137,11 @@ impl<'a> SynthSample<'a> {
             ("mask.png", relit_data::shard::encode_mask(&mask(buffer))?),
             (
                 "normal.png",
-                encode_sixteen(buffer, &Sixteen::normals(&self.material.normals))?,
+                encode_sixteen(buffer, &Rgb16::normals(&self.material.normals))?,
             ),
             (
                 "albedo.png",
-                encode_sixteen(buffer, &Sixteen::up_to(&self.material.albedo, 1.0))?,
+                encode_sixteen(buffer, &Rgb16::up_to(&self.material.albedo, 1.0))?,
             ),
             ("shading.png", encode_sixteen(buffer, &shading)?),
             ("highlight.png", encode_sixteen(buffer, &highlight)?),
@@ -150,10 +150,10 @@ impl<'a> SynthSample<'a> {
         ])
     }
 
-    fn json(&self, white: Whites) -> Vec<u8> {
+    fn json(&self, white: WhiteLevels) -> Vec<u8> {
         #[derive(Serialize)]
         struct Record<'a> {
-            white: Whites,
+            white: WhiteLevels,
             #[serde(flatten)]
             description: &'a Description,
         }

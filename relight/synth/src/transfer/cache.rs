@@ -11,8 +11,8 @@ use relit_data::shard::Digest;
 use serde::{Deserialize, Serialize};
 
 use super::cast::{RadianceTransfer, TransferFinish};
-use super::drawn::DrawnTurn;
-use super::rooms::Rooms;
+use super::environment_lights::EnvironmentLights;
+use super::turn_sample::TurnSample;
 use super::views::TransferRecipe;
 use super::{BOUNCE_COEFFICIENTS, COEFFICIENTS};
 use crate::SynthError;
@@ -65,10 +65,10 @@ impl TransferCache {
         &self,
         library: &Library,
         number: u64,
-        rooms: &Rooms,
+        rooms: &EnvironmentLights,
         seed: u64,
-    ) -> Result<DrawnTurn, SynthError> {
-        Ok(DrawnTurn::draw(&self.view(library, number)?, rooms, seed))
+    ) -> Result<TurnSample, SynthError> {
+        Ok(TurnSample::draw(&self.view(library, number)?, rooms, seed))
     }
 
     /// The view of a number: read where it is there, else cast and kept. The numbers of a view that was read and of one

@@ -28,23 +28,23 @@
 mod cache;
 mod cast;
 mod curves;
-mod drawn;
+mod environment_lights;
 mod photo_plan;
 mod photo_view;
-mod rooms;
 #[cfg(test)]
 mod tests;
 mod timing;
+mod turn_sample;
 mod views;
 
 use relight_core::light::Order;
 use relight_core::render::cosine_lobe;
 
 pub use cache::TransferCache;
-pub use drawn::DrawnTurn;
+pub use environment_lights::EnvironmentLights;
 pub use photo_plan::{PhotoCamera, PhotoGloss, PhotoLamp, PhotoPlan, PhotoPrint};
 pub use photo_view::{PhotoView, PhotoViewRecipe, ViewLamp};
-pub use rooms::Rooms;
+pub use turn_sample::TurnSample;
 pub use views::TransferRecipe;
 
 /// The order of the light: lamps are blurred by it, and gloss as smooth as varnish.

@@ -6,8 +6,8 @@ use glam::{Mat3, Vec3};
 use relight_core::light::{Direction, Order, ShLight, basis};
 
 use super::cast::table_frame;
+use super::environment_lights::{EnvironmentLights, rotation};
 use super::photo_view::{PhotoView, ViewLamp};
-use super::rooms::{Rooms, rotation};
 use crate::lighting::{BlinnPhong, tint};
 use crate::random::Random;
 use crate::samples::camera::{CameraModel, Response};
@@ -114,7 +114,7 @@ pub struct PhotoCamera {
 impl PhotoPlan {
     /// The photograph of a seed, of a view with these lamps, in one of these rooms.
     #[must_use]
-    pub fn draw(seed: u64, lamps: &[ViewLamp], rooms: &Rooms) -> Self {
+    pub fn draw(seed: u64, lamps: &[ViewLamp], rooms: &EnvironmentLights) -> Self {
         let mut random = Random::new(seed);
         let (lit, ambient, bounce) = draw_light(&mut random, lamps.len());
         let room = draw_room(&mut random, rooms);
@@ -179,7 +179,7 @@ fn draw_light(random: &mut Random, lamps: usize) -> (Vec<PhotoLamp>, Vec3, Vec3)
 }
 
 /// A room around the viewer, of mean radiance 1: mostly upright, as seen from somewhat above.
-fn draw_room(random: &mut Random, rooms: &Rooms) -> ShLight {
+fn draw_room(random: &mut Random, rooms: &EnvironmentLights) -> ShLight {
     let room = rooms.draw(random.seed()).with_order(PhotoView::ORDER);
     let into_view = if random.chance(0.7) {
         table_frame(random.uniform(-0.1..0.8)).transpose()

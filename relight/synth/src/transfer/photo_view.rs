@@ -17,7 +17,7 @@ use crate::random::{Random, stream};
 use crate::samples::finish::Finish;
 use crate::samples::object::ObjectSource;
 use crate::samples::recipe::Recipe;
-use crate::turn::Stand;
+use crate::sequence::TablePose;
 
 /// Part of the closed objects that stand on a black table.
 const ON_TABLE: f32 = 0.4;
@@ -102,7 +102,7 @@ impl PhotoViewRecipe {
             ..Recipe::default()
         };
         let (object, mesh) = recipe.object_with(library, number, MESHES);
-        let seen = Seen::draw(&recipe, &object, &mesh, &mut random);
+        let seen = ViewGeometry::draw(&recipe, &object, &mesh, &mut random);
         let lamps: Vec<SyntheticLamp> = (0..PhotoView::LAMPS)
             .map(|_| seen.lamp(&mut random))
             .collect();
@@ -133,14 +133,14 @@ fn view_lamp(lamp: &SyntheticLamp) -> ViewLamp {
 }
 
 /// What a camera sees of an object, and what blocks light.
-pub(super) struct Seen {
+pub(super) struct ViewGeometry {
     buffer: GBuffer,
     occluder: Occluder,
     /// The table's upward axis in the viewer's frame, if it stands on one.
     table: Option<Vec3>,
 }
 
-impl Seen {
+impl ViewGeometry {
     #[cfg(test)]
     pub(super) fn new(buffer: GBuffer, occluder: Occluder, table: Option<Vec3>) -> Self {
         Self {
@@ -161,7 +161,7 @@ impl Seen {
             ObjectSource::Shape { kind, .. } => !kind.is_open(),
         };
         if can_stand && random.chance(ON_TABLE) {
-            let stand = Stand::draw(random, ELEVATIONS);
+            let stand = TablePose::draw(random, ELEVATIONS);
             let placement = stand.placement(mesh);
             return Self {
                 buffer: GBuffer::render(mesh, placement, stand.projection, recipe.size),

@@ -52,7 +52,7 @@ fn open_ball(elevation: f32) -> RadianceTransfer {
 fn a_room(seed: u64) -> ShLight {
     let made = made_panoramas().unwrap();
     let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
-    Rooms::new(&panoramas, 2, 1).draw(seed)
+    EnvironmentLights::new(&panoramas, 2, 1).draw(seed)
 }
 
 #[test]
@@ -162,7 +162,7 @@ fn soft_panorama() -> Panorama {
     Panorama::new(Rgb::new(Planes::from_fn(extent, pixel))).unwrap()
 }
 
-/// Ninety frames of a turn, rendered with rays as `synth turns` renders them.
+/// Ninety frames of a turn, rendered with rays as `synth sequences` renders them.
 const FRAMES: u32 = 90;
 
 /// Mean and first harmonics of rendered frames: shading of a white object, or its highlights, pixel by pixel.
@@ -345,7 +345,7 @@ fn rooms_are_of_any_kind_and_never_darker_than_nothing_in_the_mean() {
                 .all(|&c| c > 0.0 && c.is_finite())
         );
     }
-    assert!(Rooms::new(&[], 2, 1).is_empty());
+    assert!(EnvironmentLights::new(&[], 2, 1).is_empty());
 }
 
 #[test]
@@ -355,7 +355,7 @@ fn the_zenith_of_a_panorama_is_along_the_table_s_axis_in_most_rooms_and_its_azim
     let above: Vec<bool> = (0..200)
         .map(|seed| {
             // Band 1 of the basis is y, z, x: its middle one is along the axis.
-            let light = Rooms::new(&[&sky], 1, 1).draw(seed);
+            let light = EnvironmentLights::new(&[&sky], 1, 1).draw(seed);
             let [y, z, x] = [1, 2, 3].map(|at: usize| light.coefficients()[at][1]);
             z > 2.0 * x.hypot(y)
         })
@@ -364,7 +364,7 @@ fn the_zenith_of_a_panorama_is_along_the_table_s_axis_in_most_rooms_and_its_azim
     assert!((120..200).contains(&part), "{part} of 200");
     let lamp = |x: usize, _: usize| [if x < 8 { 1.0 } else { 0.0 }; 3];
     let lamp = Panorama::new(Rgb::new(Planes::from_fn(Extent::new(64, 32), lamp))).unwrap();
-    let rooms = Rooms::new(&[&lamp], 1, 1);
+    let rooms = EnvironmentLights::new(&[&lamp], 1, 1);
     let quarters = (0..200).fold([0; 4], |mut counts, seed| {
         let light = rooms.draw(seed);
         let [y, x] = [1, 3].map(|at: usize| light.coefficients()[at][1]);
@@ -383,11 +383,11 @@ fn a_mirror_image_has_the_normals_and_curves_of_the_mirrored_object_under_the_mi
     let rooms = {
         let made = made_panoramas().unwrap();
         let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
-        Rooms::new(&panoramas, 1, 1)
+        EnvironmentLights::new(&panoramas, 1, 1)
     };
     let drawn = loop {
         seed += 1;
-        let drawn = DrawnTurn::draw(&transfer, &rooms, seed);
+        let drawn = TurnSample::draw(&transfer, &rooms, seed);
         if drawn.pixels != transfer.pixels || drawn.normals != transfer.finishes[0].normals {
             break drawn;
         }
@@ -407,7 +407,7 @@ fn a_mirror_image_has_the_normals_and_curves_of_the_mirrored_object_under_the_mi
 fn the_light_of_rooms_and_lamps_on_a_photograph_is_that_of_rays() {
     let (_, buffer, occluder) = standing(24, 16);
     let table = Vec3::new(0.0, 0.35_f32.cos(), 0.35_f32.sin());
-    let seen = photo_view::Seen::new(buffer.clone(), occluder, Some(table));
+    let seen = photo_view::ViewGeometry::new(buffer.clone(), occluder, Some(table));
     let mut random = crate::random::Random::new(6);
     let lamps: Vec<SyntheticLamp> = (0..4).map(|_| seen.lamp(&mut random)).collect();
     let area = 24 * 24;
@@ -517,7 +517,7 @@ fn a_photograph_is_the_same_for_the_same_seed_and_its_light_is_room_and_lamps() 
     assert_eq!(view.visibility.len(), PhotoView::LAMPS * 256);
     let made = made_panoramas().unwrap();
     let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
-    let rooms = Rooms::new(&panoramas, 2, 1);
+    let rooms = EnvironmentLights::new(&panoramas, 2, 1);
     for seed in 0..40 {
         let plan = PhotoPlan::draw(seed, &view.lamps, &rooms);
         assert_eq!(plan, PhotoPlan::draw(seed, &view.lamps, &rooms));

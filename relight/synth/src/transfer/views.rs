@@ -10,7 +10,7 @@ use crate::library::Library;
 use crate::random::{Random, stream};
 use crate::samples::finish::Finish;
 use crate::samples::recipe::Recipe;
-use crate::turn::{Stand, standing_object};
+use crate::sequence::{TablePose, standing_object};
 
 /// The camera over the plate, degrees.
 const ELEVATIONS: Range<f32> = 5.0..40.0;
@@ -38,7 +38,7 @@ impl TransferRecipe {
             ..Recipe::default()
         };
         let (_, mesh) = standing_object(&recipe, library, &mut random);
-        let stand = Stand::draw(&mut random, ELEVATIONS);
+        let stand = TablePose::draw(&mut random, ELEVATIONS);
         let placement = stand.placement(&mesh);
         let buffer = GBuffer::render(&mesh, placement, stand.projection, self.size);
         let occluder = Occluder::with_disc(&mesh, placement, &stand.plate(&mesh));

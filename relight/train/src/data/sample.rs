@@ -6,7 +6,7 @@ use tch::{Device, Kind, Tensor};
 
 use crate::error::TrainError;
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
-use relight_photo::decompose::{EncodedPicture, PredictedLight};
+use relight_photo::decompose::{NetworkInput, PredictedLight};
 use relight_photo::nets::{INPUTS, LIGHT_OUTPUTS};
 use relight_synth::SynthSample;
 
@@ -60,7 +60,7 @@ impl TruthArrays {
             linear(sample, linearisation),
             sample.view.scene.buffer().mask(),
         );
-        let encoded = EncodedPicture::new(&picture, &mask);
+        let encoded = NetworkInput::new(&picture, &mask);
         let extent = encoded.extent();
         let pixels = extent.pixels();
         let mut values = Vec::with_capacity(PLANES * pixels);

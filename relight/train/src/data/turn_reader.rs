@@ -135,7 +135,7 @@ impl TurnReader {
         } else {
             None
         };
-        self.stream.give_back(drawn.batch);
+        self.stream.recycle(drawn.batch);
         if self.cursor.epoch > self.readable + 1 {
             return Err(no_frames());
         }

@@ -10,7 +10,8 @@ use crate::settings::TransferSettings;
 use relight_core::light::Panorama;
 use relight_photo::nets::TURN_INPUTS;
 use relight_synth::{
-    DrawnTurn, Folders, LeftOut, Library, Rooms, TransferCache, TransferRecipe, stream,
+    EnvironmentLights, Folders, Library, SkippedFile, TransferCache, TransferRecipe, TurnSample,
+    stream,
 };
 use relight_turn::{NetworkTurn, PhaseHypothesis, network_input};
 
@@ -25,7 +26,7 @@ const BY_SECOND: u64 = 3;
 pub(crate) struct TurnViews {
     library: Library,
     cache: TransferCache,
-    rooms: Rooms,
+    rooms: EnvironmentLights,
 }
 
 /// A batch of turns for the network.
@@ -71,7 +72,7 @@ impl TurnViews {
     }
 
     /// Unused files of the folders.
-    pub(crate) fn left_out(&self) -> &[LeftOut] {
+    pub(crate) fn left_out(&self) -> &[SkippedFile] {
         &self.library.left_out
     }
 
@@ -90,7 +91,7 @@ impl TurnViews {
         let panoramas: Vec<&Panorama> = (0..library.panoramas.len())
             .filter_map(|number| library.panoramas.get(number))
             .collect();
-        let rooms = Rooms::new(&panoramas, settings.variants, seed);
+        let rooms = EnvironmentLights::new(&panoramas, settings.variants, seed);
         Ok(Self {
             library,
             cache,
@@ -139,7 +140,7 @@ struct Planes {
 }
 
 impl Planes {
-    fn new(drawn: &DrawnTurn, phase: PhaseHypothesis) -> Self {
+    fn new(drawn: &TurnSample, phase: PhaseHypothesis) -> Self {
         let side = drawn.size as usize;
         let turn = NetworkTurn {
             side,

@@ -89,7 +89,7 @@ impl Adam {
     ///
     /// # Errors
     /// [`TrainError::Refused`] if it is another network's.
-    pub fn recall(&mut self, memory: &Weights) -> Result<(), TrainError> {
+    pub fn load_state(&mut self, memory: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.first, &memory.under("first."))?;
         copy_into(&mut self.second, &memory.under("second."))?;
         let steps = memory.get(STEPS).map(relight_photo::nets::Tensor::values);

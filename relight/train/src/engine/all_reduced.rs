@@ -17,7 +17,7 @@ use crate::error::TrainError;
 pub(crate) struct AllReducedLosses {
     /// By name, with their coefficients; the sum of all is `loss`. Empty where no process has anything to learn from.
     pub(crate) values: BTreeMap<String, f64>,
-    /// How much each head's answers vary, the mean over the processes.
+    /// How much each head's predictions vary, the mean over the processes.
     pub(crate) spreads: BTreeMap<&'static str, f64>,
     /// Whether one of several processes was asked to stop.
     pub(crate) stop: bool,
@@ -30,7 +30,7 @@ impl AllReducedLosses {
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub(crate) fn alone(losses: &StepLosses) -> Result<Self, TrainError> {
+    pub(crate) fn single_process(losses: &StepLosses) -> Result<Self, TrainError> {
         let means = losses.terms.means()?;
         let value = |&(over, value): &(f64, f64)| (over > 0.0).then_some(value);
         let values: Vec<_> = means.iter().map(value).collect();

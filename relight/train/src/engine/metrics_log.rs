@@ -18,7 +18,7 @@ pub struct MetricsLog {
 }
 
 impl MetricsLog {
-    /// The journal in a run's folder; a resumed run continues after the line of its last step.
+    /// The log in a run's folder; a resumed run continues after the line of its last step.
     ///
     /// # Errors
     /// [`TrainError::Io`], [`TrainError::Refused`] if another program has it open.
@@ -42,7 +42,7 @@ impl MetricsLog {
         Ok(Self { table, table_path })
     }
 
-    /// Whether a run in a folder has its journal open.
+    /// Whether a run in a folder has its log open.
     #[must_use]
     pub fn is_open(folder: &Path) -> bool {
         let table = OpenOptions::new().append(true).open(folder.join(TABLE));
@@ -95,13 +95,13 @@ mod tests {
     fn a_resumed_run_does_not_write_its_lines_twice() {
         let folder = tempfile::tempdir().unwrap();
         let values = |loss: f64| BTreeMap::from([("loss".to_owned(), loss)]);
-        let mut journal = MetricsLog::open(folder.path(), 0).unwrap();
+        let mut metrics_log = MetricsLog::open(folder.path(), 0).unwrap();
         for step in 1..=4 {
-            journal.scalars(step, &values(step as f64)).unwrap();
+            metrics_log.scalars(step, &values(step as f64)).unwrap();
         }
-        drop(journal);
-        let mut journal = MetricsLog::open(folder.path(), 2).unwrap();
-        journal.scalars(3, &values(0.5)).unwrap();
+        drop(metrics_log);
+        let mut metrics_log = MetricsLog::open(folder.path(), 2).unwrap();
+        metrics_log.scalars(3, &values(0.5)).unwrap();
         let table = std::fs::read_to_string(folder.path().join(TABLE)).unwrap();
         assert_eq!(table, "step,series,value\n1,loss,1\n2,loss,2\n3,loss,0.5\n");
     }
@@ -110,9 +110,9 @@ mod tests {
     fn a_journal_is_open_until_it_is_dropped() {
         let folder = tempfile::tempdir().unwrap();
         assert!(!MetricsLog::is_open(folder.path()));
-        let journal = MetricsLog::open(folder.path(), 0).unwrap();
+        let metrics_log = MetricsLog::open(folder.path(), 0).unwrap();
         assert!(MetricsLog::is_open(folder.path()));
-        drop(journal);
+        drop(metrics_log);
         assert!(!MetricsLog::is_open(folder.path()));
     }
 }

@@ -98,7 +98,7 @@ impl Model {
     ///
     /// # Errors
     /// [`TrainError::Refused`] if they are another network's.
-    pub fn recall(&mut self, weights: &Weights) -> Result<(), TrainError> {
+    pub fn load_state(&mut self, weights: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.parameters, weights)
     }
 

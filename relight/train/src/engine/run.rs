@@ -63,7 +63,7 @@ pub struct Run<'a> {
     folder: &'a Path,
     group: Option<ProcessGroup>,
     /// Of the first process.
-    journal: Option<MetricsLog>,
+    metrics_log: Option<MetricsLog>,
     guard: DivergenceGuard,
     step: u64,
     /// What the task was given beside its settings.
@@ -99,7 +99,7 @@ impl<'a> Run<'a> {
                     folder.display()
                 )));
             }
-            Some(checkpoint) => recall(task, &inputs, &checkpoint, folder)?,
+            Some(checkpoint) => load_state(task, &inputs, &checkpoint, folder)?,
         };
         if let Some(group) = &group {
             agree(group, &facts(task, &inputs, step)?)?;
@@ -113,7 +113,7 @@ impl<'a> Run<'a> {
             settings,
             folder,
             group,
-            journal: is_first
+            metrics_log: is_first
                 .then(|| MetricsLog::open(folder, step))
                 .transpose()?,
             guard: DivergenceGuard::default(),
@@ -148,7 +148,7 @@ impl<'a> Run<'a> {
             Err(fault) => return Err(fault),
         };
         let mut weights = None;
-        if self.journal.is_some() {
+        if self.metrics_log.is_some() {
             self.save(observer)?;
             weights = Some(self.write_weights()?);
         }
@@ -171,7 +171,7 @@ impl<'a> Run<'a> {
         stop: &AtomicBool,
         observer: &mut dyn TrainObserver,
     ) -> Result<BTreeMap<String, f64>, TrainError> {
-        if self.journal.is_some() {
+        if self.metrics_log.is_some() {
             for left_out in self.task.left_out() {
                 self.damaged = true;
                 observer.damaged(self.step, &left_out.to_string());
@@ -196,7 +196,7 @@ impl<'a> Run<'a> {
                 Err(TrainError::Stopped) => break,
                 made => made?,
             };
-            if self.journal.is_none() {
+            if self.metrics_log.is_none() {
                 continue;
             }
             if self.step.is_multiple_of(self.settings.validate_every)
@@ -226,7 +226,7 @@ impl<'a> Run<'a> {
         }
         let reduced = match &self.group {
             Some(group) => AllReducedLosses::new(&losses, stop, group)?,
-            None => AllReducedLosses::alone(&losses)?,
+            None => AllReducedLosses::single_process(&losses)?,
         };
         // Of some batches nothing can be learned, as of those for which the gate of saturation is closed.
         if !reduced.values.is_empty() {
@@ -247,15 +247,15 @@ impl<'a> Run<'a> {
         reduced: &AllReducedLosses,
         learning_rate: f64,
     ) -> Result<f64, TrainError> {
-        let learner = self.task.learner();
+        let trainable = self.task.trainable();
         match reduced.part(losses)? {
             Some(part) => part.f_backward()?,
-            None => learner.model.add_zero_gradients()?,
+            None => trainable.model.add_zero_gradients()?,
         }
         if let Some(group) = &self.group {
-            group.sum_gradients(learner.model.parameters())?;
+            group.sum_gradients(trainable.model.parameters())?;
         }
-        learner.learn(learning_rate, self.settings.max_grad_norm)
+        trainable.step(learning_rate, self.settings.max_grad_norm)
     }
 
     fn log(
@@ -266,7 +266,7 @@ impl<'a> Run<'a> {
     ) -> Result<(), TrainError> {
         let step = self.step + 1;
         observer.step(step, &reduced.values);
-        let Some(journal) = &mut self.journal else {
+        let Some(metrics_log) = &mut self.metrics_log else {
             return Ok(());
         };
         if !step.is_multiple_of(self.settings.log_every) {
@@ -278,7 +278,7 @@ impl<'a> Run<'a> {
         for (head, spread) in &reduced.spreads {
             values.insert(format!("spread/{head}"), *spread);
         }
-        journal.scalars(step, &values)
+        metrics_log.scalars(step, &values)
     }
 
     /// Ends the run after another process was lost: the first of the remaining processes saves it.
@@ -297,7 +297,7 @@ impl<'a> Run<'a> {
 
     /// Saves the run in process 0, and in others where that has ended and has not.
     fn save_as_successor(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
-        if self.journal.is_none() {
+        if self.metrics_log.is_none() {
             let begun = Instant::now();
             while MetricsLog::is_open(self.folder)
                 && !self.is_saved()
@@ -322,7 +322,7 @@ impl<'a> Run<'a> {
         &mut self,
         observer: &mut dyn TrainObserver,
     ) -> Result<BTreeMap<String, f64>, TrainError> {
-        let Some(journal) = &mut self.journal else {
+        let Some(metrics_log) = &mut self.metrics_log else {
             return Ok(BTreeMap::new());
         };
         let Validation {
@@ -338,7 +338,7 @@ impl<'a> Run<'a> {
             .iter()
             .map(|(name, value)| (format!("validation/{name}"), *value))
             .collect();
-        journal.scalars(self.step, &named)?;
+        metrics_log.scalars(self.step, &named)?;
         if let Some(png) = sheet {
             let path = self.folder.join("validation.png");
             relit_data::durable::write_whole(&path, &png)
@@ -349,7 +349,7 @@ impl<'a> Run<'a> {
     }
 
     fn save(&mut self, observer: &mut dyn TrainObserver) -> Result<(), TrainError> {
-        let state = self.task.learner().state()?;
+        let state = self.task.trainable().state()?;
         Checkpoint {
             task: self.task.name().to_owned(),
             step: self.step,
@@ -365,9 +365,11 @@ impl<'a> Run<'a> {
 
     /// The averaged weights, half precision.
     fn write_weights(&mut self) -> Result<PathBuf, TrainError> {
-        let learner = self.task.learner();
-        let path = self.folder.join(format!("{}.safetensors", learner.name()));
-        learner.averaged()?.write(&path, WeightPrecision::Half)?;
+        let trainable = self.task.trainable();
+        let path = self
+            .folder
+            .join(format!("{}.safetensors", trainable.name()));
+        trainable.averaged()?.write(&path, WeightPrecision::Half)?;
         Ok(path)
     }
 }
@@ -375,7 +377,7 @@ impl<'a> Run<'a> {
 /// Facts that have to be equal in all processes.
 fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fact>, TrainError> {
     let version = format!("{} {}", env!("CARGO_PKG_VERSION"), task.name());
-    let weights = fingerprint(task.learner().model.parameters())?;
+    let weights = fingerprint(task.trainable().model.parameters())?;
     Ok(vec![
         ("version and task", version),
         ("the settings", task.settings()),
@@ -389,7 +391,7 @@ fn facts(task: &mut dyn TrainingTask, inputs: &str, step: u64) -> Result<Vec<Fac
 }
 
 /// Brings a task to a checkpoint; its step.
-fn recall(
+fn load_state(
     task: &mut dyn TrainingTask,
     inputs: &str,
     checkpoint: &Checkpoint,
@@ -411,6 +413,6 @@ fn recall(
         return Err(other(fault.to_owned()));
     }
     task.go_to(&checkpoint.cursor).map_err(other)?;
-    task.learner().recall(&checkpoint.state)?;
+    task.trainable().load_state(&checkpoint.state)?;
     Ok(checkpoint.step)
 }

@@ -10,7 +10,7 @@ use super::terms::LossTerms;
 use super::trainable::Trainable;
 use crate::distributed::process_group::ProcessGroup;
 use crate::error::TrainError;
-use relight_synth::LeftOut;
+use relight_synth::SkippedFile;
 
 /// Where a run is computed, and with how many threads.
 #[derive(Debug, Clone)]
@@ -49,12 +49,12 @@ pub trait TrainingTask {
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError>;
 
     /// Unused files of the user.
-    fn left_out(&self) -> &[LeftOut] {
+    fn left_out(&self) -> &[SkippedFile] {
         &[]
     }
 
     /// The network that learns.
-    fn learner(&mut self) -> &mut Trainable;
+    fn trainable(&mut self) -> &mut Trainable;
 
     /// The losses of a step, from 0, on this process's part of its batch; always the same ones, in the same order. Steps
     /// are asked for one after the other.
@@ -89,7 +89,7 @@ pub trait TrainingTask {
 pub struct StepLosses {
     /// The losses.
     pub terms: LossTerms,
-    /// How much each head's answers vary, in parts of the ground truth's variation.
+    /// How much each head's predictions vary, in parts of the ground truth's variation.
     pub spreads: BTreeMap<&'static str, f64>,
     /// What was damaged in the data, and is not in the batch.
     pub damage: Option<String>,
@@ -112,7 +112,7 @@ impl StepLosses {
 pub struct Validation {
     /// Figures by name.
     pub figures: BTreeMap<String, f64>,
-    /// A sheet of answers beside the ground truth, a PNG file.
+    /// A sheet of predictions beside the ground truth, a PNG file.
     pub sheet: Option<Vec<u8>>,
     /// What was damaged in the data, and is not in the figures.
     pub damage: Option<String>,

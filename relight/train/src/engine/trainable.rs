@@ -54,7 +54,7 @@ impl Trainable {
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn learn(&mut self, learning_rate: f64, max_grad_norm: f64) -> Result<f64, TrainError> {
+    pub fn step(&mut self, learning_rate: f64, max_grad_norm: f64) -> Result<f64, TrainError> {
         let norm = self
             .adam
             .step(self.model.parameters(), learning_rate, max_grad_norm)?;
@@ -107,11 +107,11 @@ impl Trainable {
     ///
     /// # Errors
     /// [`TrainError::Refused`] if it is another network's.
-    pub fn recall(&mut self, state: &Weights) -> Result<(), TrainError> {
+    pub fn load_state(&mut self, state: &Weights) -> Result<(), TrainError> {
         let own = state.under(&format!("{}.", self.name));
-        self.model.recall(&own.under("model."))?;
-        self.average.recall(&own.under("average."))?;
-        self.adam.recall(&own)
+        self.model.load_state(&own.under("model."))?;
+        self.average.load_state(&own.under("average."))?;
+        self.adam.load_state(&own)
     }
 }
 
@@ -164,7 +164,7 @@ impl WeightAverage {
     }
 
     /// Goes on from an average that was saved.
-    fn recall(&mut self, saved: &Weights) -> Result<(), TrainError> {
+    fn load_state(&mut self, saved: &Weights) -> Result<(), TrainError> {
         copy_into(&mut self.values, saved)
     }
 }

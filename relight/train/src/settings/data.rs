@@ -1,4 +1,4 @@
-//! What a network learns from: composed samples and turns.
+//! What a network learns from: synthetic samples and turns.
 
 use std::path::PathBuf;
 

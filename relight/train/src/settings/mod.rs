@@ -3,7 +3,7 @@
 //! | file | concern |
 //! | --- | --- |
 //! | `run` | how long and how fast a network learns: `[run]` |
-//! | `data` | composed samples and turns: `[data]`, `[turns]` |
+//! | `data` | synthetic samples and turns: `[data]`, `[turns]` |
 //! | `transfer` | views and rooms of the network of turns: its `[data]` |
 //! | `loss`, `paper_phase`, `precision` | loss coefficients; the paper's phases; the precision of a run |
 //! | `file` | reading TOML, and how the settings of two runs differ |
@@ -88,7 +88,7 @@ pub struct PaperSettings {
 pub struct PaperLossCoefficients {
     /// The low-rank loss on turns.
     pub low_rank: f64,
-    /// The supervised term: the loss on composed samples beside turns; 0: none is composed.
+    /// The supervised term: the loss on synthetic samples beside turns; 0: none is composed.
     pub supervised: f64,
 }
 

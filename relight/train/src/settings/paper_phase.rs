@@ -40,13 +40,13 @@ impl PaperPhase {
 
     /// Whether there are figures of how well it does on turns.
     #[must_use]
-    pub fn is_judged_by_turns(self) -> bool {
+    pub fn validates_on_turns(self) -> bool {
         matches!(self, Self::Spec | Self::Light | Self::Joint)
     }
 
     /// Whether turns teach it anything.
     #[must_use]
-    pub fn learns_from_turns(self) -> bool {
+    pub fn uses_turns(self) -> bool {
         self != Self::Normal
     }
 

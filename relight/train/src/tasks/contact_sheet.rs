@@ -1,19 +1,19 @@
-//! Sheets of answers beside the ground truth, to be looked at while a network trains.
+//! Sheets of predictions beside the ground truth, to be looked at while a network trains.
 
 use tch::{Kind, Tensor};
 
-use super::decompose::AnsweredTensors;
+use super::decompose::PredictedTensors;
 use crate::data::sample::TruthBatch;
 use crate::error::TrainError;
 
 /// The first samples of a batch as PNG, a row each: the picture; albedo, shading, normals and highlight, the ground truth left of
-/// each answer. Albedo and shading in the scale that suits the ground truth best.
+/// each prediction. Albedo and shading in the scale that suits the ground truth best.
 ///
 /// # Errors
 /// [`TrainError::Torch`], [`TrainError::Encode`].
 pub(crate) fn validation_sheet(
     batch: &TruthBatch,
-    answer: &AnsweredTensors,
+    prediction: &PredictedTensors,
     rows: usize,
 ) -> Result<Vec<u8>, TrainError> {
     let mask = &batch.mask;
@@ -24,13 +24,13 @@ pub(crate) fn validation_sheet(
     let columns = [
         shown(&batch.picture)?,
         shown(&batch.albedo)?,
-        shown(&scaled(&answer.albedo, &batch.albedo)?)?,
+        shown(&scaled(&prediction.albedo, &batch.albedo)?)?,
         shown(&lit(&batch.shading)?)?,
-        shown(&lit(&scaled(&answer.shading, &batch.shading)?)?)?,
+        shown(&lit(&scaled(&prediction.shading, &batch.shading)?)?)?,
         colours(&batch.normals)?,
-        colours(&answer.normals)?,
+        colours(&prediction.normals)?,
         shown(&batch.highlight)?,
-        shown(&answer.highlight)?,
+        shown(&prediction.highlight)?,
     ];
     let (height, width) = (mask.size()[2], mask.size()[3]);
     let tiles = columns

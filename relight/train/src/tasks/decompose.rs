@@ -1,10 +1,10 @@
-//! Training of the decomposing network on composed samples: its answers as maps, and its losses.
+//! Training of the decomposing network on synthetic samples: its predictions as maps, and its losses.
 
 use std::collections::BTreeMap;
 
 use tch::Tensor;
 
-use super::shadow_vs_paint::Darkness;
+use super::shadow_vs_paint::ShadowVsPaint;
 use crate::data::sample::TruthBatch;
 use crate::engine::losses::{Mean, chord, gradient, relative_distance, scale_invariant, windowed};
 use crate::engine::terms::LossTerms;
@@ -20,15 +20,15 @@ const ALBEDO_FLOOR: f64 = 0.02;
 const DIVISOR_FLOOR: f64 = 0.02;
 /// Highlights of this size count fully.
 pub(crate) const FULL_HIGHLIGHT: f64 = 0.1;
-/// How much more a full highlight counts than none: most pixels have none, and an answer without any would do.
+/// How much more a full highlight counts than none: most pixels have none, and a prediction without any would do.
 pub(crate) const HIGHLIGHT_EMPHASIS: f64 = 8.0;
 /// Energy of a faint highlight, a pixel.
 const FAINT_ENERGY: f64 = 1e-4;
 
-/// The network's answers as maps on tensors, `batch x channels x height x width`: what
-/// [`relight_photo::decompose::EncodedPicture::decode`] makes of them one by one.
+/// The network's predictions as maps on tensors, `batch x channels x height x width`: what
+/// [`relight_photo::decompose::NetworkInput::decode`] makes of them one by one.
 #[derive(Debug)]
-pub struct AnsweredTensors {
+pub struct PredictedTensors {
     /// Unit normals.
     pub normals: Tensor,
     /// Albedo, 0..1.
@@ -43,7 +43,7 @@ pub struct AnsweredTensors {
     pub light: Option<Tensor>,
 }
 
-impl AnsweredTensors {
+impl PredictedTensors {
     /// The maps for the network's input and its outputs.
     ///
     /// # Errors
@@ -57,12 +57,12 @@ impl AnsweredTensors {
         })
     }
 
-    /// The maps for the network's input and its answer, the output `maps`.
+    /// The maps for the network's input and its output `maps`.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
-    pub fn new(input: &Tensor, answer: &Tensor) -> Result<Self, TrainError> {
-        let part = |from: i64, count: i64| answer.f_narrow(1, from, count);
+    pub fn new(input: &Tensor, prediction: &Tensor) -> Result<Self, TrainError> {
+        let part = |from: i64, count: i64| prediction.f_narrow(1, from, count);
         let facing = part(2, 1)?
             .f_softplus()?
             .f_add_scalar(f64::from(MIN_FACING))?;
@@ -97,19 +97,19 @@ impl AnsweredTensors {
 /// [`TrainError::Torch`].
 pub(crate) fn decompose_losses(
     batch: &TruthBatch,
-    answer: &AnsweredTensors,
+    prediction: &PredictedTensors,
     coefficients: &DecomposeLossCoefficients,
 ) -> Result<LossTerms, TrainError> {
     let mut terms = LossTerms::default();
     let mask = &batch.mask;
-    let (albedo, found_albedo) = (grey(&batch.albedo)?, grey(&answer.albedo)?);
+    let (albedo, found_albedo) = (grey(&batch.albedo)?, grey(&prediction.albedo)?);
     let diffuse = batch.picture.f_sub(&batch.highlight)?.f_clamp_min(0.0)?;
-    let quotient = grey(&diffuse)?.f_div(&answer.shading.f_add_scalar(DIVISOR_FLOOR)?)?;
+    let quotient = grey(&diffuse)?.f_div(&prediction.shading.f_add_scalar(DIVISOR_FLOOR)?)?;
 
     let whole = coefficients.whole;
-    let error = scale_invariant(&answer.shading, &batch.shading, mask)?;
+    let error = scale_invariant(&prediction.shading, &batch.shading, mask)?;
     terms.add("shading", whole, error)?;
-    let error = scale_invariant(&answer.albedo, &batch.albedo, mask)?;
+    let error = scale_invariant(&prediction.albedo, &batch.albedo, mask)?;
     terms.add("albedo", whole, error)?;
     let error = scale_invariant(&quotient, &albedo, mask)?;
     terms.add("quotient", whole * coefficients.quotient, error)?;
@@ -117,7 +117,7 @@ pub(crate) fn decompose_losses(
     let height = mask.size()[2];
     let narrow = (height / 16).max(4);
     for (name, found, truth, part) in [
-        ("shading_windows", &answer.shading, &batch.shading, 1.0),
+        ("shading_windows", &prediction.shading, &batch.shading, 1.0),
         ("albedo_windows", &found_albedo, &albedo, 1.0),
         (
             "quotient_windows",
@@ -134,7 +134,7 @@ pub(crate) fn decompose_losses(
 
     let log = |of: &Tensor, floor: f64| of.f_add_scalar(floor)?.f_log();
     let steps = gradient(
-        &log(&answer.shading, SHADING_FLOOR)?,
+        &log(&prediction.shading, SHADING_FLOOR)?,
         &log(&batch.shading, SHADING_FLOOR)?,
         mask,
     )?;
@@ -149,17 +149,17 @@ pub(crate) fn decompose_losses(
     for mean in steps {
         terms.add_mean("albedo_steps", coefficients.gradient * 0.5, mean);
     }
-    let distance = chord(&answer.normals, &batch.normals, mask)?;
+    let distance = chord(&prediction.normals, &batch.normals, mask)?;
     terms.add_mean("normals", coefficients.normals, distance);
-    let highlight = highlight_error(batch, answer)?;
+    let highlight = highlight_error(batch, prediction)?;
     terms.add_mean("highlight", coefficients.highlight, highlight);
-    let energy = highlight_energy_error(batch, answer)?;
+    let energy = highlight_energy_error(batch, prediction)?;
     terms.add_mean("highlight_energy", coefficients.highlight_energy, energy);
-    if let Some(logit) = &answer.paint {
-        let truth = Darkness::new(&batch.albedo, &batch.shading, mask)?;
+    if let Some(logit) = &prediction.paint {
+        let truth = ShadowVsPaint::new(&batch.albedo, &batch.shading, mask)?;
         terms.add_mean("paint", coefficients.paint, truth.cross_entropy(logit)?);
     }
-    if let Some(light) = &answer.light {
+    if let Some(light) = &prediction.light {
         let distance = relative_distance(light, &batch.light)?;
         terms.add_mean("light", coefficients.light, distance);
     }
@@ -167,47 +167,51 @@ pub(crate) fn decompose_losses(
 }
 
 /// Mean absolute error, in which highlights count more than their absence.
-fn highlight_error(batch: &TruthBatch, answer: &AnsweredTensors) -> Result<Mean, TrainError> {
+fn highlight_error(batch: &TruthBatch, prediction: &PredictedTensors) -> Result<Mean, TrainError> {
     let truth = &batch.highlight;
     let emphasis = truth
         .f_clamp(0.0, FULL_HIGHLIGHT)?
         .f_mul_scalar(HIGHLIGHT_EMPHASIS / FULL_HIGHLIGHT)?
         .f_add_scalar(1.0)?
         .f_mul(&batch.mask)?;
-    let error = answer.highlight.f_sub(truth)?.f_abs()?.f_mul(&emphasis)?;
+    let error = prediction
+        .highlight
+        .f_sub(truth)?
+        .f_abs()?
+        .f_mul(&emphasis)?;
     let over = batch.mask.f_sum(None)?.f_clamp_min(1.0)?;
     let value = error.f_sum(None)?.f_div(&over)?;
     Ok(Mean { value, over })
 }
 
-/// Energy of the error as a part of the energy of the batch's highlights: 1 for an answer without any. A batch
+/// Energy of the error as a part of the energy of the batch's highlights: 1 for a prediction without any. A batch
 /// with hardly any highlight counts as if it had a faint one.
 fn highlight_energy_error(
     batch: &TruthBatch,
-    answer: &AnsweredTensors,
+    prediction: &PredictedTensors,
 ) -> Result<Mean, TrainError> {
     let energy = |of: &Tensor| of.f_square()?.f_mul(&batch.mask)?.f_sum(None);
     let faint = batch.mask.f_sum(None)?.f_mul_scalar(FAINT_ENERGY)?;
     let over = energy(&batch.highlight)?.f_add(&faint)?;
-    let error = energy(&answer.highlight.f_sub(&batch.highlight)?)?;
+    let error = energy(&prediction.highlight.f_sub(&batch.highlight)?)?;
     let value = error.f_div(&over)?;
     Ok(Mean { value, over })
 }
 
-/// How much each head's answers vary from pixel to pixel under the mask, as a part of the ground truth's variation: a head that has
+/// How much each head's predictions vary from pixel to pixel under the mask, as a part of the ground truth's variation: a head that has
 /// collapsed answers the same everywhere.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
 pub(crate) fn head_spreads(
     batch: &TruthBatch,
-    answer: &AnsweredTensors,
+    prediction: &PredictedTensors,
 ) -> Result<BTreeMap<&'static str, f64>, TrainError> {
     let pairs = [
-        ("normals", &answer.normals, &batch.normals),
-        ("albedo", &answer.albedo, &batch.albedo),
-        ("shading", &answer.shading, &batch.shading),
-        ("highlight", &answer.highlight, &batch.highlight),
+        ("normals", &prediction.normals, &batch.normals),
+        ("albedo", &prediction.albedo, &batch.albedo),
+        ("shading", &prediction.shading, &batch.shading),
+        ("highlight", &prediction.highlight, &batch.highlight),
     ];
     pairs
         .into_iter()
@@ -215,7 +219,7 @@ pub(crate) fn head_spreads(
         .collect()
 }
 
-/// How much an answer varies under the mask, as a part of the ground truth's variation; 1 where that has none.
+/// How much a prediction varies under the mask, as a part of the ground truth's variation; 1 where that has none.
 ///
 /// # Errors
 /// [`TrainError::Torch`].

@@ -3,8 +3,8 @@
 use tch::Tensor;
 
 use super::contact_sheet::validation_sheet;
-use super::decompose::{AnsweredTensors, decompose_losses, head_spreads};
-use super::validation::{HeldOutSamples, highlight_figures};
+use super::decompose::{PredictedTensors, decompose_losses, head_spreads};
+use super::validation::{ValidationSamples, highlight_figures};
 use crate::data::photographs::Photographs;
 use crate::data::sample::TruthBatch;
 use crate::distributed::process_group::ProcessGroup;
@@ -14,7 +14,7 @@ use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
 use crate::settings::{DecomposeSettings, first_difference};
 use relight_photo::nets::{Weights, decomposer_with_heads};
-use relight_synth::LeftOut;
+use relight_synth::SkippedFile;
 
 /// Samples that are shown.
 const SHOWN: usize = 10;
@@ -24,9 +24,9 @@ const SHOWN: usize = 10;
 pub struct DecomposeTask {
     settings: DecomposeSettings,
     resources: Resources,
-    learner: Trainable,
+    trainable: Trainable,
     photographs: Photographs,
-    validation: HeldOutSamples,
+    validation: ValidationSamples,
 }
 
 impl DecomposeTask {
@@ -42,14 +42,14 @@ impl DecomposeTask {
         settings.check()?;
         let photographs = Photographs::new(&settings.data, &settings.run, resources.clone())?;
         let (size, count) = (settings.data.size, settings.data.validation);
-        let validation = HeldOutSamples::new(photographs.library(), size, count);
+        let validation = ValidationSamples::new(photographs.library(), size, count);
         let graph = decomposer_with_heads();
-        let learner = Trainable::new(graph, weights, &settings.run, resources.device)?;
+        let trainable = Trainable::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
             photographs,
             settings,
             resources,
-            learner,
+            trainable,
             validation,
         })
     }
@@ -69,12 +69,12 @@ impl TrainingTask for DecomposeTask {
         first_difference(&self.settings, other)
     }
 
-    fn left_out(&self) -> &[LeftOut] {
+    fn left_out(&self) -> &[SkippedFile] {
         self.photographs.left_out()
     }
 
-    fn learner(&mut self) -> &mut Trainable {
-        &mut self.learner
+    fn trainable(&mut self) -> &mut Trainable {
+        &mut self.trainable
     }
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
@@ -83,25 +83,25 @@ impl TrainingTask for DecomposeTask {
 
     fn step(&mut self, step: u64) -> Result<StepLosses, TrainError> {
         let batch = self.photographs.batch(step)?;
-        let answer = self.learner.model.forward(&batch.input)?;
-        let answer = AnsweredTensors::from_outputs(&batch.input, &answer)?;
+        let output = self.trainable.model.forward(&batch.input)?;
+        let prediction = PredictedTensors::from_outputs(&batch.input, &output)?;
         Ok(StepLosses {
-            terms: decompose_losses(&batch, &answer, &self.settings.loss)?,
-            spreads: head_spreads(&batch, &answer)?,
+            terms: decompose_losses(&batch, &prediction, &self.settings.loss)?,
+            spreads: head_spreads(&batch, &prediction)?,
             damage: None,
         })
     }
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
-        let (model, device) = (self.learner.averaged_model()?, self.resources.device);
+        let (model, device) = (self.trainable.averaged_model()?, self.resources.device);
         let (kind, mut sheet) = (model.precision().kind(), None);
         let figures = self.validation.figures(kind, device, |batch| {
-            let answer =
-                AnsweredTensors::from_outputs(&batch.input, &model.forward(&batch.input)?)?;
+            let prediction =
+                PredictedTensors::from_outputs(&batch.input, &model.forward(&batch.input)?)?;
             if sheet.is_none() {
-                sheet = Some(validation_sheet(batch, &answer, SHOWN)?);
+                sheet = Some(validation_sheet(batch, &prediction, SHOWN)?);
             }
-            figures(batch, &answer)
+            figures(batch, &prediction)
         })?;
         Ok(Validation {
             figures,
@@ -111,27 +111,27 @@ impl TrainingTask for DecomposeTask {
     }
 }
 
-/// How far the answers are from the ground truth, means over the batch.
+/// How far the predictions are from the ground truth, means over the batch.
 fn figures(
     batch: &TruthBatch,
-    answer: &AnsweredTensors,
+    prediction: &PredictedTensors,
 ) -> Result<Vec<(&'static str, f64)>, TrainError> {
     let mask = &batch.mask;
     let grey = |of: &Tensor| of.f_mean_dim([1_i64].as_slice(), true, None);
     let diffuse = batch.picture.f_sub(&batch.highlight)?.f_clamp_min(0.0)?;
-    let quotient = grey(&diffuse)?.f_div(&answer.shading.f_clamp_min(0.03)?)?;
+    let quotient = grey(&diffuse)?.f_div(&prediction.shading.f_clamp_min(0.03)?)?;
     let albedo = grey(&batch.albedo)?;
     let window = (mask.size()[2] / 16).max(4);
-    let mut figures = highlight_figures(&answer.highlight, batch)?.to_vec();
+    let mut figures = highlight_figures(&prediction.highlight, batch)?.to_vec();
     let errors = [
         (
             "shading",
-            scale_invariant(&answer.shading, &batch.shading, mask)?,
+            scale_invariant(&prediction.shading, &batch.shading, mask)?,
         ),
         ("albedo", scale_invariant(&quotient, &albedo, mask)?),
         (
             "shading_windows",
-            windowed(&answer.shading, &batch.shading, mask, window)?,
+            windowed(&prediction.shading, &batch.shading, mask, window)?,
         ),
         (
             "albedo_windows",
@@ -139,13 +139,13 @@ fn figures(
         ),
         (
             "normals_deg",
-            angular_degrees(&answer.normals, &batch.normals, mask)?,
+            angular_degrees(&prediction.normals, &batch.normals, mask)?,
         ),
     ];
     for (name, error) in errors {
         figures.push((name, f64::try_from(error)?));
     }
-    if let Some(light) = &answer.light {
+    if let Some(light) = &prediction.light {
         let distance = relative_distance(light, &batch.light)?.value;
         figures.push(("light", f64::try_from(distance)?));
     }

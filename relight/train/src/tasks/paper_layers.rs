@@ -34,7 +34,7 @@ pub(crate) fn to_srgb(linear: &Tensor) -> Result<Tensor, TrainError> {
 }
 
 /// Normals (p, q, 1) over their length of slopes (p, q), 0 outside the mask. y is as the slopes have it: down in the
-/// paper's figures and in the answers of Normal-Net.
+/// paper's figures and in the predictions of Normal-Net.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
@@ -165,29 +165,29 @@ fn power_terms(normals: &Tensor) -> Result<Tensor, TrainError> {
     )?)
 }
 
-/// Light-Net's answer, `batch x 12`, as coefficients for each colour, `batch x 9 x 3`: nine of length 1, times the
+/// Light-Net's output, `batch x 12`, as coefficients for each colour, `batch x 9 x 3`: nine of length 1, times the
 /// light's colour.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn answered_light(answer: &Tensor) -> Result<Tensor, TrainError> {
-    let nine = answer.f_narrow(1, 0, 9)?;
+pub(crate) fn predicted_light(output: &Tensor) -> Result<Tensor, TrainError> {
+    let nine = output.f_narrow(1, 0, 9)?;
     let length = nine
         .f_square()?
         .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
         .f_clamp_min(TINY)?
         .f_sqrt()?;
     let nine = nine.f_div(&length)?.f_unsqueeze(2)?;
-    Ok(nine.f_matmul(&answer.f_narrow(1, 9, 3)?.f_unsqueeze(1)?)?)
+    Ok(nine.f_matmul(&output.f_narrow(1, 9, 3)?.f_unsqueeze(1)?)?)
 }
 
-/// The reflectance net's answer, `batch x 4`, as s_p (`batch x 3`, above 0) and α (`batch`, 1 to 201).
+/// The reflectance net's output, `batch x 4`, as s_p (`batch x 3`, above 0) and α (`batch`, 1 to 201).
 ///
 /// # Errors
 /// [`TrainError::Torch`].
-pub(crate) fn answered_gloss(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
-    let reflectance = answer.f_narrow(1, 0, 3)?.f_softplus()?;
-    let smoothness = answer
+pub(crate) fn predicted_gloss(output: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
+    let reflectance = output.f_narrow(1, 0, 3)?.f_softplus()?;
+    let smoothness = output
         .f_select(1, 3)?
         .f_sigmoid()?
         .f_mul_scalar(200.0)?
@@ -273,13 +273,13 @@ mod tests {
     #[test]
     fn light_of_length_one_has_the_colour_that_was_answered() {
         tch::manual_seed(2);
-        let answer = Tensor::rand([3, 12], (Kind::Float, Device::Cpu)) - 0.3;
-        let light = answered_light(&answer).unwrap();
+        let output = Tensor::rand([3, 12], (Kind::Float, Device::Cpu)) - 0.3;
+        let light = predicted_light(&output).unwrap();
         let lengths = light
             .square()
             .sum_dim_intlist([1_i64].as_slice(), false, None::<Kind>)
             .sqrt();
-        let colours = answer.narrow(1, 9, 3).abs();
+        let colours = output.narrow(1, 9, 3).abs();
         assert!((lengths - colours).abs().max().double_value(&[]) < 1e-5);
     }
 

@@ -27,7 +27,7 @@ pub struct PaperInputs {
     /// A data set of turns.
     pub turns: Option<PathBuf>,
     /// A data set of turns that the networks are judged by, and that should not be among `turns`.
-    pub held_out: Option<PathBuf>,
+    pub validation_turns: Option<PathBuf>,
     /// Weights to begin with.
     pub weights: Option<Weights>,
     /// Spec-Net's weights.
@@ -78,11 +78,13 @@ impl PhaseNetworks {
             model.transpose()
         };
         let spec = || optional(spec_net(), &inputs.spec);
-        let normal =
-            || optional(normal_net(), &inputs.normal)?.ok_or_else(|| needed(phase, "--normal-net"));
+        let normal = || {
+            optional(normal_net(), &inputs.normal)?
+                .ok_or_else(|| missing_option(phase, "--normal-net"))
+        };
         let light = || {
             let model = optional(light_net(Head::Pooled), &inputs.light)?;
-            model.ok_or_else(|| needed(phase, "--light-net"))
+            model.ok_or_else(|| missing_option(phase, "--light-net"))
         };
         Ok(match phase {
             PaperPhase::Spec => Self::Spec,
@@ -96,7 +98,7 @@ impl PhaseNetworks {
                 spec: spec()?,
             },
             PaperPhase::Specular => Self::Specular {
-                spec: spec()?.ok_or_else(|| needed(phase, "--spec-net"))?,
+                spec: spec()?.ok_or_else(|| missing_option(phase, "--spec-net"))?,
                 normal: normal()?,
                 light: light()?,
             },
@@ -104,7 +106,7 @@ impl PhaseNetworks {
     }
 
     /// The networks that it uses and does not change.
-    pub(crate) fn given(&self) -> Vec<&Model> {
+    pub(crate) fn frozen_models(&self) -> Vec<&Model> {
         match self {
             Self::Spec | Self::Normal => Vec::new(),
             Self::Light { normal, spec } => iter::once(normal).chain(spec).collect(),
@@ -117,8 +119,8 @@ impl PhaseNetworks {
         }
     }
 
-    /// The loss on a batch of composed samples, if the phase has one.
-    pub(crate) fn on_truth(
+    /// The loss on a batch of synthetic samples, if the phase has one.
+    pub(crate) fn supervised_loss(
         &self,
         own: &Model,
         batch: &TruthBatch,
@@ -131,7 +133,7 @@ impl PhaseNetworks {
         }
     }
 
-    /// How well the phase's network does on composed samples.
+    /// How well the phase's network does on synthetic samples.
     pub(crate) fn sample_figures(
         &self,
         own: &Model,
@@ -192,7 +194,7 @@ impl PhaseNetworks {
     }
 
     /// The loss on a batch of turns; `None` if the gate of saturation is closed.
-    pub(crate) fn on_turns(
+    pub(crate) fn turn_loss(
         &self,
         own: &Model,
         turns: &TurnTensors,
@@ -215,12 +217,12 @@ impl PhaseNetworks {
     }
 }
 
-pub(crate) fn needed(phase: PaperPhase, option: &str) -> TrainError {
+pub(crate) fn missing_option(phase: PaperPhase, option: &str) -> TrainError {
     TrainError::Refused(format!("relight train {} needs {option}", phase.name()))
 }
 
 /// The network that a phase trains.
-pub(crate) fn learned(phase: PaperPhase) -> Graph {
+pub(crate) fn trained_graph(phase: PaperPhase) -> Graph {
     match phase {
         PaperPhase::Spec => spec_net(),
         PaperPhase::Normal | PaperPhase::Joint => normal_net(),

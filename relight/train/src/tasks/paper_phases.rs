@@ -2,22 +2,22 @@
 //!
 //! | phase | learns | from |
 //! | --- | --- | --- |
-//! | `spec` | Spec-Net | highlights of composed samples; chromaticity of rank one on turns whose frames are saturated |
-//! | `normal` | Normal-Net | normals of composed samples (the paper's warm-up) |
+//! | `spec` | Spec-Net | highlights of synthetic samples; chromaticity of rank one on turns whose frames are saturated |
+//! | `normal` | Normal-Net | normals of synthetic samples (the paper's warm-up) |
 //! | `light` | Light-Net, from random weights | reflectance of rank one on turns, Normal-Net as it is (first round) |
 //! | `joint` | Normal-Net | reflectance of rank one on turns, Light-Net as it is (second round) |
 //! | `specular` | the reflectance net | the highlight of Spec-Net, rendered again |
 //!
 //! On turns alone the low-rank loss pulls networks away from what they know: each phase that has both has a supervised
-//! term on composed samples.
+//! term on synthetic samples.
 
 use tch::Tensor;
 
 use super::decompose::{FULL_HIGHLIGHT, HIGHLIGHT_EMPHASIS, spread};
 use super::low_rank::{chromaticity, low_rank_loss};
 use super::paper_layers::{
-    answered_gloss, answered_light, diffuse_shading, network_input, normals_of_slopes,
-    power_highlight, to_srgb,
+    diffuse_shading, network_input, normals_of_slopes, power_highlight, predicted_gloss,
+    predicted_light, to_srgb,
 };
 use crate::data::sample::TruthBatch;
 use crate::data::turn_reader::TurnTensors;
@@ -42,8 +42,8 @@ pub(crate) fn highlight_of(
     picture: &Tensor,
     mask: &Tensor,
 ) -> Result<Tensor, TrainError> {
-    let answer = &spec.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
-    let highlight = answer.f_add_scalar(1.0)?.f_mul_scalar(0.5)?;
+    let output = &spec.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
+    let highlight = output.f_add_scalar(1.0)?.f_mul_scalar(0.5)?;
     Ok(highlight.f_clamp(0.0, 1.0)?.f_mul(mask)?)
 }
 
@@ -70,7 +70,7 @@ pub(crate) fn light_of(
     picture: &Tensor,
     mask: &Tensor,
 ) -> Result<Tensor, TrainError> {
-    answered_light(&light.forward(&network_input(&to_srgb(picture)?, mask)?)?[0])
+    predicted_light(&light.forward(&network_input(&to_srgb(picture)?, mask)?)?[0])
 }
 
 /// Rows of one turn's frames under their mask, for the low-rank loss: `1 x frames x values`, brought to a mean length of 1
@@ -150,18 +150,18 @@ pub(crate) fn spec_on_turns(
     low_rank(&diffuse_chromaticity(spec, &picture, &mask)?, &mask).map(Some)
 }
 
-/// What an answer on composed samples comes to.
+/// The loss of a prediction on synthetic samples.
 #[derive(Debug)]
 pub(crate) struct TruthLoss {
     /// Its loss.
     pub mean: Mean,
-    /// What is answered.
+    /// What is predicted.
     pub head: &'static str,
     /// How much it varies, as a part of the ground truth's variation.
     pub spread: f64,
 }
 
-/// Mean error of Spec-Net's highlight on composed samples; highlights count more than their absence.
+/// Mean error of Spec-Net's highlight on synthetic samples; highlights count more than their absence.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
@@ -184,7 +184,7 @@ pub(crate) fn spec_on_truth(spec: &Model, batch: &TruthBatch) -> Result<TruthLos
     })
 }
 
-/// `1 - cos` of Normal-Net's normals on composed samples.
+/// `1 - cos` of Normal-Net's normals on synthetic samples.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
@@ -197,7 +197,7 @@ pub(crate) fn normal_on_truth(normal: &Model, batch: &TruthBatch) -> Result<Trut
     })
 }
 
-/// Scale-invariant error of the shading by Light-Net's light on the true normals of composed samples.
+/// Scale-invariant error of the shading by Light-Net's light on the true normals of synthetic samples.
 ///
 /// # Errors
 /// [`TrainError::Torch`].
@@ -256,7 +256,7 @@ fn without_highlight(turns: &TurnTensors, highlight: &Tensor) -> Result<Tensor, 
     Ok(turns.picture.f_sub(&removed)?.f_clamp(0.0, 1.0)?)
 }
 
-/// The same of composed samples, whose highlights are known.
+/// The same of synthetic samples, whose highlights are known.
 pub(crate) fn diffuse_of_truth(batch: &TruthBatch) -> Result<Tensor, TrainError> {
     Ok(batch.picture.f_sub(&batch.highlight)?.f_clamp(0.0, 1.0)?)
 }
@@ -273,7 +273,7 @@ fn gate(turns: &TurnTensors) -> Result<Tensor, TrainError> {
         .f_view([-1, 1, 1, 1])?)
 }
 
-/// Mean squared difference between Spec-Net's highlight and the one that the answered reflectance and smoothness
+/// Mean squared difference between Spec-Net's highlight and the one that the predicted reflectance and smoothness
 /// render; `None` if the gate opens for no frame.
 ///
 /// # Errors
@@ -291,8 +291,8 @@ pub(crate) fn specular_on_turns(
     let diffuse = without_highlight(turns, &highlight)?;
     let normals = normals_of(normal, &diffuse, mask)?;
     let coefficients = light_of(light, &diffuse, mask)?;
-    let answer = &reflectance.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
-    let (strength, smoothness) = answered_gloss(answer)?;
+    let output = &reflectance.forward(&network_input(&to_srgb(picture)?, mask)?)?[0];
+    let (strength, smoothness) = predicted_gloss(output)?;
     let rendered = power_highlight(&normals, &coefficients, &strength, &smoothness)?
         .f_clamp(0.0, 1.0)?
         .f_mul(mask)?;

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use tch::{Kind, Tensor};
 
-use super::paper_networks::{PaperInputs, PhaseNetworks, learned, needed};
-use super::validation::{HeldOutSamples, HeldOutTurns};
+use super::paper_networks::{PaperInputs, PhaseNetworks, missing_option, trained_graph};
+use super::validation::{ValidationSamples, ValidationTurns};
 use crate::data::photographs::Photographs;
 use crate::data::turn_reader::{TurnGroup, TurnReader};
 use crate::distributed::agreement::fingerprint;
@@ -16,7 +16,7 @@ use crate::engine::trainable::Trainable;
 use crate::error::TrainError;
 use crate::settings::{PaperPhase, PaperSettings, first_difference};
 use relight_core::reader::Rank;
-use relight_synth::{LeftOut, stream};
+use relight_synth::{SkippedFile, stream};
 
 /// Training of one of the paper's networks.
 #[derive(Debug)]
@@ -25,12 +25,12 @@ pub struct PaperTask {
     name: &'static str,
     settings: PaperSettings,
     resources: Resources,
-    learner: Trainable,
+    trainable: Trainable,
     photographs: Photographs,
     turns: Option<TurnReader>,
     rank: Rank,
-    held_out_samples: HeldOutSamples,
-    held_out_turns: Option<HeldOutTurns>,
+    validation_samples: ValidationSamples,
+    validation_turns: Option<ValidationTurns>,
 }
 
 impl PaperTask {
@@ -47,26 +47,26 @@ impl PaperTask {
     ) -> Result<Self, TrainError> {
         settings.check()?;
         if phase.needs_turns() && inputs.turns.is_none() {
-            return Err(needed(phase, "--turns"));
+            return Err(missing_option(phase, "--turns"));
         }
-        if inputs.turns.is_some() && !phase.learns_from_turns() {
+        if inputs.turns.is_some() && !phase.uses_turns() {
             return Err(TrainError::Refused(format!(
                 "relight train {} learns from synthetic photographs, not from turns: omit --turns",
                 phase.name()
             )));
         }
-        if inputs.held_out.is_some() && !phase.is_judged_by_turns() {
+        if inputs.validation_turns.is_some() && !phase.validates_on_turns() {
             return Err(TrainError::Refused(format!(
                 "relight train {} does not validate on turns: omit --validation-turns",
                 phase.name()
             )));
         }
-        let graph = learned(phase);
+        let graph = trained_graph(phase);
         let weights = inputs.weights.as_ref();
         let kind = settings.run.precision.kind();
         let seed = stream(settings.run.seed, 31);
         let open = |path: &PathBuf| TurnReader::open(path, seed);
-        let held_out = |path: &PathBuf| HeldOutTurns::read(path, kind, resources.device);
+        let validation_turns = |path: &PathBuf| ValidationTurns::read(path, kind, resources.device);
         let photographs = Photographs::new(&settings.data, &settings.run, resources.clone())?;
         // On them, nothing is known of the paper's smoothness.
         let samples = match phase {
@@ -74,15 +74,19 @@ impl PaperTask {
             _ => settings.data.validation,
         };
         Ok(Self {
-            held_out_samples: HeldOutSamples::new(
+            validation_samples: ValidationSamples::new(
                 photographs.library(),
                 settings.data.size,
                 samples,
             ),
-            held_out_turns: inputs.held_out.as_ref().map(held_out).transpose()?,
+            validation_turns: inputs
+                .validation_turns
+                .as_ref()
+                .map(validation_turns)
+                .transpose()?,
             networks: PhaseNetworks::new(phase, &settings, resources.device, inputs)?,
             name: phase.name(),
-            learner: Trainable::new(graph, weights, &settings.run, resources.device)?,
+            trainable: Trainable::new(graph, weights, &settings.run, resources.device)?,
             photographs,
             turns: inputs.turns.as_ref().map(open).transpose()?,
             rank: Rank::ONLY,
@@ -97,7 +101,7 @@ impl PaperTask {
     }
 
     /// The losses on this process's groups of a step.
-    fn on_turns(&mut self, losses: &mut StepLosses) -> Result<(), TrainError> {
+    fn turn_loss(&mut self, losses: &mut StepLosses) -> Result<(), TrainError> {
         let kind = self.kind();
         let Some(reader) = &mut self.turns else {
             return Ok(());
@@ -110,8 +114,8 @@ impl PaperTask {
             } = reader.next_group(kind, self.resources.device)?;
             damage.extend(found);
             if let Some(turns) = frames {
-                let own = &self.learner.model;
-                values.extend(self.networks.on_turns(own, &turns)?);
+                let own = &self.trainable.model;
+                values.extend(self.networks.turn_loss(own, &turns)?);
             }
         }
         losses.add_damage(&damage);
@@ -128,7 +132,7 @@ impl PaperTask {
         Ok(())
     }
 
-    /// The coefficient of the supervised term on composed samples: 1 without turns.
+    /// The coefficient of the supervised term on synthetic samples: 1 without turns.
     fn supervised(&self) -> f64 {
         match (&self.networks, &self.turns) {
             (PhaseNetworks::Specular { .. }, _) => 0.0,
@@ -152,12 +156,12 @@ impl TrainingTask for PaperTask {
         first_difference(&self.settings, other)
     }
 
-    fn left_out(&self) -> &[LeftOut] {
+    fn left_out(&self) -> &[SkippedFile] {
         self.photographs.left_out()
     }
 
-    fn learner(&mut self) -> &mut Trainable {
-        &mut self.learner
+    fn trainable(&mut self) -> &mut Trainable {
+        &mut self.trainable
     }
 
     fn inputs(&self) -> Result<String, TrainError> {
@@ -165,7 +169,7 @@ impl TrainingTask for PaperTask {
             .turns
             .as_ref()
             .map_or(String::new(), TurnReader::identity);
-        for model in self.networks.given() {
+        for model in self.networks.frozen_models() {
             inputs += &fingerprint(model.parameters())?;
         }
         Ok(inputs)
@@ -178,8 +182,8 @@ impl TrainingTask for PaperTask {
         }
         if let Some(reader) = &mut self.turns {
             if !groups.is_multiple_of(u64::from(rank.world_size())) {
-                let needed = format!("a multiple of {}", rank.world_size());
-                return Err(indivisible("turns.groups", groups, rank, &needed));
+                let missing_option = format!("a multiple of {}", rank.world_size());
+                return Err(indivisible("turns.groups", groups, rank, &missing_option));
             }
             reader.set_rank(rank)?;
         }
@@ -192,25 +196,28 @@ impl TrainingTask for PaperTask {
         let supervised = self.supervised();
         if supervised > 0.0 {
             let batch = self.photographs.batch(step)?;
-            if let Some(loss) = self.networks.on_truth(&self.learner.model, &batch)? {
+            if let Some(loss) = self
+                .networks
+                .supervised_loss(&self.trainable.model, &batch)?
+            {
                 losses.terms.add_mean("supervised", supervised, loss.mean);
                 losses.spreads.insert(loss.head, loss.spread);
             }
         }
-        self.on_turns(&mut losses)?;
+        self.turn_loss(&mut losses)?;
         Ok(losses)
     }
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
-        let own = self.learner.averaged_model()?;
+        let own = self.trainable.averaged_model()?;
         let device = self.resources.device;
         let mut figures = self
-            .held_out_samples
+            .validation_samples
             .figures(self.kind(), device, |batch| {
                 self.networks.sample_figures(&own, batch)
             })?;
         let mut damage = None;
-        if let Some(turns) = &mut self.held_out_turns {
+        if let Some(turns) = &mut self.validation_turns {
             damage = turns.take_damage();
             figures.extend(turns.figures(|turns| self.networks.turn_figures(&own, turns))?);
         }

@@ -15,17 +15,17 @@ const AROUND: i64 = 5;
 /// Darkness beyond this counts no more: a factor of e^2.
 const MAX_DARKNESS: f64 = 2.0;
 
-/// The darkness of a batch, `batch x 1 x height x width`.
+/// Which part of a batch's darkness is paint and which is shadow, `batch x 1 x height x width`.
 #[derive(Debug)]
-pub(crate) struct Darkness {
+pub(crate) struct ShadowVsPaint {
     /// Which part of it is paint, 0..=1.
     pub(crate) paint: Tensor,
     /// How dark a pixel is: by how much it counts, 0 outside the mask.
     pub(crate) weight: Tensor,
 }
 
-impl Darkness {
-    /// The darkness of albedo under a shading.
+impl ShadowVsPaint {
+    /// That of albedo under a shading.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
@@ -43,7 +43,7 @@ impl Darkness {
         })
     }
 
-    /// The cross entropy of an answer, a logit.
+    /// The cross entropy of a prediction, a logit.
     ///
     /// # Errors
     /// [`TrainError::Torch`].
@@ -85,12 +85,12 @@ mod tests {
     #[test]
     fn black_print_in_even_light_is_paint_and_a_shadow_on_even_paint_is_not() {
         let mask = halves(1.0, 1.0, 1);
-        let print = Darkness::new(&halves(0.8, 0.05, 3), &halves(1.0, 1.0, 1), &mask).unwrap();
+        let print = ShadowVsPaint::new(&halves(0.8, 0.05, 3), &halves(1.0, 1.0, 1), &mask).unwrap();
         assert!(at(&print.paint, 13) > 0.99 && at(&print.weight, 13) > 1.0);
         assert!(at(&print.weight, 3) < 0.01);
-        let shadow = Darkness::new(&halves(0.8, 0.8, 3), &halves(1.5, 0.1, 1), &mask).unwrap();
+        let shadow = ShadowVsPaint::new(&halves(0.8, 0.8, 3), &halves(1.5, 0.1, 1), &mask).unwrap();
         assert!(at(&shadow.paint, 13) < 0.01 && at(&shadow.weight, 13) > 1.0);
-        let both = Darkness::new(&halves(0.8, 0.2, 3), &halves(1.6, 0.4, 1), &mask).unwrap();
+        let both = ShadowVsPaint::new(&halves(0.8, 0.2, 3), &halves(1.6, 0.4, 1), &mask).unwrap();
         assert!((at(&both.paint, 13) - 0.5).abs() < 0.05);
     }
 
@@ -102,7 +102,7 @@ mod tests {
             Tensor::ones_like(&albedo).narrow(1, 0, 1),
             mask.repeat([1, 1, 2, 1]),
         );
-        let truth = Darkness::new(&albedo, &shading, &mask).unwrap();
+        let truth = ShadowVsPaint::new(&albedo, &shading, &mask).unwrap();
         let cost = |left: f64, right: f64| {
             let logit = halves(left, right, 1).repeat([1, 1, 2, 1]);
             truth.cross_entropy(&logit).unwrap().value.double_value(&[])

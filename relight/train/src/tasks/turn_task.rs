@@ -14,7 +14,7 @@ use crate::error::TrainError;
 use crate::settings::{TurnNetworkSettings, first_difference};
 use relight_core::reader::Rank;
 use relight_photo::nets::{LOG_MEANS, Weights, turn_network};
-use relight_synth::{DrawnTurn, LeftOut, stream};
+use relight_synth::{SkippedFile, TurnSample, stream};
 
 /// The loss coefficient of the expected error; that of the normals is 1.
 const EXPECTED_ERROR: f64 = 0.05;
@@ -32,7 +32,7 @@ const WITHIN_DEG: [(f64, &str); 2] = [(10.0, "within_10"), (20.0, "within_20")];
 pub struct TurnNetworkTask {
     settings: TurnNetworkSettings,
     resources: Resources,
-    learner: Trainable,
+    trainable: Trainable,
     training: TurnViews,
     validation: TurnViews,
     rank: Rank,
@@ -51,13 +51,13 @@ impl TurnNetworkTask {
     ) -> Result<Self, TrainError> {
         settings.check()?;
         let graph = turn_network();
-        let learner = Trainable::new(graph, weights, &settings.run, resources.device)?;
+        let trainable = Trainable::new(graph, weights, &settings.run, resources.device)?;
         Ok(Self {
             training: TurnViews::for_training(&settings.data, views, settings.run.seed)?,
             validation: TurnViews::for_validation(&settings.data, views)?,
             settings,
             resources,
-            learner,
+            trainable,
             rank: Rank::ONLY,
         })
     }
@@ -82,14 +82,14 @@ impl TurnNetworkTask {
 }
 
 /// Unit normals, and the logarithm of their expected chord error.
-fn answered(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
-    let normals = answer.f_narrow(1, 0, 3)?;
+fn predicted_normals(output: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
+    let normals = output.f_narrow(1, 0, 3)?;
     let length = normals
         .f_square()?
         .f_sum_dim_intlist([1_i64].as_slice(), true, None)?
         .f_add_scalar(1e-8)?
         .f_sqrt()?;
-    let log_chord = answer
+    let log_chord = output
         .f_narrow(1, 3, 1)?
         .f_clamp(LOG_CHORD.0, LOG_CHORD.1)?;
     Ok((normals.f_div(&length)?, log_chord))
@@ -97,9 +97,9 @@ fn answered(answer: &Tensor) -> Result<(Tensor, Tensor), TrainError> {
 
 /// How far the logarithm of the albedo is off at each pixel and channel, 0 outside the masks. Each channel of a turn is in a
 /// unit of its own, in which its mean error is 0.
-fn albedo_errors(answer: &Tensor, batch: &TurnBatch) -> Result<Tensor, TrainError> {
+fn albedo_errors(output: &Tensor, batch: &TurnBatch) -> Result<Tensor, TrainError> {
     let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
-    let errors = answer
+    let errors = output
         .f_add(&means)?
         .f_sub(&batch.log_albedo)?
         .f_mul(&batch.mask)?;
@@ -153,15 +153,15 @@ impl TrainingTask for TurnNetworkTask {
     }
 
     fn inputs(&self) -> Result<String, TrainError> {
-        Ok(format!("turns of recipe {}\n", DrawnTurn::RECIPE))
+        Ok(format!("turns of recipe {}\n", TurnSample::RECIPE))
     }
 
-    fn left_out(&self) -> &[LeftOut] {
+    fn left_out(&self) -> &[SkippedFile] {
         self.training.left_out()
     }
 
-    fn learner(&mut self) -> &mut Trainable {
-        &mut self.learner
+    fn trainable(&mut self) -> &mut Trainable {
+        &mut self.trainable
     }
 
     fn join(&mut self, group: &ProcessGroup) -> Result<(), TrainError> {
@@ -183,8 +183,8 @@ impl TrainingTask for TurnNetworkTask {
         let batch = self
             .training
             .batch(&self.turns_of(step), self.is_coarse(step), place)?;
-        let answer = self.learner.model.forward(&batch.input)?;
-        let (normals, log_chord) = answered(&answer[0])?;
+        let output = self.trainable.model.forward(&batch.input)?;
+        let (normals, log_chord) = predicted_normals(&output[0])?;
         let mut terms = LossTerms::default();
         terms.add_mean(
             "normals",
@@ -193,7 +193,7 @@ impl TrainingTask for TurnNetworkTask {
         );
         let expected = expected_error(&normals, &log_chord, &batch)?;
         terms.add_mean("expected_error", EXPECTED_ERROR, expected);
-        let albedo = albedo_error(&albedo_errors(&answer[1], &batch)?, &batch)?;
+        let albedo = albedo_error(&albedo_errors(&output[1], &batch)?, &batch)?;
         terms.add_mean("albedo", ALBEDO, albedo);
         Ok(StepLosses {
             terms,
@@ -202,22 +202,22 @@ impl TrainingTask for TurnNetworkTask {
     }
 
     fn validate(&mut self) -> Result<Validation, TrainError> {
-        let model = self.learner.averaged_model()?;
-        let mut tally = ValidationSummary::default();
+        let model = self.trainable.averaged_model()?;
+        let mut summary = ValidationSummary::default();
         let count = self.settings.data.validation;
         let turns: Vec<(u64, u64)> = (0..count).map(|k| (k, stream(44, k))).collect();
         for turns in turns.chunks(VALIDATION_BATCH) {
             let place = (Kind::Float, self.resources.device);
             let batch = self.validation.batch(turns, false, place)?;
             no_grad(|| {
-                let answer = model.forward(&batch.input)?;
-                let (normals, log_chord) = answered(&answer[0])?;
-                tally.add(&batch, &normals, &log_chord)?;
-                tally.add_albedo(&batch, &answer[1])
+                let output = model.forward(&batch.input)?;
+                let (normals, log_chord) = predicted_normals(&output[0])?;
+                summary.add(&batch, &normals, &log_chord)?;
+                summary.add_albedo(&batch, &output[1])
             })?;
         }
         Ok(Validation {
-            figures: tally.figures(),
+            figures: summary.figures(),
             ..Validation::default()
         })
     }
@@ -270,10 +270,10 @@ impl ValidationSummary {
         Ok(())
     }
 
-    fn add_albedo(&mut self, batch: &TurnBatch, answer: &Tensor) -> Result<(), TrainError> {
+    fn add_albedo(&mut self, batch: &TurnBatch, output: &Tensor) -> Result<(), TrainError> {
         let means = batch.input.f_narrow(1, LOG_MEANS as i64, 3)?;
         let within = |of: &Tensor| of.f_exp()?.f_mul(&batch.mask);
-        let (found, right) = (within(&answer.f_add(&means)?)?, within(&batch.log_albedo)?);
+        let (found, right) = (within(&output.f_add(&means)?)?, within(&batch.log_albedo)?);
         let over = |of: &Tensor| of.f_sum_dim_intlist([2_i64, 3].as_slice(), true, None);
         let square = over(&found.f_square()?)?.f_clamp_min(1e-12)?;
         let unit = over(&found.f_mul(&right)?)?.f_div(&square)?;

@@ -1,4 +1,4 @@
-//! Validation during training: on turns and composed samples that no network trains on.
+//! Validation during training: on turns and synthetic samples that no network trains on.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,7 +16,7 @@ use relight_synth::{Library, Recipe, stream};
 
 /// Batches of turns that are kept.
 const TURN_BATCHES: usize = 4;
-/// Samples of a batch of composed samples.
+/// Samples of a batch of synthetic samples.
 const SAMPLE_BATCH: usize = 16;
 /// Part of the pictures whose values are read as sRGB, whatever the camera's response.
 const TAKEN_AS_SRGB: f64 = 0.10;
@@ -30,13 +30,13 @@ pub(crate) type Figures = BTreeMap<String, f64>;
 
 /// Batches of 12 frames of turns: the first of a fixed order, so that runs can be compared.
 #[derive(Debug)]
-pub(crate) struct HeldOutTurns {
+pub(crate) struct ValidationTurns {
     batches: Vec<TurnTensors>,
     /// The damage in them, until it is reported.
     damage: Option<String>,
 }
 
-impl HeldOutTurns {
+impl ValidationTurns {
     /// Reads the batches of a data set.
     pub(crate) fn read(path: &Path, kind: Kind, device: Device) -> Result<Self, TrainError> {
         let mut reader = TurnReader::open(path, stream(0x74_75_72_6e, 23))?;
@@ -77,7 +77,7 @@ impl HeldOutTurns {
 
 /// Ray-cast samples of objects that are never trained on, all procedural.
 #[derive(Debug)]
-pub(crate) struct HeldOutSamples {
+pub(crate) struct ValidationSamples {
     recipe: Recipe,
     library: Library,
     count: u64,
@@ -85,7 +85,7 @@ pub(crate) struct HeldOutSamples {
     samples: OnceLock<Vec<TruthArrays>>,
 }
 
-impl HeldOutSamples {
+impl ValidationSamples {
     /// One sample each of `count` objects of a size. Neither their seed nor their light depends on the run's, so that runs
     /// can be compared.
     pub(crate) fn new(library: &Library, size: u32, count: u64) -> Self {

@@ -40,14 +40,14 @@ pub(crate) struct FittedPixels<'a> {
 
 /// The expected error of a pixel's normal alone, radians.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct OwnError {
+pub(crate) struct NormalUncertainty {
     /// From its curve's residual, and from its clipped part.
     deviation: f64,
     /// By how far it is from the normals around it.
     inconsistency: f64,
 }
 
-impl OwnError {
+impl NormalUncertainty {
     /// With what all pixels have in common.
     pub(crate) fn with(&self, common: f64) -> f64 {
         self.deviation
@@ -66,7 +66,7 @@ pub(crate) fn common_error(elevation: Elevation, is_fit: bool) -> f64 {
 }
 
 /// The expected error of each pixel's normal alone.
-pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
+pub(crate) fn normal_uncertainties(pixels: FittedPixels<'_>) -> Vec<NormalUncertainty> {
     let FittedPixels {
         curves,
         statistics,
@@ -88,7 +88,7 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
         .map(|pixel| {
             let statistics = &statistics[pixel];
             if statistics.is_dark() {
-                return OwnError {
+                return NormalUncertainty {
                     deviation: FRAC_PI_2,
                     inconsistency: 0.0,
                 };
@@ -97,7 +97,7 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
             let deviation = search.standard_deviation(statistics, fit, FREEDOM);
             let clipped = CLIPPED * curves.clipped_at(pixel);
             let inconsistency = dot(surroundings[pixel], fit.normal);
-            OwnError {
+            NormalUncertainty {
                 deviation: deviation.hypot(clipped),
                 inconsistency: inconsistency.clamp(-1.0, 1.0).acos(),
             }
@@ -110,11 +110,11 @@ pub(crate) fn own_errors(pixels: FittedPixels<'_>) -> Vec<OwnError> {
 pub(crate) fn shared_albedo(
     curves: &TurnCurves,
     fits: &[PixelFit],
-    errors: &[OwnError],
+    errors: &[NormalUncertainty],
 ) -> Vec<[f64; 3]> {
     let residual = median(fits.iter().map(|fit| fit.residual)).unwrap_or(0.0);
     let doubt = (residual / RELATIVE_RESIDUAL).min(1.0);
-    let error = |own: &OwnError| own.deviation.hypot(doubt * own.inconsistency);
+    let error = |own: &NormalUncertainty| own.deviation.hypot(doubt * own.inconsistency);
     let errors: Vec<f64> = errors.iter().map(error).collect();
     let albedo: Vec<[f64; 3]> = fits.iter().map(|fit| fit.albedo).collect();
     shared(curves, &albedo, &errors)

@@ -72,7 +72,7 @@ pub(crate) fn check(
     let (best, least) = shown.best(given, residual);
     let [x, y] = best.middle;
     let apart = x.hypot(y).max((best.radius - 1.0).abs());
-    let most = most_residual(ball);
+    let most = max_residual(ball);
     if least < CLEARLY * residual && least < residual - LESS && apart > APART && least < most {
         let [x, y] = place.in_picture(best.middle);
         return Err(TurnError::Misplaced {
@@ -91,7 +91,7 @@ pub(crate) fn check(
 }
 
 /// The largest residual of a ball by its own light.
-pub(crate) const fn most_residual(ball: ProbeBall) -> f64 {
+pub(crate) const fn max_residual(ball: ProbeBall) -> f64 {
     match ball {
         ProbeBall::Grey => MAX_OF_GREY,
         ProbeBall::Chrome => MAX_OF_CHROME,

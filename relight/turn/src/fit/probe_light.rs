@@ -6,7 +6,7 @@ use relight_core::render::Surface;
 
 use crate::error::TurnError;
 use crate::fit::environment::fit_turn_light;
-use crate::fit::probe_check::{Circle, check, most_residual};
+use crate::fit::probe_check::{Circle, check, max_residual};
 use crate::model::frame::TableFrame;
 use crate::model::material::MaterialKind;
 use crate::observe::conditioning::Conditioning;
@@ -38,7 +38,7 @@ impl ProbeLight {
     /// Whether the light fits the ball so badly that its place is to be checked.
     #[must_use]
     pub fn is_doubtful(&self) -> bool {
-        self.residual > most_residual(self.ball) / 2.0
+        self.residual > max_residual(self.ball) / 2.0
     }
 }
 
@@ -116,7 +116,7 @@ mod tests {
         Probe {
             place: ProbePlace::new([61.0, 40.0], 30.0).unwrap(),
             ball,
-            elevation: Elevation::given(ELEVATION).unwrap(),
+            elevation: Elevation::measured(ELEVATION).unwrap(),
         }
     }
 
@@ -156,7 +156,7 @@ mod tests {
     ) -> Result<ProbeLight, TurnError> {
         let mut builder = ProbeBuilder::new(probe);
         let normals = Normals::sphere(60);
-        let frame = TableFrame::new(Elevation::given(ELEVATION).unwrap());
+        let frame = TableFrame::new(Elevation::measured(ELEVATION).unwrap());
         let [x, y, z] = frame.axis();
         let axis = Direction::new(x, y, z).unwrap();
         for k in 0..60 {

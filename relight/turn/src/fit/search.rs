@@ -32,7 +32,7 @@ const HESSIAN_STEP: f64 = 0.06;
 /// Least eigenvalue of the Hessian: at a border of what is allowed it need not be positive. Numerical.
 const MIN_CURVATURE: f64 = 1e-3;
 
-/// A pixel's answer.
+/// The fit of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PixelFit {
     /// In the viewer's frame.
@@ -80,7 +80,7 @@ impl<'a> Search<'a> {
     }
 
     /// The best normal anywhere.
-    pub(crate) fn anywhere(&self, statistics: &CurveStatistics) -> PixelFit {
+    pub(crate) fn best_of_all(&self, statistics: &CurveStatistics) -> PixelFit {
         let mut costs: Vec<(f64, [f64; 3])> = (self.tried.iter())
             .map(|tried| {
                 let cost = statistics.residual(&tried.harmonics, &tried.products);
@@ -134,7 +134,7 @@ impl<'a> Search<'a> {
 
     /// The mean residual of the best candidates of all pixels.
     pub(crate) fn cost(&self, all: &[CurveStatistics]) -> f64 {
-        let least = |statistics: &CurveStatistics| self.anywhere(statistics).residual.min(1.0);
+        let least = |statistics: &CurveStatistics| self.best_of_all(statistics).residual.min(1.0);
         let costs: Vec<f64> = all.par_iter().map(least).collect();
         costs.iter().sum::<f64>() / all.len().max(1) as f64
     }
@@ -192,7 +192,7 @@ pub(crate) fn search_all(
             }
             match near {
                 Some(fits) => search.near(statistics, fits[pixel].normal),
-                None => search.anywhere(statistics),
+                None => search.best_of_all(statistics),
             }
         })
         .collect()

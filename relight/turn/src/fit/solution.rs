@@ -32,17 +32,17 @@ pub struct TurnSolution {
     pub(crate) measured: Option<ShLight>,
     pub(crate) conditioning: Conditioning,
     /// `None` if the object has none.
-    pub(crate) gloss: Option<FoundGloss>,
+    pub(crate) gloss: Option<EstimatedGloss>,
 }
 
 /// Specular reflectance and smoothness of the whole object, as the render layers take them; of metal of an albedo of 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct FoundGloss {
+pub(crate) struct EstimatedGloss {
     pub(crate) reflectance: f32,
     pub(crate) smoothness: f32,
 }
 
-impl FoundGloss {
+impl EstimatedGloss {
     /// Of a surface that faces the viewer and reflects this part of even light.
     pub(crate) fn new(part: f64, smoothness: f64) -> Self {
         let smoothness = smoothness as f32;

@@ -10,7 +10,7 @@ use crate::fit::curve_statistics::{CurveStatistics, HarmonicProducts, all_statis
 use crate::fit::environment::fit_model;
 use crate::fit::photo_albedo::mean_albedo;
 use crate::fit::search::PixelFit;
-use crate::fit::solution::{FoundGloss, TurnSolution};
+use crate::fit::solution::{EstimatedGloss, TurnSolution};
 use crate::model::directions::unit;
 use crate::model::frame::{Elevation, TableFrame};
 use crate::model::material::MaterialKind;
@@ -67,7 +67,8 @@ pub(crate) fn solve_by_network(
         measured: None,
         conditioning,
         // What metal shows is all that is known of the light: it may be blurred or not.
-        gloss: (material == MaterialKind::Metal).then(|| FoundGloss::new(1.0, METAL_SMOOTHNESS)),
+        gloss: (material == MaterialKind::Metal)
+            .then(|| EstimatedGloss::new(1.0, METAL_SMOOTHNESS)),
     };
     solution.conditioning = conditioning.by_network(solution.expected_error_deg());
     Ok(solution)
@@ -120,10 +121,16 @@ mod tests {
     fn the_light_that_goes_with_a_network_s_answer_is_found_up_to_its_colour() {
         let (surface, light) = (ball(), environment());
         let curves = film(&surface, &light, TAKE);
-        let answer = knowing(&surface, 10.0);
+        let prediction = knowing(&surface, 10.0);
         let material = MaterialKind::Diffuse;
-        let found =
-            solve_by_network(&curves, &answer, surface.albedo(), elevation(), material).unwrap();
+        let found = solve_by_network(
+            &curves,
+            &prediction,
+            surface.albedo(),
+            elevation(),
+            material,
+        )
+        .unwrap();
         assert!(off(&surface, &found.normals(&curves)) < 0.1);
         assert!((found.expected_error_deg() - 10.0 * CALIBRATION).abs() < 1e-3);
         assert_eq!(found.verdict(), TurnVerdict::Good);
@@ -147,10 +154,11 @@ mod tests {
     #[test]
     fn metal_that_was_given_as_such_is_explained() {
         let (surface, _, curves) = metal_ball();
-        let answer = knowing(&surface, 10.0);
+        let prediction = knowing(&surface, 10.0);
         let residual = |material| {
             let seen = surface.albedo();
-            let found = solve_by_network(&curves, &answer, seen, elevation(), material).unwrap();
+            let found =
+                solve_by_network(&curves, &prediction, seen, elevation(), material).unwrap();
             assert_eq!(found.material(), material);
             found.residual()
         };
@@ -171,8 +179,9 @@ mod tests {
                 builder.push(angle, extent, [&[level; 576]; 3]).unwrap();
             }
             let curves = builder.finish().unwrap();
-            let (answer, material) = (knowing(&ball(), 10.0), MaterialKind::Diffuse);
-            let found = solve_by_network(&curves, &answer, ball().albedo(), elevation(), material);
+            let (prediction, material) = (knowing(&ball(), 10.0), MaterialKind::Diffuse);
+            let found =
+                solve_by_network(&curves, &prediction, ball().albedo(), elevation(), material);
             let refused = found.unwrap_err().to_string();
             assert!(refused.contains(said), "{refused}");
         }

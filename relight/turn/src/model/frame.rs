@@ -51,7 +51,7 @@ impl Elevation {
     ///
     /// # Errors
     /// [`TurnError::Setting`] beyond 0 to 89 degrees.
-    pub fn given(degrees: f64) -> Result<Self, TurnError> {
+    pub fn measured(degrees: f64) -> Result<Self, TurnError> {
         if !CAMERA_ELEVATIONS_DEG.contains(&degrees) {
             return Err(TurnError::Setting {
                 what: "the elevation",
@@ -73,7 +73,7 @@ impl Elevation {
     pub fn from_rig(degrees: f64) -> Result<Self, TurnError> {
         Ok(Self {
             source: FactSource::Rig,
-            ..Self::given(degrees)?
+            ..Self::measured(degrees)?
         })
     }
 
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn the_axis_is_up_for_the_table_and_leans_to_the_viewer() {
-        let frame = TableFrame::new(Elevation::given(30.0).unwrap());
+        let frame = TableFrame::new(Elevation::measured(30.0).unwrap());
         let (sin, cos) = 30.0_f64.to_radians().sin_cos();
         let up = frame.to_table([0.0, cos, sin]);
         assert!((up[2] - 1.0).abs() < 1e-12);
@@ -164,7 +164,7 @@ mod tests {
     fn an_elevation_beyond_what_a_camera_can_have_is_refused() {
         assert_eq!(Elevation::from_rig(20.0).unwrap().source(), FactSource::Rig);
         for degrees in [f64::NAN, 90.0, -1.0] {
-            assert!(Elevation::given(degrees).is_err());
+            assert!(Elevation::measured(degrees).is_err());
             assert!(Elevation::from_rig(degrees).is_err());
         }
     }

@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn the_curve_of_a_normal_is_its_shading_under_the_turning_light() {
-        let frame = TableFrame::new(Elevation::given(23.0).unwrap());
+        let frame = TableFrame::new(Elevation::measured(23.0).unwrap());
         let table = TableLight::from_light(&light().rotated(&frame.rotation())).irradiance();
         let (sin, cos) = 23.0_f64.to_radians().sin_cos();
         let axis = Direction::new(0.0, cos, sin).unwrap();
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn light_comes_back_from_what_is_seen_of_it() {
-        let frame = TableFrame::new(Elevation::given(40.0).unwrap());
+        let frame = TableFrame::new(Elevation::measured(40.0).unwrap());
         let table = TableLight::from_light(&light().rotated(&frame.rotation()));
         let model = |material| ShadingModel {
             frame,

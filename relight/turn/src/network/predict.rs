@@ -69,7 +69,7 @@ struct NetworkNormal {
 
 impl NetworkNormal {
     /// The normal of a pixel's four numbers.
-    fn from_answer([x, y, z, log_chord]: [f32; 4]) -> Self {
+    fn from_output([x, y, z, log_chord]: [f32; 4]) -> Self {
         let length = (x * x + y * y + z * z).sqrt();
         let normal = if length > 1e-9 && length.is_finite() {
             [x / length, y / length, z / length]
@@ -152,20 +152,22 @@ impl TurnNetwork {
         phase: PhaseHypothesis,
     ) -> Result<Cells, NetError> {
         let input = network_input(&crop.turn(elevation), phase);
-        let answers = self.plan.run(&input)?;
+        let predictions = self.plan.run(&input)?;
         let area = GRID * GRID;
         let value = |output: usize, channel: usize, at: usize| {
-            let values = answers.get(output).map(|answer| answer.values());
+            let values = predictions
+                .get(output)
+                .map(|prediction| prediction.values());
             let value = values.and_then(|values| values.get(channel * area + at));
             value.copied().filter(|value| value.is_finite())
         };
         let mut cells = vec![None; area];
         for &pixel in crop.pixels() {
             let at = pixel as usize;
-            let answer = [0, 1, 2, 3].map(|c| value(0, c, at).unwrap_or(0.0));
-            let [x, y, z] = NetworkNormal::from_answer(answer).normal;
+            let prediction = [0, 1, 2, 3].map(|c| value(0, c, at).unwrap_or(0.0));
+            let [x, y, z] = NetworkNormal::from_output(prediction).normal;
             let [r, g, b] = [0, 1, 2].map(|c| value(1, c, at).unwrap_or(0.0));
-            cells[at] = Some([x, y, z, answer[3], r, g, b]);
+            cells[at] = Some([x, y, z, prediction[3], r, g, b]);
         }
         Ok(cells)
     }
@@ -188,7 +190,7 @@ fn mean_of_looks(seen: &Cells, in_mirror: &Cells) -> Cells {
 
 fn mean_error(cells: &Cells) -> f32 {
     let errors = cells.iter().flatten().map(|&[x, y, z, chord, ..]| {
-        NetworkNormal::from_answer([x, y, z, chord]).expected_error_deg
+        NetworkNormal::from_output([x, y, z, chord]).expected_error_deg
     });
     let (sum, count) = errors.fold((0.0, 0.0), |(sum, count), error| (sum + error, count + 1.0));
     sum / f32::max(count, 1.0)
@@ -203,19 +205,19 @@ fn spread(
 ) -> TurnPrediction {
     let width = curves.extent().width;
     let places = curves.places().iter();
-    let answers: Vec<Cell> = places
+    let predictions: Vec<Cell> = places
         .map(|&place| crop.at(cells, place % width, place / width))
-        .map(|answer| answer.unwrap_or([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
+        .map(|prediction| prediction.unwrap_or([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
         .collect();
-    let normal = |&[x, y, z, chord, ..]: &Cell| NetworkNormal::from_answer([x, y, z, chord]);
+    let normal = |&[x, y, z, chord, ..]: &Cell| NetworkNormal::from_output([x, y, z, chord]);
     // What the network adds is smooth, so that the albedo is as fine as the frame.
-    let albedo: Vec<[f32; 3]> = (answers.iter().zip(log_means(&mean_light(curves))))
+    let albedo: Vec<[f32; 3]> = (predictions.iter().zip(log_means(&mean_light(curves))))
         .map(|(more, mean)| [0, 1, 2].map(|c| (mean[c] + more[4 + c]).exp()))
         .collect();
-    let answers: Vec<NetworkNormal> = answers.iter().map(normal).collect();
+    let predictions: Vec<NetworkNormal> = predictions.iter().map(normal).collect();
     TurnPrediction {
-        normals: Normals::new(curves.map(|pixel| answers[pixel].normal)),
-        expected_errors: curves.map(|pixel| [answers[pixel].expected_error_deg]),
+        normals: Normals::new(curves.map(|pixel| predictions[pixel].normal)),
+        expected_errors: curves.map(|pixel| [predictions[pixel].expected_error_deg]),
         albedo: Rgb::new(curves.map(|pixel| albedo[pixel])),
         figures,
     }
@@ -227,10 +229,10 @@ mod tests {
 
     #[test]
     fn an_answer_becomes_a_unit_normal_with_its_chord_as_an_angle() {
-        let found = NetworkNormal::from_answer([0.0, 3.0, 4.0, 0.2_f32.ln()]);
+        let found = NetworkNormal::from_output([0.0, 3.0, 4.0, 0.2_f32.ln()]);
         assert_eq!(found.normal, [0.0, 0.6, 0.8]);
         assert!((found.expected_error_deg - 11.48).abs() < 0.01);
-        let nothing = NetworkNormal::from_answer([0.0, f32::NAN, 0.0, 0.0]);
+        let nothing = NetworkNormal::from_output([0.0, f32::NAN, 0.0, 0.0]);
         assert_eq!(nothing.normal, [0.0, 0.0, 1.0]);
     }
 }

@@ -2,10 +2,10 @@
 
 pub(crate) mod conditioning;
 pub(crate) mod curves;
-pub(crate) mod film;
 pub(crate) mod mirror_panorama;
 pub(crate) mod origin;
 pub(crate) mod probe;
 pub(crate) mod probe_place;
 pub(crate) mod reading;
 pub(crate) mod verdict;
+pub(crate) mod video_probe;

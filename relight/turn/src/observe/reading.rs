@@ -132,7 +132,7 @@ pub fn read_curves(
         reader.take(&shrunk.batch)?;
         done += u64::from(BATCH);
         progress(done.min(frames.into()), frames.into());
-        stream.give_back(shrunk.batch);
+        stream.recycle(shrunk.batch);
     }
     let damage = reader.damage.first().cloned();
     let finished = reader.finish((*name).to_owned());

@@ -17,7 +17,7 @@ use ::nokhwa::utils::{
 use ::nokhwa::{Camera as Library, NokhwaError, nokhwa_check, nokhwa_initialize};
 use relit_video::PixelFormat;
 
-use self::worker::{FrameResult, Worker};
+use self::worker::{FrameResult, WorkerHandle};
 use super::{
     Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode, Rate,
     Rates, Sizes,
@@ -31,7 +31,7 @@ const WAITING: usize = 8;
 /// A camera by its number in the library's list.
 pub(super) struct NokhwaCamera {
     info: DeviceInfo,
-    worker: Worker,
+    worker: WorkerHandle,
     frames: Option<Receiver<FrameResult>>,
 }
 
@@ -76,7 +76,7 @@ impl NokhwaCamera {
         number: u32,
         open: impl FnOnce() -> Result<Library, NokhwaError> + Send + 'static,
     ) -> Result<Self, CameraError> {
-        let worker = Worker::start(CameraAddress::Nokhwa(number).to_string(), open)?;
+        let worker = WorkerHandle::start(CameraAddress::Nokhwa(number).to_string(), open)?;
         let (name, formats) = worker.ask("its modes were read", |owner| {
             let mut formats = owner.library.compatible_camera_formats()?;
             // Some systems leave out the current one.
@@ -169,7 +169,7 @@ impl Camera for NokhwaCamera {
         match self.frames.take() {
             Some(_) => self
                 .worker
-                .ask("its stream was stopped", worker::Owner::stop),
+                .ask("its stream was stopped", worker::WorkerThread::stop),
             None => Ok(()),
         }
     }

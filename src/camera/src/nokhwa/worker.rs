@@ -27,10 +27,10 @@ const CLOSING: Duration = Duration::from_secs(2);
 /// A frame, or why there is none.
 pub(super) type FrameResult = Result<Frame, NokhwaError>;
 
-type Job = Box<dyn FnOnce(&mut Owner) + Send>;
+type Job = Box<dyn FnOnce(&mut WorkerThread) + Send>;
 
 /// The caller's side.
-pub(super) struct Worker {
+pub(super) struct WorkerHandle {
     device: String,
     jobs: Option<SyncSender<Job>>,
     /// Is closed when the thread has closed the camera.
@@ -38,7 +38,7 @@ pub(super) struct Worker {
 }
 
 /// The thread's side.
-pub(super) struct Owner {
+pub(super) struct WorkerThread {
     pub(super) library: Library,
     stream: Option<Stream>,
 }
@@ -49,7 +49,7 @@ struct Stream {
     fourcc: Fourcc,
 }
 
-impl Worker {
+impl WorkerHandle {
     /// Starts the thread, which opens the camera.
     pub(super) fn start(
         device: String,
@@ -65,7 +65,7 @@ impl Worker {
                 Ok(library) => {
                     let _ = opened.send(Ok(()));
                     let stream = None;
-                    Owner { library, stream }.run(&queue);
+                    WorkerThread { library, stream }.run(&queue);
                 }
                 // The receiver is gone if opening took too long.
                 Err(error) => drop(opened.send(Err(error))),
@@ -87,7 +87,7 @@ impl Worker {
     pub(super) fn ask<T: Send + 'static>(
         &self,
         doing: &'static str,
-        work: impl FnOnce(&mut Owner) -> Result<T, NokhwaError> + Send + 'static,
+        work: impl FnOnce(&mut WorkerThread) -> Result<T, NokhwaError> + Send + 'static,
     ) -> Result<T, CameraError> {
         let (reply, answer) = sync_channel(1);
         let job: Job = Box::new(move |owner| drop(reply.send(work(owner))));
@@ -128,7 +128,7 @@ impl Worker {
     }
 }
 
-impl Drop for Worker {
+impl Drop for WorkerHandle {
     fn drop(&mut self) {
         self.jobs = None;
         let _ = self.ended.recv_timeout(CLOSING);
@@ -147,7 +147,7 @@ fn failed(
     }
 }
 
-impl Owner {
+impl WorkerThread {
     /// Executes jobs, and reads frames in between, until the caller's side is dropped.
     fn run(mut self, queue: &Receiver<Job>) {
         loop {

@@ -20,7 +20,7 @@ use std::time::Duration;
 use self::description::{controls, describe, rate};
 use self::faults::FaultInjector;
 use self::source::{Delivery, Source};
-use self::timeline::{Moment, Timeline};
+use self::timeline::{FrameTime, Timeline};
 use super::{
     Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode,
     ReplayAddress,
@@ -196,7 +196,7 @@ impl ReplayCamera {
         })
     }
 
-    fn frame(&self, taken: CodedFrame, moment: Moment, t_us: i64) -> Frame {
+    fn frame(&self, taken: CodedFrame, moment: FrameTime, t_us: i64) -> Frame {
         Frame {
             fourcc: self.mode.fourcc,
             width: self.mode.width,

@@ -206,7 +206,7 @@ fn frames_come_when_the_clock_shows_their_time_stamp() {
     let entries = recorded(SHORT).entries().to_vec();
     let recorded_us = entries[149].t_us - entries[0].t_us;
     let clock = Clock::virtual_time();
-    let _participant = clock.take_part();
+    let _participant = clock.participate();
     let address = format!("replay:{}", fixture(SHORT).display());
     let mut camera = open(&address.parse().unwrap(), clock.clone()).unwrap();
     camera.start(&request()).unwrap();

@@ -5,7 +5,7 @@ use relit_video::FrameInfo;
 
 /// Counter and time of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Moment {
+pub(super) struct FrameTime {
     /// The driver's counter, which continues if the recording repeats.
     pub(super) sequence: u64,
     /// Time since the recording's first frame, microseconds.
@@ -15,7 +15,7 @@ pub(super) struct Moment {
 /// Counters and times of all frames of a video; not empty, both increase.
 #[derive(Debug)]
 pub(super) struct Timeline {
-    moments: Vec<Moment>,
+    moments: Vec<FrameTime>,
 }
 
 impl Timeline {
@@ -23,22 +23,22 @@ impl Timeline {
     /// an index, are counted on and have the video's times.
     pub(super) fn new(index: Option<&FrameIndex>, frames: &[FrameInfo]) -> Self {
         let entries = index.map(FrameIndex::entries).unwrap_or_default();
-        let mut moments: Vec<Moment> = Vec::with_capacity(frames.len());
+        let mut moments: Vec<FrameTime> = Vec::with_capacity(frames.len());
         let first_us = entries.first().map_or(0, |entry| entry.t_us);
         for (at, frame) in frames.iter().enumerate() {
             let moment = match (entries.get(at), moments.last()) {
-                (Some(entry), _) => Moment {
+                (Some(entry), _) => FrameTime {
                     sequence: entry.sequence,
                     since_first_us: entry.t_us.saturating_sub(first_us),
                 },
-                (None, None) => Moment {
+                (None, None) => FrameTime {
                     sequence: 0,
                     since_first_us: 0,
                 },
                 (None, Some(last)) => {
                     // Frames without times, or with equal ones, still have increasing times here.
                     let step = frame.t_us.saturating_sub(frames[at - 1].t_us).max(1);
-                    Moment {
+                    FrameTime {
                         sequence: last.sequence.saturating_add(1),
                         since_first_us: last.since_first_us.saturating_add(step),
                     }
@@ -68,11 +68,11 @@ impl Timeline {
 
     /// The moment of a frame in the given repetition. After the last frame comes the first, one
     /// period later and counted on by one.
-    pub(super) fn moment(&self, number: u64, round: u64) -> Moment {
+    pub(super) fn moment(&self, number: u64, round: u64) -> FrameTime {
         let at = usize::try_from(number).unwrap_or(usize::MAX);
         let ends = self.moments.first().zip(self.moments.last());
         let Some((found, (first, last))) = self.moments.get(at).zip(ends) else {
-            return Moment {
+            return FrameTime {
                 sequence: number,
                 since_first_us: 0,
             };
@@ -83,7 +83,7 @@ impl Timeline {
             .saturating_add(1);
         let length = last.since_first_us.saturating_add(self.period_us());
         let rounds = i64::try_from(round).unwrap_or(i64::MAX);
-        Moment {
+        FrameTime {
             sequence: found.sequence.saturating_add(round.saturating_mul(count)),
             since_first_us: found
                 .since_first_us

@@ -71,7 +71,7 @@ pub fn measure_rotation(
     stop: &StopRequest,
 ) -> Result<RotationDirection, CaptureError> {
     let clock = equipment.clock();
-    let _part = clock.take_part();
+    let _part = clock.participate();
     let settings = equipment.settings().clone();
     equipment.open_table()?;
     equipment.open_camera()?;

@@ -23,7 +23,7 @@ pub enum CaptureError {
     Turntable(#[from] TurntableError),
     /// It was stopped on purpose.
     #[error(transparent)]
-    Stopped(#[from] Stopped),
+    Stopped(#[from] StopReason),
     /// The recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -69,7 +69,7 @@ impl CaptureError {
 
 /// Who asked for the stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
-pub enum Stopped {
+pub enum StopReason {
     /// A person.
     #[error("stopped by a person")]
     Person,

@@ -26,15 +26,15 @@ pub(crate) mod turn;
 pub use calibrate::{measure_rotation, read_facts, write_facts};
 pub use context::CaptureContext;
 pub use equipment::Equipment;
-pub use error::{CaptureError, Stopped};
+pub use error::{CaptureError, StopReason};
 pub use mode_preference::ModePreference;
 pub use recording::{
-    End, Progress, Recorded, Recorder, RecordingError, RecordingPlan, Recovered, Saved, Window,
-    recover, recover_session,
+    EndReason, FinishedRecording, Progress, Recorder, RecordingError, RecordingPlan,
+    RecoveredSession, RecoveryReport, Window, recover, recover_session,
 };
 pub use settings::Settings;
 pub use stop::StopRequest;
-pub use take::{Captured, capture};
+pub use take::{CaptureOutcome, capture};
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -12,7 +12,9 @@ use super::error::CaptureError;
 use super::settings::Settings;
 use crate::state::{Check, Obstacle};
 use relit_data::naming::is_session_name;
-use relit_turntable::{Alarm, Homed, MARGIN_DEG, Table, TableStatus, TurnPlan, TurntableError};
+use relit_turntable::{
+    Alarm, HomingResult, MARGIN_DEG, Table, TableStatus, TurnPlan, TurntableError,
+};
 
 /// What is added to the expected size of a take, as a fraction of it.
 const RESERVE: f64 = 0.2;
@@ -98,8 +100,8 @@ pub(super) fn ready_table(table: &Table) -> Result<Vec<Check>, CaptureError> {
         Check::passed("table's zero", "known")
     } else {
         match table.home()? {
-            Homed::Index => Check::passed("table's zero", "found at its index"),
-            Homed::WhereItStands => Check::noted(
+            HomingResult::Index => Check::passed("table's zero", "found at its index"),
+            HomingResult::WhereItStands => Check::noted(
                 "table's zero",
                 "taken where the table stood: it has no index",
             ),

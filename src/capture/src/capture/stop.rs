@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::error::{CaptureError, Stopped};
+use super::error::{CaptureError, StopReason};
 use relit_clock::{Clock, Waitable};
 use relit_turntable::{Table, TurntableError};
 
@@ -14,7 +14,7 @@ pub struct StopRequest {
 
 #[derive(Debug, Default)]
 struct State {
-    asked: Option<Stopped>,
+    asked: Option<StopReason>,
     /// Motions that were watched and have ended.
     ended: u64,
 }
@@ -29,23 +29,23 @@ impl StopRequest {
     }
 
     /// Asks for a stop. The end of the program outranks a person.
-    pub fn ask(&self, who: Stopped) {
+    pub fn request(&self, who: StopReason) {
         self.state
             .update(|state| state.asked = state.asked.max(Some(who)));
     }
 
     /// Who asked, if anybody did.
     #[must_use]
-    pub fn asked(&self) -> Option<Stopped> {
+    pub fn reason(&self) -> Option<StopReason> {
         self.state.lock().asked
     }
 
     /// An error where somebody asked.
     ///
     /// # Errors
-    /// [`Stopped`].
-    pub fn check(&self) -> Result<(), Stopped> {
-        self.asked().map_or(Ok(()), Err)
+    /// [`StopReason`].
+    pub fn check(&self) -> Result<(), StopReason> {
+        self.reason().map_or(Ok(()), Err)
     }
 
     /// The result of something that may have been stopped: that a stop was requested explains an
@@ -54,7 +54,7 @@ impl StopRequest {
     /// # Errors
     /// [`CaptureError::Stopped`], or the error itself.
     pub fn explain<T>(&self, result: Result<T, CaptureError>) -> Result<T, CaptureError> {
-        result.map_err(|error| match (self.asked(), &error) {
+        result.map_err(|error| match (self.reason(), &error) {
             (Some(_), CaptureError::Turntable(TurntableError::NotStopped)) | (None, _) => error,
             (Some(who), _) => who.into(),
         })
@@ -106,9 +106,9 @@ mod tests {
     fn a_stop_explains_every_error_but_that_of_a_table_that_did_not_obey() {
         let stop = StopRequest::new(&Clock::monotonic());
         let fails = |error: TurntableError| stop.explain(Err::<(), _>(error.into())).unwrap_err();
-        let is_stopped = |error| matches!(error, CaptureError::Stopped(Stopped::Person));
+        let is_stopped = |error| matches!(error, CaptureError::Stopped(StopReason::Person));
         assert!(!is_stopped(fails(TurntableError::NotHomed)));
-        stop.ask(Stopped::Person);
+        stop.request(StopReason::Person);
         assert!(is_stopped(fails(TurntableError::NotHomed)));
         assert!(!is_stopped(fails(TurntableError::NotStopped)));
         assert!(stop.explain(Ok(())).is_ok());
@@ -118,10 +118,10 @@ mod tests {
     fn the_end_of_the_program_outranks_a_person() {
         let stop = StopRequest::new(&Clock::monotonic());
         assert_eq!(stop.check(), Ok(()));
-        stop.ask(Stopped::Person);
-        assert_eq!(stop.asked(), Some(Stopped::Person));
-        stop.clone().ask(Stopped::Shutdown);
-        stop.ask(Stopped::Person);
-        assert_eq!(stop.check(), Err(Stopped::Shutdown));
+        stop.request(StopReason::Person);
+        assert_eq!(stop.reason(), Some(StopReason::Person));
+        stop.clone().request(StopReason::Shutdown);
+        stop.request(StopReason::Person);
+        assert_eq!(stop.check(), Err(StopReason::Shutdown));
     }
 }

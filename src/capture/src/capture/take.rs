@@ -21,7 +21,7 @@ use super::error::CaptureError;
 use super::locked_camera::{LockedCamera, NEXT_FRAME};
 use super::manifest::manifest;
 use super::preflight;
-use super::recording::{End, Recorder, RecordingPlan};
+use super::recording::{EndReason, Recorder, RecordingPlan};
 use super::turn::{TurnRecording, unwind};
 use crate::state::{Check, Phase, TakeSummary, Verdict};
 use relit_camera::CameraAddress;
@@ -32,7 +32,7 @@ const REPLAY_WAIT: Duration = Duration::from_secs(60);
 
 /// What a capture left.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Captured {
+pub struct CaptureOutcome {
     /// The last take, which counts.
     pub take: TakeSummary,
     /// Takes before it that are not usable, and are kept.
@@ -48,16 +48,16 @@ pub fn capture(
     equipment: &mut Equipment,
     object: &str,
     context: CaptureContext<'_>,
-) -> Result<Captured, CaptureError> {
+) -> Result<CaptureOutcome, CaptureError> {
     let clock = equipment.clock();
-    let _part = clock.take_part();
+    let _part = clock.participate();
     preflight::check_object(object).map_err(CaptureError::Refused)?;
     let retries = equipment.settings().retries;
     let mut repeated = 0;
     loop {
         let (take, repeatable) = run_take(equipment, object, context)?;
         if take.verdict != Verdict::Aborted || !repeatable || repeated == retries {
-            return Ok(Captured { take, repeated });
+            return Ok(CaptureOutcome { take, repeated });
         }
         repeated += 1;
         let fault = format!("the take is repeated: {}", take.reason.unwrap_or_default());
@@ -104,18 +104,18 @@ fn run_take(
     let track = track.unwrap_or_else(|error| {
         // A camera that failed by itself explains the take better than the table that was stopped
         // for it.
-        if matches!(recorded.end(), End::Over | End::Stopped) {
+        if matches!(recorded.end(), EndReason::Over | EndReason::Stopped) {
             let why = with_causes(&error);
             recorded.ended_by(match error {
-                CaptureError::Stopped(_) => End::OnPurpose(why),
-                _ => End::Interrupted(why),
+                CaptureError::Stopped(_) => EndReason::OnPurpose(why),
+                _ => EndReason::Interrupted(why),
             });
         }
         recorded
             .journal()
             .and_then(|journal| AngleFit::from_reports(&journal.turn, &journal.reports))
     });
-    let mut repeatable = matches!(recorded.end(), End::Over);
+    let mut repeatable = matches!(recorded.end(), EndReason::Over);
     let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));
     // The session is closed before the table turns back: nothing that happens on the way costs it.
     let modulation = recorded.modulation();

@@ -1,7 +1,7 @@
 //! `relit-capture calibrate`: the constants of a rig, for a person or a machine.
 
 use relit_capture::capture::{
-    CaptureError, Equipment, Settings, StopRequest, Stopped, measure_rotation, read_facts,
+    CaptureError, Equipment, Settings, StopReason, StopRequest, measure_rotation, read_facts,
     write_facts,
 };
 use relit_console::{Console, Event, Outcome};
@@ -25,14 +25,14 @@ pub(crate) fn run(console: Console, asked: CalibrateArguments) -> Result<Outcome
         let mut equipment = Equipment::new(settings)?;
         let stop = StopRequest::new(&equipment.clock());
         let ending = stop.clone();
-        at_end(move || ending.ask(Stopped::Shutdown))
+        at_end(move || ending.request(StopReason::Shutdown))
             .map_err(CaptureError::system("the signals", "listened to"))?;
         facts.rotation = Some(measure_rotation(&mut equipment, &stop)?);
     }
     write_facts(&root, &facts)?;
     let rotation = facts.rotation.map(|rotation| rotation.to_string());
     let elevation = facts.camera_elevation_deg;
-    console.say(
+    console.print(
         &format!(
             "the table turns {}; the camera looks down by {}",
             rotation.as_deref().unwrap_or("in an unknown direction"),

@@ -45,7 +45,7 @@ fn report_camera(console: Console, info: &DeviceInfo) {
     }
     let modes: Vec<String> = info.modes.iter().map(ToString::to_string).collect();
     let controls: Vec<Value> = controls.iter().map(as_json).collect();
-    console.say(
+    console.print(
         &text,
         &Event::Camera {
             address: info.address.to_string(),
@@ -110,5 +110,5 @@ fn report_turntable(console: Console) {
         [address] => format!("{address}: possibly a turntable's controller"),
         several => several.join("\n"),
     };
-    console.say(&text, &Event::Turntable { addresses });
+    console.print(&text, &Event::Turntable { addresses });
 }

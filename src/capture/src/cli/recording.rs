@@ -6,8 +6,8 @@ use std::thread;
 use std::time::Duration;
 
 use relit_capture::capture::{
-    CaptureContext, CaptureError, Captured, Equipment, Settings, StopRequest, Stopped, capture,
-    recover,
+    CaptureContext, CaptureError, CaptureOutcome, Equipment, Settings, StopReason, StopRequest,
+    capture, recover,
 };
 use relit_capture::state::{Monitor, Phase, RigState, Verdict};
 use relit_turntable::TurntableAddress;
@@ -16,7 +16,7 @@ use serde_json::json;
 use super::arguments::RecordArguments;
 use super::environment::at_end;
 use relit_console::{Console, Event, Outcome};
-use relit_data::durable::MadeFolder;
+use relit_data::durable::CreatedFolder;
 
 /// How often progress is looked at.
 const UPDATE: Duration = Duration::from_millis(100);
@@ -33,7 +33,7 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
     let mut equipment = Equipment::new(settings)?;
     let stop = StopRequest::new(&equipment.clock());
     let asked = stop.clone();
-    at_end(move || asked.ask(Stopped::Shutdown))
+    at_end(move || asked.request(StopReason::Shutdown))
         .map_err(CaptureError::system("the signals", "listened to"))?;
     let monitor = Monitor::default();
     let context = CaptureContext {
@@ -49,9 +49,9 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
 }
 
 /// Makes the folder of sessions; one that stays empty is removed at the end.
-pub(crate) fn make_root(settings: &Settings) -> Result<MadeFolder, CaptureError> {
+pub(crate) fn make_root(settings: &Settings) -> Result<CreatedFolder, CaptureError> {
     let root = settings.root.display().to_string();
-    MadeFolder::make(&settings.root).map_err(CaptureError::system(root, "made"))
+    CreatedFolder::make(&settings.root).map_err(CaptureError::system(root, "made"))
 }
 
 /// Asks the person at the terminal whether a real table may turn; without a terminal the answer is no.
@@ -128,7 +128,7 @@ impl Reporter {
         }
         for check in state.checks.iter().skip(self.checks) {
             let mark = if check.good { "ok" } else { "note" };
-            self.console.say(
+            self.console.print(
                 &format!("{mark:>4}  {}: {}", check.what, check.found),
                 &Event::Check(relit_console::Check::Rig {
                     what: check.what.clone(),
@@ -158,7 +158,7 @@ impl Reporter {
             }
             _ => relit_console::ProgressBar::hidden(),
         };
-        self.console.say_phase(
+        self.console.print_phase(
             &state.phase.to_string(),
             &Event::Phase {
                 phase: json!(state.phase),
@@ -167,12 +167,12 @@ impl Reporter {
     }
 }
 
-fn report(console: Console, captured: &Captured, folder: &str) -> Outcome {
+fn report(console: Console, captured: &CaptureOutcome, folder: &str) -> Outcome {
     let take = &captured.take;
     let (verdict, outcome) = judgement(captured);
     let reason = take.reason.as_ref();
     let reason = reason.map_or(String::new(), |reason| format!(": {reason}"));
-    console.say(
+    console.print(
         &format!(
             "{folder}: {} frames, {} dropped, {verdict}{reason}",
             take.frames, take.dropped
@@ -186,7 +186,7 @@ fn report(console: Console, captured: &Captured, folder: &str) -> Outcome {
 }
 
 /// What a capture is worth, in words and as an exit code.
-fn judgement(captured: &Captured) -> (&'static str, Outcome) {
+fn judgement(captured: &CaptureOutcome) -> (&'static str, Outcome) {
     match captured.take.verdict {
         Verdict::Clean if captured.repeated == 0 => ("clean", Outcome::Success),
         Verdict::Clean => ("clean, after an unusable take", Outcome::Partial),
@@ -219,7 +219,7 @@ mod tests {
                 is_stopped: false,
                 reason: None,
             };
-            assert_eq!(judgement(&Captured { take, repeated }).1, outcome);
+            assert_eq!(judgement(&CaptureOutcome { take, repeated }).1, outcome);
         }
     }
 }

@@ -14,7 +14,7 @@ use sd_notify::NotifyState;
 use super::arguments::ServeArguments;
 use super::environment::{at_end, heartbeat, notify_service, programs};
 use relit_console::{Console, Event, Outcome};
-use relit_data::durable::MadeFolder;
+use relit_data::durable::CreatedFolder;
 
 pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Box<dyn Error>> {
     let settings: Settings = asked.rig.into();
@@ -24,8 +24,8 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
     let token = token.transpose()?;
     // An address that is taken is known before anything is made or moved.
     check_address(address)?;
-    let made =
-        MadeFolder::make(root).map_err(CaptureError::system(root.display().to_string(), "made"))?;
+    let made = CreatedFolder::make(root)
+        .map_err(CaptureError::system(root.display().to_string(), "made"))?;
     let shutdown = Shutdown::new();
     let ending = shutdown.clone();
     let end = move || {
@@ -69,7 +69,7 @@ fn announce(console: Console, announcement: &Announcement) {
     if let Some(qr) = &announcement.qr {
         text = format!("{qr}\n{text}");
     }
-    console.say(
+    console.print(
         &text,
         &Event::Serving {
             url: announcement.url.clone(),

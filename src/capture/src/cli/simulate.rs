@@ -26,7 +26,7 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
     };
     let simulator = Simulator::start(&options, asked.link.as_deref())?;
     let port = asked.link.as_deref().unwrap_or(simulator.path());
-    console.say(
+    console.print(
         &format!(
             "a simulated turntable is at {}; end it with Ctrl-C",
             port.display()
@@ -38,7 +38,7 @@ pub(crate) fn run(console: Console, asked: &SimulateArguments) -> Result<Outcome
     );
     wait(console);
     drop(simulator);
-    console.say("the simulated turntable has ended", &Event::Ended);
+    console.print("the simulated turntable has ended", &Event::Ended);
     Ok(Outcome::Success)
 }
 

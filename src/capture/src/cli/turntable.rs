@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use relit_turntable::{
-    Homed, Table, TableOptions, TableStatus, TurntableAddress, TurntableError, find_serial,
+    HomingResult, Table, TableOptions, TableStatus, TurntableAddress, TurntableError, find_serial,
 };
 use serde_json::{Value, json};
 
@@ -97,7 +97,7 @@ fn no_port(address: &TurntableAddress) -> TurntableError {
 fn home(console: Console, table: &Table) -> Result<Outcome, TurntableError> {
     let homed = table.home()?;
     let status = table.status()?;
-    if homed == Homed::WhereItStands {
+    if homed == HomingResult::WhereItStands {
         console.warn(
             "homing is off ($22=0): zero is where the table stands, until the controller is switched \
              off or reset",
@@ -108,10 +108,10 @@ fn home(console: Console, table: &Table) -> Result<Outcome, TurntableError> {
 }
 
 fn report(console: Console, event: fn(Value) -> Event, status: &TableStatus) {
-    console.say(&in_words(status), &event(json!(status)));
+    console.print(&describe(status), &event(json!(status)));
 }
 
-fn in_words(status: &TableStatus) -> String {
+fn describe(status: &TableStatus) -> String {
     let mut text = format!("{}, {:.3} degrees", status.state, status.angle_deg);
     if status.restarted {
         text += " (not homed: the controller restarted)";

@@ -10,8 +10,8 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::capture::{StopRequest, Stopped};
-use crate::command::Refused;
+use crate::capture::{StopReason, StopRequest};
+use crate::command::CommandError;
 use crate::state::{Monitor, Phase};
 use relit_clock::Clock;
 
@@ -81,14 +81,14 @@ impl Dispatcher {
     }
 
     /// Makes this the job, unless one is running.
-    pub(super) fn submit(&self, job: Job) -> Result<(), Refused> {
+    pub(super) fn submit(&self, job: Job) -> Result<(), CommandError> {
         let mut plan = self.lock();
         if plan.is_ending {
             let ending = "the program is ending: start it again";
-            return Err(Refused::Unavailable(ending.to_owned()));
+            return Err(CommandError::Unavailable(ending.to_owned()));
         }
         if let Some(current) = &plan.current {
-            return Err(Refused::Busy(under_way(current)));
+            return Err(CommandError::Busy(under_way(current)));
         }
         plan.current = Some(job);
         Ok(())
@@ -101,7 +101,7 @@ impl Dispatcher {
         match &plan.current {
             _ if plan.is_ending => {}
             Some(Job::StopTable) if plan.is_running => {}
-            Some(_) if plan.is_running => plan.stop.ask(Stopped::Person),
+            Some(_) if plan.is_running => plan.stop.request(StopReason::Person),
             _ => plan.current = Some(Job::StopTable),
         }
     }
@@ -110,7 +110,7 @@ impl Dispatcher {
     pub(super) fn end(&self) {
         let mut plan = self.lock();
         plan.is_ending = true;
-        plan.stop.ask(Stopped::Shutdown);
+        plan.stop.request(StopReason::Shutdown);
     }
 
     /// Shows that the worker has failed; nothing is carried out any more.
@@ -179,14 +179,14 @@ mod tests {
         dispatcher.submit(Job::Capture("mug".to_owned())).unwrap();
         let refused = dispatcher.submit(Job::Home).unwrap_err();
         assert!(
-            matches!(&refused, Refused::Busy(why) if why.contains("mug")),
+            matches!(&refused, CommandError::Busy(why) if why.contains("mug")),
             "{refused}"
         );
         assert_eq!(begun(&dispatcher).0, Job::Capture("mug".to_owned()));
         assert!(matches!(dispatcher.begin(), Next::Idle));
         assert!(matches!(
             dispatcher.submit(Job::Home),
-            Err(Refused::Busy(_))
+            Err(CommandError::Busy(_))
         ));
         dispatcher.finish();
         dispatcher.submit(Job::Home).unwrap();
@@ -199,10 +199,10 @@ mod tests {
         dispatcher.submit(Job::Home).unwrap();
         let (_, stop) = begun(&dispatcher);
         dispatcher.stop();
-        assert_eq!(stop.asked(), Some(Stopped::Person));
+        assert_eq!(stop.reason(), Some(StopReason::Person));
         dispatcher.finish();
         dispatcher.submit(Job::Home).unwrap();
-        assert_eq!(begun(&dispatcher).1.asked(), None);
+        assert_eq!(begun(&dispatcher).1.reason(), None);
     }
 
     #[test]
@@ -214,7 +214,7 @@ mod tests {
         assert_eq!(job, Job::StopTable);
         // It is not stopped itself.
         dispatcher.stop();
-        assert_eq!(stop.asked(), None);
+        assert_eq!(stop.reason(), None);
         dispatcher.finish();
         dispatcher.stop();
         assert_eq!(begun(&dispatcher).0, Job::StopTable);
@@ -227,11 +227,11 @@ mod tests {
         let (_, stop) = begun(&dispatcher);
         dispatcher.stop();
         dispatcher.end();
-        assert_eq!(stop.asked(), Some(Stopped::Shutdown));
+        assert_eq!(stop.reason(), Some(StopReason::Shutdown));
         dispatcher.finish();
         assert!(matches!(
             dispatcher.submit(Job::Home),
-            Err(Refused::Unavailable(_))
+            Err(CommandError::Unavailable(_))
         ));
         dispatcher.stop();
         assert!(matches!(dispatcher.begin(), Next::End));

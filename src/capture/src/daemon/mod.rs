@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use crate::capture::{CaptureError, Equipment, Settings, preflight, recover};
-use crate::command::{Command, Refused, Rig};
+use crate::command::{Command, CommandError, Rig};
 use crate::preview::Preview;
 use crate::state::{Monitor, RigState};
 use dispatcher::{Dispatcher, Job};
@@ -92,7 +92,7 @@ impl Daemon {
 }
 
 impl Rig for Daemon {
-    fn command(&self, command: Command) -> Result<(), Refused> {
+    fn command(&self, command: Command) -> Result<(), CommandError> {
         let dispatcher = &self.dispatcher;
         // A name that cannot be is the better answer than a camera that is away.
         if let Command::Start { object } = &command {
@@ -161,18 +161,18 @@ impl Drop for PanicReport {
     }
 }
 
-fn check_jog(degrees: f64) -> Result<(), Refused> {
+fn check_jog(degrees: f64) -> Result<(), CommandError> {
     if degrees.is_finite() && degrees.abs() <= FARTHEST_JOG {
         Ok(())
     } else {
-        Err(Refused::Invalid(format!(
+        Err(CommandError::Invalid(format!(
             "the table cannot be turned by {degrees} degrees"
         )))
     }
 }
 
-fn check_object(object: &str) -> Result<(), Refused> {
-    preflight::check_object(object).map_err(Refused::Invalid)
+fn check_object(object: &str) -> Result<(), CommandError> {
+    preflight::check_object(object).map_err(CommandError::Invalid)
 }
 
 /// Recovers what an earlier run left, and reports the result.
@@ -198,6 +198,6 @@ mod tests {
         let faults = dispatcher.monitor().state().faults;
         assert_eq!(faults.len(), 1, "{faults:?}");
         let refused = dispatcher.submit(Job::Home);
-        assert!(matches!(refused, Err(Refused::Unavailable(_))));
+        assert!(matches!(refused, Err(CommandError::Unavailable(_))));
     }
 }

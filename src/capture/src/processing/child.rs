@@ -51,7 +51,7 @@ impl Worker {
     }
 
     /// Passes on what the program printed since.
-    pub(super) fn hear(&mut self, heard: &mut ProgramEvent) {
+    pub(super) fn read_events(&mut self, heard: &mut ProgramEvent) {
         let mut piece = [0; 4096];
         while let Ok(count @ 1..) = self.output.read_at(&mut piece, self.read) {
             self.read += count as u64;
@@ -65,7 +65,7 @@ impl Worker {
     }
 
     /// Holds the program, or lets it go on.
-    pub(super) fn hold(&mut self, held: bool) {
+    pub(super) fn set_paused(&mut self, held: bool) {
         if held != self.is_held {
             self.is_held = held;
             self.signal(if held { Signal::STOP } else { Signal::CONT });
@@ -91,13 +91,13 @@ impl Worker {
     pub(super) fn ended(&mut self, heard: &mut ProgramEvent) -> io::Result<Option<ExitStatus>> {
         let status = self.child.try_wait()?;
         if status.is_some() {
-            self.hear(heard);
+            self.read_events(heard);
         }
         Ok(status)
     }
 
     /// The end of what the program wrote on standard error.
-    pub(super) fn complaint(&self) -> String {
+    pub(super) fn error_output(&self) -> String {
         let written = self.errors.metadata().map_or(0, |data| data.len());
         let mut end = vec![0; written.min(COMPLAINT) as usize];
         let from = written.saturating_sub(COMPLAINT);
@@ -139,8 +139,8 @@ mod tests {
         ]);
         let mut worker = Worker::start(command).unwrap();
         worker.child.wait().unwrap();
-        let complaint = worker.complaint();
-        assert_eq!(complaint.len() as u64, COMPLAINT);
-        assert!(complaint.ends_with("xend"));
+        let error_output = worker.error_output();
+        assert_eq!(error_output.len() as u64, COMPLAINT);
+        assert!(error_output.ends_with("xend"));
     }
 }

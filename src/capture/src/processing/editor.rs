@@ -10,7 +10,7 @@ use relit_data::session::MASK_FILE;
 use super::child::Worker;
 use super::commands::ProcessingPrograms;
 use super::events::ProgramEvent;
-use crate::command::Refused;
+use crate::command::CommandError;
 
 /// Time in which the editor has to come up: it reads the video through once.
 const START: Duration = Duration::from_secs(60);
@@ -47,19 +47,20 @@ impl OpenEditor {
         session: &str,
         folder: &Path,
         is_busy: &dyn Fn() -> bool,
-    ) -> Result<Self, Refused> {
+    ) -> Result<Self, CommandError> {
         let recipe = recipe(folder);
         let command = programs.editor(folder, recipe.as_deref());
         let missing =
-            || Refused::Unavailable("relit-mask is not installed on this machine".to_owned());
-        let failed = |why: String| Refused::Unavailable(format!("the editor did not open: {why}"));
+            || CommandError::Unavailable("relit-mask is not installed on this machine".to_owned());
+        let failed =
+            |why: String| CommandError::Unavailable(format!("the editor did not open: {why}"));
         let mut worker = Worker::start(command.ok_or_else(missing)?)
             .map_err(|error| failed(error.to_string()))?;
         let mut heard = ProgramEvent::default();
         let until = Instant::now() + START;
         loop {
-            worker.hold(is_busy());
-            worker.hear(&mut heard);
+            worker.set_paused(is_busy());
+            worker.read_events(&mut heard);
             if let Some(target) = target(&heard) {
                 return Ok(Self {
                     session: session.to_owned(),
@@ -73,8 +74,8 @@ impl OpenEditor {
                 Ok(None) if Instant::now() < until => thread::park_timeout(LOOK),
                 Ok(None) => return Err(failed("it took too long".to_owned())),
                 Ok(Some(status)) => {
-                    let complaint = worker.complaint();
-                    return Err(failed(heard.failure(status.code(), &complaint)));
+                    let error_output = worker.error_output();
+                    return Err(failed(heard.failure(status.code(), &error_output)));
                 }
                 Err(error) => return Err(failed(error.to_string())),
             }
@@ -92,9 +93,9 @@ impl OpenEditor {
     }
 
     /// Holds it while the rig is busy. False once it is over: accepted, discarded, or abandoned.
-    pub(super) fn look_after(&mut self, held: bool) -> bool {
-        self.worker.hear(&mut self.heard);
-        self.worker.hold(held);
+    pub(super) fn poll(&mut self, held: bool) -> bool {
+        self.worker.read_events(&mut self.heard);
+        self.worker.set_paused(held);
         let is_running = matches!(self.worker.ended(&mut self.heard), Ok(None));
         is_running && self.used.elapsed() < UNUSED
     }

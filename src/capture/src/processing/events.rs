@@ -3,7 +3,7 @@
 use relit_console::{Check, Event};
 use serde::Deserialize;
 
-use super::queue::StepEnd;
+use super::queue::StepOutcome;
 use crate::state::{ProcessingOutcome, ProcessingStep};
 
 /// Warnings and reasons that are kept.
@@ -119,11 +119,11 @@ impl ProgramEvent {
         self.editor.as_ref()
     }
 
-    /// What went wrong, for a person; `complaint` is what the program wrote on standard error.
-    pub(super) fn failure(&self, exit_code: Option<i32>, complaint: &str) -> String {
+    /// What went wrong, for a person; `error_output` is what the program wrote on standard error.
+    pub(super) fn failure(&self, exit_code: Option<i32>, error_output: &str) -> String {
         let said = self.error.clone().or_else(|| self.left_out.clone());
         let last = || {
-            let mut lines = complaint.lines().map(str::trim);
+            let mut lines = error_output.lines().map(str::trim);
             let last = lines.rfind(|line| !line.is_empty())?;
             Some(last.strip_prefix("error: ").unwrap_or(last).to_owned())
         };
@@ -138,30 +138,30 @@ impl ProgramEvent {
         mut self,
         step: ProcessingStep,
         exit_code: Option<i32>,
-        complaint: &str,
-    ) -> StepEnd {
+        error_output: &str,
+    ) -> StepOutcome {
         let end = match (step, exit_code) {
             (ProcessingStep::Mask, Some(0)) if self.has_mask => Some(self.masked()),
             (ProcessingStep::Check, Some(_)) => self.check.take().map(checked),
             (ProcessingStep::Extract, Some(code @ (0 | 3))) => self.extracted(code),
             _ => None,
         };
-        end.unwrap_or_else(|| StepEnd {
+        end.unwrap_or_else(|| StepOutcome {
             outcome: ProcessingOutcome::Failed,
-            what: self.failure(exit_code, complaint),
+            what: self.failure(exit_code, error_output),
             goes_on: false,
         })
     }
 
     /// Doubts of relit-mask about its own mask count too.
-    fn masked(&self) -> StepEnd {
+    fn masked(&self) -> StepOutcome {
         match self.warnings.first() {
             None => good("the mask is made"),
             Some(warning) => doubtful(warning, true),
         }
     }
 
-    fn extracted(&mut self, code: i32) -> Option<StepEnd> {
+    fn extracted(&mut self, code: i32) -> Option<StepOutcome> {
         if let Some(skipped) = self.skipped {
             let Some(fault) = skipped.fault() else {
                 return Some(good("it is in the data set already"));
@@ -183,7 +183,7 @@ impl ProgramEvent {
     }
 }
 
-fn checked(report: CheckReport) -> StepEnd {
+fn checked(report: CheckReport) -> StepOutcome {
     let why = report.reasons.join("; ");
     match &*report.verdict {
         "fits" => good("the mask fits"),
@@ -191,16 +191,16 @@ fn checked(report: CheckReport) -> StepEnd {
     }
 }
 
-fn good(what: &str) -> StepEnd {
-    StepEnd {
+fn good(what: &str) -> StepOutcome {
+    StepOutcome {
         outcome: ProcessingOutcome::Good,
         what: what.to_owned(),
         goes_on: true,
     }
 }
 
-fn doubtful(what: &str, goes_on: bool) -> StepEnd {
-    StepEnd {
+fn doubtful(what: &str, goes_on: bool) -> StepOutcome {
+    StepOutcome {
         outcome: ProcessingOutcome::Doubtful,
         what: what.to_owned(),
         goes_on,

@@ -26,7 +26,7 @@ pub use commands::ProcessingPrograms;
 pub(crate) use editor::EditorTarget;
 pub use shared::ProcessingOptions;
 
-use crate::command::Refused;
+use crate::command::CommandError;
 use crate::state::{Monitor, ProcessingStep};
 use editor::OpenEditor;
 use queue::{PendingWork, ProcessingQueue};
@@ -120,15 +120,15 @@ impl Processing {
     /// Queues steps for a session; returns the job's number.
     ///
     /// # Errors
-    /// [`Refused`] if a program is missing, or the session is being worked on.
-    pub fn submit(&self, session: &str, steps: Vec<ProcessingStep>) -> Result<u64, Refused> {
+    /// [`CommandError`] if a program is missing, or the session is being worked on.
+    pub fn submit(&self, session: &str, steps: Vec<ProcessingStep>) -> Result<u64, CommandError> {
         if self.shared.editor().as_ref().is_some_and(|open| {
             open.session == session && open.is_in_use() && steps.contains(&ProcessingStep::Mask)
         }) {
             let error = format!("the mask of {session} is open in the editor: finish it there");
-            return Err(Refused::Busy(error));
+            return Err(CommandError::Busy(error));
         }
-        self.shared.look_for_programs();
+        self.shared.find_programs();
         self.shared.submit(PendingWork {
             session: session.to_owned(),
             steps,
@@ -142,15 +142,15 @@ impl Processing {
 
     /// Changes the settings.
     pub(crate) fn configure(&self, settings: ProcessingSettings) {
-        self.shared.look_for_programs();
+        self.shared.find_programs();
         self.shared.change(|plan| plan.settings = settings);
     }
 
     /// Ends all work on a session, so that its folder can be moved.
     ///
     /// # Errors
-    /// [`Refused::Busy`] if a program does not end.
-    pub fn release(&self, session: &str) -> Result<(), Refused> {
+    /// [`CommandError::Busy`] if a program does not end.
+    pub fn release(&self, session: &str) -> Result<(), CommandError> {
         self.shared.close_editor_of(session);
         self.shared
             .change(|plan| plan.queue.cancel_session(session));
@@ -158,7 +158,7 @@ impl Processing {
         while self.shared.plan().queue.has(session) {
             if Instant::now() > until {
                 let error = format!("{session} is still being processed: try again in a moment");
-                return Err(Refused::Busy(error));
+                return Err(CommandError::Busy(error));
             }
             thread::park_timeout(LOOK);
         }
@@ -168,16 +168,16 @@ impl Processing {
     /// Opens the editor of a session's mask, or continues with the one that is open.
     ///
     /// # Errors
-    /// [`Refused`] if the program is missing or fails, the rig is busy, or somebody edits another session.
-    pub fn edit(&self, session: &str) -> Result<(), Refused> {
+    /// [`CommandError`] if the program is missing or fails, the rig is busy, or somebody edits another session.
+    pub fn edit(&self, session: &str) -> Result<(), CommandError> {
         if is_busy(&self.shared.monitor) {
-            return Err(Refused::Busy(HELD.to_owned()));
+            return Err(CommandError::Busy(HELD.to_owned()));
         }
         if self.shared.plan().queue.has(session) {
             let error = format!("{session} is being processed: wait for it, or cancel it");
-            return Err(Refused::Busy(error));
+            return Err(CommandError::Busy(error));
         }
-        self.shared.look_for_programs();
+        self.shared.find_programs();
         let programs = self.shared.plan().programs.clone();
         let _opening = self.shared.opening.lock();
         if !self.shared.goes_on(session)? {
@@ -193,15 +193,15 @@ impl Processing {
     /// Where requests for the editor go.
     ///
     /// # Errors
-    /// [`Refused`] if none is open, or it is held while the rig is busy.
-    pub(crate) fn editor(&self) -> Result<EditorTarget, Refused> {
+    /// [`CommandError`] if none is open, or it is held while the rig is busy.
+    pub(crate) fn editor(&self) -> Result<EditorTarget, CommandError> {
         if is_busy(&self.shared.monitor) {
-            return Err(Refused::Unavailable(HELD.to_owned()));
+            return Err(CommandError::Unavailable(HELD.to_owned()));
         }
         let mut editor = self.shared.editor();
         let none = || "no mask is open in the editor: open one from the list of sessions";
         let open = editor.as_mut();
-        let open = open.ok_or_else(|| Refused::Unavailable(none().to_owned()))?;
+        let open = open.ok_or_else(|| CommandError::Unavailable(none().to_owned()))?;
         open.touch();
         Ok(open.target.clone())
     }

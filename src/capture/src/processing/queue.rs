@@ -10,7 +10,7 @@
 
 use std::collections::VecDeque;
 
-use crate::command::Refused;
+use crate::command::CommandError;
 use crate::state::{
     FinishedJob, ProcessingJob, ProcessingOutcome, ProcessingStatus, ProcessingStep,
 };
@@ -30,7 +30,7 @@ pub(super) struct PendingWork {
 
 /// How a step ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct StepEnd {
+pub(super) struct StepOutcome {
     pub(super) outcome: ProcessingOutcome,
     /// In a sentence.
     pub(super) what: String,
@@ -55,7 +55,7 @@ struct UnderWay {
 
 /// What the runner begins.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Begun {
+pub(super) struct StartedStep {
     pub(super) session: String,
     pub(super) step: ProcessingStep,
 }
@@ -72,19 +72,19 @@ pub(super) struct ProcessingQueue {
 
 impl ProcessingQueue {
     /// Appends work; returns its number.
-    pub(super) fn submit(&mut self, work: PendingWork) -> Result<u64, Refused> {
+    pub(super) fn submit(&mut self, work: PendingWork) -> Result<u64, CommandError> {
         if work.steps.is_empty() {
             let none = "no step is named: name mask, check or extract";
-            return Err(Refused::Invalid(none.to_owned()));
+            return Err(CommandError::Invalid(none.to_owned()));
         }
         if self.has(&work.session) {
             let what = &work.session;
             let already = format!("{what} is being processed already: wait for it, or cancel it");
-            return Err(Refused::Busy(already));
+            return Err(CommandError::Busy(already));
         }
         if self.waiting.len() >= MAX_WAITING {
             let full = format!("{MAX_WAITING} jobs wait already: let some of them end");
-            return Err(Refused::Busy(full));
+            return Err(CommandError::Busy(full));
         }
         self.numbers += 1;
         self.waiting.push_back(Entry {
@@ -137,7 +137,7 @@ impl ProcessingQueue {
     }
 
     /// What begins now, if anything does.
-    pub(super) fn begin(&mut self) -> Option<Begun> {
+    pub(super) fn begin(&mut self) -> Option<StartedStep> {
         if self.is_rig_busy || self.current.is_some() {
             return None;
         }
@@ -151,11 +151,11 @@ impl ProcessingQueue {
             of: 0,
             is_cancelled: false,
         });
-        Some(Begun { session, step })
+        Some(StartedStep { session, step })
     }
 
     /// Whether the program under way is to be held.
-    pub(super) fn holds(&self) -> bool {
+    pub(super) fn should_pause(&self) -> bool {
         self.is_rig_busy && self.current.is_some() && !self.is_cancelled()
     }
 
@@ -173,7 +173,7 @@ impl ProcessingQueue {
     }
 
     /// The step under way has ended.
-    pub(super) fn finish(&mut self, end: StepEnd) {
+    pub(super) fn finish(&mut self, end: StepOutcome) {
         let Some(UnderWay {
             mut entry,
             step,
@@ -273,8 +273,8 @@ mod tests {
         }
     }
 
-    fn end(outcome: ProcessingOutcome, goes_on: bool) -> StepEnd {
-        StepEnd {
+    fn end(outcome: ProcessingOutcome, goes_on: bool) -> StepOutcome {
+        StepOutcome {
             outcome,
             what: "so it ended".to_owned(),
             goes_on,
@@ -324,12 +324,12 @@ mod tests {
         queue.set_rig_busy(true);
         queue.submit(work("mug", &[Mask, Check])).unwrap();
         assert_eq!(begun(&mut queue), None);
-        assert!(!queue.holds(), "there is nothing to hold");
+        assert!(!queue.should_pause(), "there is nothing to hold");
         queue.set_rig_busy(false);
         begun(&mut queue).unwrap();
-        assert!(!queue.holds());
+        assert!(!queue.should_pause());
         queue.set_rig_busy(true);
-        assert!(queue.holds());
+        assert!(queue.should_pause());
         assert_eq!(queue.jobs()[0].status, ProcessingStatus::Held);
         // A program may end just before it is held.
         queue.finish(end(GOOD, true));
@@ -351,7 +351,7 @@ mod tests {
         queue.set_rig_busy(true);
         assert!(queue.cancel(mug) && queue.cancel(cow));
         assert!(
-            queue.is_cancelled() && !queue.holds(),
+            queue.is_cancelled() && !queue.should_pause(),
             "it has to run to end"
         );
         assert_eq!(queue.jobs().len(), 1);
@@ -379,7 +379,7 @@ mod tests {
         queue.submit(work("mug", &[Mask])).unwrap();
         let again = queue.submit(work("mug", &[Check])).unwrap_err();
         assert!(
-            matches!(&again, Refused::Busy(why) if why.contains("mug")),
+            matches!(&again, CommandError::Busy(why) if why.contains("mug")),
             "{again}"
         );
         begun(&mut queue).unwrap();
@@ -387,7 +387,10 @@ mod tests {
         queue.finish(end(GOOD, true));
         queue.submit(work("mug", &[Check])).unwrap();
         let nothing = queue.submit(work("cow", &[]));
-        assert!(matches!(nothing, Err(Refused::Invalid(_))), "{nothing:?}");
+        assert!(
+            matches!(nothing, Err(CommandError::Invalid(_))),
+            "{nothing:?}"
+        );
         queue.cancel_session("mug");
         assert!(queue.jobs().is_empty());
     }
@@ -399,6 +402,6 @@ mod tests {
             queue.submit(work(&n.to_string(), &[Mask])).unwrap();
         }
         let full = queue.submit(work("mug", &[Mask]));
-        assert!(matches!(full, Err(Refused::Busy(_))), "{full:?}");
+        assert!(matches!(full, Err(CommandError::Busy(_))), "{full:?}");
     }
 }

@@ -9,7 +9,7 @@ use relit_data::session::{MANIFEST_FILE, Manifest, Status};
 use super::child::Worker;
 use super::commands::StepPlaces;
 use super::events::ProgramEvent;
-use super::queue::{Begun, PendingWork, StepEnd};
+use super::queue::{PendingWork, StartedStep, StepOutcome};
 use super::shared::{Shared, is_busy};
 use crate::state::{Monitor, ProcessingOutcome, ProcessingStep, Verdict};
 
@@ -26,7 +26,7 @@ const ALL: [ProcessingStep; 3] = [
 
 /// The step under way.
 struct Running {
-    begun: Begun,
+    begun: StartedStep,
     worker: Worker,
     heard: ProgramEvent,
 }
@@ -41,7 +41,7 @@ pub(super) fn run(shared: &Shared) {
         seen = shared.monitor.wait_newer(seen, LOOK).version;
         if searched.elapsed() > SEARCH {
             searched = Instant::now();
-            shared.look_for_programs();
+            shared.find_programs();
             shared.show();
         }
         let is_busy = is_busy(&shared.monitor);
@@ -59,7 +59,7 @@ pub(super) fn run(shared: &Shared) {
 fn look_after_editor(shared: &Shared, is_busy: bool) {
     let mut editor = shared.editor();
     if let Some(open) = editor.as_mut()
-        && !open.look_after(is_busy)
+        && !open.poll(is_busy)
     {
         *editor = None;
     }
@@ -85,7 +85,7 @@ fn take_up_what_was_recorded(shared: &Shared, seen: &mut Option<String>) {
     };
     let steps = {
         let plan = shared.plan();
-        let can = |step: &ProcessingStep| plan.lacks(*step).is_none();
+        let can = |step: &ProcessingStep| plan.missing_program(*step).is_none();
         ALL.into_iter().take_while(can).collect::<Vec<_>>()
     };
     // Without the programs the page shows the commands.
@@ -111,7 +111,7 @@ fn begin(shared: &Shared) -> Option<Running> {
             finish(
                 shared,
                 &begun,
-                StepEnd {
+                StepOutcome {
                     outcome: ProcessingOutcome::Failed,
                     what: why,
                     goes_on: false,
@@ -122,7 +122,7 @@ fn begin(shared: &Shared) -> Option<Running> {
     }
 }
 
-fn start(shared: &Shared, begun: &Begun) -> Result<Worker, String> {
+fn start(shared: &Shared, begun: &StartedStep) -> Result<Worker, String> {
     let session = shared.root.join(&begun.session);
     let is_aborted = is_aborted(&session).map_err(|why| format!("{}: {why}", begun.session))?;
     let (programs, dataset) = {
@@ -149,16 +149,16 @@ fn is_aborted(session: &std::path::Path) -> Result<bool, String> {
 
 /// Hears the program, holds or ends it, and notes its end.
 fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
-    let (holds, is_cancelled) = {
+    let (should_pause, is_cancelled) = {
         let plan = shared.plan();
-        (plan.queue.holds(), plan.queue.is_cancelled())
+        (plan.queue.should_pause(), plan.queue.is_cancelled())
     };
     if is_cancelled {
         running.worker.end();
     } else {
-        running.worker.hold(holds);
+        running.worker.set_paused(should_pause);
     }
-    running.worker.hear(&mut running.heard);
+    running.worker.read_events(&mut running.heard);
     if let Some((done, of)) = running.heard.take_progress() {
         shared.plan().queue.advance(done, of);
     }
@@ -167,13 +167,13 @@ fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
         Ok(Some(status)) => status.code(),
         Err(_) => None,
     };
-    let complaint = running.worker.complaint();
-    let end = running.heard.end(running.begun.step, status, &complaint);
+    let error_output = running.worker.error_output();
+    let end = running.heard.end(running.begun.step, status, &error_output);
     finish(shared, &running.begun, end);
     None
 }
 
-fn finish(shared: &Shared, begun: &Begun, end: StepEnd) {
+fn finish(shared: &Shared, begun: &StartedStep, end: StepOutcome) {
     let line = format!("{}: {}: {}", begun.session, begun.step, end.what);
     shared.change(|plan| plan.queue.finish(end));
     shared.monitor.update(|state| state.note(line));

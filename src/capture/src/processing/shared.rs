@@ -9,7 +9,7 @@ use super::commands::ProcessingPrograms;
 use super::editor::OpenEditor;
 use super::queue::{PendingWork, ProcessingQueue};
 use super::store::{self, ProcessingSettings};
-use crate::command::Refused;
+use crate::command::CommandError;
 use crate::state::{Monitor, ProcessingState, ProcessingStep};
 
 /// Where data sets and programs are.
@@ -74,13 +74,13 @@ impl Shared {
         self.editor.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn look_for_programs(&self) {
+    pub(super) fn find_programs(&self) {
         let found = (self.programs)();
         self.plan().programs = found;
     }
 
     /// Whether the editor that is open is this session's. One that nobody uses makes room.
-    pub(super) fn goes_on(&self, session: &str) -> Result<bool, Refused> {
+    pub(super) fn goes_on(&self, session: &str) -> Result<bool, CommandError> {
         let mut editor = self.editor();
         match editor.as_mut() {
             Some(open) if open.session == session => open.touch(),
@@ -88,7 +88,7 @@ impl Shared {
                 let other = &open.session;
                 let error =
                     format!("the mask of {other} is being edited: finish or close it there");
-                return Err(Refused::Busy(error));
+                return Err(CommandError::Busy(error));
             }
             _ => {
                 *editor = None;
@@ -105,12 +105,12 @@ impl Shared {
         }
     }
 
-    pub(super) fn submit(&self, work: PendingWork) -> Result<u64, Refused> {
+    pub(super) fn submit(&self, work: PendingWork) -> Result<u64, CommandError> {
         self.change(|plan| {
-            let lacks = |step: &ProcessingStep| plan.lacks(*step);
-            if let Some(program) = work.steps.iter().find_map(lacks) {
+            let missing_program = |step: &ProcessingStep| plan.missing_program(*step);
+            if let Some(program) = work.steps.iter().find_map(missing_program) {
                 let error = format!("{program} is not installed on this machine: install the package relit, or copy the command");
-                return Err(Refused::Unavailable(error));
+                return Err(CommandError::Unavailable(error));
             }
             plan.queue.submit(work)
         })
@@ -161,7 +161,7 @@ impl Shared {
 
 impl Plan {
     /// The program that a step needs and that is not installed.
-    pub(super) fn lacks(&self, step: ProcessingStep) -> Option<&'static str> {
+    pub(super) fn missing_program(&self, step: ProcessingStep) -> Option<&'static str> {
         match step {
             ProcessingStep::Mask | ProcessingStep::Check => {
                 self.programs.mask.is_none().then_some("relit-mask")

@@ -12,7 +12,7 @@ use tokio::time::timeout;
 use tokio_stream::wrappers::WatchStream;
 
 use super::permits::{Permits, Work, permit};
-use crate::command::{Command, Refused, Rig};
+use crate::command::{Command, CommandError, Rig};
 use crate::state::{Monitor, RigState};
 use relit_web::Shutdown;
 use relit_web::{Failure, JsonBody};
@@ -71,12 +71,12 @@ pub(super) async fn command(
     Ok((StatusCode::ACCEPTED, Json(monitor.state())))
 }
 
-impl From<Refused> for Failure {
-    fn from(refused: Refused) -> Self {
+impl From<CommandError> for Failure {
+    fn from(refused: CommandError) -> Self {
         let (status, error) = match refused {
-            Refused::Busy(error) => (StatusCode::CONFLICT, error),
-            Refused::Invalid(error) => (StatusCode::UNPROCESSABLE_ENTITY, error),
-            Refused::Unavailable(error) => (StatusCode::SERVICE_UNAVAILABLE, error),
+            CommandError::Busy(error) => (StatusCode::CONFLICT, error),
+            CommandError::Invalid(error) => (StatusCode::UNPROCESSABLE_ENTITY, error),
+            CommandError::Unavailable(error) => (StatusCode::SERVICE_UNAVAILABLE, error),
         };
         Self::new(status, error)
     }

@@ -16,7 +16,7 @@ use tokio::time::timeout;
 
 use super::library::Library;
 use super::permits::{Permits, Work};
-use super::processing::{MayProcess, present};
+use super::processing::{ProcessingHandle, present};
 use crate::processing::EditorTarget;
 
 /// Where the editor is served.
@@ -41,7 +41,7 @@ pub(super) struct EditorPath {
 /// used it for 15 minutes. One mask is open at a time. While the rig captures, the editor is held.
 pub(super) async fn open(
     State(library): State<Arc<Library>>,
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
 ) -> Result<Json<EditorPath>, Failure> {
@@ -59,7 +59,7 @@ pub(super) async fn open(
 ///
 /// Without a mask: what was drawn is lost.
 pub(super) async fn close(
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(permits): State<Arc<Permits>>,
 ) -> Result<StatusCode, Failure> {
     let processing = present(processing)?;
@@ -72,7 +72,7 @@ pub(super) async fn close(
 
 /// Hands a request to the editor, and its answer back.
 pub(super) async fn pass_on(
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(permits): State<Arc<Permits>>,
     request: Request,
 ) -> Result<Response, Failure> {
@@ -108,7 +108,7 @@ async fn inner_request(
     let path = format!("/{}", path.strip_prefix(PLACE).unwrap_or_default());
     let uri: Uri = path
         .parse()
-        .map_err(|_| Failure::bad("the editor has no such path"))?;
+        .map_err(|_| Failure::bad_request("the editor has no such path"))?;
     let body = timeout(SKETCH, to_bytes(body, MAX_SKETCH)).await;
     let body = body.map_err(|_| {
         let error = "the drawing did not come in time";
@@ -128,7 +128,7 @@ async fn inner_request(
     }
     let value = |text: String| {
         HeaderValue::from_str(&text)
-            .map_err(|_| Failure::broken("the editor's address cannot be written"))
+            .map_err(|_| Failure::internal("the editor's address cannot be written"))
     };
     headers.insert(header::HOST, value(target.address.to_string())?);
     let token = value(format!("Bearer {}", target.token))?;

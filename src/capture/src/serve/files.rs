@@ -93,7 +93,7 @@ pub(super) async fn session_tar(
 }
 
 fn unread(error: io::Error) -> Failure {
-    Failure::broken(format!("the session cannot be read: {error}"))
+    Failure::internal(format!("the session cannot be read: {error}"))
 }
 
 /// Sends what `write` writes, `length` bytes. Where it fails, the connection ends early.
@@ -120,7 +120,7 @@ fn send(
         .header(header::CONTENT_LENGTH, length)
         .header(header::CONTENT_DISPOSITION, name)
         .body(Body::from_stream(ReceiverStream::new(receiver)));
-    answer.map_err(|error| Failure::broken(format!("the answer cannot be made: {error}")))
+    answer.map_err(|error| Failure::internal(format!("the answer cannot be made: {error}")))
 }
 
 /// Hands what is written to the client.

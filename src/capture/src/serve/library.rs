@@ -130,7 +130,7 @@ impl Library {
     fn names(&self) -> Result<Vec<String>, Failure> {
         let mut names = read_names(&self.root).map_err(|error| {
             let root = self.root.display();
-            Failure::broken(format!(
+            Failure::internal(format!(
                 "the folder of sessions {root} cannot be read: {error}"
             ))
         })?;
@@ -158,7 +158,7 @@ impl Library {
     /// All about one session.
     pub(super) fn detail(&self, id: &str) -> Result<SessionDetail, Failure> {
         let folder = self.folder(id)?;
-        let manifest = read_manifest(&folder).map_err(Failure::broken)?;
+        let manifest = read_manifest(&folder).map_err(Failure::internal)?;
         let index = read_index(&folder, &manifest);
         let mut summary = summarise(id, &manifest, index.as_ref());
         summary.results = Some(self.results_of(id, &entries_in(&(self.dataset)())));
@@ -170,7 +170,7 @@ impl Library {
         let first = entries.first().map_or(0, |entry| entry.t_us);
         Ok(SessionDetail {
             summary,
-            manifest: json.map_err(Failure::broken)?,
+            manifest: json.map_err(Failure::internal)?,
             has_mask: folder.join(MASK_FILE).is_file(),
             times_s: entries
                 .iter()
@@ -183,7 +183,7 @@ impl Library {
     /// The video of a session that is not being recorded.
     pub(super) fn video_file(&self, id: &str) -> Result<VideoFile, Failure> {
         let folder = self.ended(id)?;
-        let manifest = read_manifest(&folder).map_err(Failure::broken)?;
+        let manifest = read_manifest(&folder).map_err(Failure::internal)?;
         let path = folder.join(&manifest.video.file);
         let missing = || Failure::not_found(format!("the video of {id} is missing"));
         let version = FileVersion::read(&path).ok_or_else(missing)?;
@@ -241,7 +241,7 @@ impl Library {
     }
 
     /// Writes note and rating of a session to its manifest.
-    pub(super) fn remark(
+    pub(super) fn annotate(
         &self,
         id: &str,
         note: Option<&str>,
@@ -249,14 +249,14 @@ impl Library {
     ) -> Result<(), Failure> {
         if note.is_some_and(|note| note.chars().count() > MAX_NOTE_LENGTH) {
             let error = format!("a note has at most {MAX_NOTE_LENGTH} characters");
-            return Err(Failure::bad(error));
+            return Err(Failure::bad_request(error));
         }
         if rating.is_some_and(|rating| !(1..=5).contains(&rating)) {
-            return Err(Failure::bad("a rating is a number from 1 to 5"));
+            return Err(Failure::bad_request("a rating is a number from 1 to 5"));
         }
         let note = note.map(str::trim).filter(|note| !note.is_empty());
-        let written = session::remark(&self.ended(id)?, note, rating);
-        written.map_err(|error| Failure::broken(with_causes(&error)))
+        let written = session::annotate(&self.ended(id)?, note, rating);
+        written.map_err(|error| Failure::internal(with_causes(&error)))
     }
 
     /// A session's folder. A name with which one could leave the root is nobody's.

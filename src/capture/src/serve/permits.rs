@@ -72,7 +72,7 @@ impl Permits {
             job()
         });
         done.await
-            .unwrap_or_else(|_| Err(Failure::broken("the request could not be processed")))
+            .unwrap_or_else(|_| Err(Failure::internal("the request could not be processed")))
     }
 }
 
@@ -82,7 +82,7 @@ pub(super) fn permit(
     what: &str,
 ) -> Result<OwnedSemaphorePermit, Failure> {
     permits.clone().try_acquire_owned().map_err(|_| {
-        Failure::busy(format!(
+        Failure::unavailable(format!(
             "there are too many {what} already: close one and try again"
         ))
     })

@@ -49,7 +49,7 @@ impl Pictures {
 fn failed(error: relit_video::VideoError) -> Failure {
     match error {
         relit_video::VideoError::NoSuchFrame { .. } => Failure::not_found(with_causes(&error)),
-        _ => Failure::broken(with_causes(&error)),
+        _ => Failure::internal(with_causes(&error)),
     }
 }
 
@@ -66,7 +66,7 @@ fn encode(picture: &RgbImage, width: u32) -> Result<Bytes, Failure> {
         .encode_image(picture)
         .map_err(|error| {
             let why = with_causes(&error);
-            Failure::broken(format!("the picture cannot be encoded: {why}"))
+            Failure::internal(format!("the picture cannot be encoded: {why}"))
         })?;
     Ok(jpeg.into())
 }

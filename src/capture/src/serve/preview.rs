@@ -22,7 +22,7 @@ const NUMBER: HeaderName = HeaderName::from_static("relit-frame");
 
 /// Which picture is wanted.
 #[derive(Debug, Deserialize)]
-pub(super) struct After {
+pub(super) struct PreviewQuery {
     /// The number of the picture that the client has: the answer waits up to 4 s for another one.
     after: Option<u64>,
 }
@@ -35,10 +35,10 @@ pub(super) async fn picture(
     State(monitor): State<Monitor>,
     State(permits): State<Arc<Permits>>,
     State(shutdown): State<Shutdown>,
-    QueryParams(After { after }): QueryParams<After>,
+    QueryParams(PreviewQuery { after }): QueryParams<PreviewQuery>,
 ) -> Result<Response, Failure> {
     let Some(after) = after else {
-        let none = || Failure::busy("no picture yet: the camera has not delivered one");
+        let none = || Failure::unavailable("no picture yet: the camera has not delivered one");
         return Ok(jpeg(monitor.preview().ok_or_else(none)?));
     };
     let _permit = permit(&permits.viewers, "viewers of the preview")?;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::library::Library;
 use super::permits::{Permits, Work};
-use crate::command::Refused;
+use crate::command::CommandError;
 use crate::processing::{Processing, ProcessingSettings};
 use crate::state::{Monitor, ProcessingState, ProcessingStep};
 use relit_web::{Failure, JsonBody};
@@ -20,19 +20,19 @@ const PAGE_POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox";
 
 /// What works on sessions, where something does.
-pub(super) type MayProcess = Option<Arc<Processing>>;
+pub(super) type ProcessingHandle = Option<Arc<Processing>>;
 
 /// What works on sessions, or that nothing does.
-pub(super) fn present(processing: MayProcess) -> Result<Arc<Processing>, Failure> {
+pub(super) fn present(processing: ProcessingHandle) -> Result<Arc<Processing>, Failure> {
     processing.ok_or_else(|| {
-        Refused::Unavailable("this server does not process sessions".to_owned()).into()
+        CommandError::Unavailable("this server does not process sessions".to_owned()).into()
     })
 }
 
 /// Steps for a session, in their order.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct WantedSteps {
+pub(super) struct RequestedSteps {
     /// `mask`, `check`, `extract`, or several of them.
     steps: Vec<ProcessingStep>,
 }
@@ -51,10 +51,10 @@ pub(super) struct QueuedJob {
 /// ends the steps of its session.
 pub(super) async fn process(
     State(library): State<Arc<Library>>,
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
-    JsonBody(WantedSteps { steps }): JsonBody<WantedSteps>,
+    JsonBody(RequestedSteps { steps }): JsonBody<RequestedSteps>,
 ) -> Result<Response, Failure> {
     let processing = present(processing)?;
     let queued = permits.run(Work::Command, move || {
@@ -69,7 +69,7 @@ pub(super) async fn process(
 ///
 /// Its program is ended; what follows in its session is not begun.
 pub(super) async fn cancel(
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(permits): State<Arc<Permits>>,
     Path(number): Path<String>,
 ) -> Result<StatusCode, Failure> {
@@ -93,7 +93,7 @@ pub(super) async fn state(State(monitor): State<Monitor>) -> Json<ProcessingStat
 ///
 /// The settings are kept on the disk.
 pub(super) async fn configure(
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(monitor): State<Monitor>,
     State(permits): State<Arc<Permits>>,
     JsonBody(settings): JsonBody<ProcessingSettings>,

@@ -12,12 +12,12 @@ use super::library::Library;
 use super::options::ClientLimits;
 use super::permits::Permits;
 use super::pictures::Pictures;
-use super::processing::MayProcess;
+use super::processing::ProcessingHandle;
 use super::{api, editor, files, page, preview, processing, sessions};
 use crate::command::Rig;
 use crate::state::Monitor;
 use relit_web::Shutdown;
-use relit_web::{AccessPolicy, BodyLimit, Failure, Index, guard};
+use relit_web::{AccessPolicy, BodyLimit, Failure, IndexPage, guard};
 
 /// Largest body of a request, bytes.
 const MAX_BODY: usize = 16 * 1024;
@@ -33,7 +33,7 @@ pub(super) struct App {
     pub(super) library: Arc<Library>,
     pub(super) pictures: Arc<Pictures>,
     pub(super) shutdown: Shutdown,
-    pub(super) processing: MayProcess,
+    pub(super) processing: ProcessingHandle,
 }
 
 impl App {
@@ -42,7 +42,7 @@ impl App {
         policy: AccessPolicy,
         limits: ClientLimits,
         shutdown: Shutdown,
-        processing: MayProcess,
+        processing: ProcessingHandle,
     ) -> Self {
         let root = rig.root().to_owned();
         let beside = root.with_file_name("dataset");
@@ -62,7 +62,7 @@ impl App {
     }
 }
 
-impl FromRef<App> for Index {
+impl FromRef<App> for IndexPage {
     fn from_ref(_: &App) -> Self {
         page::INDEX
     }
@@ -113,9 +113,12 @@ pub(super) fn router(app: &App) -> Router {
 fn of_a_session() -> Router<App> {
     let path = |rest: &str| format!("/api/v1/sessions/{{id}}{rest}");
     Router::new()
-        .route(&path(""), get(sessions::detail).delete(sessions::put_away))
+        .route(
+            &path(""),
+            get(sessions::detail).delete(sessions::move_to_trash),
+        )
         .route(&path("/restore"), post(sessions::restore))
-        .route(&path("/remarks"), put(sessions::remark))
+        .route(&path("/remarks"), put(sessions::annotate))
         .route(&path("/mask.png"), get(files::mask))
         .route(&path("/thumbnail.jpg"), get(sessions::thumbnail))
         .route(&path("/frames/{frame}"), get(sessions::frame))

@@ -12,7 +12,7 @@ use super::files::session_tar;
 use super::library::{Library, SessionSummary};
 use super::permits::{Permits, Work};
 use super::pictures::Pictures;
-use super::processing::MayProcess;
+use super::processing::ProcessingHandle;
 use relit_web::{Failure, JsonBody, QueryParams};
 
 /// Sessions in one answer, unless asked otherwise, and at most.
@@ -67,16 +67,16 @@ pub(super) async fn detail(
 /// Put a session away
 ///
 /// Into the folder `.trash` beside the sessions, which nobody empties but a person. Work on it is cancelled.
-pub(super) async fn put_away(
+pub(super) async fn move_to_trash(
     State(library): State<Arc<Library>>,
-    State(processing): State<MayProcess>,
+    State(processing): State<ProcessingHandle>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
 ) -> Result<StatusCode, Failure> {
     let done = permits.run(Work::Command, move || {
         library.ended(&id)?;
         processing.map_or(Ok(()), |processing| processing.release(&id))?;
-        library.put_away(&id)
+        library.move_to_trash(&id)
     });
     done.await.map(|()| StatusCode::NO_CONTENT)
 }
@@ -113,14 +113,14 @@ pub(super) struct Annotations {
 /// Note and rating of a session
 ///
 /// Written to its manifest.
-pub(super) async fn remark(
+pub(super) async fn annotate(
     State(library): State<Arc<Library>>,
     State(permits): State<Arc<Permits>>,
     Path(id): Path<String>,
     JsonBody(Annotations { note, rating }): JsonBody<Annotations>,
 ) -> Result<StatusCode, Failure> {
     let done = permits.run(Work::Listing, move || {
-        library.remark(&id, note.as_deref(), rating)
+        library.annotate(&id, note.as_deref(), rating)
     });
     done.await.map(|()| StatusCode::NO_CONTENT)
 }

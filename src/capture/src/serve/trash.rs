@@ -23,7 +23,7 @@ impl Library {
             Err(error) => {
                 let trash = trash.display();
                 let error = format!("the trash folder {trash} cannot be read: {error}");
-                return Err(Failure::broken(error));
+                return Err(Failure::internal(error));
             }
         };
         names.sort_unstable_by(|one, other| other.cmp(one));
@@ -32,7 +32,7 @@ impl Library {
     }
 
     /// Moves a session to the trash.
-    pub(super) fn put_away(&self, id: &str) -> Result<(), Failure> {
+    pub(super) fn move_to_trash(&self, id: &str) -> Result<(), Failure> {
         let folder = self.ended(id)?;
         let trash = self.root.join(TRASH);
         fs::create_dir_all(&trash).map_err(not_moved(id))?;
@@ -61,5 +61,5 @@ fn move_folder(id: &str, from: &Path, to: &Path) -> Result<(), Failure> {
 }
 
 fn not_moved(id: &str) -> impl FnOnce(io::Error) -> Failure {
-    move |error| Failure::broken(format!("{id} could not be moved: {error}"))
+    move |error| Failure::internal(format!("{id} could not be moved: {error}"))
 }

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use relit_turntable::{Alarm, ControllerState, Homed, MotionFault, Port, Table, TurntableError};
+use relit_turntable::{
+    Alarm, ControllerState, HomingResult, MotionFault, Port, Table, TurntableError,
+};
 
 use crate::rig::{Rig, turn_by};
 
@@ -65,7 +67,7 @@ type WayOut = fn(&Table) -> Result<(), TurntableError>;
 fn after_the_release_reset_and_also_unlock_and_home_bring_the_table_back() {
     let ways: [WayOut; 2] = [
         |table| {
-            assert_eq!(table.reset()?, Homed::WhereItStands);
+            assert_eq!(table.reset()?, HomingResult::WhereItStands);
             Ok(())
         },
         |table| {
@@ -96,11 +98,11 @@ fn a_table_with_an_index_is_reset_unlocked_and_homed_to_it() {
     rig.options.clock.sleep(Duration::from_secs(1));
     drop(port);
     let table = rig.open();
-    assert_eq!(table.home().unwrap(), Homed::Index);
+    assert_eq!(table.home().unwrap(), HomingResult::Index);
     rig.simulated.press_emergency_stop(true);
     rig.options.clock.sleep(Duration::from_millis(200));
     assert!(table.status().unwrap().emergency_stop);
     rig.simulated.press_emergency_stop(false);
-    assert_eq!(table.reset().unwrap(), Homed::Index);
+    assert_eq!(table.reset().unwrap(), HomingResult::Index);
     assert_turns_again(&table);
 }

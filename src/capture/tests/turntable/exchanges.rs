@@ -1,4 +1,4 @@
-//! Many small motions over a bad wire: none wrong, none doubled.
+//! Many small motions over a bad line: none wrong, none doubled.
 //!
 //! The ordinary tests do a few thousand. The long run, with its figures:
 //! `cargo test --release --test turntable a_hundred_thousand -- --ignored --nocapture`
@@ -10,7 +10,7 @@ use relit_turntable::{ControllerState, Table, TurntableError};
 
 use crate::rig::{Rig, STEP_DEG};
 
-/// How a run over a bad wire came out.
+/// How a run over a bad line came out.
 #[derive(Debug, Default)]
 struct Outcome {
     exchanges: u64,
@@ -25,7 +25,7 @@ struct Outcome {
     wrong: Vec<String>,
 }
 
-/// Jogs to and fro until `exchanges` lines and reports went over the wire, and compares the true
+/// Jogs to and fro until `exchanges` lines and reports went over the line, and compares the true
 /// angle with what the host was told after each.
 fn run(rig: &Rig, exchanges: u64, seed: u8) -> Outcome {
     let mut outcome = Outcome::default();

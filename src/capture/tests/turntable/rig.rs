@@ -23,7 +23,7 @@ impl Rig {
 
     pub(crate) fn with(faults: &str, options: SimulatorOptions) -> Rig {
         let clock = Clock::virtual_time();
-        let participant = clock.take_part();
+        let participant = clock.participate();
         let simulated = SimulatedTable::new(&SimulatorOptions {
             clock: clock.clone(),
             faults: faults.parse().unwrap(),

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use relit_turntable::simulator::SimulatorOptions;
-use relit_turntable::{ControllerState, Homed, MotionFault, TurntableError};
+use relit_turntable::{ControllerState, HomingResult, MotionFault, TurntableError};
 
 use crate::rig::{PacedRig, Rig, STEP_DEG, paper_turn, spread, turn_by};
 
@@ -33,7 +33,7 @@ fn drifting() -> SimulatorOptions {
 /// Turns once, and gives the 99th percentile of the angle's error over the frames of the turn.
 fn turn_and_compare(rig: &Rig) -> f64 {
     let table = rig.open();
-    assert_eq!(table.home().unwrap(), Homed::WhereItStands);
+    assert_eq!(table.home().unwrap(), HomingResult::WhereItStands);
     let zero = rig.truth();
     let turn = table.start_turn(paper_turn(&table)).unwrap();
     let track = turn.wait_end().unwrap();

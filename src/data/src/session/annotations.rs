@@ -13,7 +13,7 @@ use crate::durable;
 ///
 /// # Errors
 /// [`SessionError::Unusable`] if the manifest, or the rating, is not usable, or [`SessionError::Io`].
-pub fn remark(folder: &Path, note: Option<&str>, rating: Option<u8>) -> Result<(), SessionError> {
+pub fn annotate(folder: &Path, note: Option<&str>, rating: Option<u8>) -> Result<(), SessionError> {
     let path = folder.join(MANIFEST_FILE);
     let bytes = fs::read(&path).map_err(SessionError::io(&path, "read"))?;
     let fault = |fault: String| SessionError::manifest(&path, &fault);
@@ -55,15 +55,15 @@ mod tests {
         let text = fs::read_to_string(&path).unwrap();
         let known = text.replacen('{', "{\"later\": [1],", 1);
         fs::write(&path, known).unwrap();
-        remark(&folder, Some("a fly on it"), Some(2)).unwrap();
+        annotate(&folder, Some("a fly on it"), Some(2)).unwrap();
         let read = |path| Manifest::from_json(&fs::read(path).unwrap()).unwrap();
         let manifest = read(&path);
         assert_eq!(manifest.note.as_deref(), Some("a fly on it"));
         assert_eq!(manifest.rating, Some(2));
         assert!(fs::read_to_string(&path).unwrap().contains("\"later\""));
-        assert!(remark(&folder, None, Some(9)).is_err());
+        assert!(annotate(&folder, None, Some(9)).is_err());
         assert_eq!(read(&path), manifest);
-        remark(&folder, None, None).unwrap();
+        annotate(&folder, None, None).unwrap();
         assert_eq!((read(&path).note, read(&path).rating), (None, None));
     }
 }

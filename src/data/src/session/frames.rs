@@ -38,7 +38,7 @@ pub struct FrameIndex {
 
 impl FrameIndex {
     /// Reads an index from the bytes of its file. A last line without line feed that cannot be
-    /// parsed was cut off by a power failure: it is skipped, and [`Self::is_torn`] is true.
+    /// parsed was cut off by a power failure: it is skipped, and [`Self::is_truncated`] is true.
     ///
     /// # Errors
     /// The first line that is not a frame's, or does not continue those before it, and what is wrong with it.
@@ -48,10 +48,10 @@ impl FrameIndex {
         // Every line before the first fault is an entry.
         let mut lines = bytes.split_inclusive(|&byte| byte == b'\n');
         let faulty = lines.nth(index.entries.len()).unwrap_or_default();
-        let is_torn =
+        let is_truncated =
             !faulty.ends_with(b"\n") && serde_json::from_slice::<FrameEntry>(faulty).is_err();
         match fault {
-            Some(fault) if !is_torn => Err(fault),
+            Some(fault) if !is_truncated => Err(fault),
             _ => Ok(index),
         }
     }
@@ -147,7 +147,7 @@ impl FrameIndex {
 
     /// True if the file's last line was cut off.
     #[must_use]
-    pub fn is_torn(&self) -> bool {
+    pub fn is_truncated(&self) -> bool {
         self.torn
     }
 
@@ -192,7 +192,7 @@ mod tests {
         let entries: Vec<_> = (0..5).map(entry).collect();
         let index = FrameIndex::parse(text(&entries).as_bytes()).unwrap();
         assert_eq!(index.entries(), entries);
-        assert!(!index.is_torn());
+        assert!(!index.is_truncated());
         assert!(index.gaps().is_empty());
     }
 
@@ -217,7 +217,7 @@ mod tests {
         let whole = text(&[entry(0), entry(1)]);
         let index = FrameIndex::parse(&whole.as_bytes()[..whole.len() - 9]).unwrap();
         assert_eq!(index.entries().len(), 1);
-        assert!(index.is_torn());
+        assert!(index.is_truncated());
     }
 
     #[test]
@@ -226,7 +226,7 @@ mod tests {
         let saved = format!("\u{feff}{}", whole.replace('\n', "\r\n"));
         let index = FrameIndex::parse(saved.as_bytes()).unwrap();
         assert_eq!(index.entries().len(), 2);
-        assert!(!index.is_torn());
+        assert!(!index.is_truncated());
     }
 
     #[test]

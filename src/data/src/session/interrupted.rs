@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::writer::{close, keep_as_found, write_index};
+use super::writer::{close, keep_backup, write_index};
 use super::{
     FrameIndex, INDEX_FILE, MANIFEST_FILE, Manifest, SessionError, SessionLock, Status, TurnJournal,
 };
@@ -88,7 +88,7 @@ impl InterruptedSession {
     ) -> Result<Manifest, SessionError> {
         let is_cut = self.is_faulty || frames < self.index.entries().len();
         if is_cut {
-            keep_as_found(&self.folder)?;
+            keep_backup(&self.folder)?;
             self.index.truncate(frames);
         }
         if self.index.add_angles(angle) || is_cut {

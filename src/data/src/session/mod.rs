@@ -23,7 +23,7 @@ mod recording;
 mod writer;
 
 pub use crate::naming::is_session_name;
-pub use annotations::remark;
+pub use annotations::annotate;
 pub use error::SessionError;
 pub use frames::{FrameEntry, FrameIndex, Gap};
 pub use interrupted::InterruptedSession;

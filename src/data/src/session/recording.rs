@@ -339,7 +339,7 @@ fn read_index(
         );
         SessionError::unusable(&path, &what)
     })?;
-    if index.is_torn() {
+    if index.is_truncated() {
         notices.push(Notice::Loss(format!(
             "the last line of {INDEX_FILE} is incomplete and lost"
         )));

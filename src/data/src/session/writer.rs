@@ -240,7 +240,7 @@ impl SessionWriter {
         self.lock.release_reserve()?;
         self.sync()?;
         if self.truncated {
-            keep_as_found(&self.folder)?;
+            keep_backup(&self.folder)?;
         }
         if self.rewrite || self.truncated {
             write_index(&self.folder, &self.index)?;
@@ -257,7 +257,7 @@ impl SessionWriter {
 }
 
 /// Keeps the index as it is under a second name, unless an earlier attempt did so.
-pub(super) fn keep_as_found(folder: &Path) -> Result<(), SessionError> {
+pub(super) fn keep_backup(folder: &Path) -> Result<(), SessionError> {
     let (path, kept) = (folder.join(INDEX_FILE), folder.join(INDEX_AS_FOUND));
     if kept.exists() || !path.exists() {
         return Ok(());
@@ -356,7 +356,7 @@ mod tests {
         writer.lines.write_all(b"{\"n\":2,").unwrap();
         writer.sync().unwrap();
         let index = FrameIndex::parse(&fs::read(path).unwrap()).unwrap();
-        assert!(!index.is_torn());
+        assert!(!index.is_truncated());
         assert_eq!(index.entries(), [entry(0), entry(1)]);
         assert_eq!(writer.index, index);
     }

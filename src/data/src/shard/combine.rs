@@ -135,6 +135,6 @@ fn problems(datasets: &[(&Path, Dataset)]) -> Vec<String> {
 }
 
 /// Whether a data set consists of tasks' pieces that nobody has merged.
-pub fn has_only_pieces(out: &Path) -> bool {
+pub fn has_only_partial_manifests(out: &Path) -> bool {
     !out.join(Dataset::FILE).exists() && out.join(names::TASKS).is_dir()
 }

@@ -171,7 +171,7 @@ impl<'a> SessionConversion<'a> {
         let mut source = tar.into_inner();
         source.drain().map_err(ShardError::io("read", &path))?;
         let expected = (self.shard.bytes, self.shard.blake3);
-        compare(file, expected, source.found())
+        compare(file, expected, source.digest())
     }
 
     fn read_folder(&self, writing: &mut SessionWriting<'_, '_>) -> Result<(), ShardError> {

@@ -26,7 +26,7 @@ impl Digest {
     pub fn hash_file(path: &Path) -> io::Result<(u64, Self)> {
         let mut reader = Hashing::new(File::open(path)?);
         reader.drain()?;
-        Ok(reader.found())
+        Ok(reader.digest())
     }
 
     /// The 32 bytes.
@@ -98,7 +98,7 @@ impl<T> Hashing<T> {
     }
 
     /// The number of bytes so far and their digest.
-    pub(super) fn found(&self) -> (u64, Digest) {
+    pub(super) fn digest(&self) -> (u64, Digest) {
         (self.bytes, self.hasher.finalize().into())
     }
 
@@ -172,11 +172,11 @@ mod tests {
         let bytes = vec![7_u8; 300_000];
         let mut writer = Hashing::new(Vec::new());
         writer.write_all(&bytes).unwrap();
-        let (written, digest) = writer.found();
+        let (written, digest) = writer.digest();
         let copy = writer.into_inner();
         let mut reader = Hashing::new(copy.as_slice());
         assert_eq!(reader.drain().unwrap(), 300_000);
-        assert_eq!(reader.found(), (written, digest));
+        assert_eq!(reader.digest(), (written, digest));
         assert_eq!(digest, Digest::hash(&bytes));
     }
 }

@@ -49,7 +49,7 @@ mod verify;
 mod writer;
 
 pub use codec::{decode_mask, decode_rgb, encode_mask, encode_rgb};
-pub use combine::{has_only_pieces, merge_datasets};
+pub use combine::{has_only_partial_manifests, merge_datasets};
 pub use convert::convert;
 pub use dataset::{Dataset, MaskInfo, SamplingBasis, SessionEntry, ShardEntry, SourceVideo};
 pub use digest::Digest;
@@ -61,7 +61,7 @@ pub use order::order;
 pub use output::OutputFolder;
 pub use parquet_table::{TableRow, read_table};
 pub use partial_manifest::{
-    ArrayTask, MAX_TASKS, Merged, PartialManifest, TaskOutcome, described_so_far, merge,
+    ArrayTask, MAX_TASKS, MergedDataset, PartialManifest, TaskOutcome, merge, read_partial,
 };
 pub use quality::{MaskMisfit, QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};

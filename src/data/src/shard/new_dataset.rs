@@ -11,7 +11,7 @@ use super::file::{FileEntry, compare};
 use super::output::{self, OutputFolder, PartialFile};
 use super::settings::Layout;
 use super::{Digest, ShardError, names};
-use crate::durable::{self, MadeFolder};
+use crate::durable::{self, CreatedFolder};
 
 /// A data set that is being built. Dropping it removes what was written.
 pub(super) struct NewDataset {
@@ -20,7 +20,7 @@ pub(super) struct NewDataset {
     /// Where it is built, locked.
     folder: OutputFolder,
     /// The folders around it that were missing.
-    _made: MadeFolder,
+    _made: CreatedFolder,
 }
 
 impl NewDataset {
@@ -47,7 +47,8 @@ impl NewDataset {
                 place.display()
             )));
         }
-        let made = MadeFolder::make(parent).map_err(ShardError::io("make the folder", parent))?;
+        let made =
+            CreatedFolder::make(parent).map_err(ShardError::io("make the folder", parent))?;
         let mut temporary = std::ffi::OsString::from(".");
         temporary.push(name);
         temporary.push(".partial");
@@ -120,7 +121,7 @@ impl NewDataset {
         self.make_parent(&entry.file)?;
         let mut copy = PartialFile::create(self.path(), &entry.file)?;
         io::copy(&mut source, &mut copy).map_err(ShardError::io("copy", &path))?;
-        compare(&entry.file, (entry.bytes, entry.blake3), source.found())?;
+        compare(&entry.file, (entry.bytes, entry.blake3), source.digest())?;
         copy.seal()?.publish().map(|_| ())
     }
 

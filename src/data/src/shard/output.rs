@@ -8,7 +8,7 @@ use super::digest::Hashing;
 use super::file::FileEntry;
 use super::partial_manifest::ArrayTask;
 use super::{ShardError, names};
-use crate::durable::{self, MadeFolder, Partial, SealedPartial};
+use crate::durable::{self, CreatedFolder, Partial, SealedPartial};
 
 /// The folder of a data set, locked by this process until it is dropped.
 #[derive(Debug)]
@@ -18,7 +18,7 @@ pub struct OutputFolder {
     _handle: File,
     _task: Option<File>,
     /// A run that fails before its first file leaves no folder behind.
-    _made: Option<MadeFolder>,
+    _made: Option<CreatedFolder>,
 }
 
 impl OutputFolder {
@@ -29,7 +29,7 @@ impl OutputFolder {
     /// [`ShardError::Locked`] if another process holds the lock; [`ShardError::Io`] if the folder cannot be
     /// created, opened, locked or cleaned.
     pub fn lock(out: &Path) -> Result<Self, ShardError> {
-        let made = MadeFolder::make(out).map_err(ShardError::io("make the folder", out))?;
+        let made = CreatedFolder::make(out).map_err(ShardError::io("make the folder", out))?;
         Ok(Self {
             _made: Some(made),
             ..Self::lock_existing(out)?
@@ -167,7 +167,7 @@ impl PartialFile {
 
     /// Writes and syncs all bytes to disk.
     pub(super) fn seal(self) -> Result<SealedFile, ShardError> {
-        let (bytes, blake3) = self.writer.found();
+        let (bytes, blake3) = self.writer.digest();
         let partial = self.writer.into_inner();
         let path = partial.target().to_owned();
         let sealed = partial.seal().map_err(ShardError::io("write", &path))?;

@@ -233,7 +233,7 @@ pub fn read_table(out: &Path, entry: &FileEntry) -> Result<Vec<TableRow>, ShardE
     let file = File::open(&path).map_err(io("open"))?;
     let mut hashed = Hashing::new(&file);
     hashed.drain().map_err(io("read"))?;
-    compare(&entry.file, (entry.bytes, entry.blake3), hashed.found())?;
+    compare(&entry.file, (entry.bytes, entry.blake3), hashed.digest())?;
     read_rows(file, &path)
 }
 

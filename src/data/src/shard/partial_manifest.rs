@@ -132,16 +132,16 @@ impl PartialManifest {
     }
 
     fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ShardError> {
-        let piece: Self = described(path, bytes, SCHEMA)?;
-        piece.dataset.check_names()?;
-        Ok(piece)
+        let partial: Self = described(path, bytes, SCHEMA)?;
+        partial.dataset.check_names()?;
+        Ok(partial)
     }
 }
 
 /// What was joined.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct Merged {
+pub struct MergedDataset {
     /// The description, as it was written.
     pub dataset: Dataset,
     /// Number of tasks.
@@ -160,11 +160,14 @@ pub struct Merged {
 /// [`ShardError::PartialManifests`] if a task or a recording is missing or is there twice, if all failed, if tasks saw
 /// different recordings or settings, or a file is missing; then nothing is written.
 /// [`ShardError::Locked`] while a task is running, [`ShardError::Description`], [`ShardError::Io`].
-pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Merged, ShardError> {
+pub fn merge(
+    out: &Path,
+    length: &dyn Fn(&str) -> io::Result<u64>,
+) -> Result<MergedDataset, ShardError> {
     let folder = OutputFolder::lock_existing(out)?;
-    let pieces = read_pieces(out)?;
+    let partials = read_partials(out)?;
     let mut problems = Vec::new();
-    let merged = join(&pieces, &mut problems);
+    let merged = join(&partials, &mut problems);
     if let Some(merged) = &merged {
         problems.extend(missing_files(&merged.dataset, length));
         problems.extend(not_of_a_task(out, &merged.dataset)?);
@@ -190,25 +193,25 @@ pub fn merge(out: &Path, length: &dyn Fn(&str) -> io::Result<u64>) -> Result<Mer
 ///
 /// # Errors
 /// As [`Dataset::read`].
-pub fn described_so_far(out: &Path) -> Result<(Dataset, Option<String>), ShardError> {
+pub fn read_partial(out: &Path) -> Result<(Dataset, Option<String>), ShardError> {
     let none = match Dataset::read(out) {
         Err(none @ ShardError::NoDataset(_)) => none,
         read => return Ok((read?, None)),
     };
-    let pieces = read_pieces(out)?;
-    let Some(first) = pieces.first() else {
+    let partials = read_partials(out)?;
+    let Some(first) = partials.first() else {
         return Err(none);
     };
     let mut dataset = Dataset::new(first.dataset.settings.clone());
-    for piece in &pieces {
-        for entry in &piece.dataset.sessions {
+    for partial in &partials {
+        for entry in &partial.dataset.sessions {
             dataset.replace(entry.clone(), Vec::new());
         }
     }
-    let done: usize = pieces.iter().map(|piece| piece.outcomes.len()).sum();
+    let done: usize = partials.iter().map(|partial| partial.outcomes.len()).sum();
     let problem = format!(
         "this is what {} of {} tasks have written so far, {done} of {} recordings: when all are done, run relit-extract merge {}",
-        pieces.len(),
+        partials.len(),
         first.count,
         first.recordings.len(),
         out.display()
@@ -217,13 +220,13 @@ pub fn described_so_far(out: &Path) -> Result<(Dataset, Option<String>), ShardEr
 }
 
 /// The pieces of all tasks that are there.
-fn read_pieces(out: &Path) -> Result<Vec<PartialManifest>, ShardError> {
+fn read_partials(out: &Path) -> Result<Vec<PartialManifest>, ShardError> {
     let folder = out.join(names::TASKS);
     let files = output::names_in(&folder)?;
-    let pieces = files
+    let partials = files
         .iter()
         .filter(|name| !name.starts_with('.') && name.ends_with(".json"));
-    pieces
+    partials
         .map(|name| {
             let path = folder.join(name);
             let bytes = fs::read(&path).map_err(ShardError::io("read", &path))?;
@@ -233,21 +236,21 @@ fn read_pieces(out: &Path) -> Result<Vec<PartialManifest>, ShardError> {
 }
 
 /// The pieces joined, and what is wrong with them; `None` if they do not belong together.
-fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged> {
-    let Some(first) = pieces.first() else {
+fn join(partials: &[PartialManifest], problems: &mut Vec<String>) -> Option<MergedDataset> {
+    let Some(first) = partials.first() else {
         problems.push("there are none".to_owned());
         return None;
     };
-    for piece in pieces {
-        let (a, b) = (first.task, piece.task);
-        let problem = if piece.count != first.count {
-            let (a, b) = (first.count, piece.count);
+    for partial in partials {
+        let (a, b) = (first.task, partial.task);
+        let problem = if partial.count != first.count {
+            let (a, b) = (first.count, partial.count);
             format!("some are of {a} tasks, others of {b}: remove those of an earlier run")
-        } else if piece.recordings != first.recordings {
+        } else if partial.recordings != first.recordings {
             format!(
                 "tasks {a} and {b} saw different recordings: run them again with the same inputs"
             )
-        } else if piece.dataset.settings != first.dataset.settings {
+        } else if partial.dataset.settings != first.dataset.settings {
             format!("tasks {a} and {b} had different settings")
         } else {
             continue;
@@ -255,7 +258,7 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
         problems.push(problem);
         return None;
     }
-    let by_task: BTreeMap<u32, &PartialManifest> = pieces.iter().map(|p| (p.task, p)).collect();
+    let by_task: BTreeMap<u32, &PartialManifest> = partials.iter().map(|p| (p.task, p)).collect();
     let missing: Vec<String> = (0..first.count)
         .filter(|task| !by_task.contains_key(task))
         .map(|task| task.to_string())
@@ -267,10 +270,10 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
     let (mut left_out, mut failed) = (Vec::new(), Vec::new());
     for (position, name) in first.recordings.iter().enumerate() {
         let task = (position % first.count as usize) as u32;
-        let Some(piece) = by_task.get(&task) else {
+        let Some(partial) = by_task.get(&task) else {
             continue;
         };
-        match piece.outcomes.get(&position) {
+        match partial.outcomes.get(&position) {
             None => problems.push(format!(
                 "task {task} lacks {name}: run it again with --resume"
             )),
@@ -280,7 +283,7 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
             Some(TaskOutcome::LeftOut { why }) => left_out.push((name.clone(), why.clone())),
             Some(TaskOutcome::Extracted { session }) => {
                 let there = dataset.session_alike(session);
-                match (there, piece.dataset.session(session)) {
+                match (there, partial.dataset.session(session)) {
                     (Some(other), _) if other.id == *session => {
                         problems.push(format!("session {session} is there twice"));
                     }
@@ -290,14 +293,14 @@ fn join(pieces: &[PartialManifest], problems: &mut Vec<String>) -> Option<Merged
                     )),
                     (None, Some(entry)) => dataset.replace(
                         entry.clone(),
-                        piece.dataset.shards_of(session).cloned().collect(),
+                        partial.dataset.shards_of(session).cloned().collect(),
                     ),
                     (None, None) => problems.push(format!("the piece of task {task} lacks {session}")),
                 }
             }
         }
     }
-    Some(Merged {
+    Some(MergedDataset {
         dataset,
         tasks: first.count,
         left_out,

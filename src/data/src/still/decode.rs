@@ -19,7 +19,7 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
         Some(Format::Exr) => return exr::decode(bytes),
         _ => {}
     }
-    if let Some((name, advice)) = format.and_then(Format::unread) {
+    if let Some((name, advice)) = format.and_then(Format::unsupported) {
         return Err(StillError::NotRead(format!(
             "is {name}, which is not supported: {advice}"
         )));

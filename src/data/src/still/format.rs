@@ -99,7 +99,7 @@ impl Format {
 
     /// Of a format that is not read: what a file of it is called, with its article, and what to do with it.
     #[must_use]
-    pub const fn unread(self) -> Option<(&'static str, &'static str)> {
+    pub const fn unsupported(self) -> Option<(&'static str, &'static str)> {
         match self {
             Self::Avif => Some(("an AVIF image", SAVE)),
             Self::Heic => Some((

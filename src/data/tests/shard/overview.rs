@@ -4,7 +4,7 @@ use std::fs;
 
 use relit_data::shard::{
     ArrayTask, Dataset, Layout, PartialManifest, SessionQuality, ShardError, TaskOutcome,
-    described_so_far,
+    read_partial,
 };
 
 use crate::sample_set::{self, SAMPLES, SESSION};
@@ -38,7 +38,7 @@ fn what_tasks_have_written_so_far_is_summed_and_said_to_be_unmerged() {
             .insert(position, TaskOutcome::Extracted { session });
     }
     piece.write(dir.path()).unwrap();
-    let (dataset, problem) = described_so_far(dir.path()).unwrap();
+    let (dataset, problem) = read_partial(dir.path()).unwrap();
     assert_eq!(dataset.sessions.len(), 2);
     let problem = problem.unwrap();
     for named in ["1 ", "2 tasks", "3 recordings"] {
@@ -46,7 +46,7 @@ fn what_tasks_have_written_so_far_is_summed_and_said_to_be_unmerged() {
     }
     assert!(problem.contains("relit-extract merge"), "{problem}");
     let empty = tempfile::tempdir().unwrap();
-    let error = described_so_far(empty.path()).unwrap_err();
+    let error = read_partial(empty.path()).unwrap_err();
     assert!(matches!(error, ShardError::NoDataset(_)), "{error}");
 }
 

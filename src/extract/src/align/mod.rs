@@ -8,10 +8,10 @@
 //! This module knows pictures and a mask, and nothing of files, videos or shards.
 
 mod brightness;
-mod demand;
 mod fit;
 mod median;
 mod region;
+mod required_regions;
 mod structure;
 mod template;
 
@@ -22,9 +22,9 @@ use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterato
 
 use super::CropView;
 use brightness::{half, half_luma, luma};
-use demand::Demand;
 use fit::Fit;
 use region::Region;
+use required_regions::RequiredRegions;
 use structure::{Extractor, Gradients, Plane};
 use template::Template;
 
@@ -116,8 +116,8 @@ pub struct Aligner {
     reach: f64,
     /// Pixels of a frame in one of the finest template.
     unit: f64,
-    demand: Demand,
-    least_confidence: f64,
+    required_regions: RequiredRegions,
+    min_confidence: f64,
     motion: Motion,
 }
 
@@ -209,11 +209,16 @@ impl Aligner {
         templates.reverse();
         let coarsest = reach / (1_u32 << (templates.len() - 1)) as f64;
         let mut aligner = Self {
-            demand: Demand::new(&templates, mask.dimensions(), halvings, coarsest),
+            required_regions: RequiredRegions::new(
+                &templates,
+                mask.dimensions(),
+                halvings,
+                coarsest,
+            ),
             templates,
             reach,
             unit,
-            least_confidence: MIN_CONFIDENCE,
+            min_confidence: MIN_CONFIDENCE,
             motion: Motion::default(),
         };
         let found: Vec<Alignment> = samples
@@ -225,21 +230,23 @@ impl Aligner {
         let usable = found.get(reference)?.shift.is_some();
         let registered = found.iter().filter(|found| found.shift.is_some());
         let usual = middle(registered.map(|found| found.confidence).collect());
-        aligner.least_confidence = MIN_CONFIDENCE.max(MIN_OF_MEDIAN * usual);
+        aligner.min_confidence = MIN_CONFIDENCE.max(MIN_OF_MEDIAN * usual);
         aligner.motion = Motion::from_alignments(&found, reference);
         usable.then_some(aligner)
     }
 
     /// The confidence below which a frame of this turn is not registered, 0..=1.
     #[must_use]
-    pub fn least_confidence(&self) -> f64 {
-        self.least_confidence
+    pub fn min_confidence(&self) -> f64 {
+        self.min_confidence
     }
 
     /// Where the object is in a frame, in pixels of the frame.
     #[must_use]
     pub fn measure(&self, frame: &AlignSample, buffers: &mut AlignBuffers) -> Alignment {
-        let lumas = self.demand.lumas_of_sample(&frame.0, &mut buffers.lumas);
+        let lumas = self
+            .required_regions
+            .lumas_of_sample(&frame.0, &mut buffers.lumas);
         self.located(lumas, &mut buffers.gradients)
     }
 
@@ -254,19 +261,20 @@ impl Aligner {
     /// Looks at these rows of a frame's crop, which come from the top to the bottom.
     pub fn take_rows(&self, crop: CropView<'_>, rows: Range<u32>, buffers: &mut AlignBuffers) {
         let rows = rows.start as usize..rows.end as usize;
-        self.demand.take_rows(crop, rows, &mut buffers.lumas);
+        self.required_regions
+            .take_rows(crop, rows, &mut buffers.lumas);
     }
 
     /// [`Self::measure_crop`] of a crop whose rows were all taken.
     #[must_use]
     pub fn measure_rows(&self, buffers: &mut AlignBuffers) -> Alignment {
-        let lumas = self.demand.lumas_of_rows(&mut buffers.lumas);
+        let lumas = self.required_regions.lumas_of_rows(&mut buffers.lumas);
         self.located(lumas, &mut buffers.gradients)
     }
 
     fn located(&self, lumas: &[GrayImage], buffers: &mut GradientBuffers) -> Alignment {
         let gradients = self.gradients(lumas, buffers);
-        let sure = |fit: &Fit| fit.correlation >= self.least_confidence;
+        let sure = |fit: &Fit| fit.correlation >= self.min_confidence;
         let coarsest = self.templates.len() - 1;
         let reach = self.reach / (1_u32 << coarsest) as f64;
         let start = self.templates[coarsest].search(&gradients[coarsest], reach);
@@ -292,7 +300,11 @@ impl Aligner {
     ) -> &'b [Gradients] {
         let GradientBuffers { extractor, scales } = buffers;
         scales.resize_with(self.templates.len(), Gradients::default);
-        for ((luma, needs), gradients) in lumas.iter().zip(&self.demand.needs).zip(&mut *scales) {
+        for ((luma, needs), gradients) in lumas
+            .iter()
+            .zip(&self.required_regions.needs)
+            .zip(&mut *scales)
+        {
             extractor.gradients(luma, needs, gradients);
         }
         scales

@@ -27,7 +27,7 @@ pub(crate) fn run(
     let sessions = dataset.sessions.len() as u64;
     let samples = dataset.shards.iter().map(|shard| u64::from(shard.samples));
     let samples: u64 = samples.sum();
-    console.say(
+    console.print(
         &format!(
             "{}: {} with {} in the layout {layout}",
             output.display(),

@@ -8,7 +8,9 @@ use relit_console::{Console, Done, Event, Outcome, ProgressBar, RunTotals};
 use relit_data::causes::with_causes;
 use relit_data::counts::count_of;
 use relit_data::shard::SessionEntry;
-use relit_extract::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally, extract};
+use relit_extract::{
+    ExtractError, ExtractOptions, ExtractSummary, Observer, RecordingOutcome, extract,
+};
 use serde_json::json;
 
 pub(crate) fn run(
@@ -25,7 +27,7 @@ pub(crate) fn run(
     };
     if let Some(task) = options.task {
         // It may be the scheduler's variables that say so.
-        console.say_phase(
+        console.print_phase(
             &format!(
                 "task {task}: every {}th recording is this one's",
                 task.count()
@@ -35,31 +37,31 @@ pub(crate) fn run(
             },
         );
     }
-    let tally = extract(inputs, out, options, &reporter)?;
+    let summary = extract(inputs, out, options, &reporter)?;
     if let Some(task) = options.task
-        && tally == Tally::default()
+        && summary == ExtractSummary::default()
     {
         console.warn(&format!(
             "task {task} has no recording: give all recordings to each task, or --task 0/1 to extract all that are given"
         ));
     }
-    let summary = summary(&tally);
-    console.say(
-        &format!("{}: {summary}", out.display()),
+    let description = describe(&summary);
+    console.print(
+        &format!("{}: {description}", out.display()),
         &Event::Done(Done::Extraction {
             out: out.to_string_lossy().into_owned(),
-            extracted: tally.extracted as u64,
-            lossy: tally.lossy as u64,
-            misfits: tally.misfits as u64,
-            broken: tally.broken as u64,
-            skipped: tally.skipped as u64,
-            left_out: tally.left_out as u64,
-            failed: tally.failed as u64,
-            summary,
+            extracted: summary.extracted as u64,
+            lossy: summary.lossy as u64,
+            misfits: summary.misfits as u64,
+            broken: summary.broken as u64,
+            skipped: summary.skipped as u64,
+            left_out: summary.left_out as u64,
+            failed: summary.failed as u64,
+            summary: description,
         }),
     );
-    let nothing_came_out = tally.extracted + tally.skipped == 0;
-    Ok(match (tally.failed, tally.flawed + tally.left_out) {
+    let nothing_came_out = summary.extracted + summary.skipped == 0;
+    Ok(match (summary.failed, summary.flawed + summary.left_out) {
         (0, 0) => Outcome::Success,
         (1.., _) if nothing_came_out => Outcome::Failure,
         _ => Outcome::Partial,
@@ -67,9 +69,9 @@ pub(crate) fn run(
 }
 
 /// What happened, in words that need no manual.
-fn summary(tally: &Tally) -> String {
+fn describe(summary: &ExtractSummary) -> String {
     let sessions = |count: usize| count_of(count as u64, "session");
-    let came_out = match (tally.extracted, tally.skipped) {
+    let came_out = match (summary.extracted, summary.skipped) {
         (0, 0) => "nothing extracted".to_owned(),
         (0, skipped) => format!("nothing new, {} were there already", sessions(skipped)),
         (extracted, 0) => format!("{} extracted", sessions(extracted)),
@@ -79,17 +81,17 @@ fn summary(tally: &Tally) -> String {
         ),
     };
     let troubles = [
-        (tally.failed, "failed"),
-        (tally.left_out, "left out"),
-        (tally.lossy, "with losses"),
-        (tally.misfits, "with a mask that does not fit"),
-        (tally.broken, "broken: do not train on it"),
+        (summary.failed, "failed"),
+        (summary.left_out, "left out"),
+        (summary.lossy, "with losses"),
+        (summary.misfits, "with a mask that does not fit"),
+        (summary.broken, "broken: do not train on it"),
     ];
     let troubles = troubles.iter().filter(|(count, _)| *count > 0);
     let troubles: Vec<String> = troubles
         .map(|(count, what)| format!("{count} {what}"))
         .collect();
-    match (troubles.is_empty(), tally.extracted + tally.skipped) {
+    match (troubles.is_empty(), summary.extracted + summary.skipped) {
         (true, 0) => came_out,
         (true, _) => format!("{came_out}, all is well"),
         (false, _) => format!("{came_out}; {}; see above", troubles.join(", ")),
@@ -123,7 +125,7 @@ impl Reporter<'_> {
         } else {
             ""
         };
-        self.console.say(
+        self.console.print(
             &format!("{}: already extracted, skipped{flaw}", entry.id),
             &Event::Skipped {
                 session: entry.id.clone(),
@@ -137,7 +139,7 @@ impl Reporter<'_> {
     fn left_out(&self, input: &Path, session: Option<&str>, error: &ExtractError) {
         let input = input.to_string_lossy().into_owned();
         let message = with_causes(error);
-        self.console.say(
+        self.console.print(
             &format!("{input}: left out: {message}"),
             &Event::LeftOut {
                 session: session.map(str::to_owned),
@@ -149,10 +151,10 @@ impl Reporter<'_> {
 
     fn extracted(&self, entry: &SessionEntry) {
         for warning in &entry.warnings {
-            self.console.warn_in(&entry.id, warning);
+            self.console.warn_for(&entry.id, warning);
         }
         let report = self.out.join(format!("{}.html", entry.id));
-        self.console.say(
+        self.console.print(
             &format!(
                 "{}: {}, {} ({}), Spec-Net on for {}, report {}",
                 entry.id,
@@ -197,7 +199,7 @@ impl Observer for Reporter<'_> {
             RecordingOutcome::Extracted(entry) => self.extracted(entry),
             RecordingOutcome::Skipped(entry) => self.skipped(entry),
             RecordingOutcome::LeftOut(error) => self.left_out(input, session, error),
-            RecordingOutcome::Failed(error) => self.console.error_in(input, session, error),
+            RecordingOutcome::Failed(error) => self.console.error_for(input, session, error),
         }
         if session.is_some() {
             let was_extracted = matches!(outcome, RecordingOutcome::Extracted(_));
@@ -214,16 +216,16 @@ mod tests {
 
     #[test]
     fn a_summary_names_what_happened_and_nothing_else() {
-        let of = |change: fn(&mut Tally)| {
-            let mut tally = Tally::default();
-            change(&mut tally);
-            summary(&tally)
+        let of = |change: fn(&mut ExtractSummary)| {
+            let mut summary = ExtractSummary::default();
+            change(&mut summary);
+            describe(&summary)
         };
         assert_eq!(of(|_| ()), "nothing extracted");
-        let failed = of(|tally| tally.failed = 3);
+        let failed = of(|summary| summary.failed = 3);
         assert!(failed.contains("nothing extracted") && failed.contains('3'));
-        assert!(of(|tally| tally.extracted = 2).contains("all is well"));
-        let broken = of(|tally| (tally.extracted, tally.broken) = (2, 1));
+        assert!(of(|summary| summary.extracted = 2).contains("all is well"));
+        let broken = of(|summary| (summary.extracted, summary.broken) = (2, 1));
         assert!(broken.contains("1 broken") && !broken.contains("well"));
         assert!(!broken.contains('0'), "{broken}");
     }

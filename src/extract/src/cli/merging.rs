@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
-use relit_data::shard::{Dataset, SessionEntry, has_only_pieces, merge_datasets};
+use relit_data::shard::{Dataset, SessionEntry, has_only_partial_manifests, merge_datasets};
 use relit_extract::ExtractError;
 use relit_extract::objects::merge;
 
@@ -14,7 +14,7 @@ use super::refuse_urls;
 pub(crate) fn merge_tasks(console: Console, out: &Path) -> Result<Outcome, ExtractError> {
     let merged = merge(out)?;
     for (name, why) in &merged.left_out {
-        console.say(
+        console.print(
             &format!("{name}: left out: {why}"),
             &Event::LeftOut {
                 session: None,
@@ -25,7 +25,7 @@ pub(crate) fn merge_tasks(console: Console, out: &Path) -> Result<Outcome, Extra
     }
     for (name, why) in &merged.failed {
         let error = ExtractError::Refused(why.clone());
-        console.error_in(Path::new(name), None, &error);
+        console.error_for(Path::new(name), None, &error);
     }
     let from = MergedFrom {
         tasks: merged.tasks.into(),
@@ -51,7 +51,10 @@ pub(crate) fn merge_finished(
         .chain([output])
         .collect();
     refuse_urls(&all)?;
-    if let Some(unmerged) = inputs.iter().find(|input| has_only_pieces(input)) {
+    if let Some(unmerged) = inputs
+        .iter()
+        .find(|input| has_only_partial_manifests(input))
+    {
         let unmerged = unmerged.display();
         return Err(ExtractError::Refused(format!(
             "{unmerged} holds what tasks have written: run relit-extract merge {unmerged} first"
@@ -84,7 +87,7 @@ fn report(console: Console, out: &Path, dataset: &Dataset, from: &MergedFrom) ->
         0 => count_of(from.tasks, "task"),
         datasets => count_of(datasets, "data set"),
     };
-    console.say(
+    console.print(
         &format!(
             "{}: {} with {}, merged from {merged_from}",
             out.display(),

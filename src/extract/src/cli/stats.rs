@@ -35,7 +35,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
     if let Some(problem) = &problem {
         console.warn(problem);
     }
-    let most = console.most_lines(MAX_PRINTED);
+    let most = console.max_lines(MAX_PRINTED);
     let longest = |name: &str, of: fn(&SessionEntry) -> &str| {
         let lengths = sessions.iter().map(|entry| of(entry).chars().count());
         lengths.max().unwrap_or_default().max(name.len())
@@ -44,7 +44,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         longest("session", |entry| &entry.id),
         longest("object", |entry| &entry.object),
     ];
-    console.say_to_people(&format!(
+    console.print_text(&format!(
         "{:id$}  {:object$}  verdict     samples  Spec-Net  saturated  shift rms/max px  reasons",
         "session",
         "object",
@@ -52,7 +52,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         object = widths[1],
     ));
     for entry in sessions.iter().take(most) {
-        console.say(&line(entry, widths), &event(entry));
+        console.print(&line(entry, widths), &event(entry));
     }
     if let Some(more @ 1..) = sessions.len().checked_sub(most) {
         console.warn(&format!(
@@ -61,7 +61,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         ));
     }
     let (text, event) = sums(out, sessions);
-    console.say(&text, &event);
+    console.print(&text, &event);
     Ok(match problem {
         None => Outcome::Success,
         Some(_) => Outcome::Partial,

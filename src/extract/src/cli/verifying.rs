@@ -21,9 +21,9 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
     })?;
     bar.finish_and_clear();
     let count = report.problems.len();
-    for problem in &report.problems[..count.min(console.most_lines(MAX_PRINTED))] {
+    for problem in &report.problems[..count.min(console.max_lines(MAX_PRINTED))] {
         let (file, sample, what) = (&problem.file, &problem.sample, &problem.what);
-        console.say(
+        console.print(
             &problem.to_string(),
             &Event::Problem {
                 session: problem.session.clone(),
@@ -33,7 +33,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
             },
         );
     }
-    if count > console.most_lines(MAX_PRINTED) {
+    if count > console.max_lines(MAX_PRINTED) {
         console.warn(&format!(
             "{} not shown: --json lists them all",
             count_of((count - MAX_PRINTED) as u64, "problem")
@@ -43,7 +43,7 @@ pub(crate) fn run(console: Console, out: &Path) -> Result<Outcome, ExtractError>
         0 => "no problems".to_owned(),
         n => count_of(n as u64, "problem"),
     };
-    console.say(
+    console.print(
         &format!(
             "{}: {}, {}, {} read back: {summary}",
             out.display(),

@@ -24,11 +24,11 @@ use std::path::Path;
 #[cfg(not(feature = "object-store"))]
 use std::path::PathBuf;
 
-use relit_data::shard::{self, Dataset, Merged};
+use relit_data::shard::{self, Dataset, MergedDataset};
 
 use super::ExtractError;
 #[cfg(not(feature = "object-store"))]
-use super::{ExtractOptions, Observer, Tally};
+use super::{ExtractOptions, ExtractSummary, Observer};
 
 #[cfg(feature = "object-store")]
 pub(super) use staging::extract;
@@ -41,7 +41,7 @@ pub(super) fn extract(
     out: &Path,
     _: &ExtractOptions,
     _: &dyn Observer,
-) -> Result<Tally, ExtractError> {
+) -> Result<ExtractSummary, ExtractError> {
     let mut all = inputs.iter().map(PathBuf::as_path).chain([out]);
     Err(not_built(all.find(|path| is_url(path)).unwrap_or(out)))
 }
@@ -54,13 +54,13 @@ fn not_built(path: &Path) -> ExtractError {
     ))
 }
 
-/// The description of the data set in `out`, a folder or a URL: see [`described_so_far`](shard::described_so_far).
+/// The description of the data set in `out`, a folder or a URL: see [`read_partial`](shard::read_partial).
 ///
 /// # Errors
 /// As there; [`ExtractError::Refused`] if an object store cannot be used.
 pub fn described(out: &Path) -> Result<(Dataset, Option<String>), ExtractError> {
     match is_url(out) {
-        false => Ok(shard::described_so_far(out)?),
+        false => Ok(shard::read_partial(out)?),
         #[cfg(feature = "object-store")]
         true => staging::described(out),
         #[cfg(not(feature = "object-store"))]
@@ -72,7 +72,7 @@ pub fn described(out: &Path) -> Result<(Dataset, Option<String>), ExtractError> 
 ///
 /// # Errors
 /// As [`merge`](shard::merge()); [`ExtractError::Refused`] if an object store cannot be used.
-pub fn merge(out: &Path) -> Result<Merged, ExtractError> {
+pub fn merge(out: &Path) -> Result<MergedDataset, ExtractError> {
     match is_url(out) {
         false => {
             let length = |file: &str| fs::metadata(out.join(file)).map(|found| found.len());

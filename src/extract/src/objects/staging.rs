@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use relit_data::session;
-use relit_data::shard::{self, ArrayTask, Dataset, Merged, ShardError};
+use relit_data::shard::{self, ArrayTask, Dataset, MergedDataset, ShardError};
 use tempfile::TempDir;
 
 use super::bucket::{Bucket, not_there};
 use super::url::{check, is_url};
 use crate::batch::{StorageBackend, extract_recordings, into_session, recordings_in};
-use crate::{ExtractError, ExtractOptions, Observer, RecordingOutcome, Tally};
+use crate::{ExtractError, ExtractOptions, ExtractSummary, Observer, RecordingOutcome};
 
 /// As [`extract`](crate::extract), where some of the inputs or `out` are URLs.
 pub(crate) fn extract(
@@ -22,7 +22,7 @@ pub(crate) fn extract(
     out: &Path,
     options: &ExtractOptions,
     observer: &dyn Observer,
-) -> Result<Tally, ExtractError> {
+) -> Result<ExtractSummary, ExtractError> {
     for url in inputs.iter().map(PathBuf::as_path).chain([out]) {
         if is_url(url) {
             check(url)?;
@@ -42,30 +42,30 @@ pub(crate) fn extract(
         sources: HashMap::new(),
         target,
     };
-    let (mut found, mut tally) = (Vec::new(), Tally::default());
+    let (mut found, mut summary) = (Vec::new(), ExtractSummary::default());
     for (number, input) in inputs.iter().enumerate() {
         let into = folder.path().join(format!("in-{number}"));
         match staging.recordings(input, &into, options) {
             Ok(inside) => found.extend(inside),
             Err(error) => {
                 let outcome = RecordingOutcome::from_result(Err(error));
-                tally.count(&outcome);
+                summary.count(&outcome);
                 observer.ended(input, None, &outcome);
             }
         }
     }
-    let tally = extract_recordings(&found, &local, options, observer, &staging, tally)?;
+    let summary = extract_recordings(&found, &local, options, observer, &staging, summary)?;
     if let Some(target) = &staging.target {
         target.describe()?;
     }
-    Ok(tally)
+    Ok(summary)
 }
 
 /// The description of the data set at a URL.
 pub(super) fn described(out: &Path) -> Result<(Dataset, Option<String>), ExtractError> {
     let (bucket, folder) = with_descriptions(out)?;
     let url = bucket.url("");
-    let read = shard::described_so_far(folder.path());
+    let read = shard::read_partial(folder.path());
     let (dataset, problem) = read.map_err(|error| named_by_url(error, &url))?;
     let local = folder.path().display().to_string();
     Ok((dataset, problem.map(|text| text.replace(&local, &url))))
@@ -83,7 +83,7 @@ fn with_descriptions(out: &Path) -> Result<(Bucket, TempDir), ExtractError> {
 }
 
 /// Joins the pieces of several tasks at a URL.
-pub(super) fn merge(out: &Path) -> Result<Merged, ExtractError> {
+pub(super) fn merge(out: &Path) -> Result<MergedDataset, ExtractError> {
     let (bucket, folder) = with_descriptions(out)?;
     let length = |file: &str| match bucket.length(file) {
         Ok(Some(length)) => Ok(length),

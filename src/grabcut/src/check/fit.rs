@@ -139,10 +139,10 @@ impl<'a> MaskCheck<'a> {
     /// Of parts in which the mask may be wrong, those that the turn shows to be background, or object. The
     /// turn's own mask does not count.
     fn shown(&self, parts: &Bitmap, says: impl Fn(&TurnField, &Bitmap, &Bitmap) -> bool) -> Bitmap {
-        let object = self.turn.reduced(&self.mask);
+        let object = self.turn.downscaled(&self.mask);
         let least = self.mask.count() as f64 * SMALL;
         parts.parts_where(Connectivity::Eight, |component, part| {
-            let part = || self.turn.reduced(&part());
+            let part = || self.turn.downscaled(&part());
             component.area as f64 >= least && says(&self.turn.fine, &part(), &object)
         })
     }
@@ -157,7 +157,10 @@ impl<'a> MaskCheck<'a> {
             if leaks.is_inside(component) {
                 return true;
             }
-            let (part, mask) = (self.turn.reduced(&part()), self.turn.reduced(&self.mask));
+            let (part, mask) = (
+                self.turn.downscaled(&part()),
+                self.turn.downscaled(&self.mask),
+            );
             let within = field.boundary(&part, &mask.minus(&part));
             let moves_with_rest = within.zip(field.boundary(&part, &mask.inverted()));
             let is_object = moves_with_rest.is_some_and(|(within, outside)| within <= outside)

@@ -29,14 +29,14 @@ impl ShapeCheck {
 
     /// [`Self::faults`] after a look at only a few frames of the turn.
     #[must_use]
-    pub fn faults_at_a_look(&self) -> Vec<String> {
+    pub fn quick_faults(&self) -> Vec<String> {
         faults(self, MAX_REGION_OF_A_LOOK)
     }
 
     /// Whether the mask is that of another object or recording, rather than one with a flaw: much of it is background,
     /// or much of the object is not in it: around it, or in its holes, as of one that is inverted.
     #[must_use]
-    pub fn is_of_something_else(&self) -> bool {
+    pub fn is_of_another_object(&self) -> bool {
         let share = |regions: &[DoubtfulRegion]| {
             let px: u64 = regions.iter().map(|region| region.px).sum();
             px as f64 / self.area_px as f64
@@ -128,18 +128,18 @@ mod tests {
 
     #[test]
     fn a_mask_without_much_of_the_object_is_that_of_something_else() {
-        assert!(!shape([150, 150, 40]).is_of_something_else());
+        assert!(!shape([150, 150, 40]).is_of_another_object());
         let beside = |leaks| ShapeCheck {
             outline: 0.5,
             ..shape([leaks, 0, 0])
         };
-        assert!(!beside(190).is_of_something_else());
-        assert!(beside(210).is_of_something_else());
+        assert!(!beside(190).is_of_another_object());
+        assert!(beside(210).is_of_another_object());
         // A display on the object, whose outline is right, and a mask of the table.
-        assert!(!shape([400, 0, 0]).is_of_something_else());
-        assert!(shape([510, 0, 0]).is_of_something_else());
-        assert!(shape([0, 210, 0]).is_of_something_else());
-        assert!(shape([0, 0, 247]).is_of_something_else());
-        assert!(shape([0, 120, 120]).is_of_something_else());
+        assert!(!shape([400, 0, 0]).is_of_another_object());
+        assert!(shape([510, 0, 0]).is_of_another_object());
+        assert!(shape([0, 210, 0]).is_of_another_object());
+        assert!(shape([0, 0, 247]).is_of_another_object());
+        assert!(shape([0, 120, 120]).is_of_another_object());
     }
 }

@@ -181,7 +181,7 @@ pub(crate) fn iterate<const D: usize, F: Field<D>>(
 ) -> Result<Models<D>, MaskError> {
     let active = open_pixels(labels);
     let scale = contrast_scale(field);
-    let mut open = OpenCut::new(field, scale, smoothness, labels, &active);
+    let mut open = IncrementalCut::new(field, scale, smoothness, labels, &active);
     let mut models = match first {
         Some(models) => {
             open.decide(field, &models, labels);
@@ -239,7 +239,7 @@ pub(crate) fn contrast_scale<const D: usize, F: Field<D>>(field: &F) -> f32 {
 }
 
 /// Minimum cuts of the same pixels by changing models.
-pub(crate) struct OpenCut<'a> {
+pub(crate) struct IncrementalCut<'a> {
     /// The pixels that are decided, in order.
     active: &'a [u32],
     graph: PixelGraph,
@@ -249,7 +249,7 @@ pub(crate) struct OpenCut<'a> {
     terminals: Vec<i32>,
 }
 
-impl<'a> OpenCut<'a> {
+impl<'a> IncrementalCut<'a> {
     /// The graph of the `active` pixels, which are in order. Labels of the others may not change between cuts.
     pub(crate) fn new<const D: usize, F: Field<D>>(
         field: &F,

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use image::{ImageBuffer, Pixel, RgbImage};
 
 use super::grab_cut;
-use super::grab_cut::{Field, Label, Models, OpenCut, SMOOTHNESS, squared_distance};
+use super::grab_cut::{Field, IncrementalCut, Label, Models, SMOOTHNESS, squared_distance};
 use super::lab::LabTable;
 use crate::bitmap::Bitmap;
 use crate::{Effort, MaskError};
@@ -24,7 +24,7 @@ const MIN_SMOOTHNESS: f32 = SMOOTHNESS / 8.0;
 
 /// Where the first colour models come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum FirstModels {
+pub(crate) enum InitialModels {
     /// From all pixels, after the given share of the probable object that is most like the sure
     /// background was set to probably background.
     Ranked(f64),
@@ -69,7 +69,7 @@ pub(crate) fn levels(image: &RgbImage, known: Vec<Label>, coarsest: usize) -> Ve
 pub(crate) fn segment(
     image: &RgbImage,
     known: Vec<Label>,
-    first: FirstModels,
+    first: InitialModels,
     effort: Effort,
 ) -> Result<Bitmap, MaskError> {
     let table = LabTable::new();
@@ -124,7 +124,7 @@ pub(crate) fn ascend<'a, const D: usize, F: Field<D>>(
 fn begin_smooth(
     field: &RgbField<'_>,
     labels: &mut [Label],
-    first: FirstModels,
+    first: InitialModels,
 ) -> Result<Models<3>, MaskError> {
     let known = labels.to_vec();
     let mut smoothness = SMOOTHNESS;
@@ -144,16 +144,16 @@ fn begin_smooth(
 pub(crate) fn start<const D: usize>(
     field: &impl Field<D>,
     labels: &mut [Label],
-    first: FirstModels,
+    first: InitialModels,
     smoothness: f32,
 ) -> Result<Models<D>, MaskError> {
     let models = match first {
-        FirstModels::Ranked(share) => {
+        InitialModels::Ranked(share) => {
             grab_cut::rank(field, labels, share, |_| false);
             None
         }
-        FirstModels::Sure => Some(Models::learn(field, labels, Label::is_sure)),
-        FirstModels::All => None,
+        InitialModels::Sure => Some(Models::learn(field, labels, Label::is_sure)),
+        InitialModels::All => None,
     };
     grab_cut::iterate(field, labels, models, smoothness)
 }
@@ -171,7 +171,7 @@ pub(crate) fn refine<const D: usize>(
     let band = band(labels, size, BAND);
     models.refine(field, labels);
     let scale = grab_cut::contrast_scale(field);
-    OpenCut::new(field, scale, SMOOTHNESS, labels, &band).decide(field, models, labels);
+    IncrementalCut::new(field, scale, SMOOTHNESS, labels, &band).decide(field, models, labels);
 }
 
 /// Each pixel that is not sure takes the coarse result.

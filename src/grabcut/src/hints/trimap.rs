@@ -3,7 +3,7 @@
 use relit_data::geometry::Rect;
 
 use crate::cut::grab_cut::Label;
-use crate::cut::pyramid::FirstModels;
+use crate::cut::pyramid::InitialModels;
 use crate::{Hints, Mark, MaskError};
 
 /// Share of a rectangle that is taken for background at first: a person leaves about half free.
@@ -13,7 +13,7 @@ const SHARE_OF_RECT: f64 = 0.5;
 #[derive(Debug)]
 pub(crate) struct Trimap {
     pub(crate) labels: Vec<Label>,
-    pub(crate) first: FirstModels,
+    pub(crate) first: InitialModels,
     /// The part of the hinted rectangle that is inside the frame.
     pub(crate) rect: Option<Rect>,
 }
@@ -39,9 +39,9 @@ impl Trimap {
         };
         let pixels = size.0 as usize * size.1 as usize;
         let first = match rect {
-            Some(_) => FirstModels::Ranked(SHARE_OF_RECT),
-            None if marks.contains(&Mark::Background) => FirstModels::Sure,
-            None => FirstModels::All,
+            Some(_) => InitialModels::Ranked(SHARE_OF_RECT),
+            None if marks.contains(&Mark::Background) => InitialModels::Sure,
+            None => InitialModels::All,
         };
         let initial = Self {
             labels: (0..pixels).map(label).collect(),

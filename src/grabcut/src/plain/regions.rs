@@ -85,7 +85,7 @@ impl Regions {
     /// # Errors
     /// [`MaskError::NotPlain`] if the background is not plain, or what differs from it is not clearly one object.
     pub(super) fn find(frame: &RgbImage) -> Result<Self, MaskError> {
-        let small = reduced(frame);
+        let small = downscaled(frame);
         let (width, height) = small.dimensions();
         let size = (width as usize, height as usize);
         let colours: Vec<Colour> = small.pixels().map(|pixel| pixel.0.map(f32::from)).collect();
@@ -179,7 +179,7 @@ fn refused(why: &'static str) -> MaskError {
     MaskError::NotPlain { why }
 }
 
-fn reduced(frame: &RgbImage) -> RgbImage {
+fn downscaled(frame: &RgbImage) -> RgbImage {
     let (width, height) = frame.dimensions();
     let longest = width.max(height);
     if longest <= SIDE {

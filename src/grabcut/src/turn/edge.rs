@@ -6,7 +6,7 @@
 
 use crate::bitmap::Bitmap;
 
-use super::courses::{Courses, dot};
+use super::pixel_series::{PixelSeries, dot};
 
 /// So many pixels on each side of the edge are decided.
 const BAND: usize = 2;
@@ -14,11 +14,11 @@ const BAND: usize = 2;
 const REACH: usize = 4;
 /// A mean needs at least so many pixels.
 const MIN_PIXELS: usize = 3;
-/// Courses that differ by less than this, as a root of the mean square, say nothing.
+/// Series that differ by less than this, as a root of the mean square, say nothing.
 const NOISE: f32 = 0.004;
 
 /// The object with its edge where the courses show it.
-pub(crate) fn along_courses(courses: &Courses, object: &Bitmap) -> Bitmap {
+pub(crate) fn along_series(series: &PixelSeries, object: &Bitmap) -> Bitmap {
     let outside = object.inverted();
     let band = object.dilated(BAND).and(&outside.dilated(BAND));
     let inner = [object.eroded(BAND), object.eroded(1)];
@@ -27,29 +27,29 @@ pub(crate) fn along_courses(courses: &Courses, object: &Bitmap) -> Bitmap {
         if !band.bits()[at] {
             return bit;
         }
-        let (inside, outside) = (near(&inner, at, courses), near(&outer, at, courses));
+        let (inside, outside) = (near(&inner, at, series), near(&outer, at, series));
         match inside.zip(outside) {
-            Some((inside, outside)) => share(courses, at, &inside, &outside).unwrap_or(bit),
+            Some((inside, outside)) => share(series, at, &inside, &outside).unwrap_or(bit),
             None => bit,
         }
     })
 }
 
 /// Whether most of what a pixel shows is the one and not the other; `None` if they hardly differ.
-fn share(courses: &Courses, at: usize, inside: &[f32], outside: &[f32]) -> Option<bool> {
+fn share(series: &PixelSeries, at: usize, inside: &[f32], outside: &[f32]) -> Option<bool> {
     let apart: Vec<f32> = inside.iter().zip(outside).map(|(i, o)| i - o).collect();
     let length = dot(&apart, &apart);
     if length < NOISE * NOISE * apart.len() as f32 {
         return None;
     }
-    let own = courses.mean(&[at]);
+    let own = series.mean(&[at]);
     let beyond: Vec<f32> = own.iter().zip(outside).map(|(own, o)| own - o).collect();
     Some(dot(&beyond, &apart) > 0.5 * length)
 }
 
 /// The mean course near a pixel of the first of some parts with enough pixels there.
-fn near(parts: &[Bitmap], at: usize, courses: &Courses) -> Option<Vec<f32>> {
-    let (width, height) = courses.size();
+fn near(parts: &[Bitmap], at: usize, series: &PixelSeries) -> Option<Vec<f32>> {
+    let (width, height) = series.size();
     let (x, y) = (at % width, at / width);
     let within = |part: &Bitmap| {
         let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(height);
@@ -59,7 +59,7 @@ fn near(parts: &[Bitmap], at: usize, courses: &Courses) -> Option<Vec<f32>> {
     };
     let mut found = parts.iter().map(within);
     let enough = found.find(|pixels| pixels.len() >= MIN_PIXELS);
-    enough.map(|pixels| courses.mean(&pixels))
+    enough.map(|pixels| series.mean(&pixels))
 }
 
 #[cfg(test)]
@@ -83,9 +83,9 @@ mod tests {
                 }
             })
         });
-        let courses = Courses::new(&frames, (40, 20));
+        let series = PixelSeries::new(&frames, (40, 20));
         let from = |left: usize| Bitmap::new((40, 20), (0..800).map(move |at| at % 40 >= left));
-        assert_eq!(along_courses(&courses, &from(15)), from(16));
-        assert_eq!(along_courses(&courses, &from(18)), from(16));
+        assert_eq!(along_series(&series, &from(15)), from(16));
+        assert_eq!(along_series(&series, &from(18)), from(16));
     }
 }

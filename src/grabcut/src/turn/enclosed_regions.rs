@@ -44,7 +44,7 @@ impl TurnField {
         let above = above.filter(|above| above.count() > 0 && !like_table);
         let above = above.as_ref().unwrap_or(part);
         let moves = self
-            .witness
+            .temporal_evidence
             .moves(above, &beside, &self.ground(above, object));
         if moves == Some(true) {
             return Some(true);
@@ -53,7 +53,7 @@ impl TurnField {
         // What does not move is not the room, where the room moves.
         let like_room = moves.is_none()
             && above.share_in(&self.backdrop) > MOSTLY
-            && !self.witness.together(above, &beside);
+            && !self.temporal_evidence.together(above, &beside);
         if !like_table && !like_room && !white {
             return Some(false);
         }
@@ -72,7 +72,10 @@ impl TurnField {
         let as_dark = self.table.plain.or(surface).or(&self.table.shadow);
         surface.count() > 0
             && part.share_in(&as_dark) > MOSTLY
-            && self.witness.nearer(part, surface, beside).unwrap_or(true)
+            && self
+                .temporal_evidence
+                .nearer(part, surface, beside)
+                .unwrap_or(true)
     }
 
     /// Whether a part outside the object shows that it belongs to it: it does not move, is neither room nor table,
@@ -82,13 +85,13 @@ impl TurnField {
         let beside = self.beside(part, object);
         let known =
             part.share_in(&self.backdrop) > MOSTLY || part.share_in(&self.table.surface) > MOSTLY;
-        if known || self.witness.moves(part, &beside, &ground) != Some(false) {
+        if known || self.temporal_evidence.moves(part, &beside, &ground) != Some(false) {
             return false;
         }
         let outside = object.or(part).inverted();
         let (within, without) = (self.boundary(part, object), self.boundary(part, &outside));
         let joins = within.is_some_and(|within| within <= without.unwrap_or(f32::INFINITY));
-        joins && self.witness.together(part, &beside)
+        joins && self.temporal_evidence.together(part, &beside)
     }
 
     /// The background away from the object, without the table: in the rows of a part, through which all of it passes

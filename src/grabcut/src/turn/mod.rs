@@ -1,10 +1,10 @@
 //! What a whole turn says about each pixel: the object stands still, the room passes by, the table lies below.
 
 pub(crate) mod backdrop;
-pub(crate) mod courses;
 pub(crate) mod disc;
 pub(crate) mod edge;
 pub(crate) mod enclosed_regions;
+pub(crate) mod pixel_series;
 pub(crate) mod registration;
 pub(crate) mod rim;
 pub(crate) mod statistics;
@@ -12,4 +12,4 @@ pub(crate) mod subspace;
 pub(crate) mod table;
 pub(crate) mod table_model;
 pub(crate) mod temporal_evidence;
-pub(crate) mod whiskers;
+pub(crate) mod thin_parts;

@@ -9,14 +9,14 @@
 use image::RgbImage;
 
 use super::backdrop::Backdrop;
-use super::courses::Courses;
 use super::edge;
+use super::pixel_series::PixelSeries;
 use super::registration;
 use super::rim::without_rim;
 use super::table::{Turntable, find_turntable};
-use super::table_model::{Seen, TableModel};
+use super::table_model::{TableModel, TurnObservations};
 use super::temporal_evidence::{Curves, TemporalEvidence, luminance};
-use super::whiskers::whiskers;
+use super::thin_parts::thin_parts;
 use crate::MaskError;
 use crate::bitmap::Bitmap;
 use crate::cut::grab_cut;
@@ -25,7 +25,7 @@ use crate::cut::grab_cut::{
 };
 use crate::cut::lab::LabTable;
 use crate::cut::pyramid::{
-    FirstModels, Level, RgbField, ascend, half_image, levels, refine, start,
+    InitialModels, Level, RgbField, ascend, half_image, levels, refine, start,
 };
 use crate::hints::trimap::Trimap;
 use crate::{Effort, Hints};
@@ -64,7 +64,7 @@ const WHITE: u8 = 250;
 /// And is so in this share of the frames.
 const WHITE_FRAMES: f64 = 0.9;
 /// Shorter thin parts of the object stay, pixels.
-const MIN_WHISKER: usize = 6;
+const MIN_THIN_PART: usize = 6;
 /// What the table's model says at least of a pixel that is background at first, as a logarithm.
 const SURELY_TABLE: f32 = 2.0;
 
@@ -111,7 +111,7 @@ pub struct TurnStatistics {
     pub(crate) fine: TurnField,
     /// At half the size; `None` if the fine one is small enough for the first cut.
     coarse: Option<TurnField>,
-    pub(crate) courses: Courses,
+    pub(crate) series: PixelSeries,
 }
 
 impl TurnStatistics {
@@ -124,12 +124,12 @@ impl TurnStatistics {
             let half: Vec<RgbImage> = turn.frames.iter().map(half_image).collect();
             TurnField::new(&half, &colours)
         });
-        let courses = Courses::new(&turn.frames, fine.size);
+        let series = PixelSeries::new(&turn.frames, fine.size);
         let object = match &coarse {
             Some(coarse) => coarse.own_cut().map(|object| object.enlarged(2, fine.size)),
             None => fine.own_cut(),
         };
-        let model = object.and_then(|object| fine.table_model(&courses, &object));
+        let model = object.and_then(|object| fine.table_model(&series, &object));
         if let Some(model) = &model {
             fine.learn_table(model);
             if let Some(coarse) = &mut coarse {
@@ -141,7 +141,7 @@ impl TurnStatistics {
             full: turn.full,
             fine,
             coarse,
-            courses,
+            series,
         }
     }
 
@@ -161,7 +161,7 @@ impl TurnStatistics {
     }
 
     /// A bitmap of the frames' size in that of the statistics.
-    pub(crate) fn reduced(&self, object: &Bitmap) -> Bitmap {
+    pub(crate) fn downscaled(&self, object: &Bitmap) -> Bitmap {
         let ((columns, rows), factor) = (self.fine.size, self.factor());
         let is_set = |at: usize| {
             let (x, y) = (at % columns * factor, at / columns * factor);
@@ -176,7 +176,7 @@ impl TurnStatistics {
     /// How well an outline follows what moves differently: the mean over its edges of the strength of
     /// the contrast there, 0..=1.
     pub(crate) fn outline(&self, object: &Bitmap) -> f32 {
-        let object = self.reduced(object);
+        let object = self.downscaled(object);
         self.fine.outline(&object)
     }
 
@@ -204,7 +204,7 @@ pub(crate) struct TurnField {
     pub(crate) backdrop: Bitmap,
     pub(crate) table: Turntable,
     evidence: Vec<f32>,
-    pub(crate) witness: TemporalEvidence,
+    pub(crate) temporal_evidence: TemporalEvidence,
     /// Pixels that are more likely table than object by the table's model; none without one.
     pub(crate) like_table: Option<Bitmap>,
     /// Pixels that are white in nearly every frame.
@@ -267,7 +267,7 @@ impl TurnField {
             size,
             backdrop: backdrop.alike,
             evidence: backdrop.evidence,
-            witness: curves.finish(),
+            temporal_evidence: curves.finish(),
             like_table: None,
             white: white(frames, size),
             table,
@@ -300,24 +300,24 @@ impl TurnField {
             let size = (self.size.0 as u32, self.size.1 as u32);
             grab_cut::rank(self, labels, share, ring(size, RING));
         }
-        start(self, labels, FirstModels::All, SMOOTHNESS)
+        start(self, labels, InitialModels::All, SMOOTHNESS)
     }
 
     /// The table's model, with what is known before it.
-    fn table_model(&self, courses: &Courses, object: &Bitmap) -> Option<TableModel> {
+    fn table_model(&self, series: &PixelSeries, object: &Bitmap) -> Option<TableModel> {
         let light: Vec<f32> = self.light().into_iter().map(luminance).collect();
         let change: Vec<f32> = self
             .features
             .iter()
             .map(|f| (f[3] / CHANGE_WEIGHT).exp_m1())
             .collect();
-        let seen = Seen {
+        let seen = TurnObservations {
             object,
             surface: &self.table.surface,
             light: &light,
             change: &change,
         };
-        TableModel::learn(courses, &seen)
+        TableModel::learn(series, &seen)
     }
 
     /// Takes what the table's model says as evidence.
@@ -512,10 +512,10 @@ pub(crate) fn segment(
     });
     change(&mut labels, fine.size, |object| fine.completed(object));
     change(&mut labels, fine.size, |object| {
-        edge::along_courses(&turn.courses, object)
+        edge::along_series(&turn.series, object)
     });
     change(&mut labels, fine.size, |object| {
-        object.minus(&whiskers(&turn.courses, object, MIN_WHISKER))
+        object.minus(&thin_parts(&turn.series, object, MIN_THIN_PART))
     });
     // From where the object is on average to where it is in the frame.
     change(&mut labels, fine.size, |object| {
@@ -551,7 +551,7 @@ fn known(hints: &Hints, size: (u32, u32)) -> Result<(Vec<Label>, f64), MaskError
         other => other,
     });
     let share = match initial.first {
-        FirstModels::Ranked(share) => share,
+        InitialModels::Ranked(share) => share,
         _ => SHARE,
     };
     Ok((labels.collect(), share))

@@ -1,6 +1,6 @@
 //! A few directions that explain most of many courses.
 
-use super::courses::dot;
+use super::pixel_series::dot;
 
 /// Rounds of the power method.
 const ROUNDS: usize = 12;

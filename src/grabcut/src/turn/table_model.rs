@@ -7,8 +7,8 @@
 
 use crate::bitmap::{Bitmap, Connectivity};
 
-use super::courses::Courses;
 use super::disc::Disc;
+use super::pixel_series::PixelSeries;
 use super::subspace::Subspace;
 
 /// Principal directions beside the mean: of the plain surface, and of all of the table.
@@ -57,7 +57,7 @@ const ON_DISC: f32 = 3.0;
 const RIM: f64 = 0.006;
 
 /// What is known of a turn before the table's model.
-pub(crate) struct Seen<'a> {
+pub(crate) struct TurnObservations<'a> {
     /// An object that was found without the model.
     pub(crate) object: &'a Bitmap,
     /// The table's plain surface; may be empty.
@@ -80,13 +80,13 @@ pub(crate) struct TableModel {
 
 impl TableModel {
     /// Learns the table's space; `None` if no table is seen.
-    pub(crate) fn learn(courses: &Courses, seen: &Seen<'_>) -> Option<Self> {
-        let Candidates { far, surely, table } = candidates(seen, courses.size())?;
-        let taken = learned_from(courses, &surely, &table);
-        let samples: Vec<Vec<f32>> = taken.iter().map(|&at| courses.smooth(at)).collect();
+    pub(crate) fn learn(series: &PixelSeries, seen: &TurnObservations<'_>) -> Option<Self> {
+        let Candidates { far, surely, table } = candidates(seen, series.size())?;
+        let taken = learned_from(series, &surely, &table);
+        let samples: Vec<Vec<f32>> = taken.iter().map(|&at| series.smooth(at)).collect();
         let space = Subspace::learn(&samples, DIRECTIONS);
         let brightest = quantile(taken.iter().map(|&at| seen.light[at]), BRIGHTEST_LEARNED)?;
-        let distance = distances(courses, &space);
+        let distance = distances(series, &space);
         let of_table = quantile(taken.iter().map(|&at| distance[at]), 0.5)?;
         let logs = distance.iter().zip(seen.light).map(|(distance, light)| {
             let brighter = BRIGHT_IS_FAR * (light / brightest.max(1e-6) - 1.0);
@@ -101,8 +101,8 @@ impl TableModel {
             &of_table,
         );
         // What is not table on the disc is object; elsewhere it may be the room.
-        let (width, _) = courses.size();
-        let disc = Disc::fit(&table, &far, courses.size());
+        let (width, _) = series.size();
+        let disc = Disc::fit(&table, &far, series.size());
         let bottom = table.bounds().bottom();
         let on_disc = table.map(|at, _| {
             let (x, y) = (at % width, at / width);
@@ -116,7 +116,7 @@ impl TableModel {
         Some(Self {
             ratio: ratio.collect(),
             on_disc,
-            size: courses.size(),
+            size: series.size(),
         })
     }
 
@@ -157,7 +157,7 @@ struct Candidates {
 }
 
 /// The pixels that may be table: around the plain surface, or without one around what lies below the object.
-fn candidates(seen: &Seen<'_>, (width, height): (usize, usize)) -> Option<Candidates> {
+fn candidates(seen: &TurnObservations<'_>, (width, height): (usize, usize)) -> Option<Candidates> {
     let away = ((width as f64 * AWAY).round() as usize).max(2);
     let far = seen.object.dilated(away).inverted();
     let surely = if seen.surface.count() >= MIN_SAMPLES as u64 {
@@ -188,15 +188,15 @@ fn candidates(seen: &Seen<'_>, (width, height): (usize, usize)) -> Option<Candid
 }
 
 /// Some of what may be table, without the share of it that is least like what surely is: parts of a black object.
-fn learned_from(courses: &Courses, surely: &Bitmap, table: &Bitmap) -> Vec<usize> {
+fn learned_from(series: &PixelSeries, surely: &Bitmap, table: &Bitmap) -> Vec<usize> {
     let sure: Vec<Vec<f32>> = thinned(surely)
         .iter()
-        .map(|&at| courses.smooth(at))
+        .map(|&at| series.smooth(at))
         .collect();
     let space = Subspace::learn(&sure, SURFACE_DIRECTIONS);
     let mut taken: Vec<(f32, usize)> = thinned(table)
         .into_iter()
-        .map(|at| (space.residual(&courses.smooth(at)), at))
+        .map(|at| (space.residual(&series.smooth(at)), at))
         .collect();
     taken.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     taken.truncate((taken.len() as f64 * (1.0 - LEFT_OUT)).ceil() as usize);
@@ -211,9 +211,9 @@ fn thinned(samples: &Bitmap) -> Vec<usize> {
 }
 
 /// How far the smooth course of each pixel is from the space.
-fn distances(courses: &Courses, space: &Subspace) -> Vec<f32> {
-    let length = courses.length().max(1) as f32;
-    courses.map_smooth(|course| (space.residual(course) / length).sqrt())
+fn distances(series: &PixelSeries, space: &Subspace) -> Vec<f32> {
+    let length = series.length().max(1) as f32;
+    series.map_smooth(|course| (space.residual(course) / length).sqrt())
 }
 
 fn quantile(values: impl Iterator<Item = f32>, share: f64) -> Option<f32> {

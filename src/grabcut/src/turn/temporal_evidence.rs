@@ -165,7 +165,7 @@ mod tests {
 
     /// A strip of three parts: a bright one and a dark one that one light turns about, and one that shows other
     /// things all the time.
-    fn witness(frames: usize) -> TemporalEvidence {
+    fn evidence(frames: usize) -> TemporalEvidence {
         let mut curves = Curves::new(frames, 30);
         for at in 0..frames {
             let angle = std::f32::consts::TAU * at as f32 / frames as f32;
@@ -184,17 +184,17 @@ mod tests {
 
     #[test]
     fn what_is_behind_the_object_moves_and_a_darker_part_of_it_does_not() {
-        let witness = witness(32);
-        assert_eq!(witness.moves(&third(1), &third(0), &third(2)), Some(false));
-        assert_eq!(witness.moves(&third(2), &third(0), &third(2)), Some(true));
-        assert!(witness.together(&third(0), &third(1)));
-        assert!(!witness.together(&third(0), &third(2)));
-        assert_eq!(witness.nearer(&third(1), &third(0), &third(2)), Some(true));
+        let evidence = evidence(32);
+        assert_eq!(evidence.moves(&third(1), &third(0), &third(2)), Some(false));
+        assert_eq!(evidence.moves(&third(2), &third(0), &third(2)), Some(true));
+        assert!(evidence.together(&third(0), &third(1)));
+        assert!(!evidence.together(&third(0), &third(2)));
+        assert_eq!(evidence.nearer(&third(1), &third(0), &third(2)), Some(true));
     }
 
     #[test]
     fn few_frames_and_parts_alike_say_nothing() {
-        assert_eq!(witness(6).moves(&third(1), &third(0), &third(2)), None);
-        assert_eq!(witness(32).moves(&third(1), &third(0), &third(1)), None);
+        assert_eq!(evidence(6).moves(&third(1), &third(0), &third(2)), None);
+        assert_eq!(evidence(32).moves(&third(1), &third(0), &third(1)), None);
     }
 }

@@ -8,7 +8,7 @@ use relit_grabcut::{TurnFrames, TurnStatistics};
 
 /// What an object has that makes its mask difficult.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Trouble {
+pub(crate) enum Difficulty {
     /// A handle through which the room is seen.
     Handle,
     /// A handle before the table.
@@ -29,16 +29,16 @@ pub(crate) enum Trouble {
     WhiteRoom,
 }
 
-pub(crate) const TROUBLES: [Trouble; 9] = [
-    Trouble::Handle,
-    Trouble::LowHandle,
-    Trouble::Hole,
-    Trouble::TwoHoles,
-    Trouble::DarkPart,
-    Trouble::Shade,
-    Trouble::OpenShade,
-    Trouble::Shaken,
-    Trouble::WhiteRoom,
+pub(crate) const TROUBLES: [Difficulty; 9] = [
+    Difficulty::Handle,
+    Difficulty::LowHandle,
+    Difficulty::Hole,
+    Difficulty::TwoHoles,
+    Difficulty::DarkPart,
+    Difficulty::Shade,
+    Difficulty::OpenShade,
+    Difficulty::Shaken,
+    Difficulty::WhiteRoom,
 ];
 
 /// A turn and its truth.
@@ -85,14 +85,14 @@ struct Surface {
 
 /// The shape in units of half the object's height, from its middle; y upwards.
 struct Shape {
-    trouble: Trouble,
+    trouble: Difficulty,
     paint: [f64; 3],
     side: f64,
     tall: f64,
 }
 
 impl Shape {
-    fn new(trouble: Trouble, numbers: &mut Numbers) -> Self {
+    fn new(trouble: Difficulty, numbers: &mut Numbers) -> Self {
         let grey = numbers.between(0.25, 0.6);
         Self {
             trouble,
@@ -105,7 +105,7 @@ impl Shape {
     /// What is seen of the object at a place, if it is there.
     fn at(&self, x: f64, y: f64) -> Option<Surface> {
         let x = self.side * x;
-        use Trouble::{
+        use Difficulty::{
             DarkPart, Handle, Hole, LowHandle, OpenShade, Shade, Shaken, TwoHoles, WhiteRoom,
         };
         let handle = match self.trouble {
@@ -156,12 +156,12 @@ impl Shape {
     fn is_critical(&self, x: f64, y: f64) -> bool {
         let x = self.side * x;
         match self.trouble {
-            Trouble::Handle | Trouble::Shaken | Trouble::WhiteRoom => {
+            Difficulty::Handle | Difficulty::Shaken | Difficulty::WhiteRoom => {
                 (x - 0.72).hypot(y - 0.15) < 0.2 && x > 0.72
             }
-            Trouble::LowHandle => (x - 0.72).hypot(y + 0.5) < 0.2 && x > 0.72,
-            Trouble::Hole => (x - 0.05).hypot(y - 0.1) < 0.2,
-            Trouble::TwoHoles => x.hypot(y - 0.42) < 0.14 || x.hypot(y + 0.42) < 0.14,
+            Difficulty::LowHandle => (x - 0.72).hypot(y + 0.5) < 0.2 && x > 0.72,
+            Difficulty::Hole => (x - 0.05).hypot(y - 0.1) < 0.2,
+            Difficulty::TwoHoles => x.hypot(y - 0.42) < 0.14 || x.hypot(y + 0.42) < 0.14,
             _ => (x / 0.2).powi(2) + ((y + 0.1) / 0.16).powi(2) < 1.0,
         }
     }
@@ -234,7 +234,7 @@ fn level(light: f64) -> f64 {
 
 /// A turn of `count` frames.
 pub(crate) fn scene(
-    trouble: Trouble,
+    trouble: Difficulty,
     (width, height): (u32, u32),
     count: usize,
     seed: u64,
@@ -253,7 +253,7 @@ pub(crate) fn scene(
     let frames = (0..count).map(|number| {
         let turn = number as f64 / count as f64;
         // The truth is that of the first frame.
-        let shaken = trouble == Trouble::Shaken && number > 0;
+        let shaken = trouble == Difficulty::Shaken && number > 0;
         let mut shake = || {
             if shaken {
                 numbers.between(-0.6, 0.6)
@@ -281,7 +281,7 @@ pub(crate) fn scene(
                     let open = 1.0 - 0.6 * (-near).exp();
                     [0.03 * open * lit([0.0, 1.0, 0.0]); 3]
                 }
-                None if trouble == Trouble::WhiteRoom => [1.2; 3],
+                None if trouble == Difficulty::WhiteRoom => [1.2; 3],
                 None => room.light(turn + 0.13 * x / f64::from(width), y / f64::from(height)),
             }
         };

@@ -3,7 +3,7 @@
 use image::{GrayImage, RgbImage};
 use relit_grabcut::{Effort, Hints, MaskCheck, TurnFrames, TurnStatistics};
 
-use super::turn_scene::{Scene, TROUBLES, Trouble, scene};
+use super::turn_scene::{Difficulty, Scene, TROUBLES, scene};
 use super::{by_seeds, segment_turn};
 use relit_test_support::disc::{HEIGHT, WIDTH, in_disc, seeds_image};
 
@@ -40,7 +40,7 @@ fn right_there(mask: &GrayImage, scene: &Scene) -> f64 {
 }
 
 /// Intersection over union, and the share of the critical part that is right.
-fn figures(trouble: Trouble, size: (u32, u32), frames: usize, seed: u64) -> (f64, f64) {
+fn figures(trouble: Difficulty, size: (u32, u32), frames: usize, seed: u64) -> (f64, f64) {
     let scene = scene(trouble, size, frames, seed);
     let mask = segment_turn(&scene.frames[0], &scene.statistics(), &Hints::default());
     let mask = mask.unwrap().image;
@@ -83,7 +83,7 @@ fn larger_turns_are_cut_as_well() {
 
 #[test]
 fn the_check_sees_a_hole_in_the_object_that_the_turns_own_mask_may_have_too() {
-    let scene = scene(Trouble::Shade, SMALL, 24, SEED);
+    let scene = scene(Difficulty::Shade, SMALL, 24, SEED);
     let turn = scene.statistics();
     let mut holed = scene.truth.clone();
     for (mask, critical) in holed.pixels_mut().zip(scene.critical.pixels()) {
@@ -110,7 +110,7 @@ fn the_check_sees_a_hole_in_the_object_that_the_turns_own_mask_may_have_too() {
 
 #[test]
 fn a_true_mask_is_not_blamed_whatever_the_object() {
-    let faults = |trouble: Trouble| {
+    let faults = |trouble: Difficulty| {
         let scene = scene(trouble, SMALL, 24, SEED + 1);
         let turn = scene.statistics();
         let check = MaskCheck::new(&scene.truth, &turn).unwrap();
@@ -120,7 +120,12 @@ fn a_true_mask_is_not_blamed_whatever_the_object() {
             .unwrap();
         (trouble, shape.faults())
     };
-    let found = [Trouble::LowHandle, Trouble::TwoHoles, Trouble::OpenShade].map(faults);
+    let found = [
+        Difficulty::LowHandle,
+        Difficulty::TwoHoles,
+        Difficulty::OpenShade,
+    ]
+    .map(faults);
     assert!(
         found.iter().all(|(_, faults)| faults.is_empty()),
         "{found:?}"
@@ -129,7 +134,7 @@ fn a_true_mask_is_not_blamed_whatever_the_object() {
 
 #[test]
 fn a_stroke_over_the_opening_of_a_handle_is_told() {
-    let scene = scene(Trouble::Handle, SMALL, 24, SEED);
+    let scene = scene(Difficulty::Handle, SMALL, 24, SEED);
     let turn = scene.statistics();
     let marks = GrayImage::from_fn(SMALL.0, SMALL.1, |x, y| {
         let critical = scene.critical.get_pixel(x, y).0[0] > 0;

@@ -29,7 +29,7 @@ pub(crate) fn run(
             }
             Err(error) if !several => return Err(error),
             Err(error) => {
-                console.error_in(path, Some(&recording_name(path)), &error);
+                console.error_for(path, Some(&recording_name(path)), &error);
                 failed += 1;
             }
         }
@@ -64,7 +64,7 @@ fn say_summary(console: Console, fitting: usize, unfit: usize, failed: usize) {
         failed: failed as u64,
         summary: summary.clone(),
     });
-    console.say(&summary, &event);
+    console.print(&summary, &event);
 }
 
 fn print(output: &CheckOutput, console: Console) {
@@ -79,5 +79,5 @@ fn print(output: &CheckOutput, console: Console) {
         page: output.page.to_string_lossy().into_owned(),
         report: json!(report),
     });
-    console.say(&text, &event);
+    console.print(&text, &event);
 }

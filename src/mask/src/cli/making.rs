@@ -63,7 +63,7 @@ fn says_left_out(inputs: &MaskInputs, console: Console) -> Outcome {
     for path in &inputs.strays {
         let input = path.to_string_lossy().into_owned();
         let message = "it is not a session, a video or a photograph".to_owned();
-        console.say(
+        console.print(
             &format!("{input}: left out: {message}"),
             &Event::LeftOut {
                 session: None,
@@ -73,7 +73,7 @@ fn says_left_out(inputs: &MaskInputs, console: Console) -> Outcome {
         );
     }
     for (input, fault) in &inputs.faults {
-        console.error_in(input, None, fault);
+        console.error_for(input, None, fault);
     }
     if !inputs.faults.is_empty() && inputs.recordings.is_empty() {
         Outcome::Failure
@@ -105,7 +105,7 @@ fn make(
             Err(error) => {
                 failed += 1;
                 let session = recording_name(path);
-                bar.suspend(|| console.error_in(path, Some(&session), &error));
+                bar.suspend(|| console.error_for(path, Some(&session), &error));
             }
         }
         bar.inc(1);
@@ -152,17 +152,17 @@ fn say_summary(console: Console, made: usize, left_out: usize, failed: usize) {
         failed: failed as u64,
         summary: summary.clone(),
     });
-    console.say(&summary, &event);
+    console.print(&summary, &event);
 }
 
 /// Prints the warnings about one mask, its files and its size.
 fn print(output: &MaskOutput, console: Console) {
     let id = &output.recording;
     for notice in &output.notices {
-        console.warn_in(id, notice.text());
+        console.warn_for(id, notice.text());
     }
     for warning in &output.record.warnings {
-        console.warn_in(id, warning);
+        console.warn_for(id, warning);
     }
     let (source, result) = (&output.record.source, &output.record.result);
     let found = result.statistics;
@@ -187,7 +187,7 @@ fn print(output: &MaskOutput, console: Console) {
         result: json!(result),
         warnings: output.record.warnings.clone(),
     };
-    console.say(&text, &event);
+    console.print(&text, &event);
 }
 
 /// Prints where the editor is.
@@ -197,7 +197,7 @@ fn print_editor(announcement: &Announcement, console: Console) {
         (false, Some(qr)) => format!("{qr}\n"),
         _ => String::new(),
     };
-    console.say(
+    console.print(
         &format!("{qr}Open in a browser: {url}"),
         &Event::Editor {
             address: announcement.address.to_string(),

@@ -13,7 +13,7 @@ use relit_data::causes::with_causes;
 use relit_grabcut::{Effort, outline};
 use relit_video::VideoError;
 use relit_web::{
-    AccessPolicy, BodyLimit, Failure, Index, JsonBody, PageAsset, QueryParams, SCRIPT, SKETCH,
+    AccessPolicy, BodyLimit, Failure, IndexPage, JsonBody, PageAsset, QueryParams, SCRIPT, SKETCH,
     STYLE, Shutdown, asset, guard,
 };
 use serde::Deserialize;
@@ -25,7 +25,7 @@ use super::super::{MaskRecord, MaskingError};
 use super::session::{EditorSession, Sketch};
 
 /// The page itself.
-pub(super) const INDEX: Index = Index(include_str!("page/index.html"));
+pub(super) const INDEX: IndexPage = IndexPage(include_str!("page/index.html"));
 /// Its files that are not shared with other pages.
 const ASSETS: [PageAsset; 3] = [
     asset("/editor.css", STYLE, include_str!("page/editor.css")),
@@ -62,7 +62,7 @@ pub(super) struct App {
     pub(super) shutdown: Shutdown,
     pub(super) accepted: Accepted,
     pub(super) permits: Arc<Semaphore>,
-    pub(super) index: Index,
+    pub(super) index: IndexPage,
     pub(super) limit: BodyLimit,
 }
 
@@ -72,7 +72,7 @@ impl App {
         &self,
         job: impl FnOnce(&EditorSession) -> Result<T, MaskingError> + Send + 'static,
     ) -> Result<T, Failure> {
-        let broken = || Failure::broken("the request could not be processed");
+        let internal = || Failure::internal("the request could not be processed");
         let permit = self.permits.clone().acquire_owned().await;
         let permit = permit.map_err(|_| broken())?;
         let session = self.session.clone();
@@ -136,7 +136,7 @@ async fn frame(
 }
 
 #[derive(Deserialize)]
-struct Wanted {
+struct MaskQuery {
     #[serde(default)]
     draft: bool,
 }
@@ -144,7 +144,7 @@ struct Wanted {
 /// The mask of a sketch, for showing it. The outline is polygons, to be filled by the even-odd rule.
 async fn mask(
     State(app): State<App>,
-    QueryParams(Wanted { draft }): QueryParams<Wanted>,
+    QueryParams(MaskQuery { draft }): QueryParams<MaskQuery>,
     JsonBody(sketch): JsonBody<Sketch>,
 ) -> Result<Json<Value>, Failure> {
     let effort = if draft { Effort::Draft } else { Effort::Fine };

@@ -1,11 +1,11 @@
 //! From reports to angles: where the table was at any time of the host's clock.
 //!
 //! In the part of a turn at constant speed the angle is a linear function of time. If the controller
-//! stamps its reports, the line is fitted against the chip's clock, without the wire's delays, and
+//! stamps its reports, the line is fitted against the chip's clock, without the line's delays, and
 //! the chip's clock is fitted against the host's by the requests that were answered fastest. Without
 //! stamps, a report counts for the middle between request and arrival.
 //!
-//! This module knows reports and lines, and nothing of the wire.
+//! This module knows reports and lines, and nothing of the protocol.
 
 mod line;
 #[cfg(test)]

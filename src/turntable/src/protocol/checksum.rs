@@ -7,7 +7,7 @@ const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 
 /// A line's checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sealed<'a> {
+pub(super) enum ChecksumResult<'a> {
     /// The checksum is correct; the text before it.
     Good(&'a str),
     /// The checksum is wrong.
@@ -17,23 +17,23 @@ pub(super) enum Sealed<'a> {
 }
 
 /// `text` with its checksum.
-pub(super) fn seal(text: &str) -> String {
+pub(super) fn with_checksum(text: &str) -> String {
     format!("{text}*{:04X}", CRC.checksum(text.as_bytes()))
 }
 
 /// Checks and removes a line's checksum.
-pub(super) fn unseal(line: &str) -> Sealed<'_> {
+pub(super) fn check_checksum(line: &str) -> ChecksumResult<'_> {
     // Grbl's relatives write stars of their own, as in `[NVS STORAGE:*FLASH 4K]`.
     let Some((text, digits)) = line
         .rsplit_once('*')
         .filter(|(_, digits)| is_checksum(digits))
     else {
-        return Sealed::Open;
+        return ChecksumResult::Open;
     };
     if u16::from_str_radix(digits, 16) == Ok(CRC.checksum(text.as_bytes())) {
-        Sealed::Good(text)
+        ChecksumResult::Good(text)
     } else {
-        Sealed::Bad
+        ChecksumResult::Bad
     }
 }
 
@@ -51,27 +51,39 @@ mod tests {
 
     #[test]
     fn the_checksum_is_the_published_one() {
-        assert_eq!(seal("123456789"), "123456789*29B1");
-        assert_eq!(unseal("123456789*29B1"), Sealed::Good("123456789"));
+        assert_eq!(with_checksum("123456789"), "123456789*29B1");
+        assert_eq!(
+            check_checksum("123456789*29B1"),
+            ChecksumResult::Good("123456789")
+        );
     }
 
     #[test]
     fn any_flipped_bit_is_detected() {
-        let sealed = seal("ok N17");
+        let sealed = with_checksum("ok N17");
         for bit in 0..sealed.len() * 8 {
             let mut bytes = sealed.clone().into_bytes();
             bytes[bit / 8] ^= 1 << (bit % 8);
             let damaged = String::from_utf8_lossy(&bytes);
-            assert!(!matches!(unseal(&damaged), Sealed::Good(_)), "{damaged}");
+            assert!(
+                !matches!(check_checksum(&damaged), ChecksumResult::Good(_)),
+                "{damaged}"
+            );
         }
     }
 
     #[test]
     fn a_line_without_head_or_tail_is_not_taken_for_whole() {
-        let sealed = seal("<Run|MPos:12.345,0.000,0.000|FS:432,0|T:1>");
+        let sealed = with_checksum("<Run|MPos:12.345,0.000,0.000|FS:432,0|T:1>");
         for cut in 1..sealed.len() {
-            assert!(!matches!(unseal(&sealed[cut..]), Sealed::Good(_)));
-            assert!(!matches!(unseal(&sealed[..cut]), Sealed::Good(_)));
+            assert!(!matches!(
+                check_checksum(&sealed[cut..]),
+                ChecksumResult::Good(_)
+            ));
+            assert!(!matches!(
+                check_checksum(&sealed[..cut]),
+                ChecksumResult::Good(_)
+            ));
         }
     }
 }

@@ -5,7 +5,7 @@ use super::polling::Poll;
 
 /// An event from the controller.
 #[derive(Debug, PartialEq)]
-pub enum WireEvent {
+pub enum ProtocolEvent {
     /// The line `id` has been answered or has failed.
     Answered {
         /// The id that [`Machine::send`](super::Machine::send) returned.
@@ -68,7 +68,7 @@ pub enum SendError {
     Unsendable,
 }
 
-/// Counters of lines, reports and wire errors.
+/// Counters of lines, reports and line errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Lines sent, without repetitions.

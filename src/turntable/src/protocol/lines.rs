@@ -5,7 +5,7 @@ const MAX_LENGTH: usize = 512;
 
 /// The result of a line end.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Piece {
+pub(super) enum ReceivedLine {
     /// A line, without its line end.
     Line {
         /// Its text.
@@ -27,7 +27,7 @@ pub(super) struct LineReader {
 
 impl LineReader {
     /// Takes one byte that arrived at `now_us`; a line end returns what stands before it.
-    pub(super) fn push(&mut self, now_us: i64, byte: u8) -> Option<Piece> {
+    pub(super) fn push(&mut self, now_us: i64, byte: u8) -> Option<ReceivedLine> {
         if byte == b'\r' || byte == b'\n' {
             return self.end();
         }
@@ -42,20 +42,20 @@ impl LineReader {
         None
     }
 
-    fn end(&mut self) -> Option<Piece> {
+    fn end(&mut self) -> Option<ReceivedLine> {
         let bytes = std::mem::take(&mut self.bytes);
         if std::mem::take(&mut self.is_noise) {
-            return Some(Piece::Noise);
+            return Some(ReceivedLine::Noise);
         }
         if bytes.is_empty() {
             return None;
         }
         Some(match String::from_utf8(bytes) {
-            Ok(text) => Piece::Line {
+            Ok(text) => ReceivedLine::Line {
                 text,
                 first_us: self.first_us,
             },
-            Err(_) => Piece::Noise,
+            Err(_) => ReceivedLine::Noise,
         })
     }
 }
@@ -64,7 +64,7 @@ impl LineReader {
 mod tests {
     use super::*;
 
-    fn read(reader: &mut LineReader, now_us: i64, bytes: &[u8]) -> Vec<Piece> {
+    fn read(reader: &mut LineReader, now_us: i64, bytes: &[u8]) -> Vec<ReceivedLine> {
         let pieces = bytes.iter().filter_map(|&byte| reader.push(now_us, byte));
         pieces.collect()
     }
@@ -74,15 +74,15 @@ mod tests {
         let mut reader = LineReader::default();
         assert_eq!(read(&mut reader, 5, b"\r\no"), []);
         let text = "ok".to_owned();
-        let line = Piece::Line { text, first_us: 5 };
+        let line = ReceivedLine::Line { text, first_us: 5 };
         assert_eq!(read(&mut reader, 9, b"k\r\n"), [line]);
     }
 
     #[test]
     fn a_line_with_foreign_bytes_or_without_end_is_noise_as_a_whole() {
         let mut reader = LineReader::default();
-        assert_eq!(read(&mut reader, 0, b"o\xffk\r\n"), [Piece::Noise]);
+        assert_eq!(read(&mut reader, 0, b"o\xffk\r\n"), [ReceivedLine::Noise]);
         assert_eq!(read(&mut reader, 0, &[b'x'; MAX_LENGTH + 1]), []);
-        assert_eq!(read(&mut reader, 0, b"\n\n"), [Piece::Noise]);
+        assert_eq!(read(&mut reader, 0, b"\n\n"), [ReceivedLine::Noise]);
     }
 }

@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
-use super::checksum::{Sealed, seal, unseal};
-use super::event::{Counts, LineFault, LineOutcome, SendError, WireEvent};
-use super::lines::{LineReader, Piece};
+use super::checksum::{ChecksumResult, check_checksum, with_checksum};
+use super::event::{Counts, LineFault, LineOutcome, ProtocolEvent, SendError};
+use super::lines::{LineReader, ReceivedLine};
 use super::message::{Message, parse};
-use super::pending::{Due, Pending, ReplyTimeout};
+use super::pending::{Pending, PendingAction, ReplyTimeout};
 use super::polling::Polling;
 use super::realtime;
 
@@ -45,7 +45,7 @@ pub struct Machine {
     polling: Polling,
     realtime: Vec<u8>,
     lines: Vec<u8>,
-    events: VecDeque<WireEvent>,
+    events: VecDeque<ProtocolEvent>,
     next_id: u64,
     counts: Counts,
 }
@@ -93,7 +93,7 @@ impl Machine {
         }
         match self.session {
             Session::Checked { next } => {
-                let text = seal(&format!("N{next} {block}"));
+                let text = with_checksum(&format!("N{next} {block}"));
                 self.launch(now_us, &text, Some(next), timeout)
             }
             Session::Plain | Session::Opening => self.launch(now_us, block, None, timeout),
@@ -105,7 +105,7 @@ impl Machine {
     /// # Errors
     /// [`SendError`]; nothing was sent.
     pub fn open_session(&mut self, now_us: i64) -> Result<u64, SendError> {
-        let id = self.launch(now_us, &seal("N0"), Some(0), ReplyTimeout::AtOnce)?;
+        let id = self.launch(now_us, &with_checksum("N0"), Some(0), ReplyTimeout::AtOnce)?;
         self.session = Session::Opening;
         Ok(id)
     }
@@ -155,31 +155,31 @@ impl Machine {
     }
 
     /// The next event.
-    pub fn next_event(&mut self) -> Option<WireEvent> {
+    pub fn next_event(&mut self) -> Option<ProtocolEvent> {
         self.events.pop_front()
     }
 
     /// Processes the passing of time: repeats or gives up lines without answer.
     pub fn on_time(&mut self, now_us: i64) {
-        let due = self
+        let next_action = self
             .pending
             .as_ref()
-            .map_or(Due::Wait, |line| line.due(now_us));
-        self.follow(due, now_us);
+            .map_or(PendingAction::Wait, |line| line.next_action(now_us));
+        self.follow(next_action, now_us);
     }
 
-    fn follow(&mut self, due: Due, now_us: i64) {
+    fn follow(&mut self, next_action: PendingAction, now_us: i64) {
         let Some(pending) = &mut self.pending else {
             return;
         };
-        match due {
-            Due::Wait => {}
-            Due::Again => {
+        match next_action {
+            PendingAction::Wait => {}
+            PendingAction::Again => {
                 pending.sent_again(now_us);
                 self.lines.extend_from_slice(&pending.bytes);
                 self.counts.repeats += 1;
             }
-            Due::Lost => {
+            PendingAction::Lost => {
                 let tries = pending.tries;
                 self.fail(LineFault::NoAnswer { tries });
             }
@@ -191,27 +191,29 @@ impl Machine {
         for &byte in bytes {
             match self.reader.push(now_us, byte) {
                 None => {}
-                Some(Piece::Noise) => self.counts.noise += 1,
-                Some(Piece::Line { text, first_us }) => self.on_line(now_us, &text, first_us),
+                Some(ReceivedLine::Noise) => self.counts.noise += 1,
+                Some(ReceivedLine::Line { text, first_us }) => {
+                    self.on_line(now_us, &text, first_us)
+                }
             }
         }
     }
 
     fn on_line(&mut self, now_us: i64, line: &str, first_us: i64) {
-        match (unseal(line), self.session) {
-            (Sealed::Good(text), _) => {
+        match (check_checksum(line), self.session) {
+            (ChecksumResult::Good(text), _) => {
                 self.unchecked = 0;
                 match parse(text) {
                     Some(message) => self.on_message(now_us, message, first_us),
                     None => self.counts.noise += 1,
                 }
             }
-            (Sealed::Bad, _) => self.counts.noise += 1,
-            (Sealed::Open, Session::Plain | Session::Opening) => match parse(line) {
+            (ChecksumResult::Bad, _) => self.counts.noise += 1,
+            (ChecksumResult::Open, Session::Plain | Session::Opening) => match parse(line) {
                 Some(message) => self.on_message(now_us, message, first_us),
                 None => self.counts.noise += 1,
             },
-            (Sealed::Open, Session::Checked { .. }) => self.on_unchecked(line),
+            (ChecksumResult::Open, Session::Checked { .. }) => self.on_unchecked(line),
         }
     }
 
@@ -243,11 +245,11 @@ impl Machine {
         match message {
             Message::Ok { seq } => self.on_answer(now_us, seq, None),
             Message::Error { code, seq } => self.on_answer(now_us, seq, Some(code)),
-            Message::Alarm(code) => self.events.push_back(WireEvent::Alarm(code)),
+            Message::Alarm(code) => self.events.push_back(ProtocolEvent::Alarm(code)),
             Message::Status(report) => {
                 self.counts.reports += 1;
                 let poll = self.polling.answered(report, first_us);
-                self.events.push_back(WireEvent::Status(poll));
+                self.events.push_back(ProtocolEvent::Status(poll));
             }
             Message::Banner(cause) => self.reset(cause),
             other => match &mut self.pending {
@@ -281,8 +283,8 @@ impl Machine {
 
     fn on_damaged(&mut self, now_us: i64) {
         let damaged = |line: &Pending| line.damaged(now_us);
-        let due = self.pending.as_ref().map_or(Due::Wait, damaged);
-        self.follow(due, now_us);
+        let next_action = self.pending.as_ref().map_or(PendingAction::Wait, damaged);
+        self.follow(next_action, now_us);
     }
 
     fn accept(&mut self) {
@@ -308,14 +310,16 @@ impl Machine {
             (session, _) => session,
         };
         let id = pending.id;
-        self.events.push_back(WireEvent::Answered { id, outcome });
+        self.events
+            .push_back(ProtocolEvent::Answered { id, outcome });
     }
 
     fn fail(&mut self, fault: LineFault) {
         if let Some(Pending { id, .. }) = self.pending.take() {
             self.unsure = true;
             let outcome = LineOutcome::Failed(fault);
-            self.events.push_back(WireEvent::Answered { id, outcome });
+            self.events
+                .push_back(ProtocolEvent::Answered { id, outcome });
         }
     }
 
@@ -332,6 +336,6 @@ impl Machine {
         self.unsure = false;
         self.unchecked = 0;
         self.polling.forget();
-        self.events.push_back(WireEvent::Reset(cause));
+        self.events.push_back(ProtocolEvent::Reset(cause));
     }
 }

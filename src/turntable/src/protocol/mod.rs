@@ -23,7 +23,7 @@ mod status;
 #[cfg(test)]
 mod tests;
 
-pub use event::{Counts, LineFault, LineOutcome, SendError, WireEvent};
+pub use event::{Counts, LineFault, LineOutcome, ProtocolEvent, SendError};
 pub use machine::Machine;
 pub use message::{Message, parse};
 pub use pending::ReplyTimeout;

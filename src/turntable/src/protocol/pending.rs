@@ -23,7 +23,7 @@ pub enum ReplyTimeout {
 
 /// What has to be done with a line.
 #[derive(Debug, PartialEq)]
-pub(super) enum Due {
+pub(super) enum PendingAction {
     /// Nothing yet.
     Wait,
     /// Send it again.
@@ -68,7 +68,7 @@ impl Pending {
     }
 
     /// What has to be done with a line that has no answer yet.
-    pub(super) fn due(&self, now_us: i64) -> Due {
+    pub(super) fn next_action(&self, now_us: i64) -> PendingAction {
         let waited_us = now_us - self.last_us;
         let over = match self.timeout {
             ReplyTimeout::AtOnce => {
@@ -83,22 +83,22 @@ impl Pending {
             ReplyTimeout::Within(_) => ANSWER_US << self.tries.min(TRIES),
         };
         if over {
-            Due::Lost
+            PendingAction::Lost
         } else if self.seq.is_some() && self.tries < TRIES && waited_us >= again_us {
-            Due::Again
+            PendingAction::Again
         } else {
-            Due::Wait
+            PendingAction::Wait
         }
     }
 
     /// What has to be done with this line after the controller's error for a damaged line.
-    pub(super) fn damaged(&self, now_us: i64) -> Due {
+    pub(super) fn damaged(&self, now_us: i64) -> PendingAction {
         if now_us - self.last_us < TURNAROUND_US || self.seq.is_none() {
-            Due::Wait
+            PendingAction::Wait
         } else if self.tries >= TRIES {
-            Due::Lost
+            PendingAction::Lost
         } else {
-            Due::Again
+            PendingAction::Again
         }
     }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::SimulatorError;
 
-/// Faults of the wire and of the chip.
+/// Faults of the serial line and of the chip.
 ///
 /// As text, separated by commas: `drop=0.01` loses that fraction of the bytes, `flip=` flips a bit
 /// in that fraction of the bytes, `duplicate=` repeats that fraction of the lines, `merge=` loses the
@@ -16,10 +16,10 @@ use super::SimulatorError;
 /// stop for eight seconds, and `estop@30s` for good. Times count from the table's start on its clock.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TableFaults {
-    /// Faults of the wire to the chip.
-    pub to_chip: WireFaults,
-    /// Faults of the wire from the chip.
-    pub from_chip: WireFaults,
+    /// Faults of the line to the chip.
+    pub to_chip: SerialFaults,
+    /// Faults of the line from the chip.
+    pub from_chip: SerialFaults,
     /// Times at which the chip restarts.
     pub resets: Vec<Duration>,
     /// Time at which the chip stops for good.
@@ -28,9 +28,9 @@ pub struct TableFaults {
     pub emergency_stops: Vec<(Duration, Option<Duration>)>,
 }
 
-/// Faults of one direction of the wire; fractions from 0 to 1.
+/// Faults of one direction of the serial line; fractions from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct WireFaults {
+pub struct SerialFaults {
     /// Fraction of the bytes that are lost.
     pub drop: f64,
     /// Fraction of the bytes in which one bit is flipped.
@@ -88,7 +88,7 @@ impl TableFaults {
     }
 }
 
-impl WireFaults {
+impl SerialFaults {
     fn set(&mut self, what: &str, how: &str) -> Result<(), &'static str> {
         let place = match what {
             "drop" => &mut self.drop,
@@ -153,18 +153,18 @@ mod tests {
                               estop@5s:250ms,estop@9s"
             .parse()
             .unwrap();
-        let both = WireFaults {
+        let both = SerialFaults {
             drop: 0.01,
             delay: 0.02,
             delay_by: Duration::from_millis(30),
-            ..WireFaults::default()
+            ..SerialFaults::default()
         };
         let expected = TableFaults {
-            to_chip: WireFaults {
+            to_chip: SerialFaults {
                 flip: 0.005,
                 ..both
             },
-            from_chip: WireFaults {
+            from_chip: SerialFaults {
                 duplicate: 1.0,
                 ..both
             },

@@ -3,7 +3,7 @@
 //! A [`SimulatedTable`] runs the same code as the chip, up to the present time of its [`Clock`]. Its
 //! port works in memory; a [`Simulator`] provides it as a pseudoterminal for other programs. Both
 //! behave like an Arduino's: opening the port resets the chip, bytes take as long as at 115 200 baud,
-//! and faults of the wire and the chip are injected on demand ([`TableFaults`]). Unlike a real table,
+//! and faults of the line and the chip are injected on demand ([`TableFaults`]). Unlike a real table,
 //! it also gives its true angle at any time.
 //!
 //! ```
@@ -12,7 +12,7 @@
 //! use relit_turntable::{TableOptions, Table};
 //!
 //! let clock = Clock::virtual_time();
-//! let _participant = clock.take_part();
+//! let _participant = clock.participate();
 //! let simulated = SimulatedTable::new(&SimulatorOptions {
 //!     clock: clock.clone(),
 //!     ..SimulatorOptions::default()
@@ -34,7 +34,7 @@ mod chip;
 mod faults;
 mod ground_truth;
 mod model;
-mod openings;
+mod open_counter;
 mod options;
 mod serial_line;
 mod simulated_table;
@@ -47,7 +47,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use relit_clock::{Clock, JoinHandle};
 
-pub use faults::{TableFaults, WireFaults};
+pub use faults::{SerialFaults, TableFaults};
 pub use ground_truth::{STEPS_PER_TURN, StepEdge};
 pub use options::SimulatorOptions;
 pub use simulated_table::{SimulatedPort, SimulatedTable};

@@ -1,4 +1,4 @@
-//! The simulation of chip, wire and motor, advanced to a given time on demand.
+//! The simulation of chip, serial line and motor, advanced to a given time on demand.
 
 use std::cmp::Reverse;
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ use super::chip::{Chip, IndexPlace, Pins};
 use super::faults::TableFaults;
 use super::ground_truth::{GroundTruth, STEPS_PER_TURN, StepEdge};
 use super::options::SimulatorOptions;
-use super::serial_line::{Timed, Wire};
+use super::serial_line::{SerialChannel, Timed};
 
 /// Ticks of the chip's timer per microsecond.
 const TICKS_PER_US: f64 = 2.0;
@@ -48,8 +48,8 @@ pub(super) struct Model {
     timebase: Timebase,
     chip: Chip,
     pins: Pins,
-    to_chip: Wire,
-    from_chip: Wire,
+    to_chip: SerialChannel,
+    from_chip: SerialChannel,
     outbox: VecDeque<Timed>,
     reset_on_open: bool,
     /// What happens by itself, and when: the next one last.
@@ -78,8 +78,8 @@ impl Model {
             timebase,
             chip: Chip::new(pins, index),
             pins,
-            to_chip: Wire::new(options.faults.to_chip, options.seed, true),
-            from_chip: Wire::new(options.faults.from_chip, options.seed, false),
+            to_chip: SerialChannel::new(options.faults.to_chip, options.seed, true),
+            from_chip: SerialChannel::new(options.faults.from_chip, options.seed, false),
             outbox: VecDeque::new(),
             reset_on_open: options.reset_on_open,
             events,
@@ -125,7 +125,7 @@ impl Model {
         }
     }
 
-    /// How many bytes the wire to the chip can take now.
+    /// How many bytes the line to the chip can take now.
     pub(super) fn capacity(&mut self) -> usize {
         UNDERWAY.saturating_sub(self.chip.inbox().len())
     }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use rig_firmware::realtime::{Received, classify};
 
-use super::faults::WireFaults;
+use super::faults::SerialFaults;
 
 /// Transmission time of one byte, ticks: ten bits at 115 200 baud, in half microseconds.
 pub(super) const BYTE_TICKS: u64 = 174;
@@ -16,9 +16,9 @@ const MAX_LINE_LENGTH: usize = 256;
 /// A byte with the tick at which its transmission ends.
 pub(super) type Timed = (u64, u8);
 
-/// One direction of the wire.
-pub(super) struct Wire {
-    faults: WireFaults,
+/// One direction of the serial line.
+pub(super) struct SerialChannel {
+    faults: SerialFaults,
     random: Random,
     /// The direction to the chip, in which real-time commands are not part of a line.
     to_chip: bool,
@@ -30,9 +30,9 @@ pub(super) struct Wire {
     free_at: u64,
 }
 
-impl Wire {
-    pub(super) fn new(faults: WireFaults, seed: u64, to_chip: bool) -> Wire {
-        Wire {
+impl SerialChannel {
+    pub(super) fn new(faults: SerialFaults, seed: u64, to_chip: bool) -> SerialChannel {
+        SerialChannel {
             faults,
             random: Random(seed ^ (u64::from(to_chip) << 63)),
             to_chip,
@@ -122,17 +122,17 @@ mod tests {
 
     use super::*;
 
-    fn carry(faults: WireFaults, text: &[u8]) -> (Vec<u8>, VecDeque<Timed>) {
-        let mut wire = Wire::new(faults, 1, true);
+    fn carry(faults: SerialFaults, text: &[u8]) -> (Vec<u8>, VecDeque<Timed>) {
+        let mut channel = SerialChannel::new(faults, 1, true);
         let mut out = VecDeque::new();
         text.iter()
-            .for_each(|&byte| wire.carry(1000, byte, &mut out));
+            .for_each(|&byte| channel.carry(1000, byte, &mut out));
         (out.iter().map(|(_, byte)| *byte).collect(), out)
     }
 
     #[test]
     fn a_good_wire_carries_bytes_one_after_the_other() {
-        let (bytes, timed) = carry(WireFaults::default(), b"G0\n");
+        let (bytes, timed) = carry(SerialFaults::default(), b"G0\n");
         assert_eq!(bytes, b"G0\n");
         let times: Vec<u64> = timed.iter().map(|(at, _)| *at).collect();
         assert_eq!(times, [1000, 1174, 1348]);
@@ -140,27 +140,27 @@ mod tests {
 
     #[test]
     fn certain_faults_happen_to_all() {
-        let none = WireFaults::default();
-        let (bytes, _) = carry(WireFaults { drop: 1.0, ..none }, b"G0\nX");
+        let none = SerialFaults::default();
+        let (bytes, _) = carry(SerialFaults { drop: 1.0, ..none }, b"G0\nX");
         assert!(bytes.is_empty());
-        let (bytes, _) = carry(WireFaults { merge: 1.0, ..none }, b"A\r\nB\nC\r");
+        let (bytes, _) = carry(SerialFaults { merge: 1.0, ..none }, b"A\r\nB\nC\r");
         assert_eq!(bytes, b"ABC");
-        let twice = WireFaults {
+        let twice = SerialFaults {
             duplicate: 1.0,
             ..none
         };
         let (bytes, _) = carry(twice, b"A?B\nC\n");
         assert_eq!(bytes, b"A?B\nAB\nC\nC\n");
-        let (bytes, _) = carry(WireFaults { flip: 1.0, ..none }, b"AAAA");
+        let (bytes, _) = carry(SerialFaults { flip: 1.0, ..none }, b"AAAA");
         assert!(bytes.iter().all(|byte| (byte ^ b'A').count_ones() == 1));
     }
 
     #[test]
     fn a_late_byte_keeps_the_order() {
-        let late = WireFaults {
+        let late = SerialFaults {
             delay: 1.0,
             delay_by: Duration::from_millis(1),
-            ..WireFaults::default()
+            ..SerialFaults::default()
         };
         let (bytes, timed) = carry(late, b"AB");
         assert_eq!(bytes, b"AB");
@@ -169,9 +169,9 @@ mod tests {
 
     #[test]
     fn shares_come_out_about_as_asked_and_a_seed_repeats_them() {
-        let faults = WireFaults {
+        let faults = SerialFaults {
             drop: 0.1,
-            ..WireFaults::default()
+            ..SerialFaults::default()
         };
         let text = vec![b'A'; 20_000];
         let first = carry(faults, &text).0;

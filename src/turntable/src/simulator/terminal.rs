@@ -10,12 +10,12 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::SimulatorError;
-use super::openings::Openings;
+use super::open_counter::OpenCounter;
 
 /// The chip's end of the serial line.
 pub(super) struct Terminal {
     line: OwnedFd,
-    openings: Openings,
+    openings: OpenCounter,
     path: PathBuf,
     /// No process has the port open.
     closed: bool,
@@ -47,7 +47,7 @@ impl Terminal {
         modes.make_raw();
         tcsetattr(&port, OptionalActions::Now, &modes).map_err(failed("set up"))?;
         drop(port);
-        let openings = Openings::watch(&path).map_err(failed("watch"))?;
+        let openings = OpenCounter::watch(&path).map_err(failed("watch"))?;
         Ok(Terminal {
             line,
             openings,

@@ -1,6 +1,6 @@
-//! The state machine above the wire, without I/O and without threads.
+//! The state machine above the protocol, without I/O and without threads.
 //!
-//! It processes the wire's events, keeps the last report and whether the position is still known,
+//! It processes the protocol's events, keeps the last report and whether the position is still known,
 //! monitors a motion in progress, and brings the table to a standstill when something goes wrong.
 //! It knows nothing of turns.
 
@@ -13,12 +13,12 @@ mod tests;
 
 use super::codes::Alarm;
 use super::protocol::{
-    ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ReplyTimeout, SendError,
-    WireEvent,
+    ControllerState, Counts, LineFault, LineOutcome, Machine, Poll, ProtocolEvent, ReplyTimeout,
+    SendError,
 };
 pub use fault::MotionFault;
 pub(crate) use motion::{Motion, MotionGoal};
-pub(crate) use position_report::{ControllerTraits, PositionReport};
+pub(crate) use position_report::{ControllerFeatures, PositionReport};
 pub(crate) use stop::{Stop, StopOutcome};
 
 /// Interval of reports while the table is being stopped, microseconds.
@@ -30,11 +30,11 @@ const HOST_RESET: &str = "host";
 /// Limit of recorded reports: an hour at 15 per second.
 const MAX_RECORDED: usize = 54_000;
 
-/// The state of one table, and the wire to it.
+/// The state of one table, and the protocol to it.
 #[derive(Debug)]
 pub(crate) struct Supervisor {
-    wire: Machine,
-    traits: ControllerTraits,
+    machine: Machine,
+    traits: ControllerFeatures,
     answer: Option<(u64, LineOutcome)>,
     last_report: Option<PositionReport>,
     confirmed: bool,
@@ -64,9 +64,9 @@ pub(crate) struct Supervisor {
 }
 
 impl Supervisor {
-    pub(crate) fn new(traits: ControllerTraits) -> Self {
+    pub(crate) fn new(traits: ControllerFeatures) -> Self {
         Self {
-            wire: Machine::new(),
+            machine: Machine::new(),
             traits,
             answer: None,
             last_report: None,
@@ -89,16 +89,16 @@ impl Supervisor {
         }
     }
 
-    pub(crate) fn set_traits(&mut self, traits: ControllerTraits) {
+    pub(crate) fn set_features(&mut self, traits: ControllerFeatures) {
         self.traits = traits;
     }
 
     pub(crate) fn counts(&self) -> Counts {
-        self.wire.counts()
+        self.machine.counts()
     }
 
     pub(crate) fn is_checked(&self) -> bool {
-        self.wire.is_checked()
+        self.machine.is_checked()
     }
 
     pub(crate) fn last_report(&self) -> Option<&PositionReport> {
@@ -180,7 +180,7 @@ impl Supervisor {
         if self.is_stopping() {
             return Err(SendError::Busy);
         }
-        self.wire.send(now_us, block, timeout)
+        self.machine.send(now_us, block, timeout)
     }
 
     /// Opens a checked session.
@@ -188,7 +188,7 @@ impl Supervisor {
         if self.is_stopping() {
             return Err(SendError::Busy);
         }
-        self.wire.open_session(now_us)
+        self.machine.open_session(now_us)
     }
 
     /// Takes the answer to line `id`.
@@ -280,15 +280,15 @@ impl Supervisor {
     }
 
     fn begin_stop(&mut self, now_us: i64) {
-        let unsettled = self.wire.is_open();
+        let unsettled = self.machine.is_open();
         self.halt(now_us, unsettled);
     }
 
     fn halt(&mut self, now_us: i64, unsettled: bool) {
         if !self.is_stopping() {
             self.settled = false;
-            self.wire.give_up();
-            self.stop = Some(Stop::begin(now_us, unsettled, &mut self.wire));
+            self.machine.give_up();
+            self.stop = Some(Stop::begin(now_us, unsettled, &mut self.machine));
         }
     }
 
@@ -318,16 +318,16 @@ impl Supervisor {
         } else {
             (now_us < self.wanted_until_us).then_some(WANTED_POLL_US)
         };
-        self.wire.poll_every(every_us);
-        self.wire.take_output(now_us)
+        self.machine.poll_every(every_us);
+        self.machine.take_output(now_us)
     }
 
     /// Processes the passing of time.
     pub(crate) fn on_time(&mut self, now_us: i64) {
-        self.wire.on_time(now_us);
+        self.machine.on_time(now_us);
         self.on_events(now_us);
         if let Some(stop) = &mut self.stop {
-            stop.on_time(now_us, &mut self.wire);
+            stop.on_time(now_us, &mut self.machine);
         }
         self.settle();
         if self.fault.is_none()
@@ -342,18 +342,18 @@ impl Supervisor {
 
     /// Processes received bytes.
     pub(crate) fn on_bytes(&mut self, now_us: i64, bytes: &[u8]) {
-        self.wire.on_bytes(now_us, bytes);
+        self.machine.on_bytes(now_us, bytes);
         self.on_events(now_us);
     }
 
     fn on_events(&mut self, now_us: i64) {
-        while let Some(event) = self.wire.next_event() {
+        while let Some(event) = self.machine.next_event() {
             self.changed = true;
             match event {
-                WireEvent::Answered { id, outcome } => self.on_answer(now_us, id, outcome),
-                WireEvent::Status(poll) => self.on_report(now_us, &poll),
-                WireEvent::Reset(cause) => self.on_reset(now_us, cause),
-                WireEvent::Alarm(code) => self.on_alarm(now_us, code),
+                ProtocolEvent::Answered { id, outcome } => self.on_answer(now_us, id, outcome),
+                ProtocolEvent::Status(poll) => self.on_report(now_us, &poll),
+                ProtocolEvent::Reset(cause) => self.on_reset(now_us, cause),
+                ProtocolEvent::Alarm(code) => self.on_alarm(now_us, code),
             }
         }
     }
@@ -388,7 +388,7 @@ impl Supervisor {
         }
         if self.is_stopping() {
             if let Some(stop) = &mut self.stop {
-                stop.on_report(now_us, &report, &mut self.wire);
+                stop.on_report(now_us, &report, &mut self.machine);
             }
             self.settle();
             return;
@@ -459,7 +459,7 @@ impl Supervisor {
         let Some(outcome) = self.stopped() else {
             return;
         };
-        if !self.settled && outcome != StopOutcome::Standing {
+        if !self.settled && outcome != StopOutcome::Stopped {
             self.zero_deg = None;
         }
         self.changed |= !self.settled;

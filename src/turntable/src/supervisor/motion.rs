@@ -1,6 +1,6 @@
 //! Monitoring a motion: whether it continues, and where it ends.
 
-use super::{ControllerTraits, MotionFault, PositionReport};
+use super::{ControllerFeatures, MotionFault, PositionReport};
 use crate::codes::Alarm;
 use crate::protocol::ControllerState;
 
@@ -77,7 +77,7 @@ impl Motion {
         &mut self,
         report: &PositionReport,
         alarm: Option<Alarm>,
-        traits: &ControllerTraits,
+        traits: &ControllerFeatures,
     ) -> Option<MotionFault> {
         self.last_report_us = report.came_us;
         let MotionGoal::To { target_deg, .. } = self.goal else {
@@ -130,7 +130,7 @@ impl Motion {
         report: &PositionReport,
         target_deg: f64,
         stands_us: i64,
-        traits: &ControllerTraits,
+        traits: &ControllerFeatures,
     ) -> Option<MotionFault> {
         let accepted_us = self.accepted_us?;
         let after = report
@@ -182,7 +182,7 @@ impl Motion {
     }
 
     /// The fault that the passing of time shows.
-    pub(super) fn overdue(&self, now_us: i64, traits: &ControllerTraits) -> Option<MotionFault> {
+    pub(super) fn overdue(&self, now_us: i64, traits: &ControllerFeatures) -> Option<MotionFault> {
         let silent_us = now_us - self.last_report_us;
         match self.goal {
             MotionGoal::Homing if !traits.reports_homing => None,

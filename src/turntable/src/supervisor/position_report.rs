@@ -31,7 +31,7 @@ pub(crate) struct PositionReport {
 
 impl PositionReport {
     /// Converts a report.
-    pub(super) fn from_poll(poll: &Poll, traits: &ControllerTraits) -> PositionReport {
+    pub(super) fn from_poll(poll: &Poll, traits: &ControllerFeatures) -> PositionReport {
         let report = poll.report;
         PositionReport {
             state: report.state,
@@ -57,7 +57,7 @@ impl PositionReport {
 
 /// What has to be known of a controller to read its reports.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ControllerTraits {
+pub(crate) struct ControllerFeatures {
     /// Whose alarms it reports.
     pub(crate) family: Family,
     /// Interval of reports in motion.
@@ -70,7 +70,7 @@ pub(crate) struct ControllerTraits {
     pub(crate) step_deg: f64,
 }
 
-impl ControllerTraits {
+impl ControllerFeatures {
     /// How far two reports of the same place can lie apart, degrees.
     pub(super) fn tolerance_deg(&self) -> f64 {
         self.step_deg + PRINTED_DEG

@@ -28,7 +28,7 @@ const STANDING: u32 = 2;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StopOutcome {
     /// The table was reported at rest.
-    Standing,
+    Stopped,
     /// The table was reported at rest, but at another position than before the reset: the controller
     /// has lost its position.
     Displaced,
@@ -56,7 +56,7 @@ pub(crate) struct Stop {
     since_us: i64,
     sent_us: i64,
     heard_us: i64,
-    /// Something is left in the controller or on the wire that only a reset discards.
+    /// Something is left in the controller or on the line that only a reset discards.
     unsettled: bool,
     standing: Option<(f64, u32)>,
     /// Where it stood before it was reset at a standstill.
@@ -65,8 +65,8 @@ pub(crate) struct Stop {
 
 impl Stop {
     /// Sends the feed hold. `unsettled`: a line without answer may still be executed.
-    pub(super) fn begin(now_us: i64, unsettled: bool, wire: &mut Machine) -> Self {
-        wire.realtime(realtime::HOLD);
+    pub(super) fn begin(now_us: i64, unsettled: bool, machine: &mut Machine) -> Self {
+        machine.realtime(realtime::HOLD);
         Self {
             step: Step::Braking,
             since_us: now_us,
@@ -92,28 +92,28 @@ impl Stop {
         self.standing = None;
     }
 
-    fn reset(&mut self, now_us: i64, gentle: bool, wire: &mut Machine) {
-        wire.realtime(realtime::RESET);
+    fn reset(&mut self, now_us: i64, gentle: bool, machine: &mut Machine) {
+        machine.realtime(realtime::RESET);
         self.enter(now_us, Step::Resetting { gentle });
     }
 
-    pub(super) fn on_time(&mut self, now_us: i64, wire: &mut Machine) {
+    pub(super) fn on_time(&mut self, now_us: i64, machine: &mut Machine) {
         let lasted_us = now_us - self.since_us;
         let unsent_us = now_us - self.sent_us;
         match self.step {
             Step::Braking if now_us - self.heard_us > SILENT_US || lasted_us > RAMP_US => {
-                self.reset(now_us, false, wire);
+                self.reset(now_us, false, machine);
             }
             Step::Braking if unsent_us >= REPEAT_US && self.standing.is_none() => {
                 self.sent_us = now_us;
-                wire.realtime(realtime::HOLD);
+                machine.realtime(realtime::HOLD);
             }
             Step::Resetting { .. } if lasted_us > RESTART_US => {
                 self.enter(now_us, Step::Done(StopOutcome::Unknown));
             }
             Step::Resetting { .. } if unsent_us >= RESET_REPEAT_US => {
                 self.sent_us = now_us;
-                wire.realtime(realtime::RESET);
+                machine.realtime(realtime::RESET);
             }
             Step::Checking if lasted_us > CHECK_US => {
                 self.enter(now_us, Step::Done(StopOutcome::Unknown));
@@ -132,7 +132,12 @@ impl Stop {
         gentle
     }
 
-    pub(super) fn on_report(&mut self, now_us: i64, report: &PositionReport, wire: &mut Machine) {
+    pub(super) fn on_report(
+        &mut self,
+        now_us: i64,
+        report: &PositionReport,
+        machine: &mut Machine,
+    ) {
         self.heard_us = now_us;
         if report
             .asked_us
@@ -142,29 +147,29 @@ impl Stop {
         }
         match (self.step, report.state) {
             // Only a reset ends a search for the index.
-            (Step::Braking, ControllerState::Home) => self.reset(now_us, false, wire),
+            (Step::Braking, ControllerState::Home) => self.reset(now_us, false, machine),
             (Step::Braking | Step::Checking, state) if state.may_move() => self.standing = None,
             (Step::Braking, state) if self.stands(report) => {
                 // Only a reset leads out of these, and it discards what is left of the motion.
                 let waits = matches!(state, ControllerState::Held | ControllerState::Unknown);
                 if self.unsettled || waits {
                     self.stood_at = Some(report.machine_deg);
-                    self.reset(now_us, true, wire);
+                    self.reset(now_us, true, machine);
                 } else {
-                    self.enter(now_us, Step::Done(StopOutcome::Standing));
+                    self.enter(now_us, Step::Done(StopOutcome::Stopped));
                 }
             }
             (Step::Resetting { .. }, ControllerState::Idle | ControllerState::Alarm)
                 if now_us - self.since_us > NO_BANNER_US && self.stands(report) =>
             {
-                wire.assume_reset();
+                machine.assume_reset();
             }
             (Step::Checking, _) if self.stands(report) => {
                 let same = self
                     .stood_at
                     .is_none_or(|place| place == report.machine_deg);
                 let outcome = if same {
-                    StopOutcome::Standing
+                    StopOutcome::Stopped
                 } else {
                     StopOutcome::Displaced
                 };

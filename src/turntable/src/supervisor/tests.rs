@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::*;
 use crate::family::Family;
 
-const TRAITS: ControllerTraits = ControllerTraits {
+const TRAITS: ControllerFeatures = ControllerFeatures {
     family: Family::GrblHal,
     poll: Duration::from_millis(67),
     stamps: true,
@@ -81,7 +81,7 @@ fn a_stop_holds_waits_for_rest_and_resets_only_then() {
     bench.hear("Grbl 1.1h ['$' for help]");
     assert!(bench.supervisor.is_stopping());
     bench.report("Idle", 11.2, 2);
-    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Standing));
+    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Stopped));
     assert_eq!(bench.supervisor.zero_deg(), Some(0.0));
     assert_eq!(bench.supervisor.fault(), Some(&MotionFault::Stopped));
 }
@@ -103,7 +103,7 @@ fn a_table_that_does_not_slow_down_or_says_nothing_is_reset_in_motion_and_not_ho
     bench.hear("ALARM:3");
     bench.hear("Grbl 1.1h ['$' for help]");
     bench.report("Alarm", 10.0, 2);
-    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Standing));
+    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Stopped));
     assert_eq!(bench.supervisor.zero_deg(), None);
 
     let mut bench = Bench::new();
@@ -301,7 +301,7 @@ fn a_reset_that_no_banner_follows_is_done_when_the_table_is_reported_free() {
     bench.report("Hold:0", 11.2, 2);
     assert!(bench.pass(20).contains(&0x18));
     bench.report("Idle", 11.2, 40);
-    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Standing));
+    assert_eq!(bench.supervisor.stopped(), Some(StopOutcome::Stopped));
     assert_eq!(bench.supervisor.zero_deg(), Some(0.0));
     assert!(
         bench

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use super::*;
-use fake_grbl::{FakeGrbl, FakePort, Trouble};
+use fake_grbl::{FakeGrbl, FakePort, InjectedFaults};
 use relit_clock::Participant;
 
 struct Rig {
@@ -28,7 +28,7 @@ fn try_open(fake_grbl: FakeGrbl) -> Result<Rig, TurntableError> {
 }
 
 fn open_on(clock: Clock, fake_grbl: FakeGrbl) -> Result<Rig, TurntableError> {
-    let participant = clock.take_part();
+    let participant = clock.participate();
     let fake_grbl = Arc::new(Mutex::new(fake_grbl));
     let port = FakePort {
         fake_grbl: Arc::clone(&fake_grbl),
@@ -47,7 +47,7 @@ fn open_on(clock: Clock, fake_grbl: FakeGrbl) -> Result<Rig, TurntableError> {
 }
 
 impl Rig {
-    fn set(&self, change: impl FnOnce(&mut Trouble, i64)) {
+    fn set(&self, change: impl FnOnce(&mut InjectedFaults, i64)) {
         let now_us = self.table.clock().now_us();
         change(&mut self.fake_grbl.lock().unwrap().trouble, now_us);
     }
@@ -156,7 +156,7 @@ fn a_jog_beyond_the_limit_or_at_no_speed_is_not_sent() {
 fn without_an_index_sensor_zero_is_where_the_table_stands() {
     let rig = open(FakeGrbl::new(false));
     rig.table.jog(30.0, None).unwrap();
-    assert_eq!(rig.table.home().unwrap(), Homed::WhereItStands);
+    assert_eq!(rig.table.home().unwrap(), HomingResult::WhereItStands);
     let status = rig.table.status().unwrap();
     assert_eq!((status.angle_deg, status.homed), (0.0, true));
 }
@@ -164,7 +164,7 @@ fn without_an_index_sensor_zero_is_where_the_table_stands() {
 #[test]
 fn homing_finds_the_index_or_says_that_there_is_none_although_it_was_accepted() {
     let rig = open(FakeGrbl::new(true).with_homing(true));
-    assert_eq!(rig.table.home().unwrap(), Homed::Index);
+    assert_eq!(rig.table.home().unwrap(), HomingResult::Index);
     assert!(rig.table.status().unwrap().homed);
     let rig = open(FakeGrbl::new(false).with_homing(false));
     let error = rig.table.home().unwrap_err();
@@ -262,7 +262,7 @@ fn a_turn_needs_a_position_and_the_place_it_was_planned_from() {
 
 /// Breaks a turn by a change of the controller's faults; returns the fault that ended it, and the time
 /// until then.
-fn broken(stock: bool, change: impl FnOnce(&mut Trouble, i64)) -> (Rig, MotionFault, i64) {
+fn broken(stock: bool, change: impl FnOnce(&mut InjectedFaults, i64)) -> (Rig, MotionFault, i64) {
     let rig = open(FakeGrbl::new(!stock));
     rig.table.home().unwrap();
     let mut turn = rig.turn(90.0);
@@ -285,7 +285,7 @@ fn whatever_breaks_a_turn_ends_it_with_its_reason_and_stops_the_table() {
         assert_eq!(fault, MotionFault::Restarted(cause));
         assert!(!rig.table.status().unwrap().homed);
 
-        let alarm = |trouble: &mut Trouble, now| trouble.alarm_at_us = Some((now, 10));
+        let alarm = |trouble: &mut InjectedFaults, now| trouble.alarm_at_us = Some((now, 10));
         let (rig, fault, _) = broken(stock, alarm);
         assert!(
             matches!(fault, MotionFault::Alarm(Alarm { code: Some(10), .. })),
@@ -311,8 +311,8 @@ fn a_controller_that_falls_silent_for_two_seconds_ends_the_turn() {
     turn.wait_constant().unwrap();
     let start_us = rig.table.clock().now_us();
     rig.set(|trouble, now| trouble.silent_from_us = Some(now));
-    let link = rig.table.link();
-    let found = link.wait(Duration::from_secs(10), |supervisor| {
+    let connection = rig.table.connection();
+    let found = connection.wait(Duration::from_secs(10), |supervisor| {
         supervisor.fault().cloned()
     });
     let took_us = rig.table.clock().now_us() - start_us;
@@ -324,7 +324,7 @@ fn a_controller_that_falls_silent_for_two_seconds_ends_the_turn() {
     // Whether it stands is unknown.
     assert!(matches!(turn.check(), Err(TurntableError::NotStopped)));
     drop(turn);
-    assert!(rig.table.link().supervisor().zero_deg().is_none());
+    assert!(rig.table.connection().supervisor().zero_deg().is_none());
 }
 
 #[test]
@@ -346,13 +346,13 @@ fn a_stop_in_the_middle_keeps_the_position_and_the_table_goes_on() {
 #[test]
 fn a_stop_from_another_thread_ends_a_jog_with_that_reason() {
     let rig = open(FakeGrbl::new(true));
-    let link = rig.table.link().clone();
+    let connection = rig.table.connection().clone();
     let clock = rig.table.clock().clone();
     let stopper = clock.spawn("stopper", move || {
-        link.wait(Duration::from_secs(10), |s| {
+        connection.wait(Duration::from_secs(10), |s| {
             s.last_report()?.state.may_move().then_some(())
         });
-        link.stop()
+        connection.stop()
     });
     let stopper = stopper.unwrap();
     let error = rig.table.jog(300.0, Some(5.0)).unwrap_err();

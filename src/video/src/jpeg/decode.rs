@@ -15,7 +15,7 @@ use mozjpeg_sys::{
     jpeg_skip_scanlines, jpeg_start_decompress, jpeg_std_error,
 };
 
-use super::Refused;
+use super::NotDecoded;
 use super::layout::size_of_plain;
 use relit_data::geometry::Rect;
 
@@ -41,13 +41,13 @@ pub(in super::super) fn decode_part(
     size: (u32, u32),
     part: Rect,
     take: &mut dyn FnMut(&[u8]) -> Option<()>,
-) -> Result<(), Refused> {
+) -> Result<(), NotDecoded> {
     if size_of_plain(jpeg)? != size || part.clipped_to(size.0, size.1) != Some(part) {
-        return Err(Refused);
+        return Err(NotDecoded);
     }
     let mut library = Library::new();
     // What was unwound through is only freed afterwards.
-    catch_unwind(AssertUnwindSafe(|| library.decode(jpeg, part, take))).unwrap_or(Err(Refused))
+    catch_unwind(AssertUnwindSafe(|| library.decode(jpeg, part, take))).unwrap_or(Err(NotDecoded))
 }
 
 /// The library's state for one picture. It is freed when this is dropped.
@@ -84,10 +84,10 @@ impl Library {
         jpeg: &[u8],
         part: Rect,
         take: &mut dyn FnMut(&[u8]) -> Option<()>,
-    ) -> Result<(), Refused> {
+    ) -> Result<(), NotDecoded> {
         let state = &mut *self.state;
         let (x, y) = (part.x.unsigned_abs(), part.y.unsigned_abs());
-        let length = c_ulong::try_from(jpeg.len()).map_err(|_| Refused)?;
+        let length = c_ulong::try_from(jpeg.len()).map_err(|_| NotDecoded)?;
         // SAFETY: the data outlive the calls, which read no further than their length.
         unsafe {
             jpeg_mem_src(state, jpeg.as_ptr(), length);
@@ -97,7 +97,7 @@ impl Library {
             state.jpeg_color_space,
             J_COLOR_SPACE::JCS_YCbCr | J_COLOR_SPACE::JCS_GRAYSCALE
         ) {
-            return Err(Refused);
+            return Err(NotDecoded);
         }
         state.out_color_space = J_COLOR_SPACE::JCS_EXT_RGBA;
         state.dct_method = J_DCT_METHOD::JDCT_ISLOW;
@@ -116,21 +116,21 @@ impl Library {
         let bytes = PIXEL * part.w as usize;
         let mut line = vec![0; PIXEL * width as usize + CACHED];
         let start = cached_start(line.as_ptr());
-        let line = line.get_mut(start..).ok_or(Refused)?;
+        let line = line.get_mut(start..).ok_or(NotDecoded)?;
         for _ in 0..part.h {
             let mut at = line.as_mut_ptr();
             // SAFETY: the line holds `width` pixels of the output's format.
             if unsafe { jpeg_read_scanlines(state, &mut at, 1) } != 1 {
-                return Err(Refused);
+                return Err(NotDecoded);
             }
-            take(line.get(surplus..surplus + bytes).ok_or(Refused)?).ok_or(Refused)?;
+            take(line.get(surplus..surplus + bytes).ok_or(NotDecoded)?).ok_or(NotDecoded)?;
         }
         finish(state, line)
     }
 }
 
 /// Reads what follows the part. Damaged data are mostly noticed only at their end: some are left over, or missing.
-fn finish(state: &mut jpeg_decompress_struct, line: &mut [u8]) -> Result<(), Refused> {
+fn finish(state: &mut jpeg_decompress_struct, line: &mut [u8]) -> Result<(), NotDecoded> {
     let rows = state.output_height - state.output_scanline;
     let mut at = line.as_mut_ptr();
     // SAFETY: decoding has begun, and the line holds a row of the part's width. The last row is read, because the
@@ -140,10 +140,10 @@ fn finish(state: &mut jpeg_decompress_struct, line: &mut [u8]) -> Result<(), Ref
             jpeg_skip_scanlines(state, rows - 1);
         }
         if rows > 0 && jpeg_read_scanlines(state, &mut at, 1) != 1 {
-            return Err(Refused);
+            return Err(NotDecoded);
         }
         match jpeg_finish_decompress(state) {
-            0 => Err(Refused),
+            0 => Err(NotDecoded),
             _ => Ok(()),
         }
     }
@@ -158,7 +158,7 @@ impl Drop for Library {
 
 /// Ends the decoding. Unlike a panic, this prints nothing.
 extern "C-unwind" fn fail(_: &mut jpeg_common_struct) {
-    resume_unwind(Box::new(Refused));
+    resume_unwind(Box::new(NotDecoded));
 }
 
 /// A negative level is a warning: data are damaged, and the library would go on with what it makes of them.

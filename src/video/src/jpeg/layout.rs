@@ -1,6 +1,6 @@
 //! What a JPEG's markers say (ITU-T T.81, annex B).
 
-use super::Refused;
+use super::NotDecoded;
 
 const SOI: u8 = 0xD8;
 const EOI: u8 = 0xD9;
@@ -13,9 +13,9 @@ const OTHER_FRAMES: std::ops::RangeInclusive<u8> = 0xC1..=0xCF;
 
 /// Width and height of a JPEG that is one complete scan of the baseline process with 8 bits a sample, grey or
 /// with chroma as 4:4:4, 4:2:2 or 4:2:0.
-pub(super) fn size_of_plain(jpeg: &[u8]) -> Result<(u32, u32), Refused> {
+pub(super) fn size_of_plain(jpeg: &[u8]) -> Result<(u32, u32), NotDecoded> {
     if !jpeg.starts_with(&[0xFF, SOI]) {
-        return Err(Refused);
+        return Err(NotDecoded);
     }
     let mut size = None;
     let mut at = 2;
@@ -24,11 +24,11 @@ pub(super) fn size_of_plain(jpeg: &[u8]) -> Result<(u32, u32), Refused> {
         match marker {
             BASELINE if size.is_none() => size = Some(plain_frame(segment)?),
             SOS => {
-                let size = size.ok_or(Refused)?;
-                return one_scan(jpeg.get(next..).ok_or(Refused)?).map(|()| size);
+                let size = size.ok_or(NotDecoded)?;
+                return one_scan(jpeg.get(next..).ok_or(NotDecoded)?).map(|()| size);
             }
             HUFFMAN_TABLES => {}
-            _ if marker == BASELINE || OTHER_FRAMES.contains(&marker) => return Err(Refused),
+            _ if marker == BASELINE || OTHER_FRAMES.contains(&marker) => return Err(NotDecoded),
             _ => {}
         }
         at = next;
@@ -36,28 +36,28 @@ pub(super) fn size_of_plain(jpeg: &[u8]) -> Result<(u32, u32), Refused> {
 }
 
 /// The marker at `at`, the bytes of its segment, and where the next one begins.
-fn segment(jpeg: &[u8], at: usize) -> Result<(u8, &[u8], usize), Refused> {
+fn segment(jpeg: &[u8], at: usize) -> Result<(u8, &[u8], usize), NotDecoded> {
     let mut at = at;
     if jpeg.get(at) != Some(&0xFF) {
-        return Err(Refused);
+        return Err(NotDecoded);
     }
     // A marker may be preceded by any number of fill bytes.
     while jpeg.get(at + 1) == Some(&0xFF) {
         at += 1;
     }
-    let &[marker, high, low] = jpeg.get(at + 1..at + 4).ok_or(Refused)? else {
-        return Err(Refused);
+    let &[marker, high, low] = jpeg.get(at + 1..at + 4).ok_or(NotDecoded)? else {
+        return Err(NotDecoded);
     };
     if matches!(marker, 0 | 1 | SOI | EOI) || RESTARTS.contains(&marker) {
-        return Err(Refused);
+        return Err(NotDecoded);
     }
     let next = at + 2 + usize::from(u16::from_be_bytes([high, low]));
-    Ok((marker, jpeg.get(at + 4..next).ok_or(Refused)?, next))
+    Ok((marker, jpeg.get(at + 4..next).ok_or(NotDecoded)?, next))
 }
 
-fn plain_frame(segment: &[u8]) -> Result<(u32, u32), Refused> {
+fn plain_frame(segment: &[u8]) -> Result<(u32, u32), NotDecoded> {
     let (&[bits, h1, h0, w1, w0, count], components) =
-        segment.split_first_chunk::<6>().ok_or(Refused)?;
+        segment.split_first_chunk::<6>().ok_or(NotDecoded)?;
     let size = [[w1, w0], [h1, h0]].map(|bytes| u32::from(u16::from_be_bytes(bytes)));
     let factors: Vec<(u8, u8)> = components
         .chunks_exact(3)
@@ -72,15 +72,15 @@ fn plain_frame(segment: &[u8]) -> Result<(u32, u32), Refused> {
         _ => false,
     };
     let right = bits == 8 && plain && usize::from(count) == factors.len() && !size.contains(&0);
-    right.then_some((size[0], size[1])).ok_or(Refused)
+    right.then_some((size[0], size[1])).ok_or(NotDecoded)
 }
 
 /// That the data of the scan are followed by the end of the picture and by no other marker. Data of a part
 /// that is not decoded are checked this far only.
-fn one_scan(data: &[u8]) -> Result<(), Refused> {
+fn one_scan(data: &[u8]) -> Result<(), NotDecoded> {
     let mut rest = data;
     while let Some(found) = rest.iter().position(|&byte| byte == 0xFF) {
-        match rest.get(found + 1).ok_or(Refused)? {
+        match rest.get(found + 1).ok_or(NotDecoded)? {
             0 => {}
             &EOI => return Ok(()),
             0xFF => {
@@ -88,11 +88,11 @@ fn one_scan(data: &[u8]) -> Result<(), Refused> {
                 continue;
             }
             marker if RESTARTS.contains(marker) => {}
-            _ => return Err(Refused),
+            _ => return Err(NotDecoded),
         }
         rest = &rest[found + 2..];
     }
-    Err(Refused)
+    Err(NotDecoded)
 }
 
 #[cfg(test)]
@@ -138,14 +138,17 @@ mod tests {
             (BASELINE, &[0x11; 4]),
         ] {
             let jpeg = jpeg(frame, factors, &DATA);
-            assert_eq!(size_of_plain(&jpeg), Err(Refused), "{factors:?}");
+            assert_eq!(size_of_plain(&jpeg), Err(NotDecoded), "{factors:?}");
         }
         for data in [&[1, 2][..], &[1, 0xFF], &[1, 0xFF, SOS, 0xFF, EOI]] {
-            assert_eq!(size_of_plain(&jpeg(BASELINE, &plain, data)), Err(Refused));
+            assert_eq!(
+                size_of_plain(&jpeg(BASELINE, &plain, data)),
+                Err(NotDecoded)
+            );
         }
         let whole = jpeg(BASELINE, &plain, &DATA);
         for length in 0..whole.len() {
-            assert_eq!(size_of_plain(&whole[..length]), Err(Refused), "{length}");
+            assert_eq!(size_of_plain(&whole[..length]), Err(NotDecoded), "{length}");
         }
     }
 }

@@ -15,7 +15,7 @@ pub(super) use decode::decode_part;
 
 /// The picture is not decoded here: it is of an unusual kind, or something is wrong with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Refused;
+pub(super) struct NotDecoded;
 
 #[cfg(test)]
 mod tests;

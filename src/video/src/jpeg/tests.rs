@@ -51,7 +51,7 @@ fn first(path: &Path) -> Vec<u8> {
 
 const SIZE: (u32, u32) = (149, 101);
 
-fn part(jpeg: &[u8], rect: Rect) -> Result<RgbaImage, super::Refused> {
+fn part(jpeg: &[u8], rect: Rect) -> Result<RgbaImage, super::NotDecoded> {
     let mut image = RgbaImage::new(rect.w, rect.h);
     let mut rows = image.chunks_exact_mut((4 * rect.w as usize).max(1));
     decode_part(jpeg, SIZE, rect, &mut |row| {

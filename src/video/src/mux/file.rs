@@ -7,14 +7,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// What FFmpeg writes to. FFmpeg keeps only the number of an error, so that the first one is kept here.
 pub(super) struct Sink {
     pub(super) file: File,
-    pub(super) refusal: Refusal,
+    pub(super) refusal: FirstError,
 }
 
 /// The first error of a sink.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Refusal(Arc<Mutex<Option<io::Error>>>);
+pub(super) struct FirstError(Arc<Mutex<Option<io::Error>>>);
 
-impl Refusal {
+impl FirstError {
     pub(super) fn take(&self) -> Option<io::Error> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }

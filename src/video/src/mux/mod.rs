@@ -18,7 +18,7 @@ use ffmpeg_next::format::context::{Output, StreamIo};
 use ffmpeg_next::{Packet, packet};
 
 use self::container::{end_cluster, open};
-use self::file::{Refusal, Sink};
+use self::file::{FirstError, Sink};
 
 use relit_data::disk::is_full;
 
@@ -30,7 +30,7 @@ const BUFFER: usize = 1 << 15;
 
 /// What became of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Written {
+pub enum WriteOutcome {
     /// It is in the file, or on its way there.
     Kept,
     /// It was left out: it depends on frames before the recording's first key frame.
@@ -42,7 +42,7 @@ pub struct Muxer {
     path: PathBuf,
     stream: StreamFormat,
     file: File,
-    refusal: Refusal,
+    refusal: FirstError,
     state: State,
     encoder: Option<encoder::video::Encoder>,
     sets: ParameterSets,
@@ -96,7 +96,7 @@ impl Muxer {
         let mut options = OpenOptions::new();
         let file = options.write(true).create_new(true).open(path);
         let file = file.map_err(refused)?;
-        let refusal = Refusal::default();
+        let refusal = FirstError::default();
         let sink = Sink {
             file: file.try_clone().map_err(refused)?,
             refusal: refusal.clone(),
@@ -135,7 +135,7 @@ impl Muxer {
     /// [`VideoError::DiskFull`] if the disk is full, [`VideoError::Write`] if it fails otherwise,
     /// [`VideoError::Refused`] if an uncompressed picture has not the bytes of one (nothing was
     /// written then, and the next may follow), H.264 has no start codes, or FFmpeg cannot code it.
-    pub fn write(&mut self, data: &[u8], t_us: i64) -> Result<Written, VideoError> {
+    pub fn write(&mut self, data: &[u8], t_us: i64) -> Result<WriteOutcome, VideoError> {
         let chained = self.stream.format == PixelFormat::H264;
         if chained {
             if !nal::is_annex_b(data) {
@@ -149,7 +149,7 @@ impl Muxer {
         let key = !chained || nal::is_key(data);
         if matches!(self.state, State::Waiting(_)) {
             if !key || (chained && self.sets.extradata().is_none()) {
-                return Ok(Written::BeforeKeyFrame);
+                return Ok(WriteOutcome::BeforeKeyFrame);
             }
             self.begin()?;
         }
@@ -175,7 +175,7 @@ impl Muxer {
         self.run(|output| packet.write(output).map(|_| ()))?;
         self.last_ms = ms;
         self.frames += 1;
-        Ok(Written::Kept)
+        Ok(WriteOutcome::Kept)
     }
 
     /// Writes all frames to the system: a process that is killed after this loses none of them.

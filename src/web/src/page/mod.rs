@@ -52,11 +52,11 @@ impl PageAsset {
 
 /// The token, as it stands in the address that is printed at the start.
 #[derive(Debug, Deserialize)]
-pub struct Entry {
+pub struct TokenQuery {
     token: Option<String>,
 }
 
-impl Entry {
+impl TokenQuery {
     /// The token, where the URL has one.
     #[must_use]
     pub fn token(&self) -> Option<&str> {
@@ -66,14 +66,14 @@ impl Entry {
 
 /// The page itself.
 #[derive(Debug, Clone, Copy)]
-pub struct Index(pub &'static str);
+pub struct IndexPage(pub &'static str);
 
 /// The page at `/`. With a token in the URL, the browser gets it as a cookie and continues to the URL
 /// without it, so that it stays out of history and bookmarks.
 pub async fn index(
     State(policy): State<Arc<AccessPolicy>>,
-    State(Index(text)): State<Index>,
-    QueryParams(Entry { token }): QueryParams<Entry>,
+    State(IndexPage(text)): State<IndexPage>,
+    QueryParams(TokenQuery { token }): QueryParams<TokenQuery>,
 ) -> Response {
     let page = [(header::CONTENT_TYPE, "text/html; charset=utf-8")];
     match token {

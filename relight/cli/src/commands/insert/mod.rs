@@ -46,12 +46,12 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let (decomposer, options) = (&network.decomposer, network.options);
     let mut insertion = Insertion::new(&scene, background, &folder, decomposer, options)?;
     let pairs = scene.objects.iter().zip(sources);
-    let subjects = pairs
-        .map(|(object, source)| insertion.subject(object, source))
+    let relightables = pairs
+        .map(|(object, source)| insertion.relightable(object, source))
         .collect::<Result<Vec<_>, _>>()?;
-    let pairs = scene.objects.iter().zip(&subjects);
-    let objects = pairs.map(|(object, subject)| SceneObject::described(object, subject));
-    let set = insertion.setting().scene(objects.collect())?;
+    let pairs = scene.objects.iter().zip(&relightables);
+    let objects = pairs.map(|(object, relightable)| SceneObject::described(object, relightable));
+    let set = insertion.environment().scene(objects.collect())?;
     let output = arguments.written();
     let bar = match OutputKind::from_path(output.path) {
         Some(OutputKind::Movie(_)) => {
@@ -61,32 +61,32 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     };
     let frames = insertion.write(&set, &output, || bar.inc(1))?;
     bar.finish_and_clear();
-    let (setting, output) = (insertion.setting(), output.path);
-    let matching = setting.matching;
-    console.say(
+    let (environment, output) = (insertion.environment(), output.path);
+    let harmonisation = environment.harmonisation;
+    console.print(
         &format!(
             "{}: {} object(s), {frames} frame(s){}{}",
             output.display(),
             scene.objects.len(),
-            setting.exposure.map(described).unwrap_or_default(),
-            if takes_light(&scene, setting) {
-                sun_described(setting.sun)
+            environment.exposure.map(described).unwrap_or_default(),
+            if takes_light(&scene, environment) {
+                sun_described(environment.sun)
             } else {
                 String::new()
             }
         ),
         &json!({
             "event": "inserted", "output": output, "objects": scene.objects.len(), "frames": frames,
-            "tilt": setting.tilt, "level": matching.level, "balance": matching.balance, "grain": matching.grain,
-            "exposure": setting.exposure, "sun": setting.sun,
+            "tilt": environment.tilt, "level": harmonisation.level, "balance": harmonisation.balance, "grain": harmonisation.grain,
+            "exposure": environment.exposure, "sun": environment.sun,
         }),
     );
     Ok(Outcome::Success)
 }
 
 /// Whether the light was taken from a photograph.
-fn takes_light(scene: &SceneDescription, setting: &SceneEnvironment) -> bool {
-    setting.exposure.is_none() && scene.light == LightDescription::default()
+fn takes_light(scene: &SceneDescription, environment: &SceneEnvironment) -> bool {
+    environment.exposure.is_none() && scene.light == LightDescription::default()
 }
 
 /// The sun that is seen in a photograph, in words.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use rayon::prelude::*;
 use relight_core::light::{Direction, Order, Rotation, ShLight};
-use relight_core::render::{Look, Surface, exposure_for};
+use relight_core::render::{RenderSettings, Surface, exposure_for};
 use relight_photo::files::{MovieWriter, OutputKind, write_picture};
 use relight_photo::relighting::{InsertError, LightSource};
 use relit_console::{Console, Outcome};
@@ -160,8 +160,8 @@ impl RenderArguments {
         Ok(light)
     }
 
-    fn look(&self, light: &ShLight) -> Look {
-        Look {
+    fn settings(&self, light: &ShLight) -> RenderSettings {
+        RenderSettings {
             diffuse: self.shading.diffuse(),
             specular: self.shading.specular(),
             exposure: match self.exposure {
@@ -185,11 +185,11 @@ fn image(arguments: &ImageArguments, console: Console) -> CommandResult {
         rotation(arguments, &scene, console)?;
         arguments.rotation.frames()
     } else {
-        let picture = scene.look.image(&scene.surface, &scene.light)?;
+        let picture = scene.settings.image(&scene.surface, &scene.light)?;
         write_picture(&arguments.output, &picture)?;
         1
     };
-    report(&arguments.output, frames, &scene.look, console);
+    report(&arguments.output, frames, &scene.settings, console);
     Ok(Outcome::Success)
 }
 
@@ -199,11 +199,11 @@ fn materials(arguments: &MaterialsArguments, console: Console) -> CommandResult 
     let LitObject {
         surface,
         light,
-        look,
+        settings,
     } = LitObject::read(&arguments.render)?;
-    let sheet = look.sweep(&surface, &light, &REFLECTED, &SMOOTHNESSES)?;
+    let sheet = settings.sweep(&surface, &light, &REFLECTED, &SMOOTHNESSES)?;
     write_picture(&arguments.output, &sheet)?;
-    report(&arguments.output, 1, &look, console);
+    report(&arguments.output, 1, &settings, console);
     Ok(Outcome::Success)
 }
 
@@ -211,26 +211,26 @@ fn materials(arguments: &MaterialsArguments, console: Console) -> CommandResult 
 struct LitObject {
     surface: Surface,
     light: ShLight,
-    look: Look,
+    settings: RenderSettings,
 }
 
 impl LitObject {
     fn read(arguments: &RenderArguments) -> Result<Self, Box<dyn Error>> {
         let surface = arguments.object.read()?;
         let light = arguments.read_light()?;
-        let look = arguments.look(&light);
+        let settings = arguments.settings(&light);
         Ok(Self {
             surface,
             light,
-            look,
+            settings,
         })
     }
 }
 
-fn report(output: &Path, frames: u32, look: &Look, console: Console) {
+fn report(output: &Path, frames: u32, settings: &RenderSettings, console: Console) {
     let output = output.display().to_string();
-    let event = json!({ "event": "rendered", "output": output, "frames": frames, "exposure": look.exposure });
-    console.say(&output, &event);
+    let event = json!({ "event": "rendered", "output": output, "frames": frames, "exposure": settings.exposure });
+    console.print(&output, &event);
 }
 
 /// Writes the frames of a video in which the light rotates.
@@ -242,7 +242,7 @@ fn rotation(
     let rotation = &arguments.rotation;
     let frame = |at: u32| {
         let part = rotation.degrees_at(at) / 360.0;
-        let image = scene.look.turned(&scene.surface, &scene.light, part)?;
+        let image = scene.settings.turned(&scene.surface, &scene.light, part)?;
         Ok::<_, InsertError>(image.encode())
     };
     let (path, frames) = (&arguments.output, rotation.frames());

@@ -131,7 +131,7 @@ const MATERIALS: Choices<MaterialKind> = &[
 
 fn elevation(text: &str) -> Result<Elevation, String> {
     let degrees = text.parse().map_err(|_| "give degrees".to_owned())?;
-    Elevation::given(degrees).map_err(|error| error.to_string())
+    Elevation::measured(degrees).map_err(|error| error.to_string())
 }
 
 impl FromStr for LightBall {

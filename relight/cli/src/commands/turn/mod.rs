@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         "reading_seconds": reading_seconds,
         "figures": figures,
     });
-    console.say(&text, &event);
+    console.print(&text, &event);
     for warning in solved.warnings() {
         console.warn(&warning);
     }

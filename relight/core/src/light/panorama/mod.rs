@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use super::{Direction, LightError, ShLight};
-pub use sampler::{DrawnLight, LightSampler};
+pub use sampler::{LightSample, LightSampler};
 
 use crate::image::{ColourImage, Extent, ImageError, Linear, Planes, Rgb, Samples};
 

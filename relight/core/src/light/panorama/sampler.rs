@@ -31,7 +31,7 @@ pub struct LightSampler<'a> {
 
 /// A direction that was drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DrawnLight {
+pub struct LightSample {
     /// Where the light comes from.
     pub direction: Direction,
     /// Its radiance, linear RGB.
@@ -55,7 +55,7 @@ impl<'a> LightSampler<'a> {
 
     /// The direction that belongs to two numbers, each even in 0..1.
     #[must_use]
-    pub fn draw(&self, [first, second]: [f64; 2]) -> DrawnLight {
+    pub fn draw(&self, [first, second]: [f64; 2]) -> LightSample {
         let (row, down) = find(&self.rows, first);
         let width = self.panorama.extent().width;
         let (column, across) = find(&self.columns[row * width..(row + 1) * width], second);
@@ -66,7 +66,7 @@ impl<'a> LightSampler<'a> {
         let direction = self
             .panorama
             .direction(column as f64 + across, polar * height / PI);
-        DrawnLight {
+        LightSample {
             direction,
             radiance: self
                 .panorama
@@ -155,7 +155,7 @@ mod tests {
             let part = f64::from(step) / 100.0;
             let drawn = sampler.draw([part, (part * 7.0).fract()]);
             assert!((sampler.density(drawn.direction) / drawn.density - 1.0).abs() < 1e-9);
-            let ratio = |d: DrawnLight| d.radiance.iter().sum::<f64>() / d.density;
+            let ratio = |d: LightSample| d.radiance.iter().sum::<f64>() / d.density;
             assert!((ratio(drawn) / ratio(first) - 1.0).abs() < 1e-9);
         }
     }

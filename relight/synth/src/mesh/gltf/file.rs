@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use percent_encoding::percent_decode_str;
 
 use super::document::Document;
-use crate::mesh::beside::by_address;
+use crate::mesh::sidecar_files::by_address;
 
 /// How a binary file begins.
 const MAGIC: [u8; 4] = *b"glTF";

@@ -76,7 +76,7 @@ fn refusal(document: &Value, binary: &[u8]) -> String {
 }
 
 /// The look at a corner of a triangle.
-fn look(mesh: &Mesh, triangle: usize, corner: usize) -> crate::mesh::OwnSurface {
+fn look(mesh: &Mesh, triangle: usize, corner: usize) -> crate::mesh::SurfaceSample {
     let weights = std::array::from_fn(|at| f32::from(u8::from(at == corner)));
     mesh.own_surface(triangle, weights).unwrap()
 }

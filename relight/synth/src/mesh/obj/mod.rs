@@ -10,11 +10,11 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use relight_core::image::{ColourSpace, Srgb};
 
-use super::beside::by_name;
 use super::material::{MeshMaterial, PlacedPicture};
 use super::mtl::{self, MtlMaterial, MtlPicture};
 use super::polygon::Triangulator;
 use super::raw::{RawMesh, RawTriangle};
+use super::sidecar_files::by_name;
 use super::text::{Statements, decoded, keyword, readings, without_comment};
 use crate::texture::{PictureKind, TextureImage};
 

@@ -3,7 +3,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use crate::mesh::OwnSurface;
+use crate::mesh::SurfaceSample;
 use crate::{Mesh, SynthError};
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -40,7 +40,7 @@ fn refusal(text: &str) -> String {
     }
 }
 
-fn look(mesh: &Mesh, triangle: usize, corner: usize) -> OwnSurface {
+fn look(mesh: &Mesh, triangle: usize, corner: usize) -> SurfaceSample {
     let weights = std::array::from_fn(|at| f32::from(u8::from(at == corner)));
     mesh.own_surface(triangle, weights).unwrap()
 }

@@ -27,7 +27,7 @@ pub(super) struct NoiseTiles(Tensor);
 
 /// From light to camera values.
 #[derive(Debug)]
-pub(super) struct Photographed {
+pub(super) struct SimulatedPhotos {
     /// Linear light as whoever has the picture takes it, clipped at 1.
     pub(super) picture: Tensor,
     /// By which all light was multiplied, `batch x 3 x 1 x 1`.
@@ -66,7 +66,7 @@ pub(super) fn photograph(
     mask: &Tensor,
     photos: &[PlannedPhoto],
     (tiles, seeds): (&NoiseTiles, &[u64]),
-) -> Result<Photographed, TrainError> {
+) -> Result<SimulatedPhotos, TrainError> {
     let cameras: Vec<&PhotoCamera> = photos.iter().map(|photo| &photo.plan.camera).collect();
     let device = image.device();
     let balance: Vec<f32> = cameras.iter().flat_map(|camera| camera.balance).collect();
@@ -130,7 +130,7 @@ pub(super) fn photograph(
             Ok(values.f_pow(&columns(&powers, powers.len(), values)?)?)
         },
     )?;
-    Ok(Photographed {
+    Ok(SimulatedPhotos {
         picture: picture.f_mul(mask)?,
         gain,
     })

@@ -49,7 +49,7 @@ pub(super) struct DirectionMaps {
 
 /// A batch in its light.
 #[derive(Debug)]
-pub(super) struct Lit {
+pub(super) struct LitBatch {
     /// 1 on the object, 1 channel.
     pub(super) mask: Tensor,
     /// Unit normals.
@@ -137,7 +137,7 @@ fn look_up(maps: &Tensor, at: &Tensor) -> Result<Tensor, TrainError> {
     Ok(maps.f_grid_sampler(&grid, BILINEAR, BORDER, true)?)
 }
 
-impl Lit {
+impl LitBatch {
     /// Lights photographs of views.
     pub(super) fn new(
         pool: &ViewPool,
@@ -456,7 +456,7 @@ fn unit(of: &Tensor) -> Result<Tensor, TrainError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use relight_synth::{Folders, Library, PhotoViewRecipe, Rooms, made_panoramas};
+    use relight_synth::{EnvironmentLights, Folders, Library, PhotoViewRecipe, made_panoramas};
 
     const SIZE: usize = 32;
 
@@ -475,7 +475,7 @@ mod tests {
         }
         let made = made_panoramas().unwrap();
         let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
-        let rooms = Rooms::new(&panoramas, 2, 1);
+        let rooms = EnvironmentLights::new(&panoramas, 2, 1);
         let photos = (0..24)
             .map(|seed| {
                 let place = seed as usize % 3;
@@ -554,7 +554,7 @@ mod tests {
             photo.plan.bounce = [0.0; 3];
         }
         let maps = DirectionMaps::new(Kind::Float, Device::Cpu).unwrap();
-        let lit = Lit::new(&pool, &maps, &photos).unwrap();
+        let lit = LitBatch::new(&pool, &maps, &photos).unwrap();
         let (mut off, mut sum) = ([0.0; 2], [0.0; 2]);
         for (at, photo) in photos.iter().enumerate() {
             let view = &views[photo.place];
@@ -585,9 +585,9 @@ mod tests {
     fn a_photograph_is_lit_alike_whatever_else_is_in_its_batch() {
         let (pool, photos, _) = photographs();
         let maps = DirectionMaps::new(Kind::Float, Device::Cpu).unwrap();
-        let all = Lit::new(&pool, &maps, &photos).unwrap();
+        let all = LitBatch::new(&pool, &maps, &photos).unwrap();
         for (at, photo) in photos.iter().enumerate() {
-            let one = Lit::new(&pool, &maps, std::slice::from_ref(photo)).unwrap();
+            let one = LitBatch::new(&pool, &maps, std::slice::from_ref(photo)).unwrap();
             for (one, all) in [
                 (one.image().unwrap(), all.image().unwrap()),
                 (one.shading, all.shading.shallow_clone()),
@@ -602,7 +602,8 @@ mod tests {
     fn light_that_bounces_makes_hollows_brighter_and_nothing_darker() {
         let (pool, mut photos, _) = photographs();
         let maps = DirectionMaps::new(Kind::Float, Device::Cpu).unwrap();
-        let shading = |photos: &[PlannedPhoto]| Lit::new(&pool, &maps, photos).unwrap().shading;
+        let shading =
+            |photos: &[PlannedPhoto]| LitBatch::new(&pool, &maps, photos).unwrap().shading;
         photos
             .iter_mut()
             .for_each(|photo| photo.plan.bounce = [0.0; 3]);

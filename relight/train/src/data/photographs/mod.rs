@@ -25,7 +25,7 @@ use rayon::prelude::*;
 use tch::{Kind, no_grad};
 
 use self::camera::{NoiseTiles, photograph};
-use self::lit::{DirectionMaps, Lit, PlannedPhoto};
+use self::lit::{DirectionMaps, LitBatch, PlannedPhoto};
 use self::view_loader::{ViewLoader, ViewSource};
 use self::view_pool::ViewPool;
 use super::sample::TruthBatch;
@@ -36,13 +36,15 @@ use crate::error::TrainError;
 use crate::settings::{DataSettings, RunSettings};
 use relight_core::light::Panorama;
 use relight_core::reader::Rank;
-use relight_synth::{Folders, LeftOut, Library, PhotoPlan, PhotoViewRecipe, Rooms, stream};
+use relight_synth::{
+    EnvironmentLights, Folders, Library, PhotoPlan, PhotoViewRecipe, SkippedFile, stream,
+};
 
 /// The batches of a run, lit while it trains.
 #[derive(Debug)]
 pub struct Photographs {
     source: Arc<ViewSource>,
-    rooms: Rooms,
+    rooms: EnvironmentLights,
     data: DataSettings,
     batch: u64,
     seed: u64,
@@ -83,7 +85,7 @@ impl Photographs {
             .filter_map(|number| library.panoramas.get(number))
             .collect();
         Ok(Self {
-            rooms: Rooms::new(&panoramas, data.variants, stream(run.seed, 24)),
+            rooms: EnvironmentLights::new(&panoramas, data.variants, stream(run.seed, 24)),
             source: Arc::new(ViewSource {
                 recipe: PhotoViewRecipe {
                     seed: stream(run.seed, 21),
@@ -108,7 +110,7 @@ impl Photographs {
     }
 
     /// Unused files of the folders.
-    pub(crate) fn left_out(&self) -> &[LeftOut] {
+    pub(crate) fn left_out(&self) -> &[SkippedFile] {
         &self.source.library.left_out
     }
 
@@ -161,7 +163,7 @@ impl Photographs {
             .collect();
         let symmetry = Symmetry::from_bits(stream(stream(self.seed, step), u64::MAX));
         let batch = no_grad(|| {
-            let lit = Lit::new(&open.pool, &open.maps, &photos)?;
+            let lit = LitBatch::new(&open.pool, &open.maps, &photos)?;
             let noise = (&open.noise, seeds.as_slice());
             let photographed = photograph(&lit.image()?, &lit.mask, &photos, noise)?;
             truth::truth(&lit, &photographed, &photos, symmetry)

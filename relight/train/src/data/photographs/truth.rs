@@ -5,8 +5,8 @@ use relight_photo::decompose::{LOG_FLOOR, MAX_LIGHT};
 use relight_photo::nets::LIGHT_OUTPUTS;
 use tch::Tensor;
 
-use super::camera::{Photographed, percentile};
-use super::lit::{Lit, PlannedPhoto, upload};
+use super::camera::{SimulatedPhotos, percentile};
+use super::lit::{LitBatch, PlannedPhoto, upload};
 use crate::data::sample::TruthBatch;
 use crate::data::symmetry::Symmetry;
 use crate::error::TrainError;
@@ -16,8 +16,8 @@ const ENCODED: f64 = 1.0 / 2.2;
 
 /// A batch as a network learns from it, seen in one of the eight symmetries.
 pub(super) fn truth(
-    lit: &Lit,
-    photographed: &Photographed,
+    lit: &LitBatch,
+    photographed: &SimulatedPhotos,
     photos: &[PlannedPhoto],
     symmetry: Symmetry,
 ) -> Result<TruthBatch, TrainError> {
@@ -54,7 +54,7 @@ pub(super) fn truth(
     })
 }
 
-/// The input of the decomposing network, as [`relight_photo::decompose::EncodedPicture`] makes it one by one.
+/// The input of the decomposing network, as [`relight_photo::decompose::NetworkInput`] makes it one by one.
 pub(crate) fn encoded(picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainError> {
     let light = picture.f_clamp(0.0, f64::from(MAX_LIGHT))?;
     let colour = light
@@ -77,7 +77,7 @@ pub(crate) fn encoded(picture: &Tensor, mask: &Tensor) -> Result<Tensor, TrainEr
     Ok(all.f_mul(mask)?)
 }
 
-/// What the head for light should answer, `batch x 9`.
+/// What the head for light should predict, `batch x 9`.
 fn light(
     photos: &[PlannedPhoto],
     gain: &Tensor,
@@ -146,7 +146,7 @@ fn turned_normals(normals: &Tensor, symmetry: Symmetry) -> Result<Tensor, TrainE
 mod tests {
     use super::*;
     use relight_core::image::{Extent, Planes};
-    use relight_photo::decompose::EncodedPicture;
+    use relight_photo::decompose::NetworkInput;
 
     #[test]
     fn pictures_are_encoded_on_tensors_as_one_by_one() {
@@ -155,7 +155,7 @@ mod tests {
             [x, y, x + y].map(|v| (v as f32 / 40.0).powi(2))
         });
         let mask = Planes::from_fn(Extent::new(side, side), |x, _| [f32::from(u8::from(x > 9))]);
-        let one = EncodedPicture::new(&picture, &mask);
+        let one = NetworkInput::new(&picture, &mask);
         let tensor = |planes: Vec<f32>, channels: i64| {
             Tensor::from_slice(&planes).reshape([1, channels, 32, 32])
         };

@@ -5,12 +5,12 @@ use relight_core::light::ShLight;
 use relight_core::statistics::{median, quantile};
 
 use crate::fit::confidence::{
-    FREEDOM, FittedPixels, OwnError, common_error, own_errors, shared_albedo,
+    FREEDOM, FittedPixels, NormalUncertainty, common_error, normal_uncertainties, shared_albedo,
 };
 use crate::fit::curve_statistics::{CurveStatistics, all_statistics};
 use crate::fit::residuals::robust_weights;
 use crate::fit::search::{PixelFit, Search, search_all};
-use crate::fit::solution::{FoundGloss, TurnSolution};
+use crate::fit::solution::{EstimatedGloss, TurnSolution};
 use crate::model::frame::{Elevation, TableFrame};
 use crate::model::lighting::{HEAD_ON, MIRROR, TableLight};
 use crate::model::material::MaterialKind;
@@ -74,10 +74,13 @@ pub fn solve_in_light(
     }
     solver.shrink_albedo();
     let common = common_error(elevation, conditioning.verdict.is_fit());
-    let own_errors = solver.own_errors();
+    let normal_uncertainties = solver.normal_uncertainties();
     TurnSolution {
-        albedo: shared_albedo(curves, &solver.fits, &own_errors),
-        expected_errors: own_errors.iter().map(|own| own.with(common)).collect(),
+        albedo: shared_albedo(curves, &solver.fits, &normal_uncertainties),
+        expected_errors: normal_uncertainties
+            .iter()
+            .map(|own| own.with(common))
+            .collect(),
         fits: solver.fits,
         model: solver.model,
         elevation,
@@ -178,14 +181,14 @@ impl Finish {
     }
 
     /// The gloss of such a lobe as the render layers take it.
-    fn gloss(&self, lobe: Lobe) -> Option<FoundGloss> {
+    fn gloss(&self, lobe: Lobe) -> Option<EstimatedGloss> {
         let part = match self.material {
             MaterialKind::Diffuse => HEAD_ON * lobe.strength / MIRROR,
             MaterialKind::Metal => 1.0,
         };
         // A half vector is off by half of what the light is.
         let smoothness = 4.0 / lobe.blur.powi(2);
-        (lobe.strength > 0.0).then(|| FoundGloss::new(part, smoothness.min(MAX_SMOOTHNESS)))
+        (lobe.strength > 0.0).then(|| EstimatedGloss::new(part, smoothness.min(MAX_SMOOTHNESS)))
     }
 }
 
@@ -233,8 +236,8 @@ impl Solver<'_> {
     }
 
     /// The expected error of each pixel's normal alone.
-    fn own_errors(&self) -> Vec<OwnError> {
-        own_errors(FittedPixels {
+    fn normal_uncertainties(&self) -> Vec<NormalUncertainty> {
+        normal_uncertainties(FittedPixels {
             curves: self.curves,
             statistics: &self.statistics,
             model: &self.model,

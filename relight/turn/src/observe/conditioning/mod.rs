@@ -98,7 +98,7 @@ impl Conditioning {
     }
 
     /// Whether a light was given that is too even while the turn is not.
-    pub(crate) fn is_given_at_odds(&self) -> bool {
+    pub(crate) fn contradicts_given_light(&self) -> bool {
         let given = self.given_modulation;
         given.is_some_and(|given| given < MIN_MODULATION) && self.modulation >= MIN_MODULATION
     }

@@ -33,7 +33,7 @@ impl SolvedTurn {
         warnings.extend(self.solution.verdict().advice().map(str::to_owned));
         let residual = self.solution.residual();
         let is_bad = residual > MAX_RESIDUAL || residual.is_nan();
-        if self.solution.conditioning.is_given_at_odds() {
+        if self.solution.conditioning.contradicts_given_light() {
             let odd = "the given light hardly changes over the turn, but the object's brightness does: it is not the light of \
                  this turn";
             warnings.push(odd.to_owned());

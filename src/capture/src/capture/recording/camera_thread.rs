@@ -8,9 +8,9 @@ use crossbeam_channel::{SendTimeoutError, Sender};
 use relit_data::causes::with_causes;
 
 use super::finding::Finding;
-use super::outcome::{CameraOutcome, End};
+use super::outcome::{CameraOutcome, EndReason};
 use super::progress::Shared;
-use super::trimmer::{Cutter, TurnFrame};
+use super::trimmer::{Trimmer, TurnFrame};
 use crate::preview::Preview;
 use relit_camera::{Camera, CameraError, Frame, FrameFault};
 
@@ -30,7 +30,7 @@ pub(super) struct CameraThread {
     pub(super) queue_wait: Duration,
     pub(super) queue: Sender<TurnFrame>,
     pub(super) shared: Arc<Shared>,
-    pub(super) cutter: Cutter,
+    pub(super) trimmer: Trimmer,
     pub(super) findings: Vec<Finding>,
 }
 
@@ -43,7 +43,7 @@ impl CameraThread {
                 break end;
             }
         };
-        let (rest, count) = self.cutter.end();
+        let (rest, count) = self.trimmer.end();
         let until = Instant::now() + LAST_WAIT;
         for frame in rest {
             // A disk that refuses is the writer's to report.
@@ -59,7 +59,7 @@ impl CameraThread {
     }
 
     /// Takes the next frame; `last_us`: when the one before came.
-    fn step(&mut self, last_us: &mut i64) -> Result<(), End> {
+    fn step(&mut self, last_us: &mut i64) -> Result<(), EndReason> {
         self.obey()?;
         let frame = self.camera.next_frame(FRAME_WAIT.min(self.stall));
         let now_us = self.shared.clock().now_us();
@@ -71,7 +71,7 @@ impl CameraThread {
             Err(CameraError::Timeout { .. }) => {
                 let waited = Duration::from_micros(now_us.abs_diff(*last_us));
                 if waited >= self.stall {
-                    Err(End::Failed(format!(
+                    Err(EndReason::Failed(format!(
                         "the camera gave no frame for {:.1} s: check its cable",
                         waited.as_secs_f64()
                     )))
@@ -79,55 +79,55 @@ impl CameraThread {
                     Ok(())
                 }
             }
-            Err(CameraError::EndOfRecording { .. }) => {
-                Err(End::Failed("the replayed recording has ended".to_owned()))
-            }
-            Err(error) => Err(End::Failed(with_causes(&error))),
+            Err(CameraError::EndOfRecording { .. }) => Err(EndReason::Failed(
+                "the replayed recording has ended".to_owned(),
+            )),
+            Err(error) => Err(EndReason::Failed(with_causes(&error))),
         }
     }
 
     /// Does what the owner wants.
-    fn obey(&mut self) -> Result<(), End> {
+    fn obey(&mut self) -> Result<(), EndReason> {
         let (stop, window) = {
             let state = self.shared.lock();
             (state.stop, state.window)
         };
         match window {
-            _ if stop => Err(End::Stopped),
-            Some(window) if !self.cutter.knows_window() => {
-                let frames = self.cutter.announce(window);
+            _ if stop => Err(EndReason::Stopped),
+            Some(window) if !self.trimmer.knows_window() => {
+                let frames = self.trimmer.announce(window);
                 self.enqueue_all(frames)
             }
             _ => Ok(()),
         }
     }
 
-    fn take(&mut self, frame: Frame) -> Result<(), End> {
+    fn take(&mut self, frame: Frame) -> Result<(), EndReason> {
         if let Some(fault) = frame.fault().filter(is_other_size) {
             let what = format!("the camera changed what it delivers: {fault}");
-            return Err(End::Failed(what));
+            return Err(EndReason::Failed(what));
         }
         let frame = Arc::new(frame);
         if let Some(preview) = &self.preview {
             preview.publish(&frame);
         }
-        let frames = self.cutter.push(frame);
+        let frames = self.trimmer.push(frame);
         self.enqueue_all(frames)
     }
 
-    fn enqueue_all(&mut self, frames: Vec<TurnFrame>) -> Result<(), End> {
+    fn enqueue_all(&mut self, frames: Vec<TurnFrame>) -> Result<(), EndReason> {
         for frame in frames {
             self.enqueue(frame, Instant::now() + self.queue_wait)?;
         }
-        if self.cutter.is_done() {
-            Err(End::Over)
+        if self.trimmer.is_done() {
+            Err(EndReason::Over)
         } else {
             Ok(())
         }
     }
 
     /// Queues a frame as soon as there is a place before `until`, and notes what is wrong with it.
-    fn enqueue(&mut self, frame: TurnFrame, until: Instant) -> Result<(), End> {
+    fn enqueue(&mut self, frame: TurnFrame, until: Instant) -> Result<(), EndReason> {
         let (delivered, fault) = (frame.delivered, frame.frame.fault());
         let finding = if frame.frame.data.is_empty() {
             delivered.map(Finding::Unusable)
@@ -141,7 +141,9 @@ impl CameraThread {
                     delivered.map(Finding::QueueFull)
                 }
                 Err(SendTimeoutError::Disconnected(_)) => {
-                    return Err(End::Failed("the disk accepted no more data".to_owned()));
+                    return Err(EndReason::Failed(
+                        "the disk accepted no more data".to_owned(),
+                    ));
                 }
             }
         };

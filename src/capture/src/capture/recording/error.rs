@@ -8,7 +8,7 @@ use relit_data::session;
 use relit_video::VideoError;
 
 /// Why a recording could not begin, be finished, or be recovered. What ends a recording early is no
-/// such error: see [`super::End`].
+/// such error: see [`super::EndReason`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {

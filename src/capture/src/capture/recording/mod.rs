@@ -6,7 +6,7 @@
 //! disk is never older than a second, and [`recovery`] closes a session whose recorder died.
 //!
 //! ```text
-//! camera thread -> cutter -> queue -> writer thread      CameraOutcome, WriterOutcome
+//! camera thread -> trimmer -> queue -> writer thread     CameraOutcome, WriterOutcome
 //!                                                    ->  Recorded -> TakeSummary, session.json
 //! ```
 //!
@@ -28,8 +28,8 @@ mod verdict;
 mod writer_thread;
 
 pub use error::RecordingError;
-pub use outcome::End;
+pub use outcome::EndReason;
 pub use progress::{Progress, Window};
 pub use recorder::{Recorder, RecordingPlan};
-pub use recovery::{Recovered, Saved, recover, recover_session};
-pub use verdict::Recorded;
+pub use recovery::{RecoveredSession, RecoveryReport, recover, recover_session};
+pub use verdict::FinishedRecording;

@@ -8,7 +8,7 @@ use relit_data::session::SessionWriter;
 
 /// Why a recording ended.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum End {
+pub enum EndReason {
     /// The turn is over.
     #[error("the turn is over")]
     Over,
@@ -28,7 +28,7 @@ pub enum End {
 
 /// What the camera's thread leaves.
 pub(super) struct CameraOutcome {
-    pub(super) end: End,
+    pub(super) end: EndReason,
     pub(super) count: TurnCount,
     /// What is wrong with delivered frames.
     pub(super) findings: Vec<Finding>,

@@ -12,8 +12,8 @@ use super::environment_light::EnvironmentLight;
 use super::error::RecordingError;
 use super::outcome::{CameraOutcome, WriterOutcome};
 use super::progress::{Progress, Shared, State, Window};
-use super::trimmer::{Cutter, IsKey};
-use super::verdict::Recorded;
+use super::trimmer::{KeyFrameCheck, Trimmer};
+use super::verdict::FinishedRecording;
 use super::writer_thread::{JournalLine, WriterThread};
 use crate::preview::Preview;
 use relit_camera::Camera;
@@ -86,7 +86,7 @@ impl Recorder {
             light: EnvironmentLight::new(stream),
             shared: Arc::clone(&shared),
         };
-        let is_key = (stream.format == PixelFormat::H264).then_some(is_key as IsKey);
+        let is_key = (stream.format == PixelFormat::H264).then_some(is_key as KeyFrameCheck);
         let camera = CameraThread {
             camera,
             preview: plan.preview,
@@ -94,7 +94,7 @@ impl Recorder {
             queue_wait: plan.queue_wait,
             queue: sender,
             shared: Arc::clone(&shared),
-            cutter: Cutter::new(stream.fps, is_key),
+            trimmer: Trimmer::new(stream.fps, is_key),
             findings: Vec::new(),
         };
         // The disk goes by real time: only the camera's thread takes part in the clock.
@@ -161,12 +161,12 @@ impl Recorder {
     ///
     /// # Errors
     /// [`RecordingError::Panicked`].
-    pub fn wait(mut self) -> Result<(Box<dyn Camera>, Recorded), RecordingError> {
+    pub fn wait(mut self) -> Result<(Box<dyn Camera>, FinishedRecording), RecordingError> {
         let panicked = RecordingError::Panicked;
         let (camera, writer) = self.threads.take().ok_or(panicked("recorder"))?;
         let (camera, delivered) = camera.join().map_err(|_| panicked("camera"))?;
         let written = writer.join().map_err(|_| panicked("writer"))?;
-        let recorded = Recorded {
+        let recorded = FinishedRecording {
             camera: delivered,
             writer: written,
             max_dropped: self.max_dropped,

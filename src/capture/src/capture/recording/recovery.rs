@@ -22,7 +22,7 @@ const TRIED_AT_END: usize = 64;
 
 /// What was saved of a session.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Saved {
+pub struct RecoveryReport {
     /// Frames that video and index hold.
     pub frames: usize,
     /// The time that they cover, seconds.
@@ -31,7 +31,7 @@ pub struct Saved {
     pub lines_cut: usize,
 }
 
-impl fmt::Display for Saved {
+impl fmt::Display for RecoveryReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.frames {
             0 => f.write_str("no frame reached the disk"),
@@ -43,14 +43,14 @@ impl fmt::Display for Saved {
 
 /// A session that was found interrupted.
 #[derive(Debug)]
-pub struct Recovered {
+pub struct RecoveredSession {
     /// The session folder.
     pub folder: PathBuf,
     /// What was saved, or why it could not be.
-    pub saved: Result<Saved, RecordingError>,
+    pub saved: Result<RecoveryReport, RecordingError>,
 }
 
-impl fmt::Display for Recovered {
+impl fmt::Display for RecoveredSession {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} was interrupted", self.folder.display())?;
         match &self.saved {
@@ -65,8 +65,8 @@ impl fmt::Display for Recovered {
 ///
 /// # Errors
 /// [`RecordingError::System`] if the folder cannot be listed. What goes wrong with one session
-/// is in its [`Recovered`].
-pub fn recover(root: &Path) -> Result<Vec<Recovered>, RecordingError> {
+/// is in its [`RecoveredSession`].
+pub fn recover(root: &Path) -> Result<Vec<RecoveredSession>, RecordingError> {
     let failed = |source| RecordingError::System {
         what: format!(
             "{} could not be listed: check that it is there and may be read",
@@ -88,7 +88,7 @@ pub fn recover(root: &Path) -> Result<Vec<Recovered>, RecordingError> {
             |error: &SessionError| matches!(error, SessionError::InUse(_) | SessionError::Ended(_));
         match &saved {
             Err(RecordingError::Session(error)) if other(error) => None,
-            _ => Some(Recovered { folder, saved }),
+            _ => Some(RecoveredSession { folder, saved }),
         }
     });
     Ok(recovered.collect())
@@ -100,7 +100,7 @@ pub fn recover(root: &Path) -> Result<Vec<Recovered>, RecordingError> {
 /// [`SessionError::InUse`] if its recorder lives, [`SessionError::Ended`] if there is nothing
 /// to do, [`RecordingError::NotMended`], or what the file system answers; its status stays
 /// "recording" then, except for [`RecordingError::NotMended`].
-pub fn recover_session(folder: &Path) -> Result<Saved, RecordingError> {
+pub fn recover_session(folder: &Path) -> Result<RecoveryReport, RecordingError> {
     let session = InterruptedSession::open(folder)?;
     let entries = session.index().entries();
     let frames = whole_frames(&session.video_path()).min(entries.len());
@@ -108,7 +108,7 @@ pub fn recover_session(folder: &Path) -> Result<Saved, RecordingError> {
         Some([first, .., last]) => last.t_us.saturating_sub(first.t_us) as f64 / 1e6,
         _ => 0.0,
     };
-    let saved = Saved {
+    let saved = RecoveryReport {
         frames,
         seconds,
         lines_cut: entries.len() - frames,

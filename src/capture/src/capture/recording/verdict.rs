@@ -4,7 +4,7 @@ use std::error::Error;
 
 use super::error::RecordingError;
 use super::finding::{Finding, frames};
-use super::outcome::{CameraOutcome, End, WriterOutcome};
+use super::outcome::{CameraOutcome, EndReason, WriterOutcome};
 use super::recovery::whole_frames;
 use super::timing::{MissingFrames, TimingAnomaly};
 use super::trimmer::TurnCount;
@@ -19,22 +19,22 @@ const MAX_DEGREES: f64 = 1e6;
 const MAX_LISTED: usize = 40;
 
 /// A recording that has ended, and whose session is not closed yet.
-pub struct Recorded {
+pub struct FinishedRecording {
     pub(super) camera: CameraOutcome,
     pub(super) writer: WriterOutcome,
     pub(super) max_dropped: u64,
 }
 
-impl Recorded {
+impl FinishedRecording {
     /// Why it ended.
     #[must_use]
-    pub fn end(&self) -> &End {
+    pub fn end(&self) -> &EndReason {
         &self.camera.end
     }
 
     /// Notes that something other than the recorder ended the take, which is unusable then:
-    /// [`End::Interrupted`] or [`End::OnPurpose`].
-    pub fn ended_by(&mut self, end: End) {
+    /// [`EndReason::Interrupted`] or [`EndReason::OnPurpose`].
+    pub fn ended_by(&mut self, end: EndReason) {
         self.camera.end = end;
     }
 
@@ -151,15 +151,15 @@ impl Recorded {
         let last = missing.last().map(|last| last.exposure + last.count);
         let whole = *expected > 0 && last.is_none_or(|end| end < *expected);
         match self.camera.end {
-            End::Over => false,
-            End::Interrupted(_) | End::OnPurpose(_) => true,
+            EndReason::Over => false,
+            EndReason::Interrupted(_) | EndReason::OnPurpose(_) => true,
             _ => !whole,
         }
     }
 
     /// Whether nothing but a stop on purpose keeps the take from being whole.
     fn is_stopped(&self) -> bool {
-        self.writer.failure.is_none() && matches!(self.camera.end, End::OnPurpose(_))
+        self.writer.failure.is_none() && matches!(self.camera.end, EndReason::OnPurpose(_))
     }
 
     /// Why the take cannot be used; `None` if it can.

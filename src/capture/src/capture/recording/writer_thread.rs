@@ -14,7 +14,7 @@ use super::progress::Shared;
 use super::trimmer::TurnFrame;
 use relit_data::session::{FrameEntry, SessionWriter};
 use relit_data::turn_motion::{JournaledReport, JournaledTurn};
-use relit_video::{Muxer, StreamFormat, Written};
+use relit_video::{Muxer, StreamFormat, WriteOutcome};
 
 /// How often everything is synced to the disk: with the time that the disk needs for it, nothing
 /// there is older than a second.
@@ -92,7 +92,7 @@ impl WriterThread {
             Some(padded) => self.muxer.write(&padded, frame.t_us)?,
             None => self.muxer.write(&frame.data, frame.t_us)?,
         };
-        if written == Written::BeforeKeyFrame {
+        if written == WriteOutcome::BeforeKeyFrame {
             let left_out = turn_frame.delivered.map(Finding::Unusable);
             self.findings.extend(left_out);
             return Ok(());

@@ -1,9 +1,9 @@
 //! The page for a phone beside the rig: a few files that are part of the program.
 
-use relit_web::{Index, PageAsset, SCRIPT, STYLE, asset};
+use relit_web::{IndexPage, PageAsset, SCRIPT, STYLE, asset};
 
 /// The page itself.
-pub(super) const INDEX: Index = Index(include_str!("index.html"));
+pub(super) const INDEX: IndexPage = IndexPage(include_str!("index.html"));
 
 /// All files but the page itself.
 pub(super) const ASSETS: [PageAsset; 8] = [

@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use super::{Announcement, ServeOptions, Shutdown, serve};
-use crate::command::{Command, Refused, Rig};
+use crate::command::{Command, CommandError, Rig};
 use crate::state::{Monitor, Phase};
 
 /// Longest wait for anything in these tests; all that is waited for comes far sooner.
@@ -53,15 +53,15 @@ struct Fake {
 }
 
 impl Rig for Fake {
-    fn command(&self, command: Command) -> Result<(), Refused> {
+    fn command(&self, command: Command) -> Result<(), CommandError> {
         self.told.lock().unwrap().push(command.clone());
         if self.minds_state.load(Ordering::Relaxed) {
             return command.check(&self.monitor.state());
         }
         match command {
             Command::Start { object, .. } => self.start(&object),
-            Command::Home => Err(Refused::Unavailable(NO_TABLE.to_owned())),
-            Command::Jog { .. } => Err(Refused::Invalid(TOO_FAR.to_owned())),
+            Command::Home => Err(CommandError::Unavailable(NO_TABLE.to_owned())),
+            Command::Jog { .. } => Err(CommandError::Invalid(TOO_FAR.to_owned())),
             Command::Stop => {
                 self.monitor.update(|state| state.phase = Phase::Idle);
                 Ok(())
@@ -84,7 +84,7 @@ impl Rig for Fake {
 }
 
 impl Fake {
-    fn start(&self, object: &str) -> Result<(), Refused> {
+    fn start(&self, object: &str) -> Result<(), CommandError> {
         let mut taken = false;
         self.monitor.update(|state| {
             taken = state.phase == Phase::Idle;
@@ -93,7 +93,7 @@ impl Fake {
                 state.object = Some(object.to_owned());
             }
         });
-        let busy = || Refused::Busy(BUSY.to_owned());
+        let busy = || CommandError::Busy(BUSY.to_owned());
         taken.then_some(()).ok_or_else(busy)
     }
 }

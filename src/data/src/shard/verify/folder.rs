@@ -8,7 +8,7 @@ use image::RgbImage;
 use rayon::prelude::*;
 
 use super::sample::{SessionMask, check_image};
-use super::session::{Found, SessionCheck};
+use super::session::{SessionCheck, ShardContents};
 use crate::causes::with_causes;
 use crate::image_stats::MaskSpans;
 use crate::shard::codec::decode_rgb;
@@ -22,7 +22,7 @@ const MAX_BYTES: u64 = 256 << 20;
 /// Images that are checked in parallel.
 const BATCH: usize = 32;
 
-pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
+pub(super) fn check(check: &mut SessionCheck<'_>) -> ShardContents {
     check_names(check);
     let mask = check_mask(check);
     let images = check_images(check, mask.as_ref());
@@ -34,7 +34,7 @@ pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
         }
     }
     check_mean(check, images.mean.as_ref());
-    Found {
+    ShardContents {
         samples: images.count,
         records: Vec::new(),
     }

@@ -6,7 +6,7 @@ mod listing;
 mod records;
 mod sample;
 mod session;
-mod tar_reader;
+mod tar;
 
 use std::fmt;
 use std::path::Path;
@@ -15,7 +15,7 @@ use super::ShardError;
 use super::dataset::Dataset;
 use super::record::FrameRecord;
 use super::settings::Layout;
-use session::{Found, Progress, SessionCheck};
+use session::{Progress, SessionCheck, ShardContents};
 
 /// The result of a verification.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -101,7 +101,7 @@ pub fn verify(
 /// Checks the shard and the records of a session; returns the number of complete samples.
 fn check_session(check: &mut SessionCheck<'_>) -> u64 {
     let found = match check.settings.layout {
-        Layout::Webdataset => tar_reader::check(check),
+        Layout::Webdataset => tar::check(check),
         Layout::Paper => folder::check(check),
     };
     check_records(check, &found);
@@ -115,7 +115,7 @@ fn check_session(check: &mut SessionCheck<'_>) -> u64 {
 }
 
 /// Checks the records of the table or, if the table is damaged, those in the shard.
-fn check_records(check: &mut SessionCheck<'_>, found: &Found) {
+fn check_records(check: &mut SessionCheck<'_>, found: &ShardContents) {
     let (file, records): (_, Vec<Option<&FrameRecord>>) = match &check.rows {
         Some(rows) => {
             let records = rows.iter().map(|row| Some(&row.record));

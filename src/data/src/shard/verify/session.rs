@@ -47,7 +47,7 @@ pub(super) struct SessionCheck<'a> {
 }
 
 /// What was found in a shard.
-pub(super) struct Found {
+pub(super) struct ShardContents {
     /// Samples with all their parts.
     pub(super) samples: u64,
     /// The records that could be read, by index; empty in a layout without records.

@@ -17,7 +17,7 @@ const INKS: &str = "inks (CMYK)";
 
 /// What a profile says; `is_grey`: the picture has no colours.
 pub(super) fn colour_of_profile(icc: &[u8], is_grey: bool) -> Result<Colour, ColourError> {
-    let profile = ColorProfile::new_from_slice(icc).map_err(|_| unread(icc))?;
+    let profile = ColorProfile::new_from_slice(icc).map_err(|_| unsupported(icc))?;
     check(&profile, is_grey)?;
     if profile.color_space == DataColorSpace::Gray {
         let curve = profile.gray_trc.as_ref().ok_or_else(ColourError::profile)?;
@@ -33,7 +33,7 @@ pub(super) fn colour_of_profile(icc: &[u8], is_grey: bool) -> Result<Colour, Col
 }
 
 /// What is wrong with a profile that the library does not read.
-fn unread(icc: &[u8]) -> ColourError {
+fn unsupported(icc: &[u8]) -> ColourError {
     match icc.get(16..20) {
         Some(b"CMYK") => other_space(INKS),
         _ => ColourError::profile(),

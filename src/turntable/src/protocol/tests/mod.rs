@@ -4,17 +4,17 @@ mod printed;
 mod properties;
 
 use crate::protocol::*;
-use crate::tests::fake_grbl::seal;
+use crate::tests::fake_grbl::with_checksum;
 
 const HALF_SECOND: i64 = 500_000;
 
-pub(super) fn events(machine: &mut Machine) -> Vec<WireEvent> {
+pub(super) fn events(machine: &mut Machine) -> Vec<ProtocolEvent> {
     std::iter::from_fn(|| machine.next_event()).collect()
 }
 
 pub(super) fn outcome(machine: &mut Machine) -> Option<LineOutcome> {
     events(machine).into_iter().find_map(|event| match event {
-        WireEvent::Answered { outcome, .. } => Some(outcome),
+        ProtocolEvent::Answered { outcome, .. } => Some(outcome),
         _ => None,
     })
 }
@@ -26,7 +26,7 @@ fn text(machine: &mut Machine, now_us: i64) -> String {
 pub(super) fn checked() -> Machine {
     let mut machine = Machine::new();
     machine.open_session(0).unwrap();
-    assert_eq!(text(&mut machine, 0), format!("{}\n", seal("N0")));
+    assert_eq!(text(&mut machine, 0), format!("{}\n", with_checksum("N0")));
     hear(&mut machine, 0, "ok N0");
     assert!(machine.is_checked());
     events(&mut machine);
@@ -35,7 +35,7 @@ pub(super) fn checked() -> Machine {
 
 /// Receives a complete line with its checksum.
 fn hear(machine: &mut Machine, now_us: i64, line: &str) {
-    machine.on_bytes(now_us, format!("{}\r\n", seal(line)).as_bytes());
+    machine.on_bytes(now_us, format!("{}\r\n", with_checksum(line)).as_bytes());
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_plain_line_is_never_sent_twice_and_after_a_lost_answer_nothing_is_sent_unti
         Err(SendError::Unsure)
     );
     machine.on_bytes(HALF_SECOND, b"Grbl 1.1h ['$' for help]\r\n");
-    assert_eq!(events(&mut machine), [WireEvent::Reset(None)]);
+    assert_eq!(events(&mut machine), [ProtocolEvent::Reset(None)]);
     assert!(
         machine
             .send(HALF_SECOND, "$X", ReplyTimeout::AtOnce)
@@ -125,7 +125,7 @@ fn what_would_not_be_one_line_is_not_sent() {
 fn a_checked_line_is_repeated_with_its_number_until_the_fifth_time() {
     let mut machine = checked();
     machine.send(0, "G1X1F10", ReplyTimeout::AtOnce).unwrap();
-    let line = format!("{}\n", seal("N1 G1X1F10"));
+    let line = format!("{}\n", with_checksum("N1 G1X1F10"));
     assert_eq!(text(&mut machine, 0), line);
     for again in 1..5 {
         machine.on_time(again * HALF_SECOND - 1);
@@ -196,8 +196,8 @@ fn a_banner_in_the_middle_is_a_reset_and_fails_the_line() {
     machine.on_bytes(1, b"\r\nGrbl 1.1h ['$' for help] [reset: brown-out]\r\n");
     let found = events(&mut machine);
     let failed = LineOutcome::Failed(LineFault::Restarted);
-    assert!(matches!(&found[0], WireEvent::Answered { outcome, .. } if *outcome == failed));
-    assert_eq!(found[1], WireEvent::Reset(Some("brown-out".to_owned())));
+    assert!(matches!(&found[0], ProtocolEvent::Answered { outcome, .. } if *outcome == failed));
+    assert_eq!(found[1], ProtocolEvent::Reset(Some("brown-out".to_owned())));
     assert!(!machine.is_checked());
 }
 
@@ -206,7 +206,7 @@ fn a_controller_that_has_left_the_session_unnoticed_has_restarted() {
     let mut machine = checked();
     machine.send(0, "$X", ReplyTimeout::AtOnce).unwrap();
     machine.on_bytes(1, b"error:72 N1\r\n");
-    assert!(events(&mut machine).contains(&WireEvent::Reset(None)));
+    assert!(events(&mut machine).contains(&ProtocolEvent::Reset(None)));
 
     let mut machine = checked();
     let report = b"<Idle|MPos:0.000,0.000,0.000|FS:0,0>\r\n";
@@ -214,7 +214,7 @@ fn a_controller_that_has_left_the_session_unnoticed_has_restarted() {
     machine.on_bytes(2, report);
     assert_eq!(events(&mut machine), []);
     machine.on_bytes(3, report);
-    assert_eq!(events(&mut machine), [WireEvent::Reset(None)]);
+    assert_eq!(events(&mut machine), [ProtocolEvent::Reset(None)]);
 }
 
 #[test]
@@ -237,7 +237,7 @@ fn a_report_is_bracketed_by_its_question_and_its_first_byte() {
     assert_eq!(text(&mut machine, 1000), "?");
     machine.on_bytes(3000, b"<Run|MPos:1.000,0");
     machine.on_bytes(4000, b".000,0.000>\r\n");
-    let [WireEvent::Status(poll)] = events(&mut machine)[..] else {
+    let [ProtocolEvent::Status(poll)] = events(&mut machine)[..] else {
         panic!("one report");
     };
     assert_eq!(
@@ -245,7 +245,7 @@ fn a_report_is_bracketed_by_its_question_and_its_first_byte() {
         (Some(1000), 3000, true)
     );
     machine.on_bytes(5000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
-    let [WireEvent::Status(poll)] = events(&mut machine)[..] else {
+    let [ProtocolEvent::Status(poll)] = events(&mut machine)[..] else {
         panic!("one report");
     };
     assert_eq!((poll.asked_us, poll.certain), (None, false));
@@ -262,7 +262,7 @@ fn after_a_lost_report_the_next_ones_are_not_trusted_for_time() {
     assert_eq!(text(&mut machine, 120_000), "?");
     machine.on_bytes(122_000, b"<Run|MPos:1.000,0.000,0.000>\r\n");
     let certain = |machine: &mut Machine| match events(machine)[..] {
-        [WireEvent::Status(poll)] => poll.certain,
+        [ProtocolEvent::Status(poll)] => poll.certain,
         _ => panic!("one report"),
     };
     assert!(!certain(&mut machine));
@@ -328,13 +328,13 @@ fn any_first_line_of_the_family_is_a_restart() {
     ] {
         let mut machine = Machine::new();
         machine.on_bytes(0, format!("\r\n{line}\r\n").as_bytes());
-        assert_eq!(events(&mut machine), [WireEvent::Reset(None)], "{line}");
+        assert_eq!(events(&mut machine), [ProtocolEvent::Reset(None)], "{line}");
     }
     let boot = "rst:0xf (RTCWDT_BROWN_OUT_RESET),boot:0x13 (SPI_FAST_FLASH_BOOT)";
     let mut machine = Machine::new();
     machine.on_bytes(0, format!("{boot}\r\n").as_bytes());
     let cause = Some("rtcwdt_brown_out_reset".to_owned());
-    assert_eq!(events(&mut machine), [WireEvent::Reset(cause)]);
+    assert_eq!(events(&mut machine), [ProtocolEvent::Reset(cause)]);
 }
 
 #[test]
@@ -353,7 +353,7 @@ fn lines_that_only_mention_grbl_are_no_restart() {
         assert!(
             !found
                 .iter()
-                .any(|event| matches!(event, WireEvent::Reset(_))),
+                .any(|event| matches!(event, ProtocolEvent::Reset(_))),
             "{line}"
         );
     }

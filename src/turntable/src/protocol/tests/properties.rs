@@ -1,4 +1,4 @@
-//! Properties of parser and state machine on a damaged wire and on arbitrary bytes.
+//! Properties of parser and state machine on a damaged line and on arbitrary bytes.
 
 #![allow(clippy::unwrap_used, reason = "a test's own mistakes should be loud")]
 
@@ -7,11 +7,11 @@ use proptest::prelude::*;
 
 use super::{checked, events, outcome};
 use crate::protocol::*;
-use crate::tests::fake_grbl::{FakeGrbl, seal};
+use crate::tests::fake_grbl::{FakeGrbl, with_checksum};
 
-/// A fault of the wire that changes a line.
+/// A fault of the serial line that changes a line.
 #[derive(Debug, Clone, Copy)]
-enum WireFault {
+enum SerialFault {
     None,
     Drop(usize),
     Flip(usize),
@@ -20,37 +20,37 @@ enum WireFault {
     Lose,
 }
 
-fn fault() -> impl Strategy<Value = WireFault> {
+fn fault() -> impl Strategy<Value = SerialFault> {
     prop_oneof![
-        6 => Just(WireFault::None),
-        1 => any::<usize>().prop_map(WireFault::Drop),
-        1 => any::<usize>().prop_map(WireFault::Flip),
-        1 => Just(WireFault::Twice),
-        1 => Just(WireFault::Merge),
-        1 => Just(WireFault::Lose),
+        6 => Just(SerialFault::None),
+        1 => any::<usize>().prop_map(SerialFault::Drop),
+        1 => any::<usize>().prop_map(SerialFault::Flip),
+        1 => Just(SerialFault::Twice),
+        1 => Just(SerialFault::Merge),
+        1 => Just(SerialFault::Lose),
     ]
 }
 
-fn damage(bytes: &[u8], fault: WireFault) -> Vec<u8> {
+fn damage(bytes: &[u8], fault: SerialFault) -> Vec<u8> {
     let mut damaged = bytes.to_vec();
     match fault {
-        WireFault::None => {}
-        WireFault::Drop(at) => drop(damaged.remove(at % bytes.len())),
-        WireFault::Flip(at) => damaged[at / 8 % bytes.len()] ^= 1 << (at % 8),
-        WireFault::Twice => damaged.extend(bytes),
-        WireFault::Merge => damaged.retain(|byte| !matches!(byte, b'\r' | b'\n')),
-        WireFault::Lose => damaged.clear(),
+        SerialFault::None => {}
+        SerialFault::Drop(at) => drop(damaged.remove(at % bytes.len())),
+        SerialFault::Flip(at) => damaged[at / 8 % bytes.len()] ^= 1 << (at % 8),
+        SerialFault::Twice => damaged.extend(bytes),
+        SerialFault::Merge => damaged.retain(|byte| !matches!(byte, b'\r' | b'\n')),
+        SerialFault::Lose => damaged.clear(),
     }
     damaged
 }
 
-/// Sends one line through a faulty wire until it is done or has failed.
+/// Sends one line through a faulty line until it is done or has failed.
 fn exchange(
     machine: &mut Machine,
     fake_grbl: &mut FakeGrbl,
     now_us: &mut i64,
     block: &str,
-    faults: &mut impl Iterator<Item = WireFault>,
+    faults: &mut impl Iterator<Item = SerialFault>,
 ) -> LineOutcome {
     machine.send(*now_us, block, ReplyTimeout::AtOnce).unwrap();
     for _ in 0..2000 {
@@ -83,7 +83,7 @@ proptest! {
     fn on_a_faulty_wire_a_checked_line_is_done_once_or_fails(faults in vec(fault(), 50)) {
         let (mut fake_grbl, mut machine, mut now_us) = (FakeGrbl::new(true), checked(), 1);
         fake_grbl.advance(1);
-        fake_grbl.take(format!("{}\n", seal("N0")).as_bytes());
+        fake_grbl.take(format!("{}\n", with_checksum("N0")).as_bytes());
         fake_grbl.advance(10_000);
         fake_grbl.give();
         let mut faults = faults.into_iter().cycle();
@@ -116,7 +116,7 @@ proptest! {
                 machine.on_time(now_us * 100_000);
             }
             let done = events(&mut machine).into_iter().any(|event| {
-                matches!(event, WireEvent::Answered { outcome: LineOutcome::Done(_), .. })
+                matches!(event, ProtocolEvent::Answered { outcome: LineOutcome::Done(_), .. })
             });
             prop_assert!(!done || !machine.is_checked());
         }

@@ -21,7 +21,7 @@ const TICK_US: i64 = 1000;
 
 /// The faults to inject.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Trouble {
+pub(crate) struct InjectedFaults {
     /// From this time on it answers nothing.
     pub(crate) silent_from_us: Option<i64>,
     /// It restarts at this time.
@@ -57,7 +57,7 @@ enum Mode {
 
 #[derive(Debug)]
 pub(crate) struct FakeGrbl {
-    pub(crate) trouble: Trouble,
+    pub(crate) trouble: InjectedFaults,
     rig: bool,
     dialect: Dialect,
     homing: bool,
@@ -95,7 +95,7 @@ impl FakeGrbl {
 
     fn speaking(dialect: Dialect, rig: bool) -> FakeGrbl {
         let mut fake_grbl = FakeGrbl {
-            trouble: Trouble::default(),
+            trouble: InjectedFaults::default(),
             rig,
             dialect,
             homing: false,
@@ -145,7 +145,7 @@ impl FakeGrbl {
 
     fn say(&mut self, text: &str) {
         let sealed = match self.session {
-            Some(_) => seal(text),
+            Some(_) => with_checksum(text),
             None => text.to_owned(),
         };
         self.say_as_is(&sealed);
@@ -345,6 +345,6 @@ pub(crate) fn checksum(text: &str) -> String {
     format!("{:04X}", crc.checksum(text.as_bytes()))
 }
 
-pub(crate) fn seal(text: &str) -> String {
+pub(crate) fn with_checksum(text: &str) -> String {
     format!("{text}*{}", checksum(text))
 }

@@ -20,7 +20,7 @@ const PRE_ROLL_BYTES: usize = 96 << 20;
 const MIN_FOR_RATE: usize = 30;
 
 /// Whether decoding can begin with a frame, by its data.
-pub(super) type IsKey = fn(&[u8]) -> bool;
+pub(super) type KeyFrameCheck = fn(&[u8]) -> bool;
 
 /// A frame that is to be recorded.
 #[derive(Debug, Clone)]
@@ -59,10 +59,10 @@ impl TurnCount {
 }
 
 /// Selects the frames of one turn, in the order of their delivery.
-pub(super) struct Cutter {
+pub(super) struct Trimmer {
     fps: f64,
     /// Where frames build on each other: which are key frames.
-    is_key: Option<IsKey>,
+    is_key: Option<KeyFrameCheck>,
     window: Option<Window>,
     pre_roll: PreRoll,
     /// The last frame before the first of the turn.
@@ -73,8 +73,8 @@ pub(super) struct Cutter {
     done: bool,
 }
 
-impl Cutter {
-    pub(super) fn new(fps: f64, is_key: Option<IsKey>) -> Self {
+impl Trimmer {
+    pub(super) fn new(fps: f64, is_key: Option<KeyFrameCheck>) -> Self {
         Self {
             fps,
             is_key,
@@ -229,7 +229,7 @@ struct PreRoll {
 }
 
 impl PreRoll {
-    fn push(&mut self, frame: Arc<Frame>, is_key: Option<IsKey>) {
+    fn push(&mut self, frame: Arc<Frame>, is_key: Option<KeyFrameCheck>) {
         let is_key = |frame: &Frame| is_key.is_some_and(|is_key| is_key(&frame.data));
         let newest = frame.t_us;
         self.bytes += frame.data.len();

@@ -3,18 +3,18 @@ use proptest::prelude::*;
 use crate::capture::recording::trimmer::*;
 use crate::capture::tests::frame;
 
-/// Plays frames into a cutter, announces the window when frame `at` has come, and answers the
+/// Plays frames into a trimmer, announces the window when frame `at` has come, and answers the
 /// numbers of the frames selected, and the count.
 fn cut(frames: impl Iterator<Item = Frame>, window: Window, at: usize) -> (Vec<i64>, TurnCount) {
-    let mut cutter = Cutter::new(30.0, None);
+    let mut trimmer = Trimmer::new(30.0, None);
     let mut selected = Vec::new();
     for (n, frame) in frames.enumerate() {
-        selected.extend(cutter.push(Arc::new(frame)));
+        selected.extend(trimmer.push(Arc::new(frame)));
         if n == at {
-            selected.extend(cutter.announce(window));
+            selected.extend(trimmer.announce(window));
         }
     }
-    let (rest, count) = cutter.end();
+    let (rest, count) = trimmer.end();
     selected.extend(rest);
     let number = |selected: &TurnFrame| (selected.frame.t_us as f64 / 33_333.3).round() as i64;
     (selected.iter().map(number).collect(), count)
@@ -94,16 +94,16 @@ fn without_any_frame_all_of_the_turn_is_missing() {
 
 #[test]
 fn a_chain_of_frames_is_recorded_from_its_key_frame_on() {
-    let mut cutter = Cutter::new(30.0, Some(|data| data == [1]));
+    let mut trimmer = Trimmer::new(30.0, Some(|data| data == [1]));
     let mut selected = Vec::new();
     for (n, mut frame) in frames(0..100).enumerate() {
         frame.data = vec![u8::from(n % 12 == 0)];
-        selected.extend(cutter.push(Arc::new(frame)));
+        selected.extend(trimmer.push(Arc::new(frame)));
         if n == 35 {
-            selected.extend(cutter.announce(seconds(1.01, 2.01)));
+            selected.extend(trimmer.announce(seconds(1.01, 2.01)));
         }
     }
-    let (rest, count) = cutter.end();
+    let (rest, count) = trimmer.end();
     selected.extend(rest);
     // The turn begins with frame 31, the chain with frame 24.
     let lead = selected
@@ -116,16 +116,16 @@ fn a_chain_of_frames_is_recorded_from_its_key_frame_on() {
 
 #[test]
 fn a_chain_is_kept_from_its_key_frame_on_however_long_ago_that_was() {
-    let mut cutter = Cutter::new(30.0, Some(|data| data == [1]));
+    let mut trimmer = Trimmer::new(30.0, Some(|data| data == [1]));
     let mut selected = Vec::new();
     for (n, mut frame) in frames(0..600).enumerate() {
         frame.data = vec![u8::from(n % 250 == 0)];
-        selected.extend(cutter.push(Arc::new(frame)));
+        selected.extend(trimmer.push(Arc::new(frame)));
         if n == 480 {
-            selected.extend(cutter.announce(seconds(15.01, 17.01)));
+            selected.extend(trimmer.announce(seconds(15.01, 17.01)));
         }
     }
-    let (rest, count) = cutter.end();
+    let (rest, count) = trimmer.end();
     selected.extend(rest);
     assert_eq!((count.expected, missing(&count)), (60, 0));
     assert_eq!(selected[0].frame.data, [1]);

@@ -17,14 +17,14 @@ use crate::view::{Pose, Projection};
 const PLATE: f32 = 2.5;
 
 /// How an object stands on the table.
-pub(crate) struct Stand {
+pub(crate) struct TablePose {
     pub(crate) pose: Pose,
     pub(crate) projection: Projection,
     /// Of the camera over the plate, radians.
     elevation: f32,
 }
 
-impl Stand {
+impl TablePose {
     /// A camera at an elevation within this range, degrees.
     pub(crate) fn draw(random: &mut Random, elevations: Range<f32>) -> Self {
         let elevation = random.uniform(elevations).to_radians();

@@ -7,12 +7,12 @@ use crate::samples::camera::CameraModel;
 use crate::samples::finish::Finish;
 use crate::samples::object::ObjectSource;
 use crate::samples::recipe::Recipe;
-use crate::samples::sample::Whites;
+use crate::samples::sample::WhiteLevels;
 use crate::view::{Pose, Projection};
 
 /// How turns are made.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TurnRecipe {
+pub struct SequenceRecipe {
     /// Seed, size, light and shadows; its camera is sRGB without noise or compression.
     pub recipe: Recipe,
     /// Frames a turn, 1..=1 000 000.
@@ -22,7 +22,7 @@ pub struct TurnRecipe {
 /// The inputs of a turn, as in `turn.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub struct TurnDescription {
+pub struct SequenceDescription {
     /// `relight.turn/1`.
     pub(crate) schema: String,
     /// The seed of its draws: the recipe's seed and the turn's number.
@@ -61,7 +61,7 @@ pub struct FrameTruth {
     /// The table's angle, degrees.
     pub angle_deg: f64,
     /// The value of 65535 in the frame's `shading` and `highlight`.
-    pub(crate) white: Whites,
+    pub(crate) white: WhiteLevels,
     /// All light but what bounces, as nine coefficients in the viewer's frame, with the camera's gain.
     pub coefficients: [[f64; 3]; 9],
 }

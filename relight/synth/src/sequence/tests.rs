@@ -15,8 +15,8 @@ use crate::samples::camera::CameraModel;
 use crate::samples::recipe::Recipe;
 use crate::write_samples;
 
-fn turns(seed: u64) -> TurnRecipe {
-    TurnRecipe {
+fn turns(seed: u64) -> SequenceRecipe {
+    SequenceRecipe {
         recipe: Recipe {
             seed,
             size: 40,
@@ -50,7 +50,7 @@ fn a_turn_passes_verification_and_is_what_its_truth_says() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     let library = library();
-    let written = write_turns(&turns(1), &library, 2, out, &|| {}).unwrap();
+    let written = write_sequences(&turns(1), &library, 2, out, &|| {}).unwrap();
     assert_eq!((written.new, written.kept), (2, 0));
     let verdict = verify(out, &|_, _| {}).unwrap();
     assert_eq!(verdict.problems, []);
@@ -86,7 +86,7 @@ fn a_turn_passes_verification_and_is_what_its_truth_says() {
 #[test]
 fn the_light_turns_and_comes_back() {
     let folder = tempfile::tempdir().unwrap();
-    write_turns(&turns(2), &library(), 1, folder.path(), &|| {}).unwrap();
+    write_sequences(&turns(2), &library(), 1, folder.path(), &|| {}).unwrap();
     let images = images(folder.path(), "synth-2-0000");
     let distance = |a: u32, b: u32| {
         let pairs = images[&a].as_raw().iter().zip(images[&b].as_raw());
@@ -106,7 +106,7 @@ fn the_number_of_threads_changes_no_byte() {
             .build()
             .unwrap();
         let library = library();
-        pool.install(|| write_turns(&turns(3), &library, 1, folder.path(), &|| {}))
+        pool.install(|| write_sequences(&turns(3), &library, 1, folder.path(), &|| {}))
             .unwrap();
         let truth = folder.path().join("truth/synth-3-0000");
         let files = [
@@ -132,29 +132,29 @@ fn the_number_of_threads_changes_no_byte() {
 fn turns_that_are_whole_are_kept_and_others_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let library = library();
-    write_turns(&turns(4), &library, 1, folder.path(), &|| {}).unwrap();
-    let again = write_turns(&turns(4), &library, 2, folder.path(), &|| {}).unwrap();
+    write_sequences(&turns(4), &library, 1, folder.path(), &|| {}).unwrap();
+    let again = write_sequences(&turns(4), &library, 2, folder.path(), &|| {}).unwrap();
     assert_eq!((again.new, again.kept), (1, 1));
-    let other = TurnRecipe {
+    let other = SequenceRecipe {
         frames: 12,
         ..turns(4)
     };
-    let error = write_turns(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
+    let error = write_sequences(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
     assert!(matches!(error, SynthError::Unusable { .. }), "{error:?}");
     let samples = tempfile::tempdir().unwrap();
     write_samples(&turns(4).recipe, &library, 1, samples.path(), &|| {}).unwrap();
-    let error = write_turns(&turns(4), &library, 1, samples.path(), &|| {}).unwrap_err();
+    let error = write_sequences(&turns(4), &library, 1, samples.path(), &|| {}).unwrap_err();
     assert!(matches!(error, SynthError::Unusable { .. }), "{error:?}");
     let mut other = turns(4);
     other.recipe.light = LightKind::Sh;
-    let error = write_turns(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
+    let error = write_sequences(&other, &library, 1, folder.path(), &|| {}).unwrap_err();
     assert!(matches!(error, SynthError::Unusable { .. }), "{error:?}");
 }
 
 #[test]
 fn some_frames_of_glossy_turns_are_saturated() {
     let folder = tempfile::tempdir().unwrap();
-    write_turns(&turns(5), &library(), 6, folder.path(), &|| {}).unwrap();
+    write_sequences(&turns(5), &library(), 6, folder.path(), &|| {}).unwrap();
     let dataset = Dataset::read(folder.path()).unwrap();
     let saturated: u32 = dataset
         .sessions

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::cast::{RadianceTransfer, TransferFinish};
 use super::curves::{CURVE_COEFFICIENTS, CurveCoefficients, TransferLobe, TransferMaterial};
-use super::rooms::Rooms;
+use super::environment_lights::EnvironmentLights;
 use super::timing::TableTiming;
 use crate::lighting::BlinnPhong;
 use crate::random::Random;
@@ -35,7 +35,7 @@ const ANGLES: usize = 36;
 
 /// A turn as its curves, and the truth.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DrawnTurn {
+pub struct TurnSample {
     /// Width and height, pixels.
     pub size: u32,
     /// The covered pixels, ascending: row times size plus column.
@@ -50,12 +50,12 @@ pub struct DrawnTurn {
     pub albedo: Vec<Vec3>,
 }
 
-impl DrawnTurn {
+impl TurnSample {
     /// How turns are drawn: another number draws another turn of a seed.
     pub const RECIPE: u32 = 2;
 
     /// The turn of a seed: the view in a random material and environment light.
-    pub(super) fn draw(view: &RadianceTransfer, rooms: &Rooms, seed: u64) -> Self {
+    pub(super) fn draw(view: &RadianceTransfer, rooms: &EnvironmentLights, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let finish = finish(view, &mut random);
         let material = TransferMaterial::draw(&mut random);

@@ -15,7 +15,7 @@ const BETWEEN: usize = 3;
 
 /// What is needed of the pictures in which one object is looked for.
 #[derive(Debug, Default)]
-pub(super) struct Demand {
+pub(super) struct RequiredRegions {
     /// How often the crop is halved for the finest template.
     halvings: usize,
     /// Of the brightness, from the largest picture that is made to the smallest.
@@ -24,7 +24,7 @@ pub(super) struct Demand {
     pub(super) needs: Vec<Needs>,
 }
 
-impl Demand {
+impl RequiredRegions {
     /// Of templates, from the finest on, at shifts of up to `reach` pixels of the coarsest.
     pub(super) fn new(templates: &[Template], crop: (u32, u32), halvings: u32, reach: f64) -> Self {
         let halvings = halvings as usize;

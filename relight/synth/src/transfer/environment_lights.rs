@@ -28,12 +28,12 @@ const ANY_WAY: f32 = 0.15;
 
 /// Light to draw from, in the table's frame.
 #[derive(Debug, Clone)]
-pub struct Rooms {
+pub struct EnvironmentLights {
     /// Mean radiance 1; one list a panorama: as it is, and in other curves of brightness.
     panoramas: Vec<Vec<ShLight>>,
 }
 
-impl Rooms {
+impl EnvironmentLights {
     /// Rooms of these panoramas, each in `variants` curves of brightness. Black panoramas are left out.
     #[must_use]
     pub fn new(panoramas: &[&Panorama], variants: u32, seed: u64) -> Self {

@@ -11,7 +11,7 @@
 mod description;
 mod ground_truth;
 mod simulated;
-mod stand;
+mod table_pose;
 #[cfg(test)]
 mod tests;
 
@@ -32,10 +32,10 @@ use super::library::Library;
 use super::samples::folder::{SynthSummary, holds_samples};
 use super::samples::sample::mask;
 use ground_truth::GroundTruthFolder;
-use simulated::{RenderedFrame, SimulatedTurn};
-pub(crate) use stand::{Stand, standing_object};
+use simulated::{RenderedFrame, SimulatedSequence};
+pub(crate) use table_pose::{TablePose, standing_object};
 
-pub use description::{FrameTruth, TurnDescription, TurnRecipe};
+pub use description::{FrameTruth, SequenceDescription, SequenceRecipe};
 
 /// Frames that are made in parallel before they are written.
 const BATCH: u32 = 32;
@@ -47,8 +47,8 @@ const BATCH: u32 = 32;
 /// # Errors
 /// If a setting is out of range, `out` holds another data set, or a file cannot be written: turns
 /// that are whole stay.
-pub fn write_turns(
-    turns: &TurnRecipe,
+pub fn write_sequences(
+    turns: &SequenceRecipe,
     library: &Library,
     count: u64,
     out: &Path,
@@ -66,7 +66,7 @@ pub fn write_turns(
     let mut dataset = open_dataset(out, &settings(turns))?;
     let mut written = SynthSummary::default();
     for number in 0..count {
-        let turn = SimulatedTurn::draw(turns, library, number);
+        let turn = SimulatedSequence::draw(turns, library, number);
         if is_whole(&turn, &dataset, out)? {
             written.kept += 1;
             (0..turns.frames).for_each(|_| progress());
@@ -80,7 +80,7 @@ pub fn write_turns(
     Ok(written)
 }
 
-fn settings(turns: &TurnRecipe) -> ExtractionSettings {
+fn settings(turns: &SequenceRecipe) -> ExtractionSettings {
     ExtractionSettings {
         frames: turns.frames,
         size: ImageSize::NATIVE,
@@ -107,7 +107,11 @@ fn open_dataset(out: &Path, settings: &ExtractionSettings) -> Result<Dataset, Sy
 }
 
 /// Whether the data set holds this very turn, whole.
-fn is_whole(turn: &SimulatedTurn<'_>, dataset: &Dataset, out: &Path) -> Result<bool, SynthError> {
+fn is_whole(
+    turn: &SimulatedSequence<'_>,
+    dataset: &Dataset,
+    out: &Path,
+) -> Result<bool, SynthError> {
     let Some(entry) = dataset.session(&turn.session) else {
         return Ok(false);
     };
@@ -121,7 +125,7 @@ fn is_whole(turn: &SimulatedTurn<'_>, dataset: &Dataset, out: &Path) -> Result<b
 
 /// Writes shard, table and ground truth.
 fn write_turn(
-    turn: &SimulatedTurn<'_>,
+    turn: &SimulatedSequence<'_>,
     folder: &OutputFolder,
     progress: &(dyn Fn() + Sync),
 ) -> Result<(SessionEntry, Vec<ShardEntry>), SynthError> {

@@ -9,7 +9,7 @@ const EXTENT: Extent = Extent::new(1024, 512);
 
 /// A panorama that is made.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Scenery {
+pub(crate) struct ProceduralPanorama {
     /// By what the page asks for it.
     pub(crate) id: &'static str,
     /// What a person reads.
@@ -17,7 +17,7 @@ pub(crate) struct Scenery {
     radiance: fn(Direction) -> Colour,
 }
 
-impl Scenery {
+impl ProceduralPanorama {
     /// All of them: a photographer's room with two soft boxes, a room with a window on the left and a lamp, a meadow under a
     /// clouded sky and at noon, a beach before sunset, a square at night between coloured lamps.
     pub(crate) const ALL: [Self; 6] = [
@@ -331,22 +331,22 @@ mod tests {
 
     #[test]
     fn each_has_a_name_of_its_own_and_is_found_by_its_id() {
-        for scenery in Scenery::ALL {
+        for scenery in ProceduralPanorama::ALL {
             assert_eq!(
-                Scenery::from_id(scenery.id).map(|found| found.name),
+                ProceduralPanorama::from_id(scenery.id).map(|found| found.name),
                 Some(scenery.name)
             );
-            let names = Scenery::ALL
+            let names = ProceduralPanorama::ALL
                 .iter()
                 .filter(|other| other.name == scenery.name);
             assert_eq!(names.count(), 1);
         }
-        assert!(Scenery::from_id("moon").is_none());
+        assert!(ProceduralPanorama::from_id("moon").is_none());
     }
 
     #[test]
     fn all_are_light_and_more_comes_from_above_than_from_below() {
-        for scenery in Scenery::ALL {
+        for scenery in ProceduralPanorama::ALL {
             let panorama = scenery.panorama_of(SMALL).unwrap();
             let planes = panorama.image().planes().planes();
             assert!(planes.into_iter().flatten().all(|value| *value >= 0.0));
@@ -358,7 +358,7 @@ mod tests {
 
     #[test]
     fn a_low_sun_is_warm() {
-        let evening = Scenery::from_id("evening")
+        let evening = ProceduralPanorama::from_id("evening")
             .unwrap()
             .panorama_of(SMALL)
             .unwrap()
@@ -369,7 +369,7 @@ mod tests {
 
     #[test]
     fn a_window_lights_from_the_left() {
-        let room = Scenery::from_id("room")
+        let room = ProceduralPanorama::from_id("room")
             .unwrap()
             .panorama_of(SMALL)
             .unwrap()
@@ -380,7 +380,7 @@ mod tests {
 
     #[test]
     fn left_and_right_edge_meet() {
-        for scenery in Scenery::ALL {
+        for scenery in ProceduralPanorama::ALL {
             let panorama = scenery.panorama_of(Extent::new(512, 256)).unwrap();
             let planes = panorama.image().planes();
             let apart = (0..256).filter(|&y| {

@@ -26,7 +26,7 @@ const MAX_DIFFERENT: f64 = 0.12;
 ///
 /// # Errors
 /// If the video cannot be read, is not that of the turn, or the ball is not in it or under the object's mask.
-pub(crate) fn film(
+pub(crate) fn probe_from_video(
     recording: &Recording,
     turn: &ReadTurn,
     probe: Probe,

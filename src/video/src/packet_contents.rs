@@ -11,7 +11,7 @@ use super::nal;
 
 /// What a packet holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Contents {
+pub(super) enum PacketContents {
     /// One picture.
     Picture,
     /// A picture that is never shown.
@@ -64,16 +64,16 @@ struct H264 {
 }
 
 impl H264 {
-    fn contents(&mut self, packet: &Packet) -> Contents {
+    fn contents(&mut self, packet: &Packet) -> PacketContents {
         if self.parser.is_field(packet) {
-            return Contents::Unclear;
+            return PacketContents::Unclear;
         }
         // Between pictures, a byte stream can have packets without any.
         let data = packet.data().unwrap_or_default();
         if self.byte_stream.has_picture(data) {
-            Contents::Picture
+            PacketContents::Picture
         } else {
-            Contents::Hidden
+            PacketContents::Hidden
         }
     }
 }
@@ -99,14 +99,14 @@ impl Inspector {
     }
 
     /// The contents of the next packet, and whether decoding can begin with it.
-    pub(super) fn inspect(&mut self, packet: &Packet) -> (Contents, bool) {
+    pub(super) fn inspect(&mut self, packet: &Packet) -> (PacketContents, bool) {
         let contents = match self.coding {
-            Coding::OneEach | Coding::OneEachInOrder => Contents::Picture,
+            Coding::OneEach | Coding::OneEachInOrder => PacketContents::Picture,
             Coding::H264 => match &mut self.h264 {
                 Some(h264) => h264.contents(packet),
-                None => Contents::Unclear,
+                None => PacketContents::Unclear,
             },
-            Coding::Any => Contents::Unclear,
+            Coding::Any => PacketContents::Unclear,
         };
         // The container's flag also means a recovery point, after which some pictures are incomplete.
         let key = packet.is_key()

@@ -5,7 +5,7 @@
 
 use crate::bitmap::{Bitmap, Component, Connectivity};
 
-use super::courses::{Courses, dot};
+use super::pixel_series::{PixelSeries, dot};
 
 /// A thin part is at most twice this share of the frame's width wide.
 const WIDTH: f64 = 0.004;
@@ -21,8 +21,8 @@ const NOISE: f32 = 1e-5;
 const MOSTLY: f64 = 0.35;
 
 /// The thin parts of `object` that are at least `least` pixels long and show what lies on both sides of them.
-pub(crate) fn whiskers(courses: &Courses, object: &Bitmap, least: usize) -> Bitmap {
-    let width = courses.size().0;
+pub(crate) fn thin_parts(series: &PixelSeries, object: &Bitmap, least: usize) -> Bitmap {
+    let width = series.size().0;
     let radius = ((width as f64 * WIDTH).round() as usize).max(1);
     let thin = object.minus(&object.opened(radius));
     let ground = object.inverted().eroded(1);
@@ -33,20 +33,20 @@ pub(crate) fn whiskers(courses: &Courses, object: &Bitmap, least: usize) -> Bitm
         }
         let pixels = pixels();
         let set = pixels.bits().iter().enumerate().filter(|(_, bit)| **bit);
-        let shown = set.filter(|(at, _)| is_between(courses, &ground, *at, REACH * radius));
+        let shown = set.filter(|(at, _)| is_between(series, &ground, *at, REACH * radius));
         shown.count() as f64 >= MOSTLY * part.area as f64
     };
     thin.parts_where(Connectivity::Eight, is_whisker)
 }
 
 /// Whether a pixel shows a mixture of what lies above and below it, or left and right of it.
-fn is_between(courses: &Courses, ground: &Bitmap, at: usize, reach: usize) -> bool {
-    let (width, height) = courses.size();
+fn is_between(series: &PixelSeries, ground: &Bitmap, at: usize, reach: usize) -> bool {
+    let (width, height) = series.size();
     let (x, y) = (at % width, at / width);
     let ground = |places: Vec<usize>| {
         let mut shown = places.into_iter().filter(|&at| ground.bits()[at]);
-        let nearest = courses.mean(&[shown.next()?]);
-        let next = shown.next().map(|at| courses.mean(&[at]));
+        let nearest = series.mean(&[shown.next()?]);
+        let next = shown.next().map(|at| series.mean(&[at]));
         Some(Side::new(nearest, next))
     };
     let above = (y.saturating_sub(reach)..y)
@@ -61,7 +61,7 @@ fn is_between(courses: &Courses, ground: &Bitmap, at: usize, reach: usize) -> bo
         (ground(above.collect()), ground(below.collect())),
         (ground(left.collect()), ground(right.collect())),
     ];
-    let own = courses.mean(&[at]);
+    let own = series.mean(&[at]);
     let mut pairs = pairs
         .iter()
         .filter_map(|(one, other)| Some((one.as_ref()?, other.as_ref()?)));
@@ -141,10 +141,10 @@ mod tests {
                 Rgb([level; 3])
             })
         });
-        let courses = Courses::new(&frames, SIZE);
+        let series = PixelSeries::new(&frames, SIZE);
         let whisker = |x: usize, y: usize| rim(y) && (40..80).contains(&x);
         let object = bitmap(|x, y| body(x, y) || stick(x, y) || whisker(x, y));
-        assert_eq!(whiskers(&courses, &object, 8), bitmap(whisker));
-        assert_eq!(whiskers(&courses, &object, 50).count(), 0);
+        assert_eq!(thin_parts(&series, &object, 8), bitmap(whisker));
+        assert_eq!(thin_parts(&series, &object, 50).count(), 0);
     }
 }

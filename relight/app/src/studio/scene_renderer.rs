@@ -7,8 +7,8 @@ use relight_photo::compositing::{
 use relight_photo::relighting::RelightableObject;
 use serde_json::{Value, json};
 
-use super::background::{StudioBackground, reduced};
-use super::error::Refusal;
+use super::background::{StudioBackground, downscaled};
+use super::error::StudioError;
 use super::pixels::{covering, rgba, shown};
 
 /// How much of a pixel an object covers at least where it counts as seen.
@@ -19,19 +19,19 @@ const MUCH_CLIPPED: f32 = 0.25;
 /// The last setting, with its inputs: a background, the scene without objects and without the
 /// light's angle, and its longest side. While only those change it stays.
 #[derive(Default)]
-pub(super) struct KeptEnvironment(Option<((SceneDescription, Option<u32>), SceneEnvironment)>);
+pub(super) struct EnvironmentCache(Option<((SceneDescription, Option<u32>), SceneEnvironment)>);
 
-impl KeptEnvironment {
+impl EnvironmentCache {
     /// The setting of a scene, `longest` pixels at most; the background is made ready for it.
     ///
     /// # Errors
     /// If the light is dark.
-    pub(super) fn of(
+    pub(super) fn get_or_make(
         &mut self,
         scene: &SceneDescription,
         background: &mut StudioBackground,
         longest: Option<u32>,
-    ) -> Result<&SceneEnvironment, Refusal> {
+    ) -> Result<&SceneEnvironment, StudioError> {
         background.prepare(scene, longest);
         let mut bare = scene.clone();
         bare.objects.clear();
@@ -39,8 +39,8 @@ impl KeptEnvironment {
         let key = (bare, longest);
         let tilt = SceneEnvironment::ground_tilt(scene, background.for_scene());
         let kept = self.0.take().filter(|(was, _)| *was == key);
-        let mut setting = match kept {
-            Some((_, setting)) => setting,
+        let mut environment = match kept {
+            Some((_, environment)) => environment,
             None => {
                 let lamp = scene
                     .light
@@ -49,8 +49,8 @@ impl KeptEnvironment {
                 SceneEnvironment::new(scene, background.for_scene(), lamp)?
             }
         };
-        setting.tilt = tilt;
-        Ok(&self.0.insert((key, setting)).1)
+        environment.tilt = tilt;
+        Ok(&self.0.insert((key, environment)).1)
     }
 }
 
@@ -60,34 +60,34 @@ pub(super) fn of_size(
     background: &StudioBackground,
     longest: u32,
 ) -> SceneDescription {
-    let extent = reduced(background.extent(scene.size), Some(longest));
+    let extent = downscaled(background.extent(scene.size), Some(longest));
     scene.size = [extent.width as u32, extent.height as u32];
     scene
 }
 
 /// A scene ready to be drawn: its objects in their setting before their background.
-pub(super) struct Drawing<'a> {
-    pub(super) setting: &'a SceneEnvironment,
+pub(super) struct SceneRenderer<'a> {
+    pub(super) environment: &'a SceneEnvironment,
     pub(super) background: &'a StudioBackground,
     scene: InsertScene<'a>,
     angle: f64,
 }
 
-impl<'a> Drawing<'a> {
+impl<'a> SceneRenderer<'a> {
     /// Objects as a scene describes them; `before`: as they were photographed, without shadows.
     ///
     /// # Errors
     /// If an object cannot stand where it should.
     pub(super) fn new(
         scene: &SceneDescription,
-        setting: &'a SceneEnvironment,
+        environment: &'a SceneEnvironment,
         background: &'a StudioBackground,
-        subjects: &[&'a RelightableObject],
+        relightables: &[&'a RelightableObject],
         before: bool,
-    ) -> Result<Self, Refusal> {
-        let pairs = scene.objects.iter().zip(subjects);
-        let objects = pairs.map(|(described, &subject)| {
-            let object = SceneObject::described(described, subject);
+    ) -> Result<Self, StudioError> {
+        let pairs = scene.objects.iter().zip(relightables);
+        let objects = pairs.map(|(described, &relightable)| {
+            let object = SceneObject::described(described, relightable);
             SceneObject {
                 relit: !before,
                 shadow: if before { 0.0 } else { object.shadow },
@@ -95,8 +95,8 @@ impl<'a> Drawing<'a> {
             }
         });
         Ok(Self {
-            scene: setting.scene(objects.collect())?,
-            setting,
+            scene: environment.scene(objects.collect())?,
+            environment,
             background,
             angle: scene.light.angle.to_radians(),
         })
@@ -106,9 +106,9 @@ impl<'a> Drawing<'a> {
     ///
     /// # Errors
     /// Those of the render layers.
-    pub(super) fn picture(&self) -> Result<(Rgb<Linear>, Vec<Value>), Refusal> {
+    pub(super) fn picture(&self) -> Result<(Rgb<Linear>, Vec<Value>), StudioError> {
         let layers = self.scene.layers(self.angle)?;
-        let background = self.background.seen(self.setting, self.angle);
+        let background = self.background.seen(self.environment, self.angle);
         let boxes = layers.iter().map(|layer| json!({ "box": seen(layer) }));
         let picture = self.scene.compose(&background, &layers, 0);
         Ok((picture, boxes.collect()))
@@ -118,8 +118,8 @@ impl<'a> Drawing<'a> {
     ///
     /// # Errors
     /// Those of the render layers.
-    pub(super) fn layers(&self) -> Result<(Vec<Vec<u8>>, Vec<Value>), Refusal> {
-        let background = self.background.seen(self.setting, self.angle);
+    pub(super) fn layers(&self) -> Result<(Vec<Vec<u8>>, Vec<Value>), StudioError> {
+        let background = self.background.seen(self.environment, self.angle);
         let (mut parts, mut objects) = (vec![shown(&background)], Vec::new());
         for layer in &self.scene.layers(self.angle)? {
             parts.push(covering(layer.colours(), layer.alpha()));
@@ -137,13 +137,13 @@ impl<'a> Drawing<'a> {
     /// What the person at the page should know of the setting.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        if let Some(sun) = &self.setting.sun {
+        if let Some(sun) = &self.environment.sun {
             let sure = 100.0 * sun.confidence;
             notes.push(format!(
                 "lit by the sun in the picture ({sure:.0} % confidence)"
             ));
         }
-        if let Some(exposure) = &self.setting.exposure
+        if let Some(exposure) = &self.environment.exposure
             && exposure.clipped > MUCH_CLIPPED
         {
             let part = 100.0 * exposure.clipped;

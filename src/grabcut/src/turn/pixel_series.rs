@@ -4,7 +4,7 @@ use image::RgbImage;
 
 /// The courses of all pixels: three numbers for each frame.
 #[derive(Debug)]
-pub(crate) struct Courses {
+pub(crate) struct PixelSeries {
     /// sRGB levels, pixel by pixel.
     levels: Vec<u8>,
     length: usize,
@@ -13,14 +13,14 @@ pub(crate) struct Courses {
     linear: [f32; 256],
 }
 
-impl Courses {
+impl PixelSeries {
     /// Of frames that all have this size.
     pub(crate) fn new(frames: &[RgbImage], size: (usize, usize)) -> Self {
         let length = 3 * frames.len();
         let mut levels = vec![0; length * size.0 * size.1];
         for (number, frame) in frames.iter().enumerate() {
-            let courses = levels.chunks_exact_mut(length.max(1));
-            for (course, pixel) in courses.zip(frame.as_raw().chunks_exact(3)) {
+            let series = levels.chunks_exact_mut(length.max(1));
+            for (course, pixel) in series.zip(frame.as_raw().chunks_exact(3)) {
                 course[3 * number..3 * number + 3].copy_from_slice(pixel);
             }
         }
@@ -139,13 +139,13 @@ mod tests {
     #[test]
     fn the_courses_of_all_pixels_are_those_of_each() {
         let frame = |level: u8| RgbImage::from_fn(5, 4, |x, y| Rgb([level, 10 * x as u8, y as u8]));
-        let courses = Courses::new(&[frame(0), frame(255)], (5, 4));
-        let all = courses.map_smooth(<[f32]>::to_vec);
+        let series = PixelSeries::new(&[frame(0), frame(255)], (5, 4));
+        let all = series.map_smooth(<[f32]>::to_vec);
         for (at, course) in all.iter().enumerate() {
-            let one = courses.smooth(at);
+            let one = series.smooth(at);
             let apart = course.iter().zip(&one).map(|(a, b)| (a - b).abs());
             assert!(apart.fold(0.0, f32::max) < 1e-5, "{at}");
         }
-        assert!((courses.mean(&[7])[3] - 1.0).abs() < 1e-6);
+        assert!((series.mean(&[7])[3] - 1.0).abs() < 1e-6);
     }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::sample::{SessionMask, check_image, check_record};
-use super::session::{Found, SessionCheck};
+use super::session::{SessionCheck, ShardContents};
 use crate::causes::with_causes;
 use crate::image_stats::MaskSpans;
 use crate::shard::ShardError;
@@ -27,7 +27,7 @@ const BATCH_BYTES: usize = 64 << 20;
 
 type Source = Hashing<BufReader<File>>;
 
-pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
+pub(super) fn check(check: &mut SessionCheck<'_>) -> ShardContents {
     let path = check.out.join(&check.shard.file);
     let samples = check.session.samples as usize;
     match File::open(&path).map_err(ShardError::io("open", &path)) {
@@ -37,7 +37,7 @@ pub(super) fn check(check: &mut SessionCheck<'_>) -> Found {
         }
         Err(error) => {
             check.note(None, with_causes(&error));
-            Found {
+            ShardContents {
                 samples: 0,
                 records: vec![None; samples],
             }
@@ -101,7 +101,7 @@ impl<'a, 'b> TarCheck<'a, 'b> {
         }
     }
 
-    fn run(mut self) -> Found {
+    fn run(mut self) -> ShardContents {
         loop {
             match self.tar.next() {
                 Ok(Some(member)) => self.add(member),
@@ -254,7 +254,7 @@ impl<'a, 'b> TarCheck<'a, 'b> {
     }
 
     /// Reads the rest and compares length and digest of the file.
-    fn finish(self) -> Found {
+    fn finish(self) -> ShardContents {
         let Self {
             check,
             tar,
@@ -269,14 +269,14 @@ impl<'a, 'b> TarCheck<'a, 'b> {
             Err(error) => check.note(None, format!("it could not be read to its end: {error}")),
         }
         let shard = check.shard;
-        if let Err(error) = compare(&shard.file, (shard.bytes, shard.blake3), source.found()) {
+        if let Err(error) = compare(&shard.file, (shard.bytes, shard.blake3), source.digest()) {
             check.note(None, with_causes(&error));
         }
         let complete = seen
             .iter()
             .filter(|parts| parts.iter().all(|&seen| seen))
             .count();
-        Found {
+        ShardContents {
             samples: complete as u64,
             records,
         }

@@ -1,9 +1,9 @@
 //! Counting how often the simulated serial port is opened: an Arduino's chip restarts each time.
 
 #[cfg(target_os = "linux")]
-pub(super) use self::notified::Openings;
+pub(super) use self::notified::OpenCounter;
 #[cfg(not(target_os = "linux"))]
-pub(super) use self::polled::Openings;
+pub(super) use self::polled::OpenCounter;
 
 /// By inotify, which reports every opening.
 #[cfg(target_os = "linux")]
@@ -15,9 +15,9 @@ mod notified {
     use rustix::fs::inotify;
     use rustix::io::Errno;
 
-    pub(in crate::simulator) struct Openings(OwnedFd);
+    pub(in crate::simulator) struct OpenCounter(OwnedFd);
 
-    impl Openings {
+    impl OpenCounter {
         pub(in crate::simulator) fn watch(port: &Path) -> Result<Self, Errno> {
             let flags = inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC;
             let watch = inotify::init(flags)?;
@@ -45,11 +45,11 @@ mod polled {
 
     use rustix::io::Errno;
 
-    pub(in crate::simulator) struct Openings {
+    pub(in crate::simulator) struct OpenCounter {
         closed: bool,
     }
 
-    impl Openings {
+    impl OpenCounter {
         pub(in crate::simulator) fn watch(_port: &Path) -> Result<Self, Errno> {
             Ok(Self { closed: true })
         }

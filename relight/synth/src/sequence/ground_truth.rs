@@ -6,9 +6,9 @@ use std::process;
 
 use relit_data::durable::publish;
 
-use super::simulated::{RenderedFrame, SimulatedTurn};
+use super::simulated::{RenderedFrame, SimulatedSequence};
 use crate::SynthError;
-use crate::samples::png::{Sixteen, encode_sixteen};
+use crate::samples::png::{Rgb16, encode_sixteen};
 
 /// The folder of the ground truth of all turns.
 const TRUTH: &str = "truth";
@@ -43,13 +43,13 @@ impl GroundTruthFolder {
     }
 
     /// Writes what all frames share.
-    pub(super) fn write_object(&self, turn: &SimulatedTurn<'_>) -> Result<(), SynthError> {
+    pub(super) fn write_object(&self, turn: &SimulatedSequence<'_>) -> Result<(), SynthError> {
         let (buffer, material) = (turn.scene.buffer(), &turn.material);
         self.write("turn.json", &turn.json())?;
         self.write("light.txt", turn.first_light().to_string().as_bytes())?;
-        let albedo = encode_sixteen(buffer, &Sixteen::up_to(&material.albedo, 1.0))?;
+        let albedo = encode_sixteen(buffer, &Rgb16::up_to(&material.albedo, 1.0))?;
         self.write("albedo.png", &albedo)?;
-        let normals = encode_sixteen(buffer, &Sixteen::normals(&material.normals))?;
+        let normals = encode_sixteen(buffer, &Rgb16::normals(&material.normals))?;
         self.write("normal.png", &normals)
     }
 

@@ -10,8 +10,8 @@ use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
 use relit_data::shard::{Digest, FrameRecord, Sample, SourceVideo};
 use relit_data::spec_net_gate::SPEC_NET_GATE;
 
-use super::description::{FrameTruth, TurnDescription, TurnRecipe};
-use super::stand::{Stand, standing_object};
+use super::description::{FrameTruth, SequenceDescription, SequenceRecipe};
+use super::table_pose::{TablePose, standing_object};
 use crate::SynthError;
 use crate::geometry::{GBuffer, Occluder};
 use crate::library::Library;
@@ -20,9 +20,9 @@ use crate::mesh::Mesh;
 use crate::random::{Random, stream};
 use crate::samples::camera::CameraModel;
 use crate::samples::finish::Finish;
-use crate::samples::png::{Sixteen, encode_sixteen};
+use crate::samples::png::{Rgb16, encode_sixteen};
 use crate::samples::recipe::{AMBIENT_RAYS, Recipe};
-use crate::samples::sample::{Whites, photograph};
+use crate::samples::sample::{WhiteLevels, photograph};
 use relight_core::light::{Direction, Order, Rotation, ShLight};
 
 /// Frames from which the exposure is found.
@@ -39,10 +39,10 @@ const CLIPPED: f32 = 0.5;
 const MAX_EXPOSURE: f32 = 3.0;
 
 /// A turn, ready to be rendered.
-pub(super) struct SimulatedTurn<'a> {
+pub(super) struct SimulatedSequence<'a> {
     pub(super) session: String,
     pub(super) object: String,
-    pub(super) description: TurnDescription,
+    pub(super) description: SequenceDescription,
     axis: Direction,
     library: &'a Library,
     pub(super) scene: SyntheticScene,
@@ -58,13 +58,13 @@ pub(super) struct RenderedFrame {
     pub(super) highlight: Vec<u8>,
 }
 
-impl<'a> SimulatedTurn<'a> {
-    pub(super) fn draw(turns: &TurnRecipe, library: &'a Library, number: u64) -> Self {
+impl<'a> SimulatedSequence<'a> {
+    pub(super) fn draw(turns: &SequenceRecipe, library: &'a Library, number: u64) -> Self {
         let recipe = &turns.recipe;
         let seed = stream(stream(recipe.seed, 4), number);
         let mut random = Random::new(seed);
         let (object, mesh) = standing_object(recipe, library, &mut random);
-        let stand = Stand::draw(&mut random, ELEVATIONS);
+        let stand = TablePose::draw(&mut random, ELEVATIONS);
         let scene = scene(recipe, &stand, &mesh, random.seed());
         let finish = Finish::draw(
             &mut random,
@@ -95,7 +95,7 @@ impl<'a> SimulatedTurn<'a> {
         let level = random.uniform(0.8..1.3);
         let is_clipped = finish.gloss.is_some() && random.chance(CLIPPED);
         let clipped = is_clipped.then(|| random.uniform(0.04..0.15));
-        let description = TurnDescription {
+        let description = SequenceDescription {
             schema: "relight.turn/1".to_owned(),
             seed,
             number,
@@ -192,13 +192,13 @@ impl<'a> SimulatedTurn<'a> {
         shaded.scale(camera.gain);
         let buffer = self.scene.buffer();
         let image = photograph(buffer, camera, &self.material, &shaded, 0);
-        let shading = Sixteen::up_to_largest(&shaded.shading);
-        let highlight = Sixteen::up_to_largest(&shaded.highlight);
+        let shading = Rgb16::up_to_largest(&shaded.shading);
+        let highlight = Rgb16::up_to_largest(&shaded.highlight);
         Ok(RenderedFrame {
             truth: FrameTruth {
                 index,
                 angle_deg: self.angle_deg(index),
-                white: Whites {
+                white: WhiteLevels {
                     shading: shading.white,
                     highlight: highlight.white,
                 },
@@ -229,7 +229,7 @@ impl<'a> SimulatedTurn<'a> {
 }
 
 /// The visible surface of an object on the plate.
-fn scene(recipe: &Recipe, stand: &Stand, mesh: &Mesh, seed: u64) -> SyntheticScene {
+fn scene(recipe: &Recipe, stand: &TablePose, mesh: &Mesh, seed: u64) -> SyntheticScene {
     let placement = stand.placement(mesh);
     let buffer = GBuffer::render(mesh, placement, stand.projection, recipe.size);
     if !recipe.shadows {

@@ -25,7 +25,7 @@ const OTHER_OUTLINE: f32 = 0.5;
 const OTHER_AREA: f64 = 0.2;
 
 /// One sentence for each thing that is worth a warning about a mask, and how much the mask does not fit.
-type MaskDoubts = (Vec<String>, Option<MaskMisfit>);
+type MaskWarnings = (Vec<String>, Option<MaskMisfit>);
 
 /// What is worth a warning about a mask; nothing if the video says nothing about it. `frame` is the one on which the
 /// mask was made, if that is known: in others the object may lie elsewhere.
@@ -34,33 +34,33 @@ type MaskDoubts = (Vec<String>, Option<MaskMisfit>);
 /// of relit-mask decides.
 ///
 /// # Errors
-/// [`ExtractError::Video`] or [`ExtractError::MaskDoubts`].
-pub fn mask_doubts(
+/// [`ExtractError::Video`] or [`ExtractError::MaskWarnings`].
+pub fn mask_warnings(
     video: &Video,
     mask: &GrayImage,
     frame: Option<u64>,
-) -> Result<MaskDoubts, ExtractError> {
+) -> Result<MaskWarnings, ExtractError> {
     let inside = mask.pixels().filter(|level| level.0 != [0]).count();
     if inside as f64 > LARGE * mask.len() as f64 {
         // Too little background is left to be compared with.
-        return Ok(MaskDoubts::default());
+        return Ok(MaskWarnings::default());
     }
-    let look = MaskLook {
+    let look = MaskComparison {
         video,
         mask,
         frame,
         halvings: halvings(mask.dimensions()),
     };
-    let first = look.shape(&video.quick_spread(FRAMES), Effort::Draft)?;
-    if first.is_none_or(|shape| shape.faults_at_a_look().is_empty()) {
-        return Ok(MaskDoubts::default());
+    let first = look.shape(&video.spread_key_frames(FRAMES), Effort::Draft)?;
+    if first.is_none_or(|shape| shape.quick_faults().is_empty()) {
+        return Ok(MaskWarnings::default());
     }
     let shape = look.shape(&video.spread(TURN_FRAMES), Effort::Fine)?;
-    Ok(shape.as_ref().map(doubts).unwrap_or_default())
+    Ok(shape.as_ref().map(warnings).unwrap_or_default())
 }
 
 /// A mask that is held against some frames of its video.
-struct MaskLook<'a> {
+struct MaskComparison<'a> {
     video: &'a Video,
     mask: &'a GrayImage,
     /// The frame on which the mask was made, if that is known.
@@ -68,7 +68,7 @@ struct MaskLook<'a> {
     halvings: u32,
 }
 
-impl MaskLook<'_> {
+impl MaskComparison<'_> {
     /// The mask's shape against that which frames of these numbers show; `None` if they say nothing about it.
     fn shape(&self, numbers: &[u64], effort: Effort) -> Result<Option<ShapeCheck>, ExtractError> {
         let small = halved(self.mask, self.halvings);
@@ -127,9 +127,9 @@ fn halved<P: Pixel<Subpixel = u8>>(
     })
 }
 
-fn doubts(shape: &ShapeCheck) -> MaskDoubts {
+fn warnings(shape: &ShapeCheck) -> MaskWarnings {
     let reasons = shape.faults();
-    let misfit = match (reasons.is_empty(), is_of_something_else(shape)) {
+    let misfit = match (reasons.is_empty(), is_of_another_object(shape)) {
         (true, _) => None,
         (false, false) => Some(MaskMisfit::InPart),
         (false, true) => Some(MaskMisfit::AsAWhole),
@@ -137,12 +137,12 @@ fn doubts(shape: &ShapeCheck) -> MaskDoubts {
     (reasons, misfit)
 }
 
-fn is_of_something_else(shape: &ShapeCheck) -> bool {
+fn is_of_another_object(shape: &ShapeCheck) -> bool {
     let regions = [&shape.leaks, &shape.missing, &shape.holes];
     let wrong_px: u64 = regions.into_iter().flatten().map(|region| region.px).sum();
     let has_other_outline = shape.outline < OTHER_OUTLINE * shape.outline_of_turn;
     let has_other_area = wrong_px as f64 > OTHER_AREA * shape.area_px as f64;
-    shape.is_of_something_else() || (has_other_outline && has_other_area)
+    shape.is_of_another_object() || (has_other_outline && has_other_area)
 }
 
 #[cfg(test)]
