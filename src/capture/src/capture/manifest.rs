@@ -70,16 +70,14 @@ pub(super) fn manifest(
 /// What a camera changes as it likes where it is not the driver that is asked: nobody can see that in
 /// the recording afterwards.
 fn not_held(locked: &LockedCamera) -> Vec<Fault> {
-    if locked.clock == FrameClock::Driver {
+    let not_held = &locked.plan.not_held;
+    if locked.clock == FrameClock::Driver || not_held.is_empty() {
         return Vec::new();
     }
-    let missing = locked.plan.missing.iter();
-    missing
-        .map(|missing| Fault {
-            t_us: 0,
-            what: format!("not held during the turn: {missing}"),
-        })
-        .collect()
+    vec![Fault {
+        t_us: 0,
+        what: not_held.to_string(),
+    }]
 }
 
 fn facts_of(table: &Table, settings: &Settings) -> TurntableFacts {
