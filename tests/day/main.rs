@@ -30,16 +30,29 @@ fn main() -> ExitCode {
         trouble::a_take_that_a_person_stopped_is_no_fault,
         trouble::the_emergency_stop_comes_first_and_the_aborted_object_after_it,
         where_the_programs_are_missing_the_page_says_so_and_offers_nothing,
-    ];
-    // It fails where an extraction is asked for during a take: the page does not show that it waits. Why is not known yet.
-    let by_taps = trial(
-        "a_day_goes_by_taps_from_an_empty_table_to_a_verified_data_set_and_the_next_object",
-        chromium::find,
+        a_session_that_opens_offers_nothing_until_its_steps_are_known,
         a_day_goes_by_taps_from_an_empty_table_to_a_verified_data_set_and_the_next_object,
-    );
+    ];
     let long = trial("a_day_of_whole_turns", chromium::find, a_day_of_whole_turns);
-    trials.extend([by_taps, long].map(|trial| trial.with_ignored_flag(true)));
+    trials.push(long.with_ignored_flag(true));
     trials::run(trials)
+}
+
+fn a_session_that_opens_offers_nothing_until_its_steps_are_known(browser: PathBuf) {
+    let rig = Rig::start(&SHORT_TURN);
+    rig.hold_recorded();
+    let mut phone = Phone::open(&browser, &rig.url, "opens");
+    phone.wait_for("document.querySelector('#sessions li button:enabled') !== null");
+    // Its steps cannot be there before this has been carried out.
+    let offered = phone.value(
+        "(() => { document.querySelector('#sessions li button').click(); \
+            const shown = [...document.querySelectorAll('#made button, #made a')].filter((part) => part.checkVisibility()); \
+            return shown.filter((part) => !part.disabled).map(({ id }) => id).join(' '); })()",
+    );
+    assert_eq!(offered, "");
+    phone.wait_for(
+        "!document.getElementById('edit-mask').disabled || !document.getElementById('job').hidden",
+    );
 }
 
 fn a_day_goes_by_taps_from_an_empty_table_to_a_verified_data_set_and_the_next_object(

@@ -17,7 +17,7 @@ pub(crate) struct Turn {
     degrees_per_second: f64,
     /// Frames of a take.
     pub(crate) frames: u32,
-    /// Longest wait for a step: what is made of sessions gives way to whatever else the machine does.
+    /// Longest wait for a step.
     pub(crate) longest: Duration,
 }
 
@@ -79,17 +79,15 @@ impl Rig {
     /// As on a machine that has the rig's program alone.
     pub(crate) fn start_without_programs(turn: &'static Turn) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let alone = folder.path().join("bin");
-        fs::create_dir(&alone).unwrap();
-        let program = alone.join("relit-capture");
+        let program = folder.path().join("relit-capture");
         fs::copy(relit_tests::program("relit-capture"), &program).unwrap();
         let mut command = Command::new(program);
-        command.env("PATH", &alone);
         command.args(["serve", "--camera", &turn.camera(), "--turntable", "sim:"]);
         Self::serve(command, turn, folder)
     }
 
-    /// In its own folder, by relative paths: the page shows them, and its pictures no path of this machine.
+    /// In a folder of its own, by relative paths: the page shows them, and its pictures no path of this machine. It finds
+    /// the programs beside it and nothing else, `nice` neither: they would wait for whatever else this machine does.
     fn serve(mut command: Command, turn: &'static Turn, folder: tempfile::TempDir) -> Self {
         symlink(fixtures(), folder.path().join("fixtures")).unwrap();
         command
@@ -97,6 +95,7 @@ impl Rig {
             .args(["--degrees-per-second", &turn.degrees_per_second.to_string()])
             .args(["--root", "sessions", "--datasets", "."])
             .current_dir(&folder)
+            .env("PATH", folder.path())
             .stdout(Stdio::piped());
         let mut child = command.spawn().unwrap();
         let mut line = String::new();

@@ -56,3 +56,25 @@ fn a_drop_that_is_not_allowed_leaves_two_sessions_and_exit_code_1_with_the_defau
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     assert_eq!(recordings(root.path()).unwrap().len(), 2);
 }
+
+#[test]
+fn a_replay_whose_controls_cannot_be_set_is_noted_once_with_all_of_them() {
+    let root = tempfile::tempdir().unwrap();
+    let output = record(root.path(), "", &[]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    let events = text.lines().map(|line| serde_json::from_str(line).unwrap());
+    let notes: Vec<serde_json::Value> = events
+        .filter(|event: &serde_json::Value| event["event"] == "check" && event["good"] == false)
+        .filter(|event| event["what"] == "camera settings")
+        .collect();
+    assert_eq!(notes.len(), 1, "{notes:?}");
+    let manifest = std::fs::read(fixture(SHORT).join("session.json")).unwrap();
+    let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
+    let recorded = manifest["camera"]["controls"].as_object().unwrap();
+    assert_eq!(recorded.len(), 4);
+    let found = notes[0]["found"].as_str().unwrap();
+    for named in recorded.keys().map(String::as_str).chain(["focus"]) {
+        assert!(found.contains(named), "{named}: {found}");
+    }
+}

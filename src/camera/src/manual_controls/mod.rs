@@ -5,6 +5,8 @@
 //! controls and reads them back. The names are those that `v4l2-ctl` prints; the kernel renamed
 //! several in 5.17, and both names are known.
 
+use std::fmt;
+
 use relit_data::causes::with_causes;
 
 use super::{Camera, CameraError, Control, ControlKind};
@@ -144,8 +146,42 @@ pub struct ControlSetting {
 pub struct ManualPlan {
     /// In this order: first all automatics off, then the values, which automatics would refuse.
     pub steps: Vec<ControlSetting>,
-    /// What cannot be held, a sentence each.
-    pub missing: Vec<String>,
+    /// What cannot be held.
+    pub not_held: NotHeld,
+}
+
+/// What a camera may change by itself during a turn, and why. As text it is one sentence.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct NotHeld {
+    /// Controls that the camera does not let be set.
+    pub locked: Vec<String>,
+    /// Properties of the picture that can be switched to manual, but have no value to set.
+    pub without_value: Vec<&'static str>,
+    /// Properties of the picture that the camera has no control for.
+    pub without_control: Vec<&'static str>,
+}
+
+impl NotHeld {
+    /// Whether all is held.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl fmt::Display for NotHeld {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parts = [
+            ("cannot be set", self.locked.join(", ")),
+            ("without a value to set", self.without_value.join(", ")),
+            ("without a control", self.without_control.join(", ")),
+        ];
+        let parts = parts.iter().filter(|(_, names)| !names.is_empty());
+        let parts: Vec<String> = parts
+            .map(|(why, names)| format!("{names} ({why})"))
+            .collect();
+        write!(f, "the camera may change by itself: {}", parts.join("; "))
+    }
 }
 
 /// A control whose value is not what it should be.
@@ -170,26 +206,19 @@ impl ManualPlan {
     pub fn new(controls: &[Control], wanted: &ManualValues) -> Self {
         let mut plan = Self::default();
         let mut values = Vec::new();
-        let mut absent = Vec::new();
         for aspect in &ASPECTS {
-            let before = plan.missing.len();
+            let before = plan.not_held.locked.len();
             let switched = plan.switch_off(controls, aspect);
             let held = plan.hold(controls, wanted, aspect, &mut values);
-            if aspect.is_needed && plan.missing.len() == before && !held {
-                let name = aspect.name;
-                if switched {
-                    let what =
-                        format!("the camera's {name} can be switched to manual, but not set");
-                    plan.missing.push(what);
+            let is_locked = plan.not_held.locked.len() > before;
+            if aspect.is_needed && !held && !is_locked {
+                let not_held = if switched {
+                    &mut plan.not_held.without_value
                 } else {
-                    absent.push(name);
-                }
+                    &mut plan.not_held.without_control
+                };
+                not_held.push(aspect.name);
             }
-        }
-        if !absent.is_empty() {
-            let names = absent.join(", ");
-            plan.missing
-                .push(format!("the camera has no control for {names}"));
         }
         plan.steps.extend(values);
         plan
@@ -228,10 +257,7 @@ impl ManualPlan {
                     self.steps.push(step(aspect, control, value));
                     switched = true;
                 }
-                _ => self.missing.push(format!(
-                    "the camera's {} cannot be switched to manual: {name} does not allow it",
-                    aspect.name
-                )),
+                _ => self.not_held.locked.push(name.to_owned()),
             }
         }
         switched
@@ -251,10 +277,7 @@ impl ManualPlan {
                 continue;
             };
             if !may_be_set(control) {
-                self.missing.push(format!(
-                    "the camera's {} cannot be set: {} may not be written now",
-                    aspect.name, control.name
-                ));
+                self.not_held.locked.push(control.name.clone());
                 continue;
             }
             let current = control.value.unwrap_or(control.default);

@@ -133,7 +133,7 @@ fn automatics_go_off_before_values_are_held() {
             ("backlight_compensation", 0),
         ]
     );
-    assert!(plan.missing.is_empty(), "{:?}", plan.missing);
+    assert!(plan.not_held.is_empty(), "{:?}", plan.not_held);
 }
 
 #[test]
@@ -150,20 +150,31 @@ fn names_from_before_linux_5_17_are_known_too() {
     ] {
         assert!(found.contains(&wanted), "{wanted:?} in {found:?}");
     }
-    assert!(plan.missing.is_empty(), "{:?}", plan.missing);
+    assert!(plan.not_held.is_empty(), "{:?}", plan.not_held);
 }
 
 #[test]
 fn missing_controls_are_named() {
     let plan = ManualPlan::new(&laptop(), &ManualValues::default());
-    assert_named(&plan.missing, &[&["gain", "focus"]]);
+    assert_eq!(plan.not_held.without_control, ["gain", "focus"]);
     let none = ManualPlan::new(&[], &ManualValues::default());
     assert_eq!(none.steps, []);
+    let needed = [
+        "exposure",
+        "gain",
+        "white balance",
+        "focus",
+        "power-line filter",
+    ];
+    let not_held = NotHeld {
+        without_control: needed.to_vec(),
+        ..NotHeld::default()
+    };
     assert_eq!(
-        none.missing,
-        ["the camera has no control for exposure, gain, white balance, focus, power-line filter"],
-        "in one line, and frame rate and backlight are not missed"
+        none.not_held, not_held,
+        "frame rate and backlight are not missed"
     );
+    assert!(is_named(&not_held.to_string(), &needed));
 }
 
 #[test]
@@ -199,8 +210,7 @@ fn an_exposure_without_a_manual_mode_is_named() {
     controls.retain(|control| control.name != "auto_exposure");
     controls.push(menu("auto_exposure", &[(3, "Aperture Priority Mode")], 3));
     let plan = ManualPlan::new(&controls, &ManualValues::default());
-    let named = ["exposure", "auto_exposure"];
-    assert!(plan.missing.iter().any(|missing| is_named(missing, &named)));
+    assert_eq!(plan.not_held.locked, ["auto_exposure"]);
     assert!(
         steps(&plan)
             .iter()
@@ -216,7 +226,13 @@ fn a_read_only_value_is_named_and_an_automatic_without_value_too() {
     }
     controls.retain(|control| control.name != "white_balance_temperature");
     let plan = ManualPlan::new(&controls, &ManualValues::default());
-    assert_named(&plan.missing, &[&["gain"], &["white balance"]]);
+    let not_held = NotHeld {
+        locked: vec!["gain".to_owned()],
+        without_value: vec!["white balance"],
+        without_control: Vec::new(),
+    };
+    assert_eq!(plan.not_held, not_held);
+    assert!(is_named(&not_held.to_string(), &["gain", "white balance"]));
 }
 
 #[test]

@@ -71,9 +71,9 @@ impl LockedCamera {
         let controls = camera.controls()?;
         require_kept(plan.check(&controls))?;
         checks.extend(settings_check(&plan));
-        let missing = plan.missing.iter().cloned();
-        let noted = missing.map(|missing| Check::noted("camera settings", missing));
-        checks.extend(noted);
+        if !plan.not_held.is_empty() {
+            checks.push(Check::noted("camera settings", plan.not_held.to_string()));
+        }
         let device = camera.info().address.to_string();
         let fourcc = mode.fourcc;
         let format = fourcc.pixel_format();
@@ -146,7 +146,7 @@ fn warm_up(camera: &mut dyn Camera, stop: &StopRequest) -> Result<f64, CaptureEr
     }
 }
 
-/// The controls that are held; `None` if there are none: the plan names those that are missing.
+/// The controls that are held; `None` if there are none: the plan says what is not held.
 fn settings_check(plan: &ManualPlan) -> Option<Check> {
     let steps = plan.steps.iter();
     let held: Vec<String> = steps

@@ -70,16 +70,14 @@ pub(super) fn manifest(
 /// What a camera may change by itself when its driver is not asked: this cannot be seen in
 /// the recording afterwards.
 fn not_held(locked: &LockedCamera) -> Vec<Fault> {
-    if locked.clock == FrameClock::Driver {
+    let not_held = &locked.plan.not_held;
+    if locked.clock == FrameClock::Driver || not_held.is_empty() {
         return Vec::new();
     }
-    let missing = locked.plan.missing.iter();
-    missing
-        .map(|missing| Fault {
-            t_us: 0,
-            what: format!("not locked during the turn: {missing}"),
-        })
-        .collect()
+    vec![Fault {
+        t_us: 0,
+        what: not_held.to_string(),
+    }]
 }
 
 fn facts_of(table: &Table, settings: &Settings) -> TurntableFacts {

@@ -158,7 +158,7 @@ function showQueue() {
   $("jobs").replaceChildren(...lines);
 }
 
-/** Forgets the session: the player is closed, and what it opens with next is not known yet. */
+/** Shows the steps of no session: what the player opens with next is not known yet. */
 export function hideSteps() {
   shown = null;
   for (const part of ["job", "job-failed", "make-all", "check-page", "report-page", "player-shard"]) $(part).hidden = true;
@@ -178,6 +178,7 @@ async function configure(change) {
 
 /** Sets up the buttons; `say` tells what went wrong where no session is shown. */
 export function startProcessing(say) {
+  hideSteps();
   $("make-mask").addEventListener("click", () => queue("mask"));
   $("edit-mask").addEventListener("click", edit);
   $("make-check").addEventListener("click", () => queue("check"));
