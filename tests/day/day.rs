@@ -13,7 +13,7 @@ use crate::rig::Rig;
 const READY: &str = "document.getElementById('state')?.dataset.state === 'ready'";
 /// Whether the outline of the mask lies over the frame.
 const OUTLINE: &str = "(() => { const line = document.getElementById('player-mask'); \
-    if (line.hidden || line.width === 0) return false; \
+    if (!line || line.hidden || line.width === 0) return false; \
     const { data } = line.getContext('2d').getImageData(0, 0, line.width, line.height); \
     return data.filter((value, at) => at % 4 === 3 && value > 0).length > 200; })()";
 
