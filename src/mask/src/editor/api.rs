@@ -72,7 +72,7 @@ impl App {
         &self,
         job: impl FnOnce(&EditorSession) -> Result<T, MaskingError> + Send + 'static,
     ) -> Result<T, Failure> {
-        let internal = || Failure::internal("the request could not be processed");
+        let broken = || Failure::internal("the request could not be processed");
         let permit = self.permits.clone().acquire_owned().await;
         let permit = permit.map_err(|_| broken())?;
         let session = self.session.clone();
