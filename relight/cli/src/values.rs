@@ -32,6 +32,11 @@ pub(crate) const NORMALS_Y: Choices<NormalsFrame> = &[
 
 /// How the colour of new light is shown.
 pub(crate) const WHITE_BALANCES: Choices<WhiteBalance> = &[
+    (
+        "adapted",
+        "A lamp as an eye sees it that adapts to it in part, a panorama as it is",
+        WhiteBalance::Adapted,
+    ),
     ("light", "As the light has it", WhiteBalance::Light),
     (
         "auto",

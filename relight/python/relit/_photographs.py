@@ -120,7 +120,7 @@ def relight(
     light_angle=0.0,
     background=None,
     fov=60.0,
-    white_balance="light",
+    white_balance="adapted",
     exposure=0.0,
     size=None,
     box=None,
@@ -140,7 +140,7 @@ def relight(
     background: "photo", "light" (the panorama), "grey", "black" or "white"; by default the panorama that lights the
         object, the photograph for its own light, or grey.
     fov: degrees of a panorama that the picture's longer side shows, 1 to 150.
-    white_balance: "light", or "auto" as by a camera that is balanced for it.
+    white_balance: "adapted", a lamp as an eye sees it that adapts to it in part; "light"; or "auto" as by a camera that is balanced for it.
     exposure: stops. With 0 the strongest light is as strong as in the photograph.
     size: the longest side of the result, pixels; by default the photograph's.
 
@@ -191,7 +191,7 @@ def insert(
     down=10.0,
     tilt=None,
     match=True,
-    white_balance="light",
+    white_balance="adapted",
     exposure=0.0,
     transfer=None,
     highlights="auto",

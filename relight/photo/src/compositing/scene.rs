@@ -17,6 +17,8 @@ pub struct InsertScene<'a> {
     panorama: Panorama,
     tilt: f64,
     matching: Harmonisation,
+    /// Whether the light says how bright objects are beside the background.
+    has_brightness_of_light: bool,
     objects: Vec<SceneObject<'a>>,
 }
 
@@ -43,8 +45,16 @@ impl<'a> InsertScene<'a> {
             panorama,
             tilt: tilt.to_radians(),
             matching,
+            has_brightness_of_light: false,
             objects,
         })
+    }
+
+    /// The same scene, in which the mean brightness of objects follows the light wholly: before the panorama that lights them, an
+    /// object is as bright as its mean irradiance and its albedo make it.
+    pub(crate) fn with_brightness_of_light(mut self) -> Self {
+        self.has_brightness_of_light = true;
+        self
     }
 
     /// All objects as they are seen after the light has turned about the vertical by so many radians, from back to front.
@@ -116,7 +126,12 @@ impl<'a> InsertScene<'a> {
             } else {
                 light.rotated(&Rotation::about(Direction::VIEWER, -angle))
             };
-            subject.relit(&turned.tinted([f64::from(scale); 3]), &object.change)?
+            let turned = turned.tinted([f64::from(scale); 3]);
+            if self.has_brightness_of_light {
+                subject.relit_wholly(&turned, &object.change)?
+            } else {
+                subject.relit(&turned, &object.change)?
+            }
         } else {
             subject.matte.foreground.clone()
         };

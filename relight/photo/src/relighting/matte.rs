@@ -77,7 +77,7 @@ impl Matte {
         let mut foreground = picture.foreground(&alpha);
         for (x, y) in pixels() {
             if let Some(near) = near[y * width + x] {
-                let colour = near.reached(foreground.pixel(x, y));
+                let colour = near.reached(foreground.pixel(x, y), alpha.pixel(x, y)[0]);
                 foreground.set_pixel(x, y, colour);
             }
         }
@@ -222,11 +222,12 @@ struct NearColour {
 }
 
 impl NearColour {
-    /// A colour as far as the object's reach.
-    fn reached(self, colour: [f32; 3]) -> [f32; 3] {
+    /// A colour as far as the object's reach, and the nearer to this one the less of the pixel the object covers: the more of it is
+    /// noise and background.
+    fn reached(self, colour: [f32; 3], alpha: f32) -> [f32; 3] {
         [0, 1, 2].map(|c| {
             let apart = (colour[c] - self.colour[c]).clamp(-self.most, self.most);
-            (self.colour[c] + apart).max(0.0)
+            (self.colour[c] + alpha * apart).max(0.0)
         })
     }
 }
