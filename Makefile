@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-programs setup-app setup-train training-data train-turn test test-day test-rig test-slurm test-objects test-field packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network docs fuzz firmware emulator flash
+.PHONY: help setup setup-programs setup-app setup-train training-data train-turn test test-day test-rig test-slurm test-objects test-field packages test-packages test-image test-python wheel bench-python image static release lint wasm app test-app demo bench bench-reader bench-network sheet docs fuzz firmware emulator flash
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -213,6 +213,10 @@ bench-network: setup-train $(BENCH_VENV)/torch-ready ## Measure relight's traini
 	cargo build --locked --release -p relight-train --example network_speed
 	$(BENCH_VENV)/bin/python tests/bench/network.py --program $(TARGET)/release/examples/network_speed \
 	    --runs $(BENCH_RUNS)
+
+sheet: setup ## Make twelve compositions of relight relight and relight insert, and a sheet of them
+	cargo build --locked --release -p relight -p relit-extract --bins
+	python3 tests/bench/sheet.py $(TARGET)/release fixtures $(TARGET)/sheet $(TARGET)/sheet.jpg
 
 docs: setup ## Write the options of all programs into docs/reference, and build the libraries' reference
 	RELIT_WRITE_HELP=1 cargo test --quiet --locked $(PROGRAMS) -p relight --test help

@@ -22,7 +22,7 @@ const CONTROLS = {
   "down": { of: "scene", read: ({ down }) => down, write: (down) => ({ down }), text: degrees },
   "scene-exposure": { of: "scene", read: ({ exposure }) => exposure, write: (exposure) => ({ exposure }), text: stops },
   "match": { of: "scene", read: ({ match }) => match, write: (match) => ({ match }) },
-  "balance": { of: "scene", read: ({ white_balance }) => white_balance === "auto", write: (auto) => ({ white_balance: auto ? "auto" : "light" }) },
+  "balance": { of: "scene", read: ({ white_balance }) => white_balance === "auto", write: (auto) => ({ white_balance: auto ? "auto" : "adapted" }) },
   "shape": { of: "scene", read: ({ size }) => size.join("x"), write: (text) => ({ size: text.split("x").map(Number) }) },
   "light-angle": { of: "light", read: ({ angle }) => angle, write: (angle) => ({ angle }), text: degrees },
   "azimuth": { of: "light", read: lampAzimuth, write: lampAt, text: degrees },

@@ -11,7 +11,7 @@ const BESIDE = 0.08;
 let keys = 0;
 
 export const emptyScene = (background) => ({
-  background, size: [1280, 960], fov: 60, down: 10, match: true, white_balance: "light", exposure: 0, light: LIGHT, objects: [],
+  background, size: [1280, 960], fov: 60, down: 10, match: true, white_balance: "adapted", exposure: 0, light: LIGHT, objects: [],
 });
 
 /** A new object of a scene. `key` is its name in the page as long as it exists. */

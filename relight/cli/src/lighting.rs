@@ -4,10 +4,30 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
+use relight_core::light::Panorama;
 use relight_core::render::{DiffuseForm, SpecularForm};
-use relight_photo::relighting::{DiscLamp, InsertError, LightSource};
+use relight_photo::relighting::{DiscLamp, InsertError, LightSource, PanoramaView};
 
 use crate::values::{Choices, degrees, one_of, within};
+
+/// How many pixels of a picture there may be to one of the panorama that it shows.
+const MAX_ENLARGEMENT: f64 = 4.0;
+
+/// What to say of a panorama that is too coarse for the picture in which it is seen; none where it is not.
+pub(crate) fn too_coarse(view: &PanoramaView, panorama: &Panorama) -> Option<String> {
+    let enlargement = view.enlargement(panorama);
+    let width = panorama.extent().width as f64;
+    (enlargement > MAX_ENLARGEMENT).then(|| {
+        let wanted = (width * enlargement / MAX_ENLARGEMENT / 1024.0).ceil() * 1024.0;
+        format!(
+            "the panorama has {:.1} pixels a degree and the picture {:.1}, so that it is blurred behind the object: give one of \
+             {wanted} x {} pixels, or a smaller picture",
+            width / 360.0,
+            enlargement * width / 360.0,
+            wanted / 2.0,
+        )
+    })
+}
 
 /// New light.
 #[derive(Args)]

@@ -32,6 +32,11 @@ pub(crate) const NORMALS_Y: Choices<NormalsFrame> = &[
 
 /// How the colour of new light is shown.
 pub(crate) const WHITE_BALANCES: Choices<WhiteBalance> = &[
+    (
+        "adapted",
+        "Partly adapted to a lamp, as the eye is; a panorama keeps its colour",
+        WhiteBalance::Adapted,
+    ),
     ("light", "The light keeps its colour", WhiteBalance::Light),
     (
         "auto",

@@ -366,7 +366,12 @@ fn objects_are_inserted_from_back_to_front_by_options_and_by_a_scene_file() {
     };
     let picture = |what: &str| {
         let command = format!("insert {what} --weights w.safetensors -o o.png");
-        assert_eq!(folder.code_and_errors(&command), (0, String::new()));
+        let (code, warnings) = folder.code_and_errors(&command);
+        // The panorama has a pixel for eleven degrees.
+        let is_panorama = fs::read_to_string(folder.path("scene.toml"))
+            .is_ok_and(|scene| what.contains("scene") && scene.contains("sky.exr"));
+        assert_eq!(code, 0, "{warnings}");
+        assert_eq!(warnings.contains("sky.exr"), is_panorama, "{warnings}");
         read_planes(&folder.path("o.png")).unwrap().0
     };
     let by_options = picture(
@@ -420,13 +425,13 @@ fn linear_photographs_are_inserted_as_such_and_a_warm_lamp_may_be_balanced() {
         assert_eq!(folder.code_and_errors(command), (0, String::new()));
         read_planes(&folder.path("o.png")).unwrap().0.pixel(32, 26)
     };
-    let warm = picture("", "");
+    let warm = picture("white_balance = \"light\"", "");
     let balanced = picture("white_balance = \"auto\"", "");
     assert!(
         warm[0] / warm[2] > 1.2 * balanced[0] / balanced[2],
         "{warm:?} {balanced:?}"
     );
-    let linear = picture("", "transfer = \"linear\"");
+    let linear = picture("white_balance = \"light\"", "transfer = \"linear\"");
     assert_ne!(linear, warm);
 }
 
@@ -441,7 +446,7 @@ fn a_captured_object_is_inserted_beside_photographs_and_needs_no_mask() {
     asset.write(&folder.path("red.relit")).unwrap();
     let common = "--into sky.exr --height 0.5 --weights w.safetensors -o";
     let command = format!("insert photos/one.png red.relit --mask masks {common} both.png");
-    assert_eq!(folder.code_and_errors(&command), (0, String::new()));
+    assert_eq!(folder.code_and_errors(&command).0, 0);
     let (picture, _) = read_planes(&folder.path("both.png")).unwrap();
     let red = picture.pixel(960, 630);
     // In light as blue as this, paper would be blue.
@@ -521,4 +526,19 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
     for name in ["o.png", "o.jpg", "o.mp4", "o.bmp"] {
         assert!(!folder.path(name).exists(), "{name}");
     }
+}
+
+#[test]
+fn what_is_withheld_of_a_lamp_is_told_and_is_a_third_at_most() {
+    let folder = Folder::new();
+    let lamp = "relight photos/one.png --mask masks/one.png --lamp -70,30 --weights w.safetensors";
+    let output = folder.run(&format!("--json {lamp} -o o.png"));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let events = text.lines().map(|line| serde_json::from_str(line).unwrap());
+    let relit: serde_json::Value = events
+        .filter(|event: &serde_json::Value| event["event"] == "relit")
+        .next_back()
+        .unwrap();
+    let withheld = relit["withheld"].as_f64().unwrap();
+    assert!((0.0..=1.0 / 3.0).contains(&withheld), "{withheld}");
 }

@@ -14,7 +14,7 @@ _Object = Union[_Image, tuple[_Image, Optional[_Image]]]
 _Floats = NDArray[numpy.float32]
 _Gate = Literal["auto", "on", "off"]
 _Transfer = Literal["srgb", "gamma22", "linear"]
-_Balance = Literal["light", "auto"]
+_Balance = Literal["adapted", "light", "auto"]
 
 class RelitWarning(UserWarning): ...
 
@@ -65,7 +65,7 @@ def relight(
     light_angle: Union[float, Sequence[float], NDArray[Any]] = 0.0,
     background: Optional[Literal["photo", "light", "grey", "black", "white"]] = None,
     fov: float = 60.0,
-    white_balance: _Balance = "light",
+    white_balance: _Balance = "adapted",
     exposure: float = 0.0,
     size: Optional[int] = None,
     box: Optional[Sequence[int]] = None,
@@ -92,7 +92,7 @@ def insert(
     down: float = 10.0,
     tilt: Optional[float] = None,
     match: bool = True,
-    white_balance: _Balance = "light",
+    white_balance: _Balance = "adapted",
     exposure: float = 0.0,
     transfer: Optional[_Transfer] = None,
     highlights: _Gate = "auto",

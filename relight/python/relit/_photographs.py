@@ -120,7 +120,7 @@ def relight(
     light_angle=0.0,
     background=None,
     fov=60.0,
-    white_balance="light",
+    white_balance="adapted",
     exposure=0.0,
     size=None,
     box=None,
@@ -137,11 +137,11 @@ def relight(
     ambient: ambient light, as a part of the lamp's, 0 to 10.
     light_angle: degrees by which the light is rotated about the vertical, from the viewer to the right; or several, for
         frames x rows x columns x 3.
-    background: "photo", "light" (the panorama), "grey", "black" or "white"; by default the light's panorama,
-        the photograph for its own light, or grey.
-    fov: angle of view into a panorama along the picture's longer side, degrees, 1 to 150.
-    white_balance: "light" keeps the light's colour, "auto" is as by a camera balanced for it.
-    exposure: stops; at 0 the strongest light is as strong as in the photograph.
+    background: "photo", "light" (the panorama), "grey", "black" or "white"; by default the panorama that lights the
+        object, the photograph for its own light, or grey.
+    fov: degrees of a panorama that the picture's longer side shows, 1 to 150.
+    white_balance: "adapted", a lamp as an eye sees it that adapts to it in part; "light"; or "auto" as by a camera that is balanced for it.
+    exposure: stops. With 0 the strongest light is as strong as in the photograph.
     size: the longest side of the result, pixels; by default the photograph's.
 
     The same as `relight relight`.
@@ -191,7 +191,7 @@ def insert(
     down=10.0,
     tilt=None,
     match=True,
-    white_balance="light",
+    white_balance="adapted",
     exposure=0.0,
     transfer=None,
     highlights="auto",

@@ -263,7 +263,11 @@ fn backdrop(
 }
 
 fn balance(name: &str) -> PyResult<WhiteBalance> {
-    let choices = [("light", WhiteBalance::Light), ("auto", WhiteBalance::Auto)];
+    let choices = [
+        ("adapted", WhiteBalance::Adapted),
+        ("light", WhiteBalance::Light),
+        ("auto", WhiteBalance::Auto),
+    ];
     choice("white_balance", name, &choices)
 }
 

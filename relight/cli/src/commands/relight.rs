@@ -20,7 +20,7 @@ use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
-use crate::lighting::{LightArguments, RotationArguments};
+use crate::lighting::{LightArguments, RotationArguments, too_coarse};
 use crate::photos::{Network, NetworkArguments, PhotoArguments, name_lost, not_an_input, outcome};
 use crate::values::{WHITE_BALANCES, one_of, within};
 
@@ -37,6 +37,8 @@ Examples:
 
 /// The default for the longest side of a video's frames.
 const MOVIE_SIDE: usize = 1080;
+/// The least withheld part of a change that is reported.
+const MIN_WITHHELD: f32 = 0.005;
 /// The value of `--light` for the photograph's own light.
 const OWN: &str = "own";
 
@@ -55,7 +57,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = within(1.0..=150.0, "degrees"))]
     fov: f64,
     /// White balance of the result.
-    #[arg(long, value_parser = one_of(WHITE_BALANCES), default_value = "light")]
+    #[arg(long, value_parser = one_of(WHITE_BALANCES), default_value = "adapted")]
     white_balance: WhiteBalance,
     /// Brightness in stops; at 0 the strongest light is as strong as in the photograph.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = within(-20.0_f32..=20.0, "stops"), allow_hyphen_values = true)]
@@ -232,6 +234,11 @@ impl Run<'_> {
         let source = self.light.as_ref().unwrap_or(&own);
         let light = source.light()?;
         let backdrop = self.backdrop(photo.picture.planes().extent());
+        if let Backdrop::Panorama(view, panorama) = &backdrop
+            && let Some(warning) = too_coarse(view, panorama)
+        {
+            console.warn(&format!("{}: {warning}", output.display()));
+        }
         let exposure = arguments.exposure.exp2();
         let shot =
             RelightingSequence::new(&photo.picture, &relightable, &light, backdrop, exposure)?;
@@ -247,8 +254,17 @@ impl Run<'_> {
         let seconds = start.elapsed().as_secs_f64();
         let note = photo.mask_note.as_ref();
         let note = note.map_or_else(String::new, |note| format!("; the mask {note}"));
+        let withheld = shot.withheld(arguments.light.angle());
+        let withheld_note = if withheld >= MIN_WITHHELD {
+            format!(
+                "; {:.0} % of the change in shading is withheld, because the object's shape is uncertain",
+                100.0 * withheld
+            )
+        } else {
+            String::new()
+        };
         let text = format!(
-            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposition{note}",
+            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposition{note}{withheld_note}",
             output.display(),
         );
         let event = json!({
@@ -259,6 +275,7 @@ impl Run<'_> {
             "seconds": seconds,
             "decompose_seconds": decomposed,
             "likeness": likeness(&relightable.light, &light),
+            "withheld": withheld,
         });
         console.print(&text, &event);
         Ok(())

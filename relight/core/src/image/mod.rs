@@ -6,6 +6,7 @@ mod colour_image;
 mod downscaled;
 mod error;
 mod extent;
+mod foreground;
 mod planes;
 mod png_rows;
 mod resize;

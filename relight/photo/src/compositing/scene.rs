@@ -17,6 +17,8 @@ pub struct InsertScene<'a> {
     panorama: Panorama,
     tilt: f64,
     harmonisation: Harmonisation,
+    /// Whether the light says how bright objects are beside the background.
+    has_brightness_of_light: bool,
     objects: Vec<SceneObject<'a>>,
 }
 
@@ -43,8 +45,16 @@ impl<'a> InsertScene<'a> {
             panorama,
             tilt: tilt.to_radians(),
             harmonisation,
+            has_brightness_of_light: false,
             objects,
         })
+    }
+
+    /// The same scene, in which the mean brightness of objects follows the light wholly: before the panorama that lights them, an
+    /// object is as bright as its mean irradiance and its albedo make it.
+    pub(crate) fn with_brightness_of_light(mut self) -> Self {
+        self.has_brightness_of_light = true;
+        self
     }
 
     /// All objects after the light has rotated about the vertical by so many radians, from back to front.
@@ -107,7 +117,7 @@ impl<'a> InsertScene<'a> {
         let angle = object.placement.rotation.to_radians();
         let mut gain = object.exposure.exp2();
         let colours = if object.relit {
-            // The background's brightness is no guess: it is not hedged as the light's shape is.
+            // The background's brightness is no guess: it is not damped as the light's shape is.
             gain *= self.harmonisation.level;
             let scale = exposure_between(&relightable.light, &self.light);
             // The object is turned back, and the light with it.
@@ -116,7 +126,12 @@ impl<'a> InsertScene<'a> {
             } else {
                 light.rotated(&Rotation::about(Direction::VIEWER, -angle))
             };
-            relightable.relit(&turned.tinted([f64::from(scale); 3]), &object.change)?
+            let turned = turned.tinted([f64::from(scale); 3]);
+            if self.has_brightness_of_light {
+                relightable.relit_wholly(&turned, &object.change)?
+            } else {
+                relightable.relit(&turned, &object.change)?
+            }
         } else {
             relightable.matte.foreground.clone()
         };

@@ -10,12 +10,9 @@ use relight_core::render::exposure_for;
 use super::{Harmonisation, InsertScene, ObjectDescription, SceneDescription, SceneObject};
 use crate::decompose::Photo;
 use crate::relighting::{
-    InsertError, LightSource, PanoramaExposure, PanoramaView, SeenSun, WhiteBalance, rows, tinted,
+    InsertError, LightSource, PanoramaExposure, PanoramaView, SeenSun, WHITE, WhiteBalance, rows,
 };
 
-/// The part of the brightest light that a white diffuse surface has in a picture of a panorama: bright places clip, as in
-/// photographs.
-const WHITE: f32 = 1.4;
 /// The size of a panorama from which shadows are drawn, at most.
 const MAX_AROUND: Extent = Extent::new(512, 256);
 /// The longer side of a panorama's picture for its exposure, pixels.
@@ -57,6 +54,8 @@ pub struct SceneEnvironment {
     projected: ShLight,
     /// The same as a panorama, from which shadows are drawn.
     around: Panorama,
+    /// Whether objects are lit by the panorama that is seen, so that one exposure holds for both.
+    is_one_light: bool,
     /// What a panorama's radiance is multiplied with to be shown.
     panorama_scale: [f32; 3],
 }
@@ -95,24 +94,30 @@ impl SceneEnvironment {
             SceneBackground::Picture(picture) => LightSource::from_picture(picture, scene.fov, sun),
         });
         let coefficients = light.light()?;
-        let tint = scene.white_balance.tint(&coefficients);
-        let light = scene.white_balance.shown(light)?;
-        let projected = if scene.white_balance == WhiteBalance::Light {
+        // A panorama behind objects is not seen by an eye that adapts to their lamp.
+        let tint = match scene.white_balance {
+            WhiteBalance::Auto => scene.white_balance.tint(&coefficients),
+            WhiteBalance::Adapted | WhiteBalance::Light => [1.0; 3],
+        };
+        let projected = if scene.white_balance.keeps(&light) {
             coefficients.clone()
         } else {
-            light.light()?
+            scene.white_balance.shown(light.clone())?.light()?
         };
+        let light = scene.white_balance.shown(light)?;
         let around = for_shadows(light.panorama());
         let base = exposure_for(&coefficients.clone().tinted(tint)) * WHITE * PI;
         let mut panorama_scale = tint.map(|t| t as f32 * base);
-        let mut exposure = None;
+        let (mut exposure, mut is_one_light) = (None, false);
         if let SceneBackground::Panorama(panorama) = background {
             // A lamp's strength and a panorama's are told in other units: each is exposed by itself.
-            let is_one_light = matches!(light, LightSource::Panorama(_));
+            is_one_light = matches!(light, LightSource::Panorama(_));
             let bound = is_one_light.then_some(&coefficients);
             let found = exposed(scene, panorama, panorama_scale, bound);
             let gain = found.stops.exp2();
-            harmonisation.level = if is_one_light {
+            harmonisation.level = if is_one_light && scene.matches {
+                WHITE * gain
+            } else if is_one_light {
                 gain
             } else {
                 scene.exposure.exp2()
@@ -131,6 +136,7 @@ impl SceneEnvironment {
             harmonisation,
             sun,
             exposure,
+            is_one_light,
             projected,
             around,
             panorama_scale,
@@ -160,7 +166,12 @@ impl SceneEnvironment {
     /// Whatever is wrong with an object or the background.
     pub fn scene<'a>(&self, objects: Vec<SceneObject<'a>>) -> Result<InsertScene<'a>, InsertError> {
         let light = (self.projected.clone(), self.around.clone());
-        InsertScene::new(self.extent, light, self.tilt, self.harmonisation, objects)
+        let scene = InsertScene::new(self.extent, light, self.tilt, self.harmonisation, objects)?;
+        Ok(if self.is_one_light && self.harmonisation.level != 1.0 {
+            scene.with_brightness_of_light()
+        } else {
+            scene
+        })
     }
 
     /// The visible part of a panorama that has rotated by so many radians, at its exposure.
@@ -171,8 +182,7 @@ impl SceneEnvironment {
 }
 
 fn shown(view: &PanoramaView, panorama: &Panorama, turn: f64, scale: [f32; 3]) -> Rgb<Linear> {
-    let seen = view.picture(panorama, turn).into_planes();
-    tinted(Rgb::new(seen.map(|v| v.max(0.0))), scale)
+    view.exposed(panorama, turn, scale)
 }
 
 /// A panorama no larger than shadows need it: it is turned and looked at again and again.
@@ -251,10 +261,10 @@ mod tests {
         let plain = SceneEnvironment::new(&scene, background, None).unwrap();
         assert_eq!(plain.extent, Extent::new(200, 100));
         assert_eq!(plain.light, LightSource::Panorama(panorama.clone()));
-        // The sky is even: it is brought to the brightness of a bright place, and the objects with it.
+        // The sky is even: it is brought to the brightness of a bright place, and the objects with it, as a white one would be.
         let exposure = plain.exposure.unwrap();
         assert!(exposure.clipped == 0.0 && !exposure.for_objects);
-        assert_eq!(plain.harmonisation.level, exposure.stops.exp2());
+        assert_eq!(plain.harmonisation.level, WHITE * exposure.stops.exp2());
         assert_eq!(plain.harmonisation.balance, [1.0; 3]);
         let view = PanoramaView::new(plain.extent, scene.fov, scene.down);
         let shown = |environment: &SceneEnvironment| {
@@ -316,6 +326,7 @@ mod tests {
         assert_eq!(taken.extent, Extent::new(64, 48));
         assert!(taken.harmonisation.level < 0.5 && taken.harmonisation.balance == [1.0; 3]);
         let lamp = LightSource::Lamp(DiscLamp::default());
+        let scene = described("white_balance = \"light\"");
         let given = SceneEnvironment::new(&scene, background, Some(lamp.clone())).unwrap();
         assert_eq!(given.light, lamp);
         assert!(given.harmonisation.balance[0] > given.harmonisation.balance[2]);

@@ -99,6 +99,7 @@ impl Shadow {
     /// The shadow of a shape on ground that the camera looks down on by `tilt` radians, in the light of a panorama.
     pub(crate) fn cast(relief: &HeightField, tilt: f64, light: &Panorama) -> Self {
         let ground = Ground::under(relief, tilt);
+        let relief = &relief.standing(|below| ground.depth(below));
         let patterns = rays(&ground, relief.around(), &light.resized(DRAWN));
         let Extent { width, height } = relief.extent;
         let (beside, beyond) = (
@@ -199,6 +200,11 @@ impl Ground {
         }
     }
 
+    /// How far towards the viewer it is, so far below the relief's first row.
+    fn depth(&self, below: f64) -> f64 {
+        (self.level + below * self.up[1]) / self.up[2]
+    }
+
     /// Fills in the part of the light that arrives at every fourth cell of a row of the ground, from cell `phase` on. The row is so
     /// far below the relief's first row, and begins at column `first` of the relief.
     fn shade(
@@ -208,8 +214,7 @@ impl Ground {
         row: &mut [&mut [f32]; 3],
         (phase, below, first): (usize, f64, f64),
     ) {
-        let z = (self.level + below * self.up[1]) / self.up[2];
-        let [y, z] = [-below as f32, z as f32];
+        let [y, z] = [-below as f32, self.depth(below) as f32];
         let middle = 0.5 + first as f32;
         // First all that is kept from each cell, then what is left of the light.
         for ray in rays {
@@ -287,7 +292,7 @@ impl HeightField {
     fn holds(&self, walk: &Walk) -> bool {
         self.cell(walk).is_some_and(|[column, row]| {
             let half = self.half[row * self.extent.width + column];
-            half > 0.0 && walk.z.abs() <= half
+            half > 0.0 && (walk.z - self.middle[column]).abs() <= half
         })
     }
 }
@@ -580,5 +585,26 @@ mod tests {
                 .iter()
                 .all(|&v| (v - 1.0).abs() < 1e-6)
         );
+    }
+
+    #[test]
+    fn a_leg_that_ends_higher_in_the_picture_does_not_float() {
+        let extent = Extent::new(60, 60);
+        let flat = Normals::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
+        let alpha = Planes::from_fn(extent, |x, y| {
+            let ends = [(8..20, 58), (40..52, 50)];
+            let is_leg = ends.iter().any(|(leg, end)| leg.contains(&x) && y < *end);
+            [f32::from(u8::from(
+                is_leg || (y < 12 && (8..52).contains(&x)),
+            ))]
+        });
+        let relief = HeightField::new(&flat, &alpha).unwrap();
+        let even = Panorama::from_light(
+            &relight_core::light::ShLight::even(relight_core::light::Order::TWO, [1.0; 3]),
+            Extent::new(64, 32),
+        );
+        let shadow = Shadow::cast(&relief, 0.5, &even);
+        let [lower, higher] = [(14, 58), (46, 50)].map(|(x, y)| 1.0 - arriving(&shadow, x, y));
+        assert!(lower > 0.1 && higher > 0.6 * lower, "{lower} {higher}");
     }
 }

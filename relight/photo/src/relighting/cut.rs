@@ -36,7 +36,7 @@ impl Cut {
             .cut(place, extent)
             .map(|m| f32::from(u8::from(m >= 0.5)));
         let matte = match alpha {
-            Some(alpha) => Matte::from_cut_out(&picture, &alpha.cut(place, extent)),
+            Some(alpha) => Matte::from_alpha(&picture, &alpha.cut(place, extent)),
             None => Matte::estimate(&picture, &mask, edge),
         };
         Ok(Self {

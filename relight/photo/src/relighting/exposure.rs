@@ -9,9 +9,12 @@ use relight_core::statistics::above_part;
 const BRIGHT: f32 = 0.8;
 /// The part of the pixels that is brighter.
 const BRIGHTEST_PART: f64 = 0.05;
+/// As what a white diffuse surface is shown in the brightest light of a panorama, before it is exposed: bright places clip, as in
+/// photographs. Objects in it are shown by as much brighter than in their photographs, in which white does not clip.
+pub(crate) const WHITE: f32 = 1.4;
 /// The least and the most that the mean light on the side of an object that is seen is shown as, where the strongest light of its
 /// photograph was 1: an object against the light does not become black, and one in it is not bleached.
-const OBJECT: (f32, f32) = (0.25, 1.2);
+const OBJECT: (f32, f32) = (0.25, 0.9);
 
 /// How a panorama and its light are exposed.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -34,7 +37,7 @@ impl PanoramaExposure {
             _ => 1.0,
         };
         let gain = light.map_or(wanted, |light| {
-            let facing = facing(light).max(f32::MIN_POSITIVE);
+            let facing = (WHITE * facing(light)).max(f32::MIN_POSITIVE);
             wanted.clamp(OBJECT.0 / facing, OBJECT.1 / facing)
         });
         Self {
@@ -115,10 +118,10 @@ mod tests {
     fn an_object_against_the_light_is_not_black_and_one_in_a_dark_room_is_not_bleached() {
         let behind = PanoramaExposure::new(&ramp(30.0), Some(&lamp(180.0)));
         assert!(behind.for_objects && behind.clipped > 0.1, "{behind:?}");
-        let shown = facing(&lamp(180.0)) * behind.stops.exp2();
+        let shown = WHITE * facing(&lamp(180.0)) * behind.stops.exp2();
         assert!((shown / OBJECT.0 - 1.0).abs() < 1e-3);
         let dark = PanoramaExposure::new(&ramp(0.01), Some(&lamp(0.0)));
-        let shown = facing(&lamp(0.0)) * dark.stops.exp2();
+        let shown = WHITE * facing(&lamp(0.0)) * dark.stops.exp2();
         assert!(dark.for_objects && (shown / OBJECT.1 - 1.0).abs() < 1e-3);
     }
 }

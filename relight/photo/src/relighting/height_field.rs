@@ -18,7 +18,13 @@ const BLOCK_BITS: u32 = 3;
 /// The side of a block, cells.
 pub(crate) const BLOCK: usize = 1 << BLOCK_BITS;
 
-/// The height of an object towards the viewer, cell by cell. The back is not seen: it is assumed to be the front,
+/// The part of an object's width over which a foot is the lowest of its outline.
+const FOOT: f64 = 1.0 / 16.0;
+/// The most that a foot stands before or behind the lowest one, as a part of the object's width: what would have to stand further
+/// away to touch the ground hangs in the air.
+const MAX_DEPTH: f64 = 0.5;
+
+/// How far an object reaches towards the viewer, cell by cell. What is behind is not seen: it is taken to be the front,
 /// mirrored at the plane of the rim.
 #[derive(Debug, Clone)]
 pub(crate) struct HeightField {
@@ -27,7 +33,9 @@ pub(crate) struct HeightField {
     pub(crate) scale: f64,
     /// Half the thickness, cells; 0 where there is nothing.
     pub(crate) half: Vec<f32>,
-    /// The most of it.
+    /// The depth of the middle of the thickness in each column, cells towards the viewer.
+    pub(crate) middle: Vec<f32>,
+    /// The most by which anything is before or behind the plane of the rim.
     pub(crate) thickest: f32,
     /// The most of it in each block of cells and in those that touch it.
     near: Vec<f32>,
@@ -70,19 +78,82 @@ impl HeightField {
             }
         });
         let half: Vec<f32> = half.collect();
-        Some(Self {
+        Some(Self::from_cells(
             extent,
             scale,
-            thickest: half.iter().fold(0.0, |a, &b| a.max(b)),
-            near: near(&half, extent),
-            blocks: extent.width.div_ceil(BLOCK),
             half,
-        })
+            vec![0.0; extent.width],
+        ))
     }
 
-    /// The most of half the thickness of all cells that are less than a block's side away from this one.
+    fn from_cells(extent: Extent, scale: f64, half: Vec<f32>, middle: Vec<f32>) -> Self {
+        let reach = |(at, &half): (usize, &f32)| {
+            if half > 0.0 {
+                half + middle[at % extent.width].abs()
+            } else {
+                0.0
+            }
+        };
+        let reach: Vec<f32> = half.iter().enumerate().map(reach).collect();
+        Self {
+            extent,
+            scale,
+            thickest: reach.iter().fold(0.0, |a, &b| a.max(b)),
+            near: near(&reach, extent),
+            blocks: extent.width.div_ceil(BLOCK),
+            half,
+            middle,
+        }
+    }
+
+    /// The same shape with all its feet on the ground, of which `depth` says how far towards the viewer it is at a row.
+    ///
+    /// A foot that ends higher in the picture than the lowest one stands further away. Feet are where the outline is lowest among
+    /// what is beside it, and not too high for the ground; between them depth changes evenly, as of an object that is seen aslant.
+    pub(crate) fn standing(&self, depth: impl Fn(f64) -> f64) -> Self {
+        let Extent { width, height } = self.extent;
+        let lowest: Vec<Option<usize>> = (0..width)
+            .map(|x| (0..height).rfind(|y| self.half[y * width + x] > 0.0))
+            .collect();
+        let across = lowest.iter().flatten().count() as f64;
+        let nearest = depth(
+            lowest
+                .iter()
+                .flatten()
+                .max()
+                .map_or(0.0, |&row| row as f64 + 1.0),
+        );
+        let beside = (across * FOOT).ceil() as usize;
+        let foot = |x: usize| {
+            let row = lowest[x]?;
+            let around = x.saturating_sub(beside)..(x + beside + 1).min(width);
+            let is_lowest = lowest[around].iter().flatten().all(|&other| other <= row);
+            let middle = (depth(row as f64 + 1.0) - nearest) as f32;
+            (is_lowest && f64::from(middle.abs()) <= MAX_DEPTH * across).then_some((x, middle))
+        };
+        let feet: Vec<(usize, f32)> = (0..width).filter_map(foot).collect();
+        let middle = (0..width).map(|x| between_feet(&feet, x)).collect();
+        Self::from_cells(self.extent, self.scale, self.half.clone(), middle)
+    }
+
+    /// The most of half the thickness and of the depth of all cells that are less than a block's side away from this one.
     pub(crate) fn thickest_near(&self, column: usize, row: usize) -> f32 {
         self.near[(row >> BLOCK_BITS) * self.blocks + (column >> BLOCK_BITS)]
+    }
+}
+
+/// The depth at a column between the feet beside it, or that of the last one.
+fn between_feet(feet: &[(usize, f32)], x: usize) -> f32 {
+    let next = feet.partition_point(|&(column, _)| column < x);
+    match (
+        next.checked_sub(1).and_then(|at| feet.get(at)),
+        feet.get(next),
+    ) {
+        (Some(&(left, a)), Some(&(right, b))) => {
+            a + (b - a) * (x - left) as f32 / (right - left) as f32
+        }
+        (Some(&(_, depth)), None) | (None, Some(&(_, depth))) => depth,
+        (None, None) => 0.0,
     }
 }
 
@@ -227,5 +298,42 @@ mod tests {
         let relief = HeightField::new(&flat, &Planes::filled(extent, [1.0])).unwrap();
         assert!(relief.half.iter().all(|&half| half == MIN_THICKNESS));
         assert!(HeightField::new(&flat, &Planes::zeros(extent)).is_none());
+    }
+
+    /// A table of two legs, of which the right one ends eight rows higher, and an arm that ends far above.
+    fn table() -> HeightField {
+        let extent = Extent::new(60, 60);
+        let flat = Normals::<YUp>::new(Planes::filled(extent, [0.0, 0.0, 1.0]));
+        let alpha = Planes::from_fn(extent, |x, y| {
+            let end = match x {
+                2..6 => 14,
+                10..16 => 58,
+                40..46 => 50,
+                _ => 0,
+            };
+            let is_top = (4..10).contains(&y) && (2..46).contains(&x);
+            [f32::from(u8::from(is_top || (4..end).contains(&y)))]
+        });
+        HeightField::new(&flat, &alpha).unwrap()
+    }
+
+    #[test]
+    fn feet_that_end_higher_stand_further_away_and_what_hangs_stays() {
+        // Ground that goes away by two cells for each row up.
+        let standing = table().standing(|below| 2.0 * below + 5.0);
+        assert!(standing.middle[12].abs() < 1e-4, "{:?}", standing.middle);
+        assert!(
+            (standing.middle[42] + 16.0).abs() < 1e-4,
+            "{:?}",
+            standing.middle
+        );
+        assert!(
+            (standing.middle[28] + 8.0).abs() < 1.0,
+            "{:?}",
+            standing.middle
+        );
+        // The arm would have to stand 88 cells away.
+        assert_eq!(standing.middle[3], standing.middle[10]);
+        assert!((standing.thickest - 16.0 - MIN_THICKNESS).abs() < 1e-4);
     }
 }

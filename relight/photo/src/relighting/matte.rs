@@ -19,6 +19,8 @@ const NEAREST_VARIANCE: f32 = 0.2;
 const SPREAD: f32 = 1.5;
 /// Steps in which the most probable alpha is found.
 const STEPS: usize = 4;
+/// The most by which values differ that are one colour but for rounding.
+const ONE_COLOUR: f32 = 0.01;
 /// The part of an object's side that its soft edge is wide.
 const EDGE_PART: f64 = 1.0 / 160.0;
 
@@ -41,9 +43,9 @@ impl Matte {
     /// In that band, F and B are colours of the object and of the background: the means nearby, or those of the nearest places,
     /// whichever explain the pixel better. Alpha is the most probable value where colours are spread about
     /// `alpha F + (1 - alpha) B` as those of both sides are, and alpha about the smoothed mask. So a bright place of a
-    /// many-coloured object stays part of it before a bright wall, and its shadow on the ground does not become part of it. The
-    /// colours are F and the part alpha of the residual, as in Forte, "Approximate Fast Foreground Colour Estimation" (2021), as
-    /// far as the object's colours reach: the residual of a many-coloured background would be black and white dots on the rim.
+    /// many-coloured object stays its own before a bright wall, and its shadow on the ground is no part of it. The
+    /// colours are those of [`Planes::foreground`], as far as the object's colours nearby reach: where alpha is too high, they would
+    /// be the background's, as dark or white dots on the rim.
     ///
     /// # Panics
     /// Where the mask has another size.
@@ -58,34 +60,54 @@ impl Matte {
         let object = Neighbours::new(picture, &inside, mask, edge);
         let beside = mask.clone().map(|m| 1.0 - m);
         let around = Neighbours::new(picture, &outside, &beside, edge);
-        let mut matte = Self {
-            alpha: inside,
-            foreground: picture.clone(),
-        };
+        let mut alpha = inside.clone();
         let Extent { width, height } = picture.extent();
-        for y in 0..height {
-            for x in 0..width {
-                if matte.alpha.pixel(x, y) == [1.0] {
-                    continue;
-                }
-                let is_outside = outside.pixel(x, y) == [1.0];
-                let (alpha, colour) = if is_outside {
-                    (0.0, object.mean.pixel(x, y))
-                } else {
-                    mixed(
-                        picture.pixel(x, y),
-                        smooth.pixel(x, y)[0],
-                        object.at(x, y).zip(around.at(x, y)),
-                    )
-                };
-                matte.alpha.set_pixel(x, y, [alpha]);
-                matte.foreground.set_pixel(x, y, colour);
+        let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        // The colour that the object has at a pixel of the band, and how far from it its colours may be.
+        let mut near = vec![None; picture.extent().pixels()];
+        for (x, y) in pixels() {
+            if inside.pixel(x, y) == [1.0] || outside.pixel(x, y) == [1.0] {
+                continue;
+            }
+            let sides = object.at(x, y).zip(around.at(x, y));
+            let (found, colour) = mixed(picture.pixel(x, y), smooth.pixel(x, y)[0], sides);
+            alpha.set_pixel(x, y, [found]);
+            near[y * width + x] = colour;
+        }
+        let mut foreground = picture.foreground(&alpha);
+        for (x, y) in pixels() {
+            if let Some(near) = near[y * width + x] {
+                let colour = near.reached(foreground.pixel(x, y), alpha.pixel(x, y)[0]);
+                foreground.set_pixel(x, y, colour);
             }
         }
-        matte.continued(2 * edge + 1)
+        Self { alpha, foreground }.continued(2 * edge + 1)
     }
 
-    /// The matte of a cut-out picture, whose colours are the object's own.
+    /// The matte of a picture that has alpha. Where it covers nothing, a picture that was cut out has one colour near the object,
+    /// and its colours are the object's own wherever it covers something. Else it still shows the background there, and at the soft
+    /// edge both: colours are freed of it, by [`Planes::foreground`].
+    ///
+    /// # Panics
+    /// Where alpha has another size.
+    #[must_use]
+    pub(crate) fn from_alpha(picture: &Planes<3>, alpha: &Planes<1>) -> Self {
+        let near = blurred(alpha, 2);
+        let mut range = [[f32::INFINITY, f32::NEG_INFINITY]; 3];
+        let bare = (0..near.plane(0).len())
+            .filter(|&at| alpha.plane(0)[at] <= 0.0 && near.plane(0)[at] > 0.0);
+        for at in bare {
+            for (range, plane) in range.iter_mut().zip(picture.planes()) {
+                *range = [range[0].min(plane[at]), range[1].max(plane[at])];
+            }
+        }
+        if range.iter().all(|[least, most]| most - least < ONE_COLOUR) {
+            return Self::from_cut_out(picture, alpha);
+        }
+        Self::from_cut_out(&picture.foreground(alpha), alpha)
+    }
+
+    /// The matte of an object whose colours are its own wherever it covers something.
     ///
     /// # Panics
     /// Where alpha has another size.
@@ -191,16 +213,35 @@ fn nearest(picture: &Planes<3>, far: &Planes<1>, near: &Planes<1>, reach: usize)
     first.extended(&known, &wanted)
 }
 
-/// Alpha and the object's colour of a pixel that may show both.
+/// The object's colour near a pixel of its edge.
+#[derive(Clone, Copy)]
+struct NearColour {
+    colour: [f32; 3],
+    /// How far a channel may be from it.
+    most: f32,
+}
+
+impl NearColour {
+    /// A colour as far as the object's reach, and the nearer to this one the less of the pixel the object covers: the more of it is
+    /// noise and background.
+    fn reached(self, colour: [f32; 3], alpha: f32) -> [f32; 3] {
+        [0, 1, 2].map(|c| {
+            let apart = (colour[c] - self.colour[c]).clamp(-self.most, self.most);
+            (self.colour[c] + alpha * apart).max(0.0)
+        })
+    }
+}
+
+/// Alpha of a pixel that may show both, and the object's colour there.
 fn mixed(
     pixel: [f32; 3],
     geometry: f32,
     sides: Option<([SideColour; 2], [SideColour; 2])>,
-) -> (f32, [f32; 3]) {
+) -> (f32, Option<NearColour>) {
     let Some((objects, arounds)) = sides else {
-        return (geometry, pixel);
+        return (geometry, None);
     };
-    let mut best = (f32::INFINITY, geometry, pixel);
+    let mut best = (f32::INFINITY, geometry, None);
     for (object, around) in objects
         .into_iter()
         .flat_map(|object| arounds.map(|around| (object, around)))
@@ -221,12 +262,11 @@ fn mixed(
         let alpha = mixture.alpha();
         let cost = mixture.cost(alpha);
         if cost < best.0 {
-            let most = SPREAD * mixture.variances[0].sqrt() / (1.0 - alpha).max(1e-6);
-            let colour = [0, 1, 2].map(|c| {
-                let rest = pixel[c] - alpha * object[c] - (1.0 - alpha) * around[c];
-                (object[c] + (alpha * rest).clamp(-most, most)).max(0.0)
-            });
-            best = (cost, alpha, colour);
+            let near = NearColour {
+                colour: object,
+                most: SPREAD * mixture.variances[0].sqrt() / (1.0 - alpha).max(1e-6),
+            };
+            best = (cost, alpha, Some(near));
         }
     }
     (best.1, best.2)
@@ -426,5 +466,34 @@ mod tests {
         let matte = Matte::from_cut_out(&picture, &alpha);
         assert_eq!(matte.alpha, alpha);
         assert_eq!(matte.foreground.pixel(4, 0), [0.5; 3]);
+    }
+
+    #[test]
+    fn a_picture_with_alpha_that_still_shows_its_background_is_freed_of_it() {
+        let extent = Extent::new(64, 64);
+        let alpha = Planes::from_fn(extent, |x, y| [coverage(x, y)]);
+        let ground = |x: usize| 0.05 + 0.01 * x as f32;
+        let picture = Planes::from_fn(extent, |x, y| {
+            let alpha = coverage(x, y);
+            OBJECT.map(|own| alpha * own + (1.0 - alpha) * ground(x))
+        });
+        let worst = |matte: &Matte| {
+            let partly = (0..extent.pixels()).filter(|&at| alpha.plane(0)[at] > 0.2);
+            partly
+                .map(|at| (matte.foreground.plane(0)[at] - OBJECT[0]).abs())
+                .fold(0.0, f32::max)
+        };
+        let freed = worst(&Matte::from_alpha(&picture, &alpha));
+        let kept = worst(&Matte::from_cut_out(&picture, &alpha));
+        assert!(freed < 0.1 && kept > 0.3, "{freed} {kept}");
+        // What was cut out has its own colours already.
+        let cut = Planes::from_fn(extent, |x, y| {
+            if coverage(x, y) > 0.0 {
+                OBJECT
+            } else {
+                [0.0; 3]
+            }
+        });
+        assert!(worst(&Matte::from_alpha(&cut, &alpha)) < 1e-6);
     }
 }

@@ -41,6 +41,7 @@ mod white_balance;
 
 pub use error::InsertError;
 pub use exposure::PanoramaExposure;
+pub(crate) use exposure::WHITE;
 #[cfg(feature = "files")]
 pub(crate) use height_field::HeightSolver;
 pub(crate) use height_field::{BLOCK, HeightField};
@@ -55,4 +56,3 @@ pub use source::{LightSource, exposure_between, likeness};
 pub use sun::SeenSun;
 pub use view::PanoramaView;
 pub use white_balance::WhiteBalance;
-pub(crate) use white_balance::tinted;

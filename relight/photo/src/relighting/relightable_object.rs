@@ -8,9 +8,9 @@ use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
 use super::placed_object::{PlacedObject, PlacedObjectCache};
 use super::placement::Fit;
-use super::shading::{DARK, Shading};
+use super::shading::{DARK, LeastKept, Shading};
 use super::smooth::weighted_mean;
-use super::source::likeness;
+use super::source::{directedness, likeness};
 use crate::decompose::{
     DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, WORKING_SIDE,
 };
@@ -231,9 +231,9 @@ impl RelightableObject {
     ///
     /// where t and u are the confidence in the decomposition. For a photograph t is 0.6. u is 0.2 where it is dark (S up to
     /// 0.15) to 0.8 where it is bright (from 0.5 on), 0.25 more where the network is certain how much of the dark is paint, and
-    /// as much less where it is uncertain. For a captured object both are 1. So relief and fine texture stay, shadows stay as
-    /// far as the light comes from the same directions, brightness changes only as far as the confidence allows, and the
-    /// photograph's own light gives the photograph.
+    /// as much less where it is uncertain; in the light of a lamp alone it is at least 0.8. For a captured object both are 1. So
+    /// relief and fine texture stay, shadows stay as far as the light comes from the same directions, brightness changes only as
+    /// far as the confidence allows, and the photograph's own light gives the photograph.
     ///
     /// # Errors
     /// None for a relightable, whose maps have one size; those of the render layers in general.
@@ -241,6 +241,35 @@ impl RelightableObject {
         &self,
         light: &ShLight,
         change: &MaterialChange,
+    ) -> Result<Planes<3>, InsertError> {
+        self.relit_by(light, change, LeastKept::in_light(directedness(light)))
+    }
+
+    /// The same, where the mean change of brightness is kept wholly: before what the light shows too, less would be wrong.
+    pub(crate) fn relit_wholly(
+        &self,
+        light: &ShLight,
+        change: &MaterialChange,
+    ) -> Result<Planes<3>, InsertError> {
+        let least = LeastKept::in_light(directedness(light)).with_mean();
+        self.relit_by(light, change, least)
+    }
+
+    /// The part of the change of brightness from place to place, as a logarithm, that [`RelightableObject::relit`] withholds in a
+    /// light because the decomposition is uncertain, 0 to 1.
+    #[must_use]
+    pub fn withheld(&self, light: &ShLight) -> f32 {
+        let kept = likeness(&self.light, light) as f32;
+        let irradiance = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(&self.normals);
+        let least = LeastKept::in_light(directedness(light));
+        self.shading.withheld(irradiance.planes(), kept, least)
+    }
+
+    fn relit_by(
+        &self,
+        light: &ShLight,
+        change: &MaterialChange,
+        least: LeastKept,
     ) -> Result<Planes<3>, InsertError> {
         let kept = likeness(&self.light, light) as f32;
         let irradiance = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(&self.normals);
@@ -254,7 +283,7 @@ impl RelightableObject {
                 let irradiance = [*red, *green, *blue];
                 let shades = self.shading.at(at, irradiance, kept);
                 let own = self.shading.own[at] + DARK;
-                let damping = self.shading.damping(at, shades, mean_change);
+                let damping = self.shading.damping(at, shades, mean_change, least);
                 let colours: [f32; 3] = std::array::from_fn(|channel| {
                     let grown = ((irradiance[channel] + DARK) / own).min(REST_GROWTH);
                     let colour = self.albedo.plane(channel)[at] * shades[channel]

@@ -21,12 +21,42 @@ const KEPT_OF_MEAN: f32 = 0.6;
 /// The part of the change's deviation from the mean that is kept where the shading is dark, which may be paint, and where it
 /// is bright.
 const KEPT_BESIDE: (f32, f32) = (0.2, 0.8);
-/// How much more of it is kept where the paint is certain than where it is uncertain.
+/// The least part of what is beside the mean that is kept in light that comes from one side alone: a lamp that is asked for is to be
+/// seen, though the object's shape is a guess.
+const KEPT_OF_LAMP: f32 = 0.8;
+/// By how much more of it is kept where it is certain what is paint than where nobody can tell.
 const KEPT_IF_CERTAIN: f32 = 0.5;
 /// Shading that counts as dark, and as bright.
 const DARK_AND_BRIGHT: (f32, f32) = (0.15, 0.5);
 
-/// The uncertainty of the decomposition of a photograph: see [`Shading::damping`].
+/// How much of a change of brightness is kept at the least, whatever is uncertain.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeastKept {
+    /// Of its mean over the object.
+    of_mean: f32,
+    /// Of what is beside the mean.
+    beside: f32,
+}
+
+impl LeastKept {
+    /// In light that comes from one side as much as this says, 0 to 1.
+    pub(crate) fn in_light(directedness: f32) -> Self {
+        Self {
+            of_mean: KEPT_OF_MEAN,
+            beside: KEPT_OF_LAMP * directedness,
+        }
+    }
+
+    /// The same, and all of the mean.
+    pub(crate) fn with_mean(self) -> Self {
+        Self {
+            of_mean: 1.0,
+            ..self
+        }
+    }
+}
+
+/// How little the decomposition of a photograph is believed: see [`Shading::damping`].
 #[derive(Debug, Clone)]
 struct Doubt {
     /// Pixels over which the mean change is taken.
@@ -152,12 +182,39 @@ impl Shading {
     /// grow with its distance from the shading S of the photograph. So only parts of its change c are kept: t of the mean m over
     /// the object, which is the brightness of the light on the visible side, and u of the deviation from m:
     /// `exp(-(1 - t) m - (1 - u) (c - m))`. It is 1 in the light of the photograph.
-    pub(crate) fn damping(&self, at: usize, new: [f32; 3], mean_change: f32) -> f32 {
+    pub(crate) fn damping(
+        &self,
+        at: usize,
+        new: [f32; 3],
+        mean_change: f32,
+        least: LeastKept,
+    ) -> f32 {
         let Some(Doubt { kept_beside, .. }) = &self.doubt else {
             return 1.0;
         };
         let beside = self.change(at, new) - mean_change;
-        ((KEPT_OF_MEAN - 1.0) * mean_change + (kept_beside[at] - 1.0) * beside).exp()
+        let kept_beside = kept_beside[at].max(least.beside);
+        ((least.of_mean - 1.0) * mean_change + (kept_beside - 1.0) * beside).exp()
+    }
+
+    /// The part of the change beside the mean that the damping withholds in new irradiance, 0 to 1.
+    pub(crate) fn withheld(&self, irradiance: &Planes<3>, kept: f32, least: LeastKept) -> f32 {
+        let Some(Doubt {
+            sample,
+            kept_beside,
+        }) = &self.doubt
+        else {
+            return 0.0;
+        };
+        let mean_change = self.mean_change(irradiance, kept);
+        let (mut all, mut withheld) = (0.0_f32, 0.0_f32);
+        for &at in sample {
+            let irradiance = std::array::from_fn(|channel| irradiance.plane(channel)[at]);
+            let beside = (self.change(at, self.at(at, irradiance, kept)) - mean_change).abs();
+            all += beside;
+            withheld += (1.0 - kept_beside[at].max(least.beside)) * beside;
+        }
+        if all > 0.0 { withheld / all } else { 0.0 }
     }
 }
 
@@ -190,13 +247,13 @@ mod tests {
         let new = Planes::filled(Extent::new(SIDE, SIDE), [1.0; 3]);
         let mean_change = shading.mean_change(&new, 0.0);
         let new = shading.at(at, [1.0; 3], 0.0);
-        new[0] * shading.damping(at, new, mean_change)
+        new[0] * shading.damping(at, new, mean_change, LeastKept::in_light(0.0))
     }
 
     #[test]
     fn a_shadow_goes_with_the_light_as_far_as_it_is_believed() {
         let shading = half_dark();
-        let hedged = moved(&shading, DARK_PLACE);
+        let damped = moved(&shading, DARK_PLACE);
         let mut trusted = shading;
         trusted.doubt = None;
         let believed = moved(&trusted, DARK_PLACE);
@@ -204,7 +261,7 @@ mod tests {
         // Of the change from 0.1 to 1, with d, half is that of the mean: 0.4 of that goes, and 0.8 of the rest.
         let change = (1.05_f32 / 0.15).ln();
         let expected = believed * (-0.4 * change / 2.0 - 0.8 * change / 2.0).exp();
-        assert!((hedged - expected).abs() < 0.03, "{hedged} {expected}");
+        assert!((damped - expected).abs() < 0.03, "{damped} {expected}");
     }
 
     #[test]
@@ -223,21 +280,45 @@ mod tests {
     }
 
     #[test]
-    fn what_the_light_does_not_change_is_not_hedged() {
+    fn what_the_light_does_not_change_is_not_damped() {
         let shading = half_dark();
         let same = shading.at(DARK_PLACE, [1.0; 3], 1.0);
         assert!((same[0] - 0.1).abs() < 1e-4);
         let new = Planes::filled(Extent::new(SIDE, SIDE), [1.0; 3]);
         let mean_change = shading.mean_change(&new, 1.0);
-        assert!((shading.damping(DARK_PLACE, same, mean_change) - 1.0).abs() < 1e-4);
+        let least = LeastKept::in_light(1.0);
+        let damping = shading.damping(DARK_PLACE, same, mean_change, least);
+        assert!((damping - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn of_a_lamp_no_more_than_a_third_is_withheld_anywhere() {
+        let shading = half_dark();
+        let new = Planes::filled(Extent::new(SIDE, SIDE), [1.0; 3]);
+        let withheld = |least| shading.withheld(&new, 0.0, least);
+        let (room, lamp) = (
+            withheld(LeastKept::in_light(0.0)),
+            withheld(LeastKept::in_light(1.0)),
+        );
+        assert!(room > 0.4 && lamp < 1.0 / 3.0, "{room} {lamp}");
+        let mean_change = shading.mean_change(&new, 0.0);
+        let shades = shading.at(DARK_PLACE, [1.0; 3], 0.0);
+        let damping = |least| shading.damping(DARK_PLACE, shades, mean_change, least);
+        let whole = damping(LeastKept::in_light(1.0).with_mean());
+        assert!(whole > damping(LeastKept::in_light(1.0)));
+        assert!(
+            (whole / (-0.2 * mean_change).exp() - 1.0).abs() < 0.02,
+            "{whole}"
+        );
     }
 
     #[test]
     fn light_of_another_colour_keeps_its_colour() {
         let shading = half_dark();
         let new = shading.at(DARK_PLACE, [1.5, 1.0, 0.5], 0.0);
-        let hedged = new.map(|value| value * shading.damping(DARK_PLACE, new, 0.3));
-        assert!((hedged[0] / hedged[1] - new[0] / new[1]).abs() < 1e-5);
+        let least = LeastKept::in_light(0.5);
+        let damped = new.map(|value| value * shading.damping(DARK_PLACE, new, 0.3, least));
+        assert!((damped[0] / damped[1] - new[0] / new[1]).abs() < 1e-5);
     }
 
     #[test]

@@ -84,6 +84,17 @@ pub fn likeness(old: &ShLight, new: &ShLight) -> f64 {
     1.0 - apart / (all + NEARLY_EVEN)
 }
 
+/// How much of a light comes from one side, 0 to 1: 1 for a lamp with hardly any light from elsewhere, 0 for most rooms.
+pub(crate) fn directedness(light: &ShLight) -> f32 {
+    let length = directed(light).iter().map(|c| c * c).sum::<f64>().sqrt();
+    let (room, lamp) = ROOM_AND_LAMP;
+    let part = ((length - room) / (lamp - room)).clamp(0.0, 1.0);
+    (part * part * (3.0 - 2.0 * part)) as f32
+}
+
+/// The irradiance of bands 1 and 2 over that of band 0 of light that comes from one side as it does in a room, and of a lamp's with
+/// the even light of [`DiscLamp::default`].
+const ROOM_AND_LAMP: (f64, f64) = (0.35, 0.7);
 /// Directed light below this part of the even light hardly makes a shadow.
 const NEARLY_EVEN: f64 = 0.05;
 
@@ -133,6 +144,19 @@ mod tests {
         assert!((exposure_between(&lamp(10.0), &bright) - 0.25).abs() < 1e-6);
         let turned = bright.rotated(&Rotation::about(Direction::UP, 1.0));
         assert!((exposure_between(&lamp(10.0), &turned) - 0.25).abs() < 0.005);
+    }
+
+    #[test]
+    fn a_lamp_comes_from_one_side_and_even_light_from_all() {
+        for azimuth in [0.0, 60.0, 180.0] {
+            assert!(directedness(&lamp(azimuth)) > 0.99);
+        }
+        let weak = DiscLamp {
+            ambient: 1.5,
+            ..DiscLamp::default()
+        };
+        assert_eq!(directedness(&weak.light(Order::TWO)), 0.0);
+        assert_eq!(directedness(&ShLight::even(Order::TWO, [1.0; 3])), 0.0);
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub struct PanoramaView {
     extent: Extent,
     /// For each pixel the part of the panorama's width and of its height.
     places: Vec<[f32; 2]>,
+    /// In the middle.
+    pixels_a_radian: f64,
 }
 
 impl PanoramaView {
@@ -43,68 +45,101 @@ impl PanoramaView {
         Self {
             extent,
             places: (0..extent.pixels()).map(place).collect(),
+            pixels_a_radian: 1.0 / scale,
         }
     }
 
     /// The radiance that it sees after the panorama has turned about the vertical by `turn` radians, from the viewer to the
-    /// right, as light does by [`ShLight::rotated`](relight_core::light::ShLight::rotated). Between pixels it is interpolated linearly.
+    /// right, as light does by [`ShLight::rotated`](relight_core::light::ShLight::rotated), in units in which 1 is shown as white.
     #[must_use]
     pub fn picture(&self, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
+        self.exposed(panorama, turn, [1.0; 3])
+    }
+
+    /// The same times `scale`, of which 1 is shown as white.
+    ///
+    /// A panorama that is seen enlarged is interpolated by the cubic B-spline, which has neither steps nor dark rims, else linearly.
+    /// What is brighter than white is compressed before and expanded after it: else a window or a lamp, a hundred times as bright as
+    /// the wall around, would grow to the middles of the pixels around and have steps for an outline.
+    #[must_use]
+    pub(crate) fn exposed(&self, panorama: &Panorama, turn: f64, scale: [f32; 3]) -> Rgb<Linear> {
         let source = panorama.image().planes();
         let Extent { width, height } = source.extent();
         let planes = source.planes();
         let shift = (turn / (2.0 * PI)).rem_euclid(1.0) as f32;
+        let is_smooth = self.enlargement(panorama) > MAX_LINEAR;
         let mut picture = Planes::zeros(self.extent);
         let columns = self.extent.width;
-        picture.fill_rows(|y, [red, green, blue]| {
+        picture.fill_rows(|y, mut row| {
             let places = &self.places[y * columns..][..columns];
-            let pixels = red.iter_mut().zip(green).zip(blue).zip(places);
-            for (((red, green), blue), &[across, down]) in pixels {
-                let (left, right, part) = between_around(across + shift, width);
-                let (above, below, under) = between(down, height);
-                let (above, below) = (above * width, below * width);
-                let corners = [above + left, above + right, below + left, below + right];
-                *red = mixed(planes[0], corners, [part, under]);
-                *green = mixed(planes[1], corners, [part, under]);
-                *blue = mixed(planes[2], corners, [part, under]);
+            for (x, &[across, down]) in places.iter().enumerate() {
+                let (first, across) = taps((across + shift).rem_euclid(1.0), width, is_smooth);
+                let (top, down) = taps(down, height, is_smooth);
+                let at = |tap: i64| (first + tap).rem_euclid(width as i64) as usize;
+                let columns = [0, 1, 2, 3].map(at);
+                let mut sum = [0.0; 3];
+                for (tap, weight) in (0..).zip(down) {
+                    let line = (top + tap).clamp(0, height as i64 - 1) as usize * width;
+                    for (channel, plane) in planes.into_iter().enumerate() {
+                        let values =
+                            columns.map(|column| compressed(scale[channel] * plane[line + column]));
+                        let across = values.iter().zip(across).map(|(value, part)| value * part);
+                        sum[channel] += weight * across.sum::<f32>();
+                    }
+                }
+                for (line, sum) in row.iter_mut().zip(sum) {
+                    line[x] = expanded(sum);
+                }
             }
         });
         Rgb::new(picture)
     }
+
+    /// How many of its pixels there are to one of a panorama, across, in the middle of what it sees: from about 4 on, the picture of
+    /// it is visibly blurred.
+    #[must_use]
+    pub fn enlargement(&self, panorama: &Panorama) -> f64 {
+        self.pixels_a_radian * 2.0 * PI / panorama.extent().width as f64
+    }
 }
 
-/// The value between four pixels, so far to the right and down.
+/// How many pixels of a picture there are to one of a panorama until linear interpolation shows.
+const MAX_LINEAR: f64 = 1.5;
+/// The most that a compressed value is.
+const MAX_COMPRESSED: f32 = 2.0 - 1e-5;
+
+/// Values up to white are as they are, and all brighter ones less than 2.
 #[inline]
-fn mixed(plane: &[f32], [a, b, c, d]: [usize; 4], [right, down]: [f32; 2]) -> f32 {
-    let upper = plane[a] + (plane[b] - plane[a]) * right;
-    let lower = plane[c] + (plane[d] - plane[c]) * right;
-    upper + (lower - upper) * down
+fn compressed(value: f32) -> f32 {
+    if value > 1.0 {
+        (2.0 - 1.0 / value).min(MAX_COMPRESSED)
+    } else {
+        value
+    }
 }
 
-/// The pixels between whose middles a place lies, and how far it is to the second; the ends meet. A place lies less than a width
-/// outside.
-fn between_around(part: f32, pixels: usize) -> (usize, usize, f32) {
+/// What was compressed.
+#[inline]
+fn expanded(value: f32) -> f32 {
+    if value > 1.0 {
+        1.0 / (2.0 - value.min(MAX_COMPRESSED))
+    } else {
+        value.max(0.0)
+    }
+}
+
+/// The first of the four pixels of a line around a place, which may lie outside, and their weights.
+fn taps(part: f32, pixels: usize, is_smooth: bool) -> (i64, [f32; 4]) {
     let place = part * pixels as f32 - 0.5;
-    let place = if place < 0.0 {
-        place + pixels as f32
+    let first = place.floor();
+    let (t, u) = (place - first, 1.0 - (place - first));
+    let weights = if is_smooth {
+        let near = |d: f32| 2.0 / 3.0 - d * d * (2.0 - d) / 2.0;
+        [u * u * u / 6.0, near(t), near(u), t * t * t / 6.0]
     } else {
-        place
+        [0.0, u, t, 0.0]
     };
-    let first = place as usize;
-    let left = if first >= pixels {
-        first - pixels
-    } else {
-        first
-    };
-    let right = if left + 1 == pixels { 0 } else { left + 1 };
-    (left, right, place - first as f32)
-}
-
-/// The same, where there is nothing beyond the ends.
-fn between(part: f32, pixels: usize) -> (usize, usize, f32) {
-    let place = (part * pixels as f32 - 0.5).clamp(0.0, (pixels - 1) as f32);
-    let first = place as usize;
-    (first, (first + 1).min(pixels - 1), place - first as f32)
+    (first as i64 - 1, weights)
 }
 
 #[cfg(test)]
@@ -112,13 +147,15 @@ mod tests {
     use super::*;
 
     fn numbered() -> Panorama {
-        let planes = Planes::from_fn(Extent::new(64, 32), |x, y| [x as f32, y as f32, 0.0]);
+        let planes = Planes::from_fn(Extent::new(64, 32), |x, y| {
+            [x as f32 / 64.0, y as f32 / 64.0, 0.0]
+        });
         Panorama::new(Rgb::new(planes)).unwrap()
     }
 
     fn middle(view: &PanoramaView, turn: f64) -> [f32; 3] {
         let seen = view.picture(&numbered(), turn);
-        seen.planes().pixel(20, 20)
+        seen.planes().pixel(20, 20).map(|part| 64.0 * part)
     }
 
     #[test]
@@ -130,8 +167,8 @@ mod tests {
             "{x} {y}"
         );
         let seen = view.picture(&numbered(), 0.0);
-        assert!(seen.planes().pixel(40, 20)[0] > 38.0);
-        assert!(seen.planes().pixel(20, 0)[1] < 8.5);
+        assert!(64.0 * seen.planes().pixel(40, 20)[0] > 38.0);
+        assert!(64.0 * seen.planes().pixel(20, 0)[1] < 8.5);
     }
 
     #[test]
@@ -148,5 +185,49 @@ mod tests {
         let level = middle(&PanoramaView::new(Extent::new(41, 41), 60.0, 0.0), 0.0);
         let down = middle(&PanoramaView::new(Extent::new(41, 41), 60.0, 30.0), 0.0);
         assert!((down[1] - level[1] - 32.0 / 6.0).abs() < 1e-2);
+    }
+
+    /// Light beyond a slanted edge, a hundred times as bright as white, seen much larger.
+    fn window() -> Rgb<Linear> {
+        let planes = Planes::from_fn(Extent::new(64, 32), |x, y| {
+            [if 2 * x + y > 82 { 100.0 } else { 0.2 }; 3]
+        });
+        let panorama = Panorama::new(Rgb::new(planes)).unwrap();
+        PanoramaView::new(Extent::new(200, 200), 60.0, 0.0).picture(&panorama, 0.0)
+    }
+
+    #[test]
+    fn a_window_much_brighter_than_white_has_a_smooth_outline() {
+        let seen = window();
+        // In each row the first column that is shown as white.
+        let edge: Vec<i64> = (60..140)
+            .map(|y| {
+                (0..200)
+                    .position(|x| seen.planes().pixel(x, y)[0] >= 1.0)
+                    .unwrap() as i64
+            })
+            .collect();
+        // A straight line but for a third of the panorama's pixels, which are 17 of these wide.
+        let (first, last) = (edge[0] as f64, edge[edge.len() - 1] as f64);
+        for (at, &column) in edge.iter().enumerate() {
+            let along = first + (last - first) * at as f64 / (edge.len() - 1) as f64;
+            assert!((column as f64 - along).abs() < 6.0, "{at} {column} {along}");
+        }
+    }
+
+    #[test]
+    fn light_beyond_white_keeps_its_strength() {
+        let seen = window();
+        let strongest = seen.planes().brightest().fold(0.0_f32, f32::max);
+        assert!((strongest / 100.0 - 1.0).abs() < 0.02, "{strongest}");
+        assert!(seen.planes().plane(0).iter().all(|&v| v >= 0.0));
+    }
+
+    #[test]
+    fn how_much_a_panorama_is_enlarged_is_known() {
+        let view = PanoramaView::new(Extent::new(200, 100), 60.0, 0.0);
+        // 200 pixels across 2 tan 30 degrees, and 64 across all around.
+        let expected = 200.0 / (2.0 * 30_f64.to_radians().tan()) * 2.0 * PI / 64.0;
+        assert!((view.enlargement(&numbered()) - expected).abs() < 1e-9);
     }
 }

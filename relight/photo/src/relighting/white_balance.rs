@@ -1,6 +1,6 @@
-//! How the colour of new light is shown: as it is, or by a camera that is balanced for it.
+//! How the colour of new light is shown: as it is, as an eye that adapts to it sees it, or by a camera that is balanced for it.
 
-use relight_core::image::{Linear, Rgb};
+use relight_core::image::Rgb;
 use relight_core::light::{Panorama, ShLight};
 use serde::{Deserialize, Serialize};
 
@@ -9,29 +9,52 @@ use super::{DiscLamp, InsertError, LightSource};
 /// The most by which a channel is changed: light of one colour alone cannot become white.
 const MAX_GAIN: f64 = 8.0;
 
+/// How far an eye adapts to the colour of a lamp: D = F (1 - exp(-(L + 42) / 92) / 3.6) of CIECAM02 (Moroney et al. 2002), in dim
+/// surroundings (F = 0.9) to which it is adapted at L = 20 cd/m².
+const ADAPTATION: f64 = 0.7726;
+
 /// How the colour of new light is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum WhiteBalance {
-    /// As the light has it.
+    /// The colour of a lamp or of coefficients as an eye sees it that adapts to it in part; a panorama, which is seen, as it is.
     #[default]
+    Adapted,
+    /// As the light has it.
     Light,
     /// As by a camera that is balanced for it: white is as grey in it as in the picture around the object.
     Auto,
 }
 
 impl WhiteBalance {
-    /// What light is multiplied with, channel by channel: its mean stays, and with [`WhiteBalance::Auto`] it becomes grey.
+    /// What light is multiplied with, channel by channel: its mean stays, and with [`WhiteBalance::Auto`] it becomes grey. With
+    /// [`WhiteBalance::Adapted`] it does so in part, after von Kries, as in CIECAM02: D mean / channel + 1 - D.
     #[must_use]
     pub fn tint(self, light: &ShLight) -> [f64; 3] {
         // The mean irradiance over all normals is that of band 0.
         let mean = light.coefficients().first().copied().unwrap_or([1.0; 3]);
         let grey = mean.iter().sum::<f64>() / 3.0;
+        let degree = match self {
+            Self::Adapted => ADAPTATION,
+            Self::Light => 0.0,
+            Self::Auto => 1.0,
+        };
+        if grey <= 0.0 {
+            return [1.0; 3];
+        }
+        mean.map(|c| {
+            let whole = (grey / c.max(grey / MAX_GAIN)).max(1.0 / MAX_GAIN);
+            degree * whole + (1.0 - degree)
+        })
+    }
+
+    /// Whether light is shown in the colours that it has.
+    #[must_use]
+    pub(crate) fn keeps(self, source: &LightSource) -> bool {
         match self {
-            Self::Auto if grey > 0.0 => {
-                mean.map(|c| (grey / c.max(grey / MAX_GAIN)).max(1.0 / MAX_GAIN))
-            }
-            _ => [1.0; 3],
+            Self::Adapted => matches!(source, LightSource::Panorama(_)),
+            Self::Light => true,
+            Self::Auto => false,
         }
     }
 
@@ -40,15 +63,17 @@ impl WhiteBalance {
     /// # Errors
     /// If the light is dark.
     pub fn shown(self, source: LightSource) -> Result<LightSource, InsertError> {
-        if self == Self::Light {
+        if self.keeps(&source) {
             return Ok(source);
         }
         let tint = self.tint(&source.light()?);
         Ok(match source {
             LightSource::Panorama(panorama) => {
-                let planes = panorama.image().planes().clone();
-                let tinted = tinted(Rgb::new(planes), tint.map(|t| t as f32));
-                LightSource::Panorama(Panorama::new(tinted)?)
+                let mut planes = panorama.image().planes().clone();
+                for (plane, tint) in planes.planes_mut().into_iter().zip(tint) {
+                    plane.iter_mut().for_each(|value| *value *= tint as f32);
+                }
+                LightSource::Panorama(Panorama::new(Rgb::new(planes))?)
             }
             LightSource::Lamp(lamp) => LightSource::Lamp(DiscLamp {
                 colour: [0, 1, 2].map(|c| lamp.colour[c] * tint[c]),
@@ -57,15 +82,6 @@ impl WhiteBalance {
             LightSource::Coefficients(light) => LightSource::Coefficients(light.tinted(tint)),
         })
     }
-}
-
-/// A picture whose channels are multiplied.
-pub(crate) fn tinted(mut picture: Rgb<Linear>, tint: [f32; 3]) -> Rgb<Linear> {
-    let planes = picture.planes_mut().planes_mut();
-    for (plane, tint) in planes.into_iter().zip(tint) {
-        plane.iter_mut().for_each(|value| *value *= tint);
-    }
-    picture
 }
 
 #[cfg(test)]
@@ -90,6 +106,20 @@ mod tests {
         let before: f64 = mean(&warm()).iter().sum();
         assert!((shown.iter().sum::<f64>() / before - 1.0).abs() < 1e-6);
         assert!((shown[0] / shown[2] - 1.0).abs() < 1e-6, "{shown:?}");
+    }
+
+    #[test]
+    fn to_a_lamp_an_eye_adapts_in_part_and_a_panorama_is_shown_as_it_is() {
+        let ratio = |balance: WhiteBalance| {
+            let [r, _, b] = mean(&balance.shown(warm()).unwrap());
+            r / b
+        };
+        let adapted = ratio(WhiteBalance::Adapted);
+        assert!(adapted > 1.1 * ratio(WhiteBalance::Auto));
+        assert!(adapted < 0.4 * ratio(WhiteBalance::Light), "{adapted}");
+        let blue = ShLight::even(Order::TWO, [0.2, 0.4, 1.0]);
+        let sky = LightSource::Panorama(Panorama::from_light(&blue, Extent::new(32, 16)));
+        assert_eq!(WhiteBalance::default().shown(sky.clone()).unwrap(), sky);
     }
 
     #[test]

@@ -14,6 +14,7 @@ use serde_json::json;
 
 pub(crate) use self::arguments::{Arguments, EXAMPLES};
 use crate::commands::CommandResult;
+use crate::lighting::too_coarse;
 use crate::photos::not_an_input;
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
@@ -33,6 +34,12 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     }
     let background = BackgroundFile::read(&file(&scene.background), &scene)?;
     check_output(&background, arguments)?;
+    if let BackgroundFile::Panorama(parts) = &background
+        && let Some(warning) = too_coarse(&parts.0, &parts.1)
+    {
+        let path = file(&scene.background);
+        console.warn(&format!("{}: {warning}", path.display()));
+    }
     if let Some(conversion) = background.colour_conversion() {
         let path = file(&scene.background);
         console.warn(&format!(

@@ -11,8 +11,11 @@ use crate::model::material::MaterialKind;
 use crate::observe::curves::TurnCurves;
 use crate::observe::reading::ReadTurn;
 
-/// What a pixel beside another one contributes to its coverage, over the pixel itself. By hand: a deviation of 0.6 pixels.
-const EDGE: f32 = 0.25;
+/// The standard deviation by which a mask is smoothed to find its outline, pixels. By hand: steps of some pixels vanish, and parts
+/// of three pixels stay.
+const OUTLINE: f32 = 1.5;
+/// How far that reaches, pixels.
+const REACH: i64 = 5;
 /// Coverage below which a pixel is not part of the object, 0 to 1. By hand.
 const MIN_ALPHA: f32 = 0.02;
 
@@ -49,7 +52,7 @@ impl TurnSolution {
         let curves = &turn.curves;
         let extent = curves.extent();
         let mask = curves.mask();
-        let alpha = softened(&turn.mask);
+        let alpha = coverage(&turn.mask);
         let inner: Vec<bool> = (0..mask.len())
             .map(|at| {
                 mask[at]
@@ -76,29 +79,54 @@ impl TurnSolution {
     }
 }
 
-/// The part of each pixel under the mask, were its edge as soft as a lens makes it; what is hardly anything is nothing.
-fn softened(mask: &Planes<1>) -> Planes<1> {
+/// The part of each pixel that the object covers; what is hardly anything is nothing.
+///
+/// A mask that says it pixel by pixel is taken as it is. The outline of another is smoothed, so that it has no steps, and is one pixel
+/// wide: alpha follows the distance from where the smoothed mask is one half. What is too thin for that keeps what is left of it.
+fn coverage(mask: &Planes<1>) -> Planes<1> {
+    let is_partly = |value: &&f32| (MIN_ALPHA..1.0 - MIN_ALPHA).contains(*value);
+    let whole = |alpha: f32| if alpha < MIN_ALPHA { 0.0 } else { alpha };
+    if mask.plane(0).iter().any(|value| is_partly(&value)) {
+        return mask.clone().map(whole);
+    }
     let Extent { width, height } = mask.extent();
-    let near = |at: usize, size: usize| {
-        let places = [
-            (at.checked_sub(1), EDGE),
-            (Some(at), 1.0),
-            (Some(at + 1), EDGE),
-        ];
-        let places = places.into_iter();
-        places.filter_map(move |(at, weight)| Some((at.filter(|&at| at < size)?, weight)))
-    };
+    let smooth = smoothed(mask);
+    let at = |x: usize, y: usize| smooth.pixel(x, y)[0];
     Planes::from_fn(mask.extent(), |x, y| {
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for (row, down) in near(y, height) {
-            for (column, across) in near(x, width) {
-                sum += down * across * mask.pixel(column, row)[0];
-                weights += down * across;
-            }
-        }
-        let alpha = sum / weights;
-        [if alpha < MIN_ALPHA { 0.0 } else { alpha }]
+        let right = (x + 1).min(width - 1);
+        let below = (y + 1).min(height - 1);
+        let (left, above) = (x.saturating_sub(1), y.saturating_sub(1));
+        let across = (at(right, y) - at(left, y)) / (right - left).max(1) as f32;
+        let down = (at(x, below) - at(x, above)) / (below - above).max(1) as f32;
+        let beyond = (at(x, y) - 0.5) / across.hypot(down).max(f32::MIN_POSITIVE);
+        let thin = mask.pixel(x, y)[0] * at(x, y);
+        [whole((0.5 + beyond).clamp(0.0, 1.0).max(thin))]
     })
+}
+
+/// The mean of each pixel's surroundings, weighted as a Gaussian.
+fn smoothed(mask: &Planes<1>) -> Planes<1> {
+    let Extent { width, height } = mask.extent();
+    let weights: Vec<f32> = (-REACH..=REACH)
+        .map(|step| (-0.5 * (step as f32 / OUTLINE).powi(2)).exp())
+        .collect();
+    let all: f32 = weights.iter().sum();
+    let along = |source: &Planes<1>, across: bool| {
+        Planes::from_fn(source.extent(), |x, y| {
+            let taps = (-REACH..=REACH).zip(&weights).map(|(step, weight)| {
+                let line =
+                    |at: usize, size: usize| (at as i64 + step).clamp(0, size as i64 - 1) as usize;
+                let [x, y] = if across {
+                    [line(x, width), y]
+                } else {
+                    [x, line(y, height)]
+                };
+                weight * source.pixel(x, y)[0]
+            });
+            [taps.sum::<f32>() / all]
+        })
+    };
+    along(&along(mask, true), false)
 }
 
 #[cfg(test)]
