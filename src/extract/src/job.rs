@@ -18,7 +18,7 @@ use relit_data::shard::{
 };
 use relit_video::Video;
 
-use super::interpolate::ShiftCourse;
+use super::interpolated_shifts::ShiftCourse;
 use super::mask_warnings::mask_warnings;
 use super::object::ObjectMask;
 use super::pipeline::{self, LostFrame, ProcessedFrame, Stage};

@@ -42,7 +42,7 @@ mod crop;
 mod crop_view;
 mod dataset_index;
 mod error;
-mod interpolate;
+mod interpolated_shifts;
 mod job;
 mod mask_warnings;
 mod object;

@@ -18,7 +18,7 @@ use relit_data::shard;
 use relit_video::{DecodeFault, Pending, Reader, Video};
 
 use super::crop::repeat_edge;
-use super::interpolate::InterpolatedShift;
+use super::interpolated_shifts::InterpolatedShift;
 use super::plan::Assignments;
 use super::scale::{APRON, Scaling};
 use super::{

@@ -8,20 +8,20 @@
 
 mod access;
 mod address;
-mod extract;
 mod failure;
 mod forward;
 mod listen;
 mod listen_address;
 mod page;
+mod request_body;
 mod token;
 
 pub use access::{AccessPolicy, LocalAddress, guard};
 pub use address::Announcement;
-pub use extract::{BodyLimit, JsonBody, QueryParams};
 pub use failure::Failure;
 pub use forward::forward;
 pub use listen::{ConnectionLimits, GRACE, Shutdown, run, serve_page};
 pub use listen_address::ListenAddress;
 pub use page::{IndexPage, PageAsset, SCRIPT, SKETCH, STYLE, TokenQuery, asset, index};
+pub use request_body::{BodyLimit, JsonBody, QueryParams, SKETCH_LIMIT};
 pub use token::Token;

@@ -10,15 +10,15 @@
 //!
 //! A sample that is damaged is never left out in silence: [`DamagedBatch`]. [`Stream`] has an example.
 
+mod draw_plan;
 mod error;
 mod listing;
-mod plan;
 mod stream;
 mod truth;
 mod turns;
 
+pub use draw_plan::{Cursor, Draw, DrawPlan, Rank, SampleId};
 pub use error::{DamagedBatch, DamagedSample, OpenError, SampleFault};
-pub use plan::{Cursor, Draw, DrawPlan, Rank, SampleId};
 pub use stream::{Source, Stream, StreamedBatch, Streaming};
 pub use truth::{TruthLayout, TruthSample, TruthSet};
 pub use turns::{Encoding, TurnBatch, TurnFrame, Turns};

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
-use super::plan::Job;
+use super::draw_plan::Job;
 use super::{Cursor, DamagedBatch, DamagedSample, DrawPlan, OpenError, SampleId};
 
 /// A set of samples that batches can be drawn from.

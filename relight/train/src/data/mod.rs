@@ -3,5 +3,5 @@
 pub(crate) mod photographs;
 pub(crate) mod sample;
 pub(crate) mod symmetry;
+pub(crate) mod synthetic_turns;
 pub(crate) mod turn_reader;
-pub(crate) mod turn_samples;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tch::{Kind, Tensor, no_grad};
 
-use crate::data::turn_samples::{TurnBatch, TurnViews};
+use crate::data::synthetic_turns::{TurnBatch, TurnViews};
 use crate::distributed::process_group::{ProcessGroup, indivisible};
 use crate::engine::losses::{Mean, angular_degrees, chord};
 use crate::engine::task::{Resources, StepLosses, TrainingTask, Validation};

@@ -10,7 +10,7 @@ use axum::body::{Body, to_bytes};
 use axum::extract::{Path, Request, State};
 use axum::http::{HeaderValue, Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
-use relit_web::{Failure, forward};
+use relit_web::{Failure, SKETCH_LIMIT, forward};
 use serde::Serialize;
 use tokio::time::timeout;
 
@@ -21,10 +21,6 @@ use crate::processing::EditorTarget;
 
 /// Where the editor is served.
 pub(super) const PLACE: &str = "/edit/";
-/// Largest sketch: what the editor takes.
-const MAX_SKETCH: usize = 4 << 20;
-/// Time in which a sketch has to come.
-const SKETCH: Duration = Duration::from_secs(20);
 /// Time in which the editor has to answer: it may look at the whole turn.
 const ANSWER: Duration = Duration::from_secs(300);
 
@@ -109,7 +105,7 @@ async fn inner_request(
     let uri: Uri = path
         .parse()
         .map_err(|_| Failure::bad_request("the editor has no such path"))?;
-    let body = timeout(SKETCH, to_bytes(body, MAX_SKETCH)).await;
+    let body = timeout(SKETCH_LIMIT.time, to_bytes(body, SKETCH_LIMIT.bytes)).await;
     let body = body.map_err(|_| {
         let error = "the drawing did not come in time";
         Failure::new(StatusCode::REQUEST_TIMEOUT, error)

@@ -10,8 +10,8 @@ use image::RgbImage;
 
 use super::backdrop::Backdrop;
 use super::edge;
+use super::frame_shift;
 use super::pixel_series::PixelSeries;
-use super::registration;
 use super::rim::without_rim;
 use super::table::{Turntable, find_turntable};
 use super::table_model::{TableModel, TurnObservations};
@@ -521,8 +521,8 @@ pub(crate) fn segment(
     change(&mut labels, fine.size, |object| {
         let pixels = levels[at_fine].image.pixels();
         let light: Vec<f32> = pixels.map(|pixel| table.lab(pixel.0)[0]).collect();
-        let by = registration::shift(&fine.light(), &light, object, fine.size);
-        registration::moved(object, by, fine.size)
+        let by = frame_shift::shift(&fine.light(), &light, object, fine.size);
+        frame_shift::moved(object, by, fine.size)
     });
     let field = |steps, image| FrameInTurn {
         turn: fine,

@@ -1,7 +1,6 @@
 //! What the page asks for: the recording, its frames, the mask of a sketch, and that it be written.
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 use axum::extract::{FromRef, Path, State};
 use axum::http::{StatusCode, header};
@@ -43,11 +42,6 @@ pub(super) fn page_paths() -> Vec<&'static str> {
     assets().map(|asset| asset.path).chain(["/"]).collect()
 }
 
-/// Largest sketch: some hundred thousand points.
-pub(super) const BODY: BodyLimit = BodyLimit {
-    bytes: 4 << 20,
-    time: Duration::from_secs(20),
-};
 /// Widest picture of a frame that can be requested, pixels.
 const MAX_WIDTH: u32 = 8192;
 

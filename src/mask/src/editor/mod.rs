@@ -81,7 +81,7 @@ fn serve(
             accepted: accepted.clone(),
             permits: Arc::new(Semaphore::new(AT_ONCE)),
             index: api::INDEX,
-            limit: api::BODY,
+            limit: relit_web::SKETCH_LIMIT,
         })
     };
     let paths = api::page_paths();

@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use serde::Deserialize;
 
 use crate::access::AccessPolicy;
-use crate::extract::QueryParams;
+use crate::request_body::QueryParams;
 
 /// The content type of a script.
 pub const SCRIPT: &str = "text/javascript; charset=utf-8";

@@ -1,8 +1,8 @@
 //! What the numbers of a picture stand for, and their conversion to light in Rec. 709, whose primaries sRGB has.
 
+mod from_file;
 mod icc;
 mod png_chunks;
-mod statement;
 
 use std::fmt;
 use std::sync::Arc;

@@ -23,6 +23,12 @@ pub struct BodyLimit {
     pub time: Duration,
 }
 
+/// The limit on a sketch of an object: some hundred thousand points.
+pub const SKETCH_LIMIT: BodyLimit = BodyLimit {
+    bytes: 4 << 20,
+    time: Duration::from_secs(20),
+};
+
 /// A JSON body.
 pub struct JsonBody<T>(pub T);
 
