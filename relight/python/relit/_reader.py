@@ -107,6 +107,6 @@ class Dataset:
 
 
 def open(path, *, linear=False):
-    """Open a data set: a shard, a folder of shards, or a folder that relit-extract has written. `linear` gives linear values
-    in place of sRGB."""
+    """Open the data set at `path`: a shard, a folder of shards, or a folder that relit-extract has written. `linear` gives
+    linear values in place of sRGB."""
     return Dataset(path, linear)
