@@ -20,11 +20,10 @@ pub(crate) const BLOCK: usize = 1 << BLOCK_BITS;
 
 /// The part of an object's width over which a foot is the lowest of its outline.
 const FOOT: f64 = 1.0 / 16.0;
-/// The most that a foot stands before or behind the lowest one, as a part of the object's width: what would have to stand further
-/// away to touch the ground hangs in the air.
+/// The largest distance of a foot from the lowest one, as a part of the object's width: anything further hangs in the air.
 const MAX_DEPTH: f64 = 0.5;
 
-/// How far an object reaches towards the viewer, cell by cell. What is behind is not seen: it is taken to be the front,
+/// The height of an object towards the viewer, cell by cell. The back is not seen: it is assumed to be the front,
 /// mirrored at the plane of the rim.
 #[derive(Debug, Clone)]
 pub(crate) struct HeightField {
@@ -106,10 +105,10 @@ impl HeightField {
         }
     }
 
-    /// The same shape with all its feet on the ground, of which `depth` says how far towards the viewer it is at a row.
+    /// The same shape with all its feet on the ground; `depth` is the ground's distance towards the viewer at a row.
     ///
-    /// A foot that ends higher in the picture than the lowest one stands further away. Feet are where the outline is lowest among
-    /// what is beside it, and not too high for the ground; between them depth changes evenly, as of an object that is seen aslant.
+    /// A foot that ends higher in the picture than the lowest one stands further away. Feet are the columns whose outline is lower
+    /// than that of their neighbours, within [`MAX_DEPTH`]; between feet, depth is interpolated linearly.
     pub(crate) fn standing(&self, depth: impl Fn(f64) -> f64) -> Self {
         let Extent { width, height } = self.extent;
         let lowest: Vec<Option<usize>> = (0..width)
@@ -142,7 +141,7 @@ impl HeightField {
     }
 }
 
-/// The depth at a column between the feet beside it, or that of the last one.
+/// The depth at a column: interpolated between the feet to its left and right, or that of the nearest one.
 fn between_feet(feet: &[(usize, f32)], x: usize) -> f32 {
     let next = feet.partition_point(|&(column, _)| column < x);
     match (
@@ -300,7 +299,7 @@ mod tests {
         assert!(HeightField::new(&flat, &Planes::zeros(extent)).is_none());
     }
 
-    /// A table of two legs, of which the right one ends eight rows higher, and an arm that ends far above.
+    /// A table with two legs, the right one eight rows shorter, and an arm that ends far above.
     fn table() -> HeightField {
         let extent = Extent::new(60, 60);
         let flat = Normals::<YUp>::new(Planes::filled(extent, [0.0, 0.0, 1.0]));

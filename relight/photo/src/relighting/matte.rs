@@ -43,7 +43,7 @@ impl Matte {
     /// In that band, F and B are colours of the object and of the background: the means nearby, or those of the nearest places,
     /// whichever explain the pixel better. Alpha is the most probable value where colours are spread about
     /// `alpha F + (1 - alpha) B` as those of both sides are, and alpha about the smoothed mask. So a bright place of a
-    /// many-coloured object stays its own before a bright wall, and its shadow on the ground is no part of it. The
+    /// many-coloured object stays part of it before a bright wall, and its shadow on the ground does not become part of it. The
     /// colours are those of [`Planes::foreground`], as far as the object's colours nearby reach: where alpha is too high, they would
     /// be the background's, as dark or white dots on the rim.
     ///

@@ -56,7 +56,7 @@ impl LeastKept {
     }
 }
 
-/// How little the decomposition of a photograph is believed: see [`Shading::damping`].
+/// The uncertainty of a photograph's decomposition: see [`Shading::damping`].
 #[derive(Debug, Clone)]
 struct Doubt {
     /// Pixels over which the mean change is taken.

@@ -56,11 +56,11 @@ impl PanoramaView {
         self.exposed(panorama, turn, [1.0; 3])
     }
 
-    /// The same times `scale`, of which 1 is shown as white.
+    /// The same times `scale`; 1 is shown as white.
     ///
-    /// A panorama that is seen enlarged is interpolated by the cubic B-spline, which has neither steps nor dark rims, else linearly.
-    /// What is brighter than white is compressed before and expanded after it: else a window or a lamp, a hundred times as bright as
-    /// the wall around, would grow to the middles of the pixels around and have steps for an outline.
+    /// An enlarged panorama is interpolated by the cubic B-spline, which has neither steps nor dark rims, any other linearly.
+    /// Values above white are compressed before and expanded after it: a window is a hundred times as bright as its wall, and
+    /// would otherwise grow by a pixel and have a staircase as its outline.
     #[must_use]
     pub(crate) fn exposed(&self, panorama: &Panorama, turn: f64, scale: [f32; 3]) -> Rgb<Linear> {
         let source = panorama.image().planes();

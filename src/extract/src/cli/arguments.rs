@@ -29,7 +29,7 @@ Examples:
       the fourth of ten parts; afterwards: relit-extract merge dataset
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 finished, but something was left out or lost, \
-or a mask does not fit its object.";
+a mask does not fit, or a session is broken.";
 
 /// Turn recorded turns into masked frames with saturation statistics, in training shards.
 #[derive(Parser)]

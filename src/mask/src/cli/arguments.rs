@@ -49,7 +49,7 @@ pub(crate) struct CommandLine {
 pub(crate) enum Verb {
     /// Compare a recording's mask with what its turn shows; writes NAME-check.html
     #[command(
-        after_help = "Example:\n  relit-mask check 20261120T093015Z-mug\n\nExit codes: 0 the mask fits, 1 it could not be checked, 2 wrong usage, 3 it does not fit."
+        after_help = "Example:\n  relit-mask check 20261120T093015Z-mug\n\nExit codes: 0 the mask fits, 1 it could not be checked, 2 wrong usage, 3 it does not fit or that is unknown."
     )]
     Check {
         /// A session folder, a video, or a folder of sessions or videos
