@@ -11,11 +11,7 @@ impl RelightableObject {
     /// Where the photograph or the colours have another size.
     #[must_use]
     pub fn in_place(&self, photo: &Rgb<Linear>, colours: &Planes<3>) -> Rgb<Linear> {
-        self.blended(
-            photo.clone(),
-            |alpha, old, own, new| (old + alpha * (new - own)).max(0.0),
-            colours,
-        )
+        self.blended(photo.clone(), recoloured, colours)
     }
 
     /// A background of the photograph's size with the object before it, at its place and in these colours.
@@ -62,4 +58,12 @@ impl RelightableObject {
         }
         picture
     }
+}
+
+/// A pixel of the photograph, of which the object covers the part `alpha` and has the colour `own`, after the object gets the
+/// colour `new`. No more changes than the pixel holds: where the object's colour is overestimated, the pixel would turn black.
+fn recoloured(alpha: f32, old: f32, own: f32, new: f32) -> f32 {
+    let part = alpha * own;
+    let held = if part > old { old / part } else { 1.0 };
+    (old + held * alpha * (new - own)).max(0.0)
 }

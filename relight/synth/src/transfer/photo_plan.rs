@@ -14,6 +14,8 @@ use crate::samples::camera::{CameraModel, Response};
 
 /// Part of the photographs whose main light is a lamp.
 const BY_LAMP: f32 = 0.8;
+/// Part of these whose surroundings give even light, as a laboratory with black walls does; a room is around the others.
+const EVEN_BESIDE_LAMPS: f32 = 0.6;
 /// Part of the surfaces with gloss.
 const GLOSSY: f32 = 0.35;
 /// Part of these with coloured highlights.
@@ -116,9 +118,14 @@ impl PhotoPlan {
     #[must_use]
     pub fn draw(seed: u64, lamps: &[ViewLamp], rooms: &EnvironmentLights) -> Self {
         let mut random = Random::new(seed);
-        let (lit, ambient, bounce) = draw_light(&mut random, lamps.len());
-        let room = draw_room(&mut random, rooms);
-        let room: Vec<[f32; 3]> = room
+        let by_lamp = random.chance(BY_LAMP);
+        let (lit, ambient, bounce) = draw_light(&mut random, by_lamp, lamps.len());
+        let around = if by_lamp && random.chance(EVEN_BESIDE_LAMPS) {
+            ShLight::even(PhotoView::ORDER, [1.0; 3])
+        } else {
+            draw_room(&mut random, rooms)
+        };
+        let room: Vec<[f32; 3]> = around
             .coefficients()
             .iter()
             .map(|c| [0, 1, 2].map(|channel| c[channel] as f32 * ambient[channel]))
@@ -143,7 +150,7 @@ impl PhotoPlan {
 }
 
 /// Lamps, the irradiance of light from all around, and what of the bounced light counts.
-fn draw_light(random: &mut Random, lamps: usize) -> (Vec<PhotoLamp>, Vec3, Vec3) {
+fn draw_light(random: &mut Random, by_lamp: bool, lamps: usize) -> (Vec<PhotoLamp>, Vec3, Vec3) {
     let mut lit = Vec::new();
     let mut add = |random: &mut Random, strength: f32| {
         if lamps > 0 {
@@ -153,7 +160,7 @@ fn draw_light(random: &mut Random, lamps: usize) -> (Vec<PhotoLamp>, Vec3, Vec3)
             });
         }
     };
-    let ambient = if random.chance(BY_LAMP) {
+    let ambient = if by_lamp {
         let (count, most) = random.weighted([((1, 0.25), 0.75), ((2, 0.3), 0.15), ((3, 0.3), 0.1)]);
         for _ in 0..count {
             let strength = if count == 1 {

@@ -528,3 +528,22 @@ fn a_photograph_is_the_same_for_the_same_seed_and_its_light_is_room_and_lamps() 
         assert!(plan.finish < PhotoView::FINISHES && plan.lamps.len() <= 3);
     }
 }
+
+#[test]
+fn light_around_most_lamps_is_even_as_in_a_laboratory() {
+    let made = made_panoramas().unwrap();
+    let panoramas: Vec<_> = made.iter().map(|(_, panorama)| panorama).collect();
+    let rooms = EnvironmentLights::new(&panoramas, 2, 1);
+    let lamp = ViewLamp {
+        centre: [0.0, 0.0, 5.0],
+        half_angle: 0.1,
+    };
+    let is_even = |plan: &PhotoPlan| plan.room[1..].iter().flatten().all(|c| c.abs() < 1e-6);
+    let plans: Vec<_> = (0..1000)
+        .map(|seed| PhotoPlan::draw(seed, &[lamp], &rooms))
+        .collect();
+    let even: Vec<_> = plans.iter().filter(|plan| is_even(plan)).collect();
+    // 0.8 of the photographs are by lamps, 0.6 of these in even light.
+    assert!((430..530).contains(&even.len()), "{}", even.len());
+    assert!(even.iter().all(|plan| !plan.lamps.is_empty()));
+}
