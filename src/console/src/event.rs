@@ -76,6 +76,8 @@ pub enum Event {
         #[serde(default)]
         session: String,
         #[serde(default)]
+        input: String,
+        #[serde(default)]
         mask: String,
         #[serde(default)]
         record: String,
@@ -88,6 +90,12 @@ pub enum Event {
         #[serde(default)]
         warnings: Vec<String>,
     },
+    /// A mask that was made by hand, and that nobody asked to replace.
+    Kept {
+        session: String,
+        input: String,
+        mask: String,
+    },
     Editor {
         address: String,
         url: String,
@@ -98,11 +106,15 @@ pub enum Event {
     },
     Extracted {
         session: String,
+        #[serde(default)]
+        input: String,
         /// That of `dataset.json`.
         entry: Value,
     },
     Skipped {
         session: String,
+        #[serde(default)]
+        input: String,
         lossy: bool,
         #[serde(default)]
         misfit: bool,
@@ -149,11 +161,20 @@ pub enum Event {
         samples: u64,
         tasks: u64,
         datasets: u64,
+        /// Sessions with losses, with a mask that does not fit, or broken.
+        flawed: Vec<String>,
     },
     Converted {
         out: String,
         layout: String,
         sessions: u64,
+        samples: u64,
+        /// As above.
+        flawed: Vec<String>,
+    },
+    Removed {
+        out: String,
+        sessions: Vec<String>,
         samples: u64,
     },
     Session(Value),
@@ -172,6 +193,8 @@ pub enum Check {
     Mask {
         #[serde(default)]
         session: String,
+        #[serde(default)]
+        input: String,
         #[serde(default)]
         page: String,
         report: Value,
@@ -209,6 +232,7 @@ pub enum Done {
     /// `relit-mask` of several recordings.
     Masks {
         made: u64,
+        kept: u64,
         left_out: u64,
         failed: u64,
         summary: String,
@@ -239,6 +263,6 @@ mod tests {
             assert_eq!(json_of(&event), line);
             count += 1;
         }
-        assert_eq!(count, 35);
+        assert_eq!(count, 37);
     }
 }

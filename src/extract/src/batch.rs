@@ -204,6 +204,9 @@ impl Run<'_> {
             });
         }
         self.names.insert(folded(&id), id);
+        if options.resume && options.task.is_some() {
+            self.catalog.adopt(folder.path(), job.id())?;
+        }
         let dataset = self.catalog.dataset();
         if let Some(other) = job.alike(dataset) {
             return Err(name_alike(job.id(), other));

@@ -58,6 +58,28 @@ impl DatasetIndex {
         }
     }
 
+    /// Takes a session into a task's part that the folder's `dataset.json` has and the part does not: of a run without
+    /// tasks, or with another number of them.
+    pub(super) fn adopt(&mut self, out: &Path, id: &str) -> Result<(), ExtractError> {
+        let Self::Partial(partial) = self else {
+            return Ok(());
+        };
+        if partial.dataset.session(id).is_some() {
+            return Ok(());
+        }
+        match Dataset::read(out) {
+            Ok(whole) if whole.settings.differences(&partial.dataset.settings).is_empty() => {
+                if let Some(entry) = whole.session(id) {
+                    let shards = whole.shards_of(id).cloned().collect();
+                    partial.dataset.replace(entry.clone(), shards);
+                }
+                Ok(())
+            }
+            Ok(_) | Err(ShardError::NoDataset(_)) => Ok(()),
+            Err(error) => Err(error.into()),
+        }
+    }
+
     /// Adds a session; an older one of the same id is replaced.
     pub(super) fn add(
         &mut self,

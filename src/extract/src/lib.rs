@@ -82,6 +82,12 @@ pub fn extract(
     options: &ExtractOptions,
     observer: &dyn Observer,
 ) -> Result<ExtractSummary, ExtractError> {
+    if let Some(mask) = options.mask.as_deref().filter(|mask| !mask.exists()) {
+        return Err(ExtractError::Refused(format!(
+            "the mask {} does not exist: make one with relit-mask, or correct --mask",
+            mask.display()
+        )));
+    }
     if inputs.iter().any(|input| objects::is_url(input)) || objects::is_url(out) {
         return objects::extract(inputs, out, options, observer);
     }

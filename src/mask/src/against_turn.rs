@@ -195,15 +195,15 @@ fn source_frame(files: &MaskFiles, video: &Video) -> Result<u64, MaskingError> {
     })
 }
 
-/// The page and the record: `NAME-check.html` and `NAME-check.json` in the session folder, so that one mask can be held
-/// against several sessions, or beside the mask.
+/// The page and the record: `NAME-check.html` and `NAME-check.json` in the folder of a recorded session, so that one mask can be
+/// held against several sessions, or beside the mask.
 fn check_files(files: &MaskFiles, recording: &Recording) -> [PathBuf; 2] {
     ["-check.html", "-check.json"].map(|ending| {
         let mut name = files.mask.file_stem().unwrap_or_default().to_owned();
         name.push(ending);
         match &recording.folder {
-            Some(folder) => folder.join(name),
-            None => files.mask.with_file_name(name),
+            Some(folder) if recording.manifest.is_some() => folder.join(name),
+            _ => files.mask.with_file_name(name),
         }
     })
 }

@@ -2,7 +2,7 @@
 
 use std::io;
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use relit_data::session;
 
@@ -94,6 +94,16 @@ pub enum MaskingError {
 }
 
 impl MaskingError {
+    /// The mask that was made by hand, if that is why none was made.
+    #[must_use]
+    pub fn handmade(&self) -> Option<&Path> {
+        match self {
+            Self::Handmade(mask) => Some(mask),
+            Self::Recording { source, .. } => source.handmade(),
+            _ => None,
+        }
+    }
+
     pub(super) fn io(
         path: impl Into<PathBuf>,
         doing: &'static str,

@@ -357,9 +357,7 @@ fn find_damage(
             first.number
         ));
     }
-    if damage.is_empty() {
-        damage.extend(shorter(frames, packets.end_us, promised.duration_us));
-    }
+    damage.extend(shorter(frames, packets.end_us, promised.duration_us));
     damage
 }
 

@@ -86,7 +86,7 @@ pub fn size_hint(mask: (u32, u32), picture: (u32, u32)) -> Option<&'static str> 
     if (mask.1, mask.0) == picture && w != h {
         Some("it lies on its side: turn it by 90 degrees")
     } else if mask.0 > 0 && mask.1 > 0 && fits(wide / w, h, high) {
-        Some("it was made on a scaled copy: scale it back")
+        Some("make it on this video, or scale it back if it was made on a scaled copy")
     } else {
         None
     }

@@ -50,14 +50,17 @@ pub fn mask_in(masks: &Path, recording: &Recording) -> Option<PathBuf> {
     exact.next().or_else(|| alike_in(masks, &names))
 }
 
-/// A file with one of these names, whatever its case.
+/// A file with one of these names, whose ending may be in capitals. Of two clips whose names differ in case, neither gets the
+/// other's mask.
 fn alike_in(folder: &Path, names: &[OsString]) -> Option<PathBuf> {
     let mut found: Vec<PathBuf> = fs::read_dir(folder)
         .ok()?
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| {
-            let found = path.file_name().unwrap_or_default();
-            names.iter().any(|name| found.eq_ignore_ascii_case(name)) && path.is_file()
+            let is_png = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
+            let mut name = path.file_stem().unwrap_or_default().to_owned();
+            name.push(".png");
+            is_png && names.contains(&name) && path.is_file()
         })
         .collect();
     found.sort();
@@ -77,12 +80,12 @@ mod tests {
         let masks = folder.path().join("masks");
         fs::create_dir(&masks).unwrap();
         assert_eq!(mask_in(&masks, &recording), None);
-        for name in ["cup.png", "my cup-preview.png", "my cup.json"] {
+        for name in ["cup.png", "My Cup.png", "my cup-preview.png", "my cup.json"] {
             fs::write(masks.join(name), b"").unwrap();
         }
         assert_eq!(mask_in(&masks, &recording), None);
         // From the least fitting name to the best.
-        for name in ["My Cup.PNG", "my_cup.png", "my cup-mask.png", "my cup.png"] {
+        for name in ["my cup.PNG", "my_cup.png", "my cup-mask.png", "my cup.png"] {
             fs::write(masks.join(name), b"").unwrap();
             assert_eq!(mask_in(&masks, &recording), Some(masks.join(name)));
         }

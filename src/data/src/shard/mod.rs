@@ -18,6 +18,7 @@
 //! | [`SampleSpans`] | where the samples of a shard stand, for reading in any order (`index`) |
 //! | [`ArrayTask`], [`PartialManifest`], [`merge`] | a data set that several tasks write |
 //! | [`merge_datasets`], [`convert`](convert()) | finished data sets joined, or in the other layout (`new_dataset`: whole or not at all) |
+//! | [`remove_sessions`] | sessions taken out of a data set |
 //! | [`verify`](verify()) | reads everything back and reports what is wrong |
 //!
 //! This module knows pixel rectangles, images and their statistics
@@ -42,6 +43,7 @@ mod partial_manifest;
 mod quality;
 mod reader;
 pub mod record;
+mod remove;
 mod settings;
 mod spool;
 mod tar_reader;
@@ -66,6 +68,7 @@ pub use partial_manifest::{
 pub use quality::{MaskMisfit, QualityVerdict, SessionQuality};
 pub use reader::{ShardReader, ShardSample};
 pub use record::FrameRecord;
+pub use remove::remove_sessions;
 pub use settings::{Align, ExtractionSettings, ImageSize, Layout, Native};
 pub use verify::{VerifyProblem, VerifyReport, verify};
 pub use writer::{Sample, ShardFiles, ShardWriter};

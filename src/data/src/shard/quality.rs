@@ -15,6 +15,8 @@ const USABLE_SHARE: f64 = 0.05;
 const FEW: f64 = 2.0;
 /// Up to this share of samples at which the exposure steps, a session is usable.
 const USABLE_STEPS: f64 = 0.01;
+/// A session of fewer source frames is broken: batches of twelve neighbours show the light of a turn.
+const MIN_SOURCE_FRAMES: u32 = 12;
 /// An object whose mean is nowhere above this 8-bit value is black.
 const BLACK: f64 = 4.0;
 /// A frame with more than this part of the object saturated is overexposed.
@@ -159,6 +161,12 @@ impl SessionQuality {
             let reason = format!("more than half of the object is saturated in {samples}");
             self.add(QualityVerdict::Broken, &reason);
         }
+        let repeated = count(records, |r| r.duplicate);
+        let own = records.len() as u32 - repeated;
+        if repeated > 0 && own < MIN_SOURCE_FRAMES {
+            let reason = format!("it has only {}", count_of(u64::from(own), "source frame"));
+            self.add(QualityVerdict::Broken, &reason);
+        }
         let share = |limit: f64| limit * records.len() as f64;
         let flaws = [
             (
@@ -183,7 +191,7 @@ impl SessionQuality {
                 "the shift comes from the frames around",
             ),
             (
-                count(records, |r| r.duplicate),
+                repeated,
                 f64::INFINITY,
                 "a source frame is used again",
             ),
@@ -329,8 +337,9 @@ mod tests {
 
     #[test]
     fn repeated_frames_losses_and_part_of_a_turn_leave_a_session_usable() {
-        let mut records = turn(10);
-        records.iter_mut().for_each(|r| r.duplicate = true);
+        let mut records = turn(30);
+        let repeat = |r: &mut FrameRecord| r.duplicate = true;
+        records.iter_mut().take(10).for_each(repeat);
         for (lossy, covered, count, named) in [
             (false, None, 1, "10 samples"),
             (true, None, 2, "10 samples"),
@@ -341,6 +350,21 @@ mod tests {
             assert_eq!(quality.reasons.len(), count, "{:?}", quality.reasons);
             assert!(quality.reasons.iter().any(|reason| reason.contains(named)));
         }
+    }
+
+    #[test]
+    fn a_turn_of_a_few_source_frames_is_broken() {
+        for (own, verdict) in [(12, QualityVerdict::Usable), (11, QualityVerdict::Broken)] {
+            let mut records = turn(100);
+            records
+                .iter_mut()
+                .skip(own)
+                .for_each(|r| r.duplicate = true);
+            let quality = SessionQuality::from_records(&records, false, None);
+            assert_eq!(quality.verdict, verdict, "{:?}", quality.reasons);
+        }
+        let short = SessionQuality::from_records(&turn(8), false, None);
+        assert_eq!(short.verdict, QualityVerdict::Good);
     }
 
     #[test]

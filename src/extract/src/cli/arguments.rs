@@ -76,11 +76,22 @@ pub(crate) enum Verb {
         /// The data set's folder.
         out: PathBuf,
         /// The folder of the new data set.
-        #[arg(short, long, value_name = "OUT")]
+        #[arg(short, long, value_name = "OTHER")]
         output: PathBuf,
         /// The new layout.
         #[arg(long, value_parser = named::<Layout>(["webdataset", "paper"]))]
         layout: Layout,
+    },
+    /// Remove sessions from a data set, with their files.
+    #[command(
+        after_help = "Example:\n  relit-extract remove dataset 20261120T093015Z-mug\n\nIn a data set that tasks wrote, it is there again after the next merge, unless its recording is gone."
+    )]
+    Remove {
+        /// The data set's folder.
+        out: PathBuf,
+        /// The sessions' names, as `stats` prints them.
+        #[arg(value_name = "SESSION", required = true)]
+        sessions: Vec<String>,
     },
     /// Summarise a data set: each session's verdict, saturation, shifts and reasons.
     #[command(

@@ -7,7 +7,7 @@ use relit_data::counts::count_of;
 use relit_data::shard::{Layout, convert};
 use relit_extract::ExtractError;
 
-use super::merging::outcome_of;
+use super::merging::{describe_flawed, flawed, outcome_of};
 use super::refuse_urls;
 
 pub(crate) fn run(
@@ -27,18 +27,21 @@ pub(crate) fn run(
     let sessions = dataset.sessions.len() as u64;
     let samples = dataset.shards.iter().map(|shard| u64::from(shard.samples));
     let samples: u64 = samples.sum();
+    let flawed = flawed(&dataset);
     console.print(
         &format!(
-            "{}: {} with {} in the layout {layout}",
+            "{}: {} with {} in the layout {layout}{}",
             output.display(),
             count_of(sessions, "session"),
             count_of(samples, "sample"),
+            describe_flawed(&flawed),
         ),
         &Event::Converted {
             out: output.to_string_lossy().into_owned(),
             layout: layout.to_string(),
             sessions,
             samples,
+            flawed,
         },
     );
     Ok(outcome_of(&dataset))

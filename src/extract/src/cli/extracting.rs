@@ -29,7 +29,7 @@ pub(crate) fn run(
         // It may be the scheduler's variables that say so.
         console.print_phase(
             &format!(
-                "task {task}: every {}th recording is this one's",
+                "task {task}: extracts one of every {} recordings",
                 task.count()
             ),
             &Event::Task {
@@ -73,6 +73,7 @@ fn describe(summary: &ExtractSummary) -> String {
     let sessions = |count: usize| count_of(count as u64, "session");
     let came_out = match (summary.extracted, summary.skipped) {
         (0, 0) => "nothing extracted".to_owned(),
+        (0, 1) => "nothing new, 1 session was there already".to_owned(),
         (0, skipped) => format!("nothing new, {} were there already", sessions(skipped)),
         (extracted, 0) => format!("{} extracted", sessions(extracted)),
         (extracted, skipped) => format!(
@@ -115,7 +116,7 @@ impl Reporter<'_> {
         self.totals.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn skipped(&self, entry: &SessionEntry) {
+    fn skipped(&self, input: &Path, entry: &SessionEntry) {
         let flaw = if entry.has_misfit() {
             "; its mask does not fit, see its report"
         } else if entry.is_broken() {
@@ -129,6 +130,7 @@ impl Reporter<'_> {
             &format!("{}: already extracted, skipped{flaw}", entry.id),
             &Event::Skipped {
                 session: entry.id.clone(),
+                input: input.to_string_lossy().into_owned(),
                 lossy: entry.lossy,
                 misfit: entry.has_misfit(),
                 broken: entry.is_broken(),
@@ -149,7 +151,7 @@ impl Reporter<'_> {
         );
     }
 
-    fn extracted(&self, entry: &SessionEntry) {
+    fn extracted(&self, input: &Path, entry: &SessionEntry) {
         for warning in &entry.warnings {
             self.console.warn_for(&entry.id, warning);
         }
@@ -166,6 +168,7 @@ impl Reporter<'_> {
             ),
             &Event::Extracted {
                 session: entry.id.clone(),
+                input: input.to_string_lossy().into_owned(),
                 entry: json!(entry),
             },
         );
@@ -196,8 +199,8 @@ impl Observer for Reporter<'_> {
     fn ended(&self, input: &Path, session: Option<&str>, outcome: &RecordingOutcome) {
         self.bar().finish_and_clear();
         match outcome {
-            RecordingOutcome::Extracted(entry) => self.extracted(entry),
-            RecordingOutcome::Skipped(entry) => self.skipped(entry),
+            RecordingOutcome::Extracted(entry) => self.extracted(input, entry),
+            RecordingOutcome::Skipped(entry) => self.skipped(input, entry),
             RecordingOutcome::LeftOut(error) => self.left_out(input, session, error),
             RecordingOutcome::Failed(error) => self.console.error_for(input, session, error),
         }

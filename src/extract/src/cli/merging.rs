@@ -87,12 +87,14 @@ fn report(console: Console, out: &Path, dataset: &Dataset, from: &MergedFrom) ->
         0 => count_of(from.tasks, "task"),
         datasets => count_of(datasets, "data set"),
     };
+    let flawed = flawed(dataset);
     console.print(
         &format!(
-            "{}: {} with {}, merged from {merged_from}",
+            "{}: {} with {}, merged from {merged_from}{}",
             out.display(),
             count_of(sessions, "session"),
             count_of(samples, "sample"),
+            describe_flawed(&flawed),
         ),
         &Event::Merged {
             out: out.to_string_lossy().into_owned(),
@@ -100,9 +102,28 @@ fn report(console: Console, out: &Path, dataset: &Dataset, from: &MergedFrom) ->
             samples,
             tasks: from.tasks,
             datasets: from.datasets,
+            flawed,
         },
     );
     outcome_of(dataset)
+}
+
+/// The sessions of a data set at which a person should look.
+pub(super) fn flawed(dataset: &Dataset) -> Vec<String> {
+    let sessions = dataset.sessions.iter();
+    let flawed = sessions.filter(|session| session.is_flawed());
+    flawed.map(|session| session.id.clone()).collect()
+}
+
+/// These sessions, at the end of a sentence.
+pub(super) fn describe_flawed(flawed: &[String]) -> String {
+    if flawed.is_empty() {
+        return String::new();
+    }
+    format!(
+        "; with losses, a mask that does not fit, or broken (see their reports): {}",
+        flawed.join(", ")
+    )
 }
 
 /// Whether a person should look at some session of a data set.

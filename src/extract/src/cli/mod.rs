@@ -4,6 +4,7 @@ mod arguments;
 mod converting;
 mod extracting;
 mod merging;
+mod removing;
 mod stats;
 mod verifying;
 
@@ -59,6 +60,9 @@ pub(crate) fn run() -> ExitCode {
             }),
             None,
         ) => console.finish(converting::run(console, &out, &output, layout)),
+        (Some(Verb::Remove { out, sessions }), None) => {
+            console.finish(removing::run(console, &out, &sessions))
+        }
         (Some(Verb::Stats { out }), None) => console.finish(stats::run(console, &out)),
         (None, Some(extract)) => match extract.options() {
             Ok(options) => {

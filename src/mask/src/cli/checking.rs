@@ -24,7 +24,7 @@ pub(crate) fn run(
     for path in &paths {
         match check_mask(path, mask) {
             Ok(output) => {
-                print(&output, console);
+                print(path, &output, console);
                 fitting += usize::from(output.report.verdict == MaskVerdict::Fits);
             }
             Err(error) if !several => return Err(error),
@@ -67,7 +67,7 @@ fn say_summary(console: Console, fitting: usize, unfit: usize, failed: usize) {
     console.print(&summary, &event);
 }
 
-fn print(output: &CheckOutput, console: Console) {
+fn print(input: &Path, output: &CheckOutput, console: Console) {
     let (id, report) = (&output.recording, &output.report);
     let (_, word) = report.verdict.words();
     let mut text = format!("{id}: {word}; see {}", output.page.display());
@@ -76,6 +76,7 @@ fn print(output: &CheckOutput, console: Console) {
     }
     let event = Event::Check(Check::Mask {
         session: id.clone(),
+        input: input.to_string_lossy().into_owned(),
         page: output.page.to_string_lossy().into_owned(),
         report: json!(report),
     });

@@ -48,7 +48,7 @@ fn draw(
     let announce = |announcement: &Announcement| print_editor(announcement, console);
     match edit(&path, output, request, arguments.listen.socket(), announce)? {
         Some(output) => {
-            print(&output, console);
+            print(&path, &output, console);
             Ok(Outcome::Success)
         }
         None => {
@@ -94,14 +94,18 @@ fn make(
     let paths = std::mem::take(&mut inputs.recordings);
     let bar = console.progress(paths.len() as u64, "masks");
     let mut totals = RunTotals::new(paths.len() as u64, Instant::now());
-    let mut failed = 0;
+    let (mut failed, mut kept) = (0, 0);
     for path in &paths {
         let files = inputs.files_of(path, arguments.output.as_ref());
         let made = files.and_then(|files| make_mask(path, files, &request));
         totals.ended(made.is_ok(), Instant::now());
         match made {
-            Ok(output) => bar.suspend(|| print(&output, console)),
-            Err(error) if paths.len() == 1 && found == Outcome::Success => return Err(error),
+            Ok(output) => bar.suspend(|| print(path, &output, console)),
+            Err(error) if paths.len() > 1 && error.handmade().is_some() => {
+                kept += 1;
+                let mask = error.handmade().unwrap_or(path);
+                bar.suspend(|| print_kept(path, mask, console));
+            }
             Err(error) => {
                 failed += 1;
                 let session = recording_name(path);
@@ -116,7 +120,8 @@ fn make(
         let left_out = inputs.strays.len();
         say_summary(
             console,
-            paths.len() - failed,
+            paths.len() - failed - kept,
+            kept,
             left_out,
             failed + inputs.faults.len(),
         );
@@ -131,23 +136,30 @@ fn make(
 }
 
 /// What became of all inputs.
-fn say_summary(console: Console, made: usize, left_out: usize, failed: usize) {
+fn say_summary(console: Console, made: usize, kept: usize, left_out: usize, failed: usize) {
     let mut summary = match made {
         0 => "no mask made".to_owned(),
         made => format!("{} made", count_of(made as u64, "mask")),
     };
-    for (count, what) in [(failed, "failed"), (left_out, "left out")] {
+    let others = [
+        (kept, "kept as made by hand"),
+        (failed, "failed"),
+        (left_out, "left out"),
+    ];
+    for (count, what) in others {
         if count > 0 {
             summary += &format!(", {count} {what}");
         }
     }
     summary += match (made, left_out + failed) {
+        (0, 0) => "",
         (0, _) => ": see above",
         (_, 0) => "; look at each preview",
         _ => ": see above; look at each preview",
     };
     let event = Event::Done(Done::Masks {
         made: made as u64,
+        kept: kept as u64,
         left_out: left_out as u64,
         failed: failed as u64,
         summary: summary.clone(),
@@ -155,8 +167,22 @@ fn say_summary(console: Console, made: usize, left_out: usize, failed: usize) {
     console.print(&summary, &event);
 }
 
+/// Prints that a mask stays as somebody made it.
+fn print_kept(input: &Path, mask: &Path, console: Console) {
+    let session = recording_name(input);
+    let mask = mask.to_string_lossy().into_owned();
+    console.print(
+        &format!("{session}: kept {mask}, which was made or changed by hand; --force replaces it"),
+        &Event::Kept {
+            session: session.clone(),
+            input: input.to_string_lossy().into_owned(),
+            mask: mask.clone(),
+        },
+    );
+}
+
 /// Prints the warnings about one mask, its files and its size.
-fn print(output: &MaskOutput, console: Console) {
+fn print(input: &Path, output: &MaskOutput, console: Console) {
     let id = &output.recording;
     for notice in &output.notices {
         console.warn_for(id, notice.text());
@@ -180,6 +206,7 @@ fn print(output: &MaskOutput, console: Console) {
     let path = |path: &Path| path.to_string_lossy().into_owned();
     let event = Event::Mask {
         session: id.clone(),
+        input: path(input),
         mask: path(&output.files.mask),
         record: path(&output.files.record),
         preview: path(&output.files.preview),
