@@ -68,7 +68,12 @@ impl DatasetIndex {
             return Ok(());
         }
         match Dataset::read(out) {
-            Ok(whole) if whole.settings.differences(&partial.dataset.settings).is_empty() => {
+            Ok(whole)
+                if whole
+                    .settings
+                    .differences(&partial.dataset.settings)
+                    .is_empty() =>
+            {
                 if let Some(entry) = whole.session(id) {
                     let shards = whole.shards_of(id).cloned().collect();
                     partial.dataset.replace(entry.clone(), shards);

@@ -219,3 +219,55 @@ fn damage_in_a_folder_of_images_ends_a_conversion_and_leaves_nothing() {
     place.events(1, "convert a -o b --layout webdataset");
     assert_eq!(place.names(), ["a"]);
 }
+
+#[test]
+fn a_removed_session_leaves_no_file_and_a_sound_data_set() {
+    for layout in ["webdataset", "paper"] {
+        let place = Place::new();
+        for session in [COW, BUST] {
+            place.extract(session, &format!("--layout {layout} -o all"));
+        }
+        place.extract(BUST, &format!("--layout {layout} -o bust"));
+        place.events(1, &format!("remove all {COW} nobody"));
+        place.assert_sound("all", 80);
+        let events = place.events(0, &format!("remove all {COW}"));
+        assert_eq!(events[0]["event"], "removed");
+        assert_eq!(events[0]["sessions"], serde_json::json!([COW]));
+        assert_same(&place.files("all"), &place.files("bust"));
+        place.events(1, &format!("remove all {COW}"));
+    }
+    let place = Place::new();
+    place.events(1, "remove missing x");
+    assert_eq!(place.run("remove missing").status.code(), Some(2));
+}
+
+#[test]
+fn flawed_sessions_of_a_merged_data_set_are_named() {
+    let place = Place::new();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures");
+    let (cow, mask) = (fixtures.join(COW), fixtures.join(BUST).join("mask_gt.png"));
+    let settings = "--frames 40 --size 32 --align off";
+    place.events(
+        3,
+        &format!(
+            "{} --mask {} {settings} -o a",
+            cow.display(),
+            mask.display()
+        ),
+    );
+    place.extract(BUST, "-o b");
+    for line in ["merge a b -o c", "convert a -o d --layout paper"] {
+        let events = place.events(3, line);
+        let flawed = &events.last().unwrap()["flawed"];
+        assert_eq!(*flawed, serde_json::json!([COW]), "{line}");
+    }
+}
+
+#[test]
+fn a_mask_that_does_not_exist_is_told_once_and_before_the_recordings() {
+    let place = Place::new();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures");
+    let events = place.events(1, &format!("{} --mask nowhere -o a", fixtures.display()));
+    assert_eq!(events.len(), 1, "{events:?}");
+    assert!(place.names().is_empty());
+}

@@ -57,7 +57,9 @@ fn alike_in(folder: &Path, names: &[OsString]) -> Option<PathBuf> {
         .ok()?
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| {
-            let is_png = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
+            let is_png = path
+                .extension()
+                .is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
             let mut name = path.file_stem().unwrap_or_default().to_owned();
             name.push(".png");
             is_png && names.contains(&name) && path.is_file()

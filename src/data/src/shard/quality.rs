@@ -190,11 +190,7 @@ impl SessionQuality {
                 f64::INFINITY,
                 "the shift comes from the frames around",
             ),
-            (
-                repeated,
-                f64::INFINITY,
-                "a source frame is used again",
-            ),
+            (repeated, f64::INFINITY, "a source frame is used again"),
         ];
         for (samples, most, what) in flaws {
             if samples > 0 {

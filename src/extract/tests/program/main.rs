@@ -27,6 +27,7 @@ fn main() -> ExitCode {
         tasks::a_merge_names_what_failed_and_refuses_tasks_of_different_inputs,
         tasks::a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed,
         tasks::a_task_without_recordings_says_so,
+        tasks::another_number_of_tasks_takes_over_what_the_data_set_has,
     ];
     #[cfg(not(feature = "object-store"))]
     trials.extend(trials![

@@ -106,6 +106,28 @@ pub(crate) fn a_session_that_no_task_made_and_a_file_that_is_gone_are_noticed() 
     );
 }
 
+pub(crate) fn another_number_of_tasks_takes_over_what_the_data_set_has() {
+    let workshop = workshop();
+    for index in 0..2 {
+        workshop.errors(0, &part(index, 2));
+    }
+    workshop.errors(0, "merge out");
+    let whole = files(&workshop.path("out"));
+    fs::remove_dir_all(workshop.path("out/tasks")).unwrap();
+    for index in 0..3 {
+        let events = workshop.events(0, &part(index, 3));
+        assert_eq!(events.last().unwrap()["extracted"], 0, "{events:?}");
+    }
+    workshop.errors(0, "merge out");
+    let mut merged = files(&workshop.path("out"));
+    merged.retain(|name, _| !name.starts_with("tasks/"));
+    assert!(
+        merged
+            .iter()
+            .all(|(name, bytes)| whole.get(name) == Some(bytes))
+    );
+}
+
 fn warnings(events: &[Value]) -> impl Iterator<Item = &str> {
     let warnings = events.iter().filter(|event| event["event"] == "warning");
     warnings.filter_map(|event| event["message"].as_str())

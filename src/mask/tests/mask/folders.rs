@@ -78,6 +78,25 @@ fn each_clip_of_a_folder_gets_a_mask_of_its_name_and_strays_end_no_run() {
 }
 
 #[test]
+fn masks_that_were_made_by_hand_are_kept_and_are_no_failure() {
+    let folder = photographs();
+    let path = folder.path();
+    let line = ["photos", "--rect", BOX, "-o", "masks", "--json"];
+    assert_eq!(code(&relit_mask(path, &line)), 0);
+    let by_hand = read(path, "masks/bowl.png");
+    fs::write(path.join("masks/cup.png"), &by_hand).unwrap();
+    let output = relit_mask(path, &line);
+    assert_eq!(code(&output), 0, "{}", said(&output));
+    assert_eq!(events(&output, "kept")[0]["input"], "photos/cup.png");
+    let done = &events(&output, "done")[0];
+    assert_eq!((&done["made"], &done["kept"]), (&1.into(), &1.into()));
+    assert_eq!(read(path, "masks/cup.png"), by_hand);
+    // Of a single input, it is the outcome.
+    let one = ["photos/cup.png", "--rect", BOX, "-o", "masks/cup.png"];
+    assert_eq!(code(&relit_mask(path, &one)), 1);
+}
+
+#[test]
 fn a_folder_of_one_clip_gives_a_mask_of_the_clips_name() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("videos")).unwrap();

@@ -320,11 +320,11 @@ fn each_session_of_a_folder_gets_its_mask_and_a_failing_one_stops_no_other() {
         "20261120T093215Z-c",
     ];
     let folders = names.map(|name| session(root.path(), name));
-    fs::write(folders[1].join("mask.png"), "painted").unwrap();
+    fs::write(folders[1].join("video.y4m"), "torn").unwrap();
     let output = relit_mask(root.path(), &[".", "--rect", AROUND, "--json"]);
     assert_eq!(code(&output), 3, "{}", said(&output));
     assert!(folders[0].join("mask.json").is_file());
-    assert_eq!(read(&folders[1], "mask.png"), b"painted");
+    assert!(!folders[1].join("mask.png").exists());
     assert!(folders[2].join("mask-preview.png").is_file());
     let events = String::from_utf8(output.stdout).unwrap();
     let events: Vec<serde_json::Value> = events
