@@ -52,6 +52,7 @@ pub(super) fn with_strokes<'a>(
         request.frame = record.source.frame;
         let unusable = |fault| MaskingError::unusable("recipe", &files.record, &fault);
         request.hints = record.hints.hints().map_err(unusable)?;
+        request.found_by = record.network;
     } else {
         request.hints.strokes = record.hints.strokes;
     }
