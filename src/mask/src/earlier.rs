@@ -46,7 +46,7 @@ pub(super) fn with_strokes<'a>(
         "applied {strokes} of the earlier mask again: --force leaves them out"
     ));
     let mut request = request.clone();
-    if request.hints.is_empty() && request.turn == TurnRequest::None {
+    if request.hints.is_empty() && request.turn == TurnRequest::None && request.network.is_none() {
         // Nothing but the editor was asked for: it goes on where it stopped.
         request.turn = TurnRequest::from_record(&record);
         request.frame = record.source.frame;

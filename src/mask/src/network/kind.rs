@@ -4,10 +4,10 @@
 //! EfficientSAM's own export (one file, or encoder and decoder), and the encoder and decoder that the exporters of
 //! Segment Anything write, also of MobileSAM.
 
-use super::picture::{Fit, Layout, PictureForm};
+use super::picture::{Fit, Layout, MEAN_COLOUR, PictureForm};
 
 /// Mean and standard deviation of ImageNet's colours, 0 to 1.
-const IMAGENET: ([f32; 3], [f32; 3]) = ([0.485, 0.456, 0.406], [0.229, 0.224, 0.225]);
+const IMAGENET: ([f32; 3], [f32; 3]) = (MEAN_COLOUR, [0.229, 0.224, 0.225]);
 /// As IS-Net was trained.
 const CENTRED: ([f32; 3], [f32; 3]) = ([0.5; 3], [1.0; 3]);
 /// As a network takes it that does the rest itself: 0 to 1.
@@ -26,9 +26,6 @@ const U2NET_OUTPUTS: usize = 7;
 /// The decoder's input for what the encoder answers.
 pub(super) const EMBEDDINGS: &str = "image_embeddings";
 const NEEDED: &str = "needed is a network that takes one picture with 3 channels (like U2-Net, IS-Net or BiRefNet), one that also takes `batched_point_coords` and `batched_point_labels` (EfficientSAM), or the encoder and the decoder of one like MobileSAM, each with a --model of its own";
-
-/// What encoders of Segment Anything take from each colour.
-pub(super) const MEAN_COLOUR: [f32; 3] = IMAGENET.0;
 
 /// What the numbers of an input are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,7 +10,8 @@ use relit_grabcut::{Mark, MaskError, Seeds};
 use super::answer::SoftMap;
 use super::picture::Placement;
 
-/// A network that is nowhere as sure of the object found none.
+/// A network that is nowhere as sure of the object found none. Where it is nowhere sure of the background, that is what
+/// it is less sure of.
 const FOUND_FROM: f32 = 0.5;
 /// Of the most that it is sure of anywhere: from here on it is surely object, and up to there background.
 const OBJECT_FROM: f32 = 0.9;
@@ -111,14 +112,14 @@ impl PlacedMap<'_> {
             return None;
         }
         let band = [across, down].map(|cells| (BAND * cells).ceil().max(1.0) as usize);
-        let object = sure
-            .iter()
-            .map(|&sure| sure >= OBJECT_FROM * most)
-            .collect();
-        let background = sure
-            .iter()
-            .map(|&sure| sure <= BACKGROUND_TO * most)
-            .collect();
+        let cells = |is_so: &dyn Fn(f32) -> bool| -> Vec<bool> {
+            sure.iter().map(|&sure| is_so(sure / most)).collect()
+        };
+        let object = cells(&|sure| sure >= OBJECT_FROM);
+        let mut background = cells(&|sure| sure <= BACKGROUND_TO);
+        if !background.contains(&true) {
+            background = cells(&|sure| sure < FOUND_FROM);
+        }
         let object = shrunk(object, columns, band);
         let background = shrunk(background, columns, band);
         let levels = object.iter().zip(&background).map(|pair| match pair {
@@ -217,12 +218,13 @@ mod tests {
     #[test]
     fn outside_the_rectangle_is_background_and_what_is_found_there_does_not_count() {
         let map = square(1.0, 0.0);
-        let rect = Rect::new(0, 0, 20, 40);
+        let rect = Rect::new(0, 0, 24, 40);
         let marks = on_frame(&map).marks((40, 40), Some(rect), None);
         let marks = marks.unwrap().unwrap();
         let at = |x: usize, y: usize| marks.marks()[y * 40 + x];
-        assert_eq!(at(22, 20), Mark::Background);
-        assert_eq!(at(19, 20), Mark::Unknown);
+        assert_eq!(at(26, 20), Mark::Background);
+        assert_eq!(at(22, 20), Mark::Unknown);
+        assert_eq!(at(18, 20), Mark::Object);
         let corner = Rect::new(0, 0, 8, 8);
         let nothing = on_frame(&map).marks((40, 40), Some(corner), None);
         assert!(matches!(nothing, Ok(None)));

@@ -235,7 +235,7 @@ impl Prompted {
         covers: (usize, usize),
     ) -> Result<SoftMap, String> {
         let value = |kind: &Option<DecoderInput>| match kind {
-            Some(DecoderInput::Points) => self.prompt.placed(placement),
+            Some(DecoderInput::Points) => self.prompt.placed(placement, covers),
             _ => seen.clone(),
         };
         let asked: Vec<Vec<f32>> = self.asked.iter().map(value).collect();

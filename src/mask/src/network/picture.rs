@@ -9,6 +9,9 @@ use relit_data::geometry::Rect;
 /// What is shown around a rectangle, as a share of its longer side.
 const AROUND: f64 = 0.1;
 
+/// ImageNet's mean colour, 0 to 1, which stands around a padded picture: networks that pad themselves do so with it.
+pub(super) const MEAN_COLOUR: [f32; 3] = [0.485, 0.456, 0.406];
+
 /// In which order the values stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Layout {
@@ -87,7 +90,7 @@ impl PictureForm {
             let level = if inside {
                 f32::from(scaled.get_pixel(x as u32, y as u32).0[channel]) / 255.0
             } else {
-                self.filling()[channel]
+                MEAN_COLOUR[channel]
             };
             (level - self.mean[channel]) / self.deviation[channel]
         };
@@ -110,14 +113,6 @@ impl PictureForm {
         };
         let origin = [f64::from(part.x), f64::from(part.y)];
         (values, Placement { origin, scale })
-    }
-
-    /// The colour around a padded picture: what becomes 0 in the network.
-    fn filling(&self) -> [f32; 3] {
-        match self.layout {
-            Layout::Planes => self.mean,
-            Layout::Pixels => super::kind::MEAN_COLOUR,
-        }
     }
 }
 
@@ -181,7 +176,8 @@ mod tests {
     fn a_padded_picture_keeps_its_shape_in_the_corner() {
         let whole = Rect::new(0, 0, 16, 8);
         let (values, placement) = form(Layout::Planes, Fit::Padded).values(&frame(), whole);
-        assert_eq!((values[0], values[3 * 8], values[4 * 8]), (2.0, 2.0, 0.0));
+        assert_eq!((values[0], values[3 * 8]), (2.0, 2.0));
+        assert_eq!(values[4 * 8], (MEAN_COLOUR[0] - 0.5) / 0.25);
         assert_eq!(placement.of([16.0, 8.0]), [8.0, 4.0]);
     }
 

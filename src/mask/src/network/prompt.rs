@@ -53,14 +53,19 @@ impl Prompt {
         self
     }
 
-    /// The points on a network's picture, as it takes them: x and y of each in turn.
-    pub(super) fn placed(&self, placement: &Placement) -> Vec<f32> {
+    /// The points on a network's picture of this width and height, as it takes them: x and y of each in turn.
+    pub(super) fn placed(
+        &self,
+        placement: &Placement,
+        (width, height): (usize, usize),
+    ) -> Vec<f32> {
         let points = self.points.iter().zip(&self.labels);
         let placed = points.flat_map(|(&point, &label)| {
             if label == NO_POINT {
                 [0.0; 2]
             } else {
-                placement.of(point)
+                let [x, y] = placement.of(point);
+                [x.clamp(0.0, width as f64), y.clamp(0.0, height as f64)]
             }
         });
         placed.map(|side| side as f32).collect()
@@ -145,9 +150,9 @@ mod tests {
             origin: [0.0; 2],
             scale: [2.0; 2],
         };
-        let placed = prompt.placed(&placement);
+        let placed = prompt.placed(&placement, (35, 90));
         assert_eq!(placed[..2], [11.0, 11.0]);
-        assert_eq!(placed[4..], [39.0, 19.0, 0.0, 0.0]);
+        assert_eq!(placed[4..], [35.0, 19.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -88,7 +88,7 @@ fn a_rectangle_says_which_of_two_objects_is_meant() {
     for (x, y, pixel) in two.enumerate_pixels_mut() {
         let near =
             |left: f64, radius: f64| (f64::from(x) - left).hypot(f64::from(y) - 100.0) < radius;
-        if near(110.0, 70.0) || near(300.0, 40.0) {
+        if near(110.0, 70.0) || near(300.0, 30.0) {
             *pixel = Rgb([230, 225, 215]);
         }
     }
@@ -102,7 +102,7 @@ fn a_rectangle_says_which_of_two_objects_is_meant() {
         assert_eq!(record["network"].get("rect").is_some(), hints.len() == 2);
         found.push(record["result"]["area_px"].as_u64().unwrap());
     }
-    let discs = [70.0, 40.0].map(|radius: f64| (std::f64::consts::PI * radius * radius) as u64);
+    let discs = [70.0, 30.0].map(|radius: f64| (std::f64::consts::PI * radius * radius) as u64);
     for (found, expected) in found.iter().zip([discs[0], discs[1], discs[0] + discs[1]]) {
         assert!(
             found.abs_diff(expected) < expected / 50,
@@ -131,6 +131,29 @@ fn seeds_correct_what_the_network_finds() {
         .into_luma8();
     assert_eq!(mask.get_pixel(48, 32).0, [0]);
     assert_eq!(mask.get_pixel(48, 20).0, [255]);
+}
+
+#[test]
+fn strokes_of_an_earlier_mask_are_applied_to_what_the_network_finds() {
+    let folder = folder_with(&[("net.onnx", u2netp())]);
+    let folder = folder.path();
+    let arguments = ["disc.png", "--model", "net.onnx"];
+    assert_eq!(code(&relit_mask(folder, &arguments)), 0);
+    let mut painted = record(folder, "mask.json");
+    let stroke =
+        serde_json::json!({"brush": "background", "radius": 5.0, "points": [[48.0, 32.0]]});
+    painted["hints"]["strokes"] = serde_json::json!([stroke]);
+    fs::write(folder.join("mask.json"), painted.to_string()).unwrap();
+    let done = relit_mask(folder, &arguments);
+    assert_eq!(code(&done), 0, "{}", said(&done));
+    let mask = image::load_from_memory(&read(folder, "mask.png"))
+        .unwrap()
+        .into_luma8();
+    assert_eq!(mask.get_pixel(48, 32).0, [0]);
+    assert_eq!(mask.get_pixel(48, 20).0, [255]);
+    let found = record(folder, "mask.json");
+    assert_eq!(found["network"], painted["network"]);
+    assert_eq!(found["hints"]["strokes"], painted["hints"]["strokes"]);
 }
 
 #[test]
