@@ -54,8 +54,12 @@ impl Network {
     /// # Errors
     /// [`MaskingError::Io`], [`MaskingError::Unusable`]; [`MaskingError::Refused`] if it needs hints and there are none.
     pub(crate) fn open(paths: &[PathBuf], hints: &Hints) -> Result<Self, MaskingError> {
-        let mut files = Vec::new();
-        let mut read = Vec::new();
+        let Some(first) = paths.first() else {
+            return Err(MaskingError::Refused(
+                "a network needs at least one file".to_owned(),
+            ));
+        };
+        let (mut files, mut read) = (Vec::new(), Vec::new());
         for path in paths {
             files.push(hashed(path, path)?);
             let file = File::read(path).map_err(unusable(path))?;
@@ -70,7 +74,7 @@ impl Network {
             Prompt::from_hints(hints).ok_or_else(|| {
                 MaskingError::Refused(format!(
                     "{} has to be told which object is meant: give --rect, or --seeds with some of the object painted white",
-                    paths[0].display()
+                    first.display()
                 ))
             })
         };
@@ -83,11 +87,9 @@ impl Network {
                 let prompted = Prompted::new(&read[0], prompt()?, &form, None);
                 (0, form, prompted.map(Steps::Prompted))
             }
-            Kind::Pair { form, decoder } => {
+            Kind::Pair { form, decoder: at } => {
                 let prompt = prompt()?.filled_up();
-                let (encoder, decoder) = (&read[1 - decoder], &read[decoder]);
-                let steps = pair(encoder, decoder, prompt, &form);
-                (1 - usize::from(paths.len() == 1), form, steps)
+                (at, form, pair(&read[1 - at], &read[at], prompt, &form))
             }
         };
         Ok(Self {
