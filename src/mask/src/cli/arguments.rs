@@ -22,7 +22,7 @@ Examples:
   relit-mask videos/ --auto -o masks/
   relit-mask photographs/ --auto -o masks/
   relit-mask photographs/ --model u2netp.onnx -o masks/
-  relit-mask cup.jpg --model mobile_sam.encoder.onnx --model mobile_sam.decoder.onnx --rect 120,40,260,420
+  relit-mask cup.jpg --model encoder.onnx --model decoder.onnx --rect 120,40,260,420
   relit-mask cup.jpg bowl.jpg --rect 120,40,260,420 -o masks/
   relit-mask check 20261120T093015Z-mug
 

@@ -70,7 +70,8 @@ impl Answer {
         let longer = columns.max(rows).max(width.max(height));
         let is_alike = (columns * height).abs_diff(rows * width) <= longer;
         let pixels = rows * columns;
-        if columns.min(rows) < LEAST_SIDE || !is_alike || self.values.len() % pixels != 0 {
+        if columns.min(rows) < LEAST_SIDE || !is_alike || !self.values.len().is_multiple_of(pixels)
+        {
             return Err(self.unfit());
         }
         if self.values.iter().all(|value| value.is_finite()) {
