@@ -148,6 +148,7 @@ lint: setup ## Check formatting, lints and documentation
 	cargo clippy --locked -p relight -- -D warnings
 	cargo clippy --locked $(PROGRAMS) --all-targets -- -D warnings
 	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
+	cargo clippy --locked -p relit-mask --no-default-features --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps $(EXTRAS)
 	@if cargo tree --locked -p relight -e normal --prefix none \
 	    | grep -E '^(ffmpeg|opencv|relit-(video|mask|capture|camera|turntable))'; then \

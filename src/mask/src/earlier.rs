@@ -46,12 +46,13 @@ pub(super) fn with_strokes<'a>(
         "applied {strokes} of the earlier mask again: --force leaves them out"
     ));
     let mut request = request.clone();
-    if request.hints.is_empty() && request.turn == TurnRequest::None {
+    if request.hints.is_empty() && request.turn == TurnRequest::None && request.network.is_none() {
         // Nothing but the editor was asked for: it goes on where it stopped.
         request.turn = TurnRequest::from_record(&record);
         request.frame = record.source.frame;
         let unusable = |fault| MaskingError::unusable("recipe", &files.record, &fault);
         request.hints = record.hints.hints().map_err(unusable)?;
+        request.found_by = record.network;
     } else {
         request.hints.strokes = record.hints.strokes;
     }

@@ -15,7 +15,7 @@ pub enum MaskingError {
     /// A file that is given cannot be used.
     #[error("the {what} {path} cannot be used: {why}")]
     Unusable {
-        /// What it is given as: "seeds", "recipe", "mask", "photograph".
+        /// What it is given as: "seeds", "recipe", "mask", "photograph", "network".
         what: &'static str,
         /// The file.
         path: PathBuf,
@@ -53,6 +53,11 @@ pub enum MaskingError {
     /// The request does not fit the recording, the mask that is there, or this program: why, and what to do.
     #[error("{0}")]
     Refused(String),
+    /// A network sees no object in the frame, or none in the rectangle.
+    #[error(
+        "the network {0} found no object: give a rectangle around it with --rect, or mark it in --seeds without --model"
+    )]
+    NothingFound(PathBuf),
     /// OpenCV's GrabCut reported an error.
     #[error("OpenCV's GrabCut failed")]
     OpenCv(#[source] Box<dyn std::error::Error + Send + Sync>),

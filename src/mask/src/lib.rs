@@ -11,6 +11,9 @@
 //! This crate brings frames and folders to [`relit_grabcut`], and is the program `relit-mask` (in `cli/`).
 //! It knows nothing of data sets and the rig.
 //!
+//! With the feature `networks`, which is on by default, a segmentation network from an ONNX file can find the object
+//! ([`MaskRequest::with_network`]).
+//!
 //! With the feature `opencv`, which is off by default, OpenCV's GrabCut can cut a mask as well: a reference
 //! ([`MaskEngine::OpenCv`]).
 //!
@@ -45,6 +48,7 @@ mod error;
 mod files;
 mod inputs;
 mod making;
+mod network;
 #[cfg(feature = "opencv")]
 mod opencv_grab_cut;
 mod record;
@@ -58,6 +62,7 @@ pub use error::MaskingError;
 pub use files::MaskFiles;
 pub use inputs::{MaskInputs, MaskTarget};
 pub use making::{MaskOutput, make_mask};
+pub use network::{NetworkFile, RecordedNetwork};
 pub use record::{
     MASK_SCHEMA, MaskRecord, MaskSoftware, RecordedHints, RecordedResult, SourceFrame,
 };

@@ -94,13 +94,24 @@ fn segment_and_write(
 }
 
 /// Cuts the object out of `frame` as the request wants it, and says by which request the same mask is made again: of a
-/// photograph whose plain background was all there was to go by, with what that showed.
+/// photograph whose plain background was all there was to go by, with what that showed, and of a network's mask with the
+/// network's marks.
 pub(super) fn cut<'a>(
     frame: &RgbImage,
     turn: Option<&SampledTurn>,
     request: &'a MaskRequest,
     effort: Effort,
 ) -> Result<(Mask, Cow<'a, MaskRequest>), MaskingError> {
+    if let Some(network) = &request.network {
+        let request = MaskRequest {
+            hints: network.marks(frame, &request.hints)?,
+            network: None,
+            found_by: Some(network.recorded()),
+            ..request.clone()
+        };
+        let (mask, request) = cut(frame, turn, &request, effort)?;
+        return Ok((mask, Cow::Owned(request.into_owned())));
+    }
     let (hints, settings) = (&request.hints, &request.settings);
     if turn.is_none() && request.is_unhinted() {
         let cut = segment_on_plain(frame, &hints.strokes, settings, effort)?;
@@ -187,6 +198,7 @@ fn record_of(
         software,
         source,
         hints: RecordedHints::new(&request.hints, turn_frames)?,
+        network: request.found_by.clone(),
         engine: request.engine,
         settings: request.settings,
         result,

@@ -7,8 +7,8 @@ use relit_grabcut::{Hints, MaskError, MaskStatistics, Seeds, SegmentSettings, St
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::MaskEngine;
 use super::engine::opencv_version;
+use super::{MaskEngine, RecordedNetwork};
 
 /// The schema that this version writes and reads.
 pub const MASK_SCHEMA: &str = "relit.mask/1";
@@ -25,6 +25,9 @@ pub struct MaskRecord {
     pub source: SourceFrame,
     /// The hints.
     pub hints: RecordedHints,
+    /// The network that found the object, whose marks are among the hints; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network: Option<RecordedNetwork>,
     /// What cut the object out.
     pub engine: MaskEngine,
     /// The settings.
@@ -231,6 +234,7 @@ mod tests {
                 frame_blake3: "00".to_owned(),
             },
             hints: RecordedHints::new(&Rect::new(-1, 2, 30, 40).into(), &[]).unwrap(),
+            network: None,
             engine: MaskEngine::OpenCv,
             settings: SegmentSettings::default(),
             result: RecordedResult::new(statistics, b"png"),

@@ -2,10 +2,12 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use relit_grabcut::{Hints, Seeds, SegmentSettings};
 
-use super::{MaskEngine, MaskRecord, MaskingError};
+use super::network::Network;
+use super::{MaskEngine, MaskRecord, MaskingError, RecordedNetwork};
 
 /// How to make a mask.
 #[derive(Debug, Clone)]
@@ -16,6 +18,10 @@ pub struct MaskRequest {
     pub hints: Hints,
     pub(super) turn: TurnRequest,
     pub(super) engine: MaskEngine,
+    /// The network that is asked where the object is.
+    pub(super) network: Option<Arc<Network>>,
+    /// The one by which the hints were found already.
+    pub(super) found_by: Option<RecordedNetwork>,
     /// The settings.
     pub settings: SegmentSettings,
     pub(super) recipe: Option<Recipe>,
@@ -60,6 +66,8 @@ impl MaskRequest {
             hints: hints.into(),
             turn: TurnRequest::None,
             engine: MaskEngine::default(),
+            network: None,
+            found_by: None,
             settings,
             recipe: None,
             force: false,
@@ -100,9 +108,21 @@ impl MaskRequest {
                 path: path.to_owned(),
                 record: record.clone(),
             }),
+            found_by: record.network,
             ..Self::new(record.source.frame, hints, record.settings)
         };
         request.with_engine(engine)
+    }
+
+    /// Lets a segmentation network find the object by the hints of this request: `files` are its ONNX file, or its
+    /// encoder and its decoder. Its answer becomes hints for the cut. [`edit`](super::edit) does not ask it.
+    ///
+    /// # Errors
+    /// [`MaskingError::Io`] or [`MaskingError::Unusable`] if it cannot be used; [`MaskingError::Refused`] if it needs
+    /// hints and there are none, or networks are not built in.
+    pub fn with_network(self, files: &[PathBuf]) -> Result<Self, MaskingError> {
+        let network = Some(Arc::new(Network::open(files, &self.hints)?));
+        Ok(Self { network, ..self })
     }
 
     /// Lets this engine cut the object out. [`edit`](super::edit) cuts by relit's nevertheless.

@@ -21,6 +21,8 @@ Examples:
   relit-mask sessions/ --rect 610,240,420,380 --keep-all
   relit-mask videos/ --auto -o masks/
   relit-mask photographs/ --auto -o masks/
+  relit-mask photographs/ --model u2netp.onnx -o masks/
+  relit-mask cup.jpg --model encoder.onnx --model decoder.onnx --rect 120,40,260,420
   relit-mask cup.jpg bowl.jpg --rect 120,40,260,420 -o masks/
   relit-mask check 20261120T093015Z-mug
 
@@ -63,7 +65,7 @@ pub(crate) enum Verb {
 
 /// What mask is to be made.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("hint").args(["rect", "seeds", "auto", "edit", "recipe"]).required(true).multiple(true))]
+#[command(group = ArgGroup::new("hint").args(["rect", "seeds", "auto", "edit", "model", "recipe"]).required(true).multiple(true))]
 pub(crate) struct MaskArguments {
     /// Session folders, videos, photographs, or folders of them; all use the same hints
     #[arg(value_name = "INPUT", required = true)]
@@ -81,6 +83,11 @@ pub(crate) struct MaskArguments {
     /// added), in a photograph by its plain background
     #[arg(long)]
     auto: bool,
+
+    /// An ONNX file of a segmentation network that finds the object, by --rect and --seeds if they are given; twice for
+    /// an encoder and its decoder
+    #[arg(long, value_name = "ONNX", conflicts_with_all = ["auto", "edit"])]
+    model: Vec<PathBuf>,
 
     /// Draw hints in the browser, starting from the other hints
     #[arg(long)]
@@ -123,7 +130,7 @@ pub(crate) struct MaskArguments {
 
     /// Make the mask that this mask.json describes again, byte for byte
     #[arg(long, value_name = "JSON", conflicts_with_all =
-        ["rect", "seeds", "auto", "frame", "engine", "keep_all"])]
+        ["rect", "seeds", "auto", "model", "frame", "engine", "keep_all"])]
     recipe: Option<PathBuf>,
 }
 
@@ -131,7 +138,7 @@ impl MaskArguments {
     /// The requested mask.
     ///
     /// # Errors
-    /// If seeds or recipe cannot be read, or the engine is not built in.
+    /// If seeds, recipe or network cannot be read, or the engine is not built in.
     pub(crate) fn request(&self) -> Result<MaskRequest, MaskingError> {
         if let Some(path) = &self.recipe {
             let mut request = MaskRequest::from_recipe(path)?;
@@ -149,16 +156,23 @@ impl MaskArguments {
             request = request.by_turn();
         }
         request.force = self.force;
-        request.with_engine(self.engine)
+        request = request.with_engine(self.engine)?;
+        if self.model.is_empty() {
+            Ok(request)
+        } else {
+            request.with_network(&self.model)
+        }
     }
 
-    /// Refuses OpenCV's engine for a turn, and one name, or one page, for the masks of several recordings.
+    /// Refuses OpenCV's engine for a turn, networks of more than two files, and one name, or one page, for the masks of several recordings.
     ///
     /// # Errors
     /// A usage error, ready to be printed.
     pub(crate) fn check(&self, recordings: usize) -> Result<(), clap::Error> {
         let text = if self.auto && self.engine == MaskEngine::OpenCv {
             OPENCV_KNOWS_NO_TURN.to_owned()
+        } else if self.model.len() > 2 {
+            "--model takes a network in one file, or its encoder and its decoder".to_owned()
         } else if recordings <= 1 {
             return Ok(());
         } else if self.edit {

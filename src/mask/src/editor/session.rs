@@ -149,6 +149,7 @@ impl EditorSession {
             request = request.by_turn();
         }
         request.force = self.request.force;
+        request.found_by = self.request.found_by.clone();
         request
     }
 

@@ -98,3 +98,14 @@ fn a_program_without_opencv_says_in_one_sentence_how_to_build_it_in() {
     assert!(said.contains("--features opencv"), "{said}");
     assert_eq!(read(folder.path(), "mask.png"), b"painted");
 }
+
+#[cfg(not(feature = "networks"))]
+#[test]
+fn a_program_without_networks_says_in_one_sentence_how_to_build_them_in() {
+    let folder = clip();
+    let output = relit_mask(folder.path(), &["clip.y4m", "--model", "net.onnx"]);
+    assert_eq!(code(&output), 1);
+    let said = said(&output);
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.contains("--features networks"), "{said}");
+}

@@ -13,6 +13,8 @@ mod editor;
 mod engine;
 mod folders;
 mod names;
+#[cfg(feature = "networks")]
+mod networks;
 mod photographs;
 mod program;
 mod support;
