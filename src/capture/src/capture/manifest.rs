@@ -15,6 +15,11 @@ use relit_data::session::{
 };
 use relit_turntable::Table;
 
+/// The name of a session of an object that begins at this second.
+pub(super) fn session_name(begun: Timestamp, object: &str) -> String {
+    format!("{}-{object}", begun.strftime("%Y%m%dT%H%M%SZ"))
+}
+
 /// The manifest of a take that is to begin `now`.
 pub(super) fn manifest(
     equipment: &Equipment,
@@ -30,7 +35,7 @@ pub(super) fn manifest(
         .as_ref()
         .map(|camera| camera.info().name.clone());
     Manifest {
-        id: format!("{}-{object}", now.strftime("%Y%m%dT%H%M%SZ")),
+        id: session_name(now, object),
         object: object.to_owned(),
         created: now,
         status: Status::Recording,

@@ -71,7 +71,7 @@ fn run_take(
     object: &str,
     context: CaptureContext<'_>,
 ) -> Result<(TakeSummary, bool), CaptureError> {
-    let begun = equipment.session_time();
+    let begun = equipment.session_time(object);
     context.begin_take(object);
     context.note([preflight::check_clock(begun)?]);
     let (locked, turn) = prepare(equipment, context)?;
