@@ -220,6 +220,7 @@ mod tests {
                 reason: None,
             };
             assert_eq!(judgement(&CaptureOutcome { take, repeated }).1, outcome);
+                notes: Vec::new(),
         }
     }
 }

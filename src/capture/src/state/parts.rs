@@ -66,6 +66,8 @@ pub struct TakeSummary {
     pub is_stopped: bool,
     /// Why, in a sentence, where the verdict is not clean.
     pub reason: Option<String>,
+    /// What else to know of the whole take, such as light that is too even, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// The turntable as last heard.

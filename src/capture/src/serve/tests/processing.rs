@@ -382,6 +382,7 @@ fn a_usable_take_is_processed_by_itself_where_that_is_set_and_another_is_not() {
                 dropped: 0,
                 is_stopped: false,
                 reason: None,
+                notes: Vec::new(),
             });
         });
     };
