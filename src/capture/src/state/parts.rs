@@ -84,6 +84,8 @@ pub struct TableState {
     pub degrees_per_second: Option<f64>,
     /// Its highest speed, degrees a second.
     pub max_degrees_per_second: Option<f64>,
+    /// Whether it has an index sensor, by which it finds zero. Without one, zero is where a person sets it.
+    pub has_index: bool,
     /// Whether zero is known.
     pub homed: bool,
     /// Whether the emergency stop is pressed.
