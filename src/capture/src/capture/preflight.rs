@@ -63,7 +63,10 @@ pub(super) fn check_clock(now: Timestamp) -> Result<Check, CaptureError> {
 }
 
 /// Checks that an object's name can be part of a session's.
-pub(crate) fn check_object(name: &str) -> Result<(), String> {
+///
+/// # Errors
+/// What a name can have, in a sentence.
+pub fn check_object(name: &str) -> Result<(), String> {
     if is_session_name(name) && name.len() <= MAX_OBJECT_LENGTH {
         Ok(())
     } else {
