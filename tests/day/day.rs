@@ -82,7 +82,7 @@ impl<'a> Day<'a> {
         phone.tap("#go");
         phone.wait_text("#phase", "Recording");
         phone.wait_for("document.getElementById('progress').value > 0.1");
-        phone.wait_text("#go", "Stop");
+        phone.wait_button("Stop", true);
         phone.see("recording");
         phone.wait_text_so_long("#last-open", "clean", longest);
         phone.wait_text_so_long("#phase", "Ready", longest);
@@ -171,6 +171,8 @@ impl<'a> Day<'a> {
         assert_eq!(entry.samples, 1500);
         let verdict = entry.quality.verdict;
         phone.wait_text("#extract-text", &format!("1500 samples, {verdict}"));
+        let narrow = "[...document.querySelectorAll('.steps > li > p:first-child')].some((part) => part.clientWidth < 100)";
+        assert_eq!(phone.value(narrow), false);
         phone.see("extracted");
         phone.tap("#report-page");
         phone.look_into_opened("report", session);
@@ -196,13 +198,14 @@ impl<'a> Day<'a> {
         }
     }
 
-    /// Stars and a note, and the list afterwards.
+    /// Stars and a note, which are saved as they are given, and the list afterwards.
     fn rate_it(&mut self, session: &str) {
         let phone = &mut self.phone;
         phone.tap("#stars button:nth-child(4)");
+        phone.wait_text("#saved", "Saved");
         phone.write("#note", "a stroke across the belly");
         phone.see("remarks");
-        phone.tap("#save");
+        phone.tap("#player-close");
         phone.wait_for("!document.getElementById('player').open");
         phone.wait_text("#sessions .day", "1 recorded · 1 masked · 1 extracted");
         phone.wait_text("#sessions li button .standing", "extracted");

@@ -28,6 +28,8 @@ fn main() -> ExitCode {
     let mut trials = trials![with chromium::find =>
         trouble::what_is_not_there_is_named_by_headline_and_button,
         trouble::a_take_that_a_person_stopped_is_no_fault,
+        trouble::a_page_goes_on_with_a_rig_that_was_started_again,
+        trouble::a_second_tap_on_start_is_no_stop,
         trouble::the_emergency_stop_comes_first_and_the_aborted_object_after_it,
         where_the_programs_are_missing_the_page_says_so_and_offers_nothing,
         a_session_that_opens_offers_nothing_until_its_steps_are_known,

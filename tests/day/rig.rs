@@ -44,6 +44,9 @@ pub(crate) const LONG_TURN: Turn = Turn {
     longest: Duration::from_secs(1800),
 };
 
+/// The variable with the address to listen on.
+const LISTEN: &str = "RELIT_TEST_LISTEN";
+
 impl Turn {
     /// The address of the recording as a camera.
     pub(crate) fn camera(&self) -> String {
@@ -55,6 +58,7 @@ impl Turn {
 #[derive(Debug)]
 pub(crate) struct Rig {
     child: Child,
+    command: Command,
     pub(crate) url: String,
     pub(crate) turn: &'static Turn,
     folder: tempfile::TempDir,
@@ -71,7 +75,7 @@ impl Rig {
         for program in ["relit-mask", "relit-extract"] {
             assert!(relit_tests::program(program).is_file());
         }
-        let mut command = Command::new(relit_tests::program("relit-capture"));
+        let mut command = program(&relit_tests::program("relit-capture"));
         command.args(["serve", "--camera", camera, "--turntable", table]);
         Self::serve(command, turn, tempfile::tempdir().unwrap())
     }
@@ -79,9 +83,9 @@ impl Rig {
     /// As on a machine that has the rig's program alone.
     pub(crate) fn start_without_programs(turn: &'static Turn) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let program = folder.path().join("relit-capture");
-        fs::copy(relit_tests::program("relit-capture"), &program).unwrap();
-        let mut command = Command::new(program);
+        let copy = folder.path().join("relit-capture");
+        fs::copy(relit_tests::program("relit-capture"), &copy).unwrap();
+        let mut command = program(&copy);
         command.args(["serve", "--camera", &turn.camera(), "--turntable", "sim:"]);
         Self::serve(command, turn, folder)
     }
@@ -91,23 +95,34 @@ impl Rig {
     fn serve(mut command: Command, turn: &'static Turn, folder: tempfile::TempDir) -> Self {
         symlink(fixtures(), folder.path().join("fixtures")).unwrap();
         command
-            .args(["--json", "--listen", "127.0.0.1:0"])
+            .arg("--json")
             .args(["--degrees-per-second", &turn.degrees_per_second.to_string()])
             .args(["--root", "sessions", "--datasets", "."])
             .current_dir(&folder)
             .env("PATH", folder.path())
             .stdout(Stdio::piped());
-        let mut child = command.spawn().unwrap();
-        let mut line = String::new();
-        let output = child.stdout.take().unwrap();
-        BufReader::new(output).read_line(&mut line).unwrap();
-        let serving: Value = serde_json::from_str(&line).unwrap();
+        let (child, serving) = started(command.env(LISTEN, "127.0.0.1:0"));
+        // Another start takes the same port.
+        command.env(LISTEN, serving["address"].as_str().unwrap());
         Self {
             url: serving["url"].as_str().unwrap().to_owned(),
             child,
+            command,
             turn,
             folder,
         }
+    }
+
+    /// Ends the program and starts it again, at the same address.
+    pub(crate) fn restart(&mut self) {
+        self.end();
+        (self.child, _) = started(&mut self.command);
+    }
+
+    /// It ends its programs when it is asked to end.
+    fn end(&mut self) {
+        let _ = kill_process(Pid::from_child(&self.child), Signal::TERM);
+        let _ = self.child.wait();
     }
 
     /// Puts the recording itself among the sessions; returns its name.
@@ -155,10 +170,25 @@ fn fixtures() -> PathBuf {
     fixtures.canonicalize().unwrap()
 }
 
+/// A program that listens where an environment variable says, which can be changed between two starts.
+fn program(path: &Path) -> Command {
+    let mut command = Command::new("/bin/sh");
+    command.args(["-c", &format!("exec \"$@\" --listen \"${LISTEN}\""), "sh"]);
+    command.arg(path);
+    command
+}
+
+/// A program at work, and where it serves.
+fn started(command: &mut Command) -> (Child, Value) {
+    let mut child = command.spawn().unwrap();
+    let mut line = String::new();
+    let output = child.stdout.take().unwrap();
+    BufReader::new(output).read_line(&mut line).unwrap();
+    (child, serde_json::from_str(&line).unwrap())
+}
+
 impl Drop for Rig {
     fn drop(&mut self) {
-        // It ends its programs when it is asked to end.
-        let _ = kill_process(Pid::from_child(&self.child), Signal::TERM);
-        let _ = self.child.wait();
+        self.end();
     }
 }

@@ -64,6 +64,54 @@ pub(crate) fn a_take_that_a_person_stopped_is_no_fault(browser: PathBuf) {
     phone.see("stopped");
     phone.value("document.getElementById('sessions-title').scrollIntoView()");
     phone.see("stopped-in-the-list");
+    // What there is of it is extracted only step by step.
+    phone.tap("#last-open");
+    phone.wait_for("!document.getElementById('edit-mask').disabled");
+    assert_eq!(
+        phone.value("document.getElementById('make-all').hidden"),
+        true
+    );
+}
+
+pub(crate) fn a_page_goes_on_with_a_rig_that_was_started_again(browser: PathBuf) {
+    let longest = SHORT_TURN.longest;
+    let mut rig = Rig::start(&SHORT_TURN);
+    let mut phone = Phone::open(&browser, &rig.url, "restart");
+    phone.write("#object", "cow");
+    phone.wait_button("Start cow", true);
+    phone.tap("#go");
+    phone.wait_text_so_long("#last-open", "clean", longest);
+    phone.wait_text_so_long("#phase", "Ready", longest);
+    phone.value(
+        "window.thrown = []; addEventListener('error', ({ message }) => thrown.push(message))",
+    );
+    rig.restart();
+    // The new rig counts its states from the beginning.
+    phone.wait_text("#table-fault", "cable");
+    phone.wait_button("Start cow", true);
+    phone.wait_text("#last-open", "cow");
+    assert_eq!(phone.value("thrown.join('; ')"), "");
+    // It takes its zero where a person wants it.
+    phone.tap("#home");
+    phone.wait_for("document.getElementById('table-fault').hidden");
+    phone.see("started-again");
+}
+
+pub(crate) fn a_second_tap_on_start_is_no_stop(browser: PathBuf) {
+    let rig = Rig::start(&SLOW_TURN);
+    let mut phone = Phone::open(&browser, &rig.url, "double-tap");
+    phone.write("#object", "calf");
+    phone.wait_button("Start calf", true);
+    // As soon as the button is another one.
+    phone.value(
+        "(() => { const go = document.getElementById('go'); \
+            new MutationObserver(() => { if (go.textContent === 'Stop') { window.again = go.disabled; go.click(); } }).observe(go, { childList: true }); \
+            go.click(); })()",
+    );
+    phone.wait_for("window.again === true");
+    phone.wait_for("document.getElementById('progress').value > 0.02");
+    phone.wait_text("#phase", "Recording");
+    phone.wait_button("Stop", true);
 }
 
 pub(crate) fn the_emergency_stop_comes_first_and_the_aborted_object_after_it(browser: PathBuf) {

@@ -200,6 +200,20 @@ fn commands_that_make_no_sense_are_refused_where_they_are_given() {
     ));
 }
 
+#[test]
+fn a_table_without_an_index_says_what_to_do_until_its_zero_is_set() {
+    let root = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(settings(root.path(), "", "sim:?speed=3")).unwrap();
+    let table = once(&daemon, is_ready).table;
+    assert!(!table.has_index && !table.homed, "{table:?}");
+    assert!(table.fault.is_some(), "{table:?}");
+    // It is a warning: a person may know that the cable hangs free.
+    assert!(Command::check(&start("mug"), &daemon.monitor().state()).is_ok());
+    daemon.command(Command::Home).unwrap();
+    let table = once(&daemon, |state| state.table.homed).table;
+    assert_eq!(table.fault, None);
+}
+
 /// Presses the emergency stop while the table moves.
 fn press_in_motion(daemon: &Daemon) -> RigState {
     daemon.command(Command::Jog { degrees: 390.0 }).unwrap();
@@ -239,10 +253,13 @@ fn after_an_emergency_stop_one_command_brings_the_table_back() {
         "{refused}"
     );
     // The jog that was interrupted is still being wound up.
+    let faults = daemon.monitor().state().faults.len();
     once(&daemon, |_| daemon.command(Command::Reset).is_ok());
     once(&daemon, |state| {
         state.table.homed && state.table.state == "Idle"
     });
+    // Nobody has seen yet whether its cable is wound.
+    once(&daemon, |state| state.faults.len() > faults);
     once(&daemon, |_| daemon.command(start("mug")).is_ok());
     let state = once(&daemon, |state| state.last_take.is_some());
     assert_eq!(state.last_take.unwrap().verdict, Verdict::Clean);

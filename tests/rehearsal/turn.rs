@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use relit_capture::state::Verdict;
+use relit_capture::state::{Check, Verdict};
 use relit_data::session::Status;
 use relit_data::shard::ImageSize;
 use relit_extract::{ExtractOptions, extract};
@@ -99,13 +99,28 @@ fn even_room(folder: &Path) -> PathBuf {
     path
 }
 
-/// What a take says about the room: whether it is good, and a sentence.
+/// What a take says about the room: whether it is good, and a sentence, which the take keeps if it is not.
 fn room_check(rig: &mut Rehearsal) -> (bool, String) {
     let take = rig.capture().unwrap();
     assert_eq!(take.verdict, Verdict::Clean, "{take:?}");
+    let manifest = rig.session(&take).manifest.unwrap();
+    assert_eq!(manifest.notes(), take.notes);
     let checks = rig.monitor.state().checks;
     let check = checks.into_iter().find(|check| check.what == "light");
-    check.map(|check| (check.good, check.found)).unwrap()
+    let (good, found) = check.map(|check| (check.good, check.found)).unwrap();
+    assert_eq!(take.notes.contains(&found), !good, "{:?}", take.notes);
+    (good, found)
+}
+
+#[test]
+fn a_take_keeps_what_its_camera_may_have_changed_by_itself() {
+    let mut rig = Rehearsal::short("", |_| {});
+    let take = rig.capture().unwrap();
+    let checks = rig.monitor.state().checks;
+    let of_camera = |check: &&Check| check.what == "camera settings" && !check.good;
+    let noted: Vec<_> = checks.iter().filter(of_camera).collect();
+    assert_eq!(noted.len(), 1, "{checks:?}");
+    assert!(take.notes.contains(&noted[0].found), "{:?}", take.notes);
 }
 
 #[test]

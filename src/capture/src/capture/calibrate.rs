@@ -47,15 +47,16 @@ pub fn read_facts(root: &Path) -> Result<Option<RigFacts>, CaptureError> {
         .map_err(CaptureError::system(path.display().to_string(), "read"))
 }
 
-/// Keeps what is known of the rig for its further sessions.
+/// Keeps what is known of the rig for its further sessions; returns the file.
 ///
 /// # Errors
 /// What the file system answers.
-pub fn write_facts(root: &Path, facts: &RigFacts) -> Result<(), CaptureError> {
+pub fn write_facts(root: &Path, facts: &RigFacts) -> Result<PathBuf, CaptureError> {
     let path = path(root);
     let bytes = serde_json::to_vec_pretty(facts).map_err(io::Error::from);
     let written = bytes.and_then(|bytes| durable::write_whole(&path, &bytes));
-    written.map_err(CaptureError::system(path.display().to_string(), "written"))
+    written.map_err(CaptureError::system(path.display().to_string(), "written"))?;
+    Ok(path)
 }
 
 fn path(root: &Path) -> PathBuf {

@@ -30,6 +30,9 @@ impl CaptureContext<'_> {
             (state.frames, state.dropped) = (take.frames, take.dropped);
             state.session = None;
             state.note(format!("{}: {} frames", take.session, take.frames));
+            for note in &take.notes {
+                state.note(note.clone());
+            }
             state.last_take = Some(take.clone());
         });
     }

@@ -5,6 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 
 use super::error::CaptureError;
+use super::manifest::session_name;
 use super::settings::Settings;
 use relit_camera::{self as camera, Camera};
 use relit_clock::Clock;
@@ -13,8 +14,8 @@ use relit_turntable::{Table, TableOptions, TurntableAddress, find_serial};
 
 /// How many times faster than real time a rehearsal runs at most where people look at it.
 const FASTEST_SHOWN: f64 = 20.0;
-/// Session names have whole seconds: two sessions begin at least so far apart.
-const NAME_SPACING: Duration = Duration::from_secs(1);
+/// Time between two looks whether a session's name, which has whole seconds, is free.
+const NAME_LOOK: Duration = Duration::from_millis(100);
 
 /// Camera and table of a rig.
 pub struct Equipment {
@@ -26,8 +27,6 @@ pub struct Equipment {
     simulator: Option<SimulatedTable>,
     settings: Settings,
     clock: Clock,
-    /// When the last session was named.
-    named: Option<Timestamp>,
 }
 
 impl Equipment {
@@ -74,7 +73,6 @@ impl Equipment {
             simulator,
             settings,
             clock,
-            named: None,
         })
     }
 
@@ -102,14 +100,15 @@ impl Equipment {
         self.settings.turntable != TurntableAddress::None
     }
 
-    /// The time of day for the next session's name: waits until it differs from the one before.
-    pub(super) fn session_time(&mut self) -> Timestamp {
-        let passed = self
-            .named
-            .map(|named| Timestamp::now().duration_since(named));
-        let passed = passed.map_or(NAME_SPACING, |passed| passed.unsigned_abs());
-        std::thread::sleep(NAME_SPACING.saturating_sub(passed));
-        *self.named.insert(Timestamp::now())
+    /// The time of day for the next session's name: waits until no session of the object has it.
+    pub(super) fn session_time(&self, object: &str) -> Timestamp {
+        loop {
+            let now = Timestamp::now();
+            if !self.settings.root.join(session_name(now, object)).exists() {
+                return now;
+            }
+            std::thread::sleep(NAME_LOOK);
+        }
     }
 
     /// Opens the camera where it is not.
@@ -161,6 +160,18 @@ mod tests {
         let (camera, table) = (camera.parse().unwrap(), table.parse().unwrap());
         let settings = Settings::new("/root".into(), camera, table);
         Equipment::new(settings).unwrap().clock()
+    }
+
+    #[test]
+    fn a_second_session_of_an_object_waits_until_its_name_is_free() {
+        let root = tempfile::tempdir().unwrap();
+        let (camera, table) = ("replay:a".parse().unwrap(), "none".parse().unwrap());
+        let settings = Settings::new(root.path().to_owned(), camera, table);
+        let equipment = Equipment::new(settings).unwrap();
+        let name = || session_name(equipment.session_time("mug"), "mug");
+        let first = name();
+        std::fs::create_dir(root.path().join(&first)).unwrap();
+        assert_ne!(name(), first);
     }
 
     #[test]

@@ -11,9 +11,14 @@ use super::settings::Settings;
 use relit_camera::{Control, ControlKind};
 use relit_data::rig::RigFacts;
 use relit_data::session::{
-    CameraFacts, Fault, FrameClock, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts,
+    CameraFacts, Fault, Manifest, SoftwareFacts, Status, TurntableFacts, VideoFacts,
 };
 use relit_turntable::Table;
+
+/// The name of a session of an object that begins at this second.
+pub(super) fn session_name(begun: Timestamp, object: &str) -> String {
+    format!("{}-{object}", begun.strftime("%Y%m%dT%H%M%SZ"))
+}
 
 /// The manifest of a take that is to begin `now`.
 pub(super) fn manifest(
@@ -30,7 +35,7 @@ pub(super) fn manifest(
         .as_ref()
         .map(|camera| camera.info().name.clone());
     Manifest {
-        id: format!("{}-{object}", now.strftime("%Y%m%dT%H%M%SZ")),
+        id: session_name(now, object),
         object: object.to_owned(),
         created: now,
         status: Status::Recording,
@@ -67,17 +72,14 @@ pub(super) fn manifest(
     }
 }
 
-/// What a camera may change by itself when its driver is not asked: this cannot be seen in
-/// the recording afterwards.
+/// What the camera may change by itself, which cannot be seen in the recording afterwards.
 fn not_held(locked: &LockedCamera) -> Vec<Fault> {
     let not_held = &locked.plan.not_held;
-    if locked.clock == FrameClock::Driver || not_held.is_empty() {
-        return Vec::new();
-    }
-    vec![Fault {
+    let fault = (!not_held.is_empty()).then(|| Fault {
         t_us: 0,
         what: not_held.to_string(),
-    }]
+    });
+    fault.into_iter().collect()
 }
 
 fn facts_of(table: &Table, settings: &Settings) -> TurntableFacts {

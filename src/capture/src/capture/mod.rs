@@ -28,6 +28,7 @@ pub use context::CaptureContext;
 pub use equipment::Equipment;
 pub use error::{CaptureError, StopReason};
 pub use mode_preference::ModePreference;
+pub use preflight::check_object;
 pub use recording::{
     EndReason, FinishedRecording, Progress, Recorder, RecordingError, RecordingPlan,
     RecoveredSession, RecoveryReport, Window, recover, recover_session,

@@ -20,6 +20,10 @@ use relit_turntable::{
 const RESERVE: f64 = 0.2;
 /// Longest object name, bytes: a session's name has date and time before it.
 const MAX_OBJECT_LENGTH: usize = 80;
+/// What a person has to do with a table that has no index sensor, before zero is known.
+pub(crate) const ZERO_NOT_SET: &str = "zero is not set, and the cable may be wound: turn the table until the cable hangs free, then press “Set zero here”";
+/// What a person has to check where such a table took its zero without being asked.
+pub(crate) const ZERO_TAKEN: &str = "zero is now where the table stands, as it has no index sensor: if the cable is wound, turn the table until it hangs free, then press “Set zero here”";
 /// 2025-01-01, seconds since 1970.
 const EARLIEST: i64 = 1_735_689_600;
 
@@ -59,7 +63,10 @@ pub(super) fn check_clock(now: Timestamp) -> Result<Check, CaptureError> {
 }
 
 /// Checks that an object's name can be part of a session's.
-pub(crate) fn check_object(name: &str) -> Result<(), String> {
+///
+/// # Errors
+/// What a name can have, in a sentence.
+pub fn check_object(name: &str) -> Result<(), String> {
     if is_session_name(name) && name.len() <= MAX_OBJECT_LENGTH {
         Ok(())
     } else {
@@ -94,7 +101,7 @@ pub(super) fn ready_table(table: &Table) -> Result<Vec<Check>, CaptureError> {
     checks.push(Check::passed("table", format!("Grbl {firmware} answers")));
     // Without an index, the place where it stands would become the zero of a cable that may be wound.
     if status.restarted && !table.identity().homing {
-        return Err(TurntableError::NotHomed.into());
+        return Err(CaptureError::Refused(ZERO_NOT_SET.to_owned()));
     }
     checks.push(if status.homed {
         Check::passed("table's zero", "known")

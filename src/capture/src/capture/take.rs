@@ -71,7 +71,7 @@ fn run_take(
     object: &str,
     context: CaptureContext<'_>,
 ) -> Result<(TakeSummary, bool), CaptureError> {
-    let begun = equipment.session_time();
+    let begun = equipment.session_time(object);
     context.begin_take(object);
     context.note([preflight::check_clock(begun)?]);
     let (locked, turn) = prepare(equipment, context)?;
@@ -118,10 +118,13 @@ fn run_take(
     let mut repeatable = matches!(recorded.end(), EndReason::Over);
     let angle = |t_us| track.as_ref().and_then(|track| track.angle_at(t_us));
     // The session is closed before the table turns back: nothing that happens on the way costs it.
-    let modulation = recorded.modulation();
+    let light = recorded.modulation().map(check_light);
+    if let Some(light) = light.as_ref().filter(|light| !light.good) {
+        recorded.add_note(light.found.clone());
+    }
     let take = recorded.finish(&angle, &control_faults)?;
     if take.verdict != Verdict::Aborted {
-        context.note(modulation.map(check_room));
+        context.note(light);
     }
     context.end_take(&take);
     if let (Some(table), Some(finished)) = (equipment.table.as_ref(), finished) {
@@ -131,7 +134,7 @@ fn run_take(
 }
 
 /// Whether a turn in this light tells normals and albedo, and trains networks on what changes.
-fn check_room(modulation: f64) -> Check {
+fn check_light(modulation: f64) -> Check {
     let percent = 100.0 * modulation;
     if modulation < MIN_MODULATION {
         let found = format!(

@@ -157,25 +157,25 @@ fn enter_without_reports(context: CaptureContext<'_>, phase: Phase) {
 }
 
 /// What is wrong with the table, in a sentence.
-fn fault_of(status: &TableStatus) -> Option<String> {
+fn fault_of(status: &TableStatus, has_index: bool) -> Option<String> {
     if status.emergency_stop {
         return Some(Obstacle::emergency_stop().to_string());
     }
-    let restarted = || {
-        status
+    let lost = || match (has_index, status.homed) {
+        // Without an index sensor only a person sees whether the cable is wound.
+        (false, false) => Some(preflight::ZERO_NOT_SET.to_owned()),
+        _ => status
             .restarted
-            .then(|| MotionFault::Restarted(None).to_string())
+            .then(|| MotionFault::Restarted(None).to_string()),
     };
-    status
-        .alarm
-        .map(|alarm| alarm.to_string())
-        .or_else(restarted)
+    status.alarm.map(|alarm| alarm.to_string()).or_else(lost)
 }
 
 /// Asks the table and shows its answer.
 pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), TurntableError> {
     let status = table.status()?;
     let (low_deg, high_deg) = table.limits(&status);
+    let has_index = table.identity().homing;
     monitor.update(|state| {
         let degrees_per_second = state.settings.degrees_per_second;
         state.table = TableState {
@@ -184,6 +184,7 @@ pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), Turntab
             angle_deg: Some(status.angle_deg),
             degrees_per_second: Some(status.degrees_per_second),
             max_degrees_per_second: Some(table.identity().max_degrees_per_second),
+            has_index,
             homed: status.homed,
             battery_v: status.battery_v,
             low_deg: Some(low_deg),
@@ -191,7 +192,7 @@ pub(crate) fn show_table(monitor: &Monitor, table: &Table) -> Result<(), Turntab
             no_room: preflight::no_room(table, &status, degrees_per_second),
             emergency_stop: status.emergency_stop,
             locked: status.state == ControllerState::Alarm,
-            fault: fault_of(&status),
+            fault: fault_of(&status, has_index),
         };
     });
     Ok(())

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use relit_camera::CameraAddress;
 use relit_camera::manual_controls::ManualValues;
-use relit_capture::capture::{ModePreference, Settings};
+use relit_capture::capture::{ModePreference, Settings, check_object};
 use relit_capture::serve::ListenAddress;
 use relit_console::ConsoleOptions;
 use relit_turntable as turntable;
@@ -72,7 +72,7 @@ pub(crate) enum Verb {
 #[derive(Args)]
 pub(crate) struct RecordArguments {
     /// The object's name: letters, digits, '-', '_' and '.'.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = object)]
     pub(crate) object: String,
     #[command(flatten)]
     pub(crate) turn: TurnArguments,
@@ -177,6 +177,10 @@ fn figure(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
         Ok(value) if (low..=high).contains(&value) => Ok(value),
         _ => Err(format!("give {what} from {low} to {high}")),
     }
+}
+
+fn object(text: &str) -> Result<String, String> {
+    check_object(text).map(|()| text.to_owned())
 }
 
 fn speed(text: &str) -> Result<f64, String> {

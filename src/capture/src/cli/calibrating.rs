@@ -29,16 +29,21 @@ pub(crate) fn run(console: Console, asked: CalibrateArguments) -> Result<Outcome
             .map_err(CaptureError::system("the signals", "listened to"))?;
         facts.rotation = Some(measure_rotation(&mut equipment, &stop)?);
     }
-    write_facts(&root, &facts)?;
+    let file = write_facts(&root, &facts)?;
     let rotation = facts.rotation.map(|rotation| rotation.to_string());
     let elevation = facts.camera_elevation_deg;
     console.print(
         &format!(
-            "the table turns {}; the camera looks down by {}",
-            rotation.as_deref().unwrap_or("in an unknown direction"),
-            elevation.map_or("an unknown angle".to_owned(), |degrees| format!(
-                "{degrees} degrees"
-            ))
+            "{}: {}; {}",
+            file.display(),
+            rotation.as_deref().map_or(
+                "rotation direction not measured".to_owned(),
+                |rotation| format!("the table turns {rotation}")
+            ),
+            elevation.map_or(
+                "elevation of the camera not given (--elevation)".to_owned(),
+                |degrees| format!("the camera looks down by {degrees} degrees")
+            ),
         ),
         &Event::Calibrated {
             rotation,

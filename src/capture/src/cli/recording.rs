@@ -25,12 +25,14 @@ pub(crate) fn run(console: Console, record: RecordArguments) -> Result<Outcome, 
     let RecordArguments { object, turn } = record;
     let settings: Settings = turn.rig.into();
     let _made = make_root(&settings)?;
-    if !turn.yes && !agreed(console, &settings)? {
-        return Ok(Outcome::Failure);
-    }
     let _camera = settings.lock_camera()?;
     report_recovered(console, &settings)?;
     let mut equipment = Equipment::new(settings)?;
+    // Without a camera there is nothing to agree to.
+    equipment.open_camera()?;
+    if !turn.yes && !agreed(console, equipment.settings())? {
+        return Ok(Outcome::Failure);
+    }
     let stop = StopRequest::new(&equipment.clock());
     let asked = stop.clone();
     at_end(move || asked.request(StopReason::Shutdown))
@@ -218,6 +220,7 @@ mod tests {
                 dropped: 0,
                 is_stopped: false,
                 reason: None,
+                notes: Vec::new(),
             };
             assert_eq!(judgement(&CaptureOutcome { take, repeated }).1, outcome);
         }

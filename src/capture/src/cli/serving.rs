@@ -45,17 +45,21 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
     };
     let processing = Processing::start(rig.root(), rig.monitor().clone(), processing)?;
     let processing = Arc::new(processing);
+    let names = asked.listen.names(&asked.names);
+    // Another name than the machine's own leads here from elsewhere.
+    let is_for_phones = !address.ip().is_loopback() || !names.is_empty();
+    let keeps_token = address.ip().is_loopback() || token.is_some();
     let options = ServeOptions {
         processing: Some(Arc::clone(&processing)),
         token,
-        names: asked.listen.names(&asked.names),
+        names,
         heartbeat: heartbeat(),
         ..ServeOptions::at(address)
     };
     serve(rig.clone(), options, &shutdown, |announcement| {
         let status = format!("Serving on {}", announcement.address);
         notify_service(&[NotifyState::Ready, NotifyState::Status(&status)]);
-        announce(console, announcement);
+        announce(console, announcement, is_for_phones, keeps_token);
     })?;
     // Threads of the server may hold the rig a moment longer: its end does not wait for them.
     rig.end();
@@ -64,10 +68,15 @@ pub(crate) fn run(console: Console, asked: ServeArguments) -> Result<Outcome, Bo
     Ok(Outcome::Success)
 }
 
-fn announce(console: Console, announcement: &Announcement) {
+fn announce(console: Console, announcement: &Announcement, is_for_phones: bool, keeps_token: bool) {
     let mut text = format!("The rig is at {}", announcement.url);
-    if let Some(qr) = &announcement.qr {
-        text = format!("{qr}\n{text}");
+    match &announcement.qr {
+        Some(qr) if is_for_phones => text = format!("{qr}\n{text}"),
+        Some(_) => text += "\nOnly this machine can open it. For a phone: --listen 0.0.0.0:8420",
+        None => {}
+    }
+    if !keeps_token {
+        text += "\nAfter a restart, phones have to scan a new code. To keep it: --token-file FILE";
     }
     console.print(
         &text,

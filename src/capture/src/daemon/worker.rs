@@ -8,12 +8,13 @@ use relit_data::causes::with_causes;
 
 use super::dispatcher::{Dispatcher, Job, Next};
 use super::idle::Idle;
+use crate::capture::preflight::ZERO_TAKEN;
 use crate::capture::turn::show_table;
 use crate::capture::{CaptureContext, CaptureError, Equipment, StopRequest, capture};
 use crate::preview::Preview;
 use relit_camera::Camera;
 use relit_camera::manual_controls::{ManualPlan, ManualValues};
-use relit_turntable::{Table, TurntableError};
+use relit_turntable::{HomingResult, Table, TurntableError};
 
 /// Time between two checks of a motion.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -69,7 +70,12 @@ impl Worker {
                 let jog = |table: &Table| table.jog(degrees, None);
                 self.with_table(stop, jog).map(drop)
             }
-            Job::ResetTable => self.with_table(stop, Table::reset).map(drop),
+            Job::ResetTable => {
+                if self.with_table(stop, Table::reset)? == HomingResult::WhereItStands {
+                    self.report(ZERO_TAKEN.to_owned());
+                }
+                Ok(())
+            }
             Job::SetControl { name, value } => self.set_control(&name, value),
         }
     }

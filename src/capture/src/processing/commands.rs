@@ -13,7 +13,7 @@ pub struct ProcessingPrograms {
     pub mask: Option<PathBuf>,
     /// `relit-extract`, where it is installed.
     pub extract: Option<PathBuf>,
-    /// What a program is started by, such as `nice`; the program and its arguments follow.
+    /// What a program that nobody waits for is started by, such as `nice`; the program and its arguments follow.
     pub launcher: Vec<OsString>,
 }
 
@@ -51,7 +51,8 @@ impl ProcessingPrograms {
         Some(self.launch(program.as_deref()?, arguments))
     }
 
-    /// The editor of a session's mask, on this machine alone. It continues with a `recipe` where there is one.
+    /// The editor of a session's mask, on this machine alone, without the launcher: a person waits for it. It continues
+    /// with a `recipe` where there is one.
     pub(super) fn editor(&self, session: &Path, recipe: Option<&Path>) -> Option<Command> {
         let mut arguments: Vec<OsString> = vec![session.into(), "--edit".into(), "--json".into()];
         match recipe {
@@ -59,7 +60,9 @@ impl ProcessingPrograms {
             None => arguments.push("--auto".into()),
         }
         arguments.extend(["--listen".into(), "127.0.0.1:0".into()]);
-        Some(self.launch(self.mask.as_deref()?, arguments))
+        let mut command = Command::new(self.mask.as_deref()?);
+        command.args(arguments);
+        Some(command)
     }
 
     fn launch(&self, program: &Path, arguments: Vec<OsString>) -> Command {
@@ -97,6 +100,12 @@ mod tests {
         };
         assert!(programs.command(ProcessingStep::Mask, &places).is_none());
         assert!(programs.editor(&places.session, None).is_none());
+        let with_editor = ProcessingPrograms {
+            mask: Some("/bin/relit-mask".into()),
+            ..programs.clone()
+        };
+        let editor = with_editor.editor(&places.session, None).unwrap();
+        assert_eq!(editor.get_program(), "/bin/relit-mask");
         let command = programs.command(ProcessingStep::Extract, &places).unwrap();
         let wanted =
             "ionice -c 3 /bin/relit-extract /s/mug -o /d --resume --progress --partial --json";

@@ -10,6 +10,7 @@ use relit_data::session::MASK_FILE;
 use super::child::Worker;
 use super::commands::ProcessingPrograms;
 use super::events::ProgramEvent;
+use super::shared::{Shared, is_busy};
 use crate::command::CommandError;
 
 /// Time in which the editor has to come up: it reads the video through once.
@@ -41,12 +42,12 @@ pub(super) struct OpenEditor {
 }
 
 impl OpenEditor {
-    /// Starts the editor of a session's mask and waits until it can be reached. It is held while `is_busy`.
+    /// Starts the editor of a session's mask and waits until it can be reached. It is held while the rig is busy.
     pub(super) fn open(
+        shared: &Shared,
         programs: &ProcessingPrograms,
         session: &str,
         folder: &Path,
-        is_busy: &dyn Fn() -> bool,
     ) -> Result<Self, CommandError> {
         let recipe = recipe(folder);
         let command = programs.editor(folder, recipe.as_deref());
@@ -54,12 +55,12 @@ impl OpenEditor {
             || CommandError::Unavailable("relit-mask is not installed on this machine".to_owned());
         let failed =
             |why: String| CommandError::Unavailable(format!("the editor did not open: {why}"));
-        let mut worker = Worker::start(command.ok_or_else(missing)?)
-            .map_err(|error| failed(error.to_string()))?;
+        let started = shared.start(command.ok_or_else(missing)?);
+        let mut worker = started.map_err(|error| failed(error.to_string()))?;
         let mut heard = ProgramEvent::default();
         let until = Instant::now() + START;
         loop {
-            worker.set_paused(is_busy());
+            worker.set_paused(is_busy(&shared.monitor));
             worker.read_events(&mut heard);
             if let Some(target) = target(&heard) {
                 return Ok(Self {
@@ -98,6 +99,11 @@ impl OpenEditor {
         self.worker.set_paused(held);
         let is_running = matches!(self.worker.ended(&mut self.heard), Ok(None));
         is_running && self.used.elapsed() < UNUSED
+    }
+
+    /// The session, if a mask of it was accepted.
+    pub(super) fn masked_session(&self) -> Option<&str> {
+        self.heard.has_mask().then_some(&*self.session)
     }
 }
 

@@ -119,6 +119,11 @@ impl ProgramEvent {
         self.editor.as_ref()
     }
 
+    /// Whether it made a mask.
+    pub(super) fn has_mask(&self) -> bool {
+        self.has_mask
+    }
+
     /// What went wrong, for a person; `error_output` is what the program wrote on standard error.
     pub(super) fn failure(&self, exit_code: Option<i32>, error_output: &str) -> String {
         let said = self.error.clone().or_else(|| self.left_out.clone());

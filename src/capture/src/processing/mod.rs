@@ -18,7 +18,7 @@ mod store;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -89,6 +89,7 @@ impl Processing {
         if dataset == root {
             dataset.as_mut_os_string().push("-shards");
         }
+        let (to_start, starts) = mpsc::sync_channel(1);
         let shared = Arc::new(Shared {
             dataset,
             monitor,
@@ -99,6 +100,7 @@ impl Processing {
             }),
             editor: Mutex::default(),
             opening: Mutex::default(),
+            to_start,
             is_ending: AtomicBool::new(false),
             programs: options.programs,
             root,
@@ -107,7 +109,7 @@ impl Processing {
         let worked = Arc::clone(&shared);
         let thread = thread::Builder::new()
             .name("relit-processing".to_owned())
-            .spawn(move || runner::run(&worked))
+            .spawn(move || runner::run(&worked, &starts))
             .map_err(ProcessingError::from_io(
                 "a thread for processing could not be started".to_owned(),
             ))?;
@@ -182,8 +184,7 @@ impl Processing {
         let _opening = self.shared.opening.lock();
         if !self.shared.goes_on(session)? {
             let folder = self.shared.root.join(session);
-            let is_busy = || is_busy(&self.shared.monitor);
-            let opened = OpenEditor::open(&programs, session, &folder, &is_busy)?;
+            let opened = OpenEditor::open(&self.shared, &programs, session, &folder)?;
             *self.shared.editor() = Some(opened);
         }
         self.shared.show();

@@ -17,6 +17,8 @@ use crate::state::{
 
 /// Jobs that can wait.
 const MAX_WAITING: usize = 200;
+/// How a job ended that was cancelled.
+const CANCELLED: &str = "cancelled by a person";
 /// Ended jobs that are remembered.
 const REMEMBERED: usize = 30;
 
@@ -115,7 +117,7 @@ impl ProcessingQueue {
         if let Some(entry) = self.waiting.remove(at)
             && let Some(&step) = entry.work.steps.first()
         {
-            self.remember(entry, step, ProcessingOutcome::Cancelled, "cancelled");
+            self.remember(entry, step, ProcessingOutcome::Cancelled, CANCELLED);
         }
         true
     }
@@ -172,8 +174,8 @@ impl ProcessingQueue {
         }
     }
 
-    /// The step under way has ended.
-    pub(super) fn finish(&mut self, end: StepOutcome) {
+    /// The step under way has ended; returns how, as it is shown.
+    pub(super) fn finish(&mut self, end: StepOutcome) -> String {
         let Some(UnderWay {
             mut entry,
             step,
@@ -181,20 +183,27 @@ impl ProcessingQueue {
             ..
         }) = self.current.take()
         else {
-            return;
+            return end.what;
         };
         // What was done before the cancel arrived is done.
         let stopped = is_cancelled && end.outcome == ProcessingOutcome::Failed;
         let (outcome, what) = if stopped {
-            (ProcessingOutcome::Cancelled, "cancelled")
+            (ProcessingOutcome::Cancelled, CANCELLED.to_owned())
         } else {
-            (end.outcome, end.what.as_str())
+            (end.outcome, end.what)
         };
-        self.remember(entry.clone(), step, outcome, what);
+        self.remember(entry.clone(), step, outcome, &what);
         entry.work.steps.remove(0);
         if end.goes_on && !is_cancelled && !entry.work.steps.is_empty() {
             self.waiting.push_front(entry);
         }
+        what
+    }
+
+    /// Forgets how masks of this session came out: a person has made another one.
+    pub(super) fn forget_masks(&mut self, session: &str) {
+        self.finished
+            .retain(|job| job.session != session || job.step != ProcessingStep::Mask);
     }
 
     fn remember(

@@ -2,15 +2,17 @@
 
 use std::fs;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use relit_data::session::{MANIFEST_FILE, Manifest, Status};
 
 use super::child::Worker;
 use super::commands::StepPlaces;
+use super::editor::OpenEditor;
 use super::events::ProgramEvent;
 use super::queue::{PendingWork, StartedStep, StepOutcome};
-use super::shared::{Shared, is_busy};
+use super::shared::{Shared, ToStart, is_busy};
 use crate::state::{Monitor, ProcessingOutcome, ProcessingStep, Verdict};
 
 /// Longest time between two looks at the program and the rig.
@@ -32,13 +34,17 @@ struct Running {
 }
 
 /// Works until the program ends.
-pub(super) fn run(shared: &Shared) {
+pub(super) fn run(shared: &Shared, starts: &Receiver<ToStart>) {
     let mut running: Option<Running> = None;
     let mut last_take = last_take(&shared.monitor).0;
     let mut searched = Instant::now();
     let mut seen = 0;
     while !shared.is_ending.load(Ordering::Relaxed) {
         seen = shared.monitor.wait_newer(seen, LOOK).version;
+        for ToStart { command, started } in starts.try_iter() {
+            // Who waited has gone: the program ends with its worker.
+            let _ = started.send(Worker::start(command));
+        }
         if searched.elapsed() > SEARCH {
             searched = Instant::now();
             shared.find_programs();
@@ -58,10 +64,10 @@ pub(super) fn run(shared: &Shared) {
 
 fn look_after_editor(shared: &Shared, is_busy: bool) {
     let mut editor = shared.editor();
-    if let Some(open) = editor.as_mut()
-        && !open.poll(is_busy)
-    {
-        *editor = None;
+    let over = editor.take_if(|open| !open.poll(is_busy));
+    drop(editor);
+    if let Some(session) = over.as_ref().and_then(OpenEditor::masked_session) {
+        shared.change(|plan| plan.queue.forget_masks(session));
     }
 }
 
@@ -174,7 +180,7 @@ fn go_on(shared: &Shared, mut running: Running) -> Option<Running> {
 }
 
 fn finish(shared: &Shared, begun: &StartedStep, end: StepOutcome) {
-    let line = format!("{}: {}: {}", begun.session, begun.step, end.what);
-    shared.change(|plan| plan.queue.finish(end));
+    let what = shared.change(|plan| plan.queue.finish(end));
+    let line = format!("{}: {}: {what}", begun.session, begun.step);
     shared.monitor.update(|state| state.note(line));
 }

@@ -1,10 +1,13 @@
 //! What those who ask for processing and the thread that works share.
 
-use std::fmt;
 use std::path::PathBuf;
+use std::process::Command;
 use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{self, SyncSender};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::{fmt, io};
 
+use super::child::Worker;
 use super::commands::ProcessingPrograms;
 use super::editor::OpenEditor;
 use super::queue::{PendingWork, ProcessingQueue};
@@ -40,6 +43,8 @@ pub(super) struct Shared {
     pub(super) editor: Mutex<Option<OpenEditor>>,
     /// Held by who opens an editor, which takes a while.
     pub(super) opening: Mutex<()>,
+    /// Programs that the thread that works is to start.
+    pub(super) to_start: SyncSender<ToStart>,
     pub(super) is_ending: AtomicBool,
 }
 
@@ -47,6 +52,12 @@ impl fmt::Debug for Shared {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Shared").finish_non_exhaustive()
     }
+}
+
+/// A program to start, and who waits for it.
+pub(super) struct ToStart {
+    pub(super) command: Command,
+    pub(super) started: SyncSender<io::Result<Worker>>,
 }
 
 #[derive(Debug)]
@@ -77,6 +88,15 @@ impl Shared {
     pub(super) fn find_programs(&self) {
         let found = (self.programs)();
         self.plan().programs = found;
+    }
+
+    /// Starts a program on the thread that works: those of the server have a low priority, which a program inherits.
+    pub(super) fn start(&self, command: Command) -> io::Result<Worker> {
+        let ending = || io::Error::other("the rig is ending");
+        let (started, worker) = mpsc::sync_channel(1);
+        let sent = self.to_start.send(ToStart { command, started });
+        sent.map_err(|_| ending())?;
+        worker.recv().map_err(|_| ending())?
     }
 
     /// Whether the editor that is open is this session's. One that nobody uses makes room.

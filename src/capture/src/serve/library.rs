@@ -48,6 +48,8 @@ pub(super) struct SessionSummary {
     pub(super) status: SessionStatus,
     /// Why it is not whole.
     pub(super) reason: Option<String>,
+    /// What else to know of the whole take, such as light that is too even.
+    pub(super) notes: Vec<String>,
     /// Frames in the video.
     pub(super) frames: Option<u64>,
     /// Frames that the camera counted and the video lacks.
@@ -320,6 +322,7 @@ fn summarise(id: &str, manifest: &Manifest, index: Option<&FrameIndex>) -> Sessi
         created: Some(manifest.created.to_string()),
         status,
         reason,
+        notes: manifest.notes(),
         frames: manifest.video.frames.or(counted),
         dropped: index.map(missing),
         duration_s: ends.map(|(first, last)| seconds(first.t_us, last.t_us)),
@@ -336,6 +339,7 @@ fn unreadable(id: &str, reason: String) -> SessionSummary {
         created: None,
         status: SessionStatus::Unreadable,
         reason: Some(reason),
+        notes: Vec::new(),
         frames: None,
         dropped: None,
         duration_s: None,

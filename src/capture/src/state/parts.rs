@@ -66,6 +66,8 @@ pub struct TakeSummary {
     pub is_stopped: bool,
     /// Why, in a sentence, where the verdict is not clean.
     pub reason: Option<String>,
+    /// What else to know of the whole take, such as light that is too even, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// The turntable as last heard.
@@ -82,6 +84,8 @@ pub struct TableState {
     pub degrees_per_second: Option<f64>,
     /// Its highest speed, degrees a second.
     pub max_degrees_per_second: Option<f64>,
+    /// Whether it has an index sensor, by which it finds zero. Without one, zero is where a person sets it.
+    pub has_index: bool,
     /// Whether zero is known.
     pub homed: bool,
     /// Whether the emergency stop is pressed.

@@ -132,10 +132,18 @@ pub struct VideoFacts {
     pub blake3: Option<String>,
 }
 
+impl Manifest {
+    /// What to know of the whole take, such as light that is too even: the faults without a time.
+    pub fn notes(&self) -> Vec<String> {
+        let whole = self.faults.iter().filter(|fault| fault.t_us == 0);
+        whole.map(|fault| fault.what.clone()).collect()
+    }
+}
+
 /// Something that went wrong during a capture.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
-    /// When, microseconds of the driver's monotonic clock.
+    /// When, microseconds of the driver's monotonic clock; 0 if it concerns the whole take.
     pub t_us: i64,
     /// What, for a person.
     pub what: String,

@@ -170,6 +170,7 @@ impl Recorder {
             camera: delivered,
             writer: written,
             max_dropped: self.max_dropped,
+            note: None,
         };
         Ok((camera, recorded))
     }

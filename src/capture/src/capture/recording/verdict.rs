@@ -23,6 +23,7 @@ pub struct FinishedRecording {
     pub(super) camera: CameraOutcome,
     pub(super) writer: WriterOutcome,
     pub(super) max_dropped: u64,
+    pub(super) note: Option<String>,
 }
 
 impl FinishedRecording {
@@ -36,6 +37,11 @@ impl FinishedRecording {
     /// [`EndReason::Interrupted`] or [`EndReason::OnPurpose`].
     pub fn ended_by(&mut self, end: EndReason) {
         self.camera.end = end;
+    }
+
+    /// Adds what a person has to know of the whole take, in a sentence; of one that cannot be used it is not kept.
+    pub fn add_note(&mut self, note: String) {
+        self.note = Some(note);
     }
 
     /// How much the light on what stands in the middle of the picture changes over the turn, as
@@ -79,16 +85,21 @@ impl FinishedRecording {
             (None, None) => (Verdict::Clean, None),
         };
         faults.splice(0..0, self.lead_note());
+        let note = self.note.take().filter(|_| verdict != Verdict::Aborted);
+        let note = note.map(|what| Fault { t_us: 0, what });
         let is_stopped = self.is_stopped();
         let (frames, count) = (self.recorded(), &self.camera.count);
         let (mut session, delivered) = (self.writer.session, self.writer.delivered);
         session.amend(|entry| amended(entry, count, &delivered, angle))?;
-        session.manifest_mut().faults.extend(faults);
+        let listed = &mut session.manifest_mut().faults;
+        listed.splice(0..0, note);
+        listed.extend(faults);
         let manifest = match (verdict, &reason) {
             (Verdict::Aborted, Some(reason)) => session.abort(reason)?,
             _ => session.finish()?,
         };
         Ok(TakeSummary {
+            notes: manifest.notes(),
             session: manifest.id,
             verdict,
             frames,

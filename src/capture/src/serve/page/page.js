@@ -11,7 +11,7 @@ const $ = (id) => document.getElementById(id);
 /** Longest name of an object, bytes. */
 const LONGEST_NAME = 80;
 /** How a take came out, in words and as a class. */
-const VERDICTS = { clean: ["clean", "good"], tolerated: ["usable, with dropped frames", "warn"], aborted: ["aborted", "bad"] };
+const VERDICTS = { clean: ["clean", "good"], noted: ["clean, but see below", "warn"], tolerated: ["usable, with dropped frames", "warn"], aborted: ["aborted", "bad"] };
 const STOPPED = ["stopped", ""];
 /** Controls that can be set here, and by how much a step moves them. */
 const STEPS = [
@@ -21,8 +21,12 @@ const STEPS = [
   [/gain/, () => 1],
   [/white_balance_temperature/, () => 100],
 ];
+/** Milliseconds in which a second tap is not meant for what the button has become since the first. */
+const DOUBLE_TAP = 1500;
 let state = null;
 let seenFault = -Infinity;
+/** What the big button did at the last tap, and when. */
+let tapped = { does: "", at: -Infinity };
 
 /** Gives a command; why the rig refuses it is shown. */
 async function order(command) {
@@ -47,7 +51,8 @@ function show(next) {
   // Events and answers to commands come by two ways: an old state must not replace a newer one.
   if (state && next.version < state.version && state.version - next.version < 1e6) return;
   const before = state;
-  state = next;
+  // A rig that was started anew knows of no take; this page does.
+  state = { ...next, last_take: next.last_take ?? before?.last_take ?? null };
   showAlarm();
   showTake();
   showGo();
@@ -136,7 +141,8 @@ function showLast() {
   const session = listedSession(take.session);
   $("last-shard").hidden = !session?.results?.extraction;
   $("last-shard").href = shardOf(take.session);
-  const [verdict, className] = take.is_stopped ? STOPPED : VERDICTS[take.verdict];
+  const noted = take.verdict === "clean" && take.notes.length > 0;
+  const [verdict, className] = take.is_stopped ? STOPPED : VERDICTS[noted ? "noted" : take.verdict];
   const [stage, stageClass] = session ? standing(session) : ["", ""];
   // A part that is replaced while a finger is on it swallows the tap.
   const key = JSON.stringify([take, stage]);
@@ -145,7 +151,7 @@ function showLast() {
   $("last-open").replaceChildren(
     make("b", { text: objectOf(take.session) }),
     make("small", {}, make("span", { text: verdict, className }), make("span", { text: ` · ${take.frames} frames · ${take.dropped} dropped` })),
-    make("small", { className: "reason", text: take.reason ?? "" }),
+    make("small", { className: `reason ${noted ? "warn" : ""}`, text: take.reason ?? take.notes.join("; ") }),
     make("small", { className: `standing ${stageClass}`, text: stage }),
   );
 }
@@ -197,8 +203,9 @@ function showName() {
 function showGo() {
   showName();
   const { text, stop, asks, command } = action();
+  const early = command && command.command !== tapped.does && performance.now() - tapped.at < DOUBLE_TAP;
   $("go").textContent = text;
-  $("go").disabled = !(command || asks) || document.body.className !== "";
+  $("go").disabled = !(command || asks) || early || document.body.className !== "";
   $("go").classList.toggle("stop", Boolean(stop));
   $("go").classList.toggle("asks", Boolean(asks));
 }
@@ -219,16 +226,21 @@ function showFaults() {
   if (lines.join("\n") !== same.join("\n")) $("fault-list").replaceChildren(...lines.map((text) => make("li", { text })));
 }
 
+const signed = (degrees) => `${degrees < 0 ? "−" : "+"}${Math.abs(degrees).toFixed(0)}°`;
+
 function showTable() {
   const { present, state: word, angle_deg: angle, degrees_per_second: speed, homed, battery_v: battery, fault } = state.table;
   const facts = [["State", present ? word || "unknown" : "none"]];
   if (present) {
-    facts.push(["Angle", angle === null ? "unknown" : `${angle.toFixed(1)}°`], ["Zero", homed ? "known" : "unknown"]);
+    // While it turns to and fro, its angle is not asked for.
+    const unseen = resting() ? "unknown" : "turning";
+    facts.push(["Angle", angle === null ? unseen : `${angle.toFixed(1)}°`], ["Zero", homed ? "set" : "not set"]);
     if (speed) facts.push(["Speed", `${speed.toFixed(1)}°/s`]);
     if (battery !== null) facts.push(["Battery", `${battery.toFixed(1)} V`]);
     const { low_deg: low, high_deg: high } = state.table;
-    if (homed && angle !== null && high !== null) facts.push(["Cable wound", `${Math.abs(angle).toFixed(0)}° of ${(angle < 0 ? -low : high).toFixed(0)}°`]);
+    if (homed && angle !== null && high !== null) facts.push(["Can turn by", `${signed(low - angle)} to ${signed(high - angle)}`]);
   }
+  $("home").textContent = state.table.has_index ? "Home" : "Set zero here";
   $("table").replaceChildren(...facts.map(([name, value]) => make("div", {}, make("dd", { text: value }), make("dt", { text: name }))));
   warn("table-fault", alarmed() ? null : fault);
   for (const button of document.querySelectorAll("[data-jog], #home")) button.disabled = !present || !resting() || alarmed();
@@ -351,7 +363,10 @@ $("object-form").addEventListener("submit", (event) => {
 $("go").addEventListener("click", () => {
   const { asks, command } = action();
   if (asks) return askName();
-  if (command) order(command);
+  if (!command) return;
+  tapped = { does: command.command, at: performance.now() };
+  setTimeout(showGo, DOUBLE_TAP);
+  order(command);
 });
 $("last-open").addEventListener("click", () => openSession(state.last_take.session).catch((problem) => say(problem.message)));
 $("home").addEventListener("click", () => order({ command: "home" }));

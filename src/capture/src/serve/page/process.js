@@ -40,7 +40,8 @@ const jobOf = (id) => processing?.jobs.find(({ session }) => session === id);
 /** How a session stands, in words and with a class: for the list and its days. */
 export function standing({ results, id }) {
   const job = jobOf(id);
-  if (job) return [job.status === "waiting" ? "waiting for other sessions" : `${STEPS[job.step].toLowerCase()}…`, "busy"];
+  if (job?.status === "waiting") return [job === processing.jobs[0] ? "waiting until the rig rests" : "waiting for other sessions", "busy"];
+  if (job) return [`${STEPS[job.step].toLowerCase()}…`, "busy"];
   if (!results) return ["", ""];
   const { stage, is_doubtful: doubtful } = results;
   if (doubtful === null) return ["no mask yet", ""];
@@ -112,7 +113,8 @@ function showJob() {
   $("make-check").textContent = results.check ? "Check again" : "Check";
   $("make-extract").textContent = results.extraction ? "Extract again" : "Extract";
   const finished = results.stage === "extracted";
-  $("make-all").hidden = finished || !canMask || !canExtract;
+  // A take that ended early is extracted only by somebody who means it.
+  $("make-all").hidden = finished || status !== "complete" || !canMask || !canExtract;
 }
 
 /** A bar that knows how far things are, or that something is being done. */

@@ -18,8 +18,12 @@ function verdict(session) {
   if (session.status === "unreadable") return ["unreadable", "bad"];
   // What ended a take early is past: only its data is incomplete.
   if (session.status === "aborted") return ["aborted", "warn"];
-  return dropped > 0 ? [`${dropped} frames dropped`, "warn"] : ["clean", "good"];
+  if (dropped > 0) return [`${dropped} frames dropped`, "warn"];
+  return session.notes.length > 0 ? ["clean, but see below", "warn"] : ["clean", "good"];
 }
+
+/** Why a session is not whole, or what else to know of it. */
+const remarkOn = (session) => session.reason ?? session.notes.join("; ");
 
 function facts(session) {
   const parts = [];
@@ -45,7 +49,7 @@ function entry(session) {
     make("b", { text: session.object }),
     make("small", { text: when(session) }),
     make("small", {}, make("span", { text: words, className }), make("span", { text: facts(session) && ` · ${facts(session)}` })),
-    make("small", { className: "reason", text: session.reason ?? "" }),
+    make("small", { className: `reason ${session.reason ? "" : "warn"}`, text: remarkOn(session) }),
     make("small", { className: `standing ${stageClass}`, text: stage }),
   );
   const button = make("button", { type: "button", disabled: !ended }, image, text);
@@ -62,7 +66,7 @@ function heading(day, sessions) {
   const reached = (at) => sessions.filter(({ results }) => stages.indexOf(results?.stage) >= at).length;
   const doubtful = sessions.filter(({ results }) => results?.is_doubtful).length;
   const counts = [`${sessions.length} recorded`, `${reached(1)} masked`, `${reached(3)} extracted`];
-  if (doubtful) counts.push(`${doubtful} doubtful`);
+  if (doubtful) counts.push(`${doubtful} to look at`);
   return make("li", { className: "day" }, make("b", { text: date || "Other names" }), make("small", { text: counts.join(" · ") }));
 }
 
@@ -141,7 +145,8 @@ async function play(session) {
   $("player-outline").textContent = "";
   const [words, className] = verdict(session);
   Object.assign($("player-verdict"), { textContent: `${words} · ${facts(session)}`, className });
-  $("player-notes").replaceChildren(...(session.reason ? [make("li", { text: session.reason })] : []));
+  Object.assign($("player-reason"), { textContent: remarkOn(session), className: session.reason ? "quiet" : "warn" });
+  $("player-notes").replaceChildren();
   $("player-error").textContent = "";
   $("player-frame").removeAttribute("src");
   slider.max = Math.max((session.frames ?? 1) - 1, 0);
@@ -155,7 +160,9 @@ async function play(session) {
     if (shown !== mine) return;
     showSteps(detail, complain);
     Object.assign(shown, { times: detail.times_s, angles: detail.angles_deg });
-    $("player-notes").append(...detail.manifest.faults.map(({ what }) => make("li", { text: what })));
+    // What concerns the whole take stands below the verdict.
+    const faults = detail.manifest.faults.filter(({ what }) => !detail.notes.includes(what));
+    $("player-notes").replaceChildren(...faults.map(({ what }) => make("li", { text: what })));
     place();
     showMask(mine, detail.has_mask);
   } catch (problem) {
@@ -210,11 +217,17 @@ async function showMask(mine, has) {
   $("player-outline").textContent = "The line is the mask's outline.";
 }
 
-let remarks = { session: null, rating: null };
+/** The session whose remarks are shown, its stars, and the remarks as they were saved, and as they could not be. */
+let remarks = { session: null, rating: null, saved: "", refused: "" };
+
+/** Note and stars as they are shown, for the rig. */
+const written = () => JSON.stringify({ note: $("note").value.trim() || null, rating: remarks.rating });
 
 function showRemarks(session) {
-  remarks = { session, rating: session.rating };
   $("note").value = session.note ?? "";
+  remarks = { session, rating: session.rating, refused: "" };
+  remarks.saved = written();
+  $("saved").textContent = "";
   showStars();
 }
 
@@ -225,6 +238,7 @@ function showStars() {
     button.addEventListener("click", () => {
       remarks.rating = remarks.rating === n ? null : n;
       showStars();
+      saveRemarks();
     });
     return button;
   };
@@ -233,16 +247,36 @@ function showStars() {
 
 const changed = () => document.dispatchEvent(new Event("sessions-changed"));
 
-async function saveRemarks() {
-  const body = JSON.stringify({ note: $("note").value.trim() || null, rating: remarks.rating });
-  const headers = { "Content-Type": "application/json" };
-  try {
-    await request(`${path(remarks.session.id)}/remarks`, { method: "PUT", headers, body });
-    player.close();
-    changed();
-  } catch (problem) {
-    $("player-error").textContent = problem.message;
-  }
+/** Of several savings one follows the other. */
+let saving = Promise.resolve(true);
+
+/** Saves note and stars where they are new; gives whether all is saved. */
+function saveRemarks() {
+  const mine = remarks;
+  const body = written();
+  saving = saving.then(async () => {
+    if (body === mine.saved) return true;
+    const headers = { "Content-Type": "application/json" };
+    try {
+      await request(`${path(mine.session.id)}/remarks`, { method: "PUT", headers, body });
+      Object.assign(mine, { saved: body, refused: "" });
+      if (remarks === mine) $("saved").textContent = "Saved";
+      changed();
+      return true;
+    } catch (problem) {
+      mine.refused = body;
+      if (remarks === mine) $("saved").textContent = "Not saved";
+      complain(`Note and stars are not saved: ${problem.message}`);
+      return false;
+    }
+  });
+  return saving;
+}
+
+/** Closes the player once note and stars are saved; where they cannot be, the second time. */
+async function leave() {
+  const isGivenUp = player.classList.contains("trashed") || written() === remarks.refused;
+  if (isGivenUp || (await saveRemarks())) player.close();
 }
 
 /** While the session that is shown is in the trash, the one thing to do is to have it back, by the same button. */
@@ -250,7 +284,9 @@ function inTrash(is) {
   player.classList.toggle("trashed", is);
   $("put-away").textContent = is ? "Undo" : "Delete";
   $("trashed").hidden = !is;
-  $("save").disabled = is;
+  const isExtracted = !$("player-shard").hidden;
+  $("trashed").textContent = isExtracted ? "In the trash. Its samples stay in the data set." : "In the trash";
+  $("saved").hidden = is;
 }
 
 /** Puts the session away, or has it back. */
@@ -258,6 +294,7 @@ async function putAway() {
   const { session } = remarks;
   const back = player.classList.contains("trashed");
   $("put-away").disabled = true;
+  if (!back) await saveRemarks();
   try {
     if (back) await request(`${path(session.id)}/restore`, { method: "POST" });
     else await request(path(session.id), { method: "DELETE", wait: 20_000 });
@@ -327,11 +364,14 @@ slider.addEventListener("input", () => seek(slider.value));
 $("player-back").addEventListener("click", () => seek(Math.max(Number(slider.value) - 1, 0)));
 $("player-on").addEventListener("click", () => seek(Number(slider.value) + 1));
 $("player-play").addEventListener("click", () => running(timer === null));
-$("player-close").addEventListener("click", () => player.close());
-$("remarks").addEventListener("submit", (event) => {
+$("player-close").addEventListener("click", leave);
+player.addEventListener("cancel", (event) => {
   event.preventDefault();
-  saveRemarks();
+  leave();
 });
+$("note").addEventListener("input", () => ($("saved").textContent = ""));
+$("note").addEventListener("change", saveRemarks);
+$("remarks").addEventListener("submit", (event) => event.preventDefault());
 $("put-away").addEventListener("click", putAway);
 player.addEventListener("close", () => {
   running(false);

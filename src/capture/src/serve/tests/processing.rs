@@ -4,6 +4,7 @@ use std::fs;
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::path::Path;
+use std::process::Command;
 use std::sync::{Arc, mpsc};
 use std::thread;
 
@@ -45,7 +46,12 @@ fn written(folder: &Path, scripts: Scripts<'_>) -> ProcessingPrograms {
         let path = folder.join(name);
         let here = folder.display();
         let log = format!("echo \"{name} $*\" >> '{here}/log'");
-        fs::write(&path, format!("here='{here}'\n{log}\n{body}\n")).unwrap();
+        let text = folder.join(format!("{name}.sh"));
+        fs::write(&text, format!("#!/bin/sh\nhere='{here}'\n{log}\n{body}\n")).unwrap();
+        // Another process writes the program: while this one has it open, no thread could start it.
+        let mut install = Command::new("install");
+        let installed = install.args(["-m", "755"]).args([&text, &path]).status();
+        assert!(installed.unwrap().success());
         path
     };
     let mask = scripts.mask.map(|mask| {
@@ -179,6 +185,14 @@ fn what_a_program_says_of_its_progress_is_shown_and_a_cancel_ends_it() {
         steps(&[("extract", "cancelled"), ("extract", "cancelled")])
     );
     assert_eq!(state_of(folder.path()), None, "the program has ended");
+    // The log says the same, and not how the program was ended.
+    let rig = serving.rig.monitor.state();
+    let ended = rig.processing.finished.last().unwrap();
+    let line = format!("{COW}: {}: {}", ended.step, ended.what);
+    wait_until("it is in the log", || {
+        let log = serving.rig.monitor.state().log;
+        log.iter().any(|logged| logged.what == line)
+    });
     assert_eq!(serving.ask("DELETE", &path(&number), &[], b"").status, 404);
 }
 
@@ -310,6 +324,29 @@ fn where_a_program_is_missing_nothing_is_queued() {
 }
 
 #[test]
+fn what_became_of_an_automatic_mask_is_forgotten_once_a_person_has_made_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let editor = r#"case "$*" in
+        *--edit*) echo '{"event":"editor","address":"127.0.0.1:9","url":"http://127.0.0.1:9/?token=secret"}'
+            echo '{"event":"mask"}';;
+        *) exit 1;;
+    esac"#;
+    let scripts = Scripts {
+        mask: Some(editor),
+        ..ALL_WELL
+    };
+    let serving = serving(folder.path(), scripts);
+    process(&serving, COW, &["mask"]);
+    process(&serving, BUST, &["mask"]);
+    let failed = ("mask", "failed");
+    assert_eq!(wait_finished(&serving, 2), steps(&[failed, failed]));
+    let edit = format!("/api/v1/sessions/{COW}/edit");
+    assert_eq!(serving.ask("POST", &edit, &[], b"").status, 200);
+    wait_until("it is forgotten", || finished(&serving).len() == 1);
+    assert_eq!(state(&serving)["finished"][0]["session"], BUST);
+}
+
+#[test]
 fn settings_outlast_a_restart_and_programs_do_not() {
     let folder = tempfile::tempdir().unwrap();
     let slow = format!("{WAIT}; {MASK}");
@@ -345,6 +382,7 @@ fn a_usable_take_is_processed_by_itself_where_that_is_set_and_another_is_not() {
                 dropped: 0,
                 is_stopped: false,
                 reason: None,
+                notes: Vec::new(),
             });
         });
     };

@@ -53,6 +53,28 @@ fn sessions_are_listed_newest_first_with_their_verdicts() {
 }
 
 #[test]
+fn what_concerns_the_whole_take_is_listed_with_it_and_faults_of_frames_are_not() {
+    let serving = Serving::start();
+    serving.hold(&[COW]);
+    assert_eq!(
+        serving.get("/api/v1/sessions").json()[0]["notes"],
+        serde_json::json!([])
+    );
+    let path = serving.root.path().join(COW).join("session.json");
+    let mut manifest: serde_json::Value =
+        serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    manifest["faults"] = serde_json::json!([
+        { "t_us": 0, "what": "the light is too even" },
+        { "t_us": 5, "what": "1 frame missing" },
+    ]);
+    fs::write(&path, manifest.to_string()).unwrap();
+    assert_eq!(
+        serving.get("/api/v1/sessions").json()[0]["notes"],
+        serde_json::json!(["the light is too even"])
+    );
+}
+
+#[test]
 fn a_session_that_changes_is_listed_as_it_is_now() {
     let serving = Serving::start();
     serving.hold(&[COW]);

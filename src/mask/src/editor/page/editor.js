@@ -51,6 +51,8 @@ function warn(lines) {
 // The mask: one request at a time, always for the newest sketch.
 
 let cutting = false;
+/** Whether the turn is read before there is a mask. */
+let reading = false;
 let resting = 0;
 /** The sketch that the outline shows, and whether accepting writes just this. */
 let cutOf = null;
@@ -79,7 +81,9 @@ async function cut(draft) {
     return showTools();
   }
   cutting = true;
-  say("busy", sketch.auto && cutOf?.auto !== true ? `reading the ${about.auto}` : "making the mask");
+  reading = sketch.auto && cutOf?.auto !== true;
+  say("busy", reading ? `reading the ${about.auto}` : "making the mask");
+  showTools();
   try {
     const mask = await (await send(`api/v1/mask?draft=${draft}`, sketch)).json();
     if (sketcher.sketch === sketch) {
@@ -99,7 +103,7 @@ async function cut(draft) {
       if (error.held) resting = setTimeout(() => cut(draft), AGAIN);
     }
   }
-  cutting = false;
+  cutting = reading = false;
   showTools();
   if (sketcher.sketch !== sketch) return cut(true);
   if (cutOf && !exact) resting = setTimeout(() => cut(false), REST);
@@ -162,6 +166,7 @@ function showTools() {
   $("cut-here").disabled = wanted === sketch.frame;
   let hint = "";
   if (shown !== sketch.frame) hint = `Frame ${shown}. The mask is made on frame ${sketch.frame}.`;
+  else if (reading && about.auto === "turn") hint = "Reading the turn, which can take minutes. What you draw is used afterwards.";
   else if (!canCut(sketch)) hint = about.auto ? "Draw a box around the object, or press “Automatic”." : "Draw a box around the object.";
   $("hint").textContent = hint;
   $("hint").hidden = !hint;
@@ -236,8 +241,10 @@ async function begin() {
   }
   const { recording, width, height, frames, sketch } = about;
   sketcher.open({ picture: null, width, height }, sketch, sketch.rect ? "object" : "rect");
-  document.title = `relit mask: ${recording}`;
-  $("title").textContent = recording;
+  // Of a session's name, the object is what follows the time.
+  const object = recording.replace(/^\d{8}T\d{6}Z-/, "");
+  document.title = `relit mask: ${object}`;
+  Object.assign($("title"), { textContent: object, title: recording });
   $("scrub").max = frames - 1;
   $("scrub").disabled = frames < 2;
   $("auto").disabled = !about.auto;

@@ -162,6 +162,7 @@ fn set(serving: &Serving, row: Row) {
             dropped: 0,
             is_stopped: row.stopped,
             reason: aborted,
+            notes: Vec::new(),
         });
     });
 }
