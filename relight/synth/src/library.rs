@@ -182,7 +182,6 @@ impl Library {
     }
 
     /// The digest of all that views and finishes are drawn from: meshes with their materials, and pictures.
-    #[must_use]
     pub fn digest(&self) -> Digest {
         let meshes = self.meshes.par_iter();
         let meshes: Vec<String> = meshes
@@ -198,7 +197,6 @@ impl Library {
     }
 
     /// The same without its meshes: all shapes are made.
-    #[must_use]
     pub fn without_meshes(&self) -> Self {
         Self {
             meshes: Vec::new(),

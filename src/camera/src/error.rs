@@ -173,7 +173,6 @@ pub enum CameraError {
 
 impl CameraError {
     /// That frames of a format cannot be recorded.
-    #[must_use]
     pub fn format(device: String, fourcc: Fourcc) -> Self {
         let what = format!(
             "{fourcc} frames cannot be recorded; ask for MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer"

@@ -70,7 +70,6 @@ impl Partial {
     }
 
     /// The final path.
-    #[must_use]
     pub fn target(&self) -> &Path {
         &self.names.target
     }
@@ -101,7 +100,6 @@ impl Write for Partial {
 
 impl SealedPartial {
     /// The final path.
-    #[must_use]
     pub fn target(&self) -> &Path {
         &self.names.target
     }
@@ -151,7 +149,6 @@ impl CreatedFolder {
     }
 
     /// Whether the folder was not there.
-    #[must_use]
     pub fn is_new(&self) -> bool {
         !self.made.is_empty()
     }
@@ -187,7 +184,6 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
 }
 
 /// The final name of the file, if `name` is the temporary name of a [`Partial`].
-#[must_use]
 pub fn target_of(name: &str) -> Option<&str> {
     let (rest, counter) = name
         .strip_prefix('.')?

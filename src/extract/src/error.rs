@@ -78,7 +78,6 @@ impl ExtractError {
     }
 
     /// Whether the recording itself is the reason: it holds too little of a turn, and is left out.
-    #[must_use]
     pub fn skips_recording(&self) -> bool {
         matches!(
             self,

@@ -48,7 +48,6 @@ pub struct Identity {
 
 impl Identity {
     /// One step, degrees.
-    #[must_use]
     pub fn step_deg(&self) -> f64 {
         self.steps_per_degree.recip()
     }

@@ -185,7 +185,6 @@ impl ShLight {
 impl CapturedObject {
     /// Whether a path is that of a captured object: a file that is called so (`.relit`), or a folder with one
     /// ([`Self::FILE`]).
-    #[must_use]
     pub fn is_named(path: &Path) -> bool {
         path.extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("relit"))

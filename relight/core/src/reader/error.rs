@@ -92,7 +92,6 @@ impl SampleFault {
     }
 
     /// That the sample lacks a part, a suffix or a file's name.
-    #[must_use]
     pub fn missing(part: &str) -> Self {
         Self::Part(format!("its {part} is missing"))
     }

@@ -51,7 +51,6 @@ impl Default for Harmonisation {
 impl Harmonisation {
     /// Looks at a background: how bright its bright places are, the colour of its light by shades of grey (Finlayson and Trezzi,
     /// 2004), and its grain where it is smoothest.
-    #[must_use]
     pub fn from_background(background: &Rgb<Linear>) -> Self {
         Self {
             level: (bright(background) / BRIGHT).clamp(LEVELS.0, LEVELS.1),

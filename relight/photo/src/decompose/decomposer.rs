@@ -210,13 +210,11 @@ impl Decomposer {
     }
 
     /// The kind of network that [`Self::read_normals`] recognised, in words; `None` if none was read.
-    #[must_use]
     pub fn normals_network(&self) -> Option<&'static str> {
         self.normals.as_ref().map(ExternalNormals::name)
     }
 
     /// Width and height of what the network sees, pixels.
-    #[must_use]
     pub fn side(&self) -> usize {
         self.scales.fine.side()
     }

@@ -8,7 +8,6 @@ use crate::relighting::{InsertError, LightSource};
 
 impl LightSource {
     /// Whether a file is called as a text of coefficients (`.txt`).
-    #[must_use]
     pub fn is_text(path: &Path) -> bool {
         path.extension()
             .is_some_and(|ending| ending.eq_ignore_ascii_case("txt"))

@@ -84,7 +84,6 @@ impl FrameRate {
     const MAX: u32 = 240;
 
     /// `None` unless it is above 0, and within what videos have.
-    #[must_use]
     pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
         let is_rate = numerator > 0 && denominator > 0 && numerator / denominator <= Self::MAX;
         if is_rate {
@@ -98,7 +97,6 @@ impl FrameRate {
     }
 
     /// Frames a second.
-    #[must_use]
     pub fn per_second(self) -> f64 {
         f64::from(self.numerator) / f64::from(self.denominator)
     }

@@ -35,7 +35,6 @@ pub enum NetError {
 
 impl NetError {
     /// Weights lack a parameter.
-    #[must_use]
     pub fn missing(net: &str, name: &str) -> Self {
         Self::Weights(format!(
             "the weights have no {name}, which {net} needs: are they another network's?"

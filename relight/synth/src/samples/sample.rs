@@ -111,13 +111,11 @@ impl<'a> SynthSample<'a> {
     }
 
     /// All light but what bounces, as nine coefficients in the viewer's frame, times the camera's gain.
-    #[must_use]
     pub fn coefficients(&self) -> &[[f64; 3]; 9] {
         &self.description.coefficients
     }
 
     /// The light, 0..=1, for a value of the picture, 0..=1: the inverse of its camera's response.
-    #[must_use]
     pub fn light_of(&self, value: f32) -> f32 {
         self.description.camera.response.decode(value)
     }

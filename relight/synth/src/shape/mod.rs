@@ -41,7 +41,6 @@ impl ShapeKind {
     ];
 
     /// The kind's name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Blend => "blend",
@@ -59,7 +58,6 @@ impl ShapeKind {
     }
 
     /// The object of this kind and seed. The same seed always gives the same object.
-    #[must_use]
     pub fn build(self, seed: u64) -> Mesh {
         let mut random = Random::new(seed);
         // A draw may leave nothing (a cut may take all): the next one is as good.

@@ -113,7 +113,6 @@ pub struct PhotoCamera {
 
 impl PhotoPlan {
     /// The photograph of a seed, of a view with these lamps, in one of these rooms.
-    #[must_use]
     pub fn draw(seed: u64, lamps: &[ViewLamp], rooms: &EnvironmentLights) -> Self {
         let mut random = Random::new(seed);
         let (lit, ambient, bounce) = draw_light(&mut random, lamps.len());

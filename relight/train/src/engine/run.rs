@@ -123,7 +123,6 @@ impl<'a> Run<'a> {
     }
 
     /// Steps made so far.
-    #[must_use]
     pub fn steps_made(&self) -> u64 {
         self.step
     }

@@ -79,25 +79,21 @@ impl Equipment {
     }
 
     /// The settings.
-    #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
     /// The clock that everything goes by.
-    #[must_use]
     pub fn clock(&self) -> Clock {
         self.clock.clone()
     }
 
     /// The simulated table, where the table is one.
-    #[must_use]
     pub fn simulator(&self) -> Option<&SimulatedTable> {
         self.simulator.as_ref()
     }
 
     /// Whether a table is to be there.
-    #[must_use]
     pub fn wants_table(&self) -> bool {
         self.settings.turntable != TurntableAddress::None
     }

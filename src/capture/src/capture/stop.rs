@@ -21,7 +21,6 @@ struct State {
 
 impl StopRequest {
     /// Nobody has asked yet. `clock`: that of the capture.
-    #[must_use]
     pub fn new(clock: &Clock) -> Self {
         Self {
             state: Arc::new(Waitable::new(clock, State::default())),
@@ -35,7 +34,6 @@ impl StopRequest {
     }
 
     /// Who asked, if anybody did.
-    #[must_use]
     pub fn reason(&self) -> Option<StopReason> {
         self.state.lock().asked
     }

@@ -78,7 +78,6 @@ pub struct RigState {
 
 impl RigState {
     /// Whether the rig has a table, be it there at the moment or not.
-    #[must_use]
     pub fn has_table(&self) -> bool {
         !matches!(self.settings.turntable.as_str(), "" | "none")
     }

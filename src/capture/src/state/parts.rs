@@ -196,7 +196,6 @@ impl Check {
 
 impl TableState {
     /// Whether it moves, on whosever account.
-    #[must_use]
     pub fn moves(&self) -> bool {
         ["Run", "Jog", "Home", "Hold"]
             .iter()

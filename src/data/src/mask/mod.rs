@@ -56,7 +56,6 @@ pub struct ObjectPixels {
 impl ObjectPixels {
     /// What a person may want to know of a mask of this width, after "the mask": what it was taken for where that is not
     /// plain, and whether it may be inverted.
-    #[must_use]
     pub fn note(&self, width: u32) -> Option<String> {
         let is_inverted = || {
             self.marks_the_border(width as usize).then(|| {
@@ -77,7 +76,6 @@ impl ObjectPixels {
 }
 
 /// What a mask of another size than its picture's may be, after "the mask PATH is W x H pixels".
-#[must_use]
 pub fn size_hint(mask: (u32, u32), picture: (u32, u32)) -> Option<&'static str> {
     let [(w, h), (wide, high)] = [mask, picture].map(|(w, h)| (f64::from(w), f64::from(h)));
     // Sizes are rounded to whole pixels.

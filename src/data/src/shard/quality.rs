@@ -37,7 +37,6 @@ impl QualityVerdict {
     pub const ALL: [Self; 3] = [Self::Good, Self::Usable, Self::Broken];
 
     /// The word in `dataset.json`.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Good => "good",
@@ -99,7 +98,6 @@ pub struct SessionQuality {
 impl SessionQuality {
     /// The figures of a session with these records. `lossy`: something was lost. It may cover
     /// only a part of the turn (`covered_deg`).
-    #[must_use]
     pub fn from_records(records: &[FrameRecord], lossy: bool, covered_deg: Option<f64>) -> Self {
         let shifts = || {
             let measured = records.iter().filter_map(|record| record.shift_px);

@@ -5,7 +5,6 @@ use std::path::Path;
 use super::ENDINGS;
 
 /// Whether a file is called as a picture that is read.
-#[must_use]
 pub fn is_named(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     ENDINGS

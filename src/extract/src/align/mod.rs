@@ -67,7 +67,6 @@ pub struct AlignSample(GrayImage);
 
 impl AlignSample {
     /// The brightness of `crop`.
-    #[must_use]
     pub fn from_crop(crop: CropView<'_>) -> Self {
         let (width, height) = crop.dimensions();
         let (halvings, rows) = (halvings((width, height)), 0..height as usize);
@@ -154,7 +153,6 @@ impl Aligner {
     /// within a tenth of a pixel of the turn's middle place, which is known more exactly, from there.
     ///
     /// `None` if the object has too little structure.
-    #[must_use]
     pub fn learn(
         samples: &[AlignSample],
         reference: usize,
@@ -236,13 +234,11 @@ impl Aligner {
     }
 
     /// The confidence below which a frame of this turn is not registered, 0..=1.
-    #[must_use]
     pub fn min_confidence(&self) -> f64 {
         self.min_confidence
     }
 
     /// Where the object is in a frame, in pixels of the frame.
-    #[must_use]
     pub fn measure(&self, frame: &AlignSample, buffers: &mut AlignBuffers) -> Alignment {
         let lumas = self
             .required_regions
@@ -251,7 +247,6 @@ impl Aligner {
     }
 
     /// The same from the frame's crop; only what is needed of it is read. It has the size of the mask.
-    #[must_use]
     pub fn measure_crop(&self, crop: CropView<'_>, buffers: &mut AlignBuffers) -> Alignment {
         let (_, height) = crop.dimensions();
         self.take_rows(crop, 0..height, buffers);
@@ -266,7 +261,6 @@ impl Aligner {
     }
 
     /// [`Self::measure_crop`] of a crop whose rows were all taken.
-    #[must_use]
     pub fn measure_rows(&self, buffers: &mut AlignBuffers) -> Alignment {
         let lumas = self.required_regions.lumas_of_rows(&mut buffers.lumas);
         self.located(lumas, &mut buffers.gradients)

@@ -62,7 +62,6 @@ impl LockError {
 
 /// The folder for locks and sockets on this machine: [`SHARED_FOLDER`] where it was set up, else this
 /// account's own, which [`use_folder`] makes.
-#[must_use]
 pub fn standard_folder() -> PathBuf {
     let shared = Path::new(SHARED_FOLDER);
     if shared.is_dir() {

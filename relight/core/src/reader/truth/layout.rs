@@ -95,7 +95,6 @@ impl TruthLayout {
     pub const ALL: [Self; 3] = [Self::Synth, Self::Mit, Self::Janner];
 
     /// The name on the command line.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Synth => "synth",

@@ -46,7 +46,6 @@ const SPREAD_DEVIATIONS: f64 = 1.645;
 ///
 /// Gloss is fitted on some of the pixels, then every pixel by itself. Then parts of the turn with a large residual, shadows
 /// and highlights, count less for that pixel, and it is fitted again.
-#[must_use]
 pub fn solve_in_light(
     curves: &TurnCurves,
     light: &ShLight,

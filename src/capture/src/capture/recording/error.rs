@@ -47,7 +47,6 @@ pub enum RecordingError {
 
 impl RecordingError {
     /// True where a disk, quota or file size limit is exhausted.
-    #[must_use]
     pub fn is_out_of_space(&self) -> bool {
         match self {
             Self::Video(VideoError::DiskFull { .. }) => true,

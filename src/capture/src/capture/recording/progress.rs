@@ -38,7 +38,6 @@ pub struct Window {
 
 impl Window {
     /// A window of `us` microseconds, at least one, from `from_us` on.
-    #[must_use]
     pub fn lasting(from_us: i64, us: i64) -> Self {
         let from_us = from_us.min(i64::MAX - 1);
         Self {

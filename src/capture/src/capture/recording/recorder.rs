@@ -144,14 +144,12 @@ impl Recorder {
     }
 
     /// Waits until nothing more is recorded, or `timeout` is over; true where it has ended.
-    #[must_use]
     pub fn wait_ended(&self, timeout: Duration) -> bool {
         let ended = |state: &mut State| state.progress.ended.then_some(());
         self.shared.wait_for(timeout, ended).is_some()
     }
 
     /// How far it has come.
-    #[must_use]
     pub fn progress(&self) -> Progress {
         self.shared.lock().progress
     }
