@@ -204,7 +204,11 @@ impl Decomposer {
         path: &Path,
         frame: Option<NormalsFrame>,
     ) -> Result<(), DecomposeError> {
-        let onnx = crate::nets::read_onnx(path)?;
+        let onnx = std::fs::read(path).map_err(|source| NetError::Io {
+            path: path.to_owned(),
+            doing: "read",
+            source,
+        })?;
         self.normals = Some(ExternalNormals::new(path, &onnx, self.side(), frame)?);
         Ok(())
     }

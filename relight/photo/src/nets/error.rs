@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 /// Why weights could not be read, written or used.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum NetError {
     /// Weights of another network, or that do not fit into it or a file.
     #[error("{0}")]
