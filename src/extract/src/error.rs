@@ -8,7 +8,6 @@ use relit_video as video;
 
 /// Why a recording, or all of them, could not be extracted.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ExtractError {
     /// It cannot be done as it is requested: what is wrong, with what, and the way out.
     #[error("{0}")]

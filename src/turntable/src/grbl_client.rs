@@ -16,7 +16,7 @@ use super::protocol::{ControllerState, Counts, LineOutcome, Message, ReplyTimeou
 use super::status::TableStatus;
 use super::supervisor::{MotionFault, MotionGoal};
 use crate::lockfile::LockFile;
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 /// Added to the computed time of a motion.
 const MOTION_SLACK: Duration = Duration::from_secs(4);

@@ -23,7 +23,6 @@ pub const MARGIN_DEG: f64 = 2.0;
 
 /// A turn that stays inside the limits, after which the table turns back, so that the cable does not wind up.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct TurnPlan {
     /// Speed, degrees a second.
     pub degrees_per_second: f64,

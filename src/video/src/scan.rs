@@ -26,7 +26,6 @@ use relit_data::geometry::Rect;
 
 /// Codec, size and colour of a video.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct Facts {
     /// The codec's name, such as `mjpeg`.
     pub codec: String,

@@ -32,7 +32,6 @@ pub enum MovieFormat {
 
 /// Why a video is not written or read.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum MovieError {
     /// The program is not there.
     #[error("ffmpeg, which videos need, cannot be started: install it")]

@@ -16,7 +16,6 @@ use relight_core::light::{Order, ShLight};
 
 /// All that a sample was made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
 pub(crate) struct Description {
     /// The sample's number.
     pub number: u64,

@@ -15,7 +15,6 @@ use super::random::Random;
 /// A kind of procedural object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-#[non_exhaustive]
 pub enum ShapeKind {
     /// One to nine rounded primitives, blended into one another, with bumps, twists, shells, cuts.
     Blend,

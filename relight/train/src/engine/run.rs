@@ -42,7 +42,6 @@ pub trait TrainObserver {
 
 /// How a run came out.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct RunOutcome {
     /// Steps made in total.
     pub steps: u64,

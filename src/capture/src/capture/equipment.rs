@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use super::error::CaptureError;
 use super::settings::Settings;
 use relit_camera::{self as camera, Camera};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_turntable::simulator::{SimulatedTable, SimulatorOptions};
 use relit_turntable::{Table, TableOptions, TurntableAddress, find_serial};
 

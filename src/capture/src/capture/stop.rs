@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::error::{CaptureError, StopReason};
-use relit_clock::{Clock, Waitable};
+use relit_data::clock::{Clock, Waitable};
 use relit_turntable::{Table, TurntableError};
 
 /// A stop that may be requested at any time, from any thread; clones are the same request.

@@ -34,7 +34,6 @@ const LOG_KEPT: usize = 40;
 
 /// All that a viewer may know.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
-#[non_exhaustive]
 pub struct RigState {
     /// Counts changes: a viewer that has seen this number has seen this state.
     pub version: u64,
@@ -95,7 +94,6 @@ impl RigState {
 
 /// A picture for viewers.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct PreviewFrame {
     /// Counts frames, so that a viewer knows a new one.
     pub number: u64,

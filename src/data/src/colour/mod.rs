@@ -20,7 +20,6 @@ const LEVELS: usize = 1 << 16;
 
 /// Colours that cannot be converted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum ColourFault {
     /// By their transfer characteristics.
     #[error("its transfer function {0}")]

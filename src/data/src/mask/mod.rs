@@ -23,7 +23,6 @@ pub use picture::MaskPicture;
 
 /// By what a mask says where the object is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum MaskBasis {
     /// The object is bright.
     Brightness,

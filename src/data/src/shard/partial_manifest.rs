@@ -135,7 +135,6 @@ impl PartialManifest {
 
 /// What was joined.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct MergedDataset {
     /// The description, as it was written.
     pub dataset: Dataset,

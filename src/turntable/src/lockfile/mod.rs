@@ -25,7 +25,6 @@ const MAX_LENGTH: u64 = 20;
 
 /// Why a lock was not taken or could not be checked.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum LockError {
     /// Another process has it.
     #[error("{what} is in use by {}: end that one first", .pid.map_or("another process".to_owned(), |pid| format!("process {pid}")))]

@@ -1,7 +1,7 @@
 //! What a recording's owner and its two threads share: wishes one way, such as the time of the turn, figures the
 //! other.
 
-use relit_clock::Waitable;
+use relit_data::clock::Waitable;
 
 /// How far a recording has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

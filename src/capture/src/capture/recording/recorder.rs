@@ -17,7 +17,7 @@ use super::verdict::FinishedRecording;
 use super::writer_thread::{JournalLine, WriterThread};
 use crate::preview::Preview;
 use relit_camera::Camera;
-use relit_clock::{Clock, JoinHandle};
+use relit_data::clock::{Clock, JoinHandle};
 use relit_data::session::{Fault, Manifest, SessionWriter};
 use relit_data::turn_motion::{JournaledReport, JournaledTurn};
 use relit_video::{Muxer, PixelFormat, StreamFormat, is_key};
