@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use relight_photo::nets::paper::{self, Head};
 use relight_photo::nets::{
-    Graph, Inference, Tensor, WeightPrecision, Weights, decomposer, decomposer_with_heads, to_onnx,
+    Graph, Inference, NetError, Tensor, WeightPrecision, Weights, decomposer,
+    decomposer_with_heads, to_onnx,
 };
 
 const SIDE: usize = 128;
