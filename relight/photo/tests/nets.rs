@@ -209,7 +209,14 @@ fn an_onnx_file_may_keep_its_weights_in_files_beside_and_below_and_nowhere_else(
         assert_eq!(found[0].values(), wanted[0].values(), "{location}");
     }
     let outside = folder.path().join("outside.data").display().to_string();
-    for location in ["../outside.data", &outside, "none.data", "short.data", "w", ""] {
+    for location in [
+        "../outside.data",
+        &outside,
+        "none.data",
+        "short.data",
+        "w",
+        "",
+    ] {
         let refused = prepare(location);
         assert!(matches!(refused, Err(NetError::File { .. })), "{location}");
     }

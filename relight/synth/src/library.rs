@@ -16,9 +16,9 @@ use super::pack::{self, LibraryContents, LibraryFilter};
 use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
-use relight_core::statistics::ranked;
 use relit_data::file_names::is_hidden;
 use relit_data::shard::Digest;
+use relit_data::statistics::ranked;
 
 /// Size of the panoramas that are made here.
 pub(crate) const PANORAMA_EXTENT: Extent = Extent::new(256, 128);

@@ -69,6 +69,11 @@ impl Partial {
         }
     }
 
+    /// Where it is until then, for a program that writes it.
+    pub fn path(&self) -> &Path {
+        &self.names.temporary
+    }
+
     /// The final path.
     pub fn target(&self) -> &Path {
         &self.names.target

@@ -13,6 +13,7 @@
 //! | [`image_stats`] | statistics of an image's pixels, all or under a mask |
 //! | [`spec_net_gate`] | the 5 % gate of Spec-Net |
 //! | [`srgb`] | sRGB values to light and back |
+//! | [`statistics`] | medians and quantiles |
 //! | `still` | still image files as they are displayed, with the feature `still` |
 //! | [`text`] | text in files, with or without a byte order mark |
 //! | [`colour`] | colours as videos code them (HDR, wide gamut) to sRGB |
@@ -187,6 +188,7 @@ pub mod session;
 pub mod shard;
 pub mod spec_net_gate;
 pub mod srgb;
+pub mod statistics;
 #[cfg(feature = "still")]
 pub mod still;
 pub mod text;

@@ -84,7 +84,10 @@ fn measure(path: &Path, mask: &GrayImage, frames: u64, side: u32) -> Result<(), 
     while let Some(pending) = timed(&mut read, || reader.next()) {
         timed(&mut decoded, || video.part(pending, crop, &mut part))?;
         let view = CropView::whole(&part);
-        let _ = timed(&mut aligned, || aligner.measure_crop(view, &mut aligning));
+        let _ = timed(&mut aligned, || {
+            aligner.take_rows(view, 0..view.dimensions().1, &mut aligning);
+            aligner.measure_rows(&mut aligning)
+        });
         let mut measuring = spans.measuring(250);
         let image = timed(&mut scaled, || {
             scaler.scale(view, &mut scaling, &mut measuring)

@@ -1,7 +1,7 @@
 //! Properties of a background that an inserted object adopts: brightness, white balance, grain. Knows pictures only.
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
-use relight_core::statistics::above_part;
+use relit_data::statistics::above_part;
 
 /// The light that bright places of a picture have that was exposed well.
 const BRIGHT: f32 = 0.8;

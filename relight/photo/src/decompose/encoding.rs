@@ -4,7 +4,7 @@
 use crate::nets::{INPUTS, OUTPUTS};
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, YUp};
-use relight_core::statistics::above_part;
+use relit_data::statistics::above_part;
 
 /// Part of the pixels that are darker than the encoded picture's white.
 const WHITE_PERCENTILE: f64 = 0.99;

@@ -61,10 +61,11 @@ impl Inference {
         given: &[(String, i64)],
     ) -> Result<Self, NetError> {
         let shape = [1, channels, height, width];
-        let plan = TractPlan::new(bytes, path.parent(), shape, given).map_err(|fault| NetError::File {
-            path: path.to_owned(),
-            fault,
-        });
+        let plan =
+            TractPlan::new(bytes, path.parent(), shape, given).map_err(|fault| NetError::File {
+                path: path.to_owned(),
+                fault,
+            });
         Ok(Self {
             name: "the network of the ONNX file",
             shape,

@@ -27,7 +27,8 @@ impl TractPlan {
         shape: [usize; 4],
         given: &[(String, i64)],
     ) -> Result<Self, String> {
-        let plan = Self::prepared(onnx, folder, shape, given).map_err(|fault| format!("{fault:#}"))?;
+        let plan =
+            Self::prepared(onnx, folder, shape, given).map_err(|fault| format!("{fault:#}"))?;
         if plan.inputs.contains(&None) {
             Ok(plan)
         } else {

@@ -3,7 +3,7 @@
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
 use relight_core::render::mirror_reflectance;
-use relight_core::statistics::median;
+use relit_data::statistics::median;
 use serde::Serialize;
 
 use crate::fit::search::PixelFit;

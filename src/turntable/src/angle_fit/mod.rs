@@ -74,13 +74,6 @@ impl AngleFit {
             .then(|| self.line.at(t_us as f64))
     }
 
-    /// When the table was at `angle_deg`, microseconds of the host's clock; `None` outside the
-    /// part at constant speed.
-    pub fn time_at(&self, angle_deg: f64) -> Option<i64> {
-        let t_us = self.line.inverse(angle_deg)?.round() as i64;
-        (self.from_us..=self.to_us).contains(&t_us).then_some(t_us)
-    }
-
     /// Start and end of the part at constant speed, microseconds of the host's clock.
     pub fn constant_us(&self) -> (i64, i64) {
         (self.from_us, self.to_us)

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use relight_core::light::ShLight;
-use relight_core::statistics::{median, quantile};
+use relit_data::statistics::{median, quantile};
 
 use crate::fit::confidence::{
     FREEDOM, FittedPixels, NormalUncertainty, common_error, normal_uncertainties, shared_albedo,

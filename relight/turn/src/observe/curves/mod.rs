@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
-use relight_core::statistics::median;
 use relit_data::image_stats::SATURATED_VALUE;
+use relit_data::statistics::median;
 
 use crate::error::TurnError;
 use crate::model::harmonics::{COEFFICIENTS, HARMONICS};
