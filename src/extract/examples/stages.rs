@@ -9,11 +9,11 @@ use std::time::Duration;
 use image::{GrayImage, RgbaImage};
 use rayon::ThreadPoolBuilder;
 use relit_data::image_stats::MaskSpans;
+use relit_data::mask::bounding_box;
 use relit_data::shard::{Digest, encode_rgb};
 use relit_extract::mask_warnings;
 use relit_extract::{
-    AlignBuffers, AlignSample, Aligner, CropView, ScaleBuffers, Scaler, bounding_box, cut,
-    square_around,
+    AlignBuffers, AlignSample, Aligner, CropView, ScaleBuffers, Scaler, cut, square_around,
 };
 use relit_video::Video;
 use rustix::time::{ClockId, clock_gettime};

@@ -21,6 +21,10 @@ pub use fault::MaskFault;
 use fault::several;
 pub use picture::MaskPicture;
 
+use image::GrayImage;
+
+use crate::geometry::Rect;
+
 /// By what a mask says where the object is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum MaskBasis {
@@ -72,6 +76,19 @@ impl ObjectPixels {
             && is_whole(rows().next_back())
             && rows().all(|row| row.first() == Some(&true) && row.last() == Some(&true))
     }
+}
+
+/// The smallest rectangle that holds all non-zero pixels; `None` if there are none.
+pub fn bounding_box(mask: &GrayImage) -> Option<Rect> {
+    let mut corners: Option<(u32, u32, u32, u32)> = None;
+    for (x, y, pixel) in mask.enumerate_pixels() {
+        if pixel.0[0] != 0 {
+            let (x0, y0, x1, y1) = corners.unwrap_or((x, y, x, y));
+            corners = Some((x0.min(x), y0.min(y), x1.max(x), y1.max(y)));
+        }
+    }
+    let (x0, y0, x1, y1) = corners?;
+    Some(Rect::new(x0 as i32, y0 as i32, x1 - x0 + 1, y1 - y0 + 1))
 }
 
 /// What a mask of another size than its picture's may be, after "the mask PATH is W x H pixels".
