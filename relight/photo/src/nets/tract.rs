@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tract_onnx::prelude::{
     DatumExt, Framework, InferenceModelExt, IntoRunnable, TValue, TVec, Tensor as TractTensor,
-    TractResult, TypedRunnableModel,
+    TractError, TractResult, TypedRunnableModel,
 };
 use tract_onnx::tract_core::plan::eval;
 
@@ -44,7 +44,12 @@ impl TractPlan {
     ) -> TractResult<Self> {
         let reader = tract_onnx::onnx();
         let file = reader.proto_model_for_read(&mut onnx)?;
-        let mut model = reader.parse(&file, folder.and_then(Path::to_str))?.model;
+        let parsed = reader.parse(&file, folder.and_then(Path::to_str))?;
+        if !parsed.unresolved_inputs.is_empty() {
+            let names = parsed.unresolved_inputs.join(", ");
+            return Err(TractError::msg(format!("nothing answers {names}")));
+        }
+        let mut model = parsed.model;
         let mut inputs = Vec::new();
         for at in 0..model.input_outlets()?.len() {
             let node = model.input_outlets()?[at].node;
