@@ -17,7 +17,6 @@ mod tests;
 
 use std::path::Path;
 
-use image::GrayImage;
 use rayon::prelude::*;
 use relit_data::geometry::Rect;
 use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
