@@ -24,7 +24,7 @@ use relit_capture::capture::{
 };
 use relit_capture::preview::Preview;
 use relit_capture::state::{Monitor, TakeSummary, Verdict};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_data::disk::DISK_FULL;
 use relit_data::session::{
     CameraFacts, FrameClock, FrameIndex, Manifest, Recording, SessionError, SoftwareFacts, Status,

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use relit_capture::capture::recover;
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_data::session::{FrameEntry, Recording, Status, recordings};
 use relit_data::shard::{Dataset, ImageSize};
 use relit_extract::{ExtractOptions, extract};

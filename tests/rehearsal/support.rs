@@ -7,7 +7,7 @@ use relit_capture::capture::{
     CaptureContext, CaptureError, CaptureOutcome, Equipment, Settings, StopRequest, capture,
 };
 use relit_capture::state::{Monitor, TakeSummary};
-use relit_clock::Participant;
+use relit_data::clock::Participant;
 use relit_data::session::Recording;
 use relit_turntable::simulator::SimulatedTable;
 

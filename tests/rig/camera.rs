@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use relit_camera::{self as camera, Camera};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 pub(crate) const VIVID: &str = "v4l2:/dev/video0";
 const DRIVER: &str = "/sys/bus/platform/drivers/vivid";

@@ -28,7 +28,6 @@ impl EditorCanvas {
     }
 
     /// The place on the page of a place in the frame.
-    #[must_use]
     pub fn at(&self, x: f64, y: f64) -> [f64; 2] {
         [self.x + x * self.scale, self.y + y * self.scale]
     }

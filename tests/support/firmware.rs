@@ -291,7 +291,6 @@ pub struct Table {
 
 impl Table {
     /// A new table, past its banner.
-    #[must_use]
     #[allow(clippy::new_without_default, reason = "made by tests alone")]
     pub fn new() -> Table {
         let mut table = Table::on(FakeBoard::new());

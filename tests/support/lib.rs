@@ -41,7 +41,6 @@ pub fn ffmpeg(folder: &Path, arguments: &[&str]) -> Vec<u8> {
 
 /// Whether a line of `text` names all of these things (files, numbers, options). How it says so is free, so that
 /// messages can be improved without a change of tests.
-#[must_use]
 pub fn is_named(text: &str, things: &[&str]) -> bool {
     text.lines()
         .any(|line| things.iter().all(|thing| line.contains(thing)))
@@ -69,7 +68,6 @@ pub struct PacketExtent {
 ///
 /// # Panics
 /// If `ffprobe` cannot be run or prints something else.
-#[must_use]
 pub fn packets(folder: &Path, name: &str) -> Vec<PacketExtent> {
     let output = Command::new("ffprobe")
         .args(["-v", "error", "-show_entries", "packet=pos,size"])

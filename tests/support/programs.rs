@@ -19,7 +19,6 @@ pub fn beside_this_test(name: &str) -> std::io::Result<PathBuf> {
 ///
 /// # Panics
 /// If it was not built.
-#[must_use]
 #[allow(clippy::panic, reason = "a test fails by a panic, in its helpers too")]
 pub fn program(name: &str) -> PathBuf {
     match beside_this_test(name) {

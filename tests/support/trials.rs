@@ -28,7 +28,6 @@ pub fn free_trial(name: impl Into<String>, test: impl FnOnce() + Send + 'static)
 }
 
 /// Runs the trials as `cargo test` asks on the command line.
-#[must_use]
 pub fn run(trials: Vec<Trial>) -> ExitCode {
     libtest_mimic::run(&Arguments::from_args(), trials).exit_code()
 }

@@ -3,7 +3,6 @@
 
 /// The source of such a video, for FFmpeg's `lavfi`: so many frames of this size, with this hue in degrees. `object` is
 /// FFmpeg's condition for a pixel (X, Y) that is the object's.
-#[must_use]
 pub fn turning(size: [u32; 2], rate: u32, frames: u32, hue: u32, object: &str) -> String {
     let [width, height] = size;
     let seconds = f64::from(frames) / f64::from(rate);

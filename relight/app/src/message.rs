@@ -18,7 +18,6 @@ pub struct MessageFault;
 /// assert_eq!(relight_app::unpack(&message)?, [&b"{}"[..], b"abc"]);
 /// # Ok::<(), relight_app::MessageFault>(())
 /// ```
-#[must_use]
 pub fn pack(parts: &[&[u8]]) -> Vec<u8> {
     let word = |number: usize| u32::try_from(number).unwrap_or(u32::MAX).to_le_bytes();
     let content: usize = parts.iter().map(|part| part.len()).sum();

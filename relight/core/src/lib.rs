@@ -11,7 +11,6 @@
 //! | [`render`] | diffuse and specular layers on normals |
 //! | [`metrics`] | how far an estimate is from the ground truth |
 //! | [`captured_object`] | a captured object in one file, ready to be lit |
-//! | [`statistics`] | median and quantiles of samples |
 //! | [`parallel`] | parallel work on rows and parts, if there are threads |
 #![cfg_attr(
     feature = "files",
@@ -43,4 +42,3 @@ pub mod parallel;
 #[cfg(feature = "files")]
 pub mod reader;
 pub mod render;
-pub mod statistics;

@@ -13,14 +13,12 @@ use thiserror::Error;
 
 /// How many threads there are.
 #[cfg(feature = "threads")]
-#[must_use]
 pub fn threads() -> usize {
     rayon::current_num_threads()
 }
 
 /// How many threads there are.
 #[cfg(not(feature = "threads"))]
-#[must_use]
 pub fn threads() -> usize {
     1
 }

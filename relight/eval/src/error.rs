@@ -12,7 +12,6 @@ type Cause = Box<dyn Error + Send + Sync>;
 
 /// Why an evaluation cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum EvalError {
     /// The ground truth cannot be opened.
     #[error(transparent)]

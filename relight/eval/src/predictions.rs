@@ -37,13 +37,11 @@ struct Description {
 impl Predictions {
     /// The predictions in the folder `root`. PNGs hold colours in sRGB where `relight decompose` wrote an image's folder,
     /// and else linear.
-    #[must_use]
     pub const fn new(root: PathBuf, frame: NormalsFrame) -> Self {
         Self { root, frame }
     }
 
     /// How a table names them: the folder's name.
-    #[must_use]
     pub fn name(&self) -> String {
         let name = self.root.file_name().unwrap_or(self.root.as_os_str());
         name.to_string_lossy().into_owned()

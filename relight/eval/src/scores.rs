@@ -7,7 +7,6 @@ use serde::Serialize;
 /// Which pixels a measure is taken over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-#[non_exhaustive]
 pub enum MaskRule {
     /// Those of the object.
     Object,
@@ -38,7 +37,6 @@ pub struct Measured {
 
 /// One line of a table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct ScoreLine {
     /// What made the estimate.
     pub method: String,
@@ -60,7 +58,6 @@ pub struct ScoreLine {
 
 /// What a method scored on one image.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct ImageScores {
     /// What made the estimate.
     pub method: String,
@@ -73,7 +70,6 @@ pub struct ImageScores {
 /// The result of a protocol. [`Display`](fmt::Display) writes it for a terminal; as JSON it holds the
 /// scores of each image as well.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct ScoreTable {
     /// The protocol's name.
     pub protocol: String,

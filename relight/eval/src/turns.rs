@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use relight_core::image::{Linear, Rgb, Transfer};
 use relight_core::light::{Direction, Normals, Rotation, ShLight, YUp};
-use relight_core::statistics::median;
 use relight_synth::SequenceDescription;
 use relight_turn::{
     Elevation, MaterialKind, SolvedTurn, TableFrame, TurnError, TurnLight, TurnNetworks,
@@ -13,6 +12,7 @@ use relight_turn::{
 };
 use relit_data::rig::RotationDirection;
 use relit_data::shard::Dataset;
+use relit_data::statistics::median;
 use serde::Serialize;
 
 use super::predictions::{NO_SET, read_light};

@@ -10,7 +10,6 @@ use relight_core::light::LightError;
 
 /// Why data could not be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SynthError {
     /// A file or folder could not be read or written.
     #[error("{path} could not be {doing}")]

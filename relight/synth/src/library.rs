@@ -16,9 +16,9 @@ use super::pack::{self, LibraryContents, LibraryFilter};
 use super::texture::TextureImage;
 use relight_core::image::Extent;
 use relight_core::light::Panorama;
-use relight_core::statistics::ranked;
 use relit_data::file_names::is_hidden;
 use relit_data::shard::Digest;
+use relit_data::statistics::ranked;
 
 /// Size of the panoramas that are made here.
 pub(crate) const PANORAMA_EXTENT: Extent = Extent::new(256, 128);
@@ -182,7 +182,6 @@ impl Library {
     }
 
     /// The digest of all that views and finishes are drawn from: meshes with their materials, and pictures.
-    #[must_use]
     pub fn digest(&self) -> Digest {
         let meshes = self.meshes.par_iter();
         let meshes: Vec<String> = meshes
@@ -198,7 +197,6 @@ impl Library {
     }
 
     /// The same without its meshes: all shapes are made.
-    #[must_use]
     pub fn without_meshes(&self) -> Self {
         Self {
             meshes: Vec::new(),

@@ -15,7 +15,6 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 /// assert_eq!(stream(1, 2), stream(1, 2));
 /// assert_ne!(stream(1, 2), stream(2, 1));
 /// ```
-#[must_use]
 pub fn stream(seed: u64, number: u64) -> u64 {
     mix(mix(seed).wrapping_add(number.wrapping_mul(0x9e37_79b9_7f4a_7c15)))
 }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 /// Why training could not begin or go on.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum TrainError {
     /// libtorch refused.
     #[error("libtorch failed")]

@@ -15,7 +15,6 @@ use relit_data::session::SessionError;
 
 /// Why a turn cannot be solved, or what was found cannot be written.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum TurnError {
     /// The shard cannot be opened.
     #[error(transparent)]

@@ -48,7 +48,7 @@ pub struct ReplayAddress {
     /// A session folder or a video file.
     pub path: PathBuf,
     /// How many times as fast as real time the rehearsal runs, at most 1000; 0: as fast as possible.
-    /// Frames come by the clock: it has to be one [of this speed](relit_clock::Clock::at_speed).
+    /// Frames come by the clock: it has to be one [of this speed](relit_data::clock::Clock::at_speed).
     pub speed: f64,
     /// Whether it starts again at its end.
     pub repeat: bool,

@@ -18,7 +18,6 @@ const PERMITTING: &str = if cfg!(target_os = "linux") {
 /// Why a camera could not be found, set, or read. The system's error is the `source`:
 /// [`relit_data::causes::with_causes`] writes both as one sentence.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum CameraError {
     /// A text that is neither an address nor a mode.
     #[error("{text:?} is not a camera's address: {fault}")]
@@ -173,7 +172,6 @@ pub enum CameraError {
 
 impl CameraError {
     /// That frames of a format cannot be recorded.
-    #[must_use]
     pub fn format(device: String, fourcc: Fourcc) -> Self {
         let what = format!(
             "{fourcc} frames cannot be recorded; ask for MJPG, H264, YUYV, NV12, RGB3, GREY or 8-bit Bayer"

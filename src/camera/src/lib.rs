@@ -15,7 +15,7 @@
 //! use std::time::Duration;
 //!
 //! use relit_camera as camera;
-//! use relit_clock::Clock;
+//! use relit_data::clock::Clock;
 //!
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).unwrap();
 //! let address = "replay:fixtures/20261120T101500Z-cow-short".parse()?;
@@ -54,7 +54,7 @@ pub use frame::{Frame, FrameFault};
 pub use mode::CameraMode;
 pub use rate::Rate;
 
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 /// Opens a camera. A replay goes by the given clock, and as fast as that.
 ///

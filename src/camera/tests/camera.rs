@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use relit_camera::{self as camera, Camera, CameraError, Frame};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_test_support::ffmpeg;
 use tempfile::TempDir;
 

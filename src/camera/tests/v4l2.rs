@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use relit_camera::manual_controls::{ManualPlan, ManualValues, NotHeld};
 use relit_camera::{self as camera, Camera, CameraError, CameraMode, ControlKind, Frame, Rates};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_data::session::FrameClock;
 
 const VIVID: &str = "v4l2:/dev/video0";

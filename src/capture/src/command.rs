@@ -38,7 +38,6 @@ pub enum Command {
 
 /// Why a command was not taken: a sentence for the person who gave it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum CommandError {
     /// Something else is under way.
     #[error("{0}")]

@@ -13,7 +13,6 @@ const DAY: u64 = 24 * HOUR;
 ///
 /// assert_eq!(relit_console::format_duration(Duration::from_secs(8000)), "2 h 14 min");
 /// ```
-#[must_use]
 pub fn format_duration(time: Duration) -> String {
     let minutes = time.as_secs_f64() / MINUTE as f64;
     let seconds = MINUTE * minutes.ceil() as u64;

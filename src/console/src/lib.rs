@@ -92,7 +92,6 @@ impl Console {
     }
 
     /// Whether a machine reads the lines.
-    #[must_use]
     pub fn is_json(self) -> bool {
         self.json
     }

@@ -16,7 +16,6 @@ use crate::Console;
 const OPTION: &str = "--write-manual";
 
 /// Does what `PROGRAM --write-manual FOLDER` asks for, where that is the command line: the exit code. Otherwise none.
-#[must_use]
 pub fn written_manual(program: Command) -> Option<ExitCode> {
     let mut arguments = args_os().skip(1);
     let asked = (arguments.next(), arguments.next(), arguments.next());

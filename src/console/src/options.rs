@@ -18,7 +18,6 @@ pub struct ConsoleOptions {
 
 impl ConsoleOptions {
     /// The console that prints so.
-    #[must_use]
     pub fn console(self) -> Console {
         Console::new(self.json).with_progress(self.progress)
     }

@@ -49,7 +49,6 @@ impl Lines {
 
 impl ProgressBar {
     /// Shows nothing.
-    #[must_use]
     pub fn hidden() -> Self {
         Self {
             bar: indicatif::ProgressBar::hidden(),

@@ -20,7 +20,6 @@ pub struct RunTotals {
 
 impl RunTotals {
     /// Of so many recordings none is done, and the first begins now.
-    #[must_use]
     pub fn new(of: u64, now: Instant) -> Self {
         Self {
             of,
@@ -42,7 +41,6 @@ impl RunTotals {
     }
 
     /// The time until all are done, if each takes as long as those so far. Not known before one was worked on.
-    #[must_use]
     pub fn left(&self) -> Option<Duration> {
         let waiting = u32::try_from(self.of.saturating_sub(self.done)).ok()?;
         let mean = self.worked.checked_div(self.worked_on)?;

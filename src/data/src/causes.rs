@@ -20,7 +20,6 @@ use std::error::Error;
 /// let text = relit_data::causes::with_causes(&full);
 /// assert_eq!(text, "mask.png could not be written: no space left on device");
 /// ```
-#[must_use]
 pub fn with_causes(error: &(dyn Error + 'static)) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

@@ -8,7 +8,6 @@
 /// assert_eq!(count_of(1, "frame"), "1 frame");
 /// assert_eq!(count_of(0, "frame"), "0 frames");
 /// ```
-#[must_use]
 pub fn count_of(count: u64, noun: &str) -> String {
     match count {
         1 => format!("1 {noun}"),

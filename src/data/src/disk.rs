@@ -14,7 +14,6 @@ pub const DISK_FULL: &str = "the disk is full";
 /// assert!(is_full(&Error::from(ErrorKind::StorageFull)));
 /// assert!(!is_full(&Error::from(ErrorKind::PermissionDenied)));
 /// ```
-#[must_use]
 pub fn is_full(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)

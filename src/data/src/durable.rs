@@ -69,8 +69,12 @@ impl Partial {
         }
     }
 
+    /// Where it is until then, for a program that writes it.
+    pub fn path(&self) -> &Path {
+        &self.names.temporary
+    }
+
     /// The final path.
-    #[must_use]
     pub fn target(&self) -> &Path {
         &self.names.target
     }
@@ -101,7 +105,6 @@ impl Write for Partial {
 
 impl SealedPartial {
     /// The final path.
-    #[must_use]
     pub fn target(&self) -> &Path {
         &self.names.target
     }
@@ -151,7 +154,6 @@ impl CreatedFolder {
     }
 
     /// Whether the folder was not there.
-    #[must_use]
     pub fn is_new(&self) -> bool {
         !self.made.is_empty()
     }
@@ -187,7 +189,6 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
 }
 
 /// The final name of the file, if `name` is the temporary name of a [`Partial`].
-#[must_use]
 pub fn target_of(name: &str) -> Option<&str> {
     let (rest, counter) = name
         .strip_prefix('.')?

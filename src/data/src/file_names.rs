@@ -27,13 +27,11 @@ const HIDDEN: [&str; 6] = [
 ];
 
 /// Whether a file's name ends as that of a video, in any case, and is not hidden.
-#[must_use]
 pub fn is_video(path: &Path) -> bool {
     has_extension(path, &VIDEO_EXTENSIONS) && !is_hidden(path)
 }
 
 /// Whether a file's name has one of these extensions, which are in lower case; its own may be in any.
-#[must_use]
 pub fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     path.extension().is_some_and(|found| {
         extensions
@@ -44,7 +42,6 @@ pub fn has_extension(path: &Path, extensions: &[&str]) -> bool {
 
 /// Whether a file is none that a person put there: its name begins with a dot, as `.DS_Store` and the `._*` that macOS
 /// writes beside each file on other file systems, or a file manager made it.
-#[must_use]
 pub fn is_hidden(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default();
     name.as_encoded_bytes().starts_with(b".")
@@ -62,7 +59,6 @@ pub fn is_hidden(path: &Path) -> bool {
 /// assert_ne!(folded("mug"), folded("mug2"));
 /// ```
 #[cfg(feature = "files")]
-#[must_use]
 pub fn folded(name: &str) -> String {
     let apart = DecomposingNormalizerBorrowed::new_nfd().normalize(name);
     // Upper case first: a letter of two capitals, such as the German sharp s, then has their small ones.

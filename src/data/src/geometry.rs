@@ -23,13 +23,11 @@ pub struct Rect {
 
 impl Rect {
     /// The rectangle with the given corner and size.
-    #[must_use]
     pub const fn new(x: i32, y: i32, w: u32, h: u32) -> Self {
         Self { x, y, w, h }
     }
 
     /// The middle of an image: half its width and height, at least one pixel.
-    #[must_use]
     pub fn middle_of(width: u32, height: u32) -> Self {
         let (w, h) = ((width / 2).max(1), (height / 2).max(1));
         let edge = |whole: u32, part: u32| {
@@ -39,19 +37,16 @@ impl Rect {
     }
 
     /// One past the right edge, in pixels.
-    #[must_use]
     pub fn right(self) -> i64 {
         i64::from(self.x) + i64::from(self.w)
     }
 
     /// One past the lower edge, in pixels.
-    #[must_use]
     pub fn bottom(self) -> i64 {
         i64::from(self.y) + i64::from(self.h)
     }
 
     /// Whether a pixel is inside, by its number in row order of an image of this width.
-    #[must_use]
     pub fn contains(self, pixel: usize, width: u32) -> bool {
         let (x, y) = (
             pixel as i64 % i64::from(width),

@@ -53,14 +53,12 @@ pub struct Measures {
 
 impl Measures {
     /// `saturated_px / mask_px`, 0..=1; 0 if the mask is empty.
-    #[must_use]
     pub fn saturated_fraction(&self) -> f64 {
         fraction(self.saturated_px, self.mask_px)
     }
 }
 
 /// `part / whole`, or 0 if `whole` is 0.
-#[must_use]
 pub fn fraction(part: u64, whole: u64) -> f64 {
     if whole == 0 {
         0.0
@@ -70,7 +68,6 @@ pub fn fraction(part: u64, whole: u64) -> f64 {
 }
 
 /// Measures all pixels of `image`; `level` is the saturation level, 0..=255.
-#[must_use]
 pub fn measure_whole(image: &RgbImage, level: u8) -> Measures {
     MaskSpans::whole(image.width(), image.height()).sum(image, level)
 }
@@ -106,7 +103,6 @@ impl MaskSpans {
     }
 
     /// The runs of `mask`, in which values of 128 and above are the object.
-    #[must_use]
     pub fn from_mask(mask: &GrayImage) -> Self {
         let (width, height) = mask.dimensions();
         let under: Vec<Vec<bool>> = mask
@@ -136,7 +132,6 @@ impl MaskSpans {
     /// let seen = spans.within(0..9, 2..6);
     /// assert_eq!(seen.measure(&RgbImage::new(9, 6), 250).unwrap().mask_px, 36);
     /// ```
-    #[must_use]
     pub fn within(&self, columns: Range<u32>, rows: Range<u32>) -> Self {
         let inside = |all: &[Vec<Span>], by: usize| -> Vec<Vec<Span>> {
             let seen = |range: &Range<u32>| {
@@ -169,13 +164,11 @@ impl MaskSpans {
     }
 
     /// Width and height of the mask, pixels.
-    #[must_use]
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }
 
     /// Number of pixels under the mask.
-    #[must_use]
     pub fn pixels(&self) -> u64 {
         self.pixels
     }
@@ -200,7 +193,6 @@ impl MaskSpans {
     }
 
     /// Starts measuring an image that comes row by row.
-    #[must_use]
     pub fn measuring(&self, level: u8) -> Measuring<'_> {
         Measuring {
             spans: self,
@@ -312,7 +304,6 @@ impl Measuring<'_> {
     }
 
     /// The measures of the rows so far.
-    #[must_use]
     pub fn finish(self) -> Measures {
         let pixels = self.spans.pixels;
         Measures {

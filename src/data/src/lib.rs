@@ -13,12 +13,14 @@
 //! | [`image_stats`] | statistics of an image's pixels, all or under a mask |
 //! | [`spec_net_gate`] | the 5 % gate of Spec-Net |
 //! | [`srgb`] | sRGB values to light and back |
+//! | [`statistics`] | medians and quantiles |
 //! | `still` | still image files as they are displayed, with the feature `still` |
 //! | [`text`] | text in files, with or without a byte order mark |
 //! | [`colour`] | colours as videos code them (HDR, wide gamut) to sRGB |
 //! | [`turn_light`] | how much light changes over a turn |
 //! | [`turn_motion`] | a turn of the table as it was planned, and as the table reported it |
 //! | [`rig`] | what is known of a rig |
+//! | [`clock`] | the clock of a capture, by which its frames are stamped: real or virtual time, and all waits |
 //! | [`naming`] | the names that a session may have |
 //! | [`file_names`] | the names of files: videos, hidden ones, and those that are one file where case is ignored |
 //! | [`mask`] | which pixels a picture of a mask marks |
@@ -28,7 +30,7 @@
 //! | [`counts`] | numbers of things in sentences |
 //!
 //! Without the feature `files`, which is on by default, only what needs no operating system is there: all
-//! modules but `session`, `shard`, `report` and `durable`.
+//! modules but `session`, `shard`, `report`, `clock` and `durable`.
 //!
 //! `shard` knows `geometry`, `image_stats`, `naming` and `durable`; `report` knows the records of `shard`
 //! and `image_stats`; both know `rig`; `session` and `shard` do not know each other. `docs/reference/formats.md`
@@ -164,6 +166,8 @@
 //! ```
 
 pub mod causes;
+#[cfg(all(feature = "files", unix))]
+pub mod clock;
 #[cfg(feature = "still")]
 pub mod colour;
 pub mod counts;
@@ -184,6 +188,7 @@ pub mod session;
 pub mod shard;
 pub mod spec_net_gate;
 pub mod srgb;
+pub mod statistics;
 #[cfg(feature = "still")]
 pub mod still;
 pub mod text;

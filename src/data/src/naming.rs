@@ -12,7 +12,6 @@ const NUMBERED_DEVICES: [&str; 2] = ["com", "lpt"];
 /// Whether `name` can be a session's name, which becomes a folder's name, a file's stem and part of
 /// a sample's key: letters and digits of any script, `-`, `_` and `.`, not starting or ending with `.`, 1 to
 /// 120 bytes, and not the name of a device of Windows such as `con`.
-#[must_use]
 pub fn is_session_name(name: &str) -> bool {
     !name.is_empty()
         && name.len() <= MAX_LENGTH

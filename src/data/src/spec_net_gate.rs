@@ -8,7 +8,6 @@
 pub const SPEC_NET_GATE: f64 = 0.05;
 
 /// Whether the gate opens: more than the fraction `gate` of the object's pixels is saturated.
-#[must_use]
 pub fn opens(saturated_fraction: f64, gate: f64) -> bool {
     saturated_fraction > gate
 }

@@ -8,7 +8,6 @@
 /// assert!((to_linear(0.5) - 0.214_041).abs() < 1e-6);
 /// assert!((from_linear(to_linear(0.02)) - 0.02).abs() < 1e-6);
 /// ```
-#[must_use]
 pub fn to_linear(value: f64) -> f64 {
     if value <= 0.040_45 {
         value / 12.92
@@ -18,7 +17,6 @@ pub fn to_linear(value: f64) -> f64 {
 }
 
 /// The sRGB value of light.
-#[must_use]
 pub fn from_linear(light: f64) -> f64 {
     if light <= 0.003_130_8 {
         12.92 * light
@@ -28,7 +26,6 @@ pub fn from_linear(light: f64) -> f64 {
 }
 
 /// [`to_linear`] in single precision; negative values are mirrored.
-#[must_use]
 pub fn to_linear_f32(value: f32) -> f32 {
     let size = value.abs();
     let light = if size <= 0.04045 {
@@ -40,7 +37,6 @@ pub fn to_linear_f32(value: f32) -> f32 {
 }
 
 /// [`from_linear`] in single precision; negative light is mirrored.
-#[must_use]
 pub fn from_linear_f32(light: f32) -> f32 {
     let size = light.abs();
     let value = if size <= 0.003_130_8 {

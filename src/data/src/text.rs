@@ -33,7 +33,6 @@ pub fn decode(mut bytes: Vec<u8>) -> Result<String, String> {
 }
 
 /// A file's content without a byte order mark of UTF-8, which parsers of JSON refuse.
-#[must_use]
 pub fn unmarked(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes)
 }

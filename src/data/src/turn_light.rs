@@ -26,7 +26,6 @@ const DARK: f64 = 1e-5;
 /// assert!((found - 0.4 / 2.0_f64.sqrt()).abs() < 1e-9);
 /// # Ok::<(), &'static str>(())
 /// ```
-#[must_use]
 pub fn modulation(light: &[(f64, f64)]) -> Option<f64> {
     let count = light.len() as f64;
     let mean = light.iter().map(|(_, value)| value).sum::<f64>() / count;

@@ -9,11 +9,11 @@ use std::time::Duration;
 use image::{GrayImage, RgbaImage};
 use rayon::ThreadPoolBuilder;
 use relit_data::image_stats::MaskSpans;
+use relit_data::mask::bounding_box;
 use relit_data::shard::{Digest, encode_rgb};
 use relit_extract::mask_warnings;
 use relit_extract::{
-    AlignBuffers, AlignSample, Aligner, CropView, ScaleBuffers, Scaler, bounding_box, cut,
-    square_around,
+    AlignBuffers, AlignSample, Aligner, CropView, ScaleBuffers, Scaler, cut, square_around,
 };
 use relit_video::Video;
 use rustix::time::{ClockId, clock_gettime};
@@ -84,7 +84,10 @@ fn measure(path: &Path, mask: &GrayImage, frames: u64, side: u32) -> Result<(), 
     while let Some(pending) = timed(&mut read, || reader.next()) {
         timed(&mut decoded, || video.part(pending, crop, &mut part))?;
         let view = CropView::whole(&part);
-        let _ = timed(&mut aligned, || aligner.measure_crop(view, &mut aligning));
+        let _ = timed(&mut aligned, || {
+            aligner.take_rows(view, 0..view.dimensions().1, &mut aligning);
+            aligner.measure_rows(&mut aligning)
+        });
         let mut measuring = spans.measuring(250);
         let image = timed(&mut scaled, || {
             scaler.scale(view, &mut scaling, &mut measuring)

@@ -10,6 +10,7 @@
 use std::collections::VecDeque;
 
 use relit_data::shard::FrameRecord;
+use relit_data::statistics::upper_median;
 
 /// Fewest frames of a whole turn with which blur is measured: between fewer, the light moves too far.
 const MIN_FRAMES: usize = 300;
@@ -37,7 +38,7 @@ pub(super) fn blurs(frames: &[&FrameRecord], whole_turn: usize) -> Vec<Option<f6
     let changes = levels
         .windows(2)
         .map(|pair| (pair[1].raw - pair[0].raw).abs());
-    let usual = median(changes.collect()).unwrap_or_default();
+    let usual = upper_median(changes).unwrap_or_default();
     let limit = MIN_DROP.max(BEYOND_USUAL * usual);
     let longest = (whole_turn / MAX_PART).max(1);
     let before = drops(levels.iter(), limit, longest);
@@ -71,8 +72,8 @@ impl Level {
     /// How far it is below the median of others, by the smaller of the two measures.
     fn below(self, others: &VecDeque<Self>) -> Option<f64> {
         let others = Some(others).filter(|others| others.len() >= MIN_AROUND)?;
-        let raw = median(others.iter().map(|level| level.raw).collect())? - self.raw;
-        let relative = median(others.iter().map(|level| level.relative).collect())?;
+        let raw = upper_median(others.iter().map(|level| level.raw))? - self.raw;
+        let relative = upper_median(others.iter().map(|level| level.relative))?;
         Some(raw.min(relative - self.relative))
     }
 }
@@ -107,11 +108,6 @@ fn drops<'a>(
         }
     }
     drops
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 #[cfg(test)]

@@ -4,24 +4,9 @@ use image::{GrayImage, RgbaImage};
 
 use relit_data::geometry::Rect;
 
-/// The smallest rectangle that holds all non-zero pixels; `None` if there are none.
-#[must_use]
-pub fn bounding_box(mask: &GrayImage) -> Option<Rect> {
-    let mut corners: Option<(u32, u32, u32, u32)> = None;
-    for (x, y, pixel) in mask.enumerate_pixels() {
-        if pixel.0[0] != 0 {
-            let (x0, y0, x1, y1) = corners.unwrap_or((x, y, x, y));
-            corners = Some((x0.min(x), y0.min(y), x1.max(x), y1.max(y)));
-        }
-    }
-    let (x0, y0, x1, y1) = corners?;
-    Some(Rect::new(x0 as i32, y0 as i32, x1 - x0 + 1, y1 - y0 + 1))
-}
-
 /// The square around `object` whose side is the object's longer side plus `margin` (a fraction of
 /// that side) on both sides. It is centred on the object and moved into the frame if it fits;
 /// otherwise it extends beyond the frame, where the image is 0.
-#[must_use]
 pub fn square_around(object: Rect, margin: f64, frame: (u32, u32)) -> Rect {
     let longer = object.w.max(object.h);
     let side = longer + 2 * (f64::from(longer) * margin).round() as u32;
@@ -44,7 +29,6 @@ fn start_of(start: i32, extent: u32, side: u32, whole: u32) -> i32 {
 }
 
 /// The part of the mask under `crop`; 0 where the crop extends beyond it.
-#[must_use]
 pub fn cut(mask: &GrayImage, crop: Rect) -> GrayImage {
     GrayImage::from_fn(crop.w, crop.h, |x, y| {
         let x = i64::from(crop.x) + i64::from(x);

@@ -14,7 +14,6 @@ pub struct CropView<'a> {
 
 impl<'a> CropView<'a> {
     /// The whole picture.
-    #[must_use]
     pub fn whole(picture: &'a RgbaImage) -> Self {
         let (width, height) = picture.dimensions();
         Self {
@@ -27,7 +26,6 @@ impl<'a> CropView<'a> {
     }
 
     /// The picture without `by` pixels on each side; empty if nothing remains.
-    #[must_use]
     pub fn within(picture: &'a RgbaImage, by: u32) -> Self {
         let (width, height) = picture.dimensions();
         Self {
@@ -57,14 +55,12 @@ impl<'a> CropView<'a> {
     }
 
     /// Width and height, pixels.
-    #[must_use]
     pub fn dimensions(self) -> (u32, u32) {
         (self.width, self.height)
     }
 
     /// The bytes of row `y`, which may lie up to `apron` rows outside, with as many pixels on both sides; empty
     /// if the picture does not have them.
-    #[must_use]
     pub(super) fn row(self, y: i64, apron: u32) -> &'a [u8] {
         let bytes = |pixels: i64| usize::try_from(4 * pixels).ok();
         let at = |picture: &'a RgbaImage| {

@@ -8,7 +8,6 @@ use relit_video as video;
 
 /// Why a recording, or all of them, could not be extracted.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ExtractError {
     /// It cannot be done as it is requested: what is wrong, with what, and the way out.
     #[error("{0}")]
@@ -78,7 +77,6 @@ impl ExtractError {
     }
 
     /// Whether the recording itself is the reason: it holds too little of a turn, and is left out.
-    #[must_use]
     pub fn skips_recording(&self) -> bool {
         matches!(
             self,

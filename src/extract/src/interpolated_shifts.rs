@@ -6,6 +6,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use relit_data::statistics::upper_median;
+
 use super::Alignment;
 
 /// The registered frames on both sides are at most so many frames apart.
@@ -107,11 +109,7 @@ fn middle(
         .chain(registered.range(after))
         .map(|(_, shift)| shift)
         .collect();
-    let median = |axis: usize| {
-        let mut values: Vec<f64> = around.iter().map(|shift| shift[axis]).collect();
-        values.sort_unstable_by(f64::total_cmp);
-        values.get(values.len() / 2).copied()
-    };
+    let median = |axis: usize| upper_median(around.iter().map(|shift| shift[axis]));
     Some([median(0)?, median(1)?])
 }
 

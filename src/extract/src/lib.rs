@@ -60,7 +60,7 @@ mod timeline;
 use std::path::{Path, PathBuf};
 
 pub use align::{AlignBuffers, AlignSample, Aligner, Alignment};
-pub use crop::{bounding_box, cut, square_around};
+pub use crop::{cut, square_around};
 pub use crop_view::CropView;
 pub use error::ExtractError;
 pub use mask_warnings::mask_warnings;

@@ -7,12 +7,12 @@ use image::imageops::{FilterType, resize};
 
 use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
-use relit_data::mask::{MaskPicture, size_hint};
+use relit_data::mask::{MaskPicture, bounding_box, size_hint};
 use relit_data::session::{MASK_FILE, Recording, mask_in, mask_stem};
 use relit_data::shard::Digest;
 use relit_data::still;
 
-use super::{ExtractError, bounding_box};
+use super::ExtractError;
 
 /// A mask that covers more than this fraction of the frame is suspicious.
 pub(super) const LARGE: f64 = 0.9;

@@ -53,7 +53,6 @@ impl RecordingOutcome {
 
 /// The outcome of an extraction: numbers of recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
 pub struct ExtractSummary {
     /// Recordings that were extracted.
     pub extracted: usize,

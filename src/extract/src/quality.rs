@@ -7,6 +7,7 @@ use relit_data::counts::count_of;
 use relit_data::session::Notice;
 use relit_data::shard::{Digest, FrameRecord};
 use relit_data::srgb::to_linear;
+use relit_data::statistics::upper_median;
 
 use super::blur::blurs;
 
@@ -125,9 +126,7 @@ fn exposure_steps(frames: &[&FrameRecord]) -> Vec<Option<f64>> {
         .collect();
     let step = |(at, &change): (usize, &f64)| {
         let around = at.saturating_sub(AROUND)..(at + AROUND + 1).min(changes.len());
-        let mut usual: Vec<f64> = changes.get(around)?.iter().map(|c| c.abs()).collect();
-        usual.sort_unstable_by(f64::total_cmp);
-        let middle = usual.get(usual.len() / 2)?;
+        let middle = upper_median(changes.get(around)?.iter().map(|c| c.abs()))?;
         let is_step = change.abs() > MIN_STEP.max(BEYOND_LIGHT * middle);
         is_step.then_some((1000.0 * change).round() / 1000.0)
     };

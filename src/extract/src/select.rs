@@ -1,6 +1,7 @@
 //! Choosing the source frames of the samples, evenly spread over one turn.
 
 use relit_data::shard::SamplingBasis;
+use relit_data::statistics::upper_median;
 
 use super::ExtractError;
 
@@ -202,12 +203,8 @@ fn no_frame_left() -> ExtractError {
 
 /// The median distance between neighbours, 0 for a single position.
 fn median_step(positions: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.is_empty() {
-        return 0.0;
-    }
-    steps.sort_by(f64::total_cmp);
-    steps[steps.len() / 2]
+    let steps = positions.windows(2).map(|pair| pair[1] - pair[0]);
+    upper_median(steps).unwrap_or_default()
 }
 
 /// The first frame at which the table goes back against its direction by more than a degree.

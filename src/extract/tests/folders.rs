@@ -94,7 +94,7 @@ fn a_mask_with_a_part_of_the_background_ends_with_3_and_leaves_the_session_usabl
     let mut mask = image::open(fixture(COW).join("mask_gt.png"))
         .unwrap()
         .into_luma8();
-    let bounds = relit_extract::bounding_box(&mask).unwrap();
+    let bounds = relit_data::mask::bounding_box(&mask).unwrap();
     // A block beside the object, of about a twelfth of its area.
     let (left, top) = (bounds.right() as u32 + 6, bounds.y as u32 + bounds.h / 3);
     for y in top..top + 70 {

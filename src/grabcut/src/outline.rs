@@ -19,7 +19,6 @@ type Sides = BTreeMap<Corner, Vec<usize>>;
 /// The edges between the mask's pixels (from 128 on) and the others, as closed polygons along the pixels'
 /// sides: corners `[x, y]`, 0 to width and height, without those at which the direction stays the same. Filled
 /// by the even-odd rule they cover the mask exactly. Pixels that touch at a corner are connected.
-#[must_use]
 pub fn outline(mask: &GrayImage) -> Vec<Vec<[u32; 2]>> {
     let mut sides = sides(mask);
     let mut polygons = Vec::new();

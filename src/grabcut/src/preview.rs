@@ -16,7 +16,6 @@ const SIDE_PER_PX: u32 = 500;
 /// The frame with its background dimmed and a bright outline around the mask, with a dark rim on both
 /// sides. The outline is 2 pixels wide, and wider for frames above 1500 pixels. If mask and frame
 /// differ in size, the frame is returned unchanged.
-#[must_use]
 pub fn preview(frame: &RgbImage, mask: &GrayImage) -> RgbImage {
     let size = frame.dimensions();
     if mask.dimensions() != size {

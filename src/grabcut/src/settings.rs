@@ -29,7 +29,6 @@ pub enum Effort {
 
 impl Effort {
     /// Whether the edge of a frame of so many pixels is decided again at its own size.
-    #[must_use]
     pub fn covers(self, pixels: usize) -> bool {
         self == Self::Fine || pixels <= 1_000_000
     }

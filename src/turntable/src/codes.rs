@@ -29,14 +29,12 @@ impl Alarm {
 
     /// Whether the emergency stop locked it. It stays locked until that is released and the controller
     /// reset.
-    #[must_use]
     pub fn is_emergency_stop(self) -> bool {
         let numbered = self.family.emergency_stop_alarm();
         self.emergency_stop || (self.code.is_some() && self.code == numbered)
     }
 
     /// Whether the counted position may be wrong after this alarm.
-    #[must_use]
     pub fn loses_position(self) -> bool {
         match self.code {
             _ if self.emergency_stop => true,

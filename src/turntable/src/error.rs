@@ -9,7 +9,6 @@ use crate::lockfile::LockError;
 
 /// An error of a turntable.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum TurntableError {
     /// The text is not an address.
     #[error(

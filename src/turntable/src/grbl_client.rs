@@ -16,7 +16,7 @@ use super::protocol::{ControllerState, Counts, LineOutcome, Message, ReplyTimeou
 use super::status::TableStatus;
 use super::supervisor::{MotionFault, MotionGoal};
 use crate::lockfile::LockFile;
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 /// Added to the computed time of a motion.
 const MOTION_SLACK: Duration = Duration::from_secs(4);
@@ -99,19 +99,16 @@ impl Table {
     }
 
     /// The controller's identity and settings.
-    #[must_use]
     pub fn identity(&self) -> &Identity {
         &self.identity
     }
 
     /// Whether the table was moving when it was opened, and had to be stopped: nobody had it.
-    #[must_use]
     pub fn was_stopped(&self) -> bool {
         self.was_stopped
     }
 
     /// Counters of lines, reports and line errors since the table was opened.
-    #[must_use]
     pub fn counts(&self) -> Counts {
         self.connection.supervisor().counts()
     }
@@ -133,7 +130,6 @@ impl Table {
     }
 
     /// The range in which the table may turn, degrees from the angle 0.
-    #[must_use]
     pub fn limits(&self, status: &TableStatus) -> (f64, f64) {
         self.identity.limits_from(status)
     }

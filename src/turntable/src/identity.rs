@@ -24,7 +24,6 @@ pub(super) fn offers_extras(about: &[Message]) -> bool {
 
 /// A controller, as it describes itself.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Identity {
     /// The firmware's version and note, such as `1.1h.20190830` or `1.1h.20261121 (relit)`.
     pub firmware: String,
@@ -48,7 +47,6 @@ pub struct Identity {
 
 impl Identity {
     /// One step, degrees.
-    #[must_use]
     pub fn step_deg(&self) -> f64 {
         self.steps_per_degree.recip()
     }

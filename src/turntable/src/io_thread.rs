@@ -11,7 +11,7 @@ use super::port::Port;
 use super::protocol::{LineOutcome, ReplyTimeout, SendError};
 use super::status::TableStatus;
 use super::supervisor::{ControllerFeatures, MotionFault, StopOutcome, Supervisor};
-use relit_clock::{Clock, JoinHandle, Waitable};
+use relit_data::clock::{Clock, JoinHandle, Waitable};
 
 /// Longest wait for bytes until the next check of time and output.
 const READ_WAIT: Duration = Duration::from_millis(2);

@@ -16,7 +16,7 @@
 //! that reason and stops the table. A position that may be lost has to be homed again.
 //!
 //! ```
-//! use relit_clock::Clock;
+//! use relit_data::clock::Clock;
 //! use relit_turntable::simulator::{SimulatedTable, SimulatorOptions};
 //! use relit_turntable::{Table, TableOptions, TurnPlan};
 //!
@@ -68,7 +68,7 @@ mod turn;
 
 use std::path::PathBuf;
 
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 pub use address::{SimulatedAddress, TurntableAddress, find_serial};
 pub use angle_fit::AngleFit;

@@ -23,7 +23,6 @@ pub const MARGIN_DEG: f64 = 2.0;
 
 /// A turn that stays inside the limits, after which the table turns back, so that the cable does not wind up.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct TurnPlan {
     /// Speed, degrees a second.
     pub degrees_per_second: f64,
@@ -97,25 +96,21 @@ impl TurnPlan {
     }
 
     /// Where it moves first: back by ramp and margin.
-    #[must_use]
     pub fn back_deg(&self) -> f64 {
         self.start_deg - self.sign * (self.ramp_deg + MARGIN_DEG)
     }
 
     /// Where its speed becomes constant.
-    #[must_use]
     pub fn constant_from_deg(&self) -> f64 {
         self.start_deg - self.sign * MARGIN_DEG
     }
 
     /// Where it starts to decelerate.
-    #[must_use]
     pub fn constant_to_deg(&self) -> f64 {
         self.constant_from_deg() + self.sign * self.constant_deg
     }
 
     /// Where it comes to rest.
-    #[must_use]
     pub fn end_deg(&self) -> f64 {
         self.constant_to_deg() + self.sign * self.ramp_deg
     }

@@ -6,7 +6,6 @@ use super::supervisor::{PositionReport, Supervisor};
 
 /// The status of a table by a fresh report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[non_exhaustive]
 pub struct TableStatus {
     /// The controller's state.
     pub state: ControllerState,

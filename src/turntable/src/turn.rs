@@ -157,7 +157,6 @@ impl<'table> Turn<'table> {
 
     /// The reports of the part at constant speed that came after the first `seen` of the turn, and
     /// how many of the turn there are now.
-    #[must_use]
     pub fn reports_after(&self, seen: usize) -> (Vec<JournaledReport>, usize) {
         let expected = self.expected();
         let supervisor = self.table.connection().supervisor();
@@ -168,7 +167,6 @@ impl<'table> Turn<'table> {
     }
 
     /// The turn in machine positions.
-    #[must_use]
     pub fn expected(&self) -> JournaledTurn {
         JournaledTurn {
             from_deg: self.zero_deg + self.plan.constant_from_deg(),

@@ -10,7 +10,7 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use relit_clock::{Clock, Participant};
+use relit_data::clock::{Clock, Participant};
 use relit_turntable::Port;
 use relit_turntable::simulator::{
     STEPS_PER_TURN, SimulatedPort, SimulatedTable, Simulator, SimulatorOptions,

@@ -63,7 +63,6 @@ impl PixelFormat {
 
     /// The codec by which a video file keeps it: `mjpeg` and `h264` as they come, `ffv1` for
     /// uncompressed frames.
-    #[must_use]
     pub fn codec(self) -> &'static str {
         match self {
             Self::Mjpeg => "mjpeg",
@@ -75,7 +74,6 @@ impl PixelFormat {
     /// Bytes of a row and number of rows of an uncompressed frame, all planes counted; `None` for
     /// compressed formats and for sizes that no memory holds. An odd width or height shares its last
     /// colour difference with nobody.
-    #[must_use]
     pub fn rows(self, width: u32, height: u32) -> Option<(usize, usize)> {
         let (width, height) = (usize::try_from(width).ok()?, usize::try_from(height).ok()?);
         Some(match self {
@@ -91,7 +89,6 @@ impl PixelFormat {
     }
 
     /// Bytes of an uncompressed frame; `None` as for [`Self::rows`].
-    #[must_use]
     pub fn frame_bytes(self, width: u32, height: u32) -> Option<usize> {
         let (row, rows) = self.rows(width, height)?;
         row.checked_mul(rows)

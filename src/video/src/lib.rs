@@ -95,7 +95,6 @@ pub use seek::first_picture;
 
 /// Why a video could not be read or written.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum VideoError {
     /// The file has no pictures that can be read: why, as the rest of a sentence, and what to do.
     #[error("{path} {why}")]
@@ -186,7 +185,6 @@ fn folder_of(path: &Path) -> &Path {
 
 /// Why a frame cannot be decoded to a picture.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum DecodeFault {
     /// The decoder refused its data.
     #[error("its data are damaged ({0})")]

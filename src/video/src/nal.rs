@@ -12,7 +12,6 @@ pub(super) fn is_annex_b(packet: &[u8]) -> bool {
 }
 
 /// True if decoding of an H.264 stream with start codes can begin with this packet.
-#[must_use]
 pub fn is_key(packet: &[u8]) -> bool {
     units(packet).any(|unit| kind(unit) == Some(IDR_SLICE))
 }

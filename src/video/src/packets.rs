@@ -58,13 +58,11 @@ impl Video {
     }
 
     /// True if each packet of the file is a frame, in order of presentation, as a camera delivers them.
-    #[must_use]
     pub fn is_in_order(&self) -> bool {
         self.track.is_by_packets() && self.track.number_of_packet.iter().flatten().is_sorted()
     }
 
     /// Width and height as coded, before any rotation, pixels.
-    #[must_use]
     pub fn coded_size(&self) -> (u32, u32) {
         self.track.coded
     }

@@ -64,13 +64,11 @@ impl Picture {
     }
 
     /// The frame's position in the video, 0-based, in order of presentation.
-    #[must_use]
     pub fn number(&self) -> u64 {
         self.number
     }
 
     /// Width and height as displayed, pixels.
-    #[must_use]
     pub fn size(&self) -> (u32, u32) {
         self.display
             .displayed(self.frame.width(), self.frame.height())

@@ -39,7 +39,6 @@ impl std::fmt::Debug for PacketBox {
 
 impl Pending {
     /// The frame's position in the video.
-    #[must_use]
     pub fn number(&self) -> u64 {
         self.number
     }

@@ -10,7 +10,6 @@ const DECODERS: usize = 2;
 
 impl Video {
     /// Up to `count` frames at equal distances, without those that are known to be damaged.
-    #[must_use]
     pub fn spread(&self, count: usize) -> Vec<u64> {
         let whole = self.frames().iter().filter(|frame| !frame.damaged);
         let whole: Vec<u64> = whole.map(|frame| frame.number).collect();
@@ -18,7 +17,6 @@ impl Video {
     }
 
     /// As [`Self::spread`], of key frames, which are decoded alone, where there are enough.
-    #[must_use]
     pub fn spread_key_frames(&self, count: usize) -> Vec<u64> {
         let damaged = |&number: &u64| {
             let at = usize::try_from(number).unwrap_or(usize::MAX);

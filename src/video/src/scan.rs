@@ -26,7 +26,6 @@ use relit_data::geometry::Rect;
 
 /// Codec, size and colour of a video.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct Facts {
     /// The codec's name, such as `mjpeg`.
     pub codec: String,
@@ -132,19 +131,16 @@ impl Video {
     }
 
     /// The file.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// Codec, size and colour.
-    #[must_use]
     pub fn facts(&self) -> &Facts {
         &self.facts
     }
 
     /// All frames in order of presentation; `frames()[i].number == i`.
-    #[must_use]
     pub fn frames(&self) -> &[FrameInfo] {
         &self.frames
     }
@@ -152,19 +148,16 @@ impl Video {
     /// Numbers of the frames that can be decoded without any other, sorted: all of Motion JPEG, the key frames of
     /// H.264; `None` if only a decoder tells which frames there are. A [`Reader`] that is asked for none but these decodes
     /// no other.
-    #[must_use]
     pub fn key_frames(&self) -> &[u64] {
         &self.track.keys
     }
 
     /// Signs that the file is incomplete or damaged, one phrase each; empty if there are none.
-    #[must_use]
     pub fn damage(&self) -> &[String] {
         &self.damage
     }
 
     /// What had to be assumed about the file, for its user.
-    #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
     }

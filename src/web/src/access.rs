@@ -54,7 +54,6 @@ pub struct AccessPolicy {
 impl AccessPolicy {
     /// The policy of a server at `port` that demands `token`, save for `open_paths`, and is known
     /// under `names` besides its addresses.
-    #[must_use]
     pub fn new(
         port: u16,
         token: Option<Token>,
@@ -102,7 +101,6 @@ impl AccessPolicy {
     }
 
     /// True where no token is requested, or the right one came.
-    #[must_use]
     pub fn is_authorised(&self, headers: &HeaderMap) -> bool {
         let Some(token) = &self.token else {
             return true;
@@ -112,13 +110,11 @@ impl AccessPolicy {
     }
 
     /// True where no token is requested.
-    #[must_use]
     pub fn is_open(&self) -> bool {
         self.token.is_none()
     }
 
     /// The cookie that lets a browser in, if `given` is the token.
-    #[must_use]
     pub fn cookie_for(&self, given: &str) -> Option<String> {
         let token = self.token.as_ref().filter(|token| token.is(given))?;
         Some(format!(

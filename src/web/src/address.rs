@@ -21,7 +21,6 @@ pub struct Announcement {
 
 impl Announcement {
     /// How to reach a server at `address`, by the first of `names` if there is one.
-    #[must_use]
     pub fn new(address: SocketAddr, names: &[String], token: Option<&Token>) -> Self {
         let port = address.port();
         let place = match names.first() {

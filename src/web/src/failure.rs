@@ -16,7 +16,6 @@ pub struct Failure {
 
 impl Failure {
     /// The status.
-    #[must_use]
     pub fn status(&self) -> StatusCode {
         self.status
     }

@@ -21,13 +21,11 @@ pub struct ListenAddress {
 
 impl ListenAddress {
     /// The address to listen on.
-    #[must_use]
     pub fn socket(&self) -> SocketAddr {
         self.socket
     }
 
     /// The names under which clients reach this machine: those that are `given`, and the one in the address.
-    #[must_use]
     pub fn names(&self, given: &[String]) -> Vec<String> {
         given.iter().chain(&self.name).cloned().collect()
     }

@@ -96,7 +96,6 @@ impl Token {
     }
 
     /// The secret itself.
-    #[must_use]
     pub fn reveal(&self) -> &str {
         &self.0
     }

@@ -6,6 +6,7 @@ use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Samples, Srg
 use relight_core::light::Panorama;
 use relight_photo::compositing::{SceneBackground, SceneDescription, SceneEnvironment};
 use relight_photo::relighting::PanoramaView;
+use relit_data::statistics::upper_median;
 use relit_data::still::Format;
 
 use super::error::{StudioError, refused};
@@ -291,9 +292,7 @@ pub(super) fn made_panoramas() -> Result<Vec<(ProceduralPanorama, Vec<u8>)>, Stu
 /// A panorama exposed for a screen by its median, so that a sun does not make everything else black.
 fn thumbnail(panorama: &Panorama) -> Vec<u8> {
     let planes = panorama.image().planes().resized(THUMBNAIL);
-    let mut values: Vec<f32> = planes.plane(1).to_vec();
-    values.sort_by(f32::total_cmp);
-    let middle = values.get(values.len() / 2).copied().unwrap_or(1.0);
+    let middle = upper_median(planes.plane(1).iter().copied()).unwrap_or(1.0);
     let gain = THUMBNAIL_MEAN / middle.max(1e-6);
     rgba(&planes.map(|value| Srgb::from_linear((value * gain).max(0.0))))
 }

@@ -78,7 +78,6 @@ type Answer = (Value, Vec<Vec<u8>>);
 
 impl Studio {
     /// An engine without networks, objects and background.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }

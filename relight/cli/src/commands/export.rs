@@ -1,11 +1,12 @@
 //! `relight export`: objects as files that other programs read.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use relight_photo::export::{ObjectMesh, read_object, to_glb, to_layers};
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
+use relit_data::file_names::has_extension;
 use serde_json::json;
 
 use crate::commands::CommandResult;
@@ -33,22 +34,15 @@ pub(crate) struct Arguments {
 impl Arguments {
     /// The fault of the combination of arguments, if there is one.
     pub(crate) fn fault(&self) -> Option<String> {
-        let is_known = ["glb", "exr"]
-            .iter()
-            .any(|ending| has_ending(&self.output, ending));
+        let is_known = has_extension(&self.output, &["glb", "exr"]);
         (!is_known).then(|| format!("--output {}: give .glb or .exr", self.output.display()))
     }
-}
-
-fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension()
-        .is_some_and(|found| found.eq_ignore_ascii_case(ending))
 }
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let object = read_object(&arguments.input)?;
     let output = &arguments.output;
-    let bytes = if has_ending(output, "exr") {
+    let bytes = if has_extension(output, &["exr"]) {
         to_layers(&object)?
     } else {
         let mesh = ObjectMesh::from_object(&object, arguments.vertices as usize)?;

@@ -10,6 +10,7 @@ use relight_photo::nets::{
 };
 use relit_console::{Console, Outcome};
 use relit_data::durable::write_whole;
+use relit_data::file_names::has_extension;
 use serde_json::json;
 
 use crate::commands::CommandResult;
@@ -151,17 +152,8 @@ impl Arguments {
             return Some("give the weights: the program contains none for this network".to_owned());
         }
         let output = export.output.display();
-        let is_known = export.ending().is_some();
+        let is_known = has_extension(&export.output, &["onnx", "safetensors"]);
         (!is_known).then(|| format!("--output {output}: give .onnx or .safetensors"))
-    }
-}
-
-impl Export {
-    fn ending(&self) -> Option<&'static str> {
-        let ending = self.output.extension()?;
-        ["onnx", "safetensors"]
-            .into_iter()
-            .find(|known| ending.eq_ignore_ascii_case(known))
     }
 }
 
@@ -205,7 +197,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     } else {
         WeightPrecision::Half
     };
-    if export.ending() == Some("onnx") {
+    if has_extension(&export.output, &["onnx"]) {
         let bytes = to_onnx(&graph, &weights, precision, &export.facts())?;
         write_whole(&export.output, &bytes)
             .map_err(|error| format!("{}: {error}", export.output.display()))?;

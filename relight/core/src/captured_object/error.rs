@@ -13,7 +13,6 @@ use crate::image::ImageError;
 
 /// Why a captured object cannot be read or written.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum CapturedObjectError {
     /// The file cannot be read or written, or is not a captured object.
     #[error("{} {fault}", path.display())]

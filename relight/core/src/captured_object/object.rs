@@ -65,31 +65,26 @@ impl CapturedObject {
     }
 
     /// Its name.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Normals, albedo and gloss.
-    #[must_use]
     pub const fn surface(&self) -> &Surface {
         &self.surface
     }
 
     /// The part of each pixel that the object covers, 0 to 1. Colours are not multiplied with it.
-    #[must_use]
     pub const fn alpha(&self) -> &Planes<1> {
         &self.alpha
     }
 
     /// How confident each normal is, 0 to 1.
-    #[must_use]
     pub const fn confidence(&self) -> &Planes<1> {
         &self.confidence
     }
 
     /// Width and height.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.surface.extent()
     }

@@ -5,6 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use relit_data::durable::write_whole;
+use relit_data::file_names::has_extension;
 use relit_data::text;
 
 use crate::captured_object::{CapturedObject, CapturedObjectError};
@@ -185,11 +186,8 @@ impl ShLight {
 impl CapturedObject {
     /// Whether a path is that of a captured object: a file that is called so (`.relit`), or a folder with one
     /// ([`Self::FILE`]).
-    #[must_use]
     pub fn is_named(path: &Path) -> bool {
-        path.extension()
-            .is_some_and(|ending| ending.eq_ignore_ascii_case("relit"))
-            || path.join(Self::FILE).is_file()
+        has_extension(path, &["relit"]) || path.join(Self::FILE).is_file()
     }
 
     /// Reads a file, or that in a folder of `relight turn`.

@@ -66,7 +66,6 @@ pub fn encode_exr(path: &Path, planes: &Planes<3>) -> Result<Vec<u8>, ImageError
 
 impl Planes<3> {
     /// The pixels as 8-bit integers, red, green and blue in turn; values beyond 0 to 1 are clipped.
-    #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         interleaved(self, |v| [to_integer(v, 255.0) as u8])
     }

@@ -86,7 +86,6 @@ pub struct Rgb<S> {
 
 impl<S: ColourSpace> Rgb<S> {
     /// The image whose values, encoded as `S` says, are these.
-    #[must_use]
     pub const fn new(planes: Planes<3>) -> Self {
         Self {
             planes,
@@ -95,7 +94,6 @@ impl<S: ColourSpace> Rgb<S> {
     }
 
     /// The encoded values.
-    #[must_use]
     pub const fn planes(&self) -> &Planes<3> {
         &self.planes
     }
@@ -107,13 +105,11 @@ impl<S: ColourSpace> Rgb<S> {
     }
 
     /// The encoded values themselves.
-    #[must_use]
     pub fn into_planes(self) -> Planes<3> {
         self.planes
     }
 
     /// The same image in proportion to light.
-    #[must_use]
     pub fn to_linear(self) -> Rgb<Linear> {
         Rgb::new(self.planes.map(S::to_linear))
     }
@@ -121,7 +117,6 @@ impl<S: ColourSpace> Rgb<S> {
 
 impl Rgb<Linear> {
     /// The same image, encoded for a file or a screen.
-    #[must_use]
     pub fn encode<T: ColourSpace>(self) -> Rgb<T> {
         Rgb::new(self.planes.map(T::from_linear))
     }

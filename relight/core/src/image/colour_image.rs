@@ -43,7 +43,6 @@ impl ColourImage {
     }
 
     /// A picture in memory. Its integers are encoded as `transfer` says; floating point values are light in Rec. 709.
-    #[must_use]
     pub const fn new(stored: StoredImage, transfer: Transfer) -> Self {
         let colour = match stored.samples {
             Samples::Integer => of_transfer(transfer),
@@ -53,20 +52,17 @@ impl ColourImage {
     }
 
     /// The numbers and alpha as they are stored.
-    #[must_use]
     pub const fn stored(&self) -> &StoredImage {
         &self.stored
     }
 
     /// The light.
-    #[must_use]
     pub fn into_light(self) -> Rgb<Linear> {
         let Self { stored, colour } = self;
         in_light(stored.planes, &colour, stored.samples)
     }
 
     /// The light, while the picture is kept.
-    #[must_use]
     pub fn to_light(&self) -> Rgb<Linear> {
         in_light(
             self.stored.planes.clone(),
@@ -76,7 +72,6 @@ impl ColourImage {
     }
 
     /// The values for a screen, in sRGB; floating point may exceed 1.
-    #[must_use]
     pub fn to_srgb(&self) -> Rgb<Srgb> {
         if self.colour.is_srgb() {
             return Rgb::new(self.stored.planes.clone());
@@ -86,7 +81,6 @@ impl ColourImage {
 
     /// The light of a neutral pixel that is stored as `level`. Where values are floating point, of one that a screen shows
     /// with that level.
-    #[must_use]
     pub fn light_at(&self, level: f32) -> f32 {
         if self.stored.samples == Samples::Float {
             return Srgb::to_linear(level);

@@ -13,7 +13,6 @@ use super::Extent;
 
 /// An error of an image or its file.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ImageError {
     /// Images that belong together, or the planes of one, differ in size.
     #[error("{0}")]

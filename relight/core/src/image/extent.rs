@@ -11,19 +11,16 @@ pub struct Extent {
 
 impl Extent {
     /// An image of `width` x `height` pixels.
-    #[must_use]
     pub const fn new(width: usize, height: usize) -> Self {
         Self { width, height }
     }
 
     /// Width and height as files have them.
-    #[must_use]
     pub fn sides(self) -> [u32; 2] {
         [self.width, self.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX))
     }
 
     /// How many pixels there are.
-    #[must_use]
     pub const fn pixels(self) -> usize {
         self.width * self.height
     }

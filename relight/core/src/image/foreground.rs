@@ -23,7 +23,6 @@ impl Planes<3> {
     ///
     /// # Panics
     /// Where alpha has another size.
-    #[must_use]
     pub fn foreground(&self, alpha: &Planes<1>) -> Self {
         assert_eq!(self.extent(), alpha.extent(), "size of alpha");
         if self.extent().pixels() == 0 {

@@ -23,7 +23,6 @@ pub struct Planes<const C: usize> {
 
 impl<const C: usize> Planes<C> {
     /// An image of one value a channel.
-    #[must_use]
     pub fn filled(extent: Extent, pixel: [f32; C]) -> Self {
         Self {
             extent,
@@ -32,7 +31,6 @@ impl<const C: usize> Planes<C> {
     }
 
     /// An image of zeros.
-    #[must_use]
     pub fn zeros(extent: Extent) -> Self {
         Self::filled(extent, [0.0; C])
     }
@@ -54,7 +52,6 @@ impl<const C: usize> Planes<C> {
     }
 
     /// The image whose pixel in column `x` and row `y` is `pixel(x, y)`.
-    #[must_use]
     pub fn from_fn(extent: Extent, mut pixel: impl FnMut(usize, usize) -> [f32; C]) -> Self {
         let mut image = Self::zeros(extent);
         for y in 0..extent.height {
@@ -91,7 +88,6 @@ impl<const C: usize> Planes<C> {
     ///
     /// # Panics
     /// Where it does not lie inside.
-    #[must_use]
     pub fn cut(&self, [x, y]: [usize; 2], extent: Extent) -> Self {
         let mut part = Self::zeros(extent);
         for (to, from) in part.planes.iter_mut().zip(&self.planes) {
@@ -103,7 +99,6 @@ impl<const C: usize> Planes<C> {
     }
 
     /// Width and height.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.extent
     }
@@ -112,13 +107,11 @@ impl<const C: usize> Planes<C> {
     ///
     /// # Panics
     /// Where there are not so many channels.
-    #[must_use]
     pub fn plane(&self, channel: usize) -> &[f32] {
         &self.planes[channel]
     }
 
     /// All channels.
-    #[must_use]
     pub fn planes(&self) -> [&[f32]; C] {
         self.planes.each_ref().map(Vec::as_slice)
     }
@@ -130,7 +123,6 @@ impl<const C: usize> Planes<C> {
     }
 
     /// The planes themselves.
-    #[must_use]
     pub fn into_planes(self) -> [Vec<f32>; C] {
         self.planes
     }
@@ -139,7 +131,6 @@ impl<const C: usize> Planes<C> {
     ///
     /// # Panics
     /// Where the pixel lies outside.
-    #[must_use]
     pub fn pixel(&self, x: usize, y: usize) -> [f32; C] {
         let at = self.at(x, y);
         array::from_fn(|channel| self.planes[channel][at])
@@ -165,7 +156,6 @@ impl<const C: usize> Planes<C> {
     }
 
     /// The same image with `change` applied to every value.
-    #[must_use]
     pub fn map(mut self, change: impl Fn(f32) -> f32 + Sync) -> Self {
         for plane in &mut self.planes {
             let parts = plane.chunks_mut(1 << 14).collect();

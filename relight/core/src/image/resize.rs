@@ -29,7 +29,6 @@ impl Part {
 impl<const C: usize> Planes<C> {
     /// The image in another size. Where it becomes smaller, each pixel is the mean of the area that it
     /// covers; where it becomes larger, it is interpolated linearly between the pixels' middles.
-    #[must_use]
     pub fn resized(&self, extent: Extent) -> Self {
         if extent == self.extent() {
             return self.clone();
@@ -42,7 +41,6 @@ impl<const C: usize> Planes<C> {
     ///
     /// # Panics
     /// Where this has another size than `source`, or `target` reaches beyond its image.
-    #[must_use]
     pub fn resized_part(&self, source: &Part, target: &Part) -> Self {
         assert_eq!(source.extent, self.extent(), "size of the part");
         let (from, extent) = (self.extent(), target.extent);

@@ -19,7 +19,6 @@ use super::{Direction, Order};
 /// assert!((values[3] - 0.488_603).abs() < 1e-6); // Y_1^1, along x
 /// assert!((values[8] - 0.546_274).abs() < 1e-6); // Y_2^2, x^2 - y^2
 /// ```
-#[must_use]
 pub fn basis(order: Order, direction: Direction) -> Vec<f64> {
     let mut values = vec![0.0; order.coefficients()];
     basis_into(order, direction.components(), &mut values);

@@ -47,7 +47,6 @@ impl ShLight {
     }
 
     /// No light.
-    #[must_use]
     pub fn dark(order: Order) -> Self {
         Self {
             order,
@@ -56,7 +55,6 @@ impl ShLight {
     }
 
     /// Even light of this radiance from everywhere.
-    #[must_use]
     pub fn even(order: Order, radiance: [f64; 3]) -> Self {
         let mut light = Self::dark(order);
         let y0 = basis(Order::ZERO, Direction::VIEWER)[0];
@@ -65,13 +63,11 @@ impl ShLight {
     }
 
     /// The highest band.
-    #[must_use]
     pub const fn order(&self) -> Order {
         self.order
     }
 
     /// All coefficients, (l, m) at index `l (l + 1) + m`.
-    #[must_use]
     pub fn coefficients(&self) -> &[[f64; 3]] {
         &self.coefficients
     }
@@ -83,7 +79,6 @@ impl ShLight {
     }
 
     /// The radiance from a direction. A truncated expansion rings: it can be negative.
-    #[must_use]
     pub fn radiance(&self, from: Direction) -> [f64; 3] {
         let values = basis(self.order, from);
         let mut sum = [0.0; 3];
@@ -96,7 +91,6 @@ impl ShLight {
     }
 
     /// The same light in another order: further bands are left out, or zero.
-    #[must_use]
     pub fn with_order(&self, order: Order) -> Self {
         let mut coefficients = self.coefficients.clone();
         coefficients.resize(order.coefficients(), [0.0; 3]);

@@ -20,7 +20,6 @@ impl Direction {
     pub const VIEWER: Self = Self([0.0, 0.0, 1.0]);
 
     /// The direction of a vector of any length; none for a vector that has none.
-    #[must_use]
     pub fn new(x: f64, y: f64, z: f64) -> Option<Self> {
         // Scaled first, so that squares neither overflow nor vanish.
         let largest = x.abs().max(y.abs()).max(z.abs());
@@ -34,20 +33,17 @@ impl Direction {
 
     /// The direction at `polar` radians from the viewer's axis (z) and `azimuth` radians around it,
     /// from x towards y: (sin θ cos φ, sin θ sin φ, cos θ), as the paper has it.
-    #[must_use]
     pub fn from_angles(polar: f64, azimuth: f64) -> Self {
         let (sin, cos) = polar.sin_cos();
         Self([sin * azimuth.cos(), sin * azimuth.sin(), cos])
     }
 
     /// x, y and z.
-    #[must_use]
     pub const fn components(self) -> [f64; 3] {
         self.0
     }
 
     /// The cosine of the angle between the two.
-    #[must_use]
     pub fn dot(self, other: Self) -> f64 {
         dot(self.0, other.0)
     }

@@ -2,7 +2,6 @@
 
 /// An error of light.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum LightError {
     /// The numbers are not the coefficients of any order.
     #[error("{0}")]

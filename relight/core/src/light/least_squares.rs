@@ -10,7 +10,6 @@ pub struct NormalEquations {
 
 impl NormalEquations {
     /// No equations yet.
-    #[must_use]
     pub fn new(unknowns: usize) -> Self {
         Self {
             unknowns,

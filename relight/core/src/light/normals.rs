@@ -61,7 +61,6 @@ pub struct Normals<Y> {
 impl<Y: YAxis> Normals<Y> {
     /// The map of these vectors, each brought to length 1; those shorter than 0.1, or that are not
     /// numbers, stand for no surface.
-    #[must_use]
     pub fn new(mut planes: Planes<3>) -> Self {
         let [x, y, z] = planes.planes_mut();
         for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
@@ -76,7 +75,6 @@ impl<Y: YAxis> Normals<Y> {
     }
 
     /// The map with these colours `(n + 1) / 2`, 0 to 1; black is outside the object.
-    #[must_use]
     pub fn from_colours(mut colours: Planes<3>) -> Self {
         let [red, green, blue] = colours.planes_mut();
         for ((r, g), b) in red.iter_mut().zip(green).zip(blue) {
@@ -87,7 +85,6 @@ impl<Y: YAxis> Normals<Y> {
     }
 
     /// The colours `(n + 1) / 2` that a file holds; black outside the object.
-    #[must_use]
     pub fn to_colours(&self) -> Planes<3> {
         let mut colours = self.planes.clone();
         let [x, y, z] = colours.planes_mut();
@@ -98,13 +95,11 @@ impl<Y: YAxis> Normals<Y> {
     }
 
     /// The colour of one pixel, by its row's number times the width, plus its column's.
-    #[must_use]
     pub fn colour_at(&self, at: usize) -> [f32; 3] {
         colour(self.planes.planes().map(|plane| plane[at]))
     }
 
     /// The same surface with y the other way.
-    #[must_use]
     pub fn flipped(self) -> Normals<Y::Opposite> {
         let mut planes = self.planes;
         let [_, y, _] = planes.planes_mut();
@@ -136,7 +131,6 @@ impl<Y: YAxis> Normals<Y> {
     ///
     /// # Panics
     /// Where the mask is not as long as the map has pixels.
-    #[must_use]
     pub fn completed(&self, mask: &[bool]) -> Self {
         let [x, y, z] = self.planes.planes();
         let known: Vec<bool> = (0..self.extent().pixels())
@@ -149,7 +143,6 @@ impl<Y: YAxis> Normals<Y> {
     }
 
     /// Whether all normals are zero.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.planes
             .planes()
@@ -159,19 +152,16 @@ impl<Y: YAxis> Normals<Y> {
     }
 
     /// x, y and z.
-    #[must_use]
     pub const fn planes(&self) -> &Planes<3> {
         &self.planes
     }
 
     /// x, y and z themselves.
-    #[must_use]
     pub fn into_planes(self) -> Planes<3> {
         self.planes
     }
 
     /// Width and height.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.planes.extent()
     }
@@ -206,7 +196,6 @@ impl Normals<YUp> {
     }
 
     /// The front of a sphere that fills a square image of `side` pixels, seen from far away.
-    #[must_use]
     pub fn sphere(side: usize) -> Self {
         let place = |at: usize| (2.0 * (at as f32 + 0.5)) / side as f32 - 1.0;
         Self::new(Planes::from_fn(Extent::new(side, side), |x, y| {

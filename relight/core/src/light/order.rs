@@ -54,13 +54,11 @@ impl Order {
     }
 
     /// The last band.
-    #[must_use]
     pub const fn get(self) -> usize {
         self.0 as usize
     }
 
     /// How many coefficients there are: (order + 1)².
-    #[must_use]
     pub const fn coefficients(self) -> usize {
         (self.get() + 1) * (self.get() + 1)
     }

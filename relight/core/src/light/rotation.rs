@@ -24,7 +24,6 @@ impl Rotation {
 
     /// The rotation by `radians` about `axis`, counter-clockwise for who looks against the axis
     /// (the right-hand rule).
-    #[must_use]
     pub fn about(axis: Direction, radians: f64) -> Self {
         let [x, y, z] = axis.components();
         let (s, c) = radians.sin_cos();
@@ -37,7 +36,6 @@ impl Rotation {
     }
 
     /// The rotation with this matrix, row by row; `None` if the matrix is not a rotation.
-    #[must_use]
     pub fn from_matrix(matrix: [[f64; 3]; 3]) -> Option<Self> {
         let rotation = Self(matrix);
         let product = rotation.after(&rotation.inverse()).0;
@@ -53,13 +51,11 @@ impl Rotation {
     }
 
     /// The matrix, row by row: it is multiplied with a column.
-    #[must_use]
     pub const fn matrix(&self) -> &[[f64; 3]; 3] {
         &self.0
     }
 
     /// The direction after the rotation.
-    #[must_use]
     pub fn apply(&self, direction: Direction) -> Direction {
         let v = direction.components();
         Direction::from_unit(
@@ -69,14 +65,12 @@ impl Rotation {
     }
 
     /// The rotation that does `first`, then this one.
-    #[must_use]
     pub fn after(&self, first: &Self) -> Self {
         let cell = |i: usize, j: usize| (0..3).map(|k| self.0[i][k] * first.0[k][j]).sum();
         Self([0, 1, 2].map(|i| [0, 1, 2].map(|j| cell(i, j))))
     }
 
     /// The rotation back.
-    #[must_use]
     pub fn inverse(&self) -> Self {
         Self([0, 1, 2].map(|i| [0, 1, 2].map(|j| self.0[j][i])))
     }

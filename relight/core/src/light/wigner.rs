@@ -18,7 +18,6 @@ impl ShLight {
     /// let from = turn.apply(Direction::VIEWER);
     /// assert!((turned.radiance(from)[0] - light.radiance(Direction::VIEWER)[0]).abs() < 1e-12);
     /// ```
-    #[must_use]
     pub fn rotated(&self, rotation: &Rotation) -> Self {
         let mut bands = vec![Band::zeroth()];
         if self.order().get() >= 1 {

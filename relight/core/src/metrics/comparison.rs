@@ -56,7 +56,6 @@ impl<'a> Comparison<'a> {
     }
 
     /// Number of pixels that count, at least 1.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.mask.iter().filter(|&&counts| counts).count()
     }

@@ -2,7 +2,6 @@
 
 /// Why something cannot be measured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum MetricError {
     /// The images, or the settings of the comparison, do not fit.
     #[error("{0}")]

@@ -19,7 +19,6 @@ impl Convention {
     pub const ALL: [Self; 2] = [Self::Strict, Self::FileUnits];
 
     /// Which scales it fits.
-    #[must_use]
     pub const fn fit(self) -> ScaleFit {
         match self {
             Self::Strict => ScaleFit::Image,

@@ -17,7 +17,6 @@ pub enum ScaleFit {
 
 impl ScaleFit {
     /// How a table names it.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::None => "none",
@@ -85,7 +84,6 @@ impl Comparison<'_> {
     /// estimate that is 0 everywhere.
     ///
     /// Squared units of the ground truth.
-    #[must_use]
     pub fn mse(&self, fit: ScaleFit) -> f64 {
         let statistics: Vec<SufficientStatistics> = self
             .channels

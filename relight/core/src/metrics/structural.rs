@@ -22,7 +22,6 @@ fn weights() -> Vec<f64> {
 }
 
 /// The dissimilarity that belongs to an SSIM: (1 - SSIM) / 2, 0..=1.
-#[must_use]
 pub fn dssim(ssim: f64) -> f64 {
     (1.0 - ssim) / 2.0
 }

@@ -56,7 +56,6 @@ impl Rank {
     };
 
     /// The process `index` of `world_size`; `None` if `index` is out of range.
-    #[must_use]
     pub const fn new(index: u32, world_size: u32) -> Option<Self> {
         if index < world_size {
             Some(Self { index, world_size })
@@ -66,13 +65,11 @@ impl Rank {
     }
 
     /// Which process this is, from 0.
-    #[must_use]
     pub const fn index(self) -> u32 {
         self.index
     }
 
     /// How many processes there are, at least 1.
-    #[must_use]
     pub const fn world_size(self) -> u32 {
         self.world_size
     }
@@ -96,7 +93,6 @@ pub(super) struct Job {
 
 impl DrawPlan {
     /// Batches of 12 neighbours in shuffled order, as the paper draws them.
-    #[must_use]
     pub const fn from_turns(seed: u64) -> Self {
         Self {
             batch: 12,

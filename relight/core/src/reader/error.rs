@@ -11,7 +11,6 @@ use crate::parallel::JobPanic;
 
 /// Why a data set cannot be opened.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum OpenError {
     /// The operating system refused.
     #[error("{} cannot be read", path.display())]
@@ -54,7 +53,6 @@ impl OpenError {
 
 /// Why a sample cannot be given.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SampleFault {
     /// The operating system refused.
     #[error("{} cannot be read", path.display())]
@@ -92,7 +90,6 @@ impl SampleFault {
     }
 
     /// That the sample lacks a part, a suffix or a file's name.
-    #[must_use]
     pub fn missing(part: &str) -> Self {
         Self::Part(format!("its {part} is missing"))
     }

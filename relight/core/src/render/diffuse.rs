@@ -81,7 +81,6 @@ const INVISIBLE: f64 = 2e-3;
 
 impl DiffuseLayer {
     /// The layer for a light: all of its bands count, or the first three in the released form.
-    #[must_use]
     pub fn new(light: &ShLight, form: DiffuseForm) -> Self {
         let mut coefficients = [[0.0; 3]; 9];
         for (to, from) in coefficients.iter_mut().zip(light.coefficients()) {
@@ -106,7 +105,6 @@ impl DiffuseLayer {
     }
 
     /// The shading S, 0 outside the object.
-    #[must_use]
     pub fn shading(&self, normals: &Normals<YUp>) -> Rgb<Linear> {
         let mut shading = Planes::zeros(normals.extent());
         simd::run(self, normals.planes().planes(), shading.planes_mut());
@@ -238,7 +236,6 @@ pub(super) const COSINE_LOBE: [f64; 3] = [PI, 2.0 * PI / 3.0, PI / 4.0];
 /// The coefficients Â_l of the cosine lobe: π, 2π / 3, π / 4, and for even l beyond
 /// 2π (-1)^(l/2 - 1) / ((l + 2) (l - 1)) l! / (2^l (l/2)!²) (Ramamoorthi and Hanrahan, *On the relationship between
 /// radiance and irradiance*, 2001); 0 for other odd l. Irradiance is light whose band l is Â_l times as strong.
-#[must_use]
 pub fn cosine_lobe(l: usize) -> f64 {
     match l {
         0..=2 => COSINE_LOBE[l],

@@ -88,7 +88,6 @@ impl Rendering {
 impl Layers {
     /// The layers for a light. [`DiffuseForm::Released`] and [`SpecularForm::Power`] take its first nine
     /// coefficients, [`DiffuseForm::Irradiance`] and [`SpecularForm::Lobe`] take all.
-    #[must_use]
     pub fn new(light: &ShLight, diffuse: DiffuseForm, specular: SpecularForm) -> Self {
         Self {
             diffuse: DiffuseLayer::new(light, diffuse),
@@ -100,7 +99,6 @@ impl Layers {
     }
 
     /// Shading and highlight of a surface.
-    #[must_use]
     pub fn render(&self, surface: &Surface) -> Rendering {
         let highlight = surface.gloss().and_then(|gloss| {
             // A surface's maps have one size, so that there is a highlight.

@@ -46,14 +46,12 @@ impl LobeLayer {
     const MORE_BANDS: usize = 8;
 
     /// The layer for a light, with enough bands for what the light holds.
-    #[must_use]
     pub fn new(light: &ShLight) -> Self {
         let order = light.order().get() + Self::MORE_BANDS;
         Self::with_order(light, Order::new(order).unwrap_or(Order::HIGHEST))
     }
 
     /// The layer whose G ends at band `order`.
-    #[must_use]
     pub fn with_order(light: &ShLight, order: Order) -> Self {
         let half = Transfer::new(light.order(), order).apply(light);
         Self {

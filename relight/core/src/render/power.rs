@@ -35,7 +35,6 @@ pub struct PowerLayer {
 
 impl PowerLayer {
     /// The layer for a light; only its first nine coefficients count.
-    #[must_use]
     pub fn new(light: &ShLight) -> Self {
         let mut coefficients = [[0.0; 3]; 9];
         for (to, from) in coefficients.iter_mut().zip(light.coefficients()) {
@@ -107,7 +106,6 @@ fn terms<T: Number>([x, y, z]: [T; 3]) -> [T; 9] {
 
 /// The constants of the paper's polynomials, each times Â_l of its band.
 #[inline(always)]
-#[must_use]
 pub const fn power_constants() -> [f64; 5] {
     let [a0, a1, a2] = COSINE_LOBE;
     [a0 * C[0], a1 * C[1], a2 * C[2], a2 * C[3], a2 * C[4]]

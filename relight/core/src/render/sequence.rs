@@ -73,14 +73,12 @@ impl RenderSettings {
 
 /// The s_p with which a surface of smoothness α that faces the viewer reflects this part of even light:
 /// part (α + 2) / 8. H alone, with a fixed s_p, falls with α as 8π / (α + 2).
-#[must_use]
 pub fn mirror_reflectance(part: f32, smoothness: f32) -> f32 {
     part * (smoothness + 2.0) / 8.0
 }
 
 /// The exposure that shows a white diffuse surface, turned to where the light is strongest, as 1. It does not
 /// change when the light turns.
-#[must_use]
 pub fn exposure_for(light: &ShLight) -> f32 {
     let layer = DiffuseLayer::new(light, DiffuseForm::Irradiance);
     let (rows, columns) = (24, 48);

@@ -32,7 +32,6 @@ impl Gloss {
     }
 
     /// The same gloss everywhere.
-    #[must_use]
     pub fn even(extent: Extent, reflectance: [f32; 3], smoothness: f32) -> Self {
         Self {
             reflectance: Planes::filled(extent, reflectance),
@@ -41,19 +40,16 @@ impl Gloss {
     }
 
     /// s_p.
-    #[must_use]
     pub const fn reflectance(&self) -> &Planes<3> {
         &self.reflectance
     }
 
     /// α.
-    #[must_use]
     pub const fn smoothness(&self) -> &Planes<1> {
         &self.smoothness
     }
 
     /// Width and height.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.reflectance.extent()
     }
@@ -97,25 +93,21 @@ impl Surface {
     }
 
     /// The normals.
-    #[must_use]
     pub const fn normals(&self) -> &Normals<YUp> {
         &self.normals
     }
 
     /// The diffuse reflectance A, 0 to 1.
-    #[must_use]
     pub const fn albedo(&self) -> &Rgb<Linear> {
         &self.albedo
     }
 
     /// The gloss, if there is any.
-    #[must_use]
     pub const fn gloss(&self) -> Option<&Gloss> {
         self.gloss.as_ref()
     }
 
     /// Width and height.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.normals.extent()
     }

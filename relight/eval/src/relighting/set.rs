@@ -115,13 +115,11 @@ impl RelightingSet {
     }
 
     /// How many objects there are.
-    #[must_use]
     pub fn objects(&self) -> usize {
         self.index.objects.len()
     }
 
     /// The lights, in the viewer's frame and in the units of the images.
-    #[must_use]
     pub fn lights(&self) -> &[ShLight] {
         &self.lights
     }

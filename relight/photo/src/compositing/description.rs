@@ -132,7 +132,6 @@ pub struct ObjectDescription {
 
 impl SceneDescription {
     /// Objects before a background, and defaults for everything else.
-    #[must_use]
     pub fn new(background: PathBuf, objects: Vec<ObjectDescription>) -> Self {
         Self {
             background,
@@ -185,7 +184,6 @@ impl SceneDescription {
     }
 
     /// Width and height of the picture that shows a part of a panorama.
-    #[must_use]
     pub fn panorama_extent(&self) -> Extent {
         let [width, height] = self.size.map(|side| side as usize);
         Extent::new(width, height)
@@ -262,7 +260,6 @@ impl LightDescription {
 
 impl ObjectDescription {
     /// The object of a photograph, and all else as a file that does not name it has it.
-    #[must_use]
     pub fn new(photo: PathBuf) -> Self {
         Self {
             photo,
@@ -279,7 +276,6 @@ impl ObjectDescription {
     }
 
     /// Where it stands.
-    #[must_use]
     pub fn placement(&self) -> Placement {
         Placement {
             at: self.at,
@@ -289,7 +285,6 @@ impl ObjectDescription {
     }
 
     /// What its material becomes.
-    #[must_use]
     pub fn change(&self) -> MaterialChange {
         MaterialChange {
             tint: self.tint,

@@ -1,7 +1,7 @@
 //! Properties of a background that an inserted object adopts: brightness, white balance, grain. Knows pictures only.
 
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Srgb};
-use relight_core::statistics::above_part;
+use relit_data::statistics::above_part;
 
 /// The light that bright places of a picture have that was exposed well.
 const BRIGHT: f32 = 0.8;
@@ -51,7 +51,6 @@ impl Default for Harmonisation {
 impl Harmonisation {
     /// Looks at a background: how bright its bright places are, the colour of its light by shades of grey (Finlayson and Trezzi,
     /// 2004), and its grain where it is smoothest.
-    #[must_use]
     pub fn from_background(background: &Rgb<Linear>) -> Self {
         Self {
             level: (bright(background) / BRIGHT).clamp(LEVELS.0, LEVELS.1),

@@ -28,25 +28,21 @@ pub(crate) struct GroundShadow {
 
 impl SceneLayer {
     /// Column and row of its first pixel in the picture; it may begin outside.
-    #[must_use]
     pub const fn place(&self) -> [i64; 2] {
         self.place
     }
 
     /// How far it covers each pixel, 0 to 1.
-    #[must_use]
     pub const fn alpha(&self) -> &Planes<1> {
         &self.alpha
     }
 
     /// Its linear colours, times alpha.
-    #[must_use]
     pub const fn colours(&self) -> &Planes<3> {
         &self.colours
     }
 
     /// Column and row of its shadow's first pixel, and the part of the light that arrives there, 0 to 1.
-    #[must_use]
     pub fn shadow(&self) -> Option<([i64; 2], &Planes<3>)> {
         let shadow = self.shadow.as_ref()?;
         Some((shadow.place, &shadow.arriving))

@@ -85,7 +85,6 @@ impl<'a> InsertScene<'a> {
     ///
     /// # Panics
     /// Where the background has another size.
-    #[must_use]
     pub fn compose(
         &self,
         background: &Rgb<Linear>,

@@ -145,13 +145,11 @@ impl SceneEnvironment {
 
     /// How far the camera of a scene looks down on the ground of its objects, degrees: as far as it is given, or as the first
     /// object's place says.
-    #[must_use]
     pub fn ground_tilt(scene: &SceneDescription, background: SceneBackground<'_>) -> f64 {
         scene.tilt.unwrap_or_else(|| tilt_of(scene, background))
     }
 
     /// The photograph of an object no larger than it has to be for its size in the scene.
-    #[must_use]
     pub fn downscaled(&self, object: &ObjectDescription, photo: Photo) -> Photo {
         let wanted = object.height * self.extent.height as f64 * RESERVE;
         let Extent { width, height } = photo.picture.planes().extent();
@@ -175,7 +173,6 @@ impl SceneEnvironment {
     }
 
     /// The visible part of a panorama that has rotated by so many radians, at its exposure.
-    #[must_use]
     pub fn seen(&self, view: &PanoramaView, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
         shown(view, panorama, turn, self.panorama_scale)
     }

@@ -27,7 +27,6 @@ pub struct SceneObject<'a> {
 
 impl<'a> SceneObject<'a> {
     /// An object as it is described, in the scene's light.
-    #[must_use]
     pub fn described(object: &ObjectDescription, relightable: &'a RelightableObject) -> Self {
         Self {
             relightable,

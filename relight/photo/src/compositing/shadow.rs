@@ -7,6 +7,7 @@ use std::ops::Range;
 use crate::relighting::{BLOCK, HeightField};
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Direction, LightSampler, Panorama};
+use relit_data::statistics::above_part;
 
 /// The size to which panoramas are brought for shadows.
 const DRAWN: Extent = Extent::new(128, 64);
@@ -184,19 +185,16 @@ impl Ground {
         let (sin, cos) = tilt.clamp(MIN_TILT, PI / 2.0).sin_cos();
         let up = [0.0, cos, sin];
         let width = relief.extent.width;
-        let mut lowest: Vec<f64> = (0..relief.half.len())
+        let lowest = (0..relief.half.len())
             .filter(|&at| relief.half[at] > 0.0)
             .map(|at| {
                 // The back is lower than the front.
                 let y = -((at / width) as f64 + 1.0);
                 y * cos - f64::from(relief.half[at]) * sin
-            })
-            .collect();
-        lowest.sort_by(f64::total_cmp);
-        let place = (lowest.len() as f64 * BELOW_GROUND) as usize;
+            });
         Self {
             up,
-            level: lowest.get(place).copied().unwrap_or(0.0),
+            level: above_part(lowest, BELOW_GROUND).unwrap_or(0.0),
         }
     }
 

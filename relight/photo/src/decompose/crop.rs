@@ -21,7 +21,6 @@ pub struct CropSquare {
 impl CropSquare {
     /// The square around the pixels where the mask is at least one half, with 4 % more than their longer
     /// side; `None` without such pixels.
-    #[must_use]
     pub fn around(mask: &Planes<1>) -> Option<Self> {
         let sides = bounds(mask)?;
         let longest = sides.iter().map(Range::len).max()?;
@@ -31,7 +30,6 @@ impl CropSquare {
     }
 
     /// Width and height.
-    #[must_use]
     pub fn extent(&self) -> Extent {
         Extent::new(self.side, self.side)
     }

@@ -204,19 +204,21 @@ impl Decomposer {
         path: &Path,
         frame: Option<NormalsFrame>,
     ) -> Result<(), DecomposeError> {
-        let onnx = crate::nets::read_onnx(path)?;
+        let onnx = std::fs::read(path).map_err(|source| NetError::Io {
+            path: path.to_owned(),
+            doing: "read",
+            source,
+        })?;
         self.normals = Some(ExternalNormals::new(path, &onnx, self.side(), frame)?);
         Ok(())
     }
 
     /// The kind of network that [`Self::read_normals`] recognised, in words; `None` if none was read.
-    #[must_use]
     pub fn normals_network(&self) -> Option<&'static str> {
         self.normals.as_ref().map(ExternalNormals::name)
     }
 
     /// Width and height of what the network sees, pixels.
-    #[must_use]
     pub fn side(&self) -> usize {
         self.scales.fine.side()
     }

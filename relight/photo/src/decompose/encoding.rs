@@ -4,7 +4,7 @@
 use crate::nets::{INPUTS, OUTPUTS};
 use relight_core::image::{Extent, Planes};
 use relight_core::light::{Normals, YUp};
-use relight_core::statistics::above_part;
+use relit_data::statistics::above_part;
 
 /// Part of the pixels that are darker than the encoded picture's white.
 const WHITE_PERCENTILE: f64 = 0.99;
@@ -48,7 +48,6 @@ impl NetworkInput {
     ///
     /// # Panics
     /// Where the mask has another size.
-    #[must_use]
     pub fn new(picture: &Planes<3>, mask: &Planes<1>) -> Self {
         assert_eq!(picture.extent(), mask.extent(), "size of the mask");
         let [red, green, blue] = picture.planes();
@@ -71,19 +70,16 @@ impl NetworkInput {
     }
 
     /// Width and height.
-    #[must_use]
     pub fn extent(&self) -> Extent {
         self.extent
     }
 
     /// [`INPUTS`] planes, one after the other, row by row.
-    #[must_use]
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
     /// The light in the picture that counts as 1: below it lie 99 of 100 pixels.
-    #[must_use]
     pub fn white(&self) -> f32 {
         self.white
     }
@@ -92,7 +88,6 @@ impl NetworkInput {
     ///
     /// # Panics
     /// Where the answer has another size.
-    #[must_use]
     pub fn decode(&self, answer: &[f32]) -> PredictedMaps {
         let (extent, pixels) = (self.extent, self.extent.pixels());
         let has_paint = answer.len() == (OUTPUTS + 1) * pixels;

@@ -17,7 +17,6 @@ use relit_data::still::ColourError;
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum DecomposeError {
     /// The network cannot be used.
     #[error(transparent)]

@@ -33,7 +33,6 @@ impl PredictedLight {
 
     /// What the network should answer of the coefficients of a light, in which the mean shading of an object is `mean`,
     /// above 0.
-    #[must_use]
     pub fn from_light(coefficients: &[[f64; 3]; LIGHT_OUTPUTS], mean: f64) -> Self {
         let irradiance = |at: usize| {
             let grey = coefficients[at].iter().sum::<f64>() / 3.0;
@@ -43,7 +42,6 @@ impl PredictedLight {
     }
 
     /// The numbers.
-    #[must_use]
     pub const fn numbers(&self) -> &[f64; LIGHT_OUTPUTS] {
         &self.0
     }

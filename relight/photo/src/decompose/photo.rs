@@ -148,7 +148,6 @@ impl Photo {
     }
 
     /// These options with what is known of the photograph's saturation.
-    #[must_use]
     pub fn options(&self, options: &DecomposeOptions) -> DecomposeOptions {
         DecomposeOptions {
             saturated_from: self.saturated_from,
@@ -165,7 +164,6 @@ pub(crate) fn stem(path: &Path) -> String {
 }
 
 /// The size that a file states; `None` if it cannot be read.
-#[must_use]
 pub fn stated_extent(bytes: &[u8]) -> Option<Extent> {
     let (width, height) = relit_data::still::stored_size(bytes)?;
     Some(Extent::new(width as usize, height as usize))

@@ -7,7 +7,6 @@ use relight_core::image::ImageError;
 
 /// Why something is not exported.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ExportError {
     /// There is nothing at the path.
     #[error("{} does not exist: give object.relit, or a folder that relight turn or relight decompose has written", .0.display())]

@@ -17,7 +17,6 @@ const ROUNDS: usize = 4;
 ///
 /// # Panics
 /// Where `inside` is not as long as the map has pixels.
-#[must_use]
 pub(super) fn integrated(normals: &Normals<YUp>, inside: &[bool]) -> Vec<f32> {
     let extent = normals.extent();
     assert_eq!(inside.len(), extent.pixels());

@@ -151,7 +151,6 @@ fn around(grid: Extent) -> impl Iterator<Item = impl Iterator<Item = usize>> {
 
 /// Colours with those of the nearest pixels inside for so many pixels beyond the outline, so that no black is mixed in where
 /// a renderer takes the mean of neighbours.
-#[must_use]
 pub(crate) fn bled(mut colours: Planes<3>, alpha: &Planes<1>, pixels: usize) -> Planes<3> {
     let grid = colours.extent();
     let mut known: Vec<bool> = alpha.plane(0).iter().map(|&alpha| alpha >= 0.5).collect();

@@ -26,7 +26,6 @@ pub enum BackgroundFile {
 
 impl BackgroundFile {
     /// The conversion of a video's colours to sRGB, in words; `None` if they are read as sRGB.
-    #[must_use]
     pub fn colour_conversion(&self) -> Option<String> {
         match self {
             Self::Movie(movie) => movie.colour_conversion(),
@@ -53,7 +52,6 @@ impl BackgroundFile {
     }
 
     /// A panorama; the scene shows part of it.
-    #[must_use]
     pub fn from_panorama(panorama: Panorama, scene: &SceneDescription) -> Self {
         let view = PanoramaView::new(scene.panorama_extent(), scene.fov, scene.down);
         Self::Panorama(Box::new((view, panorama)))

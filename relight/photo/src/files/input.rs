@@ -32,7 +32,6 @@ pub struct PhotoReading {
 
 impl PhotoReading {
     /// The mask of a photograph of this name: the given file, or the photograph's in the given folder.
-    #[must_use]
     pub fn mask_path(given: &Path, name: &str) -> PathBuf {
         if given.is_dir() {
             given.join(format!("{name}.png"))
@@ -103,7 +102,6 @@ impl PhotoInput {
 
     /// Whether a path is a shard, or a folder with shards or another data set of turns: their frames have
     /// masks of their own.
-    #[must_use]
     pub fn has_frames(path: &Path) -> bool {
         if !path.is_dir() {
             return has_extension(path, &["tar"]);
@@ -131,7 +129,6 @@ impl PhotoInput {
     }
 
     /// How an error names it.
-    #[must_use]
     pub fn place(&self) -> String {
         match self {
             Self::File(path) => path.display().to_string(),

@@ -130,7 +130,6 @@ impl<'a> Insertion<'a> {
     }
 
     /// Light, size, tilt and matching.
-    #[must_use]
     pub const fn environment(&self) -> &SceneEnvironment {
         &self.environment
     }
@@ -154,7 +153,6 @@ impl<'a> Insertion<'a> {
     }
 
     /// How many frames are written; `None` if the background has as many as it has.
-    #[must_use]
     pub fn frames(&self, output: &InsertionOutput<'_>) -> Option<u32> {
         match (OutputKind::from_path(output.path), &self.background) {
             (Some(OutputKind::Movie(_)), BackgroundFile::Movie(_)) => None,

@@ -3,15 +3,14 @@
 use std::path::Path;
 
 use relight_core::light::{Panorama, ShLight};
+use relit_data::file_names::has_extension;
 
 use crate::relighting::{InsertError, LightSource};
 
 impl LightSource {
     /// Whether a file is called as a text of coefficients (`.txt`).
-    #[must_use]
     pub fn is_text(path: &Path) -> bool {
-        path.extension()
-            .is_some_and(|ending| ending.eq_ignore_ascii_case("txt"))
+        has_extension(path, &["txt"])
     }
 
     /// Reads a text file of coefficients (`.txt`), or else a panorama.

@@ -2,17 +2,16 @@
 
 use std::ffi::OsString;
 use std::fmt;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, Command, Stdio};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 
 use relight_core::image::{Extent, Rgb, Srgb};
 use relight_core::parallel;
 use relit_data::causes::with_causes;
-use relit_data::durable;
+use relit_data::durable::Partial;
 
 use crate::relighting::InsertError;
 
@@ -32,7 +31,6 @@ pub enum MovieFormat {
 
 /// Why a video is not written or read.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum MovieError {
     /// The program is not there.
     #[error("ffmpeg, which videos need, cannot be started: install it")]
@@ -84,7 +82,6 @@ impl FrameRate {
     const MAX: u32 = 240;
 
     /// `None` unless it is above 0, and within what videos have.
-    #[must_use]
     pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
         let is_rate = numerator > 0 && denominator > 0 && numerator / denominator <= Self::MAX;
         if is_rate {
@@ -98,7 +95,6 @@ impl FrameRate {
     }
 
     /// Frames a second.
-    #[must_use]
     pub fn per_second(self) -> f64 {
         f64::from(self.numerator) / f64::from(self.denominator)
     }
@@ -125,7 +121,7 @@ impl fmt::Display for FrameRate {
 #[derive(Debug)]
 pub struct MovieWriter {
     path: PathBuf,
-    partial: PathBuf,
+    partial: Option<Partial>,
     extent: Extent,
     program: Child,
     errors: Option<JoinHandle<Option<String>>>,
@@ -159,7 +155,7 @@ impl MovieWriter {
         frame_rate: impl Into<FrameRate>,
     ) -> Result<Self, MovieError> {
         fs::create_dir_all(path.parent().unwrap_or(Path::new(""))).map_err(not_written(path))?;
-        let partial = partial_name(path);
+        let partial = Partial::create(path).map_err(not_written(path))?;
         let shown = even(extent);
         let mut program = Command::new("ffmpeg")
             .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"])
@@ -171,7 +167,7 @@ impl MovieWriter {
             .args(["-pix_fmt", "yuv420p", "-colorspace", "bt709"])
             .args(["-color_primaries", "bt709", "-color_trc", "iec61966-2-1"])
             .args(format.arguments())
-            .arg(file_url(&partial))
+            .arg(file_url(partial.path()))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -183,7 +179,7 @@ impl MovieWriter {
             .map(|pipe| thread::spawn(|| last_line(pipe)));
         Ok(Self {
             path: path.to_owned(),
-            partial,
+            partial: Some(partial),
             extent,
             program,
             errors,
@@ -254,9 +250,8 @@ impl MovieWriter {
         if !is_done || said.is_some() {
             return Err(self.failed(said));
         }
-        let published = File::open(&self.partial)
-            .and_then(|file| file.sync_all())
-            .and_then(|()| durable::publish(&self.partial, &self.path));
+        let partial = self.partial.take();
+        let published = partial.map_or(Ok(()), |partial| partial.seal()?.publish());
         published.map_err(not_written(&self.path))
     }
 
@@ -281,10 +276,9 @@ impl MovieWriter {
 
 impl Drop for MovieWriter {
     fn drop(&mut self) {
-        // After `finish` there is neither a program nor a file.
+        // After `finish` there is no program. The file goes with its name.
         let _ = self.program.kill();
         let _ = self.program.wait();
-        let _ = fs::remove_file(&self.partial);
     }
 }
 
@@ -325,16 +319,6 @@ pub(super) fn file_url(path: &Path) -> OsString {
     let mut url = OsString::from("file:");
     url.push(path);
     url
-}
-
-/// The name under which a video is written, in the same folder.
-fn partial_name(path: &Path) -> PathBuf {
-    static COUNTER: AtomicU64 = AtomicU64::new(0);
-    let counter = COUNTER.fetch_add(1, Ordering::Relaxed);
-    let mut name = OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.{counter}.partial", std::process::id()));
-    path.with_file_name(name)
 }
 
 /// The reason for a program that printed none.

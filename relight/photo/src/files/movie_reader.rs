@@ -102,19 +102,16 @@ impl MovieReader {
     }
 
     /// Width and height of its frames.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.extent
     }
 
     /// Frames a second.
-    #[must_use]
     pub const fn frame_rate(&self) -> FrameRate {
         self.frame_rate
     }
 
     /// The conversion of its colours to sRGB, in words; `None` if they are read as sRGB.
-    #[must_use]
     pub fn colour_conversion(&self) -> Option<String> {
         self.wide.as_ref().map(|wide| wide.to_srgb.to_string())
     }

@@ -32,7 +32,6 @@ pub enum OutputKind {
 
 impl OutputKind {
     /// What a file's ending asks for.
-    #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         Some(match ending.as_str() {

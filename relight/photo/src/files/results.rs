@@ -15,7 +15,7 @@ use relight_core::image::{ColourSpace, Depth, Extent, ImageError, Linear, Planes
 use relight_core::light::{Normals, Panorama};
 use relight_core::parallel;
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
-use relight_core::statistics::above_part;
+use relit_data::statistics::above_part;
 
 /// The file of figures.
 pub(super) const FIGURES: &str = "decomposition.json";

@@ -52,7 +52,6 @@ struct Heads {
 }
 
 /// The network; width and height of its input are multiples of 32.
-#[must_use]
 pub fn decomposer() -> Graph {
     build(Heads {
         paint: false,
@@ -61,7 +60,6 @@ pub fn decomposer() -> Graph {
 }
 
 /// The same network with a head that separates paint from shadow, and one that predicts the light.
-#[must_use]
 pub fn decomposer_with_heads() -> Graph {
     build(Heads {
         paint: true,
@@ -70,7 +68,6 @@ pub fn decomposer_with_heads() -> Graph {
 }
 
 /// The network of these weights: with the heads for paint and for light, if they have them.
-#[must_use]
 pub fn decomposer_of(weights: &Weights) -> Graph {
     let have = |prefix: &str| {
         let mut names = weights.iter().map(|(name, _)| name);

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 /// Why weights could not be read, written or used.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum NetError {
     /// Weights of another network, or that do not fit into it or a file.
     #[error("{0}")]
@@ -35,7 +34,6 @@ pub enum NetError {
 
 impl NetError {
     /// Weights lack a parameter.
-    #[must_use]
     pub fn missing(net: &str, name: &str) -> Self {
         Self::Weights(format!(
             "the weights have no {name}, which {net} needs: are they another network's?"

@@ -28,13 +28,11 @@ pub struct Parameter {
 
 impl Parameter {
     /// How many numbers it has.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.shape.iter().product()
     }
 
     /// Inputs that go into one output.
-    #[must_use]
     pub fn fan_in(&self) -> usize {
         self.shape.iter().skip(1).product()
     }
@@ -46,7 +44,6 @@ pub struct Value(usize);
 
 impl Value {
     /// The number of the node that computes it, from 0.
-    #[must_use]
     pub fn index(self) -> usize {
         self.0
     }
@@ -149,7 +146,6 @@ pub struct Graph {
 
 impl Graph {
     /// A network with one input picture, and that input.
-    #[must_use]
     pub fn new(name: &'static str, channels: usize) -> (Self, Value) {
         let input = Node {
             operation: Operation::Input,
@@ -166,44 +162,37 @@ impl Graph {
     }
 
     /// The network's name.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         self.name
     }
 
     /// The operations, in an order in which they can be computed; the first is the input.
-    #[must_use]
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
     }
 
     /// The node that computes a value of this graph.
-    #[must_use]
     pub fn node(&self, value: Value) -> &Node {
         &self.nodes[value.0]
     }
 
     /// The results.
-    #[must_use]
     pub fn outputs(&self) -> &[Output] {
         &self.outputs
     }
 
     /// Channels of the input.
-    #[must_use]
     pub fn input_channels(&self) -> usize {
         self.nodes[0].channels
     }
 
     /// Width and height of an input have to be multiples of this, pixels.
-    #[must_use]
     pub fn multiple(&self) -> usize {
         let scales = self.nodes.iter().filter_map(|node| node.scale);
         scales.max().unwrap_or(1)
     }
 
     /// The one width and height that an input may have, where the network has a layer that fixes it.
-    #[must_use]
     pub fn fixed_side(&self) -> Option<usize> {
         self.nodes.iter().find_map(|node| match node.operation {
             Operation::Flatten { side } => {
@@ -215,7 +204,6 @@ impl Graph {
     }
 
     /// Every parameter, in the order of the nodes.
-    #[must_use]
     pub fn parameters(&self) -> Vec<Parameter> {
         self.nodes
             .iter()

@@ -38,7 +38,7 @@ impl Inference {
         check_size(graph, (width, height))?;
         let bytes = to_onnx(graph, weights, WeightPrecision::Single, &[])?;
         let shape = [1, graph.input_channels(), height, width];
-        let plan = TractPlan::new(&bytes, shape, &[]).map_err(|fault| {
+        let plan = TractPlan::new(&bytes, None, shape, &[]).map_err(|fault| {
             NetError::Run(format!("tract could not prepare {}: {fault}", graph.name()))
         });
         Ok(Self {
@@ -48,8 +48,8 @@ impl Inference {
         })
     }
 
-    /// Makes the content of an ONNX file ready for one picture of `channels` channels, `width` x `height` pixels. Further
-    /// inputs, by their names, are the `given` numbers: the picture goes into the remaining input.
+    /// Makes the content of an ONNX file ready for one picture of `channels` channels, `width` x `height` pixels. Weights
+    /// that it keeps in other files lie in the folder of `path`, or below. Further inputs, by their names, are the `given` numbers: the picture goes into the remaining input.
     ///
     /// # Errors
     /// [`NetError::File`], which names it as `path`, if it is not a network or cannot take such a picture.
@@ -61,10 +61,11 @@ impl Inference {
         given: &[(String, i64)],
     ) -> Result<Self, NetError> {
         let shape = [1, channels, height, width];
-        let plan = TractPlan::new(bytes, shape, given).map_err(|fault| NetError::File {
-            path: path.to_owned(),
-            fault,
-        });
+        let plan =
+            TractPlan::new(bytes, path.parent(), shape, given).map_err(|fault| NetError::File {
+                path: path.to_owned(),
+                fault,
+            });
         Ok(Self {
             name: "the network of the ONNX file",
             shape,

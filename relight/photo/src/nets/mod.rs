@@ -20,7 +20,6 @@
 mod codec;
 mod decomposer;
 mod error;
-mod external;
 #[cfg(feature = "files")]
 mod files;
 mod graph;
@@ -38,9 +37,6 @@ pub use decomposer::{
     decomposer_with_heads,
 };
 pub use error::NetError;
-pub use external::{ExternalPart, with_external_weights};
-#[cfg(feature = "files")]
-pub use files::read_onnx;
 pub use graph::{EPSILON, Graph, Node, Operation, Output, Parameter, Role, Value};
 pub use inference::Inference;
 pub use onnx::{INPUT, check_size, to_onnx};

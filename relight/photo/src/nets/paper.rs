@@ -35,7 +35,6 @@ pub enum Head {
 ///
 /// Input: 3 channels, `(x - 0.5) / 0.5` of the sRGB picture times the mask. Output `specular`: 3
 /// channels, -1..=1.
-#[must_use]
 pub fn spec_net() -> Graph {
     u_net("spec-net", "specular", 3)
 }
@@ -44,7 +43,6 @@ pub fn spec_net() -> Graph {
 ///
 /// Input as [`spec_net`]'s. Output `slopes`: 2 channels, -1..=1, so that no slope beyond 45 degrees
 /// a direction can be expressed.
-#[must_use]
 pub fn normal_net() -> Graph {
     u_net("normal-net", "slopes", 2)
 }
@@ -52,7 +50,6 @@ pub fn normal_net() -> Graph {
 /// Light-Net: nine coefficients of order-2 spherical harmonics, and the light's colour.
 ///
 /// Input as [`spec_net`]'s. Output `light`: a vector of [`LIGHT_OUTPUTS`].
-#[must_use]
 pub fn light_net(head: Head) -> Graph {
     numbers_net("light-net", "light", LIGHT_OUTPUTS, head)
 }
@@ -60,7 +57,6 @@ pub fn light_net(head: Head) -> Graph {
 /// The net for specular reflectance s_p and smoothness alpha, with Light-Net's structure.
 ///
 /// Input as [`spec_net`]'s. Output `reflectance`: a vector of [`REFLECTANCE_OUTPUTS`].
-#[must_use]
 pub fn reflectance_net(head: Head) -> Graph {
     numbers_net("reflectance-net", "reflectance", REFLECTANCE_OUTPUTS, head)
 }

@@ -27,7 +27,6 @@ pub struct OnnxValue {
 
 impl OnnxSignature {
     /// The signature in the content of a file; `None` if it is not an ONNX file.
-    #[must_use]
     pub fn read(bytes: &[u8]) -> Option<Self> {
         let graph = ModelProto::decode(bytes).ok()?.graph?;
         let is_weight =
@@ -40,13 +39,11 @@ impl OnnxSignature {
     }
 
     /// The input of this name.
-    #[must_use]
     pub fn input(&self, name: &str) -> Option<&OnnxValue> {
         self.inputs.iter().find(|value| value.name == name)
     }
 
     /// The place of the output of this name.
-    #[must_use]
     pub fn output(&self, name: &str) -> Option<usize> {
         self.outputs.iter().position(|value| value.name == name)
     }

@@ -1,10 +1,11 @@
 //! Networks by tract, in pure Rust.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use tract_onnx::prelude::{
     DatumExt, Framework, InferenceModelExt, IntoRunnable, TValue, TVec, Tensor as TractTensor,
-    TractResult, TypedRunnableModel,
+    TractError, TractResult, TypedRunnableModel,
 };
 use tract_onnx::tract_core::plan::eval;
 
@@ -19,12 +20,15 @@ pub(super) struct TractPlan {
 }
 
 impl TractPlan {
+    /// Prepares the content of an ONNX file. `folder` is where weights lie that it keeps in other files.
     pub(super) fn new(
         onnx: &[u8],
+        folder: Option<&Path>,
         shape: [usize; 4],
         given: &[(String, i64)],
     ) -> Result<Self, String> {
-        let plan = Self::prepared(onnx, shape, given).map_err(|fault| format!("{fault:#}"))?;
+        let plan =
+            Self::prepared(onnx, folder, shape, given).map_err(|fault| format!("{fault:#}"))?;
         if plan.inputs.contains(&None) {
             Ok(plan)
         } else {
@@ -32,8 +36,20 @@ impl TractPlan {
         }
     }
 
-    fn prepared(mut onnx: &[u8], shape: [usize; 4], given: &[(String, i64)]) -> TractResult<Self> {
-        let mut model = tract_onnx::onnx().model_for_read(&mut onnx)?;
+    fn prepared(
+        mut onnx: &[u8],
+        folder: Option<&Path>,
+        shape: [usize; 4],
+        given: &[(String, i64)],
+    ) -> TractResult<Self> {
+        let reader = tract_onnx::onnx();
+        let file = reader.proto_model_for_read(&mut onnx)?;
+        let parsed = reader.parse(&file, folder.and_then(Path::to_str))?;
+        if !parsed.unresolved_inputs.is_empty() {
+            let names = parsed.unresolved_inputs.join(", ");
+            return Err(TractError::msg(format!("nothing answers {names}")));
+        }
+        let mut model = parsed.model;
         let mut inputs = Vec::new();
         for at in 0..model.input_outlets()?.len() {
             let node = model.input_outlets()?[at].node;

@@ -28,7 +28,6 @@ const FINE: usize = 16;
 const LAYERS: GroupedLayers = GroupedLayers { group: 8 };
 
 /// The network; width and height of its input are multiples of 16.
-#[must_use]
 pub fn turn_network() -> Graph {
     let (mut net, input) = Graph::new("turn-net", TURN_INPUTS);
     let stem = net.pointwise("stem".to_owned(), input, STEM);

@@ -14,7 +14,6 @@ pub struct Tensor {
 
 impl Tensor {
     /// A tensor of these values; `None` if their number does not match the shape.
-    #[must_use]
     pub fn new(shape: Vec<usize>, values: Vec<f32>) -> Option<Self> {
         let count = shape
             .iter()
@@ -23,19 +22,16 @@ impl Tensor {
     }
 
     /// Its shape.
-    #[must_use]
     pub fn shape(&self) -> &[usize] {
         &self.shape
     }
 
     /// Its values, row-major.
-    #[must_use]
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
     /// The values themselves.
-    #[must_use]
     pub fn into_values(self) -> Vec<f32> {
         self.values
     }
@@ -66,7 +62,6 @@ impl IntoIterator for Weights {
 
 impl Weights {
     /// The tensor of this name.
-    #[must_use]
     pub fn get(&self, name: &str) -> Option<&Tensor> {
         self.tensors.get(name)
     }
@@ -79,7 +74,6 @@ impl Weights {
     }
 
     /// The tensors whose names begin with `prefix`, without it: one network of several in a file.
-    #[must_use]
     pub fn under(&self, prefix: &str) -> Self {
         self.tensors
             .iter()
@@ -133,7 +127,6 @@ impl Weights {
 
     /// Weights to begin training with: those of layers normal with variance `2 / fan_in` (He et al.
     /// 2015, for layers before a ReLU), gains 1, offsets 0. The same seed gives the same weights.
-    #[must_use]
     pub fn initial(graph: &Graph, seed: u64) -> Self {
         let parameters = graph.parameters().into_iter().enumerate();
         let tensor = |(at, parameter): (usize, Parameter)| {
@@ -155,7 +148,6 @@ impl Weights {
 
 impl Weights {
     /// The same without weights whose names begin with this: for a network with a head less.
-    #[must_use]
     pub fn without(&self, prefix: &str) -> Self {
         let named = |name: &str| name.trim_start_matches("module.").starts_with(prefix);
         let others = self.iter().filter(|(name, _)| !named(name));

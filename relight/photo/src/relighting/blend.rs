@@ -9,7 +9,6 @@ impl RelightableObject {
     ///
     /// # Panics
     /// Where the photograph or the colours have another size.
-    #[must_use]
     pub fn in_place(&self, photo: &Rgb<Linear>, colours: &Planes<3>) -> Rgb<Linear> {
         self.blended(photo.clone(), recoloured, colours)
     }
@@ -18,7 +17,6 @@ impl RelightableObject {
     ///
     /// # Panics
     /// Where the background or the colours have another size.
-    #[must_use]
     pub fn before(&self, background: &Rgb<Linear>, colours: &Planes<3>) -> Rgb<Linear> {
         self.blended(
             background.clone(),

@@ -7,7 +7,6 @@ use relight_core::light::LightError;
 
 /// Why an object cannot be relit or inserted.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum InsertError {
     /// A photograph has a value that is negative or not finite.
     #[error(

@@ -3,7 +3,7 @@
 use relight_core::image::{Extent, Linear, Rgb};
 use relight_core::light::{Normals, ShLight};
 use relight_core::render::{DiffuseForm, DiffuseLayer, exposure_for};
-use relight_core::statistics::above_part;
+use relit_data::statistics::above_part;
 
 /// The value that one pixel in [`BRIGHTEST_PART`] exceeds in its brightest channel.
 const BRIGHT: f32 = 0.8;

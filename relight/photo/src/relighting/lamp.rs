@@ -42,7 +42,6 @@ impl Default for DiscLamp {
 
 impl DiscLamp {
     /// The direction in which it stands.
-    #[must_use]
     pub fn direction(&self) -> Direction {
         let (sin, cos) = self.azimuth.to_radians().sin_cos();
         let (height, level) = self.elevation.to_radians().sin_cos();
@@ -54,7 +53,6 @@ impl DiscLamp {
     ///
     /// The coefficients of a disc about an axis are those of the axis, times 2π ∫ P_l over the disc's cosines, which
     /// is 2π (P_(l-1) - P_(l+1)) / (2l + 1) at its edge.
-    #[must_use]
     pub fn light(&self, order: Order) -> ShLight {
         let edge = self.edge();
         let radiance = self.radiance();
@@ -80,7 +78,6 @@ impl DiscLamp {
     ///
     /// # Panics
     /// Where `extent` has no pixels.
-    #[must_use]
     pub fn panorama(&self, extent: Extent) -> Panorama {
         let frame = Panorama::from_light(&ShLight::dark(Order::TWO), extent);
         let (edge, towards) = (self.edge(), self.direction());
@@ -177,7 +174,6 @@ fn legendre(last: usize, x: f64) -> Vec<f64> {
 
 /// The colour of a black body of this temperature in kelvin, 1667 to 25000, linear sRGB of luminance 1: the cubic approximation
 /// of the Planckian locus by Kim et al. (US patent 7024034), as CIE xy.
-#[must_use]
 pub fn colour_of_temperature(kelvin: f64) -> [f64; 3] {
     let t = kelvin.clamp(*TEMPERATURES.start(), *TEMPERATURES.end());
     let cubic =

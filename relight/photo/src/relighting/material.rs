@@ -13,7 +13,6 @@ pub struct ObjectGloss {
 
 impl ObjectGloss {
     /// White gloss that reflects this part of even light towards a viewer at a right angle.
-    #[must_use]
     pub fn from_part(part: f32, smoothness: f32) -> Self {
         Self {
             reflectance: [mirror_reflectance(part, smoothness); 3],

@@ -49,7 +49,6 @@ impl Matte {
     ///
     /// # Panics
     /// Where the mask has another size.
-    #[must_use]
     pub(crate) fn estimate(picture: &Planes<3>, mask: &Planes<1>, edge: usize) -> Self {
         assert_eq!(picture.extent(), mask.extent(), "size of the mask");
         let edge = edge.max(1);
@@ -90,7 +89,6 @@ impl Matte {
     ///
     /// # Panics
     /// Where alpha has another size.
-    #[must_use]
     pub(crate) fn from_alpha(picture: &Planes<3>, alpha: &Planes<1>) -> Self {
         let near = blurred(alpha, 2);
         let mut range = [[f32::INFINITY, f32::NEG_INFINITY]; 3];
@@ -111,7 +109,6 @@ impl Matte {
     ///
     /// # Panics
     /// Where alpha has another size.
-    #[must_use]
     pub(crate) fn from_cut_out(picture: &Planes<3>, alpha: &Planes<1>) -> Self {
         assert_eq!(picture.extent(), alpha.extent(), "size of alpha");
         let matte = Self {
@@ -122,7 +119,6 @@ impl Matte {
     }
 
     /// The assumed width of the soft edge of an object of this size, pixels, for an unknown lens.
-    #[must_use]
     pub(crate) fn edge_for(extent: Extent) -> usize {
         let side = extent.width.max(extent.height) as f64;
         ((side * EDGE_PART).round() as usize).clamp(2, 12)

@@ -204,7 +204,6 @@ impl RelightableObject {
     }
 
     /// Width and height of the part of the photograph that holds the object.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.albedo.extent()
     }
@@ -257,7 +256,6 @@ impl RelightableObject {
 
     /// The part of the change of brightness from place to place, as a logarithm, that [`RelightableObject::relit`] withholds in a
     /// light because the decomposition is uncertain, 0 to 1.
-    #[must_use]
     pub fn withheld(&self, light: &ShLight) -> f32 {
         let kept = likeness(&self.light, light) as f32;
         let irradiance = DiffuseLayer::new(light, DiffuseForm::Irradiance).shading(&self.normals);

@@ -79,7 +79,6 @@ impl<'a> RelightingSequence<'a> {
 
     /// The part of the change in shading that is withheld because the decomposition is uncertain, after the light has turned:
     /// [`RelightableObject::withheld`].
-    #[must_use]
     pub fn withheld(&self, turn: f64) -> f32 {
         self.relightable.withheld(&self.turned(turn))
     }

@@ -39,7 +39,6 @@ impl LightSource {
     }
 
     /// The light as a panorama. Negative radiance, which coefficients can stand for, is none.
-    #[must_use]
     pub fn panorama(&self) -> Panorama {
         match self {
             Self::Panorama(panorama) => panorama.clone(),
@@ -65,7 +64,6 @@ fn brightest(light: &ShLight) -> f32 {
 
 /// What new light has to be multiplied with, so that a surface that faces the strongest of it is as bright as one in
 /// the old light. It does not change when light turns, and is exactly 1 for the same light.
-#[must_use]
 pub fn exposure_between(old: &ShLight, new: &ShLight) -> f32 {
     exposure_for(new) / exposure_for(old)
 }
@@ -74,7 +72,6 @@ pub fn exposure_between(old: &ShLight, new: &ShLight) -> f32 {
 /// colour, 0 for opposite ones. It is the part of the shadows in the one that hold in the other.
 ///
 /// With a and b the irradiance of bands 1 and 2, each over that of band 0, it is `1 - |a - b| / (|a| + |b|)`.
-#[must_use]
 pub fn likeness(old: &ShLight, new: &ShLight) -> f64 {
     let [a, b] = [old, new].map(directed);
     let length = |v: [f64; 8]| v.iter().map(|c| c * c).sum::<f64>().sqrt();

@@ -29,7 +29,6 @@ pub struct SeenSun {
 impl SeenSun {
     /// The sun in linear light: one small, round, clipped place in the upper part, in a glow that falls off. `None` if nothing
     /// is like that.
-    #[must_use]
     pub(crate) fn find(picture: &Planes<3>) -> Option<Self> {
         let Extent { width, height } = picture.extent();
         let longest = width.max(height).max(1);

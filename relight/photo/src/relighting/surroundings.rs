@@ -24,7 +24,6 @@ impl LightSource {
     /// A sun that is seen in the picture lights four times as strongly as all else, from one place: its shadows are hard.
     ///
     /// It is a guess: most of a scene's light comes from outside the picture.
-    #[must_use]
     pub(crate) fn from_picture(picture: &Rgb<Linear>, field: f64, sun: Option<SeenSun>) -> Self {
         let extent = picture.planes().extent();
         let radiance = picture.planes().clone().map(|v| {

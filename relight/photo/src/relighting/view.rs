@@ -27,7 +27,6 @@ pub struct PanoramaView {
 
 impl PanoramaView {
     /// A camera whose longer side sees `field` degrees (1 to 150), and which looks `down` degrees below the horizon.
-    #[must_use]
     pub fn new(extent: Extent, field: f64, down: f64) -> Self {
         let Extent { width, height } = extent;
         let tangent = (field.clamp(1.0, 150.0) / 2.0).to_radians().tan();
@@ -51,7 +50,6 @@ impl PanoramaView {
 
     /// The radiance that it sees after the panorama has turned about the vertical by `turn` radians, from the viewer to the
     /// right, as light does by [`ShLight::rotated`](relight_core::light::ShLight::rotated), in units in which 1 is shown as white.
-    #[must_use]
     pub fn picture(&self, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
         self.exposed(panorama, turn, [1.0; 3])
     }
@@ -61,7 +59,6 @@ impl PanoramaView {
     /// An enlarged panorama is interpolated by the cubic B-spline, which has neither steps nor dark rims, any other linearly.
     /// Values above white are compressed before and expanded after it: a window is a hundred times as bright as its wall, and
     /// would otherwise grow by a pixel and have a staircase as its outline.
-    #[must_use]
     pub(crate) fn exposed(&self, panorama: &Panorama, turn: f64, scale: [f32; 3]) -> Rgb<Linear> {
         let source = panorama.image().planes();
         let Extent { width, height } = source.extent();
@@ -97,7 +94,6 @@ impl PanoramaView {
 
     /// How many of its pixels there are to one of a panorama, across, in the middle of what it sees: from about 4 on, the picture of
     /// it is visibly blurred.
-    #[must_use]
     pub fn enlargement(&self, panorama: &Panorama) -> f64 {
         self.pixels_a_radian * 2.0 * PI / panorama.extent().width as f64
     }

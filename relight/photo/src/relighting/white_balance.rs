@@ -29,7 +29,6 @@ pub enum WhiteBalance {
 impl WhiteBalance {
     /// What light is multiplied with, channel by channel: its mean stays, and with [`WhiteBalance::Auto`] it becomes grey. With
     /// [`WhiteBalance::Adapted`] it does so in part, after von Kries, as in CIECAM02: D mean / channel + 1 - D.
-    #[must_use]
     pub fn tint(self, light: &ShLight) -> [f64; 3] {
         // The mean irradiance over all normals is that of band 0.
         let mean = light.coefficients().first().copied().unwrap_or([1.0; 3]);
@@ -49,7 +48,6 @@ impl WhiteBalance {
     }
 
     /// Whether light is shown in the colours that it has.
-    #[must_use]
     pub(crate) fn keeps(self, source: &LightSource) -> bool {
         match self {
             Self::Adapted => matches!(source, LightSource::Panorama(_)),

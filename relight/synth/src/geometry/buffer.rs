@@ -77,13 +77,11 @@ impl GBuffer {
     }
 
     /// Number of covered pixels.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.pixels.len()
     }
 
     /// Whether nothing is seen.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.pixels.is_empty()
     }
@@ -104,7 +102,6 @@ impl GBuffer {
     }
 
     /// A picture with these colours at the covered pixels and 0 elsewhere.
-    #[must_use]
     pub fn planes(&self, values: &[Vec3]) -> Planes<3> {
         let (side, values) = (self.size as usize, self.spread(values, Vec3::ZERO));
         Planes::from_fn(Extent::new(side, side), |x, y| {
@@ -113,7 +110,6 @@ impl GBuffer {
     }
 
     /// 1 at the covered pixels, 0 elsewhere.
-    #[must_use]
     pub fn mask(&self) -> Planes<1> {
         let side = self.size as usize;
         let covered = self.spread(&vec![[1.0]; self.len()], [0.0]);
@@ -121,7 +117,6 @@ impl GBuffer {
     }
 
     /// These normals as a map.
-    #[must_use]
     pub fn normal_map(&self, normals: &[Vec3]) -> Normals<YUp> {
         Normals::new(self.planes(normals))
     }

@@ -68,7 +68,6 @@ pub(crate) enum Method {
 
 impl Panoramas {
     /// Panoramas by name. Those that are black are left out.
-    #[must_use]
     pub fn new(named: Vec<(String, Panorama)>) -> Self {
         let entries = named.into_iter().filter_map(|(name, panorama)| {
             let light = panorama.project(Order::HIGHLIGHT);
@@ -94,25 +93,21 @@ impl Panoramas {
     }
 
     /// How many there are.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.entries.len()
     }
 
     /// Whether there is none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
 
     /// The name of one of them.
-    #[must_use]
     pub fn name(&self, number: usize) -> Option<&str> {
         self.entries.get(number).map(|entry| entry.name.as_str())
     }
 
     /// One of them.
-    #[must_use]
     pub fn get(&self, number: usize) -> Option<&Panorama> {
         self.entries.get(number).map(|entry| &entry.panorama)
     }

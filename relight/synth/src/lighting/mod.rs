@@ -52,7 +52,6 @@ pub struct Lighting {
 
 impl Lighting {
     /// A panorama by rays, at an angle about the vertical (radians); `irradiance` is the mean over all normals.
-    #[must_use]
     pub fn from_panorama(panorama: usize, turn: f64, irradiance: f32, has_shadows: bool) -> Self {
         let environment = Environment {
             panorama,
@@ -69,7 +68,6 @@ impl Lighting {
 
     /// All light except what bounces, as coefficients of an order: without shadows, their
     /// diffuse layer is the shading, smoothed where lamps are.
-    #[must_use]
     pub fn coefficients(&self, order: Order, panoramas: &Panoramas) -> ShLight {
         let even = self
             .ambient

@@ -37,13 +37,11 @@ impl SyntheticScene {
     }
 
     /// The geometry.
-    #[must_use]
     pub fn buffer(&self) -> &GBuffer {
         &self.buffer
     }
 
     /// Shading and highlight of a surface under a lighting. `seed` draws the rays.
-    #[must_use]
     pub fn light(
         &self,
         material: &Material,

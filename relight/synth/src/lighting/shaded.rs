@@ -140,7 +140,6 @@ impl Shaded {
     }
 
     /// What the surface sends to the camera.
-    #[must_use]
     pub fn image(&self, albedo: &[Vec3]) -> Vec<Vec3> {
         let diffuse = albedo.iter().zip(&self.shading).map(|(a, s)| *a * *s);
         diffuse.zip(&self.highlight).map(|(d, h)| d + *h).collect()

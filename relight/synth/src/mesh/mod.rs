@@ -99,7 +99,6 @@ impl Mesh {
     }
 
     /// Whether the mesh's file has materials.
-    #[must_use]
     pub fn has_own_surface(&self) -> bool {
         self.materials.is_some()
     }

@@ -55,7 +55,6 @@ pub struct LibrarySummary {
 
 impl LibrarySummary {
     /// The origins whose licence is unknown.
-    #[must_use]
     pub fn without_licence(&self) -> Vec<&str> {
         let entries = self.objects.iter().chain(&self.panoramas);
         let unknown = entries.filter(|entry| entry.licence == UNKNOWN);

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::random::{Random, mix};
 use relight_core::image::{ColourSpace, Srgb};
-use relight_core::statistics::ranked;
+use relit_data::statistics::ranked;
 
 /// How a camera turns light into 8-bit values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

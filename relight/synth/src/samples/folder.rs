@@ -51,7 +51,6 @@ impl Origin {
 
 /// How many samples were written, and how many were there already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
 pub struct SynthSummary {
     /// Made by this call.
     pub new: u64,

@@ -26,7 +26,6 @@ pub enum ObjectSource {
 
 impl ObjectSource {
     /// The file's name without its extension, or the shape's kind.
-    #[must_use]
     pub fn name(&self) -> String {
         match self {
             Self::Mesh { file } => match file.rsplit_once('.') {

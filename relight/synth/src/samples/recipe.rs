@@ -83,13 +83,11 @@ impl Recipe {
     }
 
     /// How many samples each object gives.
-    #[must_use]
     pub fn samples_an_object(&self) -> u64 {
         u64::from(self.views) * u64::from(self.lightings)
     }
 
     /// The object of a number.
-    #[must_use]
     pub fn object<'a>(&self, library: &'a Library, number: u64) -> (ObjectSource, Cow<'a, Mesh>) {
         self.object_with(library, number, MESHES)
     }
@@ -119,7 +117,6 @@ impl Recipe {
     }
 
     /// The view of a number of an object: of several draws the first that covers enough of the picture.
-    #[must_use]
     pub fn view(&self, object: &ObjectSource, mesh: &Mesh, number: u64) -> SyntheticView {
         let mut random = Random::new(stream(stream(self.seed, 3), number));
         let (pose, projection, buffer) = self.framed(object, mesh, &mut random);
@@ -170,7 +167,6 @@ impl Recipe {
     }
 
     /// The material of a number on what a view shows: paint, relief on a third, gloss on a third.
-    #[must_use]
     pub fn material(&self, library: &Library, view: &SyntheticView, number: u64) -> Material {
         self.finished(library, view, number).1
     }
@@ -189,7 +185,6 @@ impl Recipe {
     }
 
     /// The sample of a number: a view in a random material, under a random light, by a random camera.
-    #[must_use]
     pub fn sample<'a>(
         &self,
         library: &Library,

@@ -16,7 +16,6 @@ use relight_core::light::{Order, ShLight};
 
 /// All that a sample was made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
 pub(crate) struct Description {
     /// The sample's number.
     pub number: u64,
@@ -111,13 +110,11 @@ impl<'a> SynthSample<'a> {
     }
 
     /// All light but what bounces, as nine coefficients in the viewer's frame, times the camera's gain.
-    #[must_use]
     pub fn coefficients(&self) -> &[[f64; 3]; 9] {
         &self.description.coefficients
     }
 
     /// The light, 0..=1, for a value of the picture, 0..=1: the inverse of its camera's response.
-    #[must_use]
     pub fn light_of(&self, value: f32) -> f32 {
         self.description.camera.response.decode(value)
     }

@@ -21,7 +21,6 @@ pub struct SequenceRecipe {
 
 /// The inputs of a turn, as in `turn.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct SequenceDescription {
     /// `relight.turn/1`.
     pub(crate) schema: String,
@@ -54,7 +53,6 @@ pub struct SequenceDescription {
 
 /// The ground truth of one frame, a line of `frames.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct FrameTruth {
     /// The sample's index.
     pub index: u32,

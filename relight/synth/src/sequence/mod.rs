@@ -17,10 +17,10 @@ mod tests;
 
 use std::path::Path;
 
-use image::GrayImage;
 use rayon::prelude::*;
 use relit_data::geometry::Rect;
 use relit_data::image_stats::{MaskSpans, SATURATION_LEVEL};
+use relit_data::mask::bounding_box;
 use relit_data::shard::{
     self, Align, Dataset, Digest, ExtractionSettings, ImageSize, Layout, MaskInfo, OutputFolder,
     SamplingBasis, SessionEntry, SessionQuality, ShardEntry, ShardWriter,
@@ -166,7 +166,7 @@ fn write_turn(
         mask: MaskInfo {
             blake3: Digest::hash(&shard::encode_mask(&mask)?),
             px: spans.pixels(),
-            bounding_box: bounding_box(&mask),
+            bounding_box: bounding_box(&mask).unwrap_or(Rect::new(0, 0, 0, 0)),
         },
         selection: SamplingBasis::Angle,
         samples: frames,
@@ -181,23 +181,4 @@ fn write_turn(
         report: None,
     };
     Ok((entry, files.shards))
-}
-
-/// The smallest rectangle around the object; empty without one.
-fn bounding_box(mask: &GrayImage) -> Rect {
-    let inside = mask
-        .enumerate_pixels()
-        .filter(|(_, _, pixel)| pixel.0[0] > 0);
-    let bounds = inside.fold(None, |bounds: Option<[u32; 4]>, (x, y, _)| {
-        Some(match bounds {
-            None => [x, y, x, y],
-            Some([left, top, right, bottom]) => {
-                [left.min(x), top.min(y), right.max(x), bottom.max(y)]
-            }
-        })
-    });
-    let Some([left, top, right, bottom]) = bounds else {
-        return Rect::new(0, 0, 0, 0);
-    };
-    Rect::new(left as i32, top as i32, right - left + 1, bottom - top + 1)
 }

@@ -15,7 +15,6 @@ use super::random::Random;
 /// A kind of procedural object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-#[non_exhaustive]
 pub enum ShapeKind {
     /// One to nine rounded primitives, blended into one another, with bumps, twists, shells, cuts.
     Blend,
@@ -41,7 +40,6 @@ impl ShapeKind {
     ];
 
     /// The kind's name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Blend => "blend",
@@ -59,7 +57,6 @@ impl ShapeKind {
     }
 
     /// The object of this kind and seed. The same seed always gives the same object.
-    #[must_use]
     pub fn build(self, seed: u64) -> Mesh {
         let mut random = Random::new(seed);
         // A draw may leave nothing (a cut may take all): the next one is as good.

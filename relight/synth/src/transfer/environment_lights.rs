@@ -35,7 +35,6 @@ pub struct EnvironmentLights {
 
 impl EnvironmentLights {
     /// Rooms of these panoramas, each in `variants` curves of brightness. Black panoramas are left out.
-    #[must_use]
     pub fn new(panoramas: &[&Panorama], variants: u32, seed: u64) -> Self {
         let of = |(number, panorama): (usize, &&Panorama)| {
             let small = panorama.resized(PROJECTED);
@@ -62,13 +61,11 @@ impl EnvironmentLights {
     }
 
     /// Whether there is none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.panoramas.is_empty()
     }
 
     /// The room of a seed, in the table's frame; even light without panoramas.
-    #[must_use]
     pub fn draw(&self, seed: u64) -> ShLight {
         let mut random = Random::new(seed);
         let mut light = self.panorama(&mut random);

@@ -115,7 +115,6 @@ pub struct PhotoCamera {
 
 impl PhotoPlan {
     /// The photograph of a seed, of a view with these lamps, in one of these rooms.
-    #[must_use]
     pub fn draw(seed: u64, lamps: &[ViewLamp], rooms: &EnvironmentLights) -> Self {
         let mut random = Random::new(seed);
         let by_lamp = random.chance(BY_LAMP);

@@ -93,7 +93,6 @@ impl PhotoView {
 
 impl PhotoViewRecipe {
     /// Casts the view of a number.
-    #[must_use]
     pub fn cast(&self, library: &Library, number: u64) -> PhotoView {
         let mut random = Random::new(stream(stream(self.seed, 33), number));
         let recipe = Recipe {

@@ -164,7 +164,6 @@ impl TurnSample {
     }
 
     /// The same at half the width: means over blocks of 2 x 2 pixels, of those that are covered to a half.
-    #[must_use]
     pub fn halved(&self) -> Self {
         let size = self.size / 2;
         let mut members: Vec<Vec<usize>> = vec![Vec::new(); (size * size) as usize];

@@ -2,9 +2,6 @@
 
 use std::ops::Neg;
 
-#[cfg(test)]
-use relight_core::image::Extent;
-
 /// One of them: the picture's axes are swapped, then each is turned over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Symmetry {
@@ -24,19 +21,6 @@ impl Symmetry {
             upside_down: bits & 2 == 2,
             transposed: bits & 4 == 4,
         }
-    }
-
-    /// Which pixel of the picture is seen at a place.
-    #[cfg(test)]
-    pub(crate) fn source(self, extent: Extent, x: usize, y: usize) -> usize {
-        let (mut u, mut v) = if self.transposed { (y, x) } else { (x, y) };
-        if self.mirrored {
-            u = extent.width - 1 - u;
-        }
-        if self.upside_down {
-            v = extent.height - 1 - v;
-        }
-        v * extent.width + u
     }
 
     /// From which component of a normal its component `axis` comes (0: to the right, 1: up, 2: to the viewer), and with
@@ -76,11 +60,25 @@ impl Symmetry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use relight_core::image::Planes;
+    use relight_core::image::{Extent, Planes};
     use relight_core::light::{Normals, ShLight};
     use relight_core::render::{DiffuseForm, DiffuseLayer};
 
     const SIDE: usize = 9;
+
+    impl Symmetry {
+        /// Which pixel of the picture is seen at a place.
+        pub(crate) fn source(self, extent: Extent, x: usize, y: usize) -> usize {
+            let (mut u, mut v) = if self.transposed { (y, x) } else { (x, y) };
+            if self.mirrored {
+                u = extent.width - 1 - u;
+            }
+            if self.upside_down {
+                v = extent.height - 1 - v;
+            }
+            v * extent.width + u
+        }
+    }
 
     /// Heights of a surface that has no symmetry of its own.
     fn height(x: f32, y: f32) -> f32 {

@@ -104,13 +104,11 @@ impl ProcessGroup {
     }
 
     /// Which process this is, and how many there are.
-    #[must_use]
     pub fn rank(&self) -> Rank {
         self.rank
     }
 
     /// Whether this is process 0, which writes the run's files.
-    #[must_use]
     pub fn is_first(&self) -> bool {
         self.rank.index() == 0
     }

@@ -57,7 +57,6 @@ impl Adam {
     }
 
     /// Steps made so far.
-    #[must_use]
     pub fn steps(&self) -> u64 {
         self.steps
     }

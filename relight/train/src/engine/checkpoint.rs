@@ -33,7 +33,6 @@ pub struct Checkpoint {
 
 impl Checkpoint {
     /// Its path in a run's folder.
-    #[must_use]
     pub fn path(folder: &Path) -> PathBuf {
         folder.join(CHECKPOINT)
     }

@@ -43,7 +43,6 @@ impl MetricsLog {
     }
 
     /// Whether a run in a folder has its log open.
-    #[must_use]
     pub fn is_open(folder: &Path) -> bool {
         let table = OpenOptions::new().append(true).open(folder.join(TABLE));
         table.is_ok_and(|table| matches!(table.try_lock(), Err(TryLockError::WouldBlock)))

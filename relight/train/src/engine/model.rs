@@ -55,19 +55,16 @@ impl Model {
     }
 
     /// What it computes.
-    #[must_use]
     pub fn graph(&self) -> &Graph {
         &self.graph
     }
 
     /// Its parameters by name, sorted. They share their numbers with the network's.
-    #[must_use]
     pub fn parameters(&self) -> &BTreeMap<String, Tensor> {
         &self.parameters
     }
 
     /// In which precision its layers are computed.
-    #[must_use]
     pub fn precision(&self) -> ComputePrecision {
         self.precision
     }

@@ -42,7 +42,6 @@ pub trait TrainObserver {
 
 /// How a run came out.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct RunOutcome {
     /// Steps made in total.
     pub steps: u64,
@@ -123,7 +122,6 @@ impl<'a> Run<'a> {
     }
 
     /// Steps made so far.
-    #[must_use]
     pub fn steps_made(&self) -> u64 {
         self.step
     }

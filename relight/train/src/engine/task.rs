@@ -85,7 +85,6 @@ pub trait TrainingTask {
 
 /// What a step gives.
 #[derive(Debug, Default)]
-#[non_exhaustive]
 pub struct StepLosses {
     /// The losses.
     pub terms: LossTerms,
@@ -108,7 +107,6 @@ impl StepLosses {
 
 /// What a validation gives.
 #[derive(Debug, Default)]
-#[non_exhaustive]
 pub struct Validation {
     /// Figures by name.
     pub figures: BTreeMap<String, f64>,

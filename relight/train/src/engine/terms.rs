@@ -56,7 +56,6 @@ impl LossTerms {
     }
 
     /// Whether there is nothing to descend.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.iter().all(|term| term.mean.is_none())
     }

@@ -45,7 +45,6 @@ impl Trainable {
     }
 
     /// The network's name.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         self.name
     }

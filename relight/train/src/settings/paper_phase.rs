@@ -17,7 +17,6 @@ pub enum PaperPhase {
 
 impl PaperPhase {
     /// Its name on the command line.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Spec => "spec",
@@ -30,7 +29,6 @@ impl PaperPhase {
 
     /// The learning rate where settings name none: the paper's, 1e-6 in both rounds of joint training (`light` and `joint`)
     /// and 1e-4 for what is trained apart.
-    #[must_use]
     pub fn default_learning_rate(self) -> f64 {
         match self {
             Self::Light | Self::Joint => 1e-6,
@@ -39,19 +37,16 @@ impl PaperPhase {
     }
 
     /// Whether there are figures of how well it does on turns.
-    #[must_use]
     pub fn validates_on_turns(self) -> bool {
         matches!(self, Self::Spec | Self::Light | Self::Joint)
     }
 
     /// Whether turns teach it anything.
-    #[must_use]
     pub fn uses_turns(self) -> bool {
         self != Self::Normal
     }
 
     /// Whether it cannot do without turns.
-    #[must_use]
     pub fn needs_turns(self) -> bool {
         matches!(self, Self::Light | Self::Joint | Self::Specular)
     }

@@ -18,7 +18,6 @@ pub enum ComputePrecision {
 
 impl ComputePrecision {
     /// The type of parameters, inputs and outputs.
-    #[must_use]
     pub fn kind(self) -> Kind {
         match self {
             Self::Single | Self::Mixed => Kind::Float,

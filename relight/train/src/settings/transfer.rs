@@ -86,7 +86,6 @@ impl TransferSettings {
     }
 
     /// How many of the views there are at a step.
-    #[must_use]
     pub fn views_at(&self, step: u64) -> u64 {
         let joined = self.new_views.saturating_mul(step);
         self.first_views.saturating_add(joined).clamp(1, self.views)

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use rayon::prelude::*;
 use relight_core::image::Extent;
-use relight_core::statistics::median;
+use relit_data::statistics::median;
 
 use crate::fit::albedo::shared;
 use crate::fit::curve_statistics::CurveStatistics;

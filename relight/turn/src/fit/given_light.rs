@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use relight_core::light::{Order, Panorama, ShLight};
+use relit_data::file_names::has_extension;
 
 use crate::error::TurnError;
 
@@ -12,10 +13,7 @@ use crate::error::TurnError;
 /// # Errors
 /// If the file cannot be read.
 pub fn read_given_light(path: &Path) -> Result<ShLight, TurnError> {
-    let is_panorama = path.extension().is_some_and(|ending| {
-        ending.eq_ignore_ascii_case("hdr") || ending.eq_ignore_ascii_case("exr")
-    });
-    if !is_panorama {
+    if !has_extension(path, &["hdr", "exr"]) {
         return Ok(ShLight::read(path)?);
     }
     Ok(Panorama::read(path)?.project(Order::GLOSS))

@@ -1,9 +1,9 @@
 //! The albedo that the network of photographs sees in frames of a turn, and its mean with another one.
 
 use relight_core::image::{Linear, Planes, Rgb};
-use relight_core::statistics::median;
 use relight_photo::decompose::{DecomposeOptions, Decomposer, SpecularGate};
 use relight_photo::nets::Weights;
+use relit_data::statistics::median;
 
 use crate::error::TurnError;
 use crate::observe::curves::TurnCurves;

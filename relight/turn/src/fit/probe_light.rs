@@ -36,7 +36,6 @@ pub struct ProbeLight {
 
 impl ProbeLight {
     /// Whether the light fits the ball so badly that its place is to be checked.
-    #[must_use]
     pub fn is_doubtful(&self) -> bool {
         self.residual > max_residual(self.ball) / 2.0
     }

@@ -1,7 +1,7 @@
 //! The residual of a pixel's curve, and the parts of the turn that its fit may use: not those in which it lies in
 //! shadow or shows a highlight.
 
-use relight_core::statistics::upper_median;
+use relit_data::statistics::upper_median;
 
 use crate::fit::curve_statistics::CurveStatistics;
 use crate::fit::search::PixelFit;

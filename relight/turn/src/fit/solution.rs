@@ -3,7 +3,7 @@
 use relight_core::image::{Linear, Planes, Rgb};
 use relight_core::light::{LightError, Normals, Order, ShLight, YUp};
 use relight_core::render::mirror_reflectance;
-use relight_core::statistics::median;
+use relit_data::statistics::median;
 use serde::Serialize;
 
 use crate::fit::search::PixelFit;
@@ -55,7 +55,6 @@ impl EstimatedGloss {
 
 impl TurnSolution {
     /// The normals in the viewer's frame.
-    #[must_use]
     pub fn normals(&self, curves: &TurnCurves) -> Normals<YUp> {
         Normals::new(curves.map(|pixel| self.fits[pixel].normal.map(|v| v as f32)))
     }
@@ -63,13 +62,11 @@ impl TurnSolution {
     /// The albedo: in the light's units where that was known, else in such units that the mean shading of the object
     /// over the turn is 1 in each channel. In known light it is that of the same colour around where a normal is hardly to be
     /// trusted; in unknown light, what networks answer.
-    #[must_use]
     pub fn albedo(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| self.albedo[pixel].map(|v| v as f32)))
     }
 
     /// The shading over the whole turn: the mean irradiance of each pixel, or what white metal would show.
-    #[must_use]
     pub fn shading(&self, curves: &TurnCurves) -> Rgb<Linear> {
         Rgb::new(curves.map(|pixel| {
             let harmonics = self.model.harmonics(self.fits[pixel].normal);
@@ -78,13 +75,11 @@ impl TurnSolution {
     }
 
     /// The confidence in each normal, 0 to 1: one half at an expected error of 11.5 degrees.
-    #[must_use]
     pub fn confidence(&self, curves: &TurnCurves) -> Planes<1> {
         curves.map(|pixel| [confidence(self.expected_errors[pixel]) as f32])
     }
 
     /// The angle that each normal is expected to be off, degrees; 0 outside the mask.
-    #[must_use]
     pub fn expected_errors(&self, curves: &TurnCurves) -> Planes<1> {
         curves.map(|pixel| [self.expected_errors[pixel].to_degrees() as f32])
     }
@@ -102,25 +97,21 @@ impl TurnSolution {
     }
 
     /// The object's assumed material.
-    #[must_use]
     pub const fn material(&self) -> MaterialKind {
         self.model.material
     }
 
     /// The verdict on the normals and the albedo.
-    #[must_use]
     pub const fn verdict(&self) -> TurnVerdict {
         self.conditioning.verdict
     }
 
     /// The median over the pixels of the residual of a curve, over the energy of its variation.
-    #[must_use]
     pub fn residual(&self) -> f64 {
         median(self.fits.iter().map(|fit| fit.residual)).unwrap_or(0.0)
     }
 
     /// The median over the pixels of the angle that a normal is expected to be off, degrees.
-    #[must_use]
     pub fn expected_error_deg(&self) -> f64 {
         median(self.expected_errors.iter().copied())
             .unwrap_or(0.0)

@@ -38,7 +38,6 @@ pub struct Elevation {
 
 impl Elevation {
     /// The default for an unknown elevation: 18 ± 8 degrees.
-    #[must_use]
     pub const fn assumed() -> Self {
         Self {
             degrees: USUAL_DEG,
@@ -78,19 +77,16 @@ impl Elevation {
     }
 
     /// Degrees.
-    #[must_use]
     pub const fn degrees(&self) -> f64 {
         self.degrees
     }
 
     /// How far it may be off, degrees.
-    #[must_use]
     pub const fn uncertainty_deg(&self) -> f64 {
         self.uncertainty_deg
     }
 
     /// Where it comes from.
-    #[must_use]
     pub const fn source(&self) -> FactSource {
         self.source
     }
@@ -106,32 +102,27 @@ pub struct TableFrame {
 
 impl TableFrame {
     /// The frame of a table that is seen from this elevation.
-    #[must_use]
     pub fn new(elevation: Elevation) -> Self {
         let (sin, cos) = elevation.degrees.to_radians().sin_cos();
         Self { sin, cos }
     }
 
     /// A vector of the viewer's frame in the table's.
-    #[must_use]
     pub fn to_table(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         [x, self.sin * y - self.cos * z, self.cos * y + self.sin * z]
     }
 
     /// A vector of the table's frame in the viewer's.
-    #[must_use]
     pub fn to_viewer(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         [x, self.sin * y + self.cos * z, self.sin * z - self.cos * y]
     }
 
     /// The table's axis, upwards, in the viewer's frame.
-    #[must_use]
     pub const fn axis(&self) -> [f64; 3] {
         [0.0, self.cos, self.sin]
     }
 
     /// The rotation that does the same.
-    #[must_use]
     pub fn rotation(&self) -> Rotation {
         let Self { sin, cos } = *self;
         let matrix = [[1.0, 0.0, 0.0], [0.0, sin, -cos], [0.0, cos, sin]];

@@ -81,7 +81,6 @@ fn up_to(value: Complex32, most: f32) -> Complex32 {
 }
 
 /// The planes of the network, [`TURN_INPUTS`] of side x side values, 0 outside the object.
-#[must_use]
 pub fn network_input(turn: &NetworkTurn<'_>, phase: PhaseHypothesis) -> Vec<f32> {
     let ratios = Ratios::new(turn);
     let turned = ratios.turned(ratios.phase(phase));

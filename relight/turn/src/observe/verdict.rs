@@ -24,7 +24,6 @@ pub enum TurnVerdict {
 
 impl TurnVerdict {
     /// Whether normals and albedo are observable at all.
-    #[must_use]
     pub const fn is_fit(self) -> bool {
         matches!(self, Self::Good | Self::NotLambertian | Self::Uncertain)
     }
@@ -38,7 +37,6 @@ impl TurnVerdict {
     }
 
     /// What to do about it, in one sentence; `None` if all is well.
-    #[must_use]
     pub const fn advice(self) -> Option<&'static str> {
         match self {
             Self::Good => None,

@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 
 use relight_core::image::{ColourSpace, Extent, Planes, Rgb, Srgb};
-use relight_core::statistics::median;
 use relight_photo::files::{FrameTiming, MovieReader};
 use relit_data::geometry::Rect;
 use relit_data::session::Recording;
+use relit_data::statistics::median;
 
 use crate::error::TurnError;
 use crate::observe::probe::{Probe, ProbeBuilder};

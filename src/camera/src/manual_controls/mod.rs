@@ -163,7 +163,6 @@ pub struct NotHeld {
 
 impl NotHeld {
     /// Whether all is held.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }

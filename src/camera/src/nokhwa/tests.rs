@@ -18,8 +18,8 @@ use proptest::prelude::*;
 use super::worker::jpeg_length;
 use super::*;
 use crate::Mode;
-use relit_clock::Clock;
 use relit_data::causes::with_causes;
+use relit_data::clock::Clock;
 use relit_data::session::FrameClock;
 
 const TIMEOUT: Duration = Duration::from_secs(20);

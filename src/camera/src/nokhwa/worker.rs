@@ -16,7 +16,7 @@ use ::nokhwa::{Camera as Library, NokhwaError};
 
 use super::fourcc;
 use crate::{CameraError, Fourcc, Frame};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_data::session::FrameClock;
 
 /// Longest wait for a job.

@@ -25,7 +25,7 @@ use super::{
     Camera, CameraAddress, CameraError, CameraMode, Control, DeviceInfo, Fourcc, Frame, Mode,
     ReplayAddress,
 };
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_data::session::{FrameClock, Recording};
 use relit_video::{CodedFrame, Video};
 

@@ -9,7 +9,7 @@ use super::device::{Device, unplugged};
 use super::ioctl::Mapping;
 use crate::frame::without_padding;
 use crate::{CameraError, CameraMode, Fourcc, Frame, Rate, SequenceUnwrapper};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_data::session::FrameClock;
 use relit_video::PixelFormat;
 

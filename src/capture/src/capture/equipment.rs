@@ -8,7 +8,7 @@ use super::error::CaptureError;
 use super::manifest::session_name;
 use super::settings::Settings;
 use relit_camera::{self as camera, Camera};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_turntable::simulator::{SimulatedTable, SimulatorOptions};
 use relit_turntable::{Table, TableOptions, TurntableAddress, find_serial};
 
@@ -77,25 +77,21 @@ impl Equipment {
     }
 
     /// The settings.
-    #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
     /// The clock that everything goes by.
-    #[must_use]
     pub fn clock(&self) -> Clock {
         self.clock.clone()
     }
 
     /// The simulated table, where the table is one.
-    #[must_use]
     pub fn simulator(&self) -> Option<&SimulatedTable> {
         self.simulator.as_ref()
     }
 
     /// Whether a table is to be there.
-    #[must_use]
     pub fn wants_table(&self) -> bool {
         self.settings.turntable != TurntableAddress::None
     }

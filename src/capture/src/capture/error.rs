@@ -10,7 +10,6 @@ use relit_turntable::simulator;
 
 /// Why a capture failed.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum CaptureError {
     /// Something was not as it has to be before the table turns.
     #[error("the capture did not start: {0}")]

@@ -38,7 +38,6 @@ pub struct Settings {
 impl Settings {
     /// Settings with the usual figures: 7.2 degrees/s at 30 frames/s, no frame may be missing, one
     /// more try.
-    #[must_use]
     pub fn new(root: PathBuf, camera: CameraAddress, turntable: TurntableAddress) -> Self {
         Self {
             root,
@@ -55,7 +54,6 @@ impl Settings {
     }
 
     /// The same as everybody may see.
-    #[must_use]
     pub fn shown(&self) -> CaptureSettings {
         CaptureSettings {
             root: self.root.display().to_string(),
@@ -83,7 +81,6 @@ impl Settings {
     }
 
     /// Whether neither camera nor table is real, so that the clock need not be either.
-    #[must_use]
     pub fn is_rehearsal(&self) -> bool {
         matches!(self.camera, CameraAddress::Replay(_))
             && !matches!(self.turntable, TurntableAddress::Serial(_))
@@ -116,13 +113,11 @@ impl Settings {
     }
 
     /// Frames of a turn at this rate.
-    #[must_use]
     pub fn frames(&self, fps: f64) -> u64 {
         (360.0 / self.degrees_per_second * fps).round().max(1.0) as u64
     }
 
     /// The time of a turn, microseconds.
-    #[must_use]
     pub fn turn_us(&self) -> i64 {
         (360.0 / self.degrees_per_second * 1e6).round() as i64
     }

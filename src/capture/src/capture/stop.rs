@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::error::{CaptureError, StopReason};
-use relit_clock::{Clock, Waitable};
+use relit_data::clock::{Clock, Waitable};
 use relit_turntable::{Table, TurntableError};
 
 /// A stop that may be requested at any time, from any thread; clones are the same request.
@@ -21,7 +21,6 @@ struct State {
 
 impl StopRequest {
     /// Nobody has asked yet. `clock`: that of the capture.
-    #[must_use]
     pub fn new(clock: &Clock) -> Self {
         Self {
             state: Arc::new(Waitable::new(clock, State::default())),
@@ -35,7 +34,6 @@ impl StopRequest {
     }
 
     /// Who asked, if anybody did.
-    #[must_use]
     pub fn reason(&self) -> Option<StopReason> {
         self.state.lock().asked
     }

@@ -8,8 +8,8 @@ use super::error::CaptureError;
 use super::preflight;
 use super::recording::{Recorder, Window};
 use crate::state::{Monitor, Obstacle, Phase, TableState};
-use relit_clock::Clock;
 use relit_data::causes::with_causes;
+use relit_data::clock::Clock;
 use relit_turntable::{
     AngleFit, ControllerState, FinishedTurn, MotionFault, Table, TableStatus, Turn, TurnPlan,
     TurntableError,

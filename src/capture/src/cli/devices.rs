@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use relit_camera::{self as camera, Control, ControlKind, DeviceInfo};
-use relit_clock::Clock;
 use relit_data::causes::with_causes;
+use relit_data::clock::Clock;
 use relit_turntable::{TurntableError, find_serial};
 use serde_json::{Value, json};
 

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 use relit_turntable::simulator::{Simulator, SimulatorError, SimulatorOptions, TableFaults};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 

@@ -13,7 +13,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use crate::capture::{StopReason, StopRequest};
 use crate::command::CommandError;
 use crate::state::{Monitor, Phase};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 /// Something for the rig to do.
 #[derive(Debug, Clone, PartialEq)]

@@ -14,7 +14,7 @@ use crate::preview::Preview;
 use crate::state::{CameraState, Monitor, RigState, TableState};
 use relit_camera::manual_controls::{ManualPlan, ManualValues};
 use relit_camera::{Camera, CameraError};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 /// Longest wait for a frame in one go: how late a command is noticed.
 const FRAME_WAIT: Duration = Duration::from_millis(50);

@@ -19,7 +19,7 @@ use crate::command::{Command, CommandError, Rig};
 use crate::preview::Preview;
 use crate::state::{Monitor, RigState};
 use dispatcher::{Dispatcher, Job};
-use relit_clock::{Clock, JoinHandle};
+use relit_data::clock::{Clock, JoinHandle};
 use relit_turntable::lockfile::LockFile;
 use relit_turntable::simulator::SimulatedTable;
 use worker::Worker;

@@ -214,7 +214,6 @@ impl Processing {
     }
 
     /// The folder of the data set.
-    #[must_use]
     pub fn dataset(&self) -> PathBuf {
         self.shared.dataset.clone()
     }

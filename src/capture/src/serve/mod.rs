@@ -46,7 +46,6 @@ const BLOCKING_THREADS: usize = 24;
 
 /// Why the rig could not be served.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ServeError {
     /// The address is taken, not this machine's, or not allowed.
     #[error(

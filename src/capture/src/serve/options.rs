@@ -30,7 +30,6 @@ pub struct ServeOptions {
 
 impl ServeOptions {
     /// Options for an address, and nothing else asked for.
-    #[must_use]
     pub fn at(address: SocketAddr) -> Self {
         Self {
             address,

@@ -190,13 +190,11 @@ impl Advice {
 
 impl RigState {
     /// Whether nothing is captured at the moment.
-    #[must_use]
     pub fn rests(&self) -> bool {
         self.phase == Phase::Idle
     }
 
     /// What keeps a take from beginning: of several obstacles the first that a person has to remove.
-    #[must_use]
     pub fn obstacle_to_take(&self) -> Option<Obstacle> {
         self.obstacle_of_table()
             .or_else(|| self.obstacle_of_speed())
@@ -211,7 +209,6 @@ impl RigState {
     }
 
     /// What keeps the table from moving, other than that there is to be none; its lock apart, which homing lifts.
-    #[must_use]
     pub fn obstacle_to_motion(&self) -> Option<Obstacle> {
         if self.table.emergency_stop || !self.table.locked {
             self.obstacle_of_table()
@@ -221,7 +218,6 @@ impl RigState {
     }
 
     /// What is wrong with the table, other than that there is to be none.
-    #[must_use]
     pub fn obstacle_of_table(&self) -> Option<Obstacle> {
         let table = &self.table;
         let fault = table.fault.as_deref();

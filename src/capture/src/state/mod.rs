@@ -34,7 +34,6 @@ const LOG_KEPT: usize = 40;
 
 /// All that a viewer may know.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
-#[non_exhaustive]
 pub struct RigState {
     /// Counts changes: a viewer that has seen this number has seen this state.
     pub version: u64,
@@ -78,7 +77,6 @@ pub struct RigState {
 
 impl RigState {
     /// Whether the rig has a table, be it there at the moment or not.
-    #[must_use]
     pub fn has_table(&self) -> bool {
         !matches!(self.settings.turntable.as_str(), "" | "none")
     }
@@ -96,7 +94,6 @@ impl RigState {
 
 /// A picture for viewers.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct PreviewFrame {
     /// Counts frames, so that a viewer knows a new one.
     pub number: u64,

@@ -72,7 +72,6 @@ pub struct TakeSummary {
 
 /// The turntable as last heard.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
-#[non_exhaustive]
 pub struct TableState {
     /// Whether there is a table at all.
     pub present: bool,
@@ -107,7 +106,6 @@ pub struct TableState {
 
 /// The camera as last seen.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
-#[non_exhaustive]
 pub struct CameraState {
     /// Whether it can be reached.
     pub present: bool,
@@ -129,7 +127,6 @@ pub struct CameraState {
 
 /// Something that went wrong, in plain words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct FaultLine {
     /// Microseconds of the capture's clock.
     pub t_us: i64,
@@ -139,7 +136,6 @@ pub struct FaultLine {
 
 /// Something that happened, with the time of day.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-#[non_exhaustive]
 pub struct LogLine {
     /// When, RFC 3339, UTC.
     pub at: String,
@@ -200,7 +196,6 @@ impl Check {
 
 impl TableState {
     /// Whether it moves, on whosever account.
-    #[must_use]
     pub fn moves(&self) -> bool {
         ["Run", "Jog", "Home", "Hold"]
             .iter()

@@ -1,6 +1,6 @@
 //! A simulated table and its host, on virtual time or at a port in real time.
 
-use relit_clock::{Clock, Participant};
+use relit_data::clock::{Clock, Participant};
 use relit_turntable::simulator::{SimulatedTable, Simulator, SimulatorOptions};
 use relit_turntable::{Table, TableOptions, TurnPlan, TurntableError};
 use tempfile::TempDir;

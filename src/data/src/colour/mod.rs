@@ -20,7 +20,6 @@ const LEVELS: usize = 1 << 16;
 
 /// Colours that cannot be converted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum ColourFault {
     /// By their transfer characteristics.
     #[error("its transfer function {0}")]
@@ -238,7 +237,6 @@ impl ToSrgb {
     }
 
     /// The sRGB levels of a coded colour, whose values are 0 to 1; others are clipped.
-    #[must_use]
     pub fn levels(&self, coded: [f32; 3]) -> [u8; 3] {
         let index = |value: f32| (value * (LEVELS - 1) as f32 + 0.5) as usize;
         let mut light = coded.map(|value| self.light[index(value).min(LEVELS - 1)]);
@@ -297,7 +295,6 @@ impl YuvDecoding {
     }
 
     /// RGB of luma and the differences of blue and red.
-    #[must_use]
     pub fn rgb(&self, [luma, blue, red]: [f32; 3]) -> [f32; 3] {
         let luma = (luma - self.luma[0]) / self.luma[1];
         let difference = |value: f32| (value - 32768.0) / self.chroma;

@@ -5,7 +5,6 @@ const LISTED: usize = 6;
 
 /// Why a picture is not a mask of an object. Each begins with a verb, after "the mask PATH".
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum MaskFault {
     /// Its tones or colours are those of a photograph or a rendering.
     #[error(

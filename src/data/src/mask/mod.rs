@@ -21,9 +21,12 @@ pub use fault::MaskFault;
 use fault::several;
 pub use picture::MaskPicture;
 
+use image::GrayImage;
+
+use crate::geometry::Rect;
+
 /// By what a mask says where the object is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum MaskBasis {
     /// The object is bright.
     Brightness,
@@ -56,7 +59,6 @@ pub struct ObjectPixels {
 impl ObjectPixels {
     /// What a person may want to know of a mask of this width, after "the mask": what it was taken for where that is not
     /// plain, and whether it may be inverted.
-    #[must_use]
     pub fn note(&self, width: u32) -> Option<String> {
         let is_inverted = || {
             self.marks_the_border(width as usize).then(|| {
@@ -76,8 +78,20 @@ impl ObjectPixels {
     }
 }
 
+/// The smallest rectangle that holds all non-zero pixels; `None` if there are none.
+pub fn bounding_box(mask: &GrayImage) -> Option<Rect> {
+    let mut corners: Option<(u32, u32, u32, u32)> = None;
+    for (x, y, pixel) in mask.enumerate_pixels() {
+        if pixel.0[0] != 0 {
+            let (x0, y0, x1, y1) = corners.unwrap_or((x, y, x, y));
+            corners = Some((x0.min(x), y0.min(y), x1.max(x), y1.max(y)));
+        }
+    }
+    let (x0, y0, x1, y1) = corners?;
+    Some(Rect::new(x0 as i32, y0 as i32, x1 - x0 + 1, y1 - y0 + 1))
+}
+
 /// What a mask of another size than its picture's may be, after "the mask PATH is W x H pixels".
-#[must_use]
 pub fn size_hint(mask: (u32, u32), picture: (u32, u32)) -> Option<&'static str> {
     let [(w, h), (wide, high)] = [mask, picture].map(|(w, h)| (f64::from(w), f64::from(h)));
     // Sizes are rounded to whole pixels.

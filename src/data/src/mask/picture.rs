@@ -26,7 +26,6 @@ pub struct MaskPicture {
 
 impl MaskPicture {
     /// The values of a decoded picture. Floating point values count from 0, black, to 1, white.
-    #[must_use]
     pub fn from_image(image: &DynamicImage) -> Self {
         let (size, has_alpha) = (image.dimensions(), image.color().has_alpha());
         match image {
@@ -52,7 +51,6 @@ impl MaskPicture {
     }
 
     /// Values from 0, black or transparent, to 1, plane by plane and each row by row. What a plane lacks is 0.
-    #[must_use]
     pub fn from_planes(size: (u32, u32), colours: [&[f32]; 3], alpha: Option<&[f32]>) -> Self {
         let count = size.0 as usize * size.1 as usize;
         let at = |plane: &[f32], k: usize| plane.get(k).copied().unwrap_or_default();
@@ -91,7 +89,6 @@ impl MaskPicture {
     }
 
     /// Width and height, pixels.
-    #[must_use]
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }

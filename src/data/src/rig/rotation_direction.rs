@@ -20,7 +20,6 @@ impl RotationDirection {
     pub const ALL: [Self; 2] = [Self::CounterClockwise, Self::Clockwise];
 
     /// Its name, as files and options have it.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::CounterClockwise => "counter-clockwise",

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 /// Why a session could not be read or written.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SessionError {
     /// A session cannot be used or written: what is wrong, and what to do.
     #[error("{0}")]

@@ -58,7 +58,6 @@ impl FrameIndex {
 
     /// Reads an index up to the first fault, and returns that fault too: after a power cut the end of
     /// the file can hold anything.
-    #[must_use]
     pub fn parse_until_fault(bytes: &[u8]) -> (Self, Option<String>) {
         let mut index = Self::default();
         for text in unmarked(bytes).split_inclusive(|&byte| byte == b'\n') {
@@ -140,19 +139,16 @@ impl FrameIndex {
     }
 
     /// The frames, in order.
-    #[must_use]
     pub fn entries(&self) -> &[FrameEntry] {
         &self.entries
     }
 
     /// True if the file's last line was cut off.
-    #[must_use]
     pub fn is_truncated(&self) -> bool {
         self.torn
     }
 
     /// The jumps of the driver's counter, in order.
-    #[must_use]
     pub fn gaps(&self) -> Vec<Gap> {
         let pairs = self.entries.windows(2);
         pairs

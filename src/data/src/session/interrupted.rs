@@ -56,19 +56,16 @@ impl InterruptedSession {
     }
 
     /// The video's path.
-    #[must_use]
     pub fn video_path(&self) -> PathBuf {
         self.folder.join(&self.manifest.video.file)
     }
 
     /// The index up to its first fault.
-    #[must_use]
     pub fn index(&self) -> &FrameIndex {
         &self.index
     }
 
     /// What the turntable reported of the turn, if there was one.
-    #[must_use]
     pub fn journal(&self) -> Option<&TurnJournal> {
         self.journal.as_ref()
     }

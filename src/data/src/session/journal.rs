@@ -29,7 +29,6 @@ pub struct TurnJournal {
 impl TurnJournal {
     /// Reads a journal up to its first invalid line: after a power cut the end of the file can
     /// hold anything. `None` if not even the turn can be read.
-    #[must_use]
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         let mut lines = bytes.split_inclusive(|&byte| byte == b'\n');
         let turn = serde_json::from_slice(lines.next()?).ok()?;
@@ -41,7 +40,6 @@ impl TurnJournal {
     }
 
     /// Reads the journal of a session folder; `None` if there is none.
-    #[must_use]
     pub fn read(folder: &Path) -> Option<Self> {
         Self::parse(&fs::read(folder.join(JOURNAL_FILE)).ok()?)
     }

@@ -253,7 +253,6 @@ impl Manifest {
 
 /// The object's name in a session's id: what follows `<UTC date>T<time>Z-`, or the whole id if it does
 /// not have that form.
-#[must_use]
 pub fn object_of(id: &str) -> &str {
     let Some((stamp, object)) = id.split_once("Z-") else {
         return id;

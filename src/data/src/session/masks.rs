@@ -11,7 +11,6 @@ pub const MASK_SUFFIX: &str = "-mask";
 
 /// The name, without ending, of the mask of the recording at `path` among those of others: that of the clip or of the
 /// session's folder.
-#[must_use]
 pub fn mask_stem(path: &Path) -> OsString {
     if !path.is_dir() {
         return path.file_stem().unwrap_or_default().to_owned();
@@ -27,7 +26,6 @@ pub fn mask_stem(path: &Path) -> OsString {
 
 /// The mask of a recording in the folder `masks`: `NAME.png` or `NAME-mask.png`, where NAME is that of its clip, of its
 /// session's folder, or its id. `None` if neither exists.
-#[must_use]
 pub fn mask_in(masks: &Path, recording: &Recording) -> Option<PathBuf> {
     let mut stems = Vec::new();
     stems.extend(recording.folder.as_deref().map(mask_stem));

@@ -27,7 +27,6 @@ pub enum Notice {
 
 impl Notice {
     /// The text, one sentence.
-    #[must_use]
     pub fn text(&self) -> &str {
         match self {
             Self::Warning(text) | Self::Loss(text) => text,
@@ -35,7 +34,6 @@ impl Notice {
     }
 
     /// True if something is lost.
-    #[must_use]
     pub fn is_loss(&self) -> bool {
         matches!(self, Self::Loss(_))
     }
@@ -276,7 +274,6 @@ fn videos_in(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
 }
 
 /// The name that the recording at a path has, as far as it can be seen without reading more than the manifest.
-#[must_use]
 pub fn recording_name(path: &Path) -> String {
     if !path.is_dir() {
         return name_from(path.file_stem());

@@ -86,13 +86,11 @@ impl SessionWriter {
     }
 
     /// The session folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Path at which the video has to be written.
-    #[must_use]
     pub fn video_path(&self) -> PathBuf {
         self.folder.join(&self.manifest.video.file)
     }
@@ -164,13 +162,11 @@ impl SessionWriter {
     }
 
     /// The journal so far.
-    #[must_use]
     pub fn journal(&self) -> Option<&TurnJournal> {
         self.journal.as_ref().map(JournalWriter::journal)
     }
 
     /// The index so far.
-    #[must_use]
     pub fn index(&self) -> &FrameIndex {
         &self.index
     }

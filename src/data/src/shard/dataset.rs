@@ -132,19 +132,16 @@ pub struct SessionEntry {
 
 impl SessionEntry {
     /// Whether its mask does not fit, in part or as a whole, as far as that is known.
-    #[must_use]
     pub fn has_misfit(&self) -> bool {
         self.quality.mask_misfit.is_some()
     }
 
     /// Whether its verdict is the worst one.
-    #[must_use]
     pub fn is_broken(&self) -> bool {
         self.quality.verdict == QualityVerdict::Broken
     }
 
     /// Whether a person should look at it before it is used: something is lost, its mask does not fit, or it is broken.
-    #[must_use]
     pub fn is_flawed(&self) -> bool {
         self.lossy || self.has_misfit() || self.is_broken()
     }
@@ -188,7 +185,6 @@ impl Dataset {
     pub const FILE: &'static str = "dataset.json";
 
     /// A data set without sessions, written by this version of relit.
-    #[must_use]
     pub fn new(settings: ExtractionSettings) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
@@ -251,14 +247,12 @@ impl Dataset {
     }
 
     /// The entry of a session.
-    #[must_use]
     pub fn session(&self, id: &str) -> Option<&SessionEntry> {
         self.sessions.iter().find(|session| session.id == id)
     }
 
     /// The entry of a session whose files a session of this name would have for its own on a file system that ignores
     /// case: it has this name, or one that is like it.
-    #[must_use]
     pub fn session_alike(&self, id: &str) -> Option<&SessionEntry> {
         let wanted = folded(id);
         let alike = |session: &&SessionEntry| folded(&session.id) == wanted;

@@ -14,7 +14,6 @@ pub struct Digest([u8; 32]);
 
 impl Digest {
     /// The digest of `bytes`.
-    #[must_use]
     pub fn hash(bytes: &[u8]) -> Self {
         blake3::hash(bytes).into()
     }
@@ -30,7 +29,6 @@ impl Digest {
     }
 
     /// The 32 bytes.
-    #[must_use]
     pub fn as_bytes(&self) -> &[u8; 32] {
         &self.0
     }

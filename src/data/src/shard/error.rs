@@ -10,7 +10,6 @@ use crate::naming::not_a_name;
 
 /// Why a data set could not be written, read or checked.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum ShardError {
     /// A file or folder could not be read or written.
     #[error(

@@ -5,7 +5,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::dataset::{Dataset, ShardEntry};
-use super::digest::{Digest, FolderHasher};
+use super::digest::Digest;
+use super::new_dataset::FolderImages;
 use super::settings::Layout;
 use super::{ShardError, names};
 
@@ -103,13 +104,9 @@ fn check_shard(out: &Path, shard: &ShardEntry, layout: Layout) -> Result<(), Sha
         return check_file(out, &shard.file, expected);
     }
     names::check_path(&shard.file)?;
-    let mut hasher = FolderHasher::default();
-    let mut total = 0;
+    let mut images = FolderImages::default();
     for index in 0..shard.samples {
-        let path = out.join(&shard.file).join(format!("{index}.png"));
-        let (bytes, digest) = Digest::hash_file(&path).map_err(ShardError::io("read", &path))?;
-        hasher.add(&digest);
-        total += bytes;
+        images.read(out, shard, index)?;
     }
-    compare(&shard.file, expected, (total, hasher.finish()))
+    images.check(shard)
 }

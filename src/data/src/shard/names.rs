@@ -55,7 +55,6 @@ impl Part {
 }
 
 /// The key of a sample: `<session>/<kkkk>`, the index with at least four digits.
-#[must_use]
 pub fn sample_key(session: &str, index: u32) -> String {
     format!("{session}/{index:04}")
 }

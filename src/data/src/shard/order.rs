@@ -21,7 +21,6 @@ const AIM_UNITS: i128 = 144_000_000;
 
 /// The sample at each position of a shard of `samples` samples: a permutation of `0..samples`.
 /// Empty for 0.
-#[must_use]
 pub fn order(samples: u32) -> Vec<u32> {
     let Some(count) = NonZeroU32::new(samples) else {
         return Vec::new();

@@ -29,25 +29,21 @@ pub struct ArrayTask {
 impl ArrayTask {
     /// Task `index` (from 0) of `count`; `None` if there is none, or if there are more than
     /// [`MAX_TASKS`].
-    #[must_use]
     pub fn new(index: u32, count: u32) -> Option<Self> {
         (index < count && count <= MAX_TASKS).then_some(Self { index, count })
     }
 
     /// How many tasks there are.
-    #[must_use]
     pub fn count(self) -> u32 {
         self.count
     }
 
     /// Whether the recording at this position of the list of all is this task's.
-    #[must_use]
     pub fn takes(self, position: usize) -> bool {
         position % self.count as usize == self.index as usize
     }
 
     /// The file of its piece, relative to the data set.
-    #[must_use]
     pub fn file(self) -> String {
         format!("{}/{self}.json", names::TASKS)
     }
@@ -96,7 +92,6 @@ pub struct PartialManifest {
 
 impl PartialManifest {
     /// A piece without outcomes.
-    #[must_use]
     pub fn new(task: ArrayTask, recordings: Vec<String>, dataset: Dataset) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
@@ -140,7 +135,6 @@ impl PartialManifest {
 
 /// What was joined.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct MergedDataset {
     /// The description, as it was written.
     pub dataset: Dataset,

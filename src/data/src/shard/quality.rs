@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::record::FrameRecord;
 use crate::counts::count_of;
+use crate::statistics::upper_median;
 
 /// Degrees of a whole turn.
 const TURN_DEG: f64 = 360.0;
@@ -39,7 +40,6 @@ impl QualityVerdict {
     pub const ALL: [Self; 3] = [Self::Good, Self::Usable, Self::Broken];
 
     /// The word in `dataset.json`.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Good => "good",
@@ -101,7 +101,6 @@ pub struct SessionQuality {
 impl SessionQuality {
     /// The figures of a session with these records. `lossy`: something was lost. It may cover
     /// only a part of the turn (`covered_deg`).
-    #[must_use]
     pub fn from_records(records: &[FrameRecord], lossy: bool, covered_deg: Option<f64>) -> Self {
         let shifts = || {
             let measured = records.iter().filter_map(|record| record.shift_px);
@@ -115,7 +114,10 @@ impl SessionQuality {
                 mean(records.iter().map(|r| r.saturated_fraction)).unwrap_or_default(),
                 1e6,
             ),
-            sharpness_median: rounded(median(records.iter().map(|r| r.sharpness)), 1e3),
+            sharpness_median: rounded(
+                upper_median(records.iter().map(|r| r.sharpness)).unwrap_or_default(),
+                1e3,
+            ),
             shift_rms_px: squares.map(|square| rounded(square.sqrt(), 1e3)),
             shift_max_px: shifts().reduce(f64::max).map(|most| rounded(most, 1e3)),
             moved: count(records, |r| r.shift_applied),
@@ -238,12 +240,6 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// The upper median; 0 of nothing.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or_default()
-}
-
 /// To a `steps`th.
 fn rounded(value: f64, steps: f64) -> f64 {
     (value * steps).round() / steps

@@ -24,7 +24,6 @@ pub struct ShardSample {
 
 impl ShardSample {
     /// The bytes of the member with this suffix.
-    #[must_use]
     pub fn member(&self, suffix: &str) -> Option<&[u8]> {
         self.members
             .iter()

@@ -79,7 +79,6 @@ impl FrameRecord {
     /// own size, with what was measured of it. `gate`: the saturated fraction above which Spec-Net should run.
     ///
     /// The source frame is the one of the same number, at time 0; angle, shifts and findings are not known.
-    #[must_use]
     pub fn new(
         session: &str,
         object: &str,

@@ -22,7 +22,6 @@ impl Layout {
     pub const ALL: [Self; 2] = [Self::Webdataset, Self::Paper];
 
     /// The name on the command line and in `dataset.json`.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Webdataset => "webdataset",
@@ -107,7 +106,6 @@ pub struct ExtractionSettings {
 impl ExtractionSettings {
     /// Names and values as they are shown to people beside the samples. The layout is not among them: it says nothing of
     /// the samples, and a page outlasts its change.
-    #[must_use]
     pub fn rows(&self) -> Vec<(String, String)> {
         let settings = serde_json::to_value(self).unwrap_or_default();
         let rows = settings.as_object().into_iter().flatten();
@@ -122,7 +120,6 @@ impl ExtractionSettings {
     }
 
     /// In what other settings differ from these, one phrase each with both values.
-    #[must_use]
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let [old, new] = [self, other].map(|s| serde_json::to_value(s).unwrap_or_default());
         let names = old.as_object().into_iter().chain(new.as_object());

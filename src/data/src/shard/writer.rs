@@ -155,7 +155,6 @@ impl ShardWriter {
     }
 
     /// The record of a sample that was added and the digest of its image's PNG.
-    #[must_use]
     pub fn sample(&self, index: u32) -> Option<(&FrameRecord, Digest)> {
         let row = self.rows.get(index as usize)?.as_ref()?;
         Some((&row.record, row.png_blake3))

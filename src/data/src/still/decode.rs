@@ -45,7 +45,6 @@ pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
 }
 
 /// Width and height that a file says it has, before it is turned; `None` if they cannot be read.
-#[must_use]
 pub fn stored_size(bytes: &[u8]) -> Option<(u32, u32)> {
     match Format::sniff(bytes)? {
         Format::Radiance => radiance::size(bytes),

@@ -2,7 +2,6 @@
 
 /// Why a still image is not decoded.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum StillError {
     /// It is in a format, or has its colours in a form, that is known and not read: which, and what to do.
     #[error("{0}")]

@@ -52,7 +52,6 @@ impl Format {
     pub const HTML: Self = Self::Other("a page of a website", "download the picture itself");
 
     /// The format that the first bytes of a file show.
-    #[must_use]
     pub fn sniff(bytes: &[u8]) -> Option<Self> {
         let starts = |magic: &[u8]| bytes.starts_with(magic);
         let at = |place: usize, magic: &[u8]| {
@@ -98,7 +97,6 @@ impl Format {
     }
 
     /// Of a format that is not read: what a file of it is called, with its article, and what to do with it.
-    #[must_use]
     pub const fn unsupported(self) -> Option<(&'static str, &'static str)> {
         match self {
             Self::Avif => Some(("an AVIF image", SAVE)),

@@ -3,14 +3,11 @@
 use std::path::Path;
 
 use super::ENDINGS;
+use crate::file_names::has_extension;
 
 /// Whether a file is called as a picture that is read.
-#[must_use]
 pub fn is_named(path: &Path) -> bool {
-    let ending = path.extension().unwrap_or_default().to_string_lossy();
-    ENDINGS
-        .iter()
-        .any(|known| ending.eq_ignore_ascii_case(known))
+    has_extension(path, &ENDINGS)
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ use crate::still::{Format, isobmff, png_exif};
 
 /// How a picture is turned for display: by Exif, TIFF's tag, or the properties of AVIF and HEIF. `None` if it stands as
 /// it is stored, or where its orientation cannot be read.
-#[must_use]
 pub fn orientation(bytes: &[u8]) -> Option<Orientation> {
     let stated = match Format::sniff(bytes)? {
         Format::Avif | Format::Heic => isobmff::orientation(bytes)?,

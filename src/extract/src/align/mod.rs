@@ -19,6 +19,7 @@ use std::ops::Range;
 
 use image::GrayImage;
 use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
+use relit_data::statistics::upper_median;
 
 use super::CropView;
 use brightness::{half, half_luma, luma};
@@ -67,7 +68,6 @@ pub struct AlignSample(GrayImage);
 
 impl AlignSample {
     /// The brightness of `crop`.
-    #[must_use]
     pub fn from_crop(crop: CropView<'_>) -> Self {
         let (width, height) = crop.dimensions();
         let (halvings, rows) = (halvings((width, height)), 0..height as usize);
@@ -154,7 +154,6 @@ impl Aligner {
     /// within a tenth of a pixel of the turn's middle place, which is known more exactly, from there.
     ///
     /// `None` if the object has too little structure.
-    #[must_use]
     pub fn learn(
         samples: &[AlignSample],
         reference: usize,
@@ -229,20 +228,18 @@ impl Aligner {
             .collect();
         let usable = found.get(reference)?.shift.is_some();
         let registered = found.iter().filter(|found| found.shift.is_some());
-        let usual = middle(registered.map(|found| found.confidence).collect());
+        let usual = upper_median(registered.map(|found| found.confidence)).unwrap_or_default();
         aligner.min_confidence = MIN_CONFIDENCE.max(MIN_OF_MEDIAN * usual);
         aligner.motion = Motion::from_alignments(&found, reference);
         usable.then_some(aligner)
     }
 
     /// The confidence below which a frame of this turn is not registered, 0..=1.
-    #[must_use]
     pub fn min_confidence(&self) -> f64 {
         self.min_confidence
     }
 
     /// Where the object is in a frame, in pixels of the frame.
-    #[must_use]
     pub fn measure(&self, frame: &AlignSample, buffers: &mut AlignBuffers) -> Alignment {
         let lumas = self
             .required_regions
@@ -250,23 +247,14 @@ impl Aligner {
         self.located(lumas, &mut buffers.gradients)
     }
 
-    /// The same from the frame's crop; only what is needed of it is read. It has the size of the mask.
-    #[must_use]
-    pub fn measure_crop(&self, crop: CropView<'_>, buffers: &mut AlignBuffers) -> Alignment {
-        let (_, height) = crop.dimensions();
-        self.take_rows(crop, 0..height, buffers);
-        self.measure_rows(buffers)
-    }
-
-    /// Looks at these rows of a frame's crop, which come from the top to the bottom.
+    /// Looks at these rows of a frame's crop, which has the size of the mask; they come from the top to the bottom.
     pub fn take_rows(&self, crop: CropView<'_>, rows: Range<u32>, buffers: &mut AlignBuffers) {
         let rows = rows.start as usize..rows.end as usize;
         self.required_regions
             .take_rows(crop, rows, &mut buffers.lumas);
     }
 
-    /// [`Self::measure_crop`] of a crop whose rows were all taken.
-    #[must_use]
+    /// Where the object is in a frame of whose crop all rows were taken.
     pub fn measure_rows(&self, buffers: &mut AlignBuffers) -> Alignment {
         let lumas = self.required_regions.lumas_of_rows(&mut buffers.lumas);
         self.located(lumas, &mut buffers.gradients)
@@ -414,13 +402,10 @@ fn final_origin(reference: Option<[f64; 2]>, shifts: &[[f64; 2]], near: f64) -> 
 
 /// The median shift to the right, and that down.
 fn middle_place(shifts: &[[f64; 2]]) -> [f64; 2] {
-    [0, 1].map(|axis| middle(shifts.iter().map(|shift| shift[axis]).collect()))
-}
-
-/// The upper median; 0 of nothing.
-fn middle(mut values: Vec<f64>) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or_default()
+    [0, 1].map(|axis| {
+        let median = upper_median(shifts.iter().map(|shift| shift[axis]));
+        median.unwrap_or_default()
+    })
 }
 
 fn fit_all(

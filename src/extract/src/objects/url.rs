@@ -6,7 +6,6 @@ use std::path::Path;
 use super::ExtractError;
 
 /// Whether a path is a URL, such as `s3://bucket/sessions`.
-#[must_use]
 pub fn is_url(path: &Path) -> bool {
     let Some((scheme, _)) = path.to_str().and_then(|text| text.split_once("://")) else {
         return false;

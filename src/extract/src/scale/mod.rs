@@ -83,7 +83,6 @@ impl Scaler {
 
     /// The mask of the scaled images: 255 where the source mask covers at least half of the pixel,
     /// else 0.
-    #[must_use]
     pub fn mask(&self) -> &GrayImage {
         self.to
             .as_ref()

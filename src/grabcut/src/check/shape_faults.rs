@@ -22,20 +22,17 @@ const NAMED: usize = 3;
 impl ShapeCheck {
     /// Why the mask is not that of the object, one sentence each; empty if it is. For a turn that was looked
     /// at as a whole.
-    #[must_use]
     pub fn faults(&self) -> Vec<String> {
         faults(self, MAX_REGION)
     }
 
     /// [`Self::faults`] after a look at only a few frames of the turn.
-    #[must_use]
     pub fn quick_faults(&self) -> Vec<String> {
         faults(self, MAX_REGION_OF_A_LOOK)
     }
 
     /// Whether the mask is that of another object or recording, rather than one with a flaw: much of it is background,
     /// or much of the object is not in it: around it, or in its holes, as of one that is inverted.
-    #[must_use]
     pub fn is_of_another_object(&self) -> bool {
         let share = |regions: &[DoubtfulRegion]| {
             let px: u64 = regions.iter().map(|region| region.px).sum();

@@ -1,5 +1,7 @@
 //! sRGB to CIE L*a*b* (D65), by tables: the colours that the models compare.
 
+use relit_data::srgb::to_linear_f32;
+
 /// Entries of the table of the cube root: its linear part near 0 spans 36 of them.
 const ROOTS: usize = 4096;
 
@@ -12,14 +14,7 @@ pub(crate) struct LabTable {
 
 impl LabTable {
     pub(crate) fn new() -> Self {
-        let linear = std::array::from_fn(|level| {
-            let value = level as f32 / 255.0;
-            if value <= 0.04045 {
-                value / 12.92
-            } else {
-                ((value + 0.055) / 1.055).powf(2.4)
-            }
-        });
+        let linear = std::array::from_fn(|level| to_linear_f32(level as f32 / 255.0));
         let root = (0..=ROOTS + 1).map(|step| {
             let value = step as f32 / ROOTS as f32;
             if value > 216.0 / 24389.0 {

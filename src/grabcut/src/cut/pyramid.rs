@@ -200,7 +200,6 @@ fn band(labels: &[Label], size: (usize, usize), radius: usize) -> Vec<u32> {
 }
 
 /// Half the image: each pixel is the average of 2 x 2; the last column and row of an odd side are doubled.
-#[must_use]
 pub fn half_image<P: Pixel<Subpixel = u8>>(
     image: &ImageBuffer<P, Vec<u8>>,
 ) -> ImageBuffer<P, Vec<u8>> {

@@ -86,19 +86,16 @@ impl Seeds {
     }
 
     /// Width and height, pixels.
-    #[must_use]
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
 
     /// The marks, row by row, `width * height` of them.
-    #[must_use]
     pub fn marks(&self) -> &[Mark] {
         &self.marks
     }
 
     /// Number of pixels of the painted image that had a colour and therefore count as unknown.
-    #[must_use]
     pub fn coloured_px(&self) -> u64 {
         self.coloured_px
     }
@@ -182,7 +179,6 @@ pub struct Hints {
 
 impl Hints {
     /// True if nothing is given.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rect.is_none() && self.seeds.is_none() && self.strokes.is_empty()
     }
@@ -203,7 +199,6 @@ impl Hints {
     }
 
     /// The marks of the seeds, none without seeds.
-    #[must_use]
     pub fn marks(&self) -> &[Mark] {
         self.seeds.as_ref().map_or(&[], Seeds::marks)
     }

@@ -66,13 +66,11 @@ impl Strokes {
     }
 
     /// True without any stroke.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
     /// Number of strokes.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.0.len()
     }

@@ -4,6 +4,8 @@
 //! backgrounds (`docs/results/masks.md`).
 
 use image::{RgbImage, imageops};
+use relit_data::srgb::{from_linear_f32, to_linear_f32};
+use relit_data::statistics::upper_median;
 
 use super::surface::{Colour, Surface, difference};
 use crate::MaskError;
@@ -205,9 +207,7 @@ fn fit_ring(colours: &[Colour], ring: &Bitmap, size: (usize, usize)) -> Option<(
     for _ in 0..ROUNDS {
         let surface = Surface::fit(colours, &used, size, DEGREES[0])?;
         let apart = differences(colours, &surface.colours(size));
-        let mut own: Vec<f32> = chosen(&apart, &used).collect();
-        let middle = own.len() / 2;
-        let (_, &mut median, _) = own.select_nth_unstable_by(middle, f32::total_cmp);
+        let median = upper_median(chosen(&apart, &used))?;
         let limit = (3.0 * (1.4826 * median).max(1.0)).max(4.0);
         used = ring.map(|at, bit| bit && apart[at] < limit);
         let count = used.count();
@@ -329,21 +329,10 @@ fn smoothed(colours: &[Colour], (width, height): (usize, usize)) -> Vec<Colour> 
 
 /// From an 8-bit value of sRGB to light, 0 to 1.
 fn linear(value: f32) -> f32 {
-    let value = value.clamp(0.0, 255.0) / 255.0;
-    if value <= 0.04045 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
-    }
+    to_linear_f32(value.clamp(0.0, 255.0) / 255.0)
 }
 
 /// From light to an 8-bit value of sRGB.
 fn coded(light: f32) -> f32 {
-    let light = light.clamp(0.0, 1.0);
-    let value = if light <= 0.003_130_8 {
-        12.92 * light
-    } else {
-        1.055 * light.powf(1.0 / 2.4) - 0.055
-    };
-    255.0 * value
+    255.0 * from_linear_f32(light.clamp(0.0, 1.0))
 }

@@ -4,6 +4,8 @@
 //! (slopes of pairs half the data apart, after Theil 1950 and Sen 1968). Three rounds of least squares
 //! over the points near the line refine it.
 
+use relit_data::statistics::upper_median;
+
 /// Rounds of rejecting outliers and fitting again.
 const ROUNDS: usize = 3;
 /// A point is an outlier beyond so many standard deviations.
@@ -55,7 +57,8 @@ pub(super) fn robust(points: &[(f64, f64)], floor: f64) -> Fit {
     for _ in 0..ROUNDS {
         let off = |&(x, y): &(f64, f64)| (y - line.at(x)).abs();
         let offs: Vec<f64> = points.iter().map(off).collect();
-        let limit = (median(offs.clone()) * SIGMA_OF_MAD * SIGMAS).max(floor);
+        let median = upper_median(offs.iter().copied()).unwrap_or_default();
+        let limit = (median * SIGMA_OF_MAD * SIGMAS).max(floor);
         kept = offs.iter().map(|off| *off <= limit).collect();
         let near = points.iter().zip(&kept).filter(|(_, kept)| **kept);
         line = least_squares(near.map(|(point, _)| *point)).unwrap_or(line);
@@ -65,9 +68,9 @@ pub(super) fn robust(points: &[(f64, f64)], floor: f64) -> Fit {
 
 /// The line of a given slope through the middle of `points`.
 pub(super) fn through(points: &[(f64, f64)], slope: f64) -> Line {
-    let x0 = median(points.iter().map(|point| point.0).collect());
+    let x0 = upper_median(points.iter().map(|point| point.0)).unwrap_or_default();
     let levels = points.iter().map(|(x, y)| y - (x - x0) * slope);
-    let y0 = median(levels.collect());
+    let y0 = upper_median(levels).unwrap_or_default();
     Line { x0, y0, slope }
 }
 
@@ -78,10 +81,8 @@ fn guess(points: &[(f64, f64)]) -> Line {
         .iter()
         .zip(far)
         .map(|((x, y), (xx, yy))| (yy - y) / (xx - x));
-    through(
-        points,
-        median(slopes.filter(|slope| slope.is_finite()).collect()),
-    )
+    let slope = upper_median(slopes.filter(|slope| slope.is_finite()));
+    through(points, slope.unwrap_or_default())
 }
 
 fn least_squares(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Line> {
@@ -96,11 +97,4 @@ fn least_squares(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Lin
     });
     let slope = sums.1 / sums.0;
     slope.is_finite().then_some(Line { x0, y0, slope })
-}
-
-/// 0 without values.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = (0.5 * values.len().saturating_sub(1) as f64).round() as usize;
-    values.get(middle).copied().unwrap_or_default()
 }

@@ -68,29 +68,18 @@ pub struct AngleFit {
 impl AngleFit {
     /// The table's angle at `t_us` microseconds of the host's clock, degrees; `None` outside
     /// the part at constant speed.
-    #[must_use]
     pub fn angle_at(&self, t_us: i64) -> Option<f64> {
         (self.from_us..=self.to_us)
             .contains(&t_us)
             .then(|| self.line.at(t_us as f64))
     }
 
-    /// When the table was at `angle_deg`, microseconds of the host's clock; `None` outside the
-    /// part at constant speed.
-    #[must_use]
-    pub fn time_at(&self, angle_deg: f64) -> Option<i64> {
-        let t_us = self.line.inverse(angle_deg)?.round() as i64;
-        (self.from_us..=self.to_us).contains(&t_us).then_some(t_us)
-    }
-
     /// Start and end of the part at constant speed, microseconds of the host's clock.
-    #[must_use]
     pub fn constant_us(&self) -> (i64, i64) {
         (self.from_us, self.to_us)
     }
 
     /// Speed by the host's clock, degrees/s; negative for turns in the negative direction.
-    #[must_use]
     pub fn degrees_per_second(&self) -> f64 {
         self.line.slope * 1e6
     }
@@ -110,7 +99,6 @@ pub(crate) fn timed(report: &PositionReport, turn: &JournaledTurn) -> Option<Jou
 
 impl AngleFit {
     /// The track of an interrupted turn by what was reported of it; `None` if that does not determine it.
-    #[must_use]
     pub fn from_reports(turn: &JournaledTurn, reports: &[JournaledReport]) -> Option<Self> {
         Self::from_part(reports, turn).ok()
     }

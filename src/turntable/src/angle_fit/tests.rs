@@ -161,18 +161,14 @@ fn a_chips_clock_that_wraps_around_in_the_middle_is_followed() {
 }
 
 #[test]
-fn angle_and_time_are_each_others_inverse_inside_the_constant_part_only() {
+fn angles_are_known_inside_the_constant_part_only() {
     let track = fit(&USUAL.reports(1), &EXPECTED).unwrap();
     let (from_us, to_us) = track.constant_us();
-    for angle in [-1.9, 0.0, 123.4, 361.9] {
-        let t_us = track.time_at(angle).unwrap();
-        assert!((track.angle_at(t_us).unwrap() - angle).abs() < 1e-4);
-    }
+    assert!(track.angle_at(from_us).is_some() && track.angle_at(to_us).is_some());
     assert_eq!(
         (track.angle_at(from_us - 1), track.angle_at(to_us + 1)),
         (None, None)
     );
-    assert_eq!((track.time_at(-2.1), track.time_at(362.1)), (None, None));
 }
 
 #[test]

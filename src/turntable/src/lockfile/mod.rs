@@ -25,7 +25,6 @@ const MAX_LENGTH: u64 = 20;
 
 /// Why a lock was not taken or could not be checked.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum LockError {
     /// Another process has it.
     #[error("{what} is in use by {}: end that one first", .pid.map_or("another process".to_owned(), |pid| format!("process {pid}")))]
@@ -62,7 +61,6 @@ impl LockError {
 
 /// The folder for locks and sockets on this machine: [`SHARED_FOLDER`] where it was set up, else this
 /// account's own, which [`use_folder`] makes.
-#[must_use]
 pub fn standard_folder() -> PathBuf {
     let shared = Path::new(SHARED_FOLDER);
     if shared.is_dir() {

@@ -34,7 +34,6 @@ pub enum LineOutcome {
 
 /// Why a line was not answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum LineFault {
     /// No answer came.
     #[error("no answer came to {tries} of it")]
@@ -55,7 +54,6 @@ pub enum LineFault {
 
 /// Why a line was not sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum SendError {
     /// Another line waits for its answer.
     #[error("another line waits for its answer")]

@@ -52,7 +52,6 @@ pub struct Machine {
 
 impl Machine {
     /// A machine that sends plain lines and requests no reports.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }

@@ -57,7 +57,6 @@ pub enum Message {
 }
 
 /// Parses one line without its line end; `None` if no controller of the Grbl family sends it.
-#[must_use]
 pub fn parse(line: &str) -> Option<Message> {
     match line.as_bytes().first()? {
         b'<' => StatusReport::parse(line).map(Message::Status),

@@ -31,7 +31,6 @@ pub enum ControllerState {
 
 impl ControllerState {
     /// Whether the table may be moving, or may start to move without a command.
-    #[must_use]
     pub fn may_move(self) -> bool {
         matches!(
             self,

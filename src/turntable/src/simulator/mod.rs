@@ -7,7 +7,7 @@
 //! it also gives its true angle at any time.
 //!
 //! ```
-//! use relit_clock::Clock;
+//! use relit_data::clock::Clock;
 //! use relit_turntable::simulator::{SimulatedTable, SimulatorOptions};
 //! use relit_turntable::{TableOptions, Table};
 //!
@@ -45,7 +45,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use relit_clock::{Clock, JoinHandle};
+use relit_data::clock::{Clock, JoinHandle};
 
 pub use faults::{SerialFaults, TableFaults};
 pub use ground_truth::{STEPS_PER_TURN, StepEdge};

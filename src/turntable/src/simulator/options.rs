@@ -1,7 +1,7 @@
 //! What a simulated table is like.
 
 use super::faults::TableFaults;
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 /// Options of a simulated table.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,7 +10,7 @@ use super::ground_truth::StepEdge;
 use super::model::Model;
 use super::options::SimulatorOptions;
 use crate::Port;
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 /// Interval at which a port checks for bytes.
 pub(super) const LOOK: Duration = Duration::from_micros(500);

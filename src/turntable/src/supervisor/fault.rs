@@ -5,7 +5,6 @@ use crate::protocol::{ControllerState, LineFault};
 
 /// The fault that ended a motion. The table is being stopped then, or has been.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum MotionFault {
     /// The controller restarted.
     #[error("the controller restarted{}, and its position is lost; check its supply and cable, then home it", .0.as_ref().map_or_else(String::new, |cause| format!(" ({cause})")))]

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use super::*;
 use fake_grbl::{FakeGrbl, FakePort, InjectedFaults};
-use relit_clock::Participant;
+use relit_data::clock::Participant;
 
 struct Rig {
     fake_grbl: Arc<Mutex<FakeGrbl>>,

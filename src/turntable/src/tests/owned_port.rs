@@ -12,7 +12,7 @@ use serialport::{SerialPort as _, TTYPort};
 use crate::lockfile::tests::accounts::{OPERATOR, OUTSIDER, SERVICE, as_user, share};
 use crate::tests::fake_grbl::FakeGrbl;
 use crate::{Table, TableOptions, TurntableError};
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 /// A fake controller at a pseudoterminal.
 struct Terminal {

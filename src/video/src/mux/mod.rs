@@ -118,13 +118,11 @@ impl Muxer {
     }
 
     /// Frames in the file.
-    #[must_use]
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
     /// Bytes taken so far, after coding.
-    #[must_use]
     pub fn bytes(&self) -> u64 {
         self.taken
     }

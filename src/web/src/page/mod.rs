@@ -28,7 +28,6 @@ pub struct PageAsset {
 }
 
 /// A file at `path` of the content type `kind`.
-#[must_use]
 pub const fn asset(path: &'static str, kind: &'static str, text: &'static str) -> PageAsset {
     PageAsset { path, kind, text }
 }
@@ -44,7 +43,6 @@ pub const SKETCH: [PageAsset; 4] = [
 
 impl PageAsset {
     /// The file as an answer.
-    #[must_use]
     pub fn answer(&self) -> Response {
         ([(header::CONTENT_TYPE, self.kind)], self.text).into_response()
     }
@@ -58,7 +56,6 @@ pub struct TokenQuery {
 
 impl TokenQuery {
     /// The token, where the URL has one.
-    #[must_use]
     pub fn token(&self) -> Option<&str> {
         self.token.as_deref()
     }

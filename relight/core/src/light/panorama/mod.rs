@@ -79,7 +79,6 @@ impl Panorama {
     ///
     /// # Panics
     /// Where `extent` has no pixels.
-    #[must_use]
     pub fn from_light(light: &ShLight, extent: Extent) -> Self {
         assert!(extent.pixels() > 0, "a panorama has pixels");
         let mut planes = Planes::zeros(extent);
@@ -96,26 +95,22 @@ impl Panorama {
     }
 
     /// The radiance, as an image.
-    #[must_use]
     pub const fn image(&self) -> &Rgb<Linear> {
         &self.image
     }
 
     /// Width and height.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.image.planes().extent()
     }
 
     /// The direction of a point of the image, in pixels from the left and from the top: (0.5, 0.5) is
     /// the middle of the first pixel.
-    #[must_use]
     pub fn direction(&self, x: f64, y: f64) -> Direction {
         direction_at(self.extent(), x, y)
     }
 
     /// Column and row of the pixel that lies in a direction.
-    #[must_use]
     pub fn pixel_towards(&self, direction: Direction) -> (usize, usize) {
         let Extent { width, height } = self.extent();
         let [x, y, z] = direction.components();
@@ -127,14 +122,12 @@ impl Panorama {
     }
 
     /// The radiance from a direction: that of its pixel.
-    #[must_use]
     pub fn radiance(&self, from: Direction) -> [f32; 3] {
         let (x, y) = self.pixel_towards(from);
         self.image.planes().pixel(x, y)
     }
 
     /// The solid angle of each pixel of a row, steradian.
-    #[must_use]
     pub fn solid_angle(&self, row: usize) -> f64 {
         let Extent { width, height } = self.extent();
         let [above, below] = [row, row + 1].map(|edge| (PI * edge as f64 / height as f64).cos());

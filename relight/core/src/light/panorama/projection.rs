@@ -21,7 +21,6 @@ impl Panorama {
     /// With the zenith as pole a harmonic is a function of the polar angle times one of the azimuth,
     /// so that the integral over a pixel is a product of two; the sum is then rotated to the viewer's
     /// frame.
-    #[must_use]
     pub fn project(&self, order: Order) -> ShLight {
         let Extent { width, height } = self.extent();
         let harmonics = AzimuthHarmonics::new(order, width);

@@ -6,7 +6,6 @@ use crate::image::{Extent, Planes, Rgb, area_shares};
 impl Panorama {
     /// The panorama turned about the vertical axis (+y, right-hand rule) by `columns` of its width:
     /// the light of [`ShLight::rotated`](crate::light::ShLight::rotated) by `2π columns / width`.
-    #[must_use]
     pub fn turned(&self, columns: usize) -> Self {
         let Extent { width, height } = self.extent();
         let mut turned = self.image.planes().clone();
@@ -24,7 +23,6 @@ impl Panorama {
     ///
     /// # Panics
     /// Where `extent` has no pixels.
-    #[must_use]
     pub fn resized(&self, extent: Extent) -> Self {
         assert!(extent.pixels() > 0, "a panorama has pixels");
         let from = self.extent();

@@ -42,7 +42,6 @@ pub struct LightSample {
 
 impl<'a> LightSampler<'a> {
     /// Prepares the sums. A black panorama is drawn from evenly.
-    #[must_use]
     pub fn new(panorama: &'a Panorama) -> Self {
         let is_black = !sums(panorama, false).0.last().is_some_and(|&all| all > 0.0);
         let (rows, columns) = sums(panorama, is_black);
@@ -54,7 +53,6 @@ impl<'a> LightSampler<'a> {
     }
 
     /// The direction that belongs to two numbers, each even in 0..1.
-    #[must_use]
     pub fn draw(&self, [first, second]: [f64; 2]) -> LightSample {
         let (row, down) = find(&self.rows, first);
         let width = self.panorama.extent().width;
@@ -79,14 +77,12 @@ impl<'a> LightSampler<'a> {
     }
 
     /// The density with which a direction is drawn, per steradian.
-    #[must_use]
     pub fn density(&self, direction: Direction) -> f64 {
         let (x, y) = self.panorama.pixel_towards(direction);
         self.density_of_pixel(x, y)
     }
 
     /// The panorama that is drawn from.
-    #[must_use]
     pub const fn panorama(&self) -> &'a Panorama {
         self.panorama
     }

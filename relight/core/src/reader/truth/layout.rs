@@ -10,7 +10,6 @@ use crate::reader::listing::listed;
 
 /// How a folder of images with their ground truth is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum TruthLayout {
     /// MIT Intrinsic Images (Grosse et al. 2009), as the release of SIRFS has it:
     /// `<object>/{original,diffuse,reflectance,shading,specular,mask}.png`, 16 bits, linear, and
@@ -95,7 +94,6 @@ impl TruthLayout {
     pub const ALL: [Self; 3] = [Self::Synth, Self::Mit, Self::Janner];
 
     /// The name on the command line.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Synth => "synth",

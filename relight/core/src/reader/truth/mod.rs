@@ -38,7 +38,6 @@ pub struct TruthSample {
 
 impl TruthSample {
     /// Width and height.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.mask.extent()
     }

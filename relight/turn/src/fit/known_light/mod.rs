@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use relight_core::light::ShLight;
-use relight_core::statistics::{median, quantile};
+use relit_data::statistics::{median, quantile};
 
 use crate::fit::confidence::{
     FREEDOM, FittedPixels, NormalUncertainty, common_error, normal_uncertainties, shared_albedo,
@@ -46,7 +46,6 @@ const SPREAD_DEVIATIONS: f64 = 1.645;
 ///
 /// Gloss is fitted on some of the pixels, then every pixel by itself. Then parts of the turn with a large residual, shadows
 /// and highlights, count less for that pixel, and it is fitted again.
-#[must_use]
 pub fn solve_in_light(
     curves: &TurnCurves,
     light: &ShLight,

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use relight_core::light::NormalEquations;
-use relight_core::statistics::median;
+use relit_data::statistics::median;
 use relit_data::turn_light::MIN_MODULATION;
 use serde::Serialize;
 

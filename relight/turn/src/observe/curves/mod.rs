@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use relight_core::image::{ColourSpace, Extent, Planes, Srgb};
-use relight_core::statistics::median;
 use relit_data::image_stats::SATURATED_VALUE;
+use relit_data::statistics::median;
 
 use crate::error::TurnError;
 use crate::model::harmonics::{COEFFICIENTS, HARMONICS};
@@ -191,7 +191,6 @@ impl Part {
 
 impl TurnCurves {
     /// Width and height of the frames.
-    #[must_use]
     pub const fn extent(&self) -> Extent {
         self.extent
     }
@@ -202,7 +201,6 @@ impl TurnCurves {
     }
 
     /// How many frames were taken up.
-    #[must_use]
     pub const fn frames(&self) -> u32 {
         self.frames
     }
@@ -290,7 +288,6 @@ impl TurnCurves {
     }
 
     /// The degrees of the turn that the frames cover: all except gaps much larger than the usual distance.
-    #[must_use]
     pub fn coverage_deg(&self) -> f64 {
         let mut angles: Vec<f64> = self.angles.iter().map(|angle| angle.to_degrees()).collect();
         angles.sort_by(f64::total_cmp);

@@ -11,7 +11,6 @@ const MAX_RESIDUAL: f64 = 0.4;
 
 impl SolvedTurn {
     /// Its warnings.
-    #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = self.ball.iter().flat_map(of_ball).collect();
         warnings.extend(self.of_rotation());
@@ -48,7 +47,6 @@ impl SolvedTurn {
     }
 
     /// Whether no frame was left out and normals and albedo are observable.
-    #[must_use]
     pub fn is_whole(&self) -> bool {
         self.turn.damage.is_empty() && self.solution.verdict().is_fit()
     }

@@ -4,6 +4,7 @@ use image::RgbImage;
 use relit_data::geometry::Rect;
 use relit_data::image_stats::SATURATION_LEVEL;
 use relit_data::srgb::to_linear;
+use relit_data::statistics::median;
 use relit_data::turn_light::modulation;
 use relit_video::{LiveDecoder, PixelFormat, StreamFormat, is_key};
 
@@ -104,14 +105,7 @@ impl EnvironmentLight {
                 .then(|| modulation(&seen))
                 .flatten()
         };
-        let mut all: Vec<f64> = (0..(BLOCKS * BLOCKS) as usize)
-            .filter_map(of_block)
-            .collect();
-        if all.is_empty() {
-            return None;
-        }
-        let middle = (all.len() - 1) / 2;
-        Some(*all.select_nth_unstable_by(middle, f64::total_cmp).1)
+        median((0..(BLOCKS * BLOCKS) as usize).filter_map(of_block))
     }
 }
 

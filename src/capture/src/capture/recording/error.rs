@@ -10,7 +10,6 @@ use relit_video::VideoError;
 /// Why a recording could not begin, be finished, or be recovered. What ends a recording early is no
 /// such error: see [`super::EndReason`].
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum RecordingError {
     /// A thread could not be started, or a folder of sessions could not be listed.
     #[error("{what}")]
@@ -47,7 +46,6 @@ pub enum RecordingError {
 
 impl RecordingError {
     /// True where a disk, quota or file size limit is exhausted.
-    #[must_use]
     pub fn is_out_of_space(&self) -> bool {
         match self {
             Self::Video(VideoError::DiskFull { .. }) => true,

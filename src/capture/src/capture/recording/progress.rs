@@ -1,7 +1,7 @@
 //! What a recording's owner and its two threads share: wishes one way, such as the time of the turn, figures the
 //! other.
 
-use relit_clock::Waitable;
+use relit_data::clock::Waitable;
 
 /// How far a recording has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,7 +38,6 @@ pub struct Window {
 
 impl Window {
     /// A window of `us` microseconds, at least one, from `from_us` on.
-    #[must_use]
     pub fn lasting(from_us: i64, us: i64) -> Self {
         let from_us = from_us.min(i64::MAX - 1);
         Self {

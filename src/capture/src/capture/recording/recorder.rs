@@ -17,7 +17,7 @@ use super::verdict::FinishedRecording;
 use super::writer_thread::{JournalLine, WriterThread};
 use crate::preview::Preview;
 use relit_camera::Camera;
-use relit_clock::{Clock, JoinHandle};
+use relit_data::clock::{Clock, JoinHandle};
 use relit_data::session::{Fault, Manifest, SessionWriter};
 use relit_data::turn_motion::{JournaledReport, JournaledTurn};
 use relit_video::{Muxer, PixelFormat, StreamFormat, is_key};
@@ -144,14 +144,12 @@ impl Recorder {
     }
 
     /// Waits until nothing more is recorded, or `timeout` is over; true where it has ended.
-    #[must_use]
     pub fn wait_ended(&self, timeout: Duration) -> bool {
         let ended = |state: &mut State| state.progress.ended.then_some(());
         self.shared.wait_for(timeout, ended).is_some()
     }
 
     /// How far it has come.
-    #[must_use]
     pub fn progress(&self) -> Progress {
         self.shared.lock().progress
     }

@@ -28,7 +28,6 @@ pub struct FinishedRecording {
 
 impl FinishedRecording {
     /// Why it ended.
-    #[must_use]
     pub fn end(&self) -> &EndReason {
         &self.camera.end
     }
@@ -46,14 +45,12 @@ impl FinishedRecording {
 
     /// How much the light on what stands in the middle of the picture changes over the turn, as
     /// [`relit_data::turn_light`] measures it; `None` if too few frames could be looked at.
-    #[must_use]
     pub fn modulation(&self) -> Option<f64> {
         let frames = usize::try_from(self.camera.count.expected).unwrap_or(usize::MAX);
         self.writer.light.modulation(frames)
     }
 
     /// What the table reported of the turn.
-    #[must_use]
     pub fn journal(&self) -> Option<&TurnJournal> {
         self.writer.session.journal()
     }

@@ -19,7 +19,6 @@ use session::{Progress, SessionCheck, ShardContents};
 
 /// The result of a verification.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct VerifyReport {
     /// Sessions that `dataset.json` lists.
     pub sessions: u64,
@@ -33,7 +32,6 @@ pub struct VerifyReport {
 
 /// Something that is wrong with a data set.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct VerifyProblem {
     /// The session, if it is known.
     pub session: Option<String>,

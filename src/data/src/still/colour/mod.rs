@@ -80,13 +80,11 @@ impl Colour {
     }
 
     /// Whether the numbers are sRGB's.
-    #[must_use]
     pub const fn is_srgb(&self) -> bool {
         matches!(self.curve_alone(), Some(Curve::Srgb))
     }
 
     /// Whether the numbers are light in Rec. 709.
-    #[must_use]
     pub const fn is_linear(&self) -> bool {
         matches!(self.curve_alone(), Some(Curve::Linear))
     }

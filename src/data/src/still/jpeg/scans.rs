@@ -1,4 +1,5 @@
-//! Goes through the scans of a JPEG and counts its blocks, without decoding them (ITU-T T.81, annexes F and G).
+//! Goes through the scans of a sequential JPEG and counts its blocks, without decoding them (ITU-T T.81, annex F). Cameras
+//! that forget the end marker write no others.
 
 use super::huffman::{Bits, Codes};
 use super::{EOI, SOS, is_frame, segment};
@@ -8,13 +9,10 @@ const BLOCK: usize = 64;
 /// Pictures have no more components, and no more scans.
 const MAX_COMPONENTS: u8 = 4;
 const MAX_SCANS: usize = 100;
-/// The most blocks whose non-zero places are remembered.
-const MAX_BLOCKS: usize = 1 << 24;
 const DHT: u8 = 0xc4;
 const DRI: u8 = 0xdd;
-/// Sequential and progressive frames with Huffman's codes.
+/// Sequential frames with Huffman's codes.
 const SEQUENTIAL: [u8; 2] = [0xc0, 0xc1];
-const PROGRESSIVE: u8 = 0xc2;
 
 /// The place behind the last scan; `None` if a scan is not whole, or scans are missing.
 pub(super) fn end(bytes: &[u8]) -> Option<usize> {
@@ -74,16 +72,11 @@ struct Component {
     sampling: [usize; 2],
     /// Its own blocks, across and down.
     blocks: [usize; 2],
-    /// Blocks in a row with those that fill up the last MCU.
-    stride: usize,
-    /// Of a progressive frame: a bit for each coefficient of a block that is not zero.
-    known: Vec<u64>,
-    /// The lowest bit of each coefficient that a scan has brought.
-    lowest: [Option<u8>; BLOCK],
+    /// Whether a scan has brought it.
+    is_there: bool,
 }
 
 struct Frame {
-    is_progressive: bool,
     /// Across and down.
     mcus: [usize; 2],
     components: Vec<Component>,
@@ -91,8 +84,7 @@ struct Frame {
 
 impl Frame {
     fn read(marker: u8, content: &[u8]) -> Option<Self> {
-        let is_progressive = marker == PROGRESSIVE;
-        if !is_progressive && !SEQUENTIAL.contains(&marker) {
+        if !SEQUENTIAL.contains(&marker) {
             return None;
         }
         let side = |at: usize| {
@@ -119,8 +111,6 @@ impl Frame {
         let mcus: [usize; 2] = [0, 1].map(|axis| size[axis].div_ceil(8 * most[axis]));
         let component = |part: &[u8]| {
             let sampling = sampling(part);
-            let stride = mcus[0] * sampling[0];
-            let count = stride * mcus[1] * sampling[1];
             Component {
                 id: part[0],
                 sampling,
@@ -129,32 +119,18 @@ impl Frame {
                         .div_ceil(most[axis])
                         .div_ceil(8)
                 }),
-                stride,
-                known: vec![
-                    0;
-                    if is_progressive && count <= MAX_BLOCKS {
-                        count
-                    } else {
-                        0
-                    }
-                ],
-                lowest: [None; BLOCK],
+                is_there: false,
             }
         };
         Some(Self {
-            is_progressive,
             mcus,
             components: parts.map(component).collect(),
         })
     }
 
-    /// Whether scans have brought all coefficients with all bits.
+    /// Whether scans have brought all components.
     fn is_whole(&self) -> bool {
-        let mut lowest = self
-            .components
-            .iter()
-            .flat_map(|component| component.lowest);
-        lowest.all(|bit| bit == Some(0))
+        self.components.iter().all(|component| component.is_there)
     }
 
     /// Goes through a scan: the place behind it.
@@ -164,41 +140,23 @@ impl Frame {
             [only] => self.components.get(only.component)?.blocks,
             _ => self.mcus,
         };
-        let mut run = 0;
         for number in 0..mcus[0] * mcus[1] {
             if tables.restart > 0 && number > 0 && number % tables.restart as usize == 0 {
                 bits.restart()?;
-                run = 0;
             }
-            let place = [number % mcus[0], number / mcus[0]];
             for part in &scan.parts {
-                let component = self.components.get_mut(part.component)?;
-                let [across, down] = if is_interleaved {
-                    component.sampling
-                } else {
-                    [1, 1]
-                };
-                for block in 0..across * down {
-                    let x = place[0] * across + block % across;
-                    let y = place[1] * down + block / across;
-                    let known = component.known.get_mut(y * component.stride + x);
-                    let codes = part
-                        .codes
-                        .map(|[class, place]| tables.codes[class][place].as_ref());
-                    if self.is_progressive {
-                        scan.pass_progressive(codes, &mut bits, &mut run, known?)?;
-                    } else {
-                        pass_sequential(codes, &mut bits)?;
-                    }
+                let [across, down] = self.components.get(part.component)?.sampling;
+                let blocks = if is_interleaved { across * down } else { 1 };
+                let [dc, ac] = part
+                    .codes
+                    .map(|[class, place]| tables.codes[class][place].as_ref());
+                for _ in 0..blocks {
+                    pass_block(dc?, ac?, &mut bits)?;
                 }
             }
         }
         for part in &scan.parts {
-            let component = self.components.get_mut(part.component)?;
-            component
-                .lowest
-                .get_mut(scan.first..=scan.last)?
-                .fill(Some(scan.low));
+            self.components.get_mut(part.component)?.is_there = true;
         }
         Some(bits.place())
     }
@@ -213,12 +171,6 @@ struct Part {
 
 struct Scan {
     parts: Vec<Part>,
-    /// The first and the last coefficient.
-    first: usize,
-    last: usize,
-    /// The lowest bit that scans before have brought, or 0, and the lowest of this scan.
-    high: u8,
-    low: u8,
 }
 
 impl Scan {
@@ -237,136 +189,16 @@ impl Scan {
             })
         });
         let parts: Vec<Part> = parts.collect::<Option<_>>()?;
-        let rest = content.get(1 + 2 * count..4 + 2 * count)?;
-        let (first, last) = (usize::from(rest[0]), usize::from(rest[1]));
-        let scan = if frame.is_progressive {
-            Self {
-                parts,
-                first,
-                last,
-                high: rest[2] >> 4,
-                low: rest[2] & 15,
-            }
-        } else {
-            Self {
-                parts,
-                first: 0,
-                last: BLOCK - 1,
-                high: 0,
-                low: 0,
-            }
-        };
-        let is_possible = !scan.parts.is_empty() && scan.first <= scan.last && scan.last < BLOCK;
-        is_possible.then_some(scan)
-    }
-
-    fn pass_progressive(
-        &self,
-        [dc, ac]: [Option<&Codes>; 2],
-        bits: &mut Bits<'_>,
-        run: &mut u32,
-        known: &mut u64,
-    ) -> Option<()> {
-        match (self.first, self.high) {
-            (0, 0) => {
-                let size = bits.symbol(dc?)?;
-                bits.number(size).map(drop)
-            }
-            (0, _) => bits.bit().map(drop),
-            (_, 0) => self.pass_first(ac?, bits, run, known),
-            _ => self.refine(ac?, bits, run, known),
-        }
-    }
-
-    /// The first bits of AC coefficients.
-    fn pass_first(
-        &self,
-        ac: &Codes,
-        bits: &mut Bits<'_>,
-        run: &mut u32,
-        known: &mut u64,
-    ) -> Option<()> {
-        if *run > 0 {
-            *run -= 1;
-            return Some(());
-        }
-        let mut at = self.first;
-        while at <= self.last {
-            let symbol = bits.symbol(ac)?;
-            let (zeros, size) = (symbol >> 4, symbol & 15);
-            match (zeros, size) {
-                (15, 0) => at += 16,
-                (bits_of_run, 0) => {
-                    *run = (1 << bits_of_run) - 1 + bits.number(bits_of_run)?;
-                    break;
-                }
-                _ => {
-                    at += usize::from(zeros);
-                    bits.number(size)?;
-                    *known |= bit_of(at)?;
-                    at += 1;
-                }
-            }
-        }
-        Some(())
-    }
-
-    /// One bit more of AC coefficients.
-    fn refine(
-        &self,
-        ac: &Codes,
-        bits: &mut Bits<'_>,
-        run: &mut u32,
-        known: &mut u64,
-    ) -> Option<()> {
-        let mut at = self.first;
-        while *run == 0 && at <= self.last {
-            let symbol = bits.symbol(ac)?;
-            let (mut zeros, size) = (symbol >> 4, symbol & 15);
-            if size == 0 && zeros < 15 {
-                *run = (1 << zeros) + bits.number(zeros)?;
-                break;
-            }
-            if size > 0 {
-                bits.bit()?;
-            }
-            while at <= self.last {
-                if *known & bit_of(at)? != 0 {
-                    bits.bit()?;
-                } else if zeros == 0 {
-                    break;
-                } else {
-                    zeros -= 1;
-                }
-                at += 1;
-            }
-            if size > 0 && at <= self.last {
-                *known |= bit_of(at)?;
-            }
-            at += 1;
-        }
-        if *run > 0 {
-            for at in at..=self.last {
-                if *known & bit_of(at)? != 0 {
-                    bits.bit()?;
-                }
-            }
-            *run -= 1;
-        }
-        Some(())
+        (!parts.is_empty()).then_some(Self { parts })
     }
 }
 
-fn bit_of(coefficient: usize) -> Option<u64> {
-    1_u64.checked_shl(u32::try_from(coefficient).ok()?)
-}
-
-fn pass_sequential([dc, ac]: [Option<&Codes>; 2], bits: &mut Bits<'_>) -> Option<()> {
-    let size = bits.symbol(dc?)?;
+fn pass_block(dc: &Codes, ac: &Codes, bits: &mut Bits<'_>) -> Option<()> {
+    let size = bits.symbol(dc)?;
     bits.number(size)?;
     let mut at = 1;
     while at < BLOCK {
-        let symbol = bits.symbol(ac?)?;
+        let symbol = bits.symbol(ac)?;
         match (symbol >> 4, symbol & 15) {
             (15, 0) => at += 16,
             (_, 0) => break,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{FakeGrbl, TICK_US};
 use crate::port::Port;
-use relit_clock::Clock;
+use relit_data::clock::Clock;
 
 /// A port to the fake controller.
 pub(crate) struct FakePort {

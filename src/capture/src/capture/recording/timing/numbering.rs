@@ -1,5 +1,7 @@
 //! The exposure number of every delivered frame, from counter and time stamps or from one of them.
 
+use relit_data::statistics::upper_median;
+
 use super::anomaly::TimingAnomaly;
 use super::line::Line;
 use super::period_fit::PeriodFit;
@@ -120,15 +122,13 @@ impl Numbering {
 fn median_period(counted: &[i64], times: &[f64]) -> Option<f64> {
     let lag = (counted.len() / 4).clamp(1, 64);
     let frames = || counted.iter().zip(times);
-    let mut periods: Vec<f64> = frames()
+    let periods = frames()
         .zip(frames().skip(lag))
         .filter_map(|((n0, t0), (n1, t1))| {
             let period = (t1 - t0) / (n1 - n0) as f64;
             (n1 > n0 && period > 0.0).then_some(period)
-        })
-        .collect();
-    periods.sort_by(f64::total_cmp);
-    periods.get(periods.len() / 2).copied()
+        });
+    upper_median(periods)
 }
 
 /// The difference between stamps and counter around a frame, by majority: its neighbours outvote

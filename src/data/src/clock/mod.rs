@@ -24,7 +24,7 @@
 //! On the monotonic clock these do the same as their counterparts in the standard library.
 //!
 //! ```
-//! use relit_clock::{Clock, Waitable};
+//! use relit_data::clock::{Clock, Waitable};
 //! use std::sync::Arc;
 //! use std::time::Duration;
 //!
