@@ -29,6 +29,11 @@ pub(crate) fn too_coarse(view: &PanoramaView, panorama: &Panorama) -> Option<Str
     })
 }
 
+/// Whether the value of `--light` is the photograph's own light, and no file.
+pub(crate) fn is_own(light: &Path) -> bool {
+    light == Path::new("own")
+}
+
 /// New light.
 #[derive(Args)]
 pub(crate) struct LightArguments {

@@ -25,7 +25,8 @@ pub(crate) struct PhotoArguments {
     /// alpha, or all but its black background].
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) mask: Option<PathBuf>,
-    /// A rectangle around the object, pixels; all of it is the object if neither alpha nor a black background shows which part.
+    /// A rectangle around the object, pixels: the object is cut out within it, as by relit-mask --rect; of a photograph with
+    /// alpha, what alpha shows within it.
     #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask")]
     pub(crate) rect: Option<Rect>,
     #[command(flatten)]
@@ -80,6 +81,13 @@ pub(crate) fn name_lost(input: &PhotoInput, message: &str, console: Console) {
     let text = format!("{}: {message}", input.place());
     let event = json!({ "event": "failed", "photo": input.place(), "message": message });
     console.warn_with(&text, &event);
+}
+
+/// Names what a person may want to know of a photograph.
+pub(crate) fn name_notes(photo: &str, notes: &[String], console: Console) {
+    for note in notes {
+        console.warn(&format!("{photo}: {note}"));
+    }
 }
 
 /// How photographs are decomposed.

@@ -91,9 +91,12 @@ fn folders_of_relight_decompose_say_themselves_how_they_are_encoded() {
     let set = TruthSet::open(&truth, TruthLayout::Mit).unwrap();
     // Nobody says it: linear, as files of other programs are.
     assert!(worst(&evaluated(&set, &found).unwrap()) > 1e-3);
+    let named = Predictions::new(found.clone(), NormalsFrame::YUp);
+    assert_eq!(named.undescribed(set.names()), Some(cup.join("albedo.png")));
     let text = r#"{"schema": "relight.decomposition/1", "transfer": "srgb", "white": {}}"#;
     fs::write(cup.join("decomposition.json"), text).unwrap();
     assert!(worst(&evaluated(&set, &found).unwrap()) < 1e-6);
+    assert_eq!(named.undescribed(set.names()), None);
     fs::write(cup.join("decomposition.json"), r#"{"schema": "other/1"}"#).unwrap();
     let text = with_causes(&evaluated(&set, &found).unwrap_err());
     assert!(text.contains("other/1"), "{text}");

@@ -193,12 +193,6 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
             "line 2",
         ),
         (
-            "relight odd.exr --mask masks/one.png --lamp 0,0 --weights w.safetensors -o o.png"
-                .to_owned(),
-            1,
-            "column 5, row 0",
-        ),
-        (
             "relight huge.png --mask masks/one.png --lamp 0,0 -o o.png".to_owned(),
             1,
             "20000 x 20000",
@@ -209,6 +203,12 @@ fn what_is_wrong_is_told_in_a_sentence_and_nothing_is_written() {
             "none.png",
         ),
         (format!("{one} -o o.png"), 2, "--lamp AZIMUTH,ELEVATION"),
+        (format!("{one} --lamp 400,120 -o o.png"), 2, "90"),
+        (
+            "relight photos/one.png photos/two.png --lamp 30,40 -o o.png".to_owned(),
+            2,
+            "o.png",
+        ),
         (format!("{one} --lamp 30 -o o.png"), 2, "AZIMUTH,ELEVATION"),
         (format!("{one} --lamp 30,40 -o o.mp4"), 2, ".exr"),
         (
@@ -517,6 +517,11 @@ fn a_scene_that_cannot_be_is_told_in_a_sentence_and_nothing_is_written() {
             "--mask",
         ),
         (format!("{one} --into sky.exr -o o.bmp"), 2, ".webm"),
+        (
+            format!("{one} --into sky.exr --light own -o o.png"),
+            2,
+            "--light own",
+        ),
     ] {
         let (found, errors) = folder.code_and_errors(&command);
         assert_eq!(found, code, "{command}: {errors}");
@@ -535,6 +540,86 @@ fn what_is_withheld_of_a_lamp_is_told_and_is_a_third_at_most() {
     let relit = relit_event(&output.stdout);
     let withheld = relit["withheld"].as_f64().unwrap();
     assert!((0.0..=1.0 / 3.0).contains(&withheld), "{withheld}");
+}
+
+#[test]
+fn float_photographs_are_made_usable_by_every_verb_with_warnings_in_the_same_words() {
+    let folder = Folder::new();
+    let extent = Extent::new(WIDTH as usize, HEIGHT as usize);
+    let odd = Planes::from_fn(extent, |x, y| {
+        let levels = photo().get_pixel(x as u32, y as u32).0;
+        let light = levels.map(|level| 1000.0 * Srgb::to_linear(f32::from(level) / 255.0));
+        if (x, y) == (5, 0) {
+            [f32::NAN, -1.0, 300.0]
+        } else {
+            light
+        }
+    });
+    write_exr(&folder.path("odd.exr"), &odd).unwrap();
+    let common = "--weights w.safetensors --json -o";
+    let warnings = |command: &str| {
+        let output = folder.run(command);
+        assert_eq!(output.status.code(), Some(0), "{command}");
+        let events = serde_json::Deserializer::from_slice(&output.stdout).into_iter();
+        let events = events.map(|event: Result<serde_json::Value, _>| event.unwrap());
+        let warnings = events.filter(|event| event["event"] == "warning");
+        let messages = warnings.map(|event| event["message"].as_str().unwrap().to_owned());
+        messages.collect::<Vec<_>>()
+    };
+    let decomposed = warnings(&format!(
+        "decompose odd.exr --mask masks/one.png {common} out"
+    ));
+    assert_eq!(decomposed.len(), 2, "{decomposed:?}");
+    assert!(decomposed.iter().all(|warning| warning.contains("odd.exr")));
+    for command in [
+        format!("relight odd.exr --mask masks/one.png --light own {common} same.exr"),
+        format!("insert odd.exr --mask masks/one.png --into photos/two.png {common} o.png"),
+        format!("insert photos/one.png --mask masks/one.png --into odd.exr {common} behind.exr"),
+    ] {
+        assert_eq!(warnings(&command), decomposed, "{command}");
+    }
+    // What is written has the units of the scaled photograph.
+    let json = fs::read(folder.path("out/decomposition.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    let scale = json["scale"].as_f64().unwrap() as f32;
+    for name in ["same.exr", "behind.exr"] {
+        let found = read_planes(&folder.path(name)).unwrap().0.pixel(2, 2)[2];
+        assert!(
+            (found / (scale * odd.pixel(2, 2)[2]) - 1.0).abs() < 0.05,
+            "{name}: {found}"
+        );
+    }
+}
+
+#[test]
+fn a_decomposition_s_folder_is_an_object_and_a_rectangle_shows_one() {
+    let folder = Folder::new();
+    let common = "--weights w.safetensors -o";
+    let rect = "--rect 12,4,40,40";
+    let command = format!("decompose photos/one.png {rect} {common} cut");
+    assert_eq!(folder.code_and_errors(&command).0, 0);
+    let (mask, _) = read_planes(&folder.path("cut/mask.png")).unwrap();
+    let [inside, corner] = [(32, 24), (13, 5)].map(|(x, y)| mask.pixel(x, y)[0]);
+    assert_eq!([inside, corner], [1.0, 0.0]);
+    let command = format!("insert photos/one.png {rect} --into photos/two.png {common} o.png");
+    assert_eq!(folder.code_and_errors(&command).0, 0);
+
+    let command = "render image cut --lamp 30,40 -o lit.png";
+    assert_eq!(folder.code_and_errors(command), (0, String::new()));
+    let (lit, _) = read_planes(&folder.path("lit.png")).unwrap();
+    assert!(lit.pixel(32, 24)[0] > 0.2 && lit.pixel(13, 5) == [0.0; 3]);
+    let command = format!("insert cut --into photos/two.png --json {common} folder.png");
+    let output = folder.run(&command);
+    assert_eq!(output.status.code(), Some(0));
+    let event: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    // The background is blue: its light is taken as less so.
+    let blue = |what: &str| event["light_colour"][what][2].as_f64().unwrap();
+    assert!(blue("found") > 1.2 && blue("used") > 1.0);
+    assert!(blue("used") - 1.0 < 0.3 * (blue("found") - 1.0), "{event}");
+    let command = format!("insert cut {rect} --into photos/two.png {common} none.png");
+    let (code, errors) = folder.code_and_errors(&command);
+    assert!(code == 1 && errors.contains("cut"), "{errors}");
+    assert!(!folder.path("none.png").exists());
 }
 
 /// What a run says of the photograph that it has relit.

@@ -119,6 +119,21 @@ fn an_exr_holds_light_in_the_exposure_that_was_asked_for() {
 }
 
 #[test]
+fn a_still_object_against_the_light_is_exposed_longer_and_a_video_as_for_light_from_all_sides() {
+    let scene = Scene::new();
+    let exposure = |lamp: &str| {
+        let output = scene.image_of(&format!("--normals up.png --lamp {lamp} --json"));
+        assert_eq!(code(&output), 0, "{}", errors(&output));
+        let event: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        event["exposure"].as_f64().unwrap()
+    };
+    let [front, behind] = ["0,20 -o front.png", "180,20 -o behind.png"].map(exposure);
+    let rotating = exposure("180,20 --rotate 90 --seconds 0.1 --fps 10 -o frames");
+    assert!(behind > 1.2 * front, "{behind} {front}");
+    assert!((rotating / front - 1.0).abs() < 0.02, "{rotating} {front}");
+}
+
+#[test]
 fn materials_are_one_sheet_of_six_by_four() {
     let scene = Scene::new();
     let output = scene.render("materials --normals up.png --light light.txt -o sheet.png");

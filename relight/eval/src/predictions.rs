@@ -59,6 +59,18 @@ impl Predictions {
         Ok(Rgb::new(brought_to(path, image.into_planes(), extent)?))
     }
 
+    /// The first PNG of colours of these samples that is read as linear light, as nothing beside it says how it is encoded.
+    #[must_use]
+    pub fn undescribed<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Option<PathBuf> {
+        let mut names = names.into_iter();
+        names.find_map(|name| {
+            let parts = ["albedo", "shading", "highlight", "specular"];
+            let mut files = parts.iter().filter_map(|part| self.existing(name, part));
+            let png = files.find(|path| path.extension().is_some_and(|ending| ending == "png"));
+            png.filter(|_| !self.file(name, DESCRIPTION).is_file())
+        })
+    }
+
     /// How PNGs of the sample `name` hold colours.
     fn transfer(&self, name: &str) -> Result<Transfer, EvalError> {
         let path = self.file(name, DESCRIPTION);

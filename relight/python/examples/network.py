@@ -5,7 +5,8 @@ import onnxruntime
 
 
 def encode(image, mask):
-    """image: rows x columns x 3, linear, sides multiples of 32; mask: bool. What the network takes, and the light of its 1."""
+    """image: rows x columns x 3, linear, the object resized to 128 x 128 (sides are multiples of 32); mask: bool.
+    What the network takes, and the light of its 1."""
     white = max(np.sort(image.max(2)[mask])[int(0.99 * mask.sum())], 1e-6)
     light = np.clip(image / white, 0, 1.5)
     mean = light.mean(2, keepdims=True)

@@ -69,9 +69,8 @@ def decompose(image, mask=None, *, box=None, transfer=None, highlights="auto", m
 
     Gives the same numbers as `relight decompose`.
     """
-    found, note = _relit.decompose(photograph(image, mask, box, transfer), highlights, mirror)
-    if note:
-        warn([f"the mask {note}"])
+    found, notes = _relit.decompose(photograph(image, mask, box, transfer), highlights, mirror)
+    warn(notes)
     return Decomposition(**found)
 
 
@@ -155,7 +154,7 @@ def relight(
         if source is None:
             raise ValueError('give the new light: light=, or lamp=(azimuth, elevation); "own" keeps the photograph\'s')
     listed, is_one = angles(light_angle)
-    pictures, note = _relit.relight(
+    pictures, notes = _relit.relight(
         photograph(image, mask, box, transfer),
         source,
         listed,
@@ -166,8 +165,7 @@ def relight(
         None if size is None else int(within("size", size, 16, 16384)),
         highlights,
     )
-    if note:
-        warn([f"the mask {note}"])
+    warn(notes)
     return frames(pictures, is_one)
 
 
@@ -256,7 +254,7 @@ def insert(
         light_source(light, lamp, ambient),
         highlights,
     )
-    warn(f"the mask {note}" for note in notes)
+    warn(notes)
     return image
 
 

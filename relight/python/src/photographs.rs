@@ -1,17 +1,17 @@
 //! Photographs: decomposed, relit, put into other pictures, and their masks.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use image::RgbImage;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Extent, Planes, StoredImage, Transfer};
 use relight_photo::compositing::{SceneDescription, SceneObject};
 use relight_photo::decompose::{
     DecomposeError, DecomposeOptions, Decomposition, Photo, PhotoHints, SpecularGate,
 };
+use relight_photo::export::{is_object, read_object};
 use relight_photo::files::{BackgroundFile, InsertSource, Insertion};
 use relight_photo::relighting::{
     Backdrop, LightSource, PanoramaView, RelightableObject, RelightingSequence, WhiteBalance,
@@ -90,14 +90,14 @@ fn gate(name: &str) -> PyResult<SpecularGate> {
     choice("highlights", name, &choices)
 }
 
-/// A photograph's layers and light, by name, and what a person may want to know of its mask.
+/// A photograph's layers and light, by name, and what a person may want to know of the photograph.
 #[pyfunction]
 pub(crate) fn decompose<'py>(
     py: Python<'py>,
     photograph: PhotographInput<'py>,
     highlights: &str,
     mirror: bool,
-) -> PyResult<(Bound<'py, PyDict>, Option<String>)> {
+) -> PyResult<(Bound<'py, PyDict>, Vec<String>)> {
     let photograph = photograph.owned()?;
     let options = DecomposeOptions {
         mirror,
@@ -105,11 +105,11 @@ pub(crate) fn decompose<'py>(
         paint: true,
         ..DecomposeOptions::default()
     };
-    let (layers, found, note) = unlocked(py, || {
+    let (layers, found, notes) = unlocked(py, || {
         let photo = photograph.load()?;
         let options = photo.options(&options);
         let found = decomposer()?.decompose(&photo.picture, &photo.mask, &options)?;
-        Ok((Layers::new(&found, &photo.mask), found, photo.mask_note))
+        Ok((Layers::new(&found, &photo.mask), found, photo.notes))
     })?;
     let fields = PyDict::new(py);
     fields.set_item("normals", layers.normals.into_python(py)?)?;
@@ -125,7 +125,7 @@ pub(crate) fn decompose<'py>(
     fields.set_item("specular", gloss)?;
     fields.set_item("saturated_fraction", found.saturated_fraction)?;
     fields.set_item("residual", found.residual)?;
-    Ok((fields, note))
+    Ok((fields, notes))
 }
 
 /// The layers of a decomposition.
@@ -166,8 +166,8 @@ enum Behind {
     Even(f32),
 }
 
-/// A picture for each angle, and what is to be known of the mask.
-type RelitPictures<'py> = (Vec<Bound<'py, PyArrayDyn<f32>>>, Option<String>);
+/// A picture for each angle, and what is to be known of the photograph.
+type RelitPictures<'py> = (Vec<Bound<'py, PyArrayDyn<f32>>>, Vec<String>);
 
 /// A photograph's object in another light: a picture for each angle by which it has turned, degrees.
 #[pyfunction]
@@ -200,7 +200,7 @@ pub(crate) fn relight<'py>(
         specular: gate(highlights)?,
         ..DecomposeOptions::default()
     };
-    let (pictures, note) = unlocked(py, || {
+    let (pictures, notes) = unlocked(py, || {
         let light = match light {
             Some(light) => Some(white_balance.shown(light.source()?)?),
             None => None,
@@ -227,10 +227,10 @@ pub(crate) fn relight<'py>(
             Ok::<_, Failure>(Array::from_planes(picture.planes()))
         };
         let pictures = turned.iter().map(picture).collect::<Result<Vec<_>, _>>()?;
-        Ok((pictures, photo.mask_note))
+        Ok((pictures, photo.notes))
     })?;
     let pictures = pictures.into_iter().map(|picture| picture.into_python(py));
-    Ok((pictures.collect::<PyResult<_>>()?, note))
+    Ok((pictures.collect::<PyResult<_>>()?, notes))
 }
 
 /// By default the panorama that lights the object, its photograph in its own light, or grey.
@@ -296,11 +296,11 @@ pub(crate) fn insert<'py>(
         let sources = sources.collect::<Result<Vec<_>, _>>()?;
         let background = background(into, &scene)?;
         let light = light.map(|light| light.source()).transpose()?;
+        let (mut relightables, mut notes) = (Vec::new(), background.notes().to_vec());
         let insertion = Insertion::in_light(&scene, background, light, decomposer()?, options)?;
-        let (mut relightables, mut notes) = (Vec::new(), Vec::new());
         for (object, source) in scene.objects.iter().zip(sources) {
             if let InsertSource::Photo(photo) = &source {
-                notes.extend(photo.mask_note.clone());
+                notes.extend(photo.notes.clone());
             }
             relightables.push(insertion.relightable(object, source)?);
         }
@@ -317,16 +317,14 @@ pub(crate) fn insert<'py>(
 /// The source of an object: a photograph, or a captured object's file.
 fn inserted(photograph: Photograph) -> Result<InsertSource, Failure> {
     match &photograph.picture {
-        Picture::File(path) if CapturedObject::is_named(path) => {
+        Picture::File(path) if is_object(path) => {
             if photograph.mask.is_some() {
                 return Err(Failure::value(format!(
                     "{} has its own mask: do not give one",
                     path.display()
                 )));
             }
-            Ok(InsertSource::Captured(Box::new(CapturedObject::read(
-                path,
-            )?)))
+            Ok(InsertSource::Captured(Box::new(read_object(path)?)))
         }
         _ => Ok(InsertSource::Photo(Box::new(photograph.load()?))),
     }
@@ -343,12 +341,12 @@ fn background(picture: Picture, scene: &SceneDescription) -> Result<BackgroundFi
         image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_)
     );
     let is_panorama = is_light && image.width() == 2 * image.height();
-    let picture = Picture::Memory(image).colours(None)?.into_light();
+    let picture = Picture::Memory(image).colours(None)?;
     Ok(if is_panorama {
-        let panorama = relight_core::light::Panorama::new(picture)?;
+        let panorama = relight_core::light::Panorama::new(picture.into_light())?;
         BackgroundFile::from_panorama(panorama, scene)
     } else {
-        BackgroundFile::from_picture(Path::new("the background"), picture)?
+        BackgroundFile::from_picture(picture)
     })
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use relight_core::image::{ColourSpace, Extent, Linear, Planes, Rgb, Samples, Srgb, encode_exr};
 use relight_core::light::Panorama;
 use relight_photo::compositing::{SceneBackground, SceneDescription, SceneEnvironment};
+use relight_photo::decompose::UsableImage;
 use relight_photo::relighting::PanoramaView;
 use relit_data::statistics::upper_median;
 use relit_data::still::Format;
@@ -92,17 +93,11 @@ impl StudioBackground {
     /// A photograph.
     ///
     /// # Errors
-    /// If it cannot be read, or has a value that is negative or not finite.
+    /// If it cannot be read.
     pub(super) fn photo(name: &str, bytes: Vec<u8>) -> Result<Self, StudioError> {
         let opened = OpenedFile::read(name, bytes, None)?;
         let (name, file) = (opened.name, opened.bytes);
-        let picture = opened.image.into_light();
-        let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
-        if !picture.planes().planes().into_iter().all(is_light) {
-            return refused(format!(
-                "{name} has a value that is negative, infinite or not a number"
-            ));
-        }
+        let picture = UsableImage::new(opened.image).image.into_light();
         Ok(Self {
             name,
             content: Content::Photo(PhotoBackground {

@@ -8,7 +8,8 @@ use relight_core::captured_object::CapturedObject;
 use relight_core::image::{ColourImage, DownscaledFile, Extent, ImageError, StoredImage, Transfer};
 use relight_photo::compositing::{ObjectDescription, SceneEnvironment};
 use relight_photo::decompose::{
-    DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, PhotoHints, stated_extent,
+    DecomposeError, DecomposeOptions, Decomposer, Decomposition, Photo, PhotoHints, UsableImage,
+    stated_extent,
 };
 use relight_photo::relighting::RelightableObject;
 use relit_data::geometry::Rect;
@@ -106,7 +107,7 @@ impl StudioObject {
             transfer: opened.transfer,
             downscaled: opened.downscaled,
             content: Content::Photo(Box::new(Cut {
-                shown: on_screen(&opened.image),
+                shown: on_screen(&UsableImage::new(opened.image).image),
                 mask,
                 photo: None,
                 preview: None,

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use crate::commands::CommandResult;
 use crate::folder::OutputFolder;
 use crate::inputs::NormalsArgument;
-use crate::photos::{NetworkArguments, PhotoArguments, name_lost, outcome};
+use crate::photos::{NetworkArguments, PhotoArguments, name_lost, name_notes, outcome};
 
 /// Each photograph takes memory, gigabytes if it is large.
 const MAX_SIDE_BY_SIDE: usize = 4;
@@ -129,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
         && let [input] = inputs.as_slice()
     {
         let done = run.decompose(input)?;
-        console.print(&done.text, &done.event);
+        done.say(console);
         return Ok(Outcome::Success);
     }
     let bar = console.progress(inputs.len() as u64, "photographs");
@@ -139,7 +139,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let decompose = |input: &PhotoInput| {
         let result = parallel::caught(|| run.decompose(input));
         match &result {
-            Ok(Ok(done)) => bar.suspend(|| console.print(&done.text, &done.event)),
+            Ok(Ok(done)) => bar.suspend(|| done.say(console)),
             Ok(Err(error)) => failed(input, &with_causes(error)),
             Err(panic) => failed(input, &panic.to_string()),
         }
@@ -157,8 +157,17 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 
 /// What is reported about a photograph.
 struct Decomposed {
+    photo: String,
+    notes: Vec<String>,
     text: String,
     event: Value,
+}
+
+impl Decomposed {
+    fn say(&self, console: Console) {
+        name_notes(&self.photo, &self.notes, console);
+        console.print(&self.text, &self.event);
+    }
 }
 
 /// All that is the same for every photograph.
@@ -214,18 +223,15 @@ impl Run {
         let figures: DecompositionFigures = files.write(&out)?;
         let source = match photo.mask_source {
             MaskSource::BlackBackground => "; the object is what is not black",
-            MaskSource::Rectangle => "; the object is the whole rectangle",
-            MaskSource::File | MaskSource::Alpha | MaskSource::Shard => "",
+            MaskSource::File | MaskSource::Alpha | MaskSource::Rectangle | MaskSource::Shard => "",
         };
-        let note = photo.mask_note.as_ref();
-        let note = note.map_or_else(String::new, |note| format!("; the mask {note}"));
         let highlights = if found.is_glossy {
             "separated"
         } else {
             "not separated"
         };
         let text = format!(
-            "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; residual {:.1} % of the picture{source}{note}",
+            "{}: {seconds:.2} s; {:.1} % saturated, highlights {highlights}; residual {:.1} % of the picture{source}",
             out.display(),
             100.0 * found.saturated_fraction,
             100.0 * found.residual,
@@ -237,6 +243,11 @@ impl Run {
             "seconds": seconds,
             "figures": figures,
         });
-        Ok(Decomposed { text, event })
+        Ok(Decomposed {
+            photo: input.place(),
+            notes: photo.notes,
+            text,
+            event,
+        })
     }
 }

@@ -266,6 +266,18 @@ fn images(
     console: Console,
 ) -> Result<ScoreTable, Box<dyn Error>> {
     let ((set, split), found) = (arguments.open()?, arguments.estimates.predictions());
+    if matches!(protocol, Protocol::Mit { .. } | Protocol::Highlight { .. }) {
+        for path in found
+            .iter()
+            .filter_map(|found| found.undescribed(set.names()))
+        {
+            console.warn(&format!(
+                "{} is read as linear light: the maps of relight decompose are sRGB, and need their decomposition.json beside \
+                 them",
+                path.display()
+            ));
+        }
+    }
     with_progress("evaluating", console, |progress| match protocol {
         Protocol::Mit { input, .. } => evaluate_intrinsic(&set, &split, *input, &found, progress),
         Protocol::Light { shading, .. } => {

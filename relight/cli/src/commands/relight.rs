@@ -20,8 +20,10 @@ use serde_json::json;
 
 use crate::commands::CommandResult;
 use crate::folder::make_folder;
-use crate::lighting::{LightArguments, RotationArguments, too_coarse};
-use crate::photos::{Network, NetworkArguments, PhotoArguments, name_lost, not_an_input, outcome};
+use crate::lighting::{LightArguments, RotationArguments, is_own, too_coarse};
+use crate::photos::{
+    Network, NetworkArguments, PhotoArguments, name_lost, name_notes, not_an_input, outcome,
+};
 use crate::values::{WHITE_BALANCES, one_of, within};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -39,8 +41,6 @@ Examples:
 const MOVIE_SIDE: usize = 1080;
 /// The least withheld part of a change that is reported.
 const MIN_WITHHELD: f32 = 0.005;
-/// The value of `--light` for the photograph's own light.
-const OWN: &str = "own";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -111,7 +111,13 @@ impl Arguments {
             return Some("--background light needs a panorama: give one with --light".to_owned());
         }
         if self.is_set() {
-            return None;
+            let is_picture = OutputKind::from_path(&self.output).is_some();
+            return (is_picture && !self.output.is_dir()).then(|| {
+                format!(
+                    "--output {}: give a folder for several photographs",
+                    self.output.display()
+                )
+            });
         }
         let rotates = self.rotation.rotate.is_some();
         let wanted = match OutputKind::from_path(&self.output) {
@@ -132,7 +138,7 @@ impl Arguments {
     }
 
     fn is_own_light(&self) -> bool {
-        self.light.light.as_deref() == Some(Path::new(OWN))
+        self.light.light.as_deref().is_some_and(is_own)
     }
 
     /// The new light, unless the photograph's own is asked for.
@@ -219,6 +225,7 @@ impl Run<'_> {
         };
         let output = arguments.output_of(&photo.name);
         self.check_outputs(&output, &photo.name)?;
+        name_notes(&input.place(), &photo.notes, console);
         let network = match self.network.get() {
             Some(network) => network,
             None => {
@@ -252,8 +259,6 @@ impl Run<'_> {
             }
         };
         let seconds = start.elapsed().as_secs_f64();
-        let note = photo.mask_note.as_ref();
-        let note = note.map_or_else(String::new, |note| format!("; the mask {note}"));
         let withheld = shot.withheld(arguments.light.angle());
         let withheld_note = if withheld >= MIN_WITHHELD {
             format!(
@@ -264,7 +269,7 @@ impl Run<'_> {
             String::new()
         };
         let text = format!(
-            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposition{note}{withheld_note}",
+            "{}: {frames} frame(s) in {seconds:.2} s, after {decomposed:.2} s of decomposition{withheld_note}",
             output.display(),
         );
         let event = json!({

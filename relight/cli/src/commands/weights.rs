@@ -57,7 +57,8 @@ const DECOMPOSER_FACTS: [(&str, &str); 7] = [
     ),
     (
         "use",
-        "an object that fills 128 x 128 to 256 x 256 pixels. relight decompose blends two such looks and fits light to them",
+        "resize the object to 128 x 128 pixels, the size of training: at 256 x 256 the normals are worse by 3 degrees and more. \
+         relight decompose blends both sizes and fits light to them",
     ),
 ];
 

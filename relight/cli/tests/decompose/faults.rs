@@ -12,7 +12,7 @@ use relit_data::causes::with_causes;
 use relit_data::geometry::Rect;
 use relit_test_support::is_named;
 
-use crate::support::{Folder, HEIGHT, WIDTH, load, object, untrained, with_mask};
+use crate::support::{Folder, HEIGHT, WIDTH, load, mask, object, untrained, with_mask};
 
 #[test]
 fn an_object_without_light_is_not_decomposed() {
@@ -24,10 +24,8 @@ fn an_object_without_light_is_not_decomposed() {
         let nan = ImageBuffer::from_pixel(WIDTH, HEIGHT, Pixel([f32::NAN; 3]));
         image::DynamicImage::ImageRgb32F(nan).save(path).unwrap();
     });
-    let reading = PhotoReading {
-        rectangle: Some(Rect::new(5, 5, 30, 30)),
-        ..PhotoReading::default()
-    };
+    let mask = folder.save("mask.png", |path| mask().save(path).unwrap());
+    let reading = with_mask(mask);
     for path in [black, numberless] {
         let photo = load(&path, &reading).unwrap();
         let found = untrained().decompose(

@@ -17,3 +17,4 @@ mod program;
 mod results;
 mod shards;
 mod support;
+mod values;

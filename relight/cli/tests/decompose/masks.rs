@@ -78,14 +78,14 @@ fn masks_of_other_programs_are_read_for_what_they_are() {
     let photo = folder.save("photo.png", |path| object(90).save(path).unwrap());
     let plain = folder.save("plain.png", |path| mask().save(path).unwrap());
     let wanted = load(&photo, &with_mask(plain)).unwrap();
-    assert_eq!(wanted.mask_note, None);
+    assert_eq!(wanted.notes.len(), 0);
     let label = folder.save("label.png", |path| {
         let level = |x, y| Luma([u8::from(is_inside(x, y))]);
         GrayImage::from_fn(WIDTH, HEIGHT, level).save(path).unwrap();
     });
     let found = load(&photo, &with_mask(label)).unwrap();
     assert_eq!(found.mask, wanted.mask);
-    assert!(found.mask_note.is_some());
+    assert_eq!(found.notes.len(), 1);
     let error = load(&photo, &with_mask(photo.clone())).unwrap_err();
     let is_refused = matches!(
         &error,
@@ -152,14 +152,20 @@ fn mask_of_displayed(folder: &Folder) -> std::path::PathBuf {
 }
 
 #[test]
-fn a_rectangle_is_the_mask_where_nothing_else_is() {
+fn within_a_rectangle_the_object_is_cut_out_unless_alpha_shows_it() {
     let folder = Folder::new();
-    let path = folder.save("grey.png", |path| object(90).save(path).unwrap());
     let reading = PhotoReading {
-        rectangle: Some(Rect::new(10, 4, 40, 40)),
+        rectangle: Some(Rect::new(6, 1, 48, 46)),
         ..PhotoReading::default()
     };
-    let photo = load(&path, &reading).unwrap();
-    assert_eq!(photo.mask_source, MaskSource::Rectangle);
-    assert_eq!(photo.mask.plane(0).iter().sum::<f32>(), 1600.0);
+    // Also before black, where all that is not black would be the object.
+    for grey in [20, 0] {
+        let path = folder.save("grey.png", |path| object(grey).save(path).unwrap());
+        let photo = load(&path, &reading).unwrap();
+        assert_eq!(photo.mask_source, MaskSource::Rectangle);
+        let wrong = photo.mask.plane(0).iter().zip(mask().into_raw());
+        let wrong = wrong.filter(|(found, wanted)| **found != f32::from(wanted / 255));
+        let wrong = wrong.count();
+        assert!(wrong < 40, "{grey}: {wrong} of {} pixels", WIDTH * HEIGHT);
+    }
 }

@@ -35,6 +35,15 @@ pub enum SceneBackground<'a> {
     Panorama(&'a Panorama),
 }
 
+/// The colours of light that was estimated from a picture, as means over all directions, red, green and blue with the mean 1.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct EstimatedColours {
+    /// As the picture has them, which is also the colour of what it shows.
+    pub found: [f64; 3],
+    /// As they light the objects.
+    pub used: [f64; 3],
+}
+
 /// The setting of a scene: what follows from its description and background, before the objects.
 #[derive(Debug, Clone)]
 pub struct SceneEnvironment {
@@ -48,6 +57,8 @@ pub struct SceneEnvironment {
     pub harmonisation: Harmonisation,
     /// The sun in a picture that gives the light.
     pub sun: Option<SeenSun>,
+    /// The colours of the light that a picture gives.
+    pub estimated: Option<EstimatedColours>,
     /// How a panorama is exposed.
     pub exposure: Option<PanoramaExposure>,
     /// The light as coefficients.
@@ -85,8 +96,9 @@ impl SceneEnvironment {
         {
             harmonisation.balance = Harmonisation::from_background(picture).balance;
         }
+        let is_estimated = given.is_none() && matches!(background, SceneBackground::Picture(_));
         let sun = match background {
-            SceneBackground::Picture(picture) if given.is_none() => SeenSun::find(picture.planes()),
+            SceneBackground::Picture(picture) if is_estimated => SeenSun::find(picture.planes()),
             _ => None,
         };
         let light = given.unwrap_or_else(|| match background {
@@ -99,12 +111,23 @@ impl SceneEnvironment {
             WhiteBalance::Auto => scene.white_balance.tint(&coefficients),
             WhiteBalance::Adapted | WhiteBalance::Light => [1.0; 3],
         };
-        let projected = if scene.white_balance.keeps(&light) {
+        // The colour of a picture is that of its light and of what it shows: its cast is limited as a lamp's is.
+        let shown = if is_estimated {
+            let tint = scene.white_balance.tint(&coefficients);
+            light.clone().tinted(tint)?
+        } else {
+            scene.white_balance.shown(light.clone())?
+        };
+        let projected = if shown == light {
             coefficients.clone()
         } else {
-            scene.white_balance.shown(light.clone())?.light()?
+            shown.light()?
         };
-        let light = scene.white_balance.shown(light)?;
+        let estimated = is_estimated.then(|| EstimatedColours {
+            found: mean_colour(&coefficients),
+            used: mean_colour(&projected),
+        });
+        let light = shown;
         let around = for_shadows(light.panorama());
         let base = exposure_for(&coefficients.clone().tinted(tint)) * WHITE * PI;
         let mut panorama_scale = tint.map(|t| t as f32 * base);
@@ -135,6 +158,7 @@ impl SceneEnvironment {
             tilt: Self::ground_tilt(scene, background),
             harmonisation,
             sun,
+            estimated,
             exposure,
             is_one_light,
             projected,
@@ -176,6 +200,13 @@ impl SceneEnvironment {
     pub fn seen(&self, view: &PanoramaView, panorama: &Panorama, turn: f64) -> Rgb<Linear> {
         shown(view, panorama, turn, self.panorama_scale)
     }
+}
+
+/// The mean colour of light over all directions, with the mean 1.
+fn mean_colour(light: &ShLight) -> [f64; 3] {
+    let mean = light.coefficients().first().copied().unwrap_or([1.0; 3]);
+    let grey = mean.iter().sum::<f64>() / 3.0;
+    mean.map(|channel| channel / grey.max(f64::MIN_POSITIVE))
 }
 
 fn shown(view: &PanoramaView, panorama: &Panorama, turn: f64, scale: [f32; 3]) -> Rgb<Linear> {
@@ -329,6 +360,36 @@ mod tests {
         assert!(given.harmonisation.balance[0] > given.harmonisation.balance[2]);
         let unmatched = SceneEnvironment::new(&described("match = false"), background, Some(lamp));
         assert_eq!(unmatched.unwrap().harmonisation, Harmonisation::default());
+    }
+
+    #[test]
+    fn the_cast_of_light_from_a_picture_is_limited_as_a_lamp_s_is_and_neutral_light_is_not_changed()
+    {
+        let of = |picture: &Rgb<Linear>, more: &str| {
+            let background = SceneBackground::Picture(picture);
+            SceneEnvironment::new(&described(more), background, None).unwrap()
+        };
+        let warm = of(&dusk(), "").estimated.unwrap();
+        // The picture is 0.3, 0.2, 0.1: after von Kries, with D = 0.7726, 1.5 becomes 0.7726 + 0.2274 x 1.5.
+        for (found, (used, wanted)) in warm.found.iter().zip(warm.used.iter().zip([1.5, 1.0, 0.5]))
+        {
+            assert!((found - wanted).abs() < 0.01, "{warm:?}");
+            assert!((used - 0.7726 - 0.2274 * wanted).abs() < 0.01, "{warm:?}");
+        }
+        let kept = of(&dusk(), "white_balance = \"light\"").estimated.unwrap();
+        assert_eq!(kept.found, kept.used);
+        let grey = Rgb::new(dusk().into_planes().map(|_| 0.4));
+        let [plain, kept] = ["", "white_balance = \"light\""].map(|more| of(&grey, more));
+        let sides = [plain.light, kept.light].map(|light| light.light().unwrap());
+        let [plain, kept] = sides.each_ref().map(|light| light.coefficients()[0]);
+        for channel in 0..3 {
+            assert!((plain[channel] / kept[channel] - 1.0).abs() < 1e-6);
+        }
+        let lamp = LightSource::Lamp(DiscLamp::default());
+        let background = dusk();
+        let background = SceneBackground::Picture(&background);
+        let given = SceneEnvironment::new(&described(""), background, Some(lamp)).unwrap();
+        assert_eq!(given.estimated, None);
     }
 
     #[test]

@@ -95,6 +95,7 @@ impl Convention {
             return Self::metric3d(signature, output);
         }
         match &signature.inputs[..] {
+            [picture] if has_other_channels(picture) => Err(other_channels(picture)),
             [] | [_] => Ok(Self {
                 name: "a network of one picture, (x - 0.5) / 0.5 of sRGB",
                 extent: Extent::new(side, side),
@@ -152,6 +153,7 @@ impl Convention {
 fn picture_of<'a>(signature: &'a OnnxSignature, other: &str) -> Result<&'a OnnxValue, String> {
     let mut rest = signature.inputs.iter().filter(|input| input.name != other);
     match (rest.next(), rest.next()) {
+        (Some(picture), None) if has_other_channels(picture) => Err(other_channels(picture)),
         (Some(picture), None) if picture.element == DataType::Float => Ok(picture),
         _ => Err(format!(
             "its inputs are {}: one of them has to be a picture of 32-bit numbers",
@@ -166,6 +168,19 @@ fn fixed_extent(picture: &OnnxValue) -> Option<Extent> {
         [_, _, Some(height), Some(width)] => Some(Extent::new(width, height)),
         _ => None,
     }
+}
+
+/// Whether a picture is one of other channels than red, green and blue.
+fn has_other_channels(picture: &OnnxValue) -> bool {
+    matches!(picture.sides[..], [_, Some(channels), _, _] if channels != 3)
+}
+
+fn other_channels(picture: &OnnxValue) -> String {
+    let channels = picture.sides.get(1).copied().flatten().unwrap_or_default();
+    format!(
+        "its input {} has {channels} channels: give a network for normals that takes red, green and blue",
+        picture.name
+    )
 }
 
 fn named(values: &[OnnxValue]) -> String {
@@ -233,6 +248,16 @@ mod tests {
         };
         let fault = Convention::from_signature(&two, 256).unwrap_err();
         assert!(fault.contains("left, right"), "{fault}");
+        let ours = OnnxSignature {
+            inputs: vec![value(
+                "input",
+                DataType::Float,
+                &[None, Some(7), None, None],
+            )],
+            outputs: answers(&["maps", "paint", "light"]),
+        };
+        let fault = Convention::from_signature(&ours, 256).unwrap_err();
+        assert!(fault.contains("7 channels"), "{fault}");
         let flat = OnnxSignature {
             inputs: vec![
                 picture("image", None, None),

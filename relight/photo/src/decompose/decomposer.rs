@@ -406,8 +406,8 @@ struct FittedLight {
     gloss: Option<FittedGloss>,
 }
 
-/// A value as light: black if it is negative or NaN.
-fn usable(value: f32) -> f32 {
+/// A value as light: black if it is negative, infinite or NaN.
+pub(super) fn usable(value: f32) -> f32 {
     if value.is_finite() {
         value.max(0.0)
     } else {

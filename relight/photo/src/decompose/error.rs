@@ -13,7 +13,9 @@ use relight_core::image::ImageError;
 use relight_core::light::LightError;
 #[cfg(feature = "files")]
 use relight_core::reader::{DamagedSample, OpenError};
+use relit_data::geometry::Rect;
 use relit_data::still::ColourError;
+use relit_grabcut::MaskError;
 
 /// Why a photograph cannot be decomposed.
 #[derive(Debug, thiserror::Error)]
@@ -48,6 +50,14 @@ pub enum DecomposeError {
     NoMask {
         /// The photograph.
         path: PathBuf,
+    },
+    /// No object can be cut out within a rectangle.
+    #[error("no object can be cut out within the rectangle {rectangle}")]
+    Rectangle {
+        /// The rectangle.
+        rectangle: Rect,
+        /// Why.
+        source: MaskError,
     },
     /// A file states colours that cannot be converted.
     #[error("{} {fault}: convert it to sRGB or EXR, or give its encoding with --transfer", path.display())]

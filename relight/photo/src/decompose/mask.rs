@@ -1,8 +1,11 @@
 //! The object's mask: from a photograph, a file or a rectangle.
 
+use image::RgbImage;
+
 use super::crop::inside;
 use relight_core::image::{Extent, Planes, beside};
 use relit_data::geometry::Rect;
+use relit_grabcut::{MaskError, SegmentSettings, segment};
 
 /// Encoded values up to this count as nearly black: 12 of 255.
 pub(super) const NEARLY_BLACK: f32 = 12.5 / 255.0;
@@ -19,7 +22,7 @@ pub enum MaskSource {
     Alpha,
     /// The background is black: the object is the largest part that is not.
     BlackBackground,
-    /// A rectangle, all of it.
+    /// A rectangle, within which the object was cut out.
     Rectangle,
     /// The mask of a shard's frame.
     Shard,
@@ -34,45 +37,33 @@ pub(super) enum NoObject {
     Black,
 }
 
-/// The mask that the photograph itself shows, cut by the rectangle if there is one: its alpha, or what is
-/// not black where its edge is black, or else the rectangle. `encoded` are the values as the file has
-/// them.
-pub(super) fn find_mask(
+/// The object within a rectangle of a photograph in sRGB, cut out as by `relit-mask --rect`, and what a person should check.
+pub(super) fn cut_out_within(
     encoded: &Planes<3>,
-    alpha: Option<&Planes<1>>,
-    rectangle: Option<Rect>,
-) -> Result<(Planes<1>, MaskSource), NoObject> {
-    let extent = encoded.extent();
-    let found = match alpha {
-        Some(alpha) => Ok((binary(alpha.clone()), MaskSource::Alpha)),
-        None => before_black(encoded).map(|mask| (mask, MaskSource::BlackBackground)),
-    };
-    let Some(rectangle) = rectangle else {
-        return found;
-    };
-    let (mut mask, source) =
-        found.unwrap_or_else(|_| (Planes::filled(extent, [1.0]), MaskSource::Rectangle));
-    let Extent { width, .. } = extent;
-    let (columns, rows) = (
-        i64::from(rectangle.x)..rectangle.right(),
-        i64::from(rectangle.y)..rectangle.bottom(),
-    );
+    rectangle: Rect,
+) -> Result<(Planes<1>, Vec<String>), MaskError> {
+    let [width, height] = encoded.extent().sides();
+    let frame = RgbImage::from_raw(width, height, encoded.to_bytes()).unwrap_or_default();
+    let found = segment(&frame, &rectangle.into(), &SegmentSettings::default())?;
+    let level = |x, y| found.image.get_pixel(x as u32, y as u32).0[0];
+    let mask = Planes::from_fn(encoded.extent(), |x, y| [f32::from(level(x, y)) / 255.0]);
+    Ok((mask, found.warnings))
+}
+
+/// The mask that alpha shows, within the rectangle if there is one.
+pub(super) fn mask_of_alpha(alpha: &Planes<1>, rectangle: Option<Rect>) -> Planes<1> {
+    let [width, _] = alpha.extent().sides();
+    let mut mask = alpha.clone();
     for (at, value) in mask.planes_mut()[0].iter_mut().enumerate() {
-        let (x, y) = ((at % width) as i64, (at / width) as i64);
-        if !(columns.contains(&x) && rows.contains(&y)) {
-            *value = 0.0;
-        }
+        let is_within = rectangle.is_none_or(|rectangle| rectangle.contains(at, width));
+        *value = f32::from(u8::from(is_within && *value >= 0.5));
     }
-    Ok((mask, source))
+    mask
 }
 
-fn binary(mask: Planes<1>) -> Planes<1> {
-    mask.map(|value| f32::from(u8::from(value >= 0.5)))
-}
-
-/// The largest part of the photograph that is not black, with the dark places in it. NaN
-/// is black.
-fn before_black(encoded: &Planes<3>) -> Result<Planes<1>, NoObject> {
+/// The largest part of a photograph in sRGB that is not black, with the dark places in it, if its edge is black. NaN is
+/// black.
+pub(super) fn before_black(encoded: &Planes<3>) -> Result<Planes<1>, NoObject> {
     let extent = encoded.extent();
     let [red, green, blue] = encoded.planes();
     let is_black = |at: usize| {
@@ -163,46 +154,51 @@ mod tests {
 
     #[test]
     fn before_black_the_object_is_the_largest_part_with_its_dark_places() {
-        let (mask, source) = find_mask(&ring(0.01), None, None).unwrap();
-        assert_eq!(source, MaskSource::BlackBackground);
+        let mask = before_black(&ring(0.01)).unwrap();
         assert_eq!(mask.pixel(20, 20), [1.0]);
         assert_eq!(mask.pixel(20, 10), [1.0]);
         assert_eq!(mask.pixel(2, 2), [0.0]);
         assert_eq!(mask.pixel(40, 30), [0.0]);
+        assert_eq!(before_black(&ring(0.3)), Err(NoObject::Background));
     }
 
     #[test]
-    fn before_anything_else_only_a_rectangle_says_where_the_object_is() {
-        let grey = ring(0.3);
-        assert_eq!(find_mask(&grey, None, None), Err(NoObject::Background));
-        let rectangle = Rect::new(40, 10, 100, 5);
-        let (mask, source) = find_mask(&grey, None, Some(rectangle)).unwrap();
-        assert_eq!(source, MaskSource::Rectangle);
-        assert_eq!(mask.plane(0).iter().sum::<f32>(), 8.0 * 5.0);
-        assert_eq!(mask.pixel(47, 14), [1.0]);
+    fn within_a_rectangle_the_object_is_cut_out_of_its_background() {
+        let disc = Planes::from_fn(Extent::new(96, 64), |x, y| {
+            if (x as f32 - 48.0).hypot(y as f32 - 32.0) <= 18.0 {
+                [0.86, 0.7, 0.16]
+            } else {
+                [0.08, (x % 7) as f32 / 255.0, 0.24]
+            }
+        });
+        let (mask, warnings) = cut_out_within(&disc, Rect::new(24, 8, 50, 48)).unwrap();
+        assert!(warnings.is_empty(), "{warnings:?}");
+        for (x, y, wanted) in [(48, 32, 1.0), (48, 15, 1.0), (28, 12, 0.0), (10, 10, 0.0)] {
+            assert_eq!(mask.pixel(x, y), [wanted], "{x} {y}");
+        }
+        let beside = cut_out_within(&disc, Rect::new(200, 0, 5, 5));
+        assert!(matches!(beside, Err(MaskError::Hints(_))), "{beside:?}");
     }
 
     #[test]
     fn a_rectangle_cuts_what_alpha_says() {
         let alpha = Planes::from_fn(Extent::new(48, 40), |x, _| [x as f32 / 47.0]);
-        let rectangle = Rect::new(0, 0, 30, 40);
-        let (mask, source) = find_mask(&ring(0.0), Some(&alpha), Some(rectangle)).unwrap();
-        assert_eq!(source, MaskSource::Alpha);
+        let mask = mask_of_alpha(&alpha, Some(Rect::new(0, 0, 30, 40)));
         assert_eq!(mask.plane(0).iter().sum::<f32>(), 6.0 * 40.0);
+        let mask = mask_of_alpha(&alpha, None);
+        assert_eq!(mask.plane(0).iter().sum::<f32>(), 24.0 * 40.0);
     }
 
     #[test]
     fn a_black_photograph_shows_no_object() {
         for value in [0.0, f32::NAN, -1.0] {
             let black = Planes::filled(Extent::new(8, 8), [value; 3]);
-            assert_eq!(find_mask(&black, None, None), Err(NoObject::Black));
+            assert_eq!(before_black(&black), Err(NoObject::Black));
         }
     }
 
     #[test]
     fn a_background_that_is_no_number_is_black() {
-        let (mask, source) = find_mask(&ring(f32::NAN), None, None).unwrap();
-        assert_eq!(source, MaskSource::BlackBackground);
-        assert_eq!(mask, find_mask(&ring(0.0), None, None).unwrap().0);
+        assert_eq!(before_black(&ring(f32::NAN)), before_black(&ring(0.0)));
     }
 }

@@ -26,6 +26,7 @@ mod photo;
 #[cfg(test)]
 mod tests;
 mod tiled_compose;
+mod usable_image;
 
 pub use crop::CropSquare;
 #[cfg(feature = "files")]
@@ -44,3 +45,4 @@ pub use mask::MaskSource;
 #[cfg(feature = "files")]
 pub(crate) use photo::stem;
 pub use photo::{Photo, PhotoHints, stated_extent};
+pub use usable_image::UsableImage;

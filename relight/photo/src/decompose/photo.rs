@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::decomposer::{DecomposeOptions, check_mask_size, check_size};
 use super::error::DecomposeError;
-use super::mask::{MaskSource, NoObject, find_mask, is_empty};
+use super::mask::{MaskSource, NoObject, before_black, cut_out_within, is_empty, mask_of_alpha};
+use super::usable_image::UsableImage;
 use relight_core::image::{
     ColourImage, ColourSpace, Extent, Linear, Planes, Rgb, Srgb, StoredImage, Transfer,
 };
@@ -22,8 +23,10 @@ pub struct Photo {
     pub mask: Planes<1>,
     /// What said so.
     pub mask_source: MaskSource,
-    /// What a person may want to know of the mask's file, after "the mask".
-    pub mask_note: Option<String>,
+    /// What the values of the file were multiplied with, so that 1 is white: 1 as a rule.
+    pub scale: f32,
+    /// What a person may want to know of the file and its mask, as clauses.
+    pub notes: Vec<String>,
     /// The file's alpha, 0 to 1.
     pub alpha: Option<Planes<1>>,
     saturated_from: f32,
@@ -42,8 +45,9 @@ pub struct PhotoHints<'a> {
 }
 
 impl Photo {
-    /// Decodes the content of a file, and finds its mask: that of `hints`, or its alpha, or what is not black before a
-    /// black background, or the rectangle. Errors name it as `path`, and its stem is the photograph's name.
+    /// Decodes the content of a file, and finds its mask: that of `hints`, or its alpha, or the object that is cut out within
+    /// the rectangle, or what is not black before a black background. Floating point values are made usable as by
+    /// [`UsableImage`]. Errors name it as `path`, and its stem is the photograph's name.
     ///
     /// # Errors
     /// If it is not a picture, is too large or encoded in an unknown way, or does not show where the object is.
@@ -74,25 +78,38 @@ impl Photo {
     ) -> Result<Self, DecomposeError> {
         let extent = image.stored().planes.extent();
         check_size(extent)?;
+        let UsableImage {
+            image,
+            scale,
+            mut notes,
+        } = UsableImage::new(image);
         let alpha = image.stored().alpha.clone();
-        let mut mask_note = None;
         let (mask, mask_source) = match hints.mask {
             Some((path, mask)) => {
                 check_mask_size(mask.planes.extent(), extent)?;
                 let (mask, note) = mask.object_mask(path)?;
-                mask_note = note;
+                notes.extend(note.map(|note| format!("the mask {note}")));
                 (mask, MaskSource::File)
             }
-            None => {
-                let encoded = image.to_srgb().into_planes();
-                find_mask(&encoded, alpha.as_ref(), hints.rectangle).map_err(|why| {
-                    let path = path.to_owned();
-                    match why {
-                        NoObject::Background => DecomposeError::NoMask { path },
-                        NoObject::Black => DecomposeError::Black { path },
-                    }
-                })?
-            }
+            None => match (&alpha, hints.rectangle) {
+                (Some(alpha), rectangle) => (mask_of_alpha(alpha, rectangle), MaskSource::Alpha),
+                (None, Some(rectangle)) => {
+                    let (mask, warnings) = cut_out_within(image.to_srgb().planes(), rectangle)
+                        .map_err(|source| DecomposeError::Rectangle { rectangle, source })?;
+                    notes.extend(warnings);
+                    (mask, MaskSource::Rectangle)
+                }
+                (None, None) => {
+                    let mask = before_black(image.to_srgb().planes()).map_err(|why| {
+                        let path = path.to_owned();
+                        match why {
+                            NoObject::Background => DecomposeError::NoMask { path },
+                            NoObject::Black => DecomposeError::Black { path },
+                        }
+                    })?;
+                    (mask, MaskSource::BlackBackground)
+                }
+            },
         };
         check_mask(&mask, hints.rectangle)?;
         Ok(Self {
@@ -102,7 +119,8 @@ impl Photo {
             picture: image.into_light(),
             mask,
             mask_source,
-            mask_note,
+            scale,
+            notes,
             alpha,
             saturated_fraction: None,
         })
@@ -124,7 +142,8 @@ impl Photo {
             picture,
             mask,
             mask_source: MaskSource::Shard,
-            mask_note: None,
+            scale: 1.0,
+            notes: Vec::new(),
             alpha: None,
             saturated_from: Srgb::to_linear(SATURATED_VALUE),
             saturated_fraction,
@@ -197,8 +216,7 @@ fn check_mask(mask: &Planes<1>, rectangle: Option<Rect>) -> Result<(), Decompose
     Err(DecomposeError::Photo(
         if rectangle.clipped_to(width, height).is_some() {
             format!(
-                "the rectangle {rectangle} contains nothing of the object: the photograph's alpha or black background places \
-                 it elsewhere"
+                "the rectangle {rectangle} contains nothing of the object: the photograph's alpha places it elsewhere"
             )
         } else {
             format!(

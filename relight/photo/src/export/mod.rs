@@ -21,4 +21,4 @@ pub use error::ExportError;
 pub use glb::to_glb;
 pub use layers::to_layers;
 pub use mesh::ObjectMesh;
-pub use source::read_object;
+pub use source::{is_object, read_object};

@@ -37,6 +37,17 @@ struct EvenGloss {
     smoothness: Option<f32>,
 }
 
+/// Whether a path is called as a captured object, or is a folder with one or with the maps of a decomposition or a turn.
+#[must_use]
+pub fn is_object(path: &Path) -> bool {
+    CapturedObject::is_named(path) || figures_in(path).is_some()
+}
+
+/// The name of the figures that a folder has with its maps.
+fn figures_in(folder: &Path) -> Option<&'static str> {
+    FIGURES.into_iter().find(|name| folder.join(name).is_file())
+}
+
 /// Reads an object: a file `*.relit`, or a folder with `object.relit` or with the maps of a decomposition or a turn.
 ///
 /// # Errors
@@ -48,8 +59,7 @@ pub fn read_object(path: &Path) -> Result<CapturedObject, ExportError> {
     if path.is_file() || path.join(CapturedObject::FILE).is_file() {
         return Ok(CapturedObject::read(path)?);
     }
-    let is_there = |name: &&str| path.join(name).is_file();
-    let Some(figures) = FIGURES.into_iter().find(is_there) else {
+    let Some(figures) = figures_in(path) else {
         return Err(ExportError::Source {
             path: path.to_owned(),
             fault: "holds no object: give object.relit, or a folder that relight turn or relight decompose has written"

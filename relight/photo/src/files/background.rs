@@ -10,14 +10,14 @@ use relit_data::still::Format;
 
 use super::{FrameTiming, MovieReader};
 use crate::compositing::SceneDescription;
-use crate::decompose::stated_extent;
+use crate::decompose::{UsableImage, stated_extent};
 use crate::relighting::{InsertError, PanoramaView};
 
 /// A background out of a file.
 #[derive(Debug)]
 pub enum BackgroundFile {
-    /// A photograph.
-    Photo(Rgb<Linear>),
+    /// A photograph, and what a person may want to know of it.
+    Photo(Rgb<Linear>, Vec<String>),
     /// A panorama, and what is seen of it.
     Panorama(Box<(PanoramaView, Panorama)>),
     /// A video.
@@ -29,14 +29,23 @@ impl BackgroundFile {
     pub fn colour_conversion(&self) -> Option<String> {
         match self {
             Self::Movie(movie) => movie.colour_conversion(),
-            Self::Photo(_) | Self::Panorama(_) => None,
+            Self::Photo(..) | Self::Panorama(_) => None,
+        }
+    }
+
+    /// What a person may want to know of a photograph, as clauses.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        match self {
+            Self::Photo(_, notes) => notes,
+            Self::Panorama(_) | Self::Movie(_) => &[],
         }
     }
 
     /// Reads the background of a scene: a video, an HDR or EXR file twice as wide as high as a panorama, or a photograph.
     ///
     /// # Errors
-    /// If it cannot be read, or has a value that is negative or not finite.
+    /// If it cannot be read, or a panorama has a value that is negative or not finite.
     pub fn read(path: &Path, scene: &SceneDescription) -> Result<Self, InsertError> {
         if has_extension(path, &VIDEO_EXTENSIONS) {
             let movie = MovieReader::open(path, FrameTiming::Even)?;
@@ -47,8 +56,9 @@ impl BackgroundFile {
             let panorama = Panorama::from_bytes(path, &bytes)?;
             return Ok(Self::from_panorama(panorama, scene));
         }
-        let picture = ColourImage::from_bytes(path, &bytes, None)?.into_light();
-        Self::from_picture(path, picture)
+        Ok(Self::from_picture(ColourImage::from_bytes(
+            path, &bytes, None,
+        )?))
     }
 
     /// A panorama; the scene shows part of it.
@@ -57,19 +67,11 @@ impl BackgroundFile {
         Self::Panorama(Box::new((view, panorama)))
     }
 
-    /// A photograph, which errors name as `path`.
-    ///
-    /// # Errors
-    /// If it has a value that is negative or not finite.
-    pub fn from_picture(path: &Path, picture: Rgb<Linear>) -> Result<Self, InsertError> {
-        let is_light = |plane: &[f32]| plane.iter().all(|v| v.is_finite() && *v >= 0.0);
-        if !picture.planes().planes().into_iter().all(is_light) {
-            return Err(InsertError::Input(format!(
-                "{} has a value that is negative, infinite or not a number",
-                path.display()
-            )));
-        }
-        Ok(Self::Photo(picture))
+    /// A photograph, made usable as by [`UsableImage`].
+    #[must_use]
+    pub fn from_picture(picture: ColourImage) -> Self {
+        let usable = UsableImage::new(picture);
+        Self::Photo(usable.image.into_light(), usable.notes)
     }
 }
 

@@ -24,7 +24,7 @@ const HEAD: u64 = 4096;
 pub struct PhotoReading {
     /// A file with the mask, or a folder with one of the photograph's name, `<name>.png`.
     pub mask: Option<PathBuf>,
-    /// A rectangle around the object.
+    /// A rectangle around the object, which is cut out within it.
     pub rectangle: Option<Rect>,
     /// How integers are encoded, where the file is not to be asked.
     pub transfer: Option<Transfer>,
@@ -139,8 +139,8 @@ impl PhotoInput {
         }
     }
 
-    /// Reads the photograph, and its mask: that of `reading`, or its alpha, or what is not black before a
-    /// black background, or the rectangle. A frame of a shard has its own.
+    /// Reads the photograph, and its mask: that of `reading`, or its alpha, or the object within the rectangle, or what is
+    /// not black before a black background. A frame of a shard has its own.
     ///
     /// # Errors
     /// If a file cannot be read or does not fit, or the object's place is unknown.

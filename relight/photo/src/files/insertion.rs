@@ -5,6 +5,7 @@ use std::path::Path;
 use relight_core::captured_object::CapturedObject;
 use relight_core::image::{Linear, Planes, Rgb, StoredImage};
 use relit_data::causes::with_causes;
+use relit_data::geometry::Rect;
 
 use super::{
     BackgroundFile, MovieFormat, MovieReader, MovieWriter, OutputKind, PhotoInput, PhotoReading,
@@ -14,6 +15,7 @@ use crate::compositing::{
     InsertScene, ObjectDescription, SceneBackground, SceneDescription, SceneEnvironment,
 };
 use crate::decompose::{DecomposeOptions, Decomposer, Photo};
+use crate::export::{is_object, read_object};
 use crate::relighting::{InsertError, LightSource, RelightableObject};
 
 /// What an object is made of.
@@ -21,7 +23,7 @@ use crate::relighting::{InsertError, LightSource, RelightableObject};
 pub enum InsertSource {
     /// A photograph, which is decomposed.
     Photo(Box<Photo>),
-    /// A captured object, whose maps are known.
+    /// A captured or decomposed object, whose maps are known.
     Captured(Box<CapturedObject>),
 }
 
@@ -52,25 +54,32 @@ pub struct InsertionOutput<'a> {
 }
 
 impl InsertSource {
-    /// Reads an object of a scene; its paths are relative to `folder`.
+    /// Reads an object of a scene; its paths are relative to `folder`. Without a mask, a photograph's object may be cut out
+    /// within a rectangle.
     ///
     /// # Errors
-    /// If a file cannot be read, or a captured object is given a mask.
-    pub fn read(object: &ObjectDescription, folder: &Path) -> Result<Self, InsertError> {
+    /// If a file cannot be read, or an object with maps is given a mask or a rectangle.
+    pub fn read(
+        object: &ObjectDescription,
+        rectangle: Option<Rect>,
+        folder: &Path,
+    ) -> Result<Self, InsertError> {
         let path = folder.join(&object.photo);
-        if CapturedObject::is_named(&path) {
-            if object.mask.is_some() {
+        if is_object(&path) {
+            if object.mask.is_some() || rectangle.is_some() {
                 return Err(InsertError::Input(format!(
-                    "{} has its own mask: do not give one",
+                    "{} has its own mask: give no mask and no rectangle",
                     path.display()
                 )));
             }
-            return Ok(Self::Captured(Box::new(CapturedObject::read(&path)?)));
+            let object =
+                read_object(&path).map_err(|error| InsertError::Input(with_causes(&error)))?;
+            return Ok(Self::Captured(Box::new(object)));
         }
         let reading = PhotoReading {
             mask: object.mask.as_ref().map(|mask| folder.join(mask)),
+            rectangle,
             transfer: object.transfer,
-            ..PhotoReading::default()
         };
         let photo = PhotoInput::File(path).load(&reading)?;
         Ok(Self::Photo(Box::new(photo)))
@@ -195,7 +204,7 @@ impl<'a> Insertion<'a> {
     /// The background after a panorama was rotated.
     fn still(&self, angle: f64) -> Rgb<Linear> {
         match &self.background {
-            BackgroundFile::Photo(picture) => picture.clone(),
+            BackgroundFile::Photo(picture, _) => picture.clone(),
             BackgroundFile::Panorama(parts) => self.environment.seen(&parts.0, &parts.1, angle),
             BackgroundFile::Movie(_) => self
                 .first
@@ -263,7 +272,7 @@ fn no_frame() -> InsertError {
 fn first_of(background: &mut BackgroundFile) -> Result<Option<Rgb<Linear>>, InsertError> {
     match background {
         BackgroundFile::Movie(movie) => first_frame(movie).map(Some),
-        BackgroundFile::Photo(_) | BackgroundFile::Panorama(_) => Ok(None),
+        BackgroundFile::Photo(..) | BackgroundFile::Panorama(_) => Ok(None),
     }
 }
 
@@ -274,7 +283,7 @@ fn still_of<'a>(
 ) -> Result<SceneBackground<'a>, InsertError> {
     match (background, first) {
         (BackgroundFile::Panorama(parts), _) => Ok(SceneBackground::Panorama(&parts.1)),
-        (BackgroundFile::Photo(picture), _) | (BackgroundFile::Movie(_), Some(picture)) => {
+        (BackgroundFile::Photo(picture, _), _) | (BackgroundFile::Movie(_), Some(picture)) => {
             Ok(SceneBackground::Picture(picture))
         }
         (BackgroundFile::Movie(_), None) => Err(no_frame()),

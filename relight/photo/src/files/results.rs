@@ -62,6 +62,8 @@ pub struct DecompositionFigures {
     mask: FigureMask,
     specular: FigureSpecular,
     transfer: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scale: Option<f32>,
     white: FigureWhites,
     light: FigureLight,
     residual: f64,
@@ -225,6 +227,7 @@ impl DecompositionFiles<'_> {
                 residual: gloss.map(|gloss| gloss.residual),
             },
             transfer: "srgb",
+            scale: (photo.scale != 1.0).then_some(photo.scale),
             white,
             light: FigureLight {
                 order: found.light.order().get(),

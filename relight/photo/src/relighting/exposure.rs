@@ -67,6 +67,14 @@ impl PanoramaExposure {
     }
 }
 
+/// The exposure in which a white surface that faces the strongest light is white, or a brighter one: an object that is lit
+/// from behind is shown as bright as before a panorama.
+#[must_use]
+pub fn exposure_for_object(light: &ShLight) -> f32 {
+    let gain = OBJECT.0 / facing(light);
+    exposure_for(light) * if gain.is_finite() { gain.max(1.0) } else { 1.0 }
+}
+
 /// The mean irradiance on what is seen of a ball, as a part of the strongest.
 fn facing(light: &ShLight) -> f32 {
     let ball = Normals::sphere(24);
@@ -112,6 +120,24 @@ mod tests {
             assert!((shown / BRIGHT - 1.0).abs() < 0.03, "{most}: {found:?}");
             assert!(found.clipped < 0.05 && !found.for_objects, "{found:?}");
         }
+    }
+
+    #[test]
+    fn without_a_background_an_object_is_as_bright_in_front_light_and_not_black_against_it() {
+        let exposure = |azimuth| {
+            let light = lamp(azimuth);
+            (
+                exposure_for_object(&light),
+                exposure_for(&light),
+                facing(&light),
+            )
+        };
+        let (found, strongest, _) = exposure(20.0);
+        assert_eq!(found, strongest);
+        let (found, strongest, facing) = exposure(180.0);
+        assert!((found / strongest * facing - OBJECT.0).abs() < 1e-4);
+        let dark = ShLight::dark(Order::TWO);
+        assert_eq!(exposure_for_object(&dark), exposure_for(&dark));
     }
 
     #[test]

@@ -116,14 +116,20 @@ impl FromStr for DiscLamp {
     /// Reads `AZIMUTH,ELEVATION[,COLOUR][,SIZE]`, the colour as `#rrggbb` (sRGB) or as a temperature such as `3200K`.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut parts = text.split(',').map(str::trim);
-        let mut angle = |least: f64, most: f64| {
+        let mut angle = |name: &str, most: f64| {
             let angle = parts.next().and_then(|part| part.parse::<f64>().ok());
-            let angle = angle.filter(|angle| (least..=most).contains(angle));
-            angle.ok_or("give AZIMUTH,ELEVATION[,COLOUR][,SIZE], such as 60,30 or -45,40,3200K,10")
+            let angle = angle.ok_or(
+                "give AZIMUTH,ELEVATION[,COLOUR][,SIZE], such as 60,30 or -45,40,3200K,10",
+            )?;
+            if (-most..=most).contains(&angle) {
+                Ok(angle)
+            } else {
+                Err(format!("give an {name} from -{most} to {most} degrees"))
+            }
         };
         let mut lamp = Self {
-            azimuth: angle(-36_000.0, 36_000.0)?,
-            elevation: angle(-90.0, 90.0)?,
+            azimuth: angle("azimuth", 36_000.0)?,
+            elevation: angle("elevation", 90.0)?,
             ..Self::default()
         };
         for part in parts {

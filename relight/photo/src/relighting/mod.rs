@@ -40,8 +40,8 @@ mod view;
 mod white_balance;
 
 pub use error::InsertError;
-pub use exposure::PanoramaExposure;
 pub(crate) use exposure::WHITE;
+pub use exposure::{PanoramaExposure, exposure_for_object};
 #[cfg(feature = "files")]
 pub(crate) use height_field::HeightSolver;
 pub(crate) use height_field::{BLOCK, HeightField};

@@ -65,19 +65,29 @@ impl WhiteBalance {
             return Ok(source);
         }
         let tint = self.tint(&source.light()?);
-        Ok(match source {
-            LightSource::Panorama(panorama) => {
+        source.tinted(tint)
+    }
+}
+
+impl LightSource {
+    /// The light with each channel multiplied.
+    ///
+    /// # Errors
+    /// None for light of finite values.
+    pub(crate) fn tinted(self, tint: [f64; 3]) -> Result<Self, InsertError> {
+        Ok(match self {
+            Self::Panorama(panorama) => {
                 let mut planes = panorama.image().planes().clone();
                 for (plane, tint) in planes.planes_mut().into_iter().zip(tint) {
                     plane.iter_mut().for_each(|value| *value *= tint as f32);
                 }
-                LightSource::Panorama(Panorama::new(Rgb::new(planes))?)
+                Self::Panorama(Panorama::new(Rgb::new(planes))?)
             }
-            LightSource::Lamp(lamp) => LightSource::Lamp(DiscLamp {
+            Self::Lamp(lamp) => Self::Lamp(DiscLamp {
                 colour: [0, 1, 2].map(|c| lamp.colour[c] * tint[c]),
                 ..lamp
             }),
-            LightSource::Coefficients(light) => LightSource::Coefficients(light.tinted(tint)),
+            Self::Coefficients(light) => Self::Coefficients(light.tinted(tint)),
         })
     }
 }

@@ -4,12 +4,13 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
-use relight_core::captured_object::CapturedObject;
 use relight_photo::compositing::{LightDescription, ObjectDescription, SceneDescription};
+use relight_photo::export::is_object;
 use relight_photo::files::{InsertionOutput, OutputKind, PhotoReading};
+use relit_data::geometry::Rect;
 use relit_data::text;
 
-use crate::lighting::{LightArguments, RotationArguments};
+use crate::lighting::{LightArguments, RotationArguments, is_own};
 use crate::photos::NetworkArguments;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -22,20 +23,21 @@ Examples:
   relight insert cup.jpg --mask cup-mask.png --into room.jpg --lamp 60,30 -o out.exr
       in the light of a lamp
   relight insert mug --into room.hdr -o out.png
-      an object that relight turn has captured: its folder, or mug/object.relit
+      an object that relight turn or relight decompose has written: its folder, or mug/object.relit
   relight insert --scene scene.toml -o out.png
       everything from a file (docs/guide/photograph.md)";
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The objects, from back to front: photographs, or captured objects (object.relit, or the folder of relight turn).
+    /// The objects, from back to front: photographs, or objects with maps (object.relit, or a folder of relight turn or relight
+    /// decompose).
     #[arg(value_name = "PHOTO", required_unless_present = "scene")]
     photos: Vec<PathBuf>,
     /// A scene file with background, light and objects, in place of the options below.
     #[arg(
         long,
         value_name = "FILE.toml",
-        conflicts_with_all = ["photos", "into", "mask", "at", "height", "light", "lamp", "light_angle"]
+        conflicts_with_all = ["photos", "into", "mask", "rect", "at", "height", "light", "lamp", "light_angle"]
     )]
     scene: Option<PathBuf>,
     /// The picture (.png, .jpg, .exr) or video (.mp4, .webm); its folder is created if missing.
@@ -63,6 +65,9 @@ struct ObjectArguments {
     /// A mask, white on the object, or a folder of masks, PHOTO.png.
     #[arg(long, value_name = "FILE|DIR", action = ArgAction::Append)]
     mask: Vec<PathBuf>,
+    /// A rectangle around the object in its photograph, pixels: the object is cut out within it, as by relit-mask --rect.
+    #[arg(long, value_name = "X,Y,W,H", conflicts_with = "mask", action = ArgAction::Append)]
+    rect: Vec<Rect>,
     /// Centre of the object's lower edge, in parts of width and height from the upper left.
     #[arg(long, value_name = "X,Y", value_parser = place, action = ArgAction::Append)]
     at: Vec<[f64; 2]>,
@@ -78,6 +83,7 @@ impl Arguments {
         let object = &self.object;
         let lists = [
             ("--mask", object.mask.len()),
+            ("--rect", object.rect.len()),
             ("--at", object.at.len()),
             ("--height", object.height.len()),
         ];
@@ -98,6 +104,12 @@ impl Arguments {
                 mask.display()
             ));
         }
+        if self.light.light.as_deref().is_some_and(is_own) {
+            return Some(
+                "--light own is for relight relight: without --light, objects are in the light of the background"
+                    .to_owned(),
+            );
+        }
         if OutputKind::from_path(&self.output).is_none() {
             return Some(format!(
                 "--output {}: give .png, .jpg, .exr, .mp4 or .webm",
@@ -114,6 +126,11 @@ impl Arguments {
                 self.output.display()
             )
         })
+    }
+
+    /// The rectangle around an object in its photograph.
+    pub(super) fn rectangle(&self, number: usize) -> Option<Rect> {
+        of(&self.object.rect, number)
     }
 
     /// The file that is asked for.
@@ -162,7 +179,7 @@ impl ObjectArguments {
         let across = (number as f64 + 0.5) / photos.len() as f64;
         let mask = of(&self.mask, number)
             // A folder of masks is for the photographs.
-            .filter(|mask| !(CapturedObject::is_named(&photo) && mask.is_dir()))
+            .filter(|mask| !(is_object(&photo) && mask.is_dir()))
             .map(|mask| {
                 let name = photo.file_stem().unwrap_or_default();
                 PhotoReading::mask_path(&mask, &name.to_string_lossy())

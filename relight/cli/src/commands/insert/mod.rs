@@ -4,9 +4,8 @@ mod arguments;
 
 use std::path::{Path, PathBuf};
 
-use relight_photo::compositing::{
-    LightDescription, SceneDescription, SceneEnvironment, SceneObject,
-};
+use relight_core::image::{ColourSpace, Srgb};
+use relight_photo::compositing::{EstimatedColours, SceneObject};
 use relight_photo::files::{BackgroundFile, InsertSource, Insertion, OutputKind};
 use relight_photo::relighting::{PanoramaExposure, SeenSun};
 use relit_console::{Console, Outcome, ProgressBar};
@@ -15,33 +14,31 @@ use serde_json::json;
 pub(crate) use self::arguments::{Arguments, EXAMPLES};
 use crate::commands::CommandResult;
 use crate::lighting::too_coarse;
-use crate::photos::not_an_input;
+use crate::photos::{name_notes, not_an_input};
 
 pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
     let (scene, folder) = arguments.description()?;
     let file = |path: &Path| folder.join(path);
-    let sources = scene
-        .objects
-        .iter()
-        .map(|object| InsertSource::read(object, &folder))
+    let objects = scene.objects.iter().enumerate();
+    let sources = objects
+        .map(|(number, object)| InsertSource::read(object, arguments.rectangle(number), &folder))
         .collect::<Result<Vec<_>, _>>()?;
-    for source in &sources {
-        if let InsertSource::Photo(photo) = source
-            && let Some(note) = &photo.mask_note
-        {
-            console.warn(&format!("{}: the mask {note}", photo.name));
+    for (object, source) in scene.objects.iter().zip(&sources) {
+        if let InsertSource::Photo(photo) = source {
+            let path = file(&object.photo).display().to_string();
+            name_notes(&path, &photo.notes, console);
         }
     }
-    let background = BackgroundFile::read(&file(&scene.background), &scene)?;
+    let path = file(&scene.background);
+    let background = BackgroundFile::read(&path, &scene)?;
+    name_notes(&path.display().to_string(), background.notes(), console);
     check_output(&background, arguments)?;
     if let BackgroundFile::Panorama(parts) = &background
         && let Some(warning) = too_coarse(&parts.0, &parts.1)
     {
-        let path = file(&scene.background);
         console.warn(&format!("{}: {warning}", path.display()));
     }
     if let Some(conversion) = background.colour_conversion() {
-        let path = file(&scene.background);
         console.warn(&format!(
             "{}: colours converted: {conversion}",
             path.display()
@@ -76,24 +73,37 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
             output.display(),
             scene.objects.len(),
             environment.exposure.map(described).unwrap_or_default(),
-            if takes_light(&scene, environment) {
-                sun_described(environment.sun)
-            } else {
-                String::new()
-            }
+            environment.estimated.map_or_else(String::new, |colours| {
+                colours_described(colours) + &sun_described(environment.sun)
+            })
         ),
         &json!({
             "event": "inserted", "output": output, "objects": scene.objects.len(), "frames": frames,
             "tilt": environment.tilt, "level": harmonisation.level, "balance": harmonisation.balance, "grain": harmonisation.grain,
-            "exposure": environment.exposure, "sun": environment.sun,
+            "exposure": environment.exposure, "sun": environment.sun, "light_colour": environment.estimated,
         }),
     );
     Ok(Outcome::Success)
 }
 
-/// Whether the light was taken from a photograph.
-fn takes_light(scene: &SceneDescription, environment: &SceneEnvironment) -> bool {
-    environment.exposure.is_none() && scene.light == LightDescription::default()
+/// The colours of light that was estimated from a photograph, in words.
+fn colours_described(colours: EstimatedColours) -> String {
+    let EstimatedColours { found, used } = colours;
+    format!(
+        "; light estimated from the picture, {}, shown as {}",
+        hexadecimal(found),
+        hexadecimal(used)
+    )
+}
+
+/// A colour as it is in sRGB, its brightest channel full.
+fn hexadecimal(colour: [f64; 3]) -> String {
+    let brightest = colour.into_iter().fold(f64::MIN_POSITIVE, f64::max);
+    let levels = colour.map(|channel| {
+        let level = Srgb::from_linear((channel / brightest) as f32);
+        format!("{:02x}", (level.clamp(0.0, 1.0) * 255.0).round() as u8)
+    });
+    format!("#{}", levels.concat())
 }
 
 /// The sun that is seen in a photograph, in words.
@@ -130,7 +140,7 @@ fn check_output(background: &BackgroundFile, arguments: &Arguments) -> Result<()
     );
     let output = arguments.output.display();
     match background {
-        BackgroundFile::Photo(_) if is_movie => Err(format!(
+        BackgroundFile::Photo(..) if is_movie => Err(format!(
             "{output}: a photograph gives a picture; give .png, .jpg or .exr"
         )),
         BackgroundFile::Panorama(_) if is_movie && arguments.rotation.rotate.is_none() => {
@@ -141,7 +151,7 @@ fn check_output(background: &BackgroundFile, arguments: &Arguments) -> Result<()
         BackgroundFile::Movie(_) if !is_movie => {
             Err(format!("{output}: give .mp4 or .webm for a video"))
         }
-        BackgroundFile::Photo(_) | BackgroundFile::Movie(_)
+        BackgroundFile::Photo(..) | BackgroundFile::Movie(_)
             if arguments.rotation.rotate.is_some() =>
         {
             Err("--rotate: only a panorama can be rotated".to_owned())

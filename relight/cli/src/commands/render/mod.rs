@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use relight_core::light::{Direction, Order, Rotation, ShLight};
 use relight_core::render::{RenderSettings, Surface, exposure_for};
 use relight_photo::files::{MovieWriter, OutputKind, write_picture};
-use relight_photo::relighting::{InsertError, LightSource};
+use relight_photo::relighting::{InsertError, LightSource, exposure_for_object};
 use relit_console::{Console, Outcome};
 use serde_json::json;
 
@@ -22,8 +22,10 @@ use crate::values::within;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  relight render image --normals normal.png --albedo albedo.png --light studio.hdr -o lit.png
-      the object in the light of a panorama
+  relight render image mug --light studio.hdr -o lit.png
+      the object of relight turn or relight decompose in the light of a panorama
+  relight render image --normals normal.png --albedo albedo.png --lamp 60,30 -o lit.png
+      the same from maps, in the light of a lamp
   relight render image --normals normal.png --albedo albedo.png --reflectance 0.3 --smoothness 60 \\
       --light light.txt --rotate 360 --seconds 8 -o rotation.mp4
       a glossy object, while the light rotates once about the vertical
@@ -71,7 +73,7 @@ struct MaterialsArguments {
 #[derive(Args)]
 struct RenderArguments {
     /// Brightness in stops: 0 shows a white surface in even light of radiance 1 as white; auto, one that faces the strongest
-    /// light.
+    /// light, and without --rotate more if that comes from behind.
     #[arg(long, value_name = "STOPS", default_value = "auto", value_parser = exposure, allow_hyphen_values = true)]
     exposure: Exposure,
     #[command(flatten)]
@@ -160,11 +162,13 @@ impl RenderArguments {
         Ok(light)
     }
 
-    fn settings(&self, light: &ShLight) -> RenderSettings {
+    /// `is_still` says that the light does not rotate, so that its side is known.
+    fn settings(&self, light: &ShLight, is_still: bool) -> RenderSettings {
         RenderSettings {
             diffuse: self.shading.diffuse(),
             specular: self.shading.specular(),
             exposure: match self.exposure {
+                Exposure::Auto if is_still => exposure_for_object(light),
                 Exposure::Auto => exposure_for(light),
                 Exposure::Stops(stops) => stops.exp2() * relight_core::render::EXPOSURE,
             },
@@ -180,7 +184,7 @@ pub(crate) fn run(arguments: &Arguments, console: Console) -> CommandResult {
 }
 
 fn image(arguments: &ImageArguments, console: Console) -> CommandResult {
-    let scene = LitObject::read(&arguments.render)?;
+    let scene = LitObject::read(&arguments.render, arguments.rotation.rotate.is_none())?;
     let frames = if arguments.rotation.rotate.is_some() {
         rotation(arguments, &scene, console)?;
         arguments.rotation.frames()
@@ -200,7 +204,7 @@ fn materials(arguments: &MaterialsArguments, console: Console) -> CommandResult 
         surface,
         light,
         settings,
-    } = LitObject::read(&arguments.render)?;
+    } = LitObject::read(&arguments.render, true)?;
     let sheet = settings.sweep(&surface, &light, &REFLECTED, &SMOOTHNESSES)?;
     write_picture(&arguments.output, &sheet)?;
     report(&arguments.output, 1, &settings, console);
@@ -215,10 +219,10 @@ struct LitObject {
 }
 
 impl LitObject {
-    fn read(arguments: &RenderArguments) -> Result<Self, Box<dyn Error>> {
+    fn read(arguments: &RenderArguments, is_still: bool) -> Result<Self, Box<dyn Error>> {
         let surface = arguments.object.read()?;
         let light = arguments.read_light()?;
-        let settings = arguments.settings(&light);
+        let settings = arguments.settings(&light, is_still);
         Ok(Self {
             surface,
             light,

@@ -4,13 +4,13 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use relight_core::captured_object::CapturedObject;
 use relight_core::files::read_planes;
 use relight_core::image::{
     Extent, ImageError, Linear, Planes, Rgb, Samples, StoredImage, Transfer, check_extent,
 };
 use relight_core::light::{Normals, NormalsFrame, YDown, YUp};
 use relight_core::render::{Gloss, Surface};
+use relight_photo::export::read_object;
 
 use crate::inputs::{NormalsArgument, TransferArgument};
 
@@ -25,7 +25,7 @@ pub(super) enum Map {
 
 #[derive(Args)]
 pub(super) struct ObjectArguments {
-    /// A captured object in place of maps: object.relit, or the folder of relight turn.
+    /// An object in place of maps: object.relit, or a folder of relight turn or relight decompose.
     #[arg(value_name = "OBJECT", help_heading = None::<&'static str>, conflicts_with_all = ["normals", "mask", "albedo", "reflectance", "smoothness"])]
     object: Option<PathBuf>,
     /// Normals, x to the right, z to the viewer: a PNG of (n + 1) / 2, black outside, or an EXR of vectors.
@@ -57,7 +57,7 @@ impl ObjectArguments {
     /// finite, or no pixel shows the object.
     pub(super) fn read(&self) -> Result<Surface, Box<dyn Error>> {
         if let Some(path) = &self.object {
-            return Ok(CapturedObject::read(path)?.surface().clone());
+            return Ok(read_object(path)?.surface().clone());
         }
         let normals = self.read_normals()?;
         let extent = normals.extent();
@@ -75,7 +75,7 @@ impl ObjectArguments {
     fn read_normals(&self) -> Result<Normals<YUp>, Box<dyn Error>> {
         let Some(path) = &self.normals else {
             return Err(
-                "give an object (object.relit, or the folder of relight turn), or --normals".into(),
+                "give an object (object.relit, or a folder of relight turn or relight decompose), or --normals".into(),
             );
         };
         let normals = match self.normals_frame.or_up() {
