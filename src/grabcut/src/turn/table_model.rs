@@ -22,19 +22,28 @@ const MIN_SAMPLES: usize = 300;
 /// The table is at most so many times as bright, and changes so many times as much, as the brightest of what surely is
 /// table.
 const BRIGHTER: f32 = 2.0;
-/// Which part of what surely is table is at most as bright, and of what was learned from.
+/// Which part of what surely is table is at most as bright.
 const BRIGHTEST: f64 = 0.95;
-const BRIGHTEST_LEARNED: f64 = 0.99;
 /// Without a plain surface, what lies below the object and is darker than this share of the scene's white is table.
 const DARK: f32 = 0.25;
 /// The scene's white is what this share of it is at most as bright as.
 const WHITE: f64 = 0.9;
 /// Share of the height by which what surely is below the object begins above its foot.
 const FOOT: f64 = 0.04;
+/// Parts of the object that are at most twice so many pixels wide may be the table's rim.
+const THIN: usize = 2;
 /// Share of the width that keeps the table's pixels away from the object.
 const AWAY: f64 = 0.006;
-/// A pixel that is brighter than the table's brightest by a share of it is at least so many times that far.
-const BRIGHT_IS_FAR: f32 = 6.0;
+/// Of what was learned from, this share is at most as bright as the table without shade.
+const LIT: f64 = 0.75;
+/// A part of the table that is darker by this logarithm is in shade.
+const SHADE: f32 = 0.1;
+/// The brightest frames of a pixel are one of so many.
+const FEW_FRAMES: usize = 8;
+/// A luminance, 0..=1, that noise hides.
+const NOISE: f32 = 0.001;
+/// Units of the density for one of the logarithm of the brightness.
+const BRIGHTNESS: f32 = 2.0;
 
 /// The logarithm of the distance is counted in bins of this width, from here on.
 const BIN: f32 = 0.25;
@@ -51,9 +60,10 @@ const FLOOR: f32 = 0.01;
 const TABLE_FLOOR: f32 = 0.03;
 /// The most that the table's model says for the table, in units of the log-likelihood of a pixel.
 const STRENGTH: f32 = 8.0;
-/// And for the object, where nothing but it can hide the table.
-const ON_DISC: f32 = 3.0;
-/// Which begins so far below the rim, as a share of the image's width.
+/// The most that it says for the table that a pixel is not brighter: a dark object is not, either.
+const AS_DARK: f32 = 2.0;
+/// The table's disc, where the model speaks for the object too, begins so far below the rim, as a share of the image's
+/// width.
 const RIM: f64 = 0.006;
 
 /// What is known of a turn before the table's model.
@@ -85,34 +95,40 @@ impl TableModel {
         let taken = learned_from(series, &surely, &table);
         let samples: Vec<Vec<f32>> = taken.iter().map(|&at| series.smooth(at)).collect();
         let space = Subspace::learn(&samples, DIRECTIONS);
-        let brightest = quantile(taken.iter().map(|&at| seen.light[at]), BRIGHTEST_LEARNED)?;
-        let distance = distances(series, &space);
-        let of_table = quantile(taken.iter().map(|&at| distance[at]), 0.5)?;
-        let logs = distance.iter().zip(seen.light).map(|(distance, light)| {
-            let brighter = BRIGHT_IS_FAR * (light / brightest.max(1e-6) - 1.0);
-            (distance / of_table.max(1e-9)).max(brighter).max(1e-3).ln()
+        let unshaded = Unshaded::learn(&samples)?;
+        let length = series.length().max(1) as f32;
+        let measures = series.map_smooth(|course| {
+            let distance = (space.residual(course) / length).sqrt();
+            (distance, unshaded.brighter(course))
         });
-        let logs: Vec<f32> = logs.collect();
-        let of_table = TableDensity::learn(taken.iter().map(|&at| logs[at]))?;
+        let of_table = quantile(taken.iter().map(|&at| measures[at].0), 0.5)?;
+        let log = |&(distance, _): &(f32, f32)| (distance / of_table.max(1e-9)).max(1e-3).ln();
+        let logs: Vec<f32> = measures.iter().map(log).collect();
+        let brighter: Vec<f32> = measures.iter().map(|&(_, by)| by).collect();
+        let trend = Trend::learn(&brighter, &taken, series.size().0);
+        let darker = brighter.iter().enumerate();
+        let darker: Vec<f32> = darker
+            .map(|(at, by)| BRIGHTNESS * (trend.at(at) - by))
+            .collect();
         let core = seen.object.eroded(2);
-        let core = core.bits().iter().zip(&logs);
-        let object = ObjectDensity::learn(
-            core.filter(|(bit, _)| **bit).map(|(_, &log)| log),
-            &of_table,
-        );
+        let by_course = log_ratios(&logs, &taken, &core)?;
+        let by_brightness = log_ratios(&darker, &taken, &core)?;
+        let both = by_course.iter().zip(&by_brightness);
+        let ratio: Vec<f32> = both
+            .map(|(course, brightness)| course + brightness.max(-AS_DARK))
+            .collect();
         // What is not table on the disc is object; elsewhere it may be the room.
-        let (width, _) = series.size();
-        let disc = Disc::fit(&table, &far, series.size());
-        let bottom = table.bounds().bottom();
-        let on_disc = table.map(|at, _| {
-            let (x, y) = (at % width, at / width);
-            let is_inside = |disc: Disc| disc.contains(x, y, RIM * width as f64);
-            (y as i64) < bottom && disc.is_some_and(is_inside)
-        });
-        let ratio = logs.iter().zip(on_disc.bits()).map(|(&log, &on_disc)| {
-            let ratio = (object.at(log) / of_table.at(log)).ln();
-            ratio.clamp(-STRENGTH, if on_disc { ON_DISC } else { 0.0 })
-        });
+        let alike = far.map(|at, far| far && ratio[at] < 0.0);
+        let seen_table = alike
+            .eroded(1)
+            .parts_where(Connectivity::Four, |part, pixels| {
+                part.area >= MIN_SAMPLES as u64 && pixels().and(&table).count() > 0
+            });
+        let on_disc = on_disc(&seen_table, &far);
+        let ratio = ratio
+            .iter()
+            .zip(on_disc.bits())
+            .map(|(&ratio, &on_disc)| ratio.clamp(-STRENGTH, if on_disc { STRENGTH } else { 0.0 }));
         Some(Self {
             ratio: ratio.collect(),
             on_disc,
@@ -159,7 +175,8 @@ struct Candidates {
 /// The pixels that may be table: around the plain surface, or without one around what lies below the object.
 fn candidates(seen: &TurnObservations<'_>, (width, height): (usize, usize)) -> Option<Candidates> {
     let away = ((width as f64 * AWAY).round() as usize).max(2);
-    let far = seen.object.dilated(away).inverted();
+    // Without the table's rim, which may hang on the object.
+    let far = seen.object.opened(THIN).dilated(away).inverted();
     let surely = if seen.surface.count() >= MIN_SAMPLES as u64 {
         seen.surface.and(&far)
     } else {
@@ -210,10 +227,105 @@ fn thinned(samples: &Bitmap) -> Vec<usize> {
     set.map(|(at, _)| at).step_by(step).collect()
 }
 
-/// How far the smooth course of each pixel is from the space.
-fn distances(series: &PixelSeries, space: &Subspace) -> Vec<f32> {
-    let length = series.length().max(1) as f32;
-    series.map_smooth(|course| (space.residual(course) / length).sqrt())
+/// The pixels between the table's upper rim and the lowest of it in their column: nothing but the object can hide the
+/// table there. None without a rim that is seen well.
+fn on_disc(table: &Bitmap, far: &Bitmap) -> Bitmap {
+    let width = table.width();
+    let size = (width, table.bits().len() / width.max(1));
+    let disc = Disc::fit(table, far, size);
+    let mut lowest = vec![0; width];
+    for (at, _) in table.bits().iter().enumerate().filter(|(_, bit)| **bit) {
+        lowest[at % width] = at / width;
+    }
+    table.map(|at, _| {
+        let (x, y) = (at % width, at / width);
+        let top = disc.and_then(|disc| disc.top(x));
+        y <= lowest[x] && top.is_some_and(|top| y as f64 >= top + RIM * width as f64)
+    })
+}
+
+/// How much more likely each pixel is object than table by one measure, as a logarithm.
+fn log_ratios(values: &[f32], table: &[usize], object: &Bitmap) -> Option<Vec<f32>> {
+    let of_table = TableDensity::learn(table.iter().map(|&at| values[at]))?;
+    let core = object.bits().iter().zip(values).filter(|(bit, _)| **bit);
+    let of_object = ObjectDensity::learn(core.map(|(_, &value)| value), &of_table);
+    let ratio = |&value: &f32| (of_object.at(value) / of_table.at(value)).ln();
+    Some(values.iter().map(ratio).collect())
+}
+
+/// The luminance of the table in each frame where nothing shades it.
+struct Unshaded(Vec<f32>);
+
+impl Unshaded {
+    fn learn(samples: &[Vec<f32>]) -> Option<Self> {
+        let frames = 0..samples.first()?.len() / 3;
+        let of = |frame: usize| {
+            let levels = samples.iter().map(|course| luminance_in(course, frame));
+            quantile(levels, LIT)
+        };
+        frames.map(of).collect::<Option<_>>().map(Self)
+    }
+
+    /// By how much a pixel is brighter in the frames in which it is so most, as a logarithm. Shade makes the table
+    /// darker in some frames, and hardly anything makes it brighter in any.
+    fn brighter(&self, course: &[f32]) -> f32 {
+        let ratio =
+            |(frame, level): (usize, &f32)| (luminance_in(course, frame) + NOISE) / (level + NOISE);
+        let mut ratios: Vec<f32> = self.0.iter().enumerate().map(ratio).collect();
+        let most = (ratios.len() / FEW_FRAMES).max(1);
+        ratios.select_nth_unstable_by(most - 1, |a, b| b.total_cmp(a));
+        (ratios[..most].iter().sum::<f32>() / most as f32).ln()
+    }
+}
+
+/// How a measure of the table depends on the row: it gleams more where it is seen at a smaller angle.
+struct Trend {
+    middle: [f32; 2],
+    slope: f32,
+    width: usize,
+}
+
+impl Trend {
+    /// The line of least squares through those values that are not far below it: those are in shade.
+    fn learn(values: &[f32], samples: &[usize], width: usize) -> Self {
+        let mut trend = Self {
+            middle: [0.0; 2],
+            slope: 0.0,
+            width,
+        };
+        for below in [f32::INFINITY, SHADE] {
+            let lit = |&&at: &&usize| values[at] > trend.at(at) - below;
+            let points: Vec<[f32; 2]> = samples
+                .iter()
+                .filter(lit)
+                .map(|&at| [(at / width) as f32, values[at]])
+                .collect();
+            let many = points.len().max(1) as f32;
+            let middle =
+                [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f32>() / many);
+            let of = |axis: usize| {
+                points
+                    .iter()
+                    .map(|point| (point[0] - middle[0]) * (point[axis] - middle[axis]))
+                    .sum::<f32>()
+            };
+            trend = Self {
+                middle,
+                slope: of(1) / of(0).max(1.0),
+                width,
+            };
+        }
+        trend
+    }
+
+    fn at(&self, at: usize) -> f32 {
+        self.middle[1] + self.slope * ((at / self.width) as f32 - self.middle[0])
+    }
+}
+
+fn luminance_in(course: &[f32], frame: usize) -> f32 {
+    let [red, green, blue] = [0, 1, 2].map(|channel| course[3 * frame + channel]);
+    0.2126 * red + 0.7152 * green + 0.0722 * blue
 }
 
 fn quantile(values: impl Iterator<Item = f32>, share: f64) -> Option<f32> {
@@ -296,6 +408,31 @@ mod tests {
         let ratio = |log: f32| (object.at(log) / table().at(log)).ln();
         assert!(ratio(0.1) < -2.0, "{}", ratio(0.1));
         assert!(ratio(4.0) > 2.0, "{}", ratio(4.0));
+    }
+
+    #[test]
+    fn shade_makes_the_table_no_brighter_and_an_upright_black_face_is_brighter_in_some_frames() {
+        let course = |level: &dyn Fn(usize) -> f32| -> Vec<f32> {
+            (0..32).flat_map(|frame| [level(frame); 3]).collect()
+        };
+        let lit = course(&|_| 0.02);
+        let unshaded = Unshaded::learn(&vec![lit.clone(); 9]).unwrap();
+        let shaded = course(&|frame| if frame < 20 { 0.002 } else { 0.02 });
+        let upright = course(&|frame| if frame < 20 { 0.002 } else { 0.04 });
+        assert!(unshaded.brighter(&lit).abs() < 0.01);
+        assert!(unshaded.brighter(&shaded).abs() < 0.01);
+        assert!(unshaded.brighter(&upright) > 0.5);
+    }
+
+    #[test]
+    fn a_table_that_gleams_in_the_distance_has_a_trend_that_shade_does_not_bend() {
+        let gleam = |at: usize| 0.5 - 0.01 * (at / 10) as f32;
+        let shade = |at: usize| if at % 10 == 0 && at > 250 { 1.0 } else { 0.0 };
+        let values: Vec<f32> = (0..500).map(|at| gleam(at) - shade(at)).collect();
+        let samples: Vec<usize> = (0..500).collect();
+        let trend = Trend::learn(&values, &samples, 10);
+        assert!((trend.at(5) - gleam(5)).abs() < 0.03);
+        assert!((trend.at(495) - gleam(495)).abs() < 0.03);
     }
 
     #[test]
