@@ -11,7 +11,7 @@ TARGET := $(or $(CARGO_TARGET_DIR),target)
 PROGRAMS := -p relit-capture -p relit-mask -p relit-extract
 
 # Features that making shards does not need; lint and tests cover them too.
-EXTRAS := --features relit-capture/nokhwa,relit-mask/opencv
+EXTRAS := --features relit-capture/nokhwa,relit-mask/networks,relit-mask/opencv
 
 # The recorded session of a whole turn, which the demonstration replays as a camera.
 SESSION := 20261120T093015Z-cow
@@ -148,7 +148,6 @@ lint: setup ## Check formatting, lints and documentation
 	cargo clippy --locked -p relight -- -D warnings
 	cargo clippy --locked $(PROGRAMS) --all-targets -- -D warnings
 	cargo clippy --locked -p relit-data --no-default-features -- -D warnings
-	cargo clippy --locked -p relit-mask --no-default-features --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps $(EXTRAS)
 	@if cargo tree --locked -p relight -e normal --prefix none \
 	    | grep -E '^(ffmpeg|opencv|relit-(video|mask|capture|camera|turntable))'; then \

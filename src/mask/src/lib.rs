@@ -11,7 +11,7 @@
 //! This crate brings frames and folders to [`relit_grabcut`], and is the program `relit-mask` (in `cli/`).
 //! It knows nothing of data sets and the rig.
 //!
-//! With the feature `networks`, which is on by default, a segmentation network from an ONNX file can find the object
+//! With the feature `networks`, which is off by default, a segmentation network from an ONNX file can find the object
 //! ([`MaskRequest::with_network`]).
 //!
 //! With the feature `opencv`, which is off by default, OpenCV's GrabCut can cut a mask as well: a reference

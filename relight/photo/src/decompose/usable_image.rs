@@ -2,7 +2,7 @@
 
 use super::decomposer::usable;
 use relight_core::image::{ColourImage, Planes, Samples, StoredImage, Transfer};
-use relight_core::statistics::above_part;
+use relit_data::statistics::above_part;
 
 /// If a larger part of the pixels that are not black is at or above 1, a picture is not in units in which 1 is white.
 const MAX_WHITE: f64 = 0.5;

@@ -427,7 +427,7 @@ mod tests {
     #[test]
     fn a_table_that_gleams_in_the_distance_has_a_trend_that_shade_does_not_bend() {
         let gleam = |at: usize| 0.5 - 0.01 * (at / 10) as f32;
-        let shade = |at: usize| if at % 10 == 0 && at > 250 { 1.0 } else { 0.0 };
+        let shade = |at: usize| if at.is_multiple_of(10) && at > 250 { 1.0 } else { 0.0 };
         let values: Vec<f32> = (0..500).map(|at| gleam(at) - shade(at)).collect();
         let samples: Vec<usize> = (0..500).collect();
         let trend = Trend::learn(&values, &samples, 10);

@@ -85,7 +85,7 @@ pub(crate) struct MaskArguments {
     auto: bool,
 
     /// An ONNX file of a segmentation network that finds the object, by --rect and --seeds if they are given; twice for
-    /// an encoder and its decoder
+    /// an encoder and its decoder; needs the feature `networks`
     #[arg(long, value_name = "ONNX", conflicts_with_all = ["auto", "edit"])]
     model: Vec<PathBuf>,
 
