@@ -332,7 +332,7 @@ impl TurnField {
         }
         let surely = model.alike(SURELY_TABLE).or(&self.table.surface);
         self.backdrop = self.backdrop.minus(&model.on_disc).or(&surely);
-        self.like_table = Some(model.alike(0.0));
+        self.like_table = Some(model.like_table());
     }
 
     /// The average brightness L of each pixel.

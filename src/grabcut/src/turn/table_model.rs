@@ -83,6 +83,8 @@ pub(crate) struct TurnObservations<'a> {
 pub(crate) struct TableModel {
     /// How much more likely each pixel is object than table, as a logarithm.
     pub(crate) ratio: Vec<f32>,
+    /// The same by the course alone: a dark part of the object in shade is not brighter than the table, either.
+    by_course: Vec<f32>,
     /// The pixels that show the table or the object, and never the room.
     pub(crate) on_disc: Bitmap,
     size: (usize, usize),
@@ -131,6 +133,7 @@ impl TableModel {
             .map(|(&ratio, &on_disc)| ratio.clamp(-STRENGTH, if on_disc { STRENGTH } else { 0.0 }));
         Some(Self {
             ratio: ratio.collect(),
+            by_course,
             on_disc,
             size: series.size(),
         })
@@ -146,10 +149,15 @@ impl TableModel {
             [(x, y), (right, y), (x, below), (right, below)].map(|(x, y)| y * width + x)
         };
         let pixels = half.0 * half.1;
-        let mean = |at: usize| four(at).iter().map(|&at| self.ratio[at]).sum::<f32>() / 4.0;
+        let mean = |values: &[f32]| -> Vec<f32> {
+            let four = (0..pixels).map(four);
+            four.map(|four| four.map(|at| values[at]).iter().sum::<f32>() / 4.0)
+                .collect()
+        };
         let on_disc = (0..pixels).map(|at| four(at).iter().all(|&at| self.on_disc.bits()[at]));
         Self {
-            ratio: (0..pixels).map(mean).collect(),
+            ratio: mean(&self.ratio),
+            by_course: mean(&self.by_course),
             on_disc: Bitmap::new((half.0 as u32, half.1 as u32), on_disc),
             size: half,
         }
@@ -157,8 +165,13 @@ impl TableModel {
 
     /// The pixels that are more likely table than object by a logarithm of at least this.
     pub(crate) fn alike(&self, least: f32) -> Bitmap {
-        let size = (self.size.0 as u32, self.size.1 as u32);
-        Bitmap::new(size, self.ratio.iter().map(|&ratio| ratio < -least))
+        self.on_disc.map(|at, _| self.ratio[at] < -least)
+    }
+
+    /// The pixels that are more likely table than object by their course too.
+    pub(crate) fn like_table(&self) -> Bitmap {
+        self.alike(0.0)
+            .map(|at, alike| alike && self.by_course[at] < 0.0)
     }
 }
 
@@ -427,7 +440,13 @@ mod tests {
     #[test]
     fn a_table_that_gleams_in_the_distance_has_a_trend_that_shade_does_not_bend() {
         let gleam = |at: usize| 0.5 - 0.01 * (at / 10) as f32;
-        let shade = |at: usize| if at.is_multiple_of(10) && at > 250 { 1.0 } else { 0.0 };
+        let shade = |at: usize| {
+            if at.is_multiple_of(10) && at > 250 {
+                1.0
+            } else {
+                0.0
+            }
+        };
         let values: Vec<f32> = (0..500).map(|at| gleam(at) - shade(at)).collect();
         let samples: Vec<usize> = (0..500).collect();
         let trend = Trend::learn(&values, &samples, 10);
