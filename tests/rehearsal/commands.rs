@@ -78,3 +78,29 @@ fn a_replay_whose_controls_cannot_be_set_is_noted_once_with_all_of_them() {
         assert!(found.contains(named), "{named}: {found}");
     }
 }
+
+#[test]
+fn a_name_that_no_object_can_have_is_wrong_usage() {
+    let mut command = Command::new(relit_tests::program("relit-capture"));
+    command.args(["record", "--object", "blue vase / 2", "--turntable", "none"]);
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+}
+
+#[test]
+fn a_camera_that_is_missing_is_named_before_anybody_is_asked() {
+    let root = tempfile::tempdir().unwrap();
+    let mut command = Command::new(relit_tests::program("relit-capture"));
+    command.args([
+        "record",
+        "--object",
+        "mug",
+        "--camera",
+        "v4l2:/dev/no-camera",
+    ]);
+    command.args(["--turntable", "serial:/dev/no-table", "--root"]);
+    let output = command.arg(root.path().join("sessions")).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("/dev/no-camera"), "{text}");
+}
