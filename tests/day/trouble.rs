@@ -105,10 +105,10 @@ pub(crate) fn a_second_tap_on_start_is_no_stop(browser: PathBuf) {
     // As soon as the button is another one.
     phone.value(
         "(() => { const go = document.getElementById('go'); \
-            new MutationObserver(() => { if (window.again === undefined && go.textContent === 'Stop') { window.again = go.disabled; go.click(); } }).observe(go, { childList: true }); \
+            new MutationObserver(() => { if (window.secondTap === undefined && go.textContent === 'Stop') { window.secondTap = go.disabled; go.click(); } }).observe(go, { childList: true }); \
             go.click(); })()",
     );
-    phone.wait_for("window.again === true");
+    phone.wait_for("window.secondTap === true");
     phone.wait_for("document.getElementById('progress').value > 0.02");
     phone.wait_text("#phase", "Recording");
     phone.wait_button("Stop", true);

@@ -21,12 +21,13 @@ const STEPS = [
   [/gain/, () => 1],
   [/white_balance_temperature/, () => 100],
 ];
-/** Milliseconds in which a second tap is not meant for what the button has become since the first. */
+/** Milliseconds for which the big button takes no tap once a tap has made it another one: a second tap is meant for what it was. */
 const DOUBLE_TAP = 1500;
 let state = null;
 let seenFault = -Infinity;
-/** What the big button did at the last tap, and when. */
-let tapped = { does: "", at: -Infinity };
+/** What the big button did when it was tapped, until it is another one, and until when it takes no tap. */
+let tapped = null;
+let calmUntil = -Infinity;
 
 /** Gives a command; why the rig refuses it is shown. */
 async function order(command) {
@@ -203,9 +204,13 @@ function showName() {
 function showGo() {
   showName();
   const { text, stop, asks, command } = action();
-  const early = command && command.command !== tapped.does && performance.now() - tapped.at < DOUBLE_TAP;
+  if (tapped && command && command.command !== tapped) {
+    tapped = null;
+    calmUntil = performance.now() + DOUBLE_TAP;
+    setTimeout(showGo, DOUBLE_TAP + 50);
+  }
   $("go").textContent = text;
-  $("go").disabled = !(command || asks) || early || document.body.className !== "";
+  $("go").disabled = !(command || asks) || performance.now() < calmUntil || document.body.className !== "";
   $("go").classList.toggle("stop", Boolean(stop));
   $("go").classList.toggle("asks", Boolean(asks));
 }
@@ -364,8 +369,7 @@ $("go").addEventListener("click", () => {
   const { asks, command } = action();
   if (asks) return askName();
   if (!command) return;
-  tapped = { does: command.command, at: performance.now() };
-  setTimeout(showGo, DOUBLE_TAP);
+  tapped = command.command;
   order(command);
 });
 $("last-open").addEventListener("click", () => openSession(state.last_take.session).catch((problem) => say(problem.message)));
