@@ -59,7 +59,7 @@ impl Predictions {
         Ok(Rgb::new(brought_to(path, image.into_planes(), extent)?))
     }
 
-    /// The first PNG of colours of these samples that is read as linear light, as nothing beside it says how it is encoded.
+    /// The first PNG of colours of these samples that is read as linear light, because no file says how it is encoded.
     #[must_use]
     pub fn undescribed<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Option<PathBuf> {
         let mut names = names.into_iter();

@@ -58,8 +58,8 @@ impl RelightableObject {
     }
 }
 
-/// A pixel of the photograph, of which the object covers the part `alpha` and has the colour `own`, after the object gets the
-/// colour `new`. No more changes than the pixel holds: where the object's colour is overestimated, the pixel would turn black.
+/// A pixel of the photograph after the object, which covers the part `alpha` of it, gets the colour `new` in place of `own`. No
+/// more changes than the pixel holds: where the object's colour is overestimated, the pixel would turn black.
 fn recoloured(alpha: f32, old: f32, own: f32, new: f32) -> f32 {
     let part = alpha * own;
     let held = if part > old { old / part } else { 1.0 };

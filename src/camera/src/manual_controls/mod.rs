@@ -74,13 +74,15 @@ const ASPECTS: [Aspect; 7] = [
             ("focus_auto", Manual::Off),
         ],
         values: &[&["focus_absolute"]],
-        is_needed: true,
+        // Without controls it is fixed.
+        is_needed: false,
     },
     Aspect {
         name: "power-line filter",
         switches: &[],
         values: &[&["power_line_frequency"]],
-        is_needed: true,
+        // Nothing for it to change at a fixed exposure.
+        is_needed: false,
     },
     Aspect {
         name: "backlight compensation",
@@ -210,7 +212,8 @@ impl ManualPlan {
             let switched = plan.switch_off(controls, aspect);
             let held = plan.hold(controls, wanted, aspect, &mut values);
             let is_locked = plan.not_held.locked.len() > before;
-            if aspect.is_needed && !held && !is_locked {
+            let has_automatic = switched && !aspect.values.is_empty();
+            if (aspect.is_needed || has_automatic) && !held && !is_locked {
                 let not_held = if switched {
                     &mut plan.not_held.without_value
                 } else {

@@ -156,25 +156,30 @@ fn names_from_before_linux_5_17_are_known_too() {
 #[test]
 fn missing_controls_are_named() {
     let plan = ManualPlan::new(&laptop(), &ManualValues::default());
-    assert_eq!(plan.not_held.without_control, ["gain", "focus"]);
+    assert_eq!(plan.not_held.without_control, ["gain"]);
     let none = ManualPlan::new(&[], &ManualValues::default());
     assert_eq!(none.steps, []);
-    let needed = [
-        "exposure",
-        "gain",
-        "white balance",
-        "focus",
-        "power-line filter",
-    ];
+    let needed = ["exposure", "gain", "white balance"];
     let not_held = NotHeld {
         without_control: needed.to_vec(),
         ..NotHeld::default()
     };
     assert_eq!(
         none.not_held, not_held,
-        "frame rate and backlight are not missed"
+        "what a camera without controls does not change is not missed"
     );
     assert!(is_named(&not_held.to_string(), &needed));
+}
+
+#[test]
+fn an_automatic_focus_without_a_value_is_named_and_a_fixed_one_is_not() {
+    let mut controls = c920_new();
+    controls.retain(|control| control.name != "focus_absolute");
+    let plan = ManualPlan::new(&controls, &ManualValues::default());
+    assert_eq!(plan.not_held.without_value, ["focus"]);
+    controls.retain(|control| !control.name.starts_with("focus"));
+    let plan = ManualPlan::new(&controls, &ManualValues::default());
+    assert!(plan.not_held.is_empty(), "{:?}", plan.not_held);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use super::output::OutputFolder;
 /// Removes sessions from the data set in `out`, first from its description and then their files, and returns their entries.
 ///
 /// # Errors
-/// [`ShardError::Refused`] if there is no session of one of these names: then nothing is removed;
+/// [`ShardError::Refused`] if one of these names is not that of a session: then nothing is removed;
 /// [`ShardError::Locked`] while the data set is being written; [`ShardError::Io`]; those of [`Dataset::read`].
 pub fn remove_sessions(out: &Path, ids: &[String]) -> Result<Vec<SessionEntry>, ShardError> {
     let mut dataset = Dataset::read(out)?;

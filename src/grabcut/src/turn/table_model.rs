@@ -266,7 +266,7 @@ fn log_ratios(values: &[f32], table: &[usize], object: &Bitmap) -> Option<Vec<f3
     Some(values.iter().map(ratio).collect())
 }
 
-/// The luminance of the table in each frame where nothing shades it.
+/// The luminance of the unshaded table in each frame.
 struct Unshaded(Vec<f32>);
 
 impl Unshaded {

@@ -11,7 +11,7 @@ const UPPER_LEFT: f32 = 2.0;
 const LOWER_RIGHT: f32 = 3.0;
 /// None: it fills up.
 const NO_POINT: f32 = -1.0;
-/// Points of the object, and of the background; EfficientSAM takes 6 in all, of which a box is 2.
+/// Points of the object, and of the background; EfficientSAM takes 6, and a box is 2 of them.
 const MOST_OF_EACH: usize = 2;
 
 /// Points in pixels of the frame, each with what it is.
@@ -44,7 +44,7 @@ impl Prompt {
         points.count() > 1
     }
 
-    /// The same with a point that is none, which the networks that were trained with a box want where there is none.
+    /// With the placeholder that networks which were trained with boxes want in place of a box.
     pub(super) fn filled_up(mut self) -> Self {
         if !self.labels.contains(&UPPER_LEFT) {
             self.points.push([0.0; 2]);
