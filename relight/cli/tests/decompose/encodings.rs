@@ -47,7 +47,10 @@ fn a_file_says_itself_whether_it_is_linear() {
     assert!(matches!(fault, DecomposeError::Colour { .. }), "{fault}");
 
     let exr = folder.save("photo.exr", |path| {
-        let bright = ImageBuffer::from_fn(WIDTH, HEIGHT, |_, _| Pixel([3.0_f32, 0.5, 0.25]));
+        // Less than half of it is brighter than white.
+        let bright = ImageBuffer::from_fn(WIDTH, HEIGHT, |x, _| {
+            Pixel([if x < 9 { 3.0_f32 } else { 0.9 }, 0.5, 0.25])
+        });
         image::DynamicImage::ImageRgb32F(bright).save(path).unwrap();
     });
     let photo = load(&exr, &with_mask(mask)).unwrap();

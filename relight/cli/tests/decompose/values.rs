@@ -57,7 +57,7 @@ fn a_photograph_in_other_units_is_scaled_and_its_maps_with_it() {
         assert!(part <= 0.01, "{units}: {part}");
         let found = write(&photo, &folder.path("out")).unwrap();
         let json = figures(&folder);
-        assert_eq!(json["scale"].as_f64(), Some(f64::from(photo.scale)));
+        assert_eq!(json["scale"].as_f64().unwrap() as f32, photo.scale);
         let white = json["white"]["diffuse"].as_f64().unwrap() as f32;
         let diffuse = Rgb::read(&folder.path("out/diffuse.png"), Transfer::Srgb).unwrap();
         let [of_file, _, _] = diffuse.planes().pixel(30, 24);

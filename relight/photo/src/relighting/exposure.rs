@@ -71,7 +71,7 @@ impl PanoramaExposure {
 /// from behind is shown as bright as before a panorama.
 #[must_use]
 pub fn exposure_for_object(light: &ShLight) -> f32 {
-    let gain = OBJECT.0 / facing(light);
+    let gain = WHITE * OBJECT.0 / facing(light);
     exposure_for(light) * if gain.is_finite() { gain.max(1.0) } else { 1.0 }
 }
 
@@ -135,7 +135,7 @@ mod tests {
         let (found, strongest, _) = exposure(20.0);
         assert_eq!(found, strongest);
         let (found, strongest, facing) = exposure(180.0);
-        assert!((found / strongest * facing - OBJECT.0).abs() < 1e-4);
+        assert!((found / strongest * facing - WHITE * OBJECT.0).abs() < 1e-4);
         let dark = ShLight::dark(Order::TWO);
         assert_eq!(exposure_for_object(&dark), exposure_for(&dark));
     }

@@ -13,6 +13,9 @@ use crate::still::{Format, StillError, exr, jpeg, radiance};
 /// # Errors
 /// If the format is not supported, or the picture is too large or cut off.
 pub fn decode(bytes: &[u8]) -> Result<DynamicImage, StillError> {
+    if bytes.is_empty() {
+        return Err(StillError::CutOff);
+    }
     let format = Format::sniff(bytes);
     match format {
         Some(Format::Radiance) => return radiance::decode(bytes),
@@ -83,6 +86,11 @@ fn fills_its_container(bytes: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_empty_file_is_cut_off() {
+        assert!(matches!(decode(b""), Err(StillError::CutOff)));
+    }
 
     #[test]
     fn a_webp_is_as_long_as_it_says() {
