@@ -254,7 +254,7 @@ impl Aligner {
             .take_rows(crop, rows, &mut buffers.lumas);
     }
 
-    /// Where the object is in a frame of whose crop all rows were taken.
+    /// Where the object is in a frame, all rows of its crop being known.
     pub fn measure_rows(&self, buffers: &mut AlignBuffers) -> Alignment {
         let lumas = self.required_regions.lumas_of_rows(&mut buffers.lumas);
         self.located(lumas, &mut buffers.gradients)

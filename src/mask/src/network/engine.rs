@@ -65,7 +65,7 @@ impl File {
 }
 
 impl Plan {
-    /// Makes a network ready whose inputs get this, and of whose outputs these are wanted.
+    /// Makes a network ready: what its inputs get, and which outputs are wanted.
     pub(super) fn new(file: &File, feeds: Vec<Feed>, outputs: &[usize]) -> Result<Self, String> {
         guarded(|| {
             let mut model = file.model.clone();

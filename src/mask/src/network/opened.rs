@@ -73,7 +73,7 @@ impl Network {
         let prompt = || {
             Prompt::from_hints(hints).ok_or_else(|| {
                 MaskingError::Refused(format!(
-                    "{} has to be told which object is meant: give --rect, or --seeds with some of the object painted white",
+                    "{} needs a hint which object is meant: give --rect, or --seeds with some of the object painted white",
                     first.display()
                 ))
             })
