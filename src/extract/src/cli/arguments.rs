@@ -84,7 +84,7 @@ pub(crate) enum Verb {
     },
     /// Remove sessions from a data set, with their files.
     #[command(
-        after_help = "Example:\n  relit-extract remove dataset 20261120T093015Z-mug\n\nIn a data set that tasks wrote, it is there again after the next merge, unless its recording is gone."
+        after_help = "Example:\n  relit-extract remove dataset 20261120T093015Z-mug\n\nIf tasks wrote the data set, remove the recording too, and run the tasks again before the next merge."
     )]
     Remove {
         /// The data set's folder.
