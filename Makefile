@@ -117,7 +117,7 @@ test-image: image ## Run the container image without a daemon, as a cluster does
 	@tests/packages/image
 
 wheel: $(PYTHON_VENV)/ready ## Make the Python package, one wheel for Python 3.9 and newer
-	$(PYTHON_VENV)/bin/maturin build --profile small --locked -m relight/python/Cargo.toml -i $(PYTHON_VENV)/bin/python \
+	$(PYTHON_VENV)/bin/maturin build --profile small --compression-level 9 --locked -m relight/python/Cargo.toml -i $(PYTHON_VENV)/bin/python \
 	    --out target/packages
 
 test-python: wheel $(DEMO)/mask.png ## Install the Python package and test it against the programs, with its notebooks; tests of torch run where it is installed
