@@ -300,7 +300,7 @@ def read_image(path, *, transfer=None):
 
 
 def to_srgb(image, dtype=numpy.uint8):
-    """Convert linear light of any shape to sRGB of `dtype` uint8 or uint16, clipped to 0 to 1."""
+    """Convert `image`, linear light of any shape, to sRGB of `dtype` uint8 or uint16, clipped to 0 to 1."""
     image = numpy.ascontiguousarray(image, dtype=numpy.float32)
     if numpy.dtype(dtype) == numpy.uint8:
         return _relit.to_srgb8(image)

@@ -80,7 +80,7 @@ def render(
     light_angle: degrees by which the light is rotated about the vertical, from the viewer to the right; or several, for
         frames x rows x columns x 3.
     exposure: stops; 0 shows a white surface in even light of radiance 1 as white; "auto", one that faces the strongest
-        light.
+        light, and a single picture of an object that is lit from behind brighter.
     order: of the spherical harmonics of a panorama, 0 to 64.
     diffuse_form: "irradiance", or "released" as in the paper's released code.
     specular_form: "lobe", close to the ground truth, or "power", the paper's formula.

@@ -10,6 +10,7 @@ use relight_core::light::{Direction, Normals, Order, Rotation, YUp};
 use relight_core::render::{
     DiffuseForm, EXPOSURE, Gloss, RenderSettings, SpecularForm, Surface, exposure_for,
 };
+use relight_photo::relighting::exposure_for_object;
 
 use crate::arrays::{Array, to_planes};
 use crate::failure::{Failure, choice, unlocked};
@@ -19,7 +20,8 @@ use crate::light::LightInput;
 type GlossInput<'py> = (PyReadonlyArray3<'py, f32>, PyReadonlyArray2<'py, f32>);
 
 /// An object that is given by its maps under a light: a picture for each angle by which it has turned, degrees. Without an
-/// exposure, in stops, a white diffuse surface that faces the strongest light is white.
+/// exposure, in stops, a white diffuse surface that faces the strongest light is white; a single picture of an object that is
+/// lit from behind is brighter.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn render<'py>(
@@ -72,8 +74,12 @@ pub(crate) fn render<'py>(
         let lights: Vec<_> = turned.collect();
         let exposure = match exposure {
             Some(stops) => stops.exp2() * EXPOSURE,
-            // It does not change as light turns: one for all pictures.
-            None => lights.first().map_or(1.0, exposure_for),
+            None => match lights.as_slice() {
+                [] => 1.0,
+                [still] => exposure_for_object(still),
+                // It does not change as light turns: one for all pictures.
+                [first, ..] => exposure_for(first),
+            },
         };
         let settings = RenderSettings {
             diffuse,
