@@ -62,6 +62,7 @@ pub(super) fn extract_recordings(
         })?;
     let mut run = Run {
         catalog: DatasetIndex::open(&folder, found, options)?,
+        earlier: DatasetIndex::earlier(out, options)?,
         folder,
         options,
         pool,
@@ -153,6 +154,8 @@ fn is_same(path: &Path, other: &Path) -> bool {
 struct Run<'a> {
     folder: OutputFolder,
     catalog: DatasetIndex,
+    /// What a task may take over.
+    earlier: Option<Dataset>,
     options: &'a ExtractOptions,
     pool: ThreadPool,
     /// Names of the recordings so far, by what they are where case is ignored.
@@ -204,8 +207,8 @@ impl Run<'_> {
             });
         }
         self.names.insert(folded(&id), id);
-        if options.resume && options.task.is_some() {
-            self.catalog.adopt(folder.path(), job.id())?;
+        if let Some(earlier) = &self.earlier {
+            self.catalog.adopt(earlier, job.id());
         }
         let dataset = self.catalog.dataset();
         if let Some(other) = job.alike(dataset) {

@@ -58,30 +58,33 @@ impl DatasetIndex {
         }
     }
 
-    /// Takes a session into a task's part that the folder's `dataset.json` has and the part does not: of a run without
-    /// tasks, or with another number of them.
-    pub(super) fn adopt(&mut self, out: &Path, id: &str) -> Result<(), ExtractError> {
-        let Self::Partial(partial) = self else {
-            return Ok(());
-        };
-        if partial.dataset.session(id).is_some() {
-            return Ok(());
+    /// What a resumed task may take over: the folder's `dataset.json`, of a run without tasks or with another number of
+    /// them, if it has the same settings.
+    pub(super) fn earlier(
+        out: &Path,
+        options: &ExtractOptions,
+    ) -> Result<Option<Dataset>, ExtractError> {
+        if options.task.is_none() || !options.resume {
+            return Ok(None);
         }
         match Dataset::read(out) {
-            Ok(whole)
-                if whole
-                    .settings
-                    .differences(&partial.dataset.settings)
-                    .is_empty() =>
-            {
-                if let Some(entry) = whole.session(id) {
-                    let shards = whole.shards_of(id).cloned().collect();
-                    partial.dataset.replace(entry.clone(), shards);
-                }
-                Ok(())
+            Ok(whole) => {
+                let differences = whole.settings.differences(&options.settings());
+                Ok(differences.is_empty().then_some(whole))
             }
-            Ok(_) | Err(ShardError::NoDataset(_)) => Ok(()),
+            Err(ShardError::NoDataset(_)) => Ok(None),
             Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Takes a session of an earlier data set into a task's part that lacks it.
+    pub(super) fn adopt(&mut self, earlier: &Dataset, id: &str) {
+        if let Self::Partial(partial) = self
+            && partial.dataset.session(id).is_none()
+            && let Some(entry) = earlier.session(id)
+        {
+            let shards = earlier.shards_of(id).cloned().collect();
+            partial.dataset.replace(entry.clone(), shards);
         }
     }
 

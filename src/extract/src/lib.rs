@@ -83,10 +83,7 @@ pub fn extract(
     observer: &dyn Observer,
 ) -> Result<ExtractSummary, ExtractError> {
     if let Some(mask) = options.mask.as_deref().filter(|mask| !mask.exists()) {
-        return Err(ExtractError::Refused(format!(
-            "the mask {} does not exist: make one with relit-mask, or correct --mask",
-            mask.display()
-        )));
+        return Err(object::missing_mask(mask));
     }
     if inputs.iter().any(|input| objects::is_url(input)) || objects::is_url(out) {
         return objects::extract(inputs, out, options, observer);

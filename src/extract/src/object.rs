@@ -32,6 +32,14 @@ pub(super) struct ObjectMask {
     note: Option<String>,
 }
 
+/// That the mask that was named is not there.
+pub(super) fn missing_mask(named: &Path) -> ExtractError {
+    ExtractError::Refused(format!(
+        "the mask {} does not exist: make one with relit-mask, or correct --mask",
+        named.display()
+    ))
+}
+
 impl ObjectMask {
     /// Reads the mask `named`, or that of the recording in a folder `named`, or else the one in the recording's folder,
     /// for frames of this size.
@@ -48,12 +56,7 @@ impl ObjectMask {
             (Some(masks), _) if masks.is_dir() => {
                 mask_in(masks, recording).ok_or_else(|| no_mask_in(masks, recording))?
             }
-            (Some(named), _) => {
-                let named = named.display();
-                return refused(format!(
-                    "the mask {named} does not exist: make one with relit-mask, or correct --mask"
-                ));
-            }
+            (Some(named), _) => return Err(missing_mask(named)),
             (None, Some(folder)) if folder.join(MASK_FILE).is_file() => folder.join(MASK_FILE),
             (None, folder) => {
                 let recording = folder.as_ref().unwrap_or(&recording.video).display();

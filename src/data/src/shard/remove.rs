@@ -14,8 +14,9 @@ use super::output::OutputFolder;
 /// [`ShardError::Refused`] if one of these names is not that of a session: then nothing is removed;
 /// [`ShardError::Locked`] while the data set is being written; [`ShardError::Io`]; those of [`Dataset::read`].
 pub fn remove_sessions(out: &Path, ids: &[String]) -> Result<Vec<SessionEntry>, ShardError> {
-    let mut dataset = Dataset::read(out)?;
+    // Locked first: what another program writes until then is not lost.
     let _lock = OutputFolder::lock_existing(out)?;
+    let mut dataset = Dataset::read(out)?;
     let mut removed = Vec::new();
     let mut files = Vec::new();
     for id in ids {

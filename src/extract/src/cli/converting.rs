@@ -28,6 +28,7 @@ pub(crate) fn run(
     let samples = dataset.shards.iter().map(|shard| u64::from(shard.samples));
     let samples: u64 = samples.sum();
     let flawed = flawed(&dataset);
+    let outcome = outcome_of(&flawed);
     console.print(
         &format!(
             "{}: {} with {} in the layout {layout}{}",
@@ -44,5 +45,5 @@ pub(crate) fn run(
             flawed,
         },
     );
-    Ok(outcome_of(&dataset))
+    Ok(outcome)
 }

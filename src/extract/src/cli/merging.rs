@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use relit_console::{Console, Event, Outcome};
 use relit_data::counts::count_of;
-use relit_data::shard::{Dataset, SessionEntry, has_only_partial_manifests, merge_datasets};
+use relit_data::shard::{Dataset, has_only_partial_manifests, merge_datasets};
 use relit_extract::ExtractError;
 use relit_extract::objects::merge;
 
@@ -88,6 +88,7 @@ fn report(console: Console, out: &Path, dataset: &Dataset, from: &MergedFrom) ->
         datasets => count_of(datasets, "data set"),
     };
     let flawed = flawed(dataset);
+    let outcome = outcome_of(&flawed);
     console.print(
         &format!(
             "{}: {} with {}, merged from {merged_from}{}",
@@ -105,7 +106,7 @@ fn report(console: Console, out: &Path, dataset: &Dataset, from: &MergedFrom) ->
             flawed,
         },
     );
-    outcome_of(dataset)
+    outcome
 }
 
 /// The sessions of a data set at which a person should look.
@@ -126,11 +127,11 @@ pub(super) fn describe_flawed(flawed: &[String]) -> String {
     )
 }
 
-/// Whether a person should look at some session of a data set.
-pub(super) fn outcome_of(dataset: &Dataset) -> Outcome {
-    if dataset.sessions.iter().any(SessionEntry::is_flawed) {
-        Outcome::Partial
-    } else {
+/// Whether a person should look at any.
+pub(super) fn outcome_of(flawed: &[String]) -> Outcome {
+    if flawed.is_empty() {
         Outcome::Success
+    } else {
+        Outcome::Partial
     }
 }

@@ -101,16 +101,17 @@ fn make(
         totals.ended(made.is_ok(), Instant::now());
         match made {
             Ok(output) => bar.suspend(|| print(path, &output, console)),
-            Err(error) if paths.len() > 1 && error.handmade().is_some() => {
-                kept += 1;
-                let mask = error.handmade().unwrap_or(path);
-                bar.suspend(|| print_kept(path, mask, console));
-            }
-            Err(error) => {
-                failed += 1;
-                let session = recording_name(path);
-                bar.suspend(|| console.error_for(path, Some(&session), &error));
-            }
+            Err(error) => match error.handmade().filter(|_| paths.len() > 1) {
+                Some(mask) => {
+                    kept += 1;
+                    bar.suspend(|| print_kept(path, mask, console));
+                }
+                None => {
+                    failed += 1;
+                    let session = recording_name(path);
+                    bar.suspend(|| console.error_for(path, Some(&session), &error));
+                }
+            },
         }
         bar.inc(1);
         bar.suspend(|| totals.say(console));
