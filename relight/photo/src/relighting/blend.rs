@@ -5,12 +5,26 @@ use relight_core::image::{Extent, Linear, Planes, Rgb};
 use super::RelightableObject;
 
 impl RelightableObject {
-    /// The photograph with these colours of the object in place of its own: its soft edge keeps the background that it has.
+    /// The photograph with these colours of the object in place of its own: its soft edge keeps the background that it has, and
+    /// what stands out beyond that, as fur does, changes with it.
     ///
     /// # Panics
     /// Where the photograph or the colours have another size.
     pub fn in_place(&self, photo: &Rgb<Linear>, colours: &Planes<3>) -> Rgb<Linear> {
-        self.blended(photo.clone(), recoloured, colours)
+        let mut picture = self.blended(photo.clone(), recoloured, colours);
+        if let Some(fringe) = &self.fringe {
+            let gains = fringe.gains(&self.matte.alpha, &self.matte.foreground, colours);
+            let [left, top] = self.place;
+            let width = self.photo.width;
+            let planes = picture.planes_mut().planes_mut();
+            for (plane, gains) in planes.into_iter().zip(gains.planes()) {
+                for (y, gains) in gains.chunks(self.extent().width).enumerate() {
+                    let line = &mut plane[(top + y) * width + left..];
+                    line.iter_mut().zip(gains).for_each(|(value, gain)| *value *= gain);
+                }
+            }
+        }
+        picture
     }
 
     /// A background of the photograph's size with the object before it, at its place and in these colours.

@@ -3,6 +3,7 @@
 use relight_core::image::{Extent, Linear, Planes, Rgb, check_extent};
 
 use super::InsertError;
+use super::fringe::Fringe;
 use super::matte::Matte;
 use crate::decompose::{CropSquare, DecomposeError};
 
@@ -15,6 +16,8 @@ pub(crate) struct Cut {
     /// 1 on the object, else 0.
     pub(crate) mask: Planes<1>,
     pub(crate) matte: Matte,
+    /// `None` where alpha says what belongs to the object.
+    pub(crate) fringe: Option<Fringe>,
 }
 
 impl Cut {
@@ -29,21 +32,28 @@ impl Cut {
         check_light(photo)?;
         let region = CropSquare::around(mask).ok_or(DecomposeError::EmptyMask)?;
         let edge = Matte::edge_for(region.extent());
-        let margin = 4 * edge + 4;
+        let margin = 8 * edge;
         let (place, extent) = window(&region, margin, expected);
         let picture = photo.planes().cut(place, extent);
         let mask = mask
             .cut(place, extent)
             .map(|m| f32::from(u8::from(m >= 0.5)));
-        let matte = match alpha {
-            Some(alpha) => Matte::from_alpha(&picture, &alpha.cut(place, extent)),
-            None => Matte::estimate(&picture, &mask, edge),
+        let (matte, fringe) = match alpha {
+            Some(alpha) => (
+                Matte::from_alpha(&picture, &alpha.cut(place, extent)),
+                None,
+            ),
+            None => (
+                Matte::estimate(&picture, &mask, edge),
+                Some(Fringe::estimate(&picture, &mask, edge)),
+            ),
         };
         Ok(Self {
             place,
             photo: expected,
             mask,
             matte,
+            fringe,
         })
     }
 }

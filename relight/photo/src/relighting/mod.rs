@@ -4,6 +4,7 @@
 //! | file | concern |
 //! | --- | --- |
 //! | `matte` | what an object covers of each pixel, and its colours without those behind it |
+//! | `fringe` | what stands out beyond its soft edge, as fur does |
 //! | `cut` | the part of a photograph around an object |
 //! | `relightable_object` | an object decomposed and relit |
 //! | `shading`, `material` | what of its shading stays in another light; what its material becomes |
@@ -21,6 +22,7 @@ mod blend;
 mod cut;
 mod error;
 mod exposure;
+mod fringe;
 mod height_field;
 mod lamp;
 mod material;

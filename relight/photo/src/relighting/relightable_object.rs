@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::InsertError;
 use super::cut::Cut;
+use super::fringe::Fringe;
 use super::material::{MaterialChange, ObjectGloss};
 use super::matte::Matte;
 use super::placed_object::{PlacedObject, PlacedObjectCache};
@@ -49,6 +50,8 @@ pub struct RelightableObject {
     pub(crate) photo: Extent,
     /// What the object covers of each pixel, and its colours.
     pub(crate) matte: Matte,
+    /// Of a photograph without alpha.
+    pub(crate) fringe: Option<Fringe>,
     /// Also under the soft edge.
     pub(crate) normals: Normals<YUp>,
     /// In units in which the mean shading is 1.
@@ -131,6 +134,7 @@ impl RelightableObject {
             place: [0, 0],
             photo: extent,
             matte: Matte::from_cut_out(&albedo, asset.alpha()),
+            fringe: None,
             normals: surface.normals().completed(&wanted),
             albedo,
             shading,
@@ -193,6 +197,7 @@ impl RelightableObject {
             photo: cut.photo,
             shading: Shading::new(&shading, own.planes(), &wanted).doubted(paint.as_ref(), &wanted),
             matte: cut.matte,
+            fringe: cut.fringe,
             normals,
             albedo,
             highlight,
