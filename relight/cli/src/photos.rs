@@ -78,8 +78,14 @@ pub(crate) fn outcome(found: &PhotoList, lost: usize, what: &str) -> CommandResu
 
 /// Says that a photograph is lost, and why.
 pub(crate) fn name_lost(input: &PhotoInput, message: &str, console: Console) {
-    let text = format!("{}: {message}", input.place());
-    let event = json!({ "event": "failed", "photo": input.place(), "message": message });
+    let place = input.place();
+    // Most faults name the file themselves.
+    let text = if message.starts_with(&place) {
+        message.to_owned()
+    } else {
+        format!("{place}: {message}")
+    };
+    let event = json!({ "event": "failed", "photo": place, "message": message });
     console.warn_with(&text, &event);
 }
 
